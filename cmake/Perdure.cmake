@@ -1,0 +1,54 @@
+# How every folder declares its library, program and tests: one call each.
+include_guard()
+
+add_library(perdure_options INTERFACE)
+target_compile_features(perdure_options INTERFACE cxx_std_20)
+target_include_directories(perdure_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(perdure_options INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+    -Wimplicit-fallthrough -Wnull-dereference -Wno-psabi>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PERDURE_WARNINGS_AS_ERRORS}>>:-Werror>
+  # Release of GCC 12 warns falsely inside Eigen's and the standard library's inlined code.
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-Wno-maybe-uninitialized -Wno-array-bounds
+    -Wno-stringop-overflow -Wno-stringop-overread -Wno-null-dereference -Wno-restrict>)
+
+# perdure_library(NAME SOURCES … DEPENDS …): a static library; NAME is the folder with underscores.
+function(perdure_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_link_libraries(${name} PUBLIC perdure_options ${ARG_DEPENDS})
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE perdure_options ${ARG_DEPENDS})
+  endif()
+endfunction()
+
+# perdure_program(NAME SOURCES … DEPENDS …): an executable in bin/.
+function(perdure_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+endfunction()
+
+# perdure_test(NAME SOURCES … DEPENDS … [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest program,
+# one ctest entry. Labels: unit (default), process, scenario, golden, data, long.
+function(perdure_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
+  if(NOT PERDURE_BUILD_TESTS)
+    return()
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
+  add_test(NAME ${name} COMMAND ${name} ${ARG_ARGS} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT}
+    ENVIRONMENT "PERDURE_BIN=${PROJECT_BINARY_DIR}/bin;PERDURE_SOURCE=${PROJECT_SOURCE_DIR};${ARG_ENVIRONMENT}")
+endfunction()

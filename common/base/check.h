@@ -1,0 +1,18 @@
+// Programmer's mistakes: a condition that must hold, checked in every build type.
+#pragma once
+
+#include <source_location>
+#include <string_view>
+
+namespace perdure {
+
+/// Prints "file:line: function: must hold: <what>" to stderr and aborts.
+[[noreturn]] void failCheck(std::string_view what, const std::source_location& where);
+
+/// Aborts with the place and `what must hold` unless `condition`. Never use it on outside input.
+inline void check(bool condition, std::string_view what,
+                  const std::source_location& where = std::source_location::current()) {
+  if (!condition) [[unlikely]] failCheck(what, where);
+}
+
+}  // namespace perdure

@@ -1,0 +1,29 @@
+// Reasons for which a program cannot start, with the exit status of sysexits.h.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace perdure {
+
+enum class ExitCode : int {
+  kOk = 0,
+  kFailure = 1,
+  kUsage = 64,          ///< wrong command line
+  kUnavailable = 69,    ///< a device, file or folder is missing or unreadable
+  kConfiguration = 78,  ///< the configuration is wrong
+};
+
+/// Thrown only before a service runs, and caught once in runService (or a tool's main).
+/// The message is one or more sentences that say the mend.
+class StartupError : public std::runtime_error {
+ public:
+  StartupError(ExitCode code, const std::string& message)
+      : std::runtime_error(message), code_(code) {}
+  ExitCode code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+}  // namespace perdure

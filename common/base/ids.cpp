@@ -1,0 +1,31 @@
+#include "common/base/ids.h"
+
+#include <array>
+#include <random>
+
+namespace perdure {
+
+InstanceId makeInstanceId() {
+  std::random_device device;
+  InstanceId id = 0;
+  while (id == 0) id = (static_cast<std::uint64_t>(device()) << 32) | device();
+  return id;
+}
+
+std::uint64_t digest(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const char c : bytes) {
+    hash ^= static_cast<unsigned char>(c);
+    hash *= 0x100000001b3ULL;
+  }
+  return hash;
+}
+
+std::string toHex(std::uint64_t value) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::array<char, 16> text{};
+  for (int i = 15; i >= 0; --i, value >>= 4) text[static_cast<std::size_t>(i)] = kDigits[value & 15];
+  return {text.data(), text.size()};
+}
+
+}  // namespace perdure

@@ -1,0 +1,41 @@
+// What is expected to go wrong at run time (late, malformed, gated out) is a value with a reason.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+
+namespace perdure {
+
+/// Why something was not done. `code` is a short stable snake_case word that Health counts;
+/// `detail` says what a person needs to mend it.
+struct Reason {
+  std::string code;
+  std::string detail;
+};
+
+template <class T>
+using Result = tl::expected<T, Reason>;
+
+inline tl::unexpected<Reason> fail(std::string_view code, std::string_view detail = {}) {
+  return tl::unexpected<Reason>(Reason{std::string(code), std::string(detail)});
+}
+
+/// Counts of reasons since the start, published in Health. Ordered, so that output is repeatable.
+class ReasonCounts {
+ public:
+  void add(const Reason& reason, std::uint64_t count = 1) { add(reason.code, count); }
+  void add(std::string_view code, std::uint64_t count = 1) { counts_[std::string(code)] += count; }
+  std::uint64_t of(const std::string& code) const {
+    const auto it = counts_.find(code);
+    return it == counts_.end() ? 0 : it->second;
+  }
+  const std::map<std::string, std::uint64_t>& all() const { return counts_; }
+
+ private:
+  std::map<std::string, std::uint64_t> counts_;
+};
+
+}  // namespace perdure

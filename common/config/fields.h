@@ -1,0 +1,86 @@
+// One description of a configuration's fields, from which reading, validation, printing and the
+// README's tables all come. A service writes `void describe(Config&, config::Fields&)`.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace perdure::config {
+
+/// How a field is described to people. `mend` ends the error message: "…; <mend>".
+struct Doc {
+  std::string text;       ///< one line
+  std::string unit = {};  ///< "rad/s/√Hz", "px", "" for none
+  std::string mend = {};
+};
+
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_open = false;  ///< the lower bound itself is not allowed
+};
+inline Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
+inline Range atLeast(double low) { return {low, std::numeric_limits<double>::infinity(), false}; }
+inline Range between(double low, double high) { return {low, high, false}; }
+
+/// A field bound to a variable, which holds the default until a file or --set changes it.
+struct Field {
+  std::string key;  ///< dotted: "tracker.max_points"
+  std::variant<double*, std::int64_t*, bool*, std::string*, std::vector<double>*,
+               std::vector<std::string>*>
+      target;
+  Range range;                       ///< numbers, and each element of number lists
+  std::vector<std::string> choices;  ///< strings: allowed values; empty = any
+  std::size_t length = 0;            ///< lists: required length; 0 = any
+  bool required = false;             ///< must be given in the file or by --set
+  Doc doc;
+};
+
+class Fields {
+ public:
+  void number(std::string key, double& target, Range range, Doc doc);
+  void integer(std::string key, std::int64_t& target, Range range, Doc doc);
+  void boolean(std::string key, bool& target, Doc doc);
+  void text(std::string key, std::string& target, Doc doc);
+  void choice(std::string key, std::string& target, std::vector<std::string> choices, Doc doc);
+  void numbers(std::string key, std::vector<double>& target, Range range, Doc doc,
+               std::size_t length = 0);
+  void texts(std::string key, std::vector<std::string>& target, Doc doc);
+  /// The field described last must be given.
+  void require();
+
+  const std::vector<Field>& all() const { return fields_; }
+  std::vector<Field>& all() { return fields_; }
+
+ private:
+  Field& add(std::string key, Doc doc);
+  std::vector<Field> fields_;
+};
+
+/// One thing wrong. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; mend".
+struct Problem {
+  std::string file;
+  int line = 0, column = 0;  ///< from 1; 0 where there is none (--set, missing key)
+  std::string message;
+  std::string str() const;
+};
+
+/// Reads YAML text into the fields' targets and returns *all* problems at once: bad syntax,
+/// unknown keys (with the nearest known one), wrong types, values out of range, missing keys,
+/// doubled keys. Targets of faulty fields keep their defaults.
+std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
+/// "key=value" as from --set; the value is YAML.
+std::vector<Problem> assign(Fields& fields, const std::string& assignment);
+/// Problems of fields that are required and were given neither by file nor by --set.
+/// (readYaml and assign remember what was given.)
+std::vector<Problem> missing(const Fields& fields, const std::string& file);
+
+/// The current values as commented YAML that reads back to the same values.
+std::string toYaml(const Fields& fields);
+/// A Markdown table: key, default, unit, range, meaning.
+std::string toMarkdown(const Fields& fields);
+
+}  // namespace perdure::config

@@ -1,0 +1,53 @@
+// What inference says: evidence for classes in boxes (eq. 6, 7), not decisions.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+
+namespace perdure {
+
+/// Corners in pixels of the distorted image; x right, y down; x1 < x2, y1 < y2. They may lie
+/// outside the image by the detector's own extrapolation.
+struct Box {
+  double x1 = 0, y1 = 0, x2 = 0, y2 = 0;
+  double width() const { return x2 - x1; }
+  double height() const { return y2 - y1; }
+  double area() const { return width() * height(); }
+};
+
+double intersectionOverUnion(const Box& a, const Box& b);
+
+struct Detection {
+  Box box;
+  /// K + 1 log-likelihoods before soft-max, [0] = clutter, [k] = class k of the model. Only
+  /// differences matter: activations[k] - activations[0] is the log-likelihood ratio of
+  /// "an instance of class k is here" against clutter, after the model's calibration.
+  std::vector<float> activations;
+  std::optional<double> azimuth;  ///< alpha (KITTI), radians; yaw minus bearing of the centre
+  double azimuth_sigma = 0.35;    ///< radians, > 0 where azimuth is given
+  bool primed = false;            ///< found only because a prediction asked for it
+};
+
+struct Detections {
+  FrameStamp stamp;
+  std::string camera;
+  InstanceId instance = 0;       ///< of the inference process
+  std::uint64_t model_hash = 0;  ///< refers to ModelInfo
+  std::vector<Detection> detections;
+};
+
+/// What the activations mean. Latched on the topic `model`, keyed by hash.
+struct ModelInfo {
+  InstanceId instance = 0;
+  std::uint64_t hash = 0;  ///< of weights and model.json
+  std::string name;
+  std::vector<std::string> classes;  ///< lower-case; K names, activations[k + 1] belongs to classes[k]
+  std::uint32_t input_width = 0, input_height = 0;
+  double box_sigma = 0.0;  ///< standard deviation of a box's side relative to its size; 0 = unknown
+};
+
+}  // namespace perdure

@@ -1,0 +1,79 @@
+// The durable map on the wire: tiles, queries and replies.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/types/objects.h"
+
+namespace perdure {
+
+/// One object as the map shows it.
+struct MapObject {
+  ObjectId id = 0;
+  WorldId world;
+  std::string class_name;
+  double existence = 0.0, class_probability = 0.0;
+  Vector7d mean = Vector7d::Zero();
+  Matrix7d covariance = Matrix7d::Identity();
+  TimePoint first_seen, last_seen;
+  std::uint32_t hits = 0;
+  Visibility visibility = Visibility::kOutOfView;
+  Memory memory = Memory::kWorking;
+};
+
+inline constexpr std::size_t kMapTileCapacity = 128;
+
+/// Objects of one square of the map; `part` counts tiles of the same square.
+struct MapTile {
+  InstanceId instance = 0;
+  std::int32_t x = 0, y = 0, part = 0;  ///< key; squares of header.tile_size_m
+  std::uint64_t revision = 0;
+  std::vector<MapObject> objects;  ///< at most kMapTileCapacity
+};
+
+struct MapHeader {
+  InstanceId instance = 0;
+  std::uint64_t revision = 0;
+  double tile_size_m = 0.0;
+  std::uint32_t tiles = 0, objects = 0;
+};
+
+enum class MapQueryKind : std::uint8_t { kById = 0, kByClass, kByRadius, kByBox, kAll, kRestore };
+
+struct MapQuery {
+  InstanceId client = 0;
+  std::uint64_t request = 0;  ///< client and request are the correlation id
+  MapQueryKind kind = MapQueryKind::kAll;
+  ObjectId object_id = 0;
+  std::string class_name;
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();   ///< box corner, or centre of the sphere
+  Eigen::Vector3d high = Eigen::Vector3d::Zero();  ///< box corner
+  double radius = 0.0;
+  WorldId world;           ///< kRestore: the frame of reference to restore
+  std::uint32_t limit = 1000;
+};
+
+struct MapReply {
+  InstanceId client = 0;
+  std::uint64_t request = 0;
+  InstanceId instance = 0;
+  bool ok = true;
+  std::string error;        ///< a sentence with the mend where !ok
+  bool truncated = false;   ///< more objects matched than `limit`
+  std::vector<MapObject> objects;
+};
+
+/// Full beliefs that come back from the map into the filter's working set.
+struct Recalled {
+  InstanceId instance = 0;
+  WorldId world;          ///< frame of the beliefs
+  bool restore = false;   ///< the working set of a filter that went away, in answer to kRestore
+  InstanceId client = 0;  ///< for whom, where restore
+  ObjectId next_id = 1;
+  std::vector<ObjectBelief> objects;
+};
+
+}  // namespace perdure

@@ -1,0 +1,102 @@
+// What semantic_filter believes (eq. 4, 8, 9): existence × PMF over classes × bank of Gaussians.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/math/rigid_transform.h"
+#include "common/types/detections.h"
+
+namespace perdure {
+
+using Vector7d = Eigen::Matrix<double, 7, 1>;
+using Matrix7d = Eigen::Matrix<double, 7, 7>;
+
+/// "other": a real, persistent thing of no known class (k = 0).
+inline constexpr char kOtherClass[] = "other";
+
+/// One EKF of the bank: p(x | class), x = [p_WO (centre), yaw, log length, log width, log height].
+struct ClassBelief {
+  std::string name;          ///< lower-case, or kOtherClass
+  double probability = 0.0;  ///< π_k; they sum to 1 over an object's classes
+  Vector7d mean = Vector7d::Zero();
+  Matrix7d covariance = Matrix7d::Identity();
+  Eigen::Matrix<double, 7, 6> cross_pose = Eigen::Matrix<double, 7, 6>::Zero();  ///< P_xg
+};
+
+enum class Visibility : std::uint8_t {
+  kVisible = 0,
+  kPartial = 1,
+  kOccluded = 2,
+  kOutOfView = 3,  ///< in front, outside the image
+  kBehind = 4,
+};
+
+enum class Memory : std::uint8_t { kWorking = 0, kLongTerm = 1 };
+
+struct ObjectBelief {
+  ObjectId id = 0;
+  double existence = 0.0;  ///< r in [0, 1]
+  bool confirmed = false;
+  std::vector<ClassBelief> classes;  ///< not empty; the most probable first
+  Visibility visibility = Visibility::kVisible;
+  double visible_fraction = 0.0;  ///< v in [0, 1]
+  ObjectId blocked_by = 0;        ///< 0: nothing, or not an object
+  TimePoint first_seen, last_seen, as_of;  ///< as_of: up to when process noise was applied
+  std::uint32_t hits = 0, visible_misses = 0;
+  double moving = 0.0;  ///< probability that it moves
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s in W, zero while static
+  Memory memory = Memory::kWorking;
+  bool recalled = false;  ///< came back from the map and not yet seen again
+
+  const ClassBelief& best() const { return classes.front(); }
+};
+
+/// The working set at one frame: enough to restore it.
+struct Objects {
+  FrameStamp stamp;
+  InstanceId instance = 0;
+  WorldId world;
+  RigidTransform T_WB;  ///< the pose that visibility was computed with
+  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
+  ObjectId next_id = 1;  ///< ids below it were given out
+  std::vector<ObjectBelief> objects;
+};
+
+enum class EventKind : std::uint8_t {
+  kBorn = 0, kConfirmed, kClassResolved, kOccluded, kLeftView, kReappeared, kMerged, kArchived,
+  kRecalled, kMissing, kGone, kMoved, kPredictedReturn, kModelChanged, kRestored,
+};
+const char* nameOf(EventKind kind);    ///< "born", "class_resolved", …
+const char* nameOf(Visibility value);  ///< "visible", "out_of_view", …
+
+struct Event {
+  FrameStamp stamp;
+  InstanceId instance = 0;
+  WorldId world;
+  EventKind kind = EventKind::kBorn;
+  ObjectId object_id = 0;
+  ObjectId other_id = 0;   ///< the blocker, or the id that was merged away
+  std::string class_name;  ///< of the object at that time
+  double probability = 0.0;  ///< what the event is about: r, or π of the class
+  std::string detail;
+};
+
+/// Where objects should be seen at a coming frame, to prime inference (top-down).
+struct Prediction {
+  ObjectId object_id = 0;
+  std::string class_name;
+  Box box;
+  double probability = 0.0;  ///< r·π·v
+};
+struct Predictions {
+  FrameStamp stamp;
+  InstanceId instance = 0;
+  std::string camera;
+  std::vector<Prediction> predictions;
+};
+
+}  // namespace perdure

@@ -1,0 +1,96 @@
+// What capture hands over: images, inertial samples, speed, calibration. SI units, sensor clock.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/time.h"
+#include "common/math/rigid_transform.h"
+
+namespace perdure {
+
+enum class ImageEncoding : std::uint8_t { kMono8 = 0, kBgr8 = 1 };
+
+/// Bytes per pixel of an encoding.
+constexpr std::uint32_t channelsOf(ImageEncoding e) { return e == ImageEncoding::kBgr8 ? 3 : 1; }
+
+/// One image of one camera. Rows are packed: data has width·height·channels bytes.
+struct Frame {
+  FrameStamp stamp;
+  std::string camera;  ///< "cam0", "cam1"
+  std::uint32_t width = 0, height = 0;
+  ImageEncoding encoding = ImageEncoding::kMono8;
+  std::shared_ptr<const std::vector<std::uint8_t>> data;  ///< shared, never changed
+};
+
+struct ImuSample {
+  InstanceId source = 0;
+  std::uint64_t sequence = 0;
+  TimePoint time;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< w_WB_B plus bias, rad/s
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force in B plus bias, m/s²
+};
+
+/// Speed of the body's origin along its x axis (a vehicle's wheels, an odometer).
+struct SpeedSample {
+  InstanceId source = 0;
+  std::uint64_t sequence = 0;
+  TimePoint time;
+  double speed = 0.0;  ///< m/s, forwards positive
+  double sigma = 0.1;  ///< m/s, > 0
+};
+
+enum class DistortionModel : std::uint8_t {
+  kNone = 0,
+  kRadialTangential = 1,  ///< k1 k2 p1 p2 (OpenCV, EuRoC "radial-tangential")
+  kEquidistant = 2,       ///< k1 k2 k3 k4 (Kannala-Brandt, OpenCV fisheye)
+};
+
+struct CameraCalibration {
+  std::string name;  ///< "cam0"
+  std::uint32_t width = 0, height = 0;
+  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
+  DistortionModel distortion = DistortionModel::kNone;
+  std::vector<double> distortion_coefficients;  ///< 0 or 4
+  RigidTransform T_BC;                          ///< camera in body
+  double time_offset_s = 0.0;  ///< t_imu = t_image + time_offset_s
+  double readout_s = 0.0;      ///< rolling shutter, first to last row; 0 = global
+  double rate_hz = 0.0;        ///< nominal
+};
+
+struct ImuCalibration {
+  double gyro_noise = 0.0;         ///< rad/s/√Hz
+  double gyro_bias_walk = 0.0;     ///< rad/s²/√Hz
+  double accel_noise = 0.0;        ///< m/s²/√Hz
+  double accel_bias_walk = 0.0;    ///< m/s³/√Hz
+  double rate_hz = 0.0;            ///< nominal
+};
+
+/// Where the body stood on Earth at a sensor time.
+struct GeoAnchor {
+  TimePoint time;
+  double latitude_deg = 0, longitude_deg = 0, height_m = 0;  ///< WGS 84
+  double yaw = 0;  ///< heading of the body's x axis, radians from east, counter-clockwise
+};
+
+struct Calibration {
+  InstanceId source = 0;
+  std::vector<CameraCalibration> cameras;  ///< the first one is the camera of detections
+  std::optional<ImuCalibration> imu;
+  bool has_speed = false;
+  std::optional<GeoAnchor> anchor;
+
+  const CameraCalibration* camera(const std::string& name) const {
+    for (const auto& c : cameras) {
+      if (c.name == name) return &c;
+    }
+    return nullptr;
+  }
+};
+
+}  // namespace perdure
