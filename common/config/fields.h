@@ -37,6 +37,7 @@ struct Field {
   std::size_t length = 0;            ///< lists: required length; 0 = any
   bool required = false;             ///< must be given in the file or by --set
   Doc doc;
+  bool given = false;  ///< set by readYaml and assign, also where the value was refused
 };
 
 class Fields {
@@ -72,11 +73,16 @@ struct Problem {
 /// unknown keys (with the nearest known one), wrong types, values out of range, missing keys,
 /// doubled keys. Targets of faulty fields keep their defaults.
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
+/// readYaml of a file's content; a file that cannot be read is a problem too.
+std::vector<Problem> readFile(Fields& fields, const std::string& path);
 /// "key=value" as from --set; the value is YAML.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);
 /// Problems of fields that are required and were given neither by file nor by --set.
 /// (readYaml and assign remember what was given.)
 std::vector<Problem> missing(const Fields& fields, const std::string& file);
+
+/// Throws StartupError (78) with one line for each problem; does nothing where there are none.
+void refuse(const std::vector<Problem>& problems);
 
 /// The current values as commented YAML that reads back to the same values.
 std::string toYaml(const Fields& fields);

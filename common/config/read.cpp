@@ -1,0 +1,334 @@
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include "common/config/fields.h"
+#include "common/config/text.h"
+
+namespace perdure::config {
+namespace {
+
+/// Edits (insert, delete, replace, swap of neighbours) between two words.
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) {
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      const std::size_t replace = d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, replace});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      }
+    }
+  }
+  return d[a.size()][b.size()];
+}
+
+std::string shortened(const std::string& text) {
+  constexpr std::size_t kLongest = 60;
+  return text.size() <= kLongest ? text : text.substr(0, kLongest) + "…";
+}
+
+std::optional<double> parseNumber(const YAML::Node& node) {
+  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // "!": it was quoted
+  const std::string& text = node.Scalar();
+  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  const char* end = text.data() + text.size();
+  double value = 0;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || stop != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::optional<std::int64_t> parseInteger(const YAML::Node& node) {
+  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;
+  const std::string& text = node.Scalar();
+  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  const char* end = text.data() + text.size();
+  std::int64_t value = 0;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return value;
+}
+
+bool inside(double value, const Range& range) {
+  return (range.low_open ? value > range.low : value >= range.low) && value <= range.high;
+}
+
+/// Walks one document and writes into the fields; collects what is wrong on the way.
+class Reader {
+ public:
+  Reader(Fields& fields, std::string file, bool located)
+      : fields_(fields), file_(std::move(file)), located_(located) {}
+
+  void readGroup(const YAML::Node& map, const std::string& prefix) {
+    for (const auto& entry : map) {
+      if (!entry.first.IsScalar()) {
+        problem(entry.first, "a key is not a word");
+        continue;
+      }
+      readEntry(entry.first, entry.second, prefix + entry.first.Scalar());
+    }
+  }
+
+  void problem(const YAML::Node& node, const std::string& message) {
+    problem(node.Mark(), message);
+  }
+
+  void problem(const YAML::Mark& mark, const std::string& message) {
+    const bool known = located_ && !mark.is_null();
+    problems_.push_back({file_, known ? mark.line + 1 : 0, known ? mark.column + 1 : 0, message});
+  }
+
+  std::vector<Problem> take() { return std::move(problems_); }
+
+ private:
+  void readEntry(const YAML::Node& key, const YAML::Node& value, const std::string& name) {
+    if (!seen_.insert(name).second) {
+      problem(key, name + ": is given twice; keep one of them");
+    } else if (Field* field = find(name)) {
+      field->given = true;
+      readField(*field, value);
+    } else if (!isGroup(name)) {
+      problem(key, name + ": is not a known key" + suggestion(name));
+    } else if (value.IsMap()) {
+      seen_.erase(name);  // a group may go on under a second heading; its keys may not
+      readGroup(value, name + ".");
+    } else if (!value.IsNull()) {
+      problem(value, name + ": is a group of keys, not a value; its first key is " +
+                         firstKeyOf(name + "."));
+    }
+  }
+
+  Field* find(const std::string& name) {
+    const auto it = std::find_if(fields_.all().begin(), fields_.all().end(),
+                                 [&](const Field& field) { return field.key == name; });
+    return it == fields_.all().end() ? nullptr : &*it;
+  }
+
+  bool isGroup(const std::string& name) const { return !firstKeyOf(name + ".").empty(); }
+
+  std::string firstKeyOf(const std::string& prefix) const {
+    for (const Field& field : fields_.all()) {
+      if (field.key.starts_with(prefix)) return field.key;
+    }
+    return {};
+  }
+
+  /// The nearest known key or group, where one is near enough to be meant.
+  std::string suggestion(const std::string& name) const {
+    std::set<std::string> known;
+    for (const Field& field : fields_.all()) {
+      known.insert(field.key);
+      for (std::size_t dot = field.key.find('.'); dot != std::string::npos;
+           dot = field.key.find('.', dot + 1)) {
+        known.insert(field.key.substr(0, dot));
+      }
+    }
+    std::string best;
+    std::size_t best_distance = std::max<std::size_t>(2, name.size() / 3) + 1;
+    for (const std::string& candidate : known) {
+      const std::size_t distance = editDistance(name, candidate);
+      if (distance < best_distance) {
+        best_distance = distance;
+        best = candidate;
+      }
+    }
+    return best.empty() ? "; --print-config lists the known ones" : "; did you mean " + best + "?";
+  }
+
+  void readField(const Field& field, const YAML::Node& value) {
+    std::visit([&](auto* target) { read(field, value, *target); }, field.target);
+  }
+
+  void refuse(const Field& field, const YAML::Node& node, const std::string& what) {
+    std::string value = "a group of keys";
+    if (node.IsScalar()) value = node.Tag() == "!" ? quoted(node.Scalar()) : node.Scalar();
+    if (node.IsNull()) value = "nothing";
+    if (node.IsSequence()) value = "a list";
+    const std::string mend = field.doc.mend.empty() ? "" : "; " + field.doc.mend;
+    problem(node, field.key + ": " + shortened(value) + " is not " + what + mend);
+  }
+
+  std::optional<double> number(const Field& field, const YAML::Node& node) {
+    const std::optional<double> value = parseNumber(node);
+    if (!value) {
+      refuse(field, node, field.doc.unit.empty() ? "a number" : "a number of " + field.doc.unit);
+    } else if (!inside(*value, field.range)) {
+      refuse(field, node, rangeText(field.range, field.doc.unit));
+      return std::nullopt;
+    }
+    return value;
+  }
+
+  void read(const Field& field, const YAML::Node& node, double& target) {
+    if (const auto value = number(field, node)) target = *value;
+  }
+
+  void read(const Field& field, const YAML::Node& node, std::int64_t& target) {
+    const std::optional<std::int64_t> value = parseInteger(node);
+    if (!value) return refuse(field, node, "a whole number");
+    if (!inside(static_cast<double>(*value), field.range)) {
+      return refuse(field, node, rangeText(field.range, field.doc.unit));
+    }
+    target = *value;
+  }
+
+  void read(const Field& field, const YAML::Node& node, bool& target) {
+    const bool plain = node.IsScalar() && node.Tag() != "!";
+    if (!plain || (node.Scalar() != "true" && node.Scalar() != "false")) {
+      return refuse(field, node, "true or false");
+    }
+    target = node.Scalar() == "true";
+  }
+
+  void read(const Field& field, const YAML::Node& node, std::string& target) {
+    if (!node.IsScalar()) return refuse(field, node, "a text");
+    const std::string& value = node.Scalar();
+    const auto& choices = field.choices;
+    if (!choices.empty() && std::find(choices.begin(), choices.end(), value) == choices.end()) {
+      std::string list;
+      for (const std::string& choice : choices) list += (list.empty() ? "" : ", ") + choice;
+      return refuse(field, node, "one of " + list);
+    }
+    target = value;
+  }
+
+  void read(const Field& field, const YAML::Node& node, std::vector<double>& target) {
+    if (!node.IsSequence()) return refuse(field, node, "a list of numbers");
+    std::vector<double> values;
+    for (const YAML::Node& element : node) {
+      if (const auto value = number(field, element)) values.push_back(*value);
+    }
+    if (field.length > 0 && node.size() != field.length) {
+      problem(node, field.key + ": has " + std::to_string(node.size()) + " values, not " +
+                        std::to_string(field.length));
+    } else if (values.size() == node.size()) {
+      target = std::move(values);
+    }
+  }
+
+  void read(const Field& field, const YAML::Node& node, std::vector<std::string>& target) {
+    if (!node.IsSequence()) return refuse(field, node, "a list of texts");
+    std::vector<std::string> values;
+    for (const YAML::Node& element : node) {
+      if (element.IsScalar()) {
+        values.push_back(element.Scalar());
+      } else {
+        refuse(field, element, "a text");
+      }
+    }
+    if (values.size() == node.size()) target = std::move(values);
+  }
+
+  Fields& fields_;
+  const std::string file_;
+  const bool located_;
+  std::set<std::string> seen_;
+  std::vector<Problem> problems_;
+};
+
+/// Listens to a document without keeping it.
+class Ignore : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark& mark) override { start = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+  YAML::Mark start;
+};
+
+/// Where something follows the first document. (YAML::LoadAll of 0.7 may loop without end on
+/// malformed text, and YAML::Load ignores what follows.)
+std::optional<YAML::Mark> afterFirstDocument(const std::string& yaml) {
+  std::istringstream stream(yaml);
+  YAML::Parser parser(stream);
+  Ignore ignore;
+  if (!parser.HandleNextDocument(ignore) || !parser.HandleNextDocument(ignore)) return {};
+  return ignore.start;
+}
+
+Problem syntaxProblem(const YAML::Exception& error, const std::string& file) {
+  const bool known = !error.mark.is_null();
+  return {file, known ? error.mark.line + 1 : 0, known ? error.mark.column + 1 : 0,
+          "is not YAML: " + error.msg};
+}
+
+}  // namespace
+
+std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file) {
+  Reader reader(fields, file, true);
+  try {
+    const YAML::Node root = YAML::Load(yaml);
+    if (const auto mark = afterFirstDocument(yaml)) {
+      reader.problem(*mark, "is not one YAML document: this begins another");
+    } else if (root.IsMap()) {
+      reader.readGroup(root, "");
+    } else if (root.IsDefined() && !root.IsNull()) {
+      reader.problem(root, "is not a list of `key: value` lines");
+    }
+  } catch (const YAML::Exception& error) {
+    std::vector<Problem> problems = reader.take();
+    problems.push_back(syntaxProblem(error, file));
+    return problems;
+  }
+  return reader.take();
+}
+
+std::vector<Problem> readFile(Fields& fields, const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream.is_open() || std::filesystem::is_directory(path)) {
+    return {{path, 0, 0, "cannot be read; check the path and its permissions"}};
+  }
+  return readYaml(fields, std::string(std::istreambuf_iterator<char>(stream), {}), path);
+}
+
+std::vector<Problem> assign(Fields& fields, const std::string& assignment) {
+  const std::string file = "--set " + shortened(assignment);
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    return {{file, 0, 0, "is not key=value"}};
+  }
+  Reader reader(fields, file, false);
+  try {
+    YAML::Node map;
+    map[assignment.substr(0, equals)] = YAML::Load(assignment.substr(equals + 1));
+    reader.readGroup(map, "");
+  } catch (const YAML::Exception& error) {
+    return {{file, 0, 0, "the value is not YAML: " + error.msg}};
+  }
+  return reader.take();
+}
+
+std::vector<Problem> missing(const Fields& fields, const std::string& file) {
+  std::vector<Problem> problems;
+  for (const Field& field : fields.all()) {
+    if (!field.required || field.given) continue;
+    const std::string mend = field.doc.mend.empty() ? field.doc.text : field.doc.mend;
+    problems.push_back({file, 0, 0, field.key + ": is missing; " + mend});
+  }
+  return problems;
+}
+
+}  // namespace perdure::config
