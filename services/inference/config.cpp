@@ -1,0 +1,37 @@
+#include "services/inference/config.h"
+
+#include <algorithm>
+
+namespace perdure::inference {
+
+void describe(Config& config, config::Fields& fields) {
+  using config::between;
+  fields.text("model.path", config.model.path,
+              {"the network: an .onnx file, or a Darknet .cfg with its .weights beside it"});
+  fields.text("model.description", config.model.description,
+              {"its model.json; empty: PATH.model.json, model.json beside it, or "
+               "config/models/<stem>.json"});
+  fields.integer("model.threads", config.model.threads, between(1, 64),
+                 {"threads of OpenCV for one image", "", "use at most the cores of the machine"});
+  fields.text("detection.camera", config.detection.camera,
+              {"the camera whose frames are looked at"});
+  fields.number("detection.score_threshold", config.detection.score_threshold, between(0.001, 0.999),
+                {"lax: boxes whose best class scores less are left out", "",
+                 "0.05 keeps the evidence that the filter wants; above 0.3 objects are lost"});
+  fields.number("detection.merge_iou", config.detection.merge_iou, between(0.1, 1.0),
+                {"boxes that overlap more are merged into one, of whatever class"});
+  fields.integer("detection.limit", config.detection.limit, between(1, 512),
+                 {"most detections of one frame; those of most evidence are kept"});
+  fields.texts("detection.classes", config.detection.classes,
+               {"classes to report, by the network's names; empty: all"});
+  fields.integer("ownership.strength", config.ownership.strength, between(1, 1000000),
+                 {"the strongest living inference process is heard; standby is one lower"});
+  fields.number("ownership.period_s", config.ownership.period_s, between(0.005, 10.0),
+                {"expected time between frames; the lease is three of them, at least 100 ms", "s"});
+}
+
+double leaseSeconds(const OwnershipConfig& ownership) {
+  return std::max(3.0 * ownership.period_s, 0.1);
+}
+
+}  // namespace perdure::inference

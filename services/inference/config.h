@@ -1,0 +1,42 @@
+// The configuration of inference.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/config/fields.h"
+
+namespace perdure::inference {
+
+struct ModelConfig {
+  std::string path;         ///< .onnx, or .cfg with its .weights
+  std::string description;  ///< "" = look for it
+  std::int64_t threads = 1;
+};
+
+struct DetectionConfig {
+  std::string camera = "cam0";
+  double score_threshold = 0.05;
+  double merge_iou = 0.6;
+  std::int64_t limit = 100;
+  std::vector<std::string> classes;  ///< empty = all of the network's
+};
+
+struct OwnershipConfig {
+  std::int64_t strength = 10;
+  double period_s = 0.1;
+};
+
+struct Config {
+  ModelConfig model;
+  DetectionConfig detection;
+  OwnershipConfig ownership;
+};
+
+void describe(Config& config, config::Fields& fields);
+
+/// The lease of `detections`: at least three periods, and never under 100 ms.
+double leaseSeconds(const OwnershipConfig& ownership);
+
+}  // namespace perdure::inference

@@ -1,0 +1,39 @@
+// Raw head tensors to boxes with evidence, one rule for each family of networks (eq. 6, 7).
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/types/detections.h"
+#include "services/inference/core/description.h"
+
+namespace perdure::inference {
+
+/// A dense float tensor, last index fastest. It does not own its values.
+struct Tensor {
+  std::vector<int> shape;
+  std::span<const float> values;
+};
+
+struct Candidate {
+  Box box;             ///< pixels of the network's input
+  double score = 0.0;  ///< the highest class score, before calibration
+  std::vector<float> activations;
+};
+
+struct DecodeOptions {
+  double score_threshold = 0.05;  ///< boxes whose best wanted class scores less are left out
+  std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
+};
+
+/// What a level's tensors must look like, in the order of tensorNames().
+std::vector<std::vector<int>> expectedShapes(const ModelDescription& model);
+
+/// Reasons: "model_output_shape", "model_output_not_finite".
+Result<std::vector<Candidate>> decode(const ModelDescription& model, const DecodeOptions& options,
+                                      const std::vector<Tensor>& tensors);
+
+}  // namespace perdure::inference

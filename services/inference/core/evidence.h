@@ -1,0 +1,43 @@
+// Scores as log-likelihood ratios (eq. 7: activations before the soft-max, one of them clutter).
+// Clutter is the reference: activations[0] = 0, and for a score p of class k
+//   activations[k] = logit(p) / T + logit(c),
+// T the temperature and c the share of clutter among the emitted boxes; README, "Clutter".
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/inference/core/description.h"
+
+namespace perdure::inference {
+
+/// log σ(x), exact for large |x|.
+inline double logSigmoid(double x) {
+  return x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x));
+}
+
+inline double sigmoid(double x) { return std::exp(logSigmoid(x)); }
+
+inline double logit(double p) { return std::log(p) - std::log1p(-p); }
+
+/// Activations are kept within ±kMaxLogit, so that no single look is certain.
+inline constexpr double kMaxLogit = 30.0;
+
+/// logit(p) from log p ≤ 0, exact for p near 0 and near 1.
+inline double logitFromLog(double log_p) {
+  if (log_p >= 0) return kMaxLogit;
+  return std::clamp(log_p - std::log(-std::expm1(log_p)), -kMaxLogit, kMaxLogit);
+}
+
+/// log of objectness^a · class^b.
+inline double logScore(const ModelDescription& model, double log_objectness, double log_class) {
+  return model.objectness_exponent * log_objectness + model.class_exponent * log_class;
+}
+
+/// The calibrated log-likelihood ratio of "class k is here" against clutter.
+inline float activation(const Calibration& calibration, double log_score) {
+  return static_cast<float>(logitFromLog(log_score) / calibration.temperature +
+                            logit(calibration.clutter_rate));
+}
+
+}  // namespace perdure::inference

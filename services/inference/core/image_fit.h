@@ -1,0 +1,30 @@
+// An image brought to the network's input, and the way back for boxes.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "common/base/result.h"
+#include "common/types/detections.h"
+#include "common/types/sensors.h"
+#include "services/inference/core/description.h"
+
+namespace perdure::inference {
+
+/// Pixels of the image to pixels of the input: x_input = x_image · scale_x + offset_x.
+struct ImageFit {
+  double scale_x = 1, scale_y = 1, offset_x = 0, offset_y = 0;
+  int width = 0, height = 0;  ///< of the scaled image, without padding
+
+  Box toImage(const Box& b) const {
+    return {(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y, (b.x2 - offset_x) / scale_x,
+            (b.y2 - offset_y) / scale_y};
+  }
+};
+
+ImageFit fitOf(const Input& input, int image_width, int image_height);
+
+/// The blob (1,3,H,W) of float32 for the network. Mono images are repeated in all three channels.
+/// Reasons: "frame_malformed" where the frame's size and its data do not agree.
+Result<cv::Mat> makeBlob(const Input& input, const Frame& frame);
+
+}  // namespace perdure::inference

@@ -1,0 +1,93 @@
+#include "services/inference/model_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "common/base/errors.h"
+#include "common/base/ids.h"
+
+namespace perdure::inference {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string readBytes(const fs::path& path, const std::string& what, const std::string& mend) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) {
+    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + " is missing; " + mend);
+  }
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << in.rdbuf();
+  if (!in || bytes.str().empty()) {
+    throw StartupError(ExitCode::kUnavailable,
+                       what + " " + path.string() + " is empty or cannot be read; " + mend);
+  }
+  return std::move(bytes).str();
+}
+
+std::string listOf(const std::vector<fs::path>& paths) {
+  std::string text;
+  for (const fs::path& p : paths) text += (text.empty() ? "" : ", ") + p.string();
+  return text;
+}
+
+fs::path findDescription(const fs::path& model, const std::vector<std::string>& folders) {
+  std::vector<fs::path> candidates = {model.string() + ".model.json",
+                                      model.parent_path() / "model.json"};
+  for (const std::string& folder : folders) {
+    candidates.push_back(fs::path(folder) / (model.stem().string() + ".json"));
+  }
+  std::error_code error;
+  for (const fs::path& candidate : candidates) {
+    if (fs::is_regular_file(candidate, error)) return candidate;
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     "Nothing describes the network " + model.string() + ": looked for " +
+                         listOf(candidates) +
+                         "; write one (services/inference/README.md, \"model.json\") or name it "
+                         "with --set model.description=FILE.");
+}
+
+}  // namespace
+
+std::vector<std::string> standardModelFolders() {
+  std::vector<std::string> folders = {"config/models"};
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  fs::path folder = program.parent_path();
+  for (int up = 0; up < 4 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
+    for (const char* there : {"config/models", "share/perdure/models"}) {
+      if (fs::is_directory(folder / there, error)) folders.push_back((folder / there).string());
+    }
+  }
+  return folders;
+}
+
+ModelFile readModelFile(const std::string& path, const std::string& description,
+                        const std::vector<std::string>& folders) {
+  if (path.empty()) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "No network is configured; set model.path to an .onnx or Darknet .cfg file.");
+  }
+  const fs::path model = path;
+  ModelFile file;
+  file.network = readBytes(model, "The network", "set model.path to an .onnx or .cfg file.");
+  if (model.extension() == ".cfg") {
+    file.darknet_weights = readBytes(fs::path(model).replace_extension(".weights"),
+                                     "The weights", "put them beside their .cfg file.");
+  }
+  const fs::path described = description.empty() ? findDescription(model, folders)
+                                                 : fs::path(description);
+  const std::string text =
+      readBytes(described, "The description", "set model.description to a model.json.");
+  file.description = parseModelDescription(text, described.string());
+  if (file.description.name.empty()) file.description.name = model.stem().string();
+  std::string all = file.network + file.darknet_weights + text;
+  for (const std::string& name : file.description.classes) all += "\n" + name;
+  file.hash = digest(all);
+  return file;
+}
+
+}  // namespace perdure::inference
