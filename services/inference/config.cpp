@@ -24,8 +24,10 @@ void describe(Config& config, config::Fields& fields) {
                  {"most detections of one frame; those of most evidence are kept"});
   fields.texts("detection.classes", config.detection.classes,
                {"classes to report, by the network's names; empty: all"});
-  fields.integer("ownership.strength", config.ownership.strength, between(1, 1000000),
-                 {"the strongest living inference process is heard; standby is one lower"});
+  fields.integer("ownership.strength", config.ownership.strength, between(2, 1000000),
+                 {"of several living inference processes the strongest is heard"});
+  fields.boolean("ownership.standby", config.ownership.standby,
+                 {"stand by: offer one less than the strength, and take over when the owner dies"});
   fields.number("ownership.period_s", config.ownership.period_s, between(0.005, 10.0),
                 {"expected time between frames; the lease is three of them, at least 100 ms", "s"});
 }

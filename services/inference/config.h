@@ -25,6 +25,7 @@ struct DetectionConfig {
 
 struct OwnershipConfig {
   std::int64_t strength = 10;
+  bool standby = false;
   double period_s = 0.1;
 };
 

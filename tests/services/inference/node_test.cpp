@@ -190,8 +190,8 @@ TEST(ModelDescription, TellsAllFaultsAtOnce) {
 }
 
 TEST(Lease, IsThreePeriodsAndNeverUnderATenthOfASecond) {
-  EXPECT_DOUBLE_EQ(leaseSeconds({10, 0.1}), 0.3);
-  EXPECT_DOUBLE_EQ(leaseSeconds({10, 0.01}), 0.1);
+  EXPECT_DOUBLE_EQ(leaseSeconds({10, false, 0.1}), 0.3);
+  EXPECT_DOUBLE_EQ(leaseSeconds({10, false, 0.01}), 0.1);
 }
 
 }  // namespace
