@@ -1,0 +1,147 @@
+#include "common/replay/dataset.h"
+
+#include <algorithm>
+
+#include "common/base/errors.h"
+#include "common/replay/recording.h"
+#include "common/vision/decode.h"
+#include "common/vision/image.h"
+
+namespace perdure::replay {
+namespace {
+
+/// The median interval, or 0 where there are too few samples to tell.
+Duration usualInterval(const std::vector<ImuSample>& samples) {
+  if (samples.size() < 3) return Duration{0};
+  std::vector<Duration> intervals;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    intervals.push_back(samples[i].time - samples[i - 1].time);
+  }
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return *middle;
+}
+
+Recording readRecording(const DatasetOptions& options) {
+  const auto& path = options.path;
+  if (path.extension() == ".mcap") {
+    throw StartupError(ExitCode::kUsage,
+                       path.string() +
+                           " is a recording; this version plays dataset folders only "
+                           "(EuRoC, KITTI raw, KITTI tracking)");
+  }
+  if (!std::filesystem::is_directory(path)) {
+    throwMissing(path, "the dataset folder",
+                 "--data takes a folder in EuRoC, KITTI raw or KITTI tracking layout");
+  }
+  if (looksLikeEuroc(path)) return readEuroc(options);
+  if (looksLikeKittiTracking(path)) return readKittiTracking(options);
+  if (looksLikeKittiRaw(path)) return readKittiRaw(options);
+  throw StartupError(ExitCode::kUnavailable,
+                     path.string() +
+                         " is no dataset folder that is known: give a folder with "
+                         "mav0 (EuRoC), with image_02 and oxts (KITTI raw, *_sync), "
+                         "or with calib (KITTI tracking)");
+}
+
+}  // namespace
+
+std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
+  return std::make_unique<Dataset>(options, readRecording(options));
+}
+
+Dataset::Dataset(const DatasetOptions& options, Recording recording)
+    : options_(options), recording_(std::move(recording)), reasons_(recording_.reasons) {
+  recording_.calibration.source = options_.source;
+  usual_interval_ = usualInterval(recording_.imu);
+}
+
+std::optional<TimePoint> Dataset::frameTime(std::uint64_t index) const {
+  for (const auto& frame : recording_.frames) {
+    if (frame.index == index && frame.camera == 0) return frame.time;
+  }
+  return std::nullopt;
+}
+
+std::optional<Message> Dataset::next() {
+  while (true) {
+    const bool has_imu = next_imu_ < recording_.imu.size();
+    const bool has_speed = next_speed_ < recording_.speed.size();
+    const bool has_frame = next_frame_ < recording_.frames.size();
+    if (!has_imu && !has_speed && !has_frame) return std::nullopt;
+    constexpr TimePoint kNever = TimePoint::max();
+    const TimePoint imu = has_imu ? recording_.imu[next_imu_].time : kNever;
+    const TimePoint speed = has_speed ? recording_.speed[next_speed_].time : kNever;
+    const TimePoint frame = has_frame ? recording_.frames[next_frame_].time : kNever;
+    if (has_imu && imu <= std::min(speed, frame)) return takeImu();
+    if (has_speed && speed <= frame) {
+      SpeedSample sample = recording_.speed[next_speed_++];
+      sample.source = options_.source;
+      return sample;
+    }
+    auto decoded = decodeFrame(recording_.frames[next_frame_++]);
+    if (decoded) return *std::move(decoded);
+  }
+}
+
+ImuSample Dataset::takeImu() {
+  ImuSample sample = recording_.imu[next_imu_];
+  sample.source = options_.source;
+  if (next_imu_ > 0 && usual_interval_ > Duration{0}) {
+    const Duration gap = sample.time - recording_.imu[next_imu_ - 1].time;
+    if (2 * gap > 7 * usual_interval_) {
+      count({"imu_gap", "no inertial samples for " + std::to_string(toSeconds(gap)) + " s"});
+    }
+  }
+  ++next_imu_;
+  return sample;
+}
+
+std::optional<Frame> Dataset::decodeFrame(const Recording::FrameFile& file) {
+  const CameraCalibration& camera = recording_.calibration.cameras[file.camera];
+  Frame frame;
+  frame.stamp.source = options_.source;
+  frame.stamp.sequence = file.index;
+  frame.stamp.time = file.time;
+  frame.camera = camera.name;
+  frame.width = camera.width;
+  frame.height = camera.height;
+  if (file.path.empty() || !options_.decode) return frame;
+  const auto encoding = file.camera == 0 ? options_.encoding : options_.second_encoding;
+  const auto image = vision::decodeImageFile(file.path, encoding);
+  if (!image) {
+    count(image.error());
+    return std::nullopt;
+  }
+  const auto set = vision::setPixels(frame, *image);
+  if (!set) {
+    count({"image_corrupt", file.path + ": " + set.error().detail});
+    return std::nullopt;
+  }
+  if (frame.width != camera.width || frame.height != camera.height) {
+    count({"image_size", file.path + " is not of the calibration's size"});
+    return std::nullopt;
+  }
+  return frame;
+}
+
+void Dataset::count(const Reason& reason) {
+  reasons_.add(reason);
+  last_problem_ = reason.detail;
+}
+
+void Dataset::seek(std::uint64_t index) {
+  const auto& frames = recording_.frames;
+  next_frame_ = 0;
+  while (next_frame_ < frames.size() && frames[next_frame_].index < index) ++next_frame_;
+  const TimePoint from = next_frame_ == 0 ? TimePoint::min() : frames[next_frame_ - 1].time;
+  const auto firstAfter = [from](const auto& samples) {
+    const auto at = std::find_if(samples.begin(), samples.end(),
+                                 [from](const auto& sample) { return sample.time > from; });
+    return static_cast<std::size_t>(at - samples.begin());
+  };
+  next_imu_ = firstAfter(recording_.imu);
+  next_speed_ = firstAfter(recording_.speed);
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,91 @@
+// Dataset folders played as messages: EuRoC ASL, KITTI raw and KITTI tracking, known by looking.
+// Samples and frames are merged by time, always in the same order; images are decoded when asked.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/replay/pose_file.h"
+#include "common/types/sensors.h"
+
+namespace perdure::replay {
+
+using Message = std::variant<ImuSample, SpeedSample, Frame>;
+
+struct DatasetOptions {
+  std::filesystem::path path;
+  std::string sequence;                                               ///< KITTI tracking only
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size;  ///< tracking without images
+  std::optional<std::size_t> frame_count;        ///< tracking without images and labels: how many
+  InstanceId source = 1;                         ///< of the messages
+  std::optional<ImageEncoding> encoding;         ///< of cam0; as the files are where not given
+  std::optional<ImageEncoding> second_encoding;  ///< of cam1
+  bool decode = true;  ///< false: frames carry stamp and size, but no pixels
+};
+
+enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking };
+
+/// What a reader found in a folder.
+struct Recording {
+  struct FrameFile {
+    TimePoint time;
+    std::uint64_t index = 0;  ///< in the dataset, from 0; both cameras of a pair share it
+    std::size_t camera = 0;   ///< index into calibration.cameras
+    std::string path;         ///< empty: a frame without pixels
+  };
+  DatasetKind kind = DatasetKind::kEuroc;
+  Calibration calibration;
+  std::size_t frame_count = 0;
+  std::vector<FrameFile> frames;  ///< by time, cameras in order
+  std::vector<ImuSample> imu;     ///< by time
+  std::vector<SpeedSample> speed;
+  std::optional<PoseFile> truth;  ///< of the body
+  ReasonCounts reasons;           ///< what was left out while reading
+};
+
+class Dataset {
+ public:
+  /// Throws StartupError(kUnavailable) with what is missing and the mend.
+  static std::unique_ptr<Dataset> open(const DatasetOptions& options);
+  Dataset(const DatasetOptions& options, Recording recording);
+
+  DatasetKind kind() const { return recording_.kind; }
+  const Calibration& calibration() const { return recording_.calibration; }
+  /// Frames of cam0 in the dataset, those that turn out unreadable included.
+  std::size_t frameCount() const { return recording_.frame_count; }
+  /// Capture time of frame `index` of cam0; nothing where the dataset has no such frame.
+  std::optional<TimePoint> frameTime(std::uint64_t index) const;
+  const std::optional<PoseFile>& truth() const { return recording_.truth; }
+
+  /// The next message, or nothing at the end. Frames that cannot be decoded are counted
+  /// (image_missing, image_truncated, image_corrupt, image_size) and left out; their index is
+  /// not given again. At equal times: imu, speed, cam0, cam1.
+  std::optional<Message> next();
+  /// Counted so far; imu_gap (more than 3.5 usual intervals) when the sample after it is given.
+  const ReasonCounts& reasons() const { return reasons_; }
+  /// The last thing that was counted, for people.
+  const std::string& lastProblem() const { return last_problem_; }
+  /// Continues at frame `index` with the samples that follow the frame before it.
+  void seek(std::uint64_t index);
+
+ private:
+  std::optional<Frame> decodeFrame(const Recording::FrameFile& file);
+  ImuSample takeImu();
+  void count(const Reason& reason);
+
+  DatasetOptions options_;
+  Recording recording_;
+  Duration usual_interval_{0};
+  std::size_t next_imu_ = 0, next_speed_ = 0, next_frame_ = 0;
+  ReasonCounts reasons_;
+  std::string last_problem_;
+};
+
+}  // namespace perdure::replay

@@ -1,0 +1,177 @@
+// KITTI raw drives (*_sync): image_02 and image_03, OXTS as inertial samples and speed. The body
+// is the OXTS unit's IMU: x forward, y left, z up. Stamps are as the files say (OXTS runs 7 ms
+// after the images); the right image takes the left one's, for one trigger exposes both.
+#include <chrono>
+#include <cstdio>
+
+#include "common/base/errors.h"
+#include "common/replay/kitti_calibration.h"
+#include "common/replay/recording.h"
+#include "common/replay/text_file.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kOxtsFields = 30;
+enum OxtsField : std::size_t { kLat = 0, kLon, kAlt, kYaw = 5, kVf = 8, kAx = 11, kWx = 17 };
+
+std::string tenDigits(std::size_t number) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%010zu", number);
+  return text;
+}
+
+/// "2011-09-26 13:04:32.345808896", taken as UTC.
+std::optional<TimePoint> parseStamp(const std::string& text) {
+  int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0, used = 0;
+  if (std::sscanf(text.c_str(), "%d-%d-%d %d:%d:%d%n", &year, &month, &day, &hour, &minute, &second,
+                  &used) != 6) {
+    return std::nullopt;
+  }
+  const std::chrono::year_month_day date{std::chrono::year(year),
+                                         std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!date.ok() || year < 1970 || year > 2200) return std::nullopt;
+  std::string digits = "0";
+  if (text[static_cast<std::size_t>(used)] == '.')
+    digits = text.substr(static_cast<std::size_t>(used) + 1, 9);
+  digits.resize(9, '0');
+  const auto fraction = parseInteger(digits);
+  if (!fraction) return std::nullopt;
+  const Duration since = std::chrono::sys_days(date).time_since_epoch() + std::chrono::hours(hour) +
+                         std::chrono::minutes(minute) + std::chrono::seconds(second);
+  return TimePoint(since + Duration(*fraction));
+}
+
+/// One stamp a line; nothing where a line is not a stamp.
+std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
+  std::vector<std::optional<TimePoint>> stamps;
+  for (const auto& line : readLines(file, "KITTI keeps timestamps.txt in each sensor's folder")) {
+    stamps.push_back(parseStamp(line.text));
+  }
+  return stamps;
+}
+
+/// The folder with the three calibration files: the drive's own, or the one above.
+fs::path calibrationFolder(const fs::path& drive) {
+  const fs::path path = fs::absolute(drive).lexically_normal();
+  const fs::path clean = path.has_filename() ? path : path.parent_path();
+  for (const auto& folder : {clean, clean.parent_path()}) {
+    if (fs::exists(folder / "calib_cam_to_cam.txt")) return folder;
+  }
+  throwMissing(clean.parent_path() / "calib_cam_to_cam.txt", "the drive's calibration",
+               "unpack KITTI's calibration of that day (calib_cam_to_cam.txt, "
+               "calib_velo_to_cam.txt, calib_imu_to_velo.txt) beside or above the drive");
+}
+
+/// The OXTS unit as an IMU. Its records are momentary values at 10 Hz, not averages: what the
+/// vehicle does between two of them is unknown, and that, not the sensor, is the noise.
+ImuCalibration oxtsCalibration() {
+  ImuCalibration imu;
+  imu.gyro_noise = 5e-3;
+  imu.gyro_bias_walk = 1e-5;
+  imu.accel_noise = 0.15;
+  imu.accel_bias_walk = 1e-3;
+  imu.rate_hz = 10.0;
+  return imu;
+}
+
+struct OxtsRecord {
+  TimePoint time;
+  std::vector<double> values;
+};
+
+std::vector<OxtsRecord> readOxts(const fs::path& folder, ReasonCounts& reasons) {
+  std::vector<OxtsRecord> records;
+  const auto stamps = readStamps(folder / "timestamps.txt");
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    const fs::path file = folder / "data" / (tenDigits(i) + ".txt");
+    if (!fs::exists(file)) {
+      reasons.add("imu_missing");
+      continue;
+    }
+    const auto lines = readLines(file, "");
+    const auto values = lines.empty() ? std::nullopt : parseNumbers(split(lines.front().text, ' '));
+    if (!stamps[i] || !values || values->size() < kOxtsFields - 5) {
+      reasons.add("imu_malformed");
+      continue;
+    }
+    records.push_back({*stamps[i], *values});
+  }
+  return records;
+}
+
+void addOxts(const std::vector<OxtsRecord>& records, Recording& recording) {
+  for (const auto& record : records) {
+    const double* v = record.values.data();
+    ImuSample sample;
+    sample.time = record.time;
+    sample.accel = Eigen::Vector3d(v[kAx], v[kAx + 1], v[kAx + 2]);
+    sample.gyro = Eigen::Vector3d(v[kWx], v[kWx + 1], v[kWx + 2]);
+    appendImu(recording, sample);
+    if (recording.imu.back().time != record.time) continue;
+    SpeedSample speed;
+    speed.time = record.time;
+    speed.sequence = recording.speed.size();
+    speed.speed = v[kVf];
+    recording.speed.push_back(speed);
+  }
+  const OxtsRecord& first = records.front();
+  GeoAnchor anchor;
+  anchor.time = first.time;
+  anchor.latitude_deg = first.values[kLat];
+  anchor.longitude_deg = first.values[kLon];
+  anchor.height_m = first.values[kAlt];
+  anchor.yaw = first.values[kYaw];
+  recording.calibration.anchor = anchor;
+  recording.calibration.has_speed = true;
+  recording.calibration.imu = oxtsCalibration();
+}
+
+void addCamera(const fs::path& folder, const std::vector<std::optional<TimePoint>>& stamps,
+               const CameraCalibration& camera, Recording& recording) {
+  const std::size_t number = recording.calibration.cameras.size();
+  recording.calibration.cameras.push_back(camera);
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    if (!stamps[i]) {
+      recording.reasons.add("frame_malformed");
+      continue;
+    }
+    recording.frames.push_back(
+        {*stamps[i], i, number, imagePath(folder / "data", tenDigits(i)).string()});
+  }
+}
+
+}  // namespace
+
+bool looksLikeKittiRaw(const fs::path& folder) {
+  return fs::is_directory(folder / "image_02") || fs::is_directory(folder / "oxts");
+}
+
+Recording readKittiRaw(const DatasetOptions& options) {
+  const fs::path& drive = options.path;
+  for (const char* part :
+       {"image_02/data", "image_02/timestamps.txt", "oxts/data", "oxts/timestamps.txt"}) {
+    if (!fs::exists(drive / part)) {
+      throwMissing(drive / part, "a part of the KITTI drive", "unpack the *_sync drive whole");
+    }
+  }
+  const KittiCalibration calibration = readRawCalibration(calibrationFolder(drive));
+  Recording recording;
+  recording.kind = DatasetKind::kKittiRaw;
+  const auto stamps = readStamps(drive / "image_02" / "timestamps.txt");
+  recording.frame_count = stamps.size();
+  addCamera(drive / "image_02", stamps, calibration.camera("cam0"), recording);
+  if (fs::is_directory(drive / "image_03" / "data")) {
+    addCamera(drive / "image_03", stamps, calibration.camera("cam1"), recording);
+  }
+  sortFrames(recording);
+  const auto records = readOxts(drive / "oxts", recording.reasons);
+  if (records.empty()) throwMissing(drive / "oxts" / "data", "any OXTS record", "fetch it again");
+  addOxts(records, recording);
+  return recording;
+}
+
+}  // namespace perdure::replay

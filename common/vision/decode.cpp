@@ -1,0 +1,56 @@
+#include "common/vision/decode.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+
+namespace perdure::vision {
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+/// libjpeg fills what is missing with grey and reports success: look for the end marks instead.
+bool endsAsItShould(std::string_view bytes) {
+  constexpr std::string_view kJpegStart = "\xFF\xD8"sv, kJpegEnd = "\xFF\xD9"sv;
+  constexpr std::string_view kPngStart = "\x89PNG"sv, kPngEnd = "IEND\xAE\x42\x60\x82"sv;
+  constexpr std::size_t kTrailing = 64;  // writers may pad behind the end mark
+  const auto tail = bytes.substr(bytes.size() - std::min(bytes.size(), kTrailing));
+  if (bytes.starts_with(kJpegStart)) return tail.find(kJpegEnd) != tail.npos;
+  if (bytes.starts_with(kPngStart)) return tail.find(kPngEnd) != tail.npos;
+  return true;
+}
+
+int readFlags(std::optional<ImageEncoding> encoding) {
+  if (!encoding) return cv::IMREAD_ANYCOLOR;
+  return *encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE;
+}
+
+}  // namespace
+
+Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding) {
+  if (bytes.empty()) return fail("image_truncated", "the file is empty");
+  if (!endsAsItShould(bytes)) return fail("image_truncated", "the end of the image is missing");
+  auto* data = const_cast<char*>(bytes.data());
+  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, data);
+  cv::Mat image;
+  try {
+    image = cv::imdecode(raw, readFlags(encoding));
+  } catch (const cv::Exception& error) {
+    return fail("image_corrupt", error.what());
+  }
+  if (image.empty()) return fail("image_corrupt", "not an image that OpenCV can decode");
+  return image;
+}
+
+Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail("image_missing", path + " cannot be read");
+  const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  auto image = decodeImage(bytes, encoding);
+  if (!image) return fail(image.error().code, path + ": " + image.error().detail);
+  return image;
+}
+
+}  // namespace perdure::vision

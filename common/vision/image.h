@@ -1,0 +1,23 @@
+// Frames as OpenCV matrices and back, without a copy wherever the encoding allows it.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "common/base/result.h"
+#include "common/types/sensors.h"
+
+namespace perdure::vision {
+
+/// The frame's own pixels (CV_8UC1 or CV_8UC3, BGR); valid while frame.data lives, never written.
+/// Reasons: image_missing (no data), image_malformed (size and bytes disagree).
+Result<cv::Mat> viewOf(const Frame& frame);
+/// CV_8UC1: a view where the frame is mono, else converted. Reasons as viewOf.
+Result<cv::Mat> monoOf(const Frame& frame);
+/// CV_8UC3, BGR: a view where the frame is BGR, else the grey value three times.
+Result<cv::Mat> bgrOf(const Frame& frame);
+
+/// Copies the pixels into the frame and sets its size and encoding.
+/// Reason image_malformed: neither CV_8UC1 nor CV_8UC3, or empty.
+Result<void> setPixels(Frame& frame, const cv::Mat& pixels);
+
+}  // namespace perdure::vision
