@@ -1,0 +1,26 @@
+#include "services/map_store/config.h"
+
+namespace perdure::map_store {
+
+void describe(Config& c, config::Fields& fields) {
+  fields.text("store.path", c.store_path,
+              {"the map's file; its folder is made where it is missing", "",
+               "give a file in a folder that the service may write"});
+  fields.number("store.commit_period", c.commit_period_s, config::between(0.01, 0.9),
+                {"changes are gathered this long, then written and synced to the disk", "s",
+                 "a confirmed object is to be durable within one second"});
+  fields.integer("store.max_size", c.max_size_mb, config::between(0, 1 << 20),
+                 {"the file grows no further than this; 0: as large as the disk", "MiB", ""});
+  fields.boolean("store.check_at_start", c.check_at_start,
+                 {"read the whole file at the start and set it aside where it is damaged"});
+  fields.number("tiles.size", c.tile_size_m, config::between(1.0, 10000.0),
+                {"width of the squares in which the map is published", "m", ""});
+  fields.number("tiles.period", c.tile_period_s, config::between(0.05, 60.0),
+                {"changed squares are published at most this often", "s", ""});
+  fields.integer("query.limit", c.query_limit, config::between(1, 4096),
+                 {"a reply holds at most this many objects, whatever the query asks for", "", ""});
+  fields.integer("query.cached_replies", c.cached_replies, config::between(1, 10000),
+                 {"answers kept for requests that come again", "", ""});
+}
+
+}  // namespace perdure::map_store

@@ -1,0 +1,24 @@
+// What can be set about map_store.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/config/fields.h"
+
+namespace perdure::map_store {
+
+struct Config {
+  std::string store_path = "state/map.sqlite";
+  double commit_period_s = 0.5;
+  std::int64_t max_size_mb = 0;
+  bool check_at_start = true;
+  double tile_size_m = 32.0;
+  double tile_period_s = 1.0;
+  std::int64_t query_limit = 1000;
+  std::int64_t cached_replies = 64;
+};
+
+void describe(Config& config, config::Fields& fields);
+
+}  // namespace perdure::map_store

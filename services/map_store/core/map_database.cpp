@@ -1,0 +1,278 @@
+#include "services/map_store/core/map_database.h"
+
+#include <cmath>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/base/errors.h"
+
+namespace perdure::map_store {
+namespace {
+
+constexpr char kPutObject[] =
+    "REPLACE INTO objects(id, world, epoch, class, class_probability, existence, x, y, z, yaw, "
+    "length, width, height, first_seen_ns, last_seen_ns, hits, visibility, memory, tile_x, tile_y, "
+    "belief) VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9,?10,?11,?12,?13,?14,?15,?16,?17,?18,?19,?20,?21)";
+
+std::uint64_t digestOf(std::span<const std::uint8_t> bytes, const WorldId& world) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return digest(text) ^ (world.world * 31 + world.epoch);
+}
+
+Result<void> failed(const Reason& reason) { return tl::unexpected<Reason>(reason); }
+
+Result<void> runOnce(const Connection& connection, std::string_view sql,
+                     const auto&... parameters) {
+  auto statement = connection.prepare(sql);
+  if (!statement) return failed(statement.error());
+  int index = 0;
+  (statement->bind(++index, parameters), ...);
+  return statement->run();
+}
+
+std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); }
+
+}  // namespace
+
+struct MapDatabase::Change {
+  std::set<Square> squares;
+  std::map<ObjectId, Row> rows;  ///< to be remembered once committed
+  std::set<ObjectId> shut_out;   ///< removed later than this frame
+};
+
+MapDatabase::MapDatabase(const StoreOptions& options) : MapDatabase(openStore(options), options) {}
+
+MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
+    : connection_(std::move(opened.connection)),
+      notice_(std::move(opened.notice)),
+      tile_size_m_(options.tile_size_m) {
+  auto ready = keepTileSize();
+  if (ready) ready = rememberWorking();
+  if (!ready) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "The map " + options.path + " cannot be read (" + ready.error().detail +
+                           "); free the disk or set store.path to another file.");
+  }
+}
+
+/// The columns tile_x and tile_y follow the configured size.
+Result<void> MapDatabase::keepTileSize() {
+  const std::string size = std::to_string(tile_size_m_);
+  auto stored = connection_.prepare("SELECT 1 FROM meta WHERE key = 'tile_size_m' AND value = ?1");
+  if (!stored) return failed(stored.error());
+  stored->bind(1, std::string_view(size));
+  const auto same = stored->step();
+  if (!same) return failed(same.error());
+  if (*same) return {};
+  stored->reset();
+  auto transaction = Transaction::begin(connection_);
+  if (!transaction) return failed(transaction.error());
+  auto done = retile();
+  if (done)
+    done =
+        runOnce(connection_, "REPLACE INTO meta VALUES('tile_size_m', ?1)", std::string_view(size));
+  return done ? transaction->commit() : done;
+}
+
+Result<void> MapDatabase::retile() {
+  auto rows = connection_.prepare("SELECT id, x, y FROM objects");
+  auto update = connection_.prepare("UPDATE objects SET tile_x = ?2, tile_y = ?3 WHERE id = ?1");
+  if (!rows) return failed(rows.error());
+  if (!update) return failed(update.error());
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return failed(row.error());
+    if (!*row) return {};
+    const auto square = squareOf({rows->real(1), rows->real(2), 0.0}, tile_size_m_);
+    if (!square) continue;
+    update->bind(1, rows->integer(0)).bind(2, std::int64_t{square->x});
+    const auto done = update->bind(3, std::int64_t{square->y}).run();
+    if (!done) return done;
+  }
+}
+
+Result<void> MapDatabase::rememberWorking() {
+  auto rows = connection_.prepare("SELECT id FROM working WHERE belief IS NULL");
+  if (!rows) return failed(rows.error());
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return failed(row.error());
+    if (!*row) return {};
+    auto known = rowOf(rows->id(0));
+    if (!known) return failed(known.error());
+    committed_[rows->id(0)] = *known;
+  }
+}
+
+Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
+  auto statement = connection_.prepare(
+      "SELECT tile_x, tile_y, gone, gone_ns, memory, world, epoch, belief FROM objects "
+      "WHERE id = ?1");
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  const auto there = statement->bindId(1, id).step();
+  if (!there) return tl::unexpected<Reason>(there.error());
+  Row row;
+  if (!*there) return row;
+  row.square = Square{static_cast<std::int32_t>(statement->integer(0)),
+                      static_cast<std::int32_t>(statement->integer(1))};
+  if (statement->integer(2) != 0) row.gone = fromNanoseconds(statement->integer(3));
+  const WorldId world{statement->id(5), static_cast<std::uint32_t>(statement->integer(6))};
+  // One that had left the working set is written again, whatever its belief.
+  if (statement->integer(4) == 0) row.digest = digestOf(statement->blob(7), world);
+  return row;
+}
+
+Result<void> MapDatabase::insert(const PlacedBelief& placed, const Square& square,
+                                 const Bytes& bytes) {
+  const MapObject o = mapObjectOf(placed.belief, placed.world);
+  const Vector7d& m = o.mean;
+  const auto done =
+      runOnce(connection_, kPutObject, asStored(o.id), asStored(o.world.world),
+              std::int64_t{o.world.epoch}, std::string_view(o.class_name), o.class_probability,
+              o.existence, m[0], m[1], m[2], m[3], std::exp(m[4]), std::exp(m[5]), std::exp(m[6]),
+              toNanoseconds(o.first_seen), toNanoseconds(o.last_seen), std::int64_t{o.hits},
+              static_cast<std::int64_t>(o.visibility), static_cast<std::int64_t>(o.memory),
+              std::int64_t{square.x}, std::int64_t{square.y}, std::span<const std::uint8_t>(bytes));
+  if (!done) return done;
+  return runOnce(connection_, "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                 asStored(o.id), m[0], m[0], m[1], m[1], m[2], m[2]);
+}
+
+Result<void> MapDatabase::put(const PlacedBelief& placed, TimePoint now, Change& change) {
+  const ObjectId id = placed.belief.id;
+  const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
+  if (!square) return fail("object_invalid", "an object's centre is not a place on the map");
+  const auto known = committed_.find(id);
+  const auto before = known != committed_.end() ? Result<Row>(known->second) : rowOf(id);
+  if (!before) return failed(before.error());
+  if (before->gone && *before->gone >= now) {
+    change.shut_out.insert(id);
+    return {};
+  }
+  const Bytes bytes = encodeBelief(placed.belief);
+  const Row after{digestOf(bytes, placed.world), square, std::nullopt};
+  change.rows[id] = after;
+  if (after.digest == before->digest) return {};
+  if (before->square) change.squares.insert(*before->square);
+  change.squares.insert(*square);
+  return insert(placed, *square, bytes);
+}
+
+Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
+  const TimePoint now = batch.working->stamp.time;
+  for (const auto& [id, placed] : batch.left) {
+    const auto done = put(placed, now, change);
+    if (!done) return done;
+  }
+  for (const auto& belief : batch.working->objects) {
+    if (!belief.confirmed) continue;
+    const auto done = put({batch.working->world, belief}, now, change);
+    if (!done) return done;
+  }
+  return {};
+}
+
+Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
+  const auto row = rowOf(id);
+  if (!row) return failed(row.error());
+  if (!row->square || row->gone) return {};
+  change.squares.insert(*row->square);
+  return runOnce(connection_, "UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1",
+                 asStored(id), static_cast<std::int64_t>(Visibility::kOutOfView),
+                 static_cast<std::int64_t>(Memory::kLongTerm));
+}
+
+Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& change) {
+  const auto row = rowOf(id);
+  if (!row) return failed(row.error());
+  if (!row->square || row->gone) return {};  // never confirmed, or gone before
+  change.squares.insert(*row->square);
+  change.rows.erase(id);
+  const auto done = runOnce(
+      connection_,
+      "UPDATE objects SET gone = ?2, gone_ns = ?3, merged_into = nullif(?4, 0) WHERE id = ?1",
+      asStored(id), 1 + static_cast<std::int64_t>(removal.kind), toNanoseconds(removal.time),
+      asStored(removal.merged_into));
+  if (!done) return done;
+  return runOnce(connection_, "DELETE FROM positions WHERE id = ?1", asStored(id));
+}
+
+Result<void> MapDatabase::putWorking(const Objects& working, const Change& change) {
+  const Bytes header = encodeHeader(working);
+  auto done = runOnce(connection_, "REPLACE INTO meta VALUES('working', ?1)",
+                      std::span<const std::uint8_t>(header));
+  if (done) done = connection_.execute("DELETE FROM working");
+  if (!done) return done;
+  auto insert = connection_.prepare("INSERT INTO working VALUES(?1, ?2, ?3)");
+  if (!insert) return failed(insert.error());
+  std::int64_t position = 0;
+  for (const auto& belief : working.objects) {
+    if (change.shut_out.contains(belief.id)) continue;
+    insert->bind(1, position++).bindId(2, belief.id);
+    if (change.rows.contains(belief.id)) {
+      insert->bindNull(3);
+    } else {
+      insert->bind(3, std::span<const std::uint8_t>(encodeBelief(belief)));
+    }
+    done = insert->run();
+    if (!done) return done;
+  }
+  return {};
+}
+
+Result<Written> MapDatabase::write(const Batch& batch) {
+  check(batch.working != nullptr, "a batch has a working set");
+  auto transaction = Transaction::begin(connection_);
+  if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  Change change;
+  auto written = putAll(batch, change);
+  if (!written) return written;
+  const auto done = transaction->commit();
+  if (!done) return tl::unexpected<Reason>(done.error());
+  remember(*batch.working, change);
+  return written;
+}
+
+Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
+  auto done = putObjects(batch, change);
+  std::set<ObjectId> alive, away;
+  for (const auto& belief : batch.working->objects) alive.insert(belief.id);
+  for (const auto& [id, row] : committed_) away.insert(id);
+  for (const auto& [id, placed] : batch.left) away.insert(id);
+  for (const ObjectId id : away) {
+    if (done && !alive.contains(id)) done = markLeft(id, change);
+  }
+  for (const auto& [id, removal] : batch.removed) {
+    if (removal.time < batch.working->stamp.time && alive.contains(id)) continue;
+    if (done) done = remove(id, removal, change);
+    change.shut_out.insert(id);
+  }
+  if (done) done = putWorking(*batch.working, change);
+  if (!done) return tl::unexpected<Reason>(done.error());
+  return nextRevision(change);
+}
+
+Result<Written> MapDatabase::nextRevision(const Change& change) {
+  const auto revision = reader().revision();
+  if (!revision) return tl::unexpected<Reason>(revision.error());
+  Written written{{change.squares.begin(), change.squares.end()}, *revision};
+  if (change.squares.empty()) return written;
+  ++written.revision;
+  const auto done =
+      runOnce(connection_, "REPLACE INTO meta VALUES('revision', ?1)", asStored(written.revision));
+  if (!done) return tl::unexpected<Reason>(done.error());
+  return written;
+}
+
+void MapDatabase::remember(const Objects& working, const Change& change) {
+  committed_.clear();
+  for (const auto& belief : working.objects) {
+    const auto row = change.rows.find(belief.id);
+    if (row != change.rows.end()) committed_.insert(*row);
+  }
+}
+
+}  // namespace perdure::map_store

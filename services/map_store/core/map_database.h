@@ -1,0 +1,122 @@
+// The durable map: what was confirmed, the newest working set, and answers to questions about them.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/types/map.h"
+#include "common/types/objects.h"
+#include "services/map_store/core/belief_codec.h"
+#include "services/map_store/core/schema.h"
+#include "services/map_store/core/sqlite.h"
+
+namespace perdure::map_store {
+
+/// A square of the map, tile_size_m wide: [x, x + 1) × [y, y + 1) times the size.
+struct Square {
+  std::int32_t x = 0, y = 0;
+  auto operator<=>(const Square&) const = default;
+};
+
+struct PlacedBelief {
+  WorldId world;
+  ObjectBelief belief;
+};
+
+/// Why an object is no longer on the map: kGone, or kMerged into another.
+struct Removal {
+  EventKind kind = EventKind::kGone;
+  TimePoint time;
+  ObjectId merged_into = 0;
+};
+
+/// What one commit writes. `left`: last beliefs of confirmed objects that left the working set.
+struct Batch {
+  const Objects* working = nullptr;  ///< not null
+  std::map<ObjectId, PlacedBelief> left;
+  std::map<ObjectId, Removal> removed;
+};
+
+struct Written {
+  std::vector<Square> squares;  ///< whose contents changed, each once
+  std::uint64_t revision = 0;
+};
+
+struct Found {
+  std::vector<MapObject> objects;
+  bool truncated = false;
+  std::uint64_t malformed = 0;  ///< rows whose belief could not be read; left out
+};
+
+/// Where the centre of a belief lies on the map; nothing where it is not finite or too far away.
+std::optional<Square> squareOf(const Eigen::Vector3d& p, double tile_size_m);
+MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world);
+
+/// Questions about a map file. Spatial ones concern one frame of reference.
+class MapReader {
+ public:
+  explicit MapReader(const Connection* connection) : connection_(connection) {}
+
+  /// Of kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id); at most `limit`.
+  /// kByRadius and kByBox look in query.world, or where that is 0 in `newest`.
+  Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
+  Result<Found> inSquare(const Square& square) const;
+  Result<std::map<Square, std::uint32_t>> squares() const;  ///< with counts of objects
+  /// The working set as it was at the last commit; nothing on an empty map.
+  Result<std::optional<Objects>> working() const;
+  Result<std::uint64_t> revision() const;
+  Result<ObjectId> largestId() const;
+
+ private:
+  const Connection* connection_;
+};
+
+class MapDatabase {
+ public:
+  /// Throws StartupError.
+  explicit MapDatabase(const StoreOptions& options);
+
+  /// All of it or nothing, durable when it returns. Beliefs that did not change are not written;
+  /// nor are those of objects removed at `working`'s time or later.
+  Result<Written> write(const Batch& batch);
+
+  MapReader reader() const { return MapReader(&connection_); }
+  const std::string& notice() const { return notice_; }
+
+ private:
+  /// What the file holds of one object.
+  struct Row {
+    std::uint64_t digest = 0;      ///< of the belief; 0: not known
+    std::optional<Square> square;  ///< nothing: not in the file
+    std::optional<TimePoint> gone;
+  };
+  struct Change;  ///< what one write has done so far
+
+  MapDatabase(OpenedStore opened, const StoreOptions& options);
+  Result<void> keepTileSize();
+  Result<void> retile();
+  Result<void> rememberWorking();
+  Result<Row> rowOf(ObjectId id) const;
+  Result<void> put(const PlacedBelief& placed, TimePoint now, Change& change);
+  Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes);
+  Result<void> putObjects(const Batch& batch, Change& change);
+  Result<void> markLeft(ObjectId id, Change& change);
+  Result<void> remove(ObjectId id, const Removal& removal, Change& change);
+  Result<void> putWorking(const Objects& working, const Change& change);
+  Result<Written> putAll(const Batch& batch, Change& change);
+  Result<Written> nextRevision(const Change& change);
+  void remember(const Objects& working, const Change& change);
+
+  Connection connection_;
+  std::string notice_;
+  double tile_size_m_;
+  /// Of the confirmed objects of the working set, as committed.
+  std::map<ObjectId, Row> committed_;
+};
+
+}  // namespace perdure::map_store

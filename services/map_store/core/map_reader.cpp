@@ -1,0 +1,205 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "services/map_store/core/map_database.h"
+
+namespace perdure::map_store {
+namespace {
+
+constexpr char kColumns[] = "SELECT o.world, o.epoch, o.visibility, o.memory, o.belief ";
+constexpr char kInBox[] =
+    "FROM positions p JOIN objects o ON o.id = p.id WHERE p.x1 >= ?1 AND p.x0 <= ?2 AND "
+    "p.y1 >= ?3 AND p.y0 <= ?4 AND p.z1 >= ?5 AND p.z0 <= ?6 AND "
+    "o.world = ?7 AND o.epoch = ?8 AND o.gone = 0 ";
+
+Result<MapObject> objectFrom(const Statement& row) {
+  auto belief = decodeBelief(row.blob(4));
+  if (!belief) return tl::unexpected<Reason>(belief.error());
+  belief->visibility = static_cast<Visibility>(std::clamp<std::int64_t>(row.integer(2), 0, 4));
+  belief->memory = row.integer(3) == 0 ? Memory::kWorking : Memory::kLongTerm;
+  return mapObjectOf(*belief, WorldId{row.id(0), static_cast<std::uint32_t>(row.integer(1))});
+}
+
+/// Reads rows up to `limit`, and one more to know whether there are more.
+Result<Found> collect(Statement& statement, std::size_t limit) {
+  Found found;
+  for (;;) {
+    const auto row = statement.step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return found;
+    if (found.objects.size() == limit) {
+      found.truncated = true;
+      statement.reset();
+      return found;
+    }
+    auto object = objectFrom(statement);
+    if (object) {
+      found.objects.push_back(std::move(*object));
+    } else {
+      ++found.malformed;
+    }
+  }
+}
+
+void bindBox(Statement& statement, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+             const WorldId& world) {
+  for (int axis = 0; axis < 3; ++axis) {
+    statement.bind(1 + 2 * axis, low[axis]).bind(2 + 2 * axis, high[axis]);
+  }
+  statement.bindId(7, world.world).bind(8, static_cast<std::int64_t>(world.epoch));
+}
+
+Result<Statement> byBox(const Connection& connection, const MapQuery& query, const WorldId& world) {
+  // The tree holds single-precision bounds that enclose the points: the columns decide.
+  auto statement = connection.prepare(std::string(kColumns) + kInBox +
+                                      "AND o.x BETWEEN ?1 AND ?2 AND o.y BETWEEN ?3 AND ?4 AND "
+                                      "o.z BETWEEN ?5 AND ?6 ORDER BY o.id");
+  if (statement) bindBox(*statement, query.low, query.high, world);
+  return statement;
+}
+
+Result<Statement> byRadius(const Connection& connection, const MapQuery& query,
+                           const WorldId& world) {
+  constexpr char kSquaredDistance[] =
+      "((o.x - ?9) * (o.x - ?9) + (o.y - ?10) * (o.y - ?10) + (o.z - ?11) * (o.z - ?11))";
+  auto statement = connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
+                                      " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
+  if (!statement) return statement;
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(query.radius);
+  bindBox(*statement, query.low - reach, query.low + reach, world);
+  for (int axis = 0; axis < 3; ++axis) statement->bind(9 + axis, query.low[axis]);
+  statement->bind(12, query.radius * query.radius);
+  return statement;
+}
+
+Result<Statement> statementFor(const Connection& connection, const MapQuery& query,
+                               const WorldId& world) {
+  const std::string from = std::string(kColumns) + "FROM objects o WHERE o.gone = 0 ";
+  switch (query.kind) {
+    case MapQueryKind::kById: {
+      auto statement = connection.prepare(from + "AND o.id = ?1");
+      if (statement) statement->bindId(1, query.object_id);
+      return statement;
+    }
+    case MapQueryKind::kByClass: {
+      auto statement = connection.prepare(from + "AND o.class = ?1 ORDER BY o.id");
+      if (statement) statement->bind(1, std::string_view(query.class_name));
+      return statement;
+    }
+    case MapQueryKind::kByRadius:
+      return byRadius(connection, query, world);
+    case MapQueryKind::kByBox:
+      return byBox(connection, query, world);
+    case MapQueryKind::kAll:
+      return connection.prepare(from + "ORDER BY o.id");
+    case MapQueryKind::kRestore:
+      break;
+  }
+  return fail("query_invalid", "a restore is not a question about the map");
+}
+
+/// The beliefs of the working set; confirmed ones are in `objects`.
+Result<std::vector<ObjectBelief>> workingBeliefs(const Connection& connection) {
+  auto rows = connection.prepare(
+      "SELECT coalesce(w.belief, o.belief) FROM working w LEFT JOIN objects o ON o.id = w.id "
+      "ORDER BY w.position");
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  std::vector<ObjectBelief> beliefs;
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return beliefs;
+    auto belief = decodeBelief(rows->blob(0));
+    if (belief) beliefs.push_back(std::move(*belief));
+  }
+}
+
+}  // namespace
+
+std::optional<Square> squareOf(const Eigen::Vector3d& p, double tile_size_m) {
+  constexpr double kFarthest = 1e9;
+  if (!p.allFinite() || p.cwiseAbs().maxCoeff() > kFarthest * std::min(1.0, tile_size_m)) {
+    return std::nullopt;
+  }
+  return Square{static_cast<std::int32_t>(std::floor(p.x() / tile_size_m)),
+                static_cast<std::int32_t>(std::floor(p.y() / tile_size_m))};
+}
+
+MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world) {
+  MapObject object;
+  object.id = belief.id;
+  object.world = world;
+  object.class_name = belief.best().name;
+  object.existence = belief.existence;
+  object.class_probability = belief.best().probability;
+  object.mean = belief.best().mean;
+  object.covariance = belief.best().covariance;
+  object.first_seen = belief.first_seen;
+  object.last_seen = belief.last_seen;
+  object.hits = belief.hits;
+  object.visibility = belief.visibility;
+  object.memory = belief.memory;
+  return object;
+}
+
+Result<Found> MapReader::find(const MapQuery& query, const WorldId& newest,
+                              std::uint32_t limit) const {
+  const WorldId world = query.world.world != 0 ? query.world : newest;
+  auto statement = statementFor(*connection_, query, world);
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  return collect(*statement, limit);
+}
+
+Result<Found> MapReader::inSquare(const Square& square) const {
+  auto statement = connection_->prepare(
+      std::string(kColumns) +
+      "FROM objects o WHERE o.tile_x = ?1 AND o.tile_y = ?2 AND o.gone = 0 ORDER BY o.id");
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  statement->bind(1, std::int64_t{square.x}).bind(2, std::int64_t{square.y});
+  return collect(*statement, SIZE_MAX);
+}
+
+Result<std::map<Square, std::uint32_t>> MapReader::squares() const {
+  auto rows = connection_->prepare(
+      "SELECT tile_x, tile_y, count(*) FROM objects WHERE gone = 0 GROUP BY tile_x, tile_y");
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  std::map<Square, std::uint32_t> squares;
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return squares;
+    const Square square{static_cast<std::int32_t>(rows->integer(0)),
+                        static_cast<std::int32_t>(rows->integer(1))};
+    squares[square] = static_cast<std::uint32_t>(rows->integer(2));
+  }
+}
+
+Result<std::optional<Objects>> MapReader::working() const {
+  auto header = connection_->prepare("SELECT value FROM meta WHERE key = 'working'");
+  if (!header) return tl::unexpected<Reason>(header.error());
+  const auto row = header->step();
+  if (!row) return tl::unexpected<Reason>(row.error());
+  if (!*row) return std::optional<Objects>();
+  auto working = decodeHeader(header->blob(0));
+  if (!working) return tl::unexpected<Reason>(working.error());
+  auto beliefs = workingBeliefs(*connection_);
+  if (!beliefs) return tl::unexpected<Reason>(beliefs.error());
+  working->objects = std::move(*beliefs);
+  return std::optional<Objects>(std::move(*working));
+}
+
+Result<std::uint64_t> MapReader::revision() const {
+  const auto value =
+      connection_->integer("SELECT coalesce((SELECT value FROM meta WHERE key = 'revision'), 0)");
+  if (!value) return tl::unexpected<Reason>(value.error());
+  return static_cast<std::uint64_t>(*value);
+}
+
+Result<ObjectId> MapReader::largestId() const {
+  const auto value = connection_->integer("SELECT coalesce(max(id), 0) FROM objects");
+  if (!value) return tl::unexpected<Reason>(value.error());
+  return static_cast<ObjectId>(*value);
+}
+
+}  // namespace perdure::map_store

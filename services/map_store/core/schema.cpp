@@ -1,0 +1,198 @@
+#include "services/map_store/core/schema.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "common/base/errors.h"
+
+namespace perdure::map_store {
+namespace {
+
+namespace fs = std::filesystem;
+
+// One row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind that ended it;
+// the row then stays as history. `belief` is what core/belief_codec.h says; the other columns are
+// there to be asked for. `tile_*` follow from x, y and meta.tile_size_m.
+constexpr char kSchema[] = R"sql(
+CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
+CREATE TABLE objects(
+  id INTEGER PRIMARY KEY, world INTEGER NOT NULL, epoch INTEGER NOT NULL,
+  class TEXT NOT NULL, class_probability REAL NOT NULL, existence REAL NOT NULL,
+  x REAL NOT NULL, y REAL NOT NULL, z REAL NOT NULL, yaw REAL NOT NULL,
+  length REAL NOT NULL, width REAL NOT NULL, height REAL NOT NULL,
+  first_seen_ns INTEGER NOT NULL, last_seen_ns INTEGER NOT NULL, hits INTEGER NOT NULL,
+  visibility INTEGER NOT NULL, memory INTEGER NOT NULL,
+  tile_x INTEGER NOT NULL, tile_y INTEGER NOT NULL,
+  gone INTEGER NOT NULL DEFAULT 0, gone_ns INTEGER, merged_into INTEGER,
+  belief BLOB NOT NULL);
+CREATE INDEX objects_by_class ON objects(class);
+CREATE INDEX objects_by_tile ON objects(tile_x, tile_y);
+CREATE VIRTUAL TABLE positions USING rtree(id, x0, x1, y0, y1, z0, z1);
+CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief BLOB);
+)sql";
+
+[[noreturn]] void cannotUse(const std::string& path, const Reason& reason) {
+  throw StartupError(ExitCode::kUnavailable,
+                     "The map " + path + " cannot be used (" + reason.code + ": " + reason.detail +
+                         "); set store.path to a file in a folder that this user may write.");
+}
+
+bool damaged(const Reason& reason) {
+  return reason.code == "corrupt" || reason.code == "not_a_database";
+}
+
+/// A file that begins neither like SQLite nor with zeros was put there by someone else.
+bool beginsLikeAnotherFile(const std::string& path) {
+  static constexpr std::array<char, 16> kMagic = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
+                                                  'o', 'r', 'm', 'a', 't', ' ', '3', '\0'};
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 16> head{};
+  file.read(head.data(), head.size());
+  const auto end = head.begin() + file.gcount();
+  return !std::equal(head.begin(), end, kMagic.begin()) &&
+         !std::all_of(head.begin(), end, [](char c) { return c == '\0'; });
+}
+
+/// The name that the damaged file has now.
+std::string setAside(const std::string& path) {
+  int number = 1;
+  while (fs::exists(path + ".damaged-" + std::to_string(number))) ++number;
+  const std::string aside = path + ".damaged-" + std::to_string(number);
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    if (fs::exists(path + suffix)) fs::rename(path + suffix, aside + suffix);
+  }
+  return aside;
+}
+
+Result<void> wholeFileIsSound(const Connection& connection) {
+  auto statement = connection.prepare("PRAGMA quick_check(1)");
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  const auto row = statement->step();
+  if (!row) return tl::unexpected<Reason>(row.error());
+  if (*row && statement->text(0) == "ok") return {};
+  return fail("corrupt", *row ? statement->text(0) : "no answer to the check");
+}
+
+struct Identity {
+  std::int64_t application = 0, version = 0, tables = 0;
+  bool empty() const { return application == 0 && version == 0 && tables == 0; }
+};
+
+Result<Identity> identityOf(const Connection& connection) {
+  Identity identity;
+  const auto application = connection.integer("PRAGMA application_id");
+  const auto version = connection.integer("PRAGMA user_version");
+  const auto tables = connection.integer("SELECT count(*) FROM sqlite_master");
+  for (const auto* value : {&application, &version, &tables}) {
+    if (!*value) return tl::unexpected<Reason>(value->error());
+  }
+  return Identity{*application, *version, *tables};
+}
+
+void refuseForeign(const std::string& path, const Identity& identity) {
+  if (identity.application != kApplicationId) {
+    throw StartupError(ExitCode::kConfiguration,
+                       path +
+                           " is another program's database, not a map of Perdure's; set "
+                           "store.path to another file.");
+  }
+  if (identity.version > kSchemaVersion) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "The map " + path + " has schema " + std::to_string(identity.version) +
+                           ", this program knows up to " + std::to_string(kSchemaVersion) +
+                           "; use the newer Perdure, or set store.path to another file.");
+  }
+}
+
+Result<void> prepareForWriting(const Connection& connection, const StoreOptions& options) {
+  // FULL: a commit is on the disk when it returns, after a loss of power too.
+  auto done = connection.execute(
+      "PRAGMA busy_timeout=250; PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;"
+      "PRAGMA journal_size_limit=16777216;");
+  if (!done || options.max_size_mb == 0) return done;
+  const auto page = connection.integer("PRAGMA page_size");
+  if (!page) return tl::unexpected<Reason>(page.error());
+  const std::int64_t pages = options.max_size_mb * (1 << 20) / *page;
+  return connection.execute("PRAGMA max_page_count=" + std::to_string(pages));
+}
+
+Result<void> create(const Connection& connection) {
+  auto transaction = Transaction::begin(connection);
+  if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  const auto made = connection.execute(
+      std::string(kSchema) + "PRAGMA application_id=" + std::to_string(kApplicationId) +
+      "; PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
+  if (!made) return made;
+  return transaction->commit();
+}
+
+/// A reason where the file is damaged; StartupError where it is not ours.
+Result<Connection> tryOpen(const StoreOptions& options) {
+  auto connection = Connection::open(options.path, Connection::Mode::kReadWriteCreate);
+  if (!connection) return connection;
+  const auto identity = identityOf(*connection);
+  if (!identity) return tl::unexpected<Reason>(identity.error());
+  if (!identity->empty()) refuseForeign(options.path, *identity);
+  if (options.check_at_start) {
+    const auto sound = wholeFileIsSound(*connection);
+    if (!sound) return tl::unexpected<Reason>(sound.error());
+  }
+  const auto prepared = prepareForWriting(*connection, options);
+  if (!prepared) return tl::unexpected<Reason>(prepared.error());
+  if (identity->empty()) {
+    const auto created = create(*connection);
+    if (!created) return tl::unexpected<Reason>(created.error());
+  }
+  return connection;
+}
+
+void makeFolderOf(const std::string& path) {
+  const fs::path folder = fs::absolute(path).parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) cannotUse(path, {"cannot_open", folder.string() + ": " + error.message()});
+}
+
+}  // namespace
+
+OpenedStore openStore(const StoreOptions& options) {
+  makeFolderOf(options.path);
+  auto opened = tryOpen(options);
+  if (opened) return {std::move(*opened), {}};
+  const Reason reason = opened.error();
+  if (!damaged(reason)) cannotUse(options.path, reason);
+  if (beginsLikeAnotherFile(options.path)) {
+    throw StartupError(ExitCode::kConfiguration,
+                       options.path + " is not a database; set store.path to another file.");
+  }
+  const std::string aside = setAside(options.path);
+  opened = tryOpen(options);
+  if (!opened) cannotUse(options.path, opened.error());
+  return {std::move(*opened),
+          "The map was damaged (" + reason.detail + ") and is now " + aside +
+              "; a new one was begun. What can be read of the old one: sqlite3 " + aside +
+              " .recover"};
+}
+
+Connection openStoreForReading(const std::string& path) {
+  if (!fs::exists(path)) {
+    throw StartupError(ExitCode::kUnavailable, "There is no map " + path +
+                                                   "; give the file that "
+                                                   "map_store writes (its store.path).");
+  }
+  auto connection = Connection::open(path, Connection::Mode::kReadOnly);
+  if (!connection) cannotUse(path, connection.error());
+  const auto identity = identityOf(*connection);
+  if (!identity) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "The map " + path + " cannot be read (" + identity.error().detail + ").");
+  }
+  refuseForeign(path, *identity);
+  (void)connection->execute("PRAGMA busy_timeout=1000");
+  return std::move(*connection);
+}
+
+}  // namespace perdure::map_store

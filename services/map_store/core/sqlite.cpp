@@ -1,0 +1,187 @@
+#include "services/map_store/core/sqlite.h"
+
+#include <sqlite3.h>
+
+#include <string>
+
+#include "common/base/check.h"
+
+namespace perdure::map_store {
+namespace {
+
+tl::unexpected<Reason> failure(int code, sqlite3* connection) {
+  return tl::unexpected<Reason>(
+      reasonOf(code, connection != nullptr ? sqlite3_errmsg(connection) : sqlite3_errstr(code)));
+}
+
+void mustBind(int code) { check(code == SQLITE_OK, "a value is bound to a parameter that exists"); }
+
+}  // namespace
+
+Reason reasonOf(int code, std::string_view detail) {
+  const char* word = "database_error";
+  switch (code & 0xff) {
+    case SQLITE_FULL:
+      word = "disk_full";
+      break;
+    case SQLITE_READONLY:
+      word = "read_only";
+      break;
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      word = "busy";
+      break;
+    case SQLITE_CORRUPT:
+      word = "corrupt";
+      break;
+    case SQLITE_NOTADB:
+      word = "not_a_database";
+      break;
+    case SQLITE_CANTOPEN:
+      word = "cannot_open";
+      break;
+    case SQLITE_IOERR:
+      word = "io_error";
+      break;
+    case SQLITE_CONSTRAINT:
+      word = "constraint";
+      break;
+    default:
+      break;
+  }
+  return {word, std::string(detail)};
+}
+
+void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+Statement& Statement::bind(int index, std::int64_t value) {
+  mustBind(sqlite3_bind_int64(statement_.get(), index, value));
+  return *this;
+}
+
+Statement& Statement::bind(int index, double value) {
+  mustBind(sqlite3_bind_double(statement_.get(), index, value));
+  return *this;
+}
+
+Statement& Statement::bind(int index, std::string_view value) {
+  mustBind(sqlite3_bind_text(statement_.get(), index, value.data(), static_cast<int>(value.size()),
+                             SQLITE_TRANSIENT));
+  return *this;
+}
+
+Statement& Statement::bind(int index, std::span<const std::uint8_t> value) {
+  mustBind(sqlite3_bind_blob(statement_.get(), index, value.data(), static_cast<int>(value.size()),
+                             SQLITE_TRANSIENT));
+  return *this;
+}
+
+Statement& Statement::bindNull(int index) {
+  mustBind(sqlite3_bind_null(statement_.get(), index));
+  return *this;
+}
+
+Statement& Statement::bindId(int index, std::uint64_t value) {
+  return bind(index, static_cast<std::int64_t>(value));
+}
+
+Result<bool> Statement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) return true;
+  sqlite3* connection = sqlite3_db_handle(statement_.get());
+  if (code == SQLITE_DONE) {
+    reset();
+    return false;
+  }
+  auto error = failure(code, connection);
+  reset();
+  return error;
+}
+
+Result<void> Statement::run() {
+  for (;;) {
+    const auto row = step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return {};
+  }
+}
+
+void Statement::reset() {
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
+}
+
+std::int64_t Statement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+double Statement::real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+
+std::string Statement::text(int column) const {
+  const auto* bytes = sqlite3_column_text(statement_.get(), column);
+  return bytes == nullptr ? std::string() : std::string(reinterpret_cast<const char*>(bytes));
+}
+
+std::span<const std::uint8_t> Statement::blob(int column) const {
+  const auto* bytes =
+      static_cast<const std::uint8_t*>(sqlite3_column_blob(statement_.get(), column));
+  return {bytes, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+bool Statement::isNull(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
+void Connection::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
+
+Result<Connection> Connection::open(const std::string& path, Mode mode) {
+  sqlite3* raw = nullptr;
+  const int flags =
+      mode == Mode::kReadOnly ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int code = sqlite3_open_v2(path.c_str(), &raw, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  Connection connection(raw);
+  if (code != SQLITE_OK) return failure(code, raw);
+  sqlite3_extended_result_codes(raw, 1);
+  return connection;
+}
+
+Result<Statement> Connection::prepare(std::string_view sql) const {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v2(connection_.get(), sql.data(), static_cast<int>(sql.size()),
+                                      &statement, nullptr);
+  if (code != SQLITE_OK) return failure(code, connection_.get());
+  return Statement(statement);
+}
+
+Result<void> Connection::execute(const std::string& sql) const {
+  const int code = sqlite3_exec(connection_.get(), sql.c_str(), nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) return failure(code, connection_.get());
+  return {};
+}
+
+Result<std::int64_t> Connection::integer(std::string_view sql) const {
+  auto statement = prepare(sql);
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  const auto row = statement->step();
+  if (!row) return tl::unexpected<Reason>(row.error());
+  if (!*row) return fail("database_error", "a query that must have one row has none");
+  return statement->integer(0);
+}
+
+Result<Transaction> Transaction::begin(const Connection& connection) {
+  const auto begun = connection.execute("BEGIN IMMEDIATE");
+  if (!begun) return tl::unexpected<Reason>(begun.error());
+  return Transaction(&connection);
+}
+
+Transaction::~Transaction() {
+  if (connection_ != nullptr) (void)connection_->execute("ROLLBACK");
+}
+
+Result<void> Transaction::commit() {
+  const auto committed = connection_->execute("COMMIT");
+  if (committed) connection_ = nullptr;
+  return committed;
+}
+
+}  // namespace perdure::map_store

@@ -1,0 +1,92 @@
+// SQLite behind RAII: a connection, prepared statements, a transaction that rolls back by itself.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/base/result.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace perdure::map_store {
+
+/// The reason of an SQLite result code: "disk_full", "read_only", "busy", "corrupt",
+/// "not_a_database", "cannot_open", "io_error", "constraint" or "database_error"; the detail is
+/// SQLite's sentence.
+Reason reasonOf(int code, std::string_view detail);
+
+/// One prepared statement. Bind from 1, read columns from 0. Valid while its connection lives.
+class Statement {
+ public:
+  Statement() = default;
+
+  Statement& bind(int index, std::int64_t value);
+  Statement& bind(int index, double value);
+  Statement& bind(int index, std::string_view value);
+  Statement& bind(int index, std::span<const std::uint8_t> value);
+  Statement& bindNull(int index);
+  Statement& bindId(int index, std::uint64_t value);  ///< stored as the same 64 bits
+
+  /// True: there is a row; false: done (and reset for the next use).
+  Result<bool> step();
+  /// Runs to the end and resets; bindings are cleared.
+  Result<void> run();
+  void reset();
+
+  std::int64_t integer(int column) const;
+  std::uint64_t id(int column) const { return static_cast<std::uint64_t>(integer(column)); }
+  double real(int column) const;
+  std::string text(int column) const;
+  /// Valid until the next step or reset.
+  std::span<const std::uint8_t> blob(int column) const;
+  bool isNull(int column) const;
+
+ private:
+  friend class Connection;
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  explicit Statement(sqlite3_stmt* statement) : statement_(statement) {}
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+class Connection {
+ public:
+  enum class Mode { kReadWriteCreate, kReadOnly };
+  static Result<Connection> open(const std::string& path, Mode mode);
+
+  Result<Statement> prepare(std::string_view sql) const;
+  /// Runs statements without results, separated by semicolons.
+  Result<void> execute(const std::string& sql) const;
+  /// The first column of the first row of a query that has one.
+  Result<std::int64_t> integer(std::string_view sql) const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* connection) const;
+  };
+  explicit Connection(sqlite3* connection) : connection_(connection) {}
+  std::unique_ptr<sqlite3, Close> connection_;
+};
+
+/// Rolls back at the end of its scope unless it was committed.
+class Transaction {
+ public:
+  static Result<Transaction> begin(const Connection& connection);
+  ~Transaction();
+  Transaction(Transaction&& other) noexcept : connection_(other.connection_) {
+    other.connection_ = nullptr;
+  }
+  Transaction& operator=(Transaction&&) = delete;
+  Result<void> commit();
+
+ private:
+  explicit Transaction(const Connection* connection) : connection_(connection) {}
+  const Connection* connection_;
+};
+
+}  // namespace perdure::map_store

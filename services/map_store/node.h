@@ -1,0 +1,85 @@
+// Long-term memory: keeps what semantic_filter confirmed, publishes it as tiles, answers questions,
+// and gives a filter that starts anew its working set back (paper, lines on long-term memory).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "common/base/ids.h"
+#include "common/base/result.h"
+#include "common/base/sink.h"
+#include "common/types/map.h"
+#include "common/types/objects.h"
+#include "services/map_store/config.h"
+#include "services/map_store/core/map_database.h"
+#include "services/map_store/core/reply_cache.h"
+#include "services/map_store/core/tile_book.h"
+
+namespace perdure::map_store {
+
+/// Ids that a restored filter leaves out, because the last ones given may not have been written.
+inline constexpr ObjectId kIdReserve = 4096;
+
+struct Outputs {
+  Sink<MapTile> tile;
+  Sink<MapTile> emptied;  ///< a key to dispose of
+  Sink<MapHeader> header;
+  Sink<MapReply> reply;
+  Sink<Recalled> recalled;
+};
+
+class Node {
+ public:
+  /// Opens the map. Throws StartupError.
+  Node(const Config& config, InstanceId instance, Outputs outputs);
+
+  void onObjects(const Objects& objects);
+  void onEvent(const Event& event);
+  void onQuery(const MapQuery& query);
+  /// Commits and publishes what is due. `now`: a monotonic time since any origin; call it ten
+  /// times a second or more often.
+  void tick(Duration now);
+  /// Commits what is left. Call it before the end.
+  void flush();
+
+  const ReasonCounts& reasons() const { return reasons_; }
+  /// What a person should know: a sentence with the mend, or nothing.
+  std::string trouble() const { return failure_.empty() ? notice_ : failure_; }
+  std::uint64_t received() const { return received_; }
+  std::uint64_t commits() const { return commits_; }
+
+ private:
+  void leaveBehind(const Objects& next);
+  bool acceptable(const ObjectBelief& belief);
+  void commit();
+  void publish();
+  void publishSquare(const Square& square);
+  MapReply answer(const MapQuery& query);
+  void restore(const MapQuery& query);
+  const Objects* workingSetFor(const MapQuery& query) const;
+  void blame(const Reason& reason);
+
+  const Config config_;
+  const InstanceId instance_;
+  const Outputs outputs_;
+  MapDatabase database_;
+  ReplyCache replies_;
+  TileBook tiles_;
+  std::set<Square> stale_squares_;
+  std::optional<Objects> newest_;    ///< as received, or as loaded
+  std::optional<Objects> previous_;  ///< the last one of the filter before this one
+  std::map<ObjectId, PlacedBelief> left_;
+  std::map<ObjectId, Removal> removed_;
+  ObjectId next_id_ = 1;
+  std::uint64_t revision_ = 0;
+  bool dirty_ = false, published_once_ = false, header_stale_ = false;
+  std::optional<Duration> committed_at_, published_at_;
+  ReasonCounts reasons_;
+  std::string notice_, failure_;
+  std::uint64_t received_ = 0, commits_ = 0;
+};
+
+}  // namespace perdure::map_store

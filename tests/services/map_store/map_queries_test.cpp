@@ -1,0 +1,197 @@
+// Answers of the R*Tree against a walk over all objects.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "services/map_store/core/map_database.h"
+#include "tests/services/map_store/beliefs.h"
+
+namespace perdure::map_store {
+namespace {
+
+using test::carAt;
+using test::TemporaryFolder;
+using test::workingSet;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr WorldId kWorld{77, 1};
+
+std::vector<ObjectId> idsOf(const Found& found) {
+  std::vector<ObjectId> ids;
+  for (const auto& object : found.objects) ids.push_back(object.id);
+  return ids;
+}
+
+class MapQueries : public ::testing::Test {
+ protected:
+  MapQueries() {
+    std::mt19937 random(5);
+    // On a coarse grid, so that many centres lie exactly on the limits of the questions.
+    std::uniform_int_distribution<int> grid(-40, 40);
+    std::vector<ObjectBelief> cars;
+    for (ObjectId id = 1; id <= 400; ++id) {
+      const Eigen::Vector3d p(0.5 * grid(random), 0.5 * grid(random), 0.1 * grid(random));
+      cars.push_back(carAt(id, p, id % 3 == 0 ? "chair" : "car"));
+    }
+    all_ = workingSet(1, cars);
+    EXPECT_TRUE(database_.write({&all_, {}, {}}).has_value());
+  }
+
+  Found ask(const MapQuery& query, std::uint32_t limit = 1000) {
+    auto found = database_.reader().find(query, kWorld, limit);
+    EXPECT_TRUE(found.has_value());
+    return *found;
+  }
+
+  template <class Predicate>
+  std::vector<ObjectId> walk(Predicate matches) const {
+    std::vector<ObjectId> ids;
+    for (const auto& belief : all_.objects) {
+      if (matches(belief)) ids.push_back(belief.id);
+    }
+    return ids;
+  }
+
+  TemporaryFolder folder_;
+  MapDatabase database_{{folder_.file("map.sqlite")}};
+  Objects all_;
+};
+
+TEST_F(MapQueries, FindWithinABoxWhatAWalkFinds) {
+  std::mt19937 random(6);
+  std::uniform_int_distribution<int> grid(-40, 40);
+  std::size_t hits = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    MapQuery query;
+    query.kind = MapQueryKind::kByBox;
+    const Eigen::Vector3d a(0.5 * grid(random), 0.5 * grid(random), 0.1 * grid(random));
+    const Eigen::Vector3d b(0.5 * grid(random), 0.5 * grid(random), 0.1 * grid(random));
+    query.low = a.cwiseMin(b);
+    query.high = a.cwiseMax(b);
+    const auto expected = walk([&](const ObjectBelief& belief) {
+      const auto p = belief.best().mean.head<3>().array();
+      return (p >= query.low.array()).all() && (p <= query.high.array()).all();
+    });
+    EXPECT_EQ(idsOf(ask(query)), expected);
+    hits += expected.size();
+  }
+  EXPECT_GT(hits, 1000u);
+}
+
+TEST_F(MapQueries, FindWithinARadiusWhatAWalkFindsNearestFirst) {
+  std::mt19937 random(7);
+  std::uniform_int_distribution<int> grid(-40, 40);
+  for (int trial = 0; trial < 200; ++trial) {
+    MapQuery query;
+    query.kind = MapQueryKind::kByRadius;
+    query.low = {0.5 * grid(random), 0.5 * grid(random), 0.0};
+    query.radius = 0.25 * (1 + trial % 40);
+    const auto distance = [&](ObjectId id) {
+      const Eigen::Vector3d d = all_.objects[id - 1].best().mean.head<3>() - query.low;
+      return d.x() * d.x() + d.y() * d.y() + d.z() * d.z();
+    };
+    auto expected = walk([&](const ObjectBelief& belief) {
+      return distance(belief.id) <= query.radius * query.radius;
+    });
+    std::stable_sort(expected.begin(), expected.end(),
+                     [&](ObjectId a, ObjectId b) { return distance(a) < distance(b); });
+    EXPECT_EQ(idsOf(ask(query)), expected);
+  }
+}
+
+TEST_F(MapQueries, FindByIdByClassAndAll) {
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = 123;
+  EXPECT_THAT(idsOf(ask(query)), ElementsAre(123u));
+  query.object_id = 1000;
+  EXPECT_THAT(idsOf(ask(query)), IsEmpty());
+  query.kind = MapQueryKind::kByClass;
+  query.class_name = "chair";
+  EXPECT_EQ(idsOf(ask(query)), walk([](const ObjectBelief& b) { return b.id % 3 == 0; }));
+  query.kind = MapQueryKind::kAll;
+  EXPECT_EQ(ask(query).objects.size(), 400u);
+}
+
+TEST_F(MapQueries, SayWhenMoreMatchedThanTheLimit) {
+  MapQuery query;
+  query.kind = MapQueryKind::kAll;
+  EXPECT_TRUE(ask(query, 399).truncated);
+  EXPECT_EQ(ask(query, 399).objects.size(), 399u);
+  EXPECT_FALSE(ask(query, 400).truncated);
+}
+
+TEST_F(MapQueries, LookForPlacesInOneFrameOfReferenceOnly) {
+  Objects elsewhere = workingSet(2, {carAt(900, {0, 0, 0})});
+  elsewhere.world = {77, 2};
+  ASSERT_TRUE(database_.write({&elsewhere, {}, {}}).has_value());
+  MapQuery query;
+  query.kind = MapQueryKind::kByRadius;
+  query.radius = 0.2;
+  query.world = {77, 2};
+  EXPECT_THAT(idsOf(ask(query)), ElementsAre(900u));
+  query.world = kWorld;
+  EXPECT_THAT(idsOf(ask(query)), ::testing::Not(::testing::Contains(900u)));
+}
+
+TEST_F(MapQueries, CarryTheWholeObject) {
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = 9;
+  const MapObject object = ask(query).objects.at(0);
+  const ObjectBelief& belief = all_.objects[8];
+  EXPECT_EQ(object.mean, belief.best().mean);
+  EXPECT_EQ(object.covariance, belief.best().covariance);
+  EXPECT_EQ(object.world, kWorld);
+  EXPECT_EQ(object.class_name, "chair");
+  EXPECT_EQ(object.hits, 7u);
+  EXPECT_EQ(object.memory, Memory::kWorking);
+}
+
+TEST_F(MapQueries, ShowObjectsThatLeftTheWorkingSetAsRemembered) {
+  const Objects fewer = workingSet(2, {all_.objects[0]});
+  ASSERT_TRUE(database_.write({&fewer, {}, {}}).has_value());
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = 2;
+  EXPECT_EQ(ask(query).objects.at(0).memory, Memory::kLongTerm);
+  EXPECT_EQ(ask(query).objects.at(0).visibility, Visibility::kOutOfView);
+  query.object_id = 1;
+  EXPECT_EQ(ask(query).objects.at(0).memory, Memory::kWorking);
+}
+
+TEST_F(MapQueries, ForgetObjectsThatAreGoneAndRefuseTheirLateBeliefs) {
+  Objects later = workingSet(3, {});
+  const TimePoint gone_at = fromNanoseconds(250'000'000);
+  ASSERT_TRUE(database_.write({&later, {}, {{5, {EventKind::kGone, gone_at, 0}}}}).has_value());
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = 5;
+  EXPECT_THAT(idsOf(ask(query)), IsEmpty());
+  const Objects late = workingSet(2, {all_.objects[4]});
+  ASSERT_TRUE(database_.write({&late, {}, {}}).has_value());
+  EXPECT_THAT(idsOf(ask(query)), IsEmpty());
+  EXPECT_TRUE(database_.reader().working().value()->objects.empty());
+  const Objects newer = workingSet(4, {all_.objects[4]});
+  ASSERT_TRUE(database_.write({&newer, {}, {}}).has_value());
+  EXPECT_THAT(idsOf(ask(query)), ElementsAre(5u));
+}
+
+TEST_F(MapQueries, StayTheSameWhenTheTileSizeChanges) {
+  const std::string path = folder_.file("map.sqlite");
+  const MapDatabase coarse({path, 1000.0});
+  EXPECT_EQ(coarse.reader().squares().value().size(), 4u);
+  const MapDatabase fine({path, 10.0});
+  std::size_t objects = 0;
+  const auto squares = fine.reader().squares();
+  for (const auto& [square, count] : *squares) {
+    EXPECT_EQ(fine.reader().inSquare(square).value().objects.size(), count);
+    objects += count;
+  }
+  EXPECT_EQ(objects, 400u);
+}
+
+}  // namespace
+}  // namespace perdure::map_store
