@@ -66,6 +66,15 @@ struct Objects {
   std::vector<ObjectBelief> objects;
 };
 
+/// The newest state of one object of the working set; latched on `object_state`, keyed by its id,
+/// and disposed when the object is gone or merged away.
+struct ObjectState {
+  FrameStamp stamp;
+  InstanceId instance = 0;
+  WorldId world;
+  ObjectBelief object;
+};
+
 enum class EventKind : std::uint8_t {
   kBorn = 0, kConfirmed, kClassResolved, kOccluded, kLeftView, kReappeared, kMerged, kArchived,
   kRecalled, kMissing, kGone, kMoved, kPredictedReturn, kModelChanged, kRestored,

@@ -1,0 +1,42 @@
+// What a message may hold: unbounded in the IDL, bounded here, where a refusal can be counted.
+#pragma once
+
+#include <cstddef>
+
+namespace perdure::wire {
+
+struct Limits {
+  double low, high;
+};
+
+inline constexpr Limits kProbability{0.0, 1.0};
+inline constexpr Limits kCoordinate{-1e8, 1e8};     ///< metres in W
+inline constexpr Limits kPixel{-1e6, 1e6};          ///< boxes may lie outside the image
+inline constexpr Limits kAngle{-1e3, 1e3};          ///< radians, not necessarily wrapped
+inline constexpr Limits kAngularRate{-1e3, 1e3};    ///< rad/s
+inline constexpr Limits kAcceleration{-1e5, 1e5};   ///< m/s²
+inline constexpr Limits kSpeed{-1e5, 1e5};          ///< m/s
+inline constexpr Limits kMatrixEntry{-1e12, 1e12};  ///< covariances, transitions
+inline constexpr Limits kLogit{-1e6, 1e6};
+inline constexpr Limits kNotNegative{0.0, 1e18};
+inline constexpr Limits kPositive{1e-12, 1e12};
+inline constexpr Limits kLatitudeDeg{-90.0, 90.0};
+inline constexpr Limits kLongitudeDeg{-360.0, 360.0};
+inline constexpr Limits kOffset{-1e3, 1e3};  ///< seconds
+
+inline constexpr std::size_t kNameLength = 256;    ///< bytes: cameras, classes, processes, reasons
+inline constexpr std::size_t kTextLength = 16384;  ///< bytes: messages, details
+inline constexpr std::size_t kImageSide = 16384;   ///< pixels
+inline constexpr std::size_t kImageBytes = 256u << 20;
+inline constexpr std::size_t kCameras = 16;
+inline constexpr std::size_t kCoefficients = 8;
+inline constexpr std::size_t kClasses = 8192;
+inline constexpr std::size_t kDetections = 8192;
+inline constexpr std::size_t kLandmarks = 65536;
+inline constexpr std::size_t kObjects = 16384;
+inline constexpr std::size_t kReplyObjects = 100000;
+inline constexpr std::size_t kReasons = 1024;
+/// Of a quaternion or a unit vector, and of the sum of a PMF.
+inline constexpr double kUnitTolerance = 1e-3;
+
+}  // namespace perdure::wire

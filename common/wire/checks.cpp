@@ -1,0 +1,87 @@
+#include "common/wire/checks.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace perdure::wire {
+namespace {
+
+constexpr double kSymmetry = 1e-6;
+
+bool isSymmetric(const Eigen::Ref<const Eigen::MatrixXd>& P) {
+  const double largest = P.cwiseAbs().maxCoeff();
+  return (P - P.transpose()).cwiseAbs().maxCoeff() <= kSymmetry * largest;
+}
+
+/// The correlations of P; rows without variance must be zero and become rows of the identity.
+/// Empty where P has a negative variance or a covariance without variance.
+Eigen::MatrixXd correlations(const Eigen::Ref<const Eigen::MatrixXd>& P) {
+  Eigen::VectorXd scale(P.rows());
+  for (Eigen::Index i = 0; i < P.rows(); ++i) {
+    const bool zero_row = P.row(i).isZero(0.0);
+    if (!(P(i, i) > 0) && !zero_row) return {};
+    scale[i] = zero_row ? 0.0 : 1.0 / std::sqrt(P(i, i));
+  }
+  Eigen::MatrixXd C = scale.asDiagonal() * P * scale.asDiagonal();
+  C.diagonal().setOnes();
+  return C;
+}
+
+bool hasCholesky(const Eigen::MatrixXd& C) {
+  return C.size() > 0 && C.allFinite() && Eigen::LLT<Eigen::MatrixXd>(C).info() == Eigen::Success;
+}
+
+/// Bytes of the UTF-8 character that begins with `lead`; 0 where none does.
+std::size_t lengthOf(unsigned char lead) {
+  if (lead < 0x80) return 1;
+  if (lead >= 0xc2 && lead < 0xe0) return 2;
+  if (lead >= 0xe0 && lead < 0xf0) return 3;
+  return lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
+}
+
+/// Over-long forms, surrogates and code points beyond U+10FFFF show in the second byte.
+bool secondByteFits(unsigned char lead, unsigned char second) {
+  switch (lead) {
+    case 0xe0: return second >= 0xa0;
+    case 0xed: return second < 0xa0;
+    case 0xf0: return second >= 0x90;
+    case 0xf4: return second < 0x90;
+    default: return true;
+  }
+}
+
+}  // namespace
+
+bool inside(double value, const Limits& limits) {
+  return value >= limits.low && value <= limits.high;  // false for NaN
+}
+
+bool isText(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[i]);
+    const std::size_t length = lengthOf(lead);
+    if (lead == 0 || length == 0 || i + length > text.size()) return false;
+    for (std::size_t k = 1; k < length; ++k) {
+      const auto byte = static_cast<unsigned char>(text[i + k]);
+      if ((byte & 0xc0) != 0x80 || (k == 1 && !secondByteFits(lead, byte))) return false;
+    }
+    i += length;
+  }
+  return true;
+}
+
+bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P) {
+  constexpr double kRounding = 1e-6;  // on correlations
+  if (P.rows() != P.cols() || !P.allFinite() || !isSymmetric(P)) return false;
+  Eigen::MatrixXd C = correlations(P);
+  if (C.size() == 0) return false;
+  C.diagonal().array() += kRounding;
+  return hasCholesky(C);
+}
+
+bool isDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P) {
+  if (P.rows() != P.cols() || !P.allFinite() || !isSymmetric(P)) return false;
+  return (P.diagonal().array() > 0).all() && hasCholesky(correlations(P));
+}
+
+}  // namespace perdure::wire

@@ -1,0 +1,60 @@
+#include "common/wire/codec.h"
+
+#include "common/wire/decoder.h"
+#include "common/wire/encoder.h"
+
+namespace perdure::wire {
+
+template <class T>
+Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena) {
+  arena.clear();
+  wire = {};
+  Encoder encoder(arena);
+  describe(encoder, value, wire);
+  if (encoder.failed()) return tl::unexpected(encoder.reason());
+  return {};
+}
+
+template <class T>
+Result<T> decode(const typename Type<T>::Wire& wire) {
+  Decoder decoder;
+  T value;
+  describe(decoder, value, wire);
+  if (decoder.failed()) return tl::unexpected(decoder.reason());
+  return value;
+}
+
+template <class T>
+T decodeKey(const typename Type<T>::Wire& wire) {
+  Decoder decoder;
+  T value;
+  describe(decoder, value, wire);
+  return value;
+}
+
+template <class T>
+struct Instances {
+  static constexpr auto kEncode = &encode<T>;
+  static constexpr auto kDecode = &decode<T>;
+  static constexpr auto kDecodeKey = &decodeKey<T>;
+};
+template struct Instances<Frame>;
+template struct Instances<ImuSample>;
+template struct Instances<SpeedSample>;
+template struct Instances<Calibration>;
+template struct Instances<Odometry>;
+template struct Instances<Landmarks>;
+template struct Instances<Detections>;
+template struct Instances<ModelInfo>;
+template struct Instances<Objects>;
+template struct Instances<ObjectState>;
+template struct Instances<Recalled>;
+template struct Instances<Event>;
+template struct Instances<Predictions>;
+template struct Instances<MapTile>;
+template struct Instances<MapHeader>;
+template struct Instances<MapQuery>;
+template struct Instances<MapReply>;
+template struct Instances<Health>;
+
+}  // namespace perdure::wire

@@ -1,0 +1,26 @@
+// Domain types ↔ wire types: total (any bytes give a value or a reason) and checked both ways
+// against one table of bounds. Reasons: not_finite, out_of_range, over_bound, bad_enum, bad_text,
+// size_mismatch, bad_rotation, bad_covariance, bad_probabilities, empty; the detail is the path of
+// the field, as "items[3].classes[0].covariance".
+#pragma once
+
+#include "common/base/result.h"
+#include "common/wire/arena.h"
+#include "common/wire/types.h"
+
+namespace perdure::wire {
+
+/// Fills `wire`, which borrows texts and pixels from `value` and sequences from `arena`: it is
+/// valid as long as both live and neither changes.
+template <class T>
+Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena);
+
+/// Copies everything out of `wire`, which may hold anything that Cyclone delivers.
+template <class T>
+Result<T> decode(const typename Type<T>::Wire& wire);
+
+/// A value of which only the key's fields mean anything: what a dispose carries.
+template <class T>
+T decodeKey(const typename Type<T>::Wire& wire);
+
+}  // namespace perdure::wire
