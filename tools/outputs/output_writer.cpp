@@ -1,0 +1,185 @@
+#include "tools/outputs/output_writer.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/base/errors.h"
+#include "tools/outputs/geodesy.h"
+#include "tools/outputs/map_picture.h"
+
+namespace perdure::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Declared, not measured: where no GNSS is at hand the map still opens in any viewer, at 0°, 0°.
+constexpr GeoAnchor kDefaultAnchor{};
+
+// Ten significant digits read back to better than a micrometre over a town, and hide the last bits
+// in which two compilers may differ.
+double rounded(double value) { return std::stod(fmt::format("{:.10g}", value)); }
+
+template <class Derived>
+Json numbersOf(const Eigen::MatrixBase<Derived>& vector) {
+  Json list = Json::array();
+  for (Eigen::Index i = 0; i < vector.size(); ++i) list.push_back(rounded(vector(i)));
+  return list;
+}
+
+std::ofstream openForWriting(const std::filesystem::path& path) {
+  std::ofstream file(path, std::ios::trunc);
+  if (!file) {
+    throw StartupError(ExitCode::kUnavailable,
+                       fmt::format("{}: cannot be written; give --out a folder that you may write",
+                                   path.string()));
+  }
+  return file;
+}
+
+Json featureOf(const ObjectBelief& belief, const GeoReference& reference) {
+  const ClassBelief& best = belief.best();
+  const Eigen::Vector3d p = best.mean.head<3>();
+  const Geodetic g = reference(p);
+  const Eigen::Vector3d size = best.mean.tail<3>().array().exp();
+  return {{"type", "Feature"},
+          {"id", belief.id},
+          {"geometry",
+           {{"type", "Point"},
+            {"coordinates", {std::stod(fmt::format("{:.9f}", g.longitude_deg)),
+                             std::stod(fmt::format("{:.9f}", g.latitude_deg)),
+                             std::stod(fmt::format("{:.3f}", g.height_m))}}}},
+          {"properties",
+           {{"class", best.name},
+            {"existence", rounded(belief.existence)},
+            {"probability", rounded(best.probability)},
+            {"local_m", numbersOf(p)},
+            {"size_m", numbersOf(size)},
+            {"yaw_rad", rounded(best.mean[3])},
+            {"memory", belief.memory == Memory::kWorking ? "working" : "long_term"}}}};
+}
+
+}  // namespace
+
+Json toJson(const Event& event) {
+  Json json = {{"timestamp_ns", toNanoseconds(event.stamp.time)},
+               {"frame", event.stamp.sequence},
+               {"event", nameOf(event.kind)},
+               {"object_id", event.object_id}};
+  if (event.other_id != 0) json["other_id"] = event.other_id;
+  if (!event.class_name.empty()) json["class"] = event.class_name;
+  json["probability"] = rounded(event.probability);
+  if (!event.detail.empty()) json["detail"] = event.detail;
+  return json;
+}
+
+Json toJson(const ObjectBelief& belief) {
+  Json pmf = Json::object(), classes = Json::object();
+  for (const ClassBelief& c : belief.classes) {
+    pmf[c.name] = rounded(c.probability);
+    Json covariance = Json::array();
+    for (Eigen::Index i = 0; i < 7; ++i) covariance.push_back(numbersOf(c.covariance.row(i)));
+    classes[c.name] = {{"mean", numbersOf(c.mean)}, {"covariance", covariance}};
+  }
+  return {{"id", belief.id},
+          {"class", belief.best().name},
+          {"existence", rounded(belief.existence)},
+          {"pmf", pmf},
+          {"classes", classes},
+          {"first_seen_ns", toNanoseconds(belief.first_seen)},
+          {"last_seen_ns", toNanoseconds(belief.last_seen)},
+          {"hits", belief.hits},
+          {"visible_misses", belief.visible_misses},
+          {"moving", rounded(belief.moving)},
+          {"memory", belief.memory == Memory::kWorking ? "working" : "long_term"}};
+}
+
+OutputWriter::OutputWriter(std::filesystem::path folder, std::string sequence)
+    : folder_(std::move(folder)), sequence_(std::move(sequence)) {
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
+  if (error) {
+    throw StartupError(ExitCode::kUnavailable,
+                       fmt::format("{}: cannot be made: {}; give --out another folder",
+                                   folder_.string(), error.message()));
+  }
+  events_ = openForWriting(folder_ / "events.jsonl");
+}
+
+void OutputWriter::onCalibration(const Calibration& calibration) {
+  if (!calibration.cameras.empty()) history_.setCamera(calibration.cameras.front());
+  if (calibration.anchor) anchor_ = calibration.anchor;
+}
+
+void OutputWriter::onOdometry(const Odometry& odometry) {
+  if (odometry.state == OdometryState::kInitialising) return;
+  poses_[odometry.stamp.sequence] = {odometry.stamp.time, odometry.T_WB};
+}
+
+void OutputWriter::onEvent(const Event& event) {
+  history_.add(event);
+  events_ << toJson(event).dump() << "\n";
+}
+
+void OutputWriter::writeJson(const std::string& name, const Json& json) const {
+  openForWriting(folder_ / name) << json.dump(1) << "\n";
+}
+
+void OutputWriter::finish() {
+  events_.flush();
+  writeTable("objects_inst.csv", history_.inst());
+  writeTable("objects_final.csv", history_.finalRows());
+  writeTrajectory();
+  writeObjects();
+  writeGeoJson();
+  std::vector<Eigen::Vector3d> path;
+  for (const auto& [frame, pose] : poses_) path.push_back(pose.T_WB.p);
+  drawMap(path, history_.lastBeliefs(), folder_ / "map.png");
+}
+
+void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const {
+  std::ofstream file = openForWriting(folder_ / name);
+  file << "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible\n";
+  for (const ObjectRow& r : rows) {
+    file << fmt::format("{},{},{},{},{},{:.6f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.5f},{}\n",
+                        sequence_, r.frame, toNanoseconds(r.time), r.object_id, r.class_name,
+                        r.score, r.p_W.x(), r.p_W.y(), r.p_W.z(), r.size.x(), r.size.y(),
+                        r.size.z(), r.yaw, r.visible ? 1 : 0);
+  }
+}
+
+void OutputWriter::writeTrajectory() const {
+  std::ofstream file = openForWriting(folder_ / "trajectory.tum");
+  for (const auto& [frame, pose] : poses_) {
+    const std::int64_t ns = toNanoseconds(pose.time);
+    const auto& [q, p] = pose.T_WB;
+    file << fmt::format("{}.{:09d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                        ns / 1'000'000'000, ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(), q.y(),
+                        q.z(), q.w());
+  }
+}
+
+void OutputWriter::writeObjects() const {
+  Json objects = Json::array();
+  for (const ObjectBelief& belief : history_.lastBeliefs()) objects.push_back(toJson(belief));
+  writeJson("objects.json", {{"objects", objects}});
+}
+
+void OutputWriter::writeGeoJson() const {
+  RigidTransform T_WB;
+  const GeoAnchor anchor = anchor_.value_or(kDefaultAnchor);
+  for (const auto& [frame, pose] : poses_) {
+    T_WB = pose.T_WB;
+    if (!anchor_ || pose.time >= anchor.time) break;
+  }
+  const GeoReference reference(anchor, T_WB);
+  Json features = Json::array();
+  for (const ObjectBelief& belief : history_.lastBeliefs()) {
+    features.push_back(featureOf(belief, reference));
+  }
+  writeJson("map.geojson", {{"type", "FeatureCollection"},
+                            {"georeferenced", anchor_.has_value()},
+                            {"features", features}});
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,63 @@
+// The files that `perdure pipeline` and the demo leave behind (DESIGN section 3), from the streams
+// odometry, objects and events. Two runs over the same messages give the same bytes.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/types/objects.h"
+#include "common/types/odometry.h"
+#include "common/types/sensors.h"
+#include "tools/outputs/object_history.h"
+
+namespace perdure::tools {
+
+class OutputWriter {
+ public:
+  /// Makes the folder where it is missing. Throws StartupError (kUnavailable) where it cannot.
+  /// `sequence` fills the column of that name.
+  OutputWriter(std::filesystem::path folder, std::string sequence);
+
+  void onCalibration(const Calibration& calibration);
+  void onOdometry(const Odometry& odometry);
+  void onObjects(const Objects& objects) { history_.add(objects); }
+  void onEvent(const Event& event);
+
+  /// Writes everything but events.jsonl, which is written as events come.
+  void finish();
+  /// Any further file: timing.json, report.json.
+  void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
+
+  const ObjectHistory& history() const { return history_; }
+  std::size_t odometryFrames() const { return poses_.size(); }
+  const std::filesystem::path& folder() const { return folder_; }
+
+ private:
+  struct Pose {
+    TimePoint time;
+    RigidTransform T_WB;
+  };
+  void writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const;
+  void writeTrajectory() const;
+  void writeObjects() const;
+  void writeGeoJson() const;
+
+  std::filesystem::path folder_;
+  std::string sequence_;
+  ObjectHistory history_;
+  std::map<std::uint64_t, Pose> poses_;
+  std::optional<GeoAnchor> anchor_;
+  std::ofstream events_;
+};
+
+/// One line of events.jsonl.
+nlohmann::ordered_json toJson(const Event& event);
+/// One element of objects.json.
+nlohmann::ordered_json toJson(const ObjectBelief& belief);
+
+}  // namespace perdure::tools

@@ -1,0 +1,56 @@
+#include "tools/outputs/stage_timer.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace perdure::tools {
+namespace {
+
+double nowMs(clockid_t clock) {
+  timespec t{};
+  clock_gettime(clock, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+nlohmann::ordered_json summary(const std::vector<double>& values) {
+  return {{"median", quantile(values, 0.5)},
+          {"p99", quantile(values, 0.99)},
+          {"total", std::accumulate(values.begin(), values.end(), 0.0)}};
+}
+
+}  // namespace
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double at = q * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(std::floor(at));
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  const double part = at - static_cast<double>(low);
+  return (1.0 - part) * values[low] + part * values[high];
+}
+
+StageTimer::Span::Span(StageTimer& timer, const std::string& stage)
+    : timer_(timer), stage_(stage), cpu_start_ms_(nowMs(CLOCK_PROCESS_CPUTIME_ID)),
+      wall_start_ms_(nowMs(CLOCK_MONOTONIC)) {}
+
+StageTimer::Span::~Span() {
+  Samples& samples = timer_.stages_[stage_];
+  samples.cpu_ms.push_back(nowMs(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_ms_);
+  samples.wall_ms.push_back(nowMs(CLOCK_MONOTONIC) - wall_start_ms_);
+}
+
+nlohmann::ordered_json StageTimer::toJson() const {
+  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
+  for (const auto& [name, samples] : stages_) {
+    stages[name] = {{"calls", samples.cpu_ms.size()},
+                    {"cpu_ms", summary(samples.cpu_ms)},
+                    {"wall_ms", summary(samples.wall_ms)}};
+  }
+  return {{"stages", stages}};
+}
+
+}  // namespace perdure::tools
