@@ -51,6 +51,16 @@ class BoundedQueue {
     return value;
   }
 
+  /// An element if there is one, without waiting.
+  std::optional<T> tryPop() {
+    const std::lock_guard lock(mutex_);
+    if (queue_.empty()) return std::nullopt;
+    T value = std::move(queue_.front());
+    queue_.pop_front();
+    not_full_.notify_one();
+    return value;
+  }
+
   void close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;

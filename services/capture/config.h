@@ -1,0 +1,54 @@
+// The configuration of capture.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/config/fields.h"
+
+namespace perdure::capture {
+
+struct DatasetConfig {
+  std::string path;
+  std::string sequence;  ///< KITTI tracking only
+  std::string cameras = "stereo";
+  double lead_s = 5.0, trail_s = 0.5;
+};
+
+struct ImageConfig {
+  std::string cam0 = "as_is", cam1 = "mono8";
+};
+
+struct PaceConfig {
+  std::string mode = "clock";
+  double rate = 1.0;
+  std::int64_t window = 1;
+  double timeout_s = 2.0;
+};
+
+struct StartConfig {
+  std::vector<std::string> readers;
+  double timeout_s = 60.0;
+};
+
+struct RunConfig {
+  std::string state;
+  std::string on_end = "stay";
+};
+
+struct Config {
+  std::string source = "dataset";
+  DatasetConfig dataset;
+  ImageConfig image;
+  PaceConfig pace;
+  StartConfig start;
+  RunConfig run;
+};
+
+void describe(Config& config, config::Fields& fields);
+
+/// Throws StartupError where a source is asked for that this version has not, or none is given.
+void requireSource(const Config& config);
+
+}  // namespace perdure::capture

@@ -1,0 +1,131 @@
+#include "services/capture/loader.h"
+
+#include <algorithm>
+
+#include "common/base/errors.h"
+
+namespace perdure::capture {
+namespace {
+
+std::optional<ImageEncoding> encodingOf(const std::string& name) {
+  if (name == "mono8") return ImageEncoding::kMono8;
+  if (name == "bgr8") return ImageEncoding::kBgr8;
+  return std::nullopt;
+}
+
+TimePoint timeOf(const replay::Message& message) {
+  return std::visit(
+      [](const auto& m) {
+        if constexpr (requires { m.stamp; }) {
+          return m.stamp.time;
+        } else {
+          return m.time;
+        }
+      },
+      message);
+}
+
+/// A drive without a single readable image is not worth starting.
+void requireImages(replay::Dataset& drive, const std::string& path) {
+  for (auto message = drive.next(); message; message = drive.next()) {
+    const auto* frame = std::get_if<Frame>(&*message);
+    if (!frame) continue;
+    if (!frame->data) break;
+    return drive.seek(0);
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     path + " has no readable images; capture needs a drive with images (a drive "
+                            "without them runs in `perdure pipeline`).");
+}
+
+/// Times of the first and the last frame of cam0.
+std::pair<TimePoint, TimePoint> spanOf(const replay::Dataset& drive) {
+  TimePoint first = TimePoint::max(), last = TimePoint::min();
+  for (std::uint64_t i = 0; i < drive.frameCount() && first == TimePoint::max(); ++i) {
+    if (const auto time = drive.frameTime(i)) first = *time;
+  }
+  for (std::uint64_t i = drive.frameCount(); i > 0 && last == TimePoint::min(); --i) {
+    if (const auto time = drive.frameTime(i - 1)) last = *time;
+  }
+  return {first, last};
+}
+
+}  // namespace
+
+std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId source) {
+  requireSource(config);
+  replay::DatasetOptions options;
+  options.path = config.dataset.path;
+  options.sequence = config.dataset.sequence;
+  options.source = source;
+  options.encoding = encodingOf(config.image.cam0);
+  options.second_encoding = encodingOf(config.image.cam1);
+  auto drive = replay::Dataset::open(options);
+  requireImages(*drive, config.dataset.path);
+  return drive;
+}
+
+Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
+               std::function<void()> notify)
+    : mono_(config.dataset.cameras == "mono"), drive_(std::move(drive)), notify_(std::move(notify)) {
+  const auto [begin, end] = spanOf(*drive_);
+  from_ = begin - durationFromSeconds(config.dataset.lead_s);
+  until_ = end + durationFromSeconds(config.dataset.trail_s);
+  drive_->seek(first);
+  thread_ = std::thread([this] { run(); });
+}
+
+Loader::~Loader() {
+  queue_.close();
+  thread_.join();
+}
+
+bool Loader::isWanted(const replay::Message& message) const {
+  const auto* frame = std::get_if<Frame>(&message);
+  if (frame) return !mono_ || frame->camera == "cam0";
+  return timeOf(message) >= from_;
+}
+
+void Loader::run() {
+  bool open = true;
+  while (open) {
+    auto message = drive_->next();
+    {
+      const std::lock_guard lock(mutex_);
+      reasons_ = drive_->reasons();
+      last_problem_ = drive_->lastProblem();
+    }
+    if (!message || timeOf(*message) > until_) break;
+    if (!isWanted(*message)) continue;
+    open = queue_.push(*std::move(message));
+    notify_();
+  }
+  finish();
+}
+
+void Loader::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  notify_();
+}
+
+std::optional<replay::Message> Loader::take() { return queue_.tryPop(); }
+
+bool Loader::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+ReasonCounts Loader::reasons() const {
+  const std::lock_guard lock(mutex_);
+  return reasons_;
+}
+
+std::string Loader::lastProblem() const {
+  const std::lock_guard lock(mutex_);
+  return last_problem_;
+}
+
+}  // namespace perdure::capture

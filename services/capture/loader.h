@@ -1,0 +1,53 @@
+// Reads and decodes a drive ahead of its pacing, on a thread of its own.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "common/base/bounded_queue.h"
+#include "common/replay/dataset.h"
+#include "services/capture/config.h"
+
+namespace perdure::capture {
+
+/// Opens the configured drive. Throws StartupError: what is missing, and the mend.
+std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId source);
+
+class Loader {
+ public:
+  /// From frame `first` on. `notify` is called on the loader's thread after each message.
+  Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
+         std::function<void()> notify);
+  ~Loader();
+  Loader(const Loader&) = delete;
+  Loader& operator=(const Loader&) = delete;
+
+  /// The next message if it is ready; ended() tells whether there will be more.
+  std::optional<replay::Message> take();
+  bool ended() const;
+  /// What was left out so far (image_truncated, imu_gap, …), and the last problem for people.
+  ReasonCounts reasons() const;
+  std::string lastProblem() const;
+
+ private:
+  void run();
+  void finish();
+  bool isWanted(const replay::Message& message) const;
+
+  const bool mono_;
+  std::unique_ptr<replay::Dataset> drive_;
+  TimePoint from_, until_;
+  std::function<void()> notify_;
+  BoundedQueue<replay::Message> queue_{16, Overflow::kBlock};
+  mutable std::mutex mutex_;
+  ReasonCounts reasons_;
+  std::string last_problem_;
+  bool ended_ = false;
+  std::thread thread_;
+};
+
+}  // namespace perdure::capture
