@@ -16,6 +16,14 @@ Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena) 
 }
 
 template <class T>
+void encodeKey(const T& value, typename Type<T>::Wire& wire, Arena& arena) {
+  arena.clear();
+  wire = {};
+  Encoder encoder(arena);
+  describe(encoder, value, wire);
+}
+
+template <class T>
 Result<T> decode(const typename Type<T>::Wire& wire) {
   Decoder decoder;
   T value;
@@ -35,6 +43,7 @@ T decodeKey(const typename Type<T>::Wire& wire) {
 template <class T>
 struct Instances {
   static constexpr auto kEncode = &encode<T>;
+  static constexpr auto kEncodeKey = &encodeKey<T>;
   static constexpr auto kDecode = &decode<T>;
   static constexpr auto kDecodeKey = &decodeKey<T>;
 };

@@ -19,6 +19,10 @@ Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena);
 template <class T>
 Result<T> decode(const typename Type<T>::Wire& wire);
 
+/// The same without checks, for a dispose: only the key's fields will be read.
+template <class T>
+void encodeKey(const T& value, typename Type<T>::Wire& wire, Arena& arena);
+
 /// A value of which only the key's fields mean anything: what a dispose carries.
 template <class T>
 T decodeKey(const typename Type<T>::Wire& wire);

@@ -113,8 +113,8 @@ class Decoder : public Checked {
     if (failed() || !checkBuffer(name, w.pixels, kImageBytes)) return;
     const std::size_t expected = std::size_t{d.width} * d.height * channelsOf(d.encoding);
     if (w.pixels._length != expected) return refuse(name, "size_mismatch");
-    d.data = std::make_shared<const std::vector<std::uint8_t>>(
-        w.pixels._buffer, w.pixels._buffer + w.pixels._length);
+    d.data = std::make_shared<const std::vector<std::uint8_t>>(w.pixels._buffer,
+                                                               w.pixels._buffer + w.pixels._length);
   }
   template <class Predicate>
   void ensureWire(const char* name, const char* code, Predicate holds) {

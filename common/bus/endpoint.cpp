@@ -1,0 +1,220 @@
+#include "common/bus/endpoint.h"
+
+#include <algorithm>
+#include <array>
+
+#include "common/base/check.h"
+#include "common/base/errors.h"
+#include "common/bus/dds.h"
+
+namespace perdure::bus {
+namespace {
+
+constexpr std::size_t kBatch = 64;
+
+dds_duration_t duration(double seconds) {
+  return seconds > 0 ? static_cast<dds_duration_t>(seconds * 1e9) : DDS_INFINITY;
+}
+
+QosPtr commonQos(const Qos& qos) {
+  constexpr double kMaxBlocking = 0.1;
+  QosPtr result(dds_create_qos());
+  dds_qset_reliability(result.get(),
+                       qos.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       duration(kMaxBlocking));
+  dds_qset_history(result.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
+  dds_qset_durability(result.get(),
+                      qos.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  if (qos.exclusive) dds_qset_ownership(result.get(), DDS_OWNERSHIP_EXCLUSIVE);
+  return result;
+}
+
+/// Readers ask for the weakest liveliness, so that every writer's suits them.
+QosPtr readerQos(const Qos& qos) { return commonQos(qos); }
+
+QosPtr writerQos(const Qos& qos, const WriterOptions& options) {
+  QosPtr result = commonQos(qos);
+  dds_qset_writer_data_lifecycle(result.get(), false);  // a death is not the end of its objects
+  if (qos.latched) {
+    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
+  const double lease = options.lease_s > 0 ? options.lease_s : qos.lease_s;
+  if (qos.exclusive) {
+    dds_qset_ownership_strength(result.get(), options.strength);
+    dds_qset_liveliness(result.get(), DDS_LIVELINESS_MANUAL_BY_TOPIC, duration(lease));
+  } else if (lease > 0) {
+    dds_qset_liveliness(result.get(), DDS_LIVELINESS_AUTOMATIC, duration(lease));
+  }
+  return result;
+}
+
+const TopicInfo& infoOf(const std::string& topic) {
+  const TopicInfo* info = findTopic(topic);
+  check(info != nullptr, "a topic stands in the table of common/bus/topics.cpp");
+  return *info;
+}
+
+Entity created(dds_entity_t handle, const std::string& what) {
+  if (handle < 0) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "DDS cannot create " + what + ": " + dds_strretcode(-handle));
+  }
+  return Entity(handle);
+}
+
+/// The topic entity may go at once: readers and writers keep what they need of it.
+Entity createTopic(const Participant& participant, const std::string& topic) {
+  return created(dds_create_topic(participant.handle(), infoOf(topic).type,
+                                  participant.wireName(topic).c_str(), nullptr, nullptr),
+                 "the topic " + topic);
+}
+
+Entity createReader(const Participant& participant, const std::string& topic) {
+  const Entity entity = createTopic(participant, topic);
+  const QosPtr qos = readerQos(infoOf(topic).qos);
+  return created(dds_create_reader(participant.handle(), entity.handle(), qos.get(), nullptr),
+                 "a reader of " + topic);
+}
+
+Entity createWriter(const Participant& participant, const std::string& topic,
+                    const WriterOptions& options) {
+  const Entity entity = createTopic(participant, topic);
+  const QosPtr qos = writerQos(infoOf(topic).qos, options);
+  return created(dds_create_writer(participant.handle(), entity.handle(), qos.get(), nullptr),
+                 "a writer of " + topic);
+}
+
+std::string errorWord(dds_return_t code) {
+  switch (-code) {
+    case DDS_RETCODE_TIMEOUT:
+      return "timeout";
+    case DDS_RETCODE_OUT_OF_RESOURCES:
+      return "out_of_resources";
+    default:
+      return "error_" + std::to_string(-code);
+  }
+}
+
+}  // namespace
+
+Endpoint::Endpoint(std::string topic, Entity entity)
+    : topic_(std::move(topic)), count_prefix_(topic_), entity_(std::move(entity)) {
+  std::replace(count_prefix_.begin(), count_prefix_.end(), '/', '_');
+}
+
+void Endpoint::count(const char* what, const Reason& reason) {
+  const std::lock_guard lock(mutex_);
+  refusals_.add(count_prefix_ + "_" + what + "_" + reason.code);
+}
+
+void Endpoint::add(ReasonCounts& counts, const char* what, std::uint64_t n) const {
+  if (n > 0) counts.add(count_prefix_ + "_" + what, n);
+}
+
+void Endpoint::addRefusals(ReasonCounts& counts) const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [reason, n] : refusals_.all()) counts.add(reason, n);
+}
+
+RawReader::RawReader(const Participant& participant, const std::string& topic)
+    : Endpoint(topic, createReader(participant, topic)) {}
+
+std::size_t RawReader::matched() const {
+  dds_subscription_matched_status_t status{};
+  dds_get_subscription_matched_status(handle(), &status);
+  return status.current_count;
+}
+
+void RawReader::report(ReasonCounts& counts) const {
+  addRefusals(counts);
+  dds_requested_incompatible_qos_status_t qos{};
+  dds_get_requested_incompatible_qos_status(handle(), &qos);
+  add(counts, "incompatible_qos", qos.total_count);
+  dds_sample_lost_status_t lost{};
+  dds_get_sample_lost_status(handle(), &lost);
+  add(counts, "sample_lost", lost.total_count);
+  dds_sample_rejected_status_t rejected{};
+  dds_get_sample_rejected_status(handle(), &rejected);
+  add(counts, "sample_rejected", rejected.total_count);
+  dds_liveliness_changed_status_t liveliness{};
+  dds_get_liveliness_changed_status(handle(), &liveliness);
+  add(counts, "writers_silent", liveliness.not_alive_count);
+}
+
+bool RawReader::takeBatch(const std::function<void(const void*)>& on_value,
+                          const std::function<void(const void*)>& on_gone) {
+  std::array<void*, kBatch> samples{};
+  std::array<dds_sample_info_t, kBatch> infos{};
+  const dds_return_t n = dds_take(handle(), samples.data(), infos.data(), kBatch, kBatch);
+  if (n <= 0) return false;
+  struct Loan {
+    dds_entity_t reader;
+    void** samples;
+    dds_return_t n;
+    ~Loan() { dds_return_loan(reader, samples, n); }
+  } const loan{handle(), samples.data(), n};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+    if (infos[i].valid_data) on_value(samples[i]);
+    const bool last = !infos[i].valid_data || infos[i].sample_rank == 0;
+    if (last && infos[i].instance_state == DDS_IST_NOT_ALIVE_DISPOSED) on_gone(samples[i]);
+  }
+  return static_cast<std::size_t>(n) == kBatch;
+}
+
+RawWriter::RawWriter(const Participant& participant, const std::string& topic,
+                     const WriterOptions& options)
+    : Endpoint(topic, createWriter(participant, topic, options)), strength_(options.strength) {}
+
+std::size_t RawWriter::matched() const {
+  dds_publication_matched_status_t status{};
+  dds_get_publication_matched_status(handle(), &status);
+  return status.current_count;
+}
+
+void RawWriter::setStrength(std::int32_t strength) {
+  const QosPtr qos(dds_create_qos());
+  dds_qset_ownership_strength(qos.get(), strength);
+  check(dds_set_qos(handle(), qos.get()) == DDS_RETCODE_OK,
+        "the strength of a writer of an exclusive topic can be changed");
+  strength_ = strength;
+}
+
+void RawWriter::assertLiveliness() { dds_assert_liveliness(handle()); }
+
+std::uint64_t RawWriter::livelinessLost() const {
+  dds_liveliness_lost_status_t status{};
+  dds_get_liveliness_lost_status(handle(), &status);
+  return status.total_count;
+}
+
+bool RawWriter::waitForAcknowledgement(double seconds) {
+  return dds_wait_for_acks(handle(), duration(seconds)) == DDS_RETCODE_OK;
+}
+
+void RawWriter::report(ReasonCounts& counts) const {
+  addRefusals(counts);
+  dds_offered_incompatible_qos_status_t qos{};
+  dds_get_offered_incompatible_qos_status(handle(), &qos);
+  add(counts, "incompatible_qos", qos.total_count);
+  add(counts, "liveliness_lost", livelinessLost());
+}
+
+Result<void> RawWriter::writeWire(const void* wire) {
+  const dds_return_t code = dds_write(handle(), wire);
+  if (code == DDS_RETCODE_OK) return {};
+  const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
+  count("write", reason);
+  return tl::unexpected(reason);
+}
+
+Result<void> RawWriter::disposeWire(const void* wire) {
+  const dds_return_t code = dds_dispose(handle(), wire);
+  dds_unregister_instance(handle(), wire);  // so that late joiners get no tombstone
+  if (code == DDS_RETCODE_OK) return {};
+  const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
+  count("dispose", reason);
+  return tl::unexpected(reason);
+}
+
+}  // namespace perdure::bus

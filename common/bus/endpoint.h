@@ -1,0 +1,139 @@
+// Readers and writers of domain messages: conversion, checks and counts inside.
+// A writer may be used by any one thread at a time; counts may be asked for from any thread.
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/bus/domain.h"
+#include "common/bus/topics.h"
+#include "common/wire/codec.h"
+
+namespace perdure::bus {
+
+struct WriterOptions {
+  std::int32_t strength = 0;  ///< of exclusive topics; the highest living one is heard
+  double lease_s = 0.0;       ///< of the liveliness; 0 = the table's
+};
+
+/// What both have: a DDS entity, a name for its counts, and refusals.
+class Endpoint {
+ public:
+  const std::string& topic() const { return topic_; }
+  std::int32_t handle() const { return entity_.handle(); }
+
+ protected:
+  Endpoint(std::string topic, Entity entity);
+  void count(const char* what, const Reason& reason);
+  /// Adds "<topic>_<what>" where it is not 0.
+  void add(ReasonCounts& counts, const char* what, std::uint64_t n) const;
+  void addRefusals(ReasonCounts& counts) const;
+
+ private:
+  std::string topic_, count_prefix_;
+  Entity entity_;
+  mutable std::mutex mutex_;
+  ReasonCounts refusals_;
+};
+
+class RawReader : public Endpoint {
+ public:
+  /// How many writers are matched now.
+  std::size_t matched() const;
+  /// Adds what DDS and the checks counted since the start: <topic>_malformed_<reason>,
+  /// _incompatible_qos, _sample_lost, _liveliness_lost (times a writer went silent).
+  void report(ReasonCounts& counts) const;
+
+ protected:
+  RawReader(const Participant& participant, const std::string& topic);
+  /// Takes what is there, at most one batch; true where there may be more.
+  bool takeBatch(const std::function<void(const void* wire)>& on_value,
+                 const std::function<void(const void* wire)>& on_gone);
+};
+
+template <class T>
+class Reader : public RawReader {
+ public:
+  using Handler = std::function<void(const T&)>;
+
+  Reader(const Participant& participant, const Topic<T>& topic)
+      : RawReader(participant, topic.name) {}
+
+  /// Hands over everything that has come, in its order; malformed messages are counted. `on_gone`
+  /// gets the key of each disposed instance (other fields mean nothing).
+  void drain(const Handler& handler, const Handler& on_gone = {}) {
+    while (drainBatch(handler, on_gone)) {
+    }
+  }
+  /// The same for at most one batch; true where there may be more.
+  bool drainBatch(const Handler& handler, const Handler& on_gone = {}) {
+    using Wire = typename wire::Type<T>::Wire;
+    const auto on_value = [&](const void* sample) {
+      if (auto value = wire::decode<T>(*static_cast<const Wire*>(sample))) {
+        handler(*value);
+      } else {
+        count("malformed", value.error());
+      }
+    };
+    const auto on_key = [&](const void* sample) {
+      if (on_gone) on_gone(wire::decodeKey<T>(*static_cast<const Wire*>(sample)));
+    };
+    return takeBatch(on_value, on_key);
+  }
+};
+
+class RawWriter : public Endpoint {
+ public:
+  /// How many readers are matched now.
+  std::size_t matched() const;
+  std::int32_t strength() const { return strength_; }
+  /// Of exclusive topics, at any time.
+  void setStrength(std::int32_t strength);
+  /// "I live" without a message, for exclusive topics.
+  void assertLiveliness();
+  /// How often this writer missed its own lease and was taken for dead.
+  std::uint64_t livelinessLost() const;
+  /// Waits until every matched reader has acknowledged everything; false after the time.
+  bool waitForAcknowledgement(double seconds);
+  /// Adds <topic>_refused_<reason> (values this process should not have made), _write_<error>,
+  /// _incompatible_qos, _liveliness_lost.
+  void report(ReasonCounts& counts) const;
+
+ protected:
+  RawWriter(const Participant& participant, const std::string& topic, const WriterOptions& options);
+  Result<void> writeWire(const void* wire);
+  Result<void> disposeWire(const void* wire);
+
+ private:
+  std::int32_t strength_;
+};
+
+template <class T>
+class Writer : public RawWriter {
+ public:
+  Writer(const Participant& participant, const Topic<T>& topic, const WriterOptions& options = {})
+      : RawWriter(participant, topic.name, options) {}
+
+  /// What cannot be written is counted and told.
+  Result<void> write(const T& value) {
+    typename wire::Type<T>::Wire sample;
+    if (auto encoded = wire::encode(value, sample, arena_); !encoded) {
+      count("refused", encoded.error());
+      return encoded;
+    }
+    return writeWire(&sample);
+  }
+  /// The instance with this value's key is gone, for late joiners too. Only the key is read.
+  Result<void> dispose(const T& key) {
+    typename wire::Type<T>::Wire sample;
+    wire::encodeKey(key, sample, arena_);
+    return disposeWire(&sample);
+  }
+
+ private:
+  wire::Arena arena_;
+};
+
+}  // namespace perdure::bus

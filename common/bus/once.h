@@ -1,0 +1,39 @@
+// Drops what was already seen: messages of one frame may come twice around a change of owner.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <set>
+#include <utility>
+
+namespace perdure::bus {
+
+/// Remembers the newest `capacity` identities (source instance, sequence number).
+class Once {
+ public:
+  explicit Once(std::size_t capacity = 1024) : capacity_(capacity) {}
+
+  /// True the first time.
+  bool first(std::uint64_t source, std::uint64_t sequence) {
+    if (!seen_.emplace(source, sequence).second) {
+      ++repeated_;
+      return false;
+    }
+    order_.emplace_back(source, sequence);
+    if (order_.size() > capacity_) {
+      seen_.erase(order_.front());
+      order_.pop_front();
+    }
+    return true;
+  }
+  std::uint64_t repeated() const { return repeated_; }
+
+ private:
+  using Identity = std::pair<std::uint64_t, std::uint64_t>;
+  std::size_t capacity_;
+  std::set<Identity> seen_;
+  std::deque<Identity> order_;
+  std::uint64_t repeated_ = 0;
+};
+
+}  // namespace perdure::bus

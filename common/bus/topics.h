@@ -1,0 +1,86 @@
+// Every topic of the system in one table: type, quality of service, expected rate, recorded or not.
+// Names on the wire are perdure/<vehicle>/<name>.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/wire/types.h"
+
+namespace perdure::bus {
+
+struct Qos {
+  bool reliable = true;
+  int depth = 1;           ///< KEEP_LAST
+  bool latched = false;    ///< TRANSIENT_LOCAL: who comes late gets the last `depth` samples
+  bool exclusive = false;  ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
+  double lease_s = 0.0;    ///< of the liveliness; 0 = infinite
+};
+
+struct TopicInfo {
+  std::string_view name;  ///< "frame/" stands for frame/<camera>
+  const dds_topic_descriptor_t* type = nullptr;
+  Qos qos;
+  double rate_hz = 0.0;  ///< nominal, of a 10 Hz camera and a 100 Hz IMU; 0 = on change
+  bool recorded = true;
+
+  std::string typeName() const;
+};
+
+std::span<const TopicInfo> topicTable();
+/// The row of "imu", "frame/cam0", …; nullptr where there is none.
+const TopicInfo* findTopic(std::string_view name);
+
+/// The shortest lease that does not flap: three periods, and never under 100 ms.
+double leaseFor(double rate_hz);
+
+/// A name that knows the type of its messages.
+template <class T>
+struct Topic {
+  std::string name;
+};
+
+namespace topics {
+inline Topic<Frame> frame(const std::string& camera) { return {"frame/" + camera}; }
+inline const Topic<ImuSample> kImu{"imu"};
+inline const Topic<SpeedSample> kSpeed{"speed"};
+inline const Topic<Calibration> kCalibration{"calibration"};
+inline const Topic<Odometry> kOdometry{"odometry"};
+inline const Topic<Landmarks> kLandmarks{"landmarks"};
+inline const Topic<Detections> kDetections{"detections"};
+inline const Topic<ModelInfo> kModel{"model"};
+inline const Topic<Objects> kObjects{"objects"};
+inline const Topic<ObjectState> kObjectState{"object_state"};
+inline const Topic<Recalled> kRecalled{"recalled"};
+inline const Topic<Event> kEvents{"events"};
+inline const Topic<Predictions> kPredictions{"predictions"};
+inline const Topic<MapTile> kMap{"map"};
+inline const Topic<MapHeader> kMapHeader{"map/header"};
+inline const Topic<MapQuery> kMapQuery{"map/query"};
+inline const Topic<MapReply> kMapReply{"map/reply"};
+inline const Topic<Health> kHealth{"health"};
+}  // namespace topics
+
+/// Calls visit(Topic<T>) with the type that belongs to a name; false where there is none.
+template <class Visit>
+bool withTopic(const std::string& name, Visit visit) {
+  bool found = false;
+  const auto offer = [&](const auto& topic) {
+    if (found || topic.name != name) return;
+    found = true;
+    visit(topic);
+  };
+  using namespace topics;
+  constexpr std::string_view kFramePrefix = "frame/";
+  if (name.size() > kFramePrefix.size() && name.starts_with(kFramePrefix)) {
+    offer(frame(name.substr(kFramePrefix.size())));
+  }
+  offer(kImu), offer(kSpeed), offer(kCalibration), offer(kOdometry), offer(kLandmarks);
+  offer(kDetections), offer(kModel), offer(kObjects), offer(kObjectState), offer(kRecalled);
+  offer(kEvents), offer(kPredictions), offer(kMap), offer(kMapHeader), offer(kMapQuery);
+  offer(kMapReply), offer(kHealth);
+  return found;
+}
+
+}  // namespace perdure::bus

@@ -1,0 +1,66 @@
+// The one loop of a service: waits for messages, ticks and wake-ups, and calls handlers in the
+// order of their registration. Handlers run in the thread that calls run().
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <vector>
+
+#include "common/bus/endpoint.h"
+
+namespace perdure::bus {
+
+class WaitLoop {
+ public:
+  explicit WaitLoop(const Participant& participant);
+
+  /// The reader must outlive the loop.
+  template <class T>
+  void on(Reader<T>& reader, typename Reader<T>::Handler handler,
+          typename Reader<T>::Handler on_gone = {}) {
+    attach(reader, [&reader, handler = std::move(handler), on_gone = std::move(on_gone)] {
+      return reader.drainBatch(handler, on_gone);
+    });
+  }
+  /// First after one period; a late tick is not made up for.
+  void every(std::chrono::nanoseconds period, std::function<void()> tick);
+  /// Runs in the loop's thread soon after wake(); several wake-ups may become one call.
+  void onWake(std::function<void()> handler) { on_wake_ = std::move(handler); }
+
+  /// Until stop().
+  void run();
+  /// Waits once, at most `longest`, and handles what is there.
+  void runOnce(std::chrono::nanoseconds longest);
+  /// From any thread (not from a signal handler); run() ends after the handler at work.
+  void stop();
+  bool stopped() const { return stopped_; }
+  /// From any thread (not from a signal handler).
+  void wake();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Source {
+    Entity condition;
+    std::function<bool()> drain;
+  };
+  struct Tick {
+    std::chrono::nanoseconds period;
+    Clock::time_point next;
+    std::function<void()> handler;
+  };
+
+  void attach(const Endpoint& reader, std::function<bool()> drain);
+  std::chrono::nanoseconds untilNextTick(std::chrono::nanoseconds longest) const;
+  void handleMessages();
+  void handleTicks();
+
+  Entity guard_;
+  std::vector<Source> sources_;
+  Entity waitset_;
+  std::vector<Tick> ticks_;
+  std::function<void()> on_wake_;
+  std::atomic<bool> stopped_ = false;
+};
+
+}  // namespace perdure::bus
