@@ -1,5 +1,5 @@
 // Long-term memory: keeps what semantic_filter confirmed, publishes it as tiles, answers questions,
-// and gives a filter that starts anew its working set back (paper, lines on long-term memory).
+// and gives a filter that starts anew its working set back (the paper's "semantic map").
 #pragma once
 
 #include <cstdint>
