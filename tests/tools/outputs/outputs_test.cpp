@@ -1,0 +1,217 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "common/base/errors.h"
+#include "tools/outputs/geodesy.h"
+#include "tools/outputs/object_history.h"
+#include "tools/outputs/output_writer.h"
+#include "tools/outputs/stage_timer.h"
+
+namespace perdure::tools {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+std::string textOf(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::filesystem::path emptyFolder(const std::string& name) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / name;
+  std::filesystem::remove_all(folder);
+  return folder;
+}
+
+ObjectBelief carAt(ObjectId id, double x, bool confirmed = true) {
+  ObjectBelief object;
+  object.id = id;
+  object.existence = 0.9;
+  object.confirmed = confirmed;
+  ClassBelief car;
+  car.name = "car";
+  car.probability = 0.8;
+  car.mean << x, 2.0, 0.5, 0.1, std::log(4.0), std::log(1.6), std::log(1.5);
+  object.classes.push_back(car);
+  object.visible_fraction = 1.0;
+  return object;
+}
+
+Objects messageAt(std::uint64_t frame, std::vector<ObjectBelief> objects) {
+  Objects message;
+  message.stamp.sequence = frame;
+  message.stamp.time = fromNanoseconds(static_cast<std::int64_t>(frame) * 100'000'000);
+  message.objects = std::move(objects);
+  return message;
+}
+
+Event eventOf(EventKind kind, ObjectId id, ObjectId other = 0) {
+  Event event;
+  event.kind = kind;
+  event.object_id = id;
+  event.other_id = other;
+  return event;
+}
+
+TEST(Geodesy, FromEcefInvertsToEcefFromPoleToEquator) {
+  for (const double lat : {-89.9, -33.0, 0.0, 49.0, 89.9}) {
+    const Geodetic g{lat, 8.4, 112.0};
+    const Geodetic back = fromEcef(toEcef(g));
+    EXPECT_NEAR(back.latitude_deg, lat, 1e-10);
+    EXPECT_NEAR(back.longitude_deg, 8.4, 1e-10);
+    EXPECT_NEAR(back.height_m, 112.0, 1e-5);
+  }
+}
+
+TEST(Geodesy, EquatorAndPoleLieOnTheAxesOfTheEllipsoid) {
+  EXPECT_NEAR(toEcef({0, 0, 0}).x(), 6378137.0, 1e-6);
+  EXPECT_NEAR(toEcef({90, 0, 0}).z(), 6356752.314245, 1e-5);
+}
+
+TEST(GeoReference, AheadOfABodyThatFacesNorthIsNorth) {
+  GeoAnchor anchor;
+  anchor.latitude_deg = 49.0;
+  anchor.longitude_deg = 8.0;
+  anchor.yaw = std::numbers::pi / 2;  // north
+  const RigidTransform T_WB(Eigen::Quaterniond::Identity(), Eigen::Vector3d(10, 0, 0));
+  const Geodetic ahead = GeoReference(anchor, T_WB)(Eigen::Vector3d(110, 0, 0));
+  EXPECT_NEAR(ahead.longitude_deg, 8.0, 1e-9);
+  EXPECT_NEAR((ahead.latitude_deg - 49.0) * 111200.0, 100.0, 0.2);
+  const Geodetic left = GeoReference(anchor, T_WB)(Eigen::Vector3d(10, 100, 0));
+  EXPECT_LT(left.longitude_deg, 8.0);  // left of north is west
+}
+
+TEST(ObjectHistory, InstHoldsConfirmedStaticObjectsInSightOnly) {
+  ObjectHistory history;
+  ObjectBelief hidden = carAt(2, 5), moving = carAt(3, 6), fresh = carAt(4, 7, false);
+  hidden.visibility = Visibility::kOccluded;
+  moving.moving = 0.9;
+  history.add(messageAt(0, {carAt(1, 4), hidden, moving, fresh}));
+  ASSERT_THAT(history.inst(), SizeIs(1));
+  EXPECT_EQ(history.inst()[0].object_id, 1u);
+  EXPECT_NEAR(history.inst()[0].score, 0.72, 1e-12);
+  EXPECT_NEAR(history.inst()[0].size.x(), 4.0, 1e-9);
+}
+
+TEST(ObjectHistory, FinalMapsTheLastEstimateBackToTheFirstDetectionAndIntoFramesNotHidden) {
+  ObjectHistory history;
+  ObjectBelief hidden = carAt(1, 4.5);
+  hidden.visibility = Visibility::kOccluded;
+  history.add(messageAt(0, {carAt(1, 4, false)}));
+  history.add(messageAt(1, {hidden}));
+  history.add(messageAt(2, {carAt(1, 5)}));
+  const auto rows = history.finalRows();
+  ASSERT_THAT(rows, SizeIs(2));
+  EXPECT_EQ(rows[0].frame, 0u);
+  EXPECT_EQ(rows[1].frame, 2u);
+  EXPECT_NEAR(rows[0].p_W.x(), 5.0, 1e-12);
+}
+
+TEST(ObjectHistory, FinalGivesTheSurvivorsIdOnceForMergedObjects) {
+  ObjectHistory history;
+  history.add(messageAt(0, {carAt(1, 4), carAt(2, 4.2)}));
+  history.add(eventOf(EventKind::kMerged, 1, 2));
+  history.add(messageAt(1, {carAt(1, 4.1)}));
+  const auto rows = history.finalRows();
+  ASSERT_THAT(rows, SizeIs(2));
+  for (const auto& row : rows) EXPECT_EQ(row.object_id, 1u);
+  EXPECT_THAT(history.inst(), SizeIs(3));  // causal: what was said then stays said
+  EXPECT_THAT(history.lastBeliefs(), SizeIs(1));
+}
+
+TEST(ObjectHistory, FinalHasNoRowsOfObjectsThatProvedMovingOrGone) {
+  ObjectHistory history;
+  ObjectBelief drives = carAt(1, 5);
+  history.add(messageAt(0, {drives, carAt(2, 8)}));
+  drives.moving = 0.9;
+  history.add(messageAt(1, {drives, carAt(2, 8)}));
+  history.add(eventOf(EventKind::kGone, 2));
+  EXPECT_THAT(history.finalRows(), SizeIs(0));
+  EXPECT_THAT(history.inst(), SizeIs(3));
+}
+
+TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
+  CameraCalibration camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 500;
+  camera.cx = 320;
+  camera.cy = 240;
+  Eigen::Matrix3d R_BC;  // z of the camera ahead, x to the right
+  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d::Zero());
+  ObjectHistory history;
+  history.setCamera(camera);
+  Objects passed = messageAt(1, {carAt(1, 10)});
+  passed.T_WB.p.x() = 20.0;  // the object now lies behind
+  history.add(messageAt(0, {carAt(1, 10)}));
+  history.add(passed);
+  const auto rows = history.finalRows();
+  ASSERT_THAT(rows, SizeIs(1));
+  EXPECT_EQ(rows[0].frame, 0u);
+}
+
+TEST(ObjectHistory, ALaterMessageAboutTheSameFrameReplacesTheEarlier) {
+  ObjectHistory history;
+  history.add(messageAt(0, {carAt(1, 4)}));
+  history.add(messageAt(0, {carAt(1, 5)}));
+  ASSERT_THAT(history.inst(), SizeIs(1));
+  EXPECT_NEAR(history.inst()[0].p_W.x(), 5.0, 1e-12);
+}
+
+TEST(OutputWriter, LeavesEveryFileWellFormed) {
+  const auto folder = emptyFolder("perdure_outputs");
+  OutputWriter writer(folder, "0000");
+  Odometry odometry;
+  odometry.state = OdometryState::kTracking;
+  odometry.stamp.time = fromNanoseconds(1'500'000'000);
+  writer.onOdometry(odometry);
+  writer.onObjects(messageAt(0, {carAt(1, 4)}));
+  writer.onEvent(eventOf(EventKind::kBorn, 1));
+  writer.finish();
+
+  EXPECT_THAT(textOf(folder / "objects_inst.csv"),
+              HasSubstr("0000,0,0,1,car,0.720000,4.0000,2.0000,0.5000,4.0000,1.6000,1.5000,0.10000,1"));
+  EXPECT_THAT(textOf(folder / "trajectory.tum"), HasSubstr("1.500000000 0.000000000"));
+  const auto objects = nlohmann::json::parse(textOf(folder / "objects.json"));
+  EXPECT_EQ(objects["objects"][0]["classes"]["car"]["covariance"].size(), 7u);
+  EXPECT_EQ(objects["objects"][0]["memory"], "working");
+  EXPECT_EQ(nlohmann::json::parse(textOf(folder / "events.jsonl"))["event"], "born");
+  const auto map = nlohmann::json::parse(textOf(folder / "map.geojson"));
+  EXPECT_EQ(map["type"], "FeatureCollection");
+  EXPECT_FALSE(map["georeferenced"]);
+  EXPECT_GT(std::filesystem::file_size(folder / "map.png"), 1000u);
+}
+
+TEST(OutputWriter, SaysTheMendWhereTheFolderCannotBeMade) {
+  try {
+    const OutputWriter writer("/proc/nowhere/out", "0000");
+    FAIL() << "a folder in /proc was made";
+  } catch (const StartupError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("--out"));
+    EXPECT_EQ(error.code(), ExitCode::kUnavailable);
+  }
+}
+
+TEST(StageTimer, QuantilesInterpolateBetweenSamples) {
+  EXPECT_DOUBLE_EQ(quantile({4, 1, 3, 2}, 0.5), 2.5);
+  EXPECT_DOUBLE_EQ(quantile({1, 2, 3}, 1.0), 3.0);
+  EXPECT_DOUBLE_EQ(quantile({}, 0.5), 0.0);
+}
+
+TEST(StageTimer, CountsCallsByStageAndHandsTheResultThrough) {
+  StageTimer timer;
+  EXPECT_EQ(timer.time("vio", [] { return 7; }), 7);
+  timer.time("vio", [] {});
+  EXPECT_EQ(timer.toJson()["stages"]["vio"]["calls"], 2);
+}
+
+}  // namespace
+}  // namespace perdure::tools
