@@ -1,0 +1,12 @@
+#include "tools/evaluate/command.h"
+
+namespace perdure::tools {
+
+void addEvaluateCommand(CLI::App& app) {
+  CLI::App* evaluate = app.add_subcommand("evaluate", "Compare results with truth");
+  evaluate->require_subcommand(1);
+  addEvaluateObjects(*evaluate);
+  addEvaluateTrajectory(*evaluate);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,137 @@
+// `perdure evaluate objects`: the nine cells and the identities, as text or JSON.
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "common/base/errors.h"
+#include "common/replay/pose_file.h"
+#include "tools/evaluate/command.h"
+#include "tools/evaluate/object_score.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ObjectsOptions {
+  std::string truth, sequence, csv, trajectory, class_name = "car";
+  std::vector<std::uint32_t> image_size;
+  ScoreOptions score;
+  bool json = false;
+};
+
+struct Evaluated {
+  ObjectScore score;
+  std::uint64_t estimates = 0, poses = 0;
+};
+
+replay::KittiCalibration readCalibration(const ObjectsOptions& options) {
+  const fs::path root = options.truth;
+  auto calibration = replay::readTrackingCalibration(root / "calib" / (options.sequence + ".txt"));
+  const auto size = replay::trackingImageSize(options.sequence);
+  calibration.width = options.image_size.empty() ? size.width : options.image_size[0];
+  calibration.height = options.image_size.empty() ? size.height : options.image_size[1];
+  return calibration;
+}
+
+Evaluated evaluate(const ObjectsOptions& options) {
+  const fs::path csv = options.csv;
+  const fs::path beside = csv.parent_path() / "trajectory.tum";
+  const fs::path tum = options.trajectory.empty() ? beside : fs::path(options.trajectory);
+  const auto labels =
+      replay::readKittiLabels(fs::path(options.truth) / "label_02" / (options.sequence + ".txt"));
+  const auto calibration = readCalibration(options);
+  auto rows = readObjectRows(csv);
+  const auto poses = posesByFrame(replay::PoseFile::read(tum).poses(), rows);
+  std::erase_if(rows, [&](const ObjectRow& row) { return row.class_name != options.class_name; });
+  const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+  return {scoreObjects(rows, truth, poses, calibration, options.score), rows.size(), poses.size()};
+}
+
+nlohmann::ordered_json toJson(const Evaluated& result) {
+  const ObjectScore& s = result.score;
+  nlohmann::ordered_json cells = nlohmann::ordered_json::array();
+  for (std::size_t d = 0; d < 3; ++d) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const Cell& c = s.cells[d][a];
+      cells.push_back({{"distance_m", kDistances_m[d]},
+                       {"angle_deg", a == 2 ? nlohmann::ordered_json("any")
+                                            : nlohmann::ordered_json(kAngles_deg[a])},
+                       {"precision", c.precision()},
+                       {"recall", c.recall()},
+                       {"matched", c.matched},
+                       {"truth", c.truth},
+                       {"false_alarms", c.false_alarms}});
+    }
+  }
+  const double objects = std::max<double>(1.0, static_cast<double>(s.objects));
+  return {{"cells", cells},
+          {"objects", s.objects},
+          {"objects_found", s.objects_found},
+          {"mean_object_recall", s.mean_object_recall},
+          {"position_error_m", s.position_error_m},
+          {"id_switches", s.id_switches},
+          {"ids_per_object", static_cast<double>(s.ids_matched) / objects},
+          {"duplicates_per_object", static_cast<double>(s.duplicates) / objects},
+          {"flicker_per_minute",
+           s.minutes > 0 ? static_cast<double>(s.interruptions) / s.minutes : 0.0},
+          {"estimates", result.estimates},
+          {"neutral", s.neutral},
+          {"outside_image", s.outside},
+          {"frames_with_pose", result.poses}};
+}
+
+void print(const Evaluated& result, const ObjectsOptions& options) {
+  const ObjectScore& s = result.score;
+  const auto json = toJson(result);
+  std::printf("sequence %s, class %s%s: precision / recall\n", options.sequence.c_str(),
+              options.class_name.c_str(), options.score.strict ? ", strict" : "");
+  std::printf("          < 30 deg       < 45 deg       any\n");
+  for (std::size_t d = 0; d < 3; ++d) {
+    std::printf("< %.1f m", kDistances_m[d]);
+    for (const Cell& c : s.cells[d]) std::printf("   %.3f / %.3f", c.precision(), c.recall());
+    std::printf("\n");
+  }
+  const Cell& wide = s.cells[2][2];
+  std::printf("at 1.5 m, any: %llu matched of %llu, %llu false alarms, %llu neutral\n",
+              static_cast<unsigned long long>(wide.matched),
+              static_cast<unsigned long long>(wide.truth),
+              static_cast<unsigned long long>(wide.false_alarms),
+              static_cast<unsigned long long>(s.neutral));
+  std::printf(
+      "true objects: %llu of %llu found, mean recall over objects %.3f, position error %.3f m\n",
+      static_cast<unsigned long long>(s.objects_found), static_cast<unsigned long long>(s.objects),
+      s.mean_object_recall, s.position_error_m);
+  std::printf(
+      "identities: %llu switches, %.2f ids an object, %.2f duplicates an object, "
+      "%.2f interruptions a minute\n",
+      static_cast<unsigned long long>(s.id_switches), json["ids_per_object"].get<double>(),
+      json["duplicates_per_object"].get<double>(), json["flicker_per_minute"].get<double>());
+}
+
+}  // namespace
+
+void addEvaluateObjects(CLI::App& evaluate_app) {
+  auto options = std::make_shared<ObjectsOptions>();
+  CLI::App* app = evaluate_app.add_subcommand(
+      "objects", "Precision and recall of objects_inst.csv or objects_final.csv on KITTI tracking");
+  app->add_option("csv", options->csv, "objects_inst.csv or objects_final.csv")->required();
+  app->add_option("--truth", options->truth, "Root of KITTI tracking (label_02, calib)")
+      ->required();
+  app->add_option("--sequence", options->sequence, "Sequence, for example 0000")->required();
+  app->add_option("--trajectory", options->trajectory, "Default: trajectory.tum beside the CSV");
+  app->add_option("--class", options->class_name, "Class of the estimates")->capture_default_str();
+  app->add_option("--image-size", options->image_size, "Width and height in pixels")->expected(2);
+  app->add_flag("--strict", options->score.strict, "Estimates on ignored labels are false alarms");
+  app->add_flag("--json", options->json, "Print JSON");
+  app->callback([options] {
+    const Evaluated result = evaluate(*options);
+    if (options->json)
+      std::cout << toJson(result).dump(2) << std::endl;
+    else
+      print(result, *options);
+  });
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,174 @@
+// `perdure evaluate trajectory`: a TUM file against a pose file or a dataset folder's own truth.
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "common/base/errors.h"
+#include "common/replay/dataset.h"
+#include "tools/evaluate/command.h"
+#include "tools/evaluate/trajectory_score.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::PoseFile;
+using replay::PoseFormat;
+
+struct TrajectoryOptions {
+  std::string truth, sequence, tum, data, align = "yaw";
+  double skip_s = 0.0;
+  bool json = false;
+};
+
+/// Truth by time, and the times at which a pose was to be expected (empty where nobody knows).
+struct Truth {
+  PoseFile poses{PoseFormat::kTum, {}};
+  std::vector<TimePoint> frames;
+};
+
+std::vector<TimePoint> frameTimes(const std::string& folder, const std::string& sequence,
+                                  std::optional<PoseFile>* truth) {
+  replay::DatasetOptions options;
+  options.path = folder;
+  options.sequence = sequence;
+  options.decode = false;
+  const auto dataset = replay::Dataset::open(options);
+  if (truth != nullptr) *truth = dataset->truth();
+  std::vector<TimePoint> times;
+  for (std::uint64_t i = 0; i < dataset->frameCount(); ++i) {
+    if (const auto time = dataset->frameTime(i)) times.push_back(*time);
+  }
+  return times;
+}
+
+/// KITTI's lines have no times: those of the frames, or 10 Hz from 0.
+PoseFile withTimes(const PoseFile& file, const std::vector<TimePoint>& frames) {
+  if (file.format() == PoseFormat::kTum) return file;
+  std::vector<replay::StampedPose> poses = file.poses();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto tenths = static_cast<std::int64_t>(i) * std::chrono::milliseconds(100);
+    poses[i].time = frames.empty() ? TimePoint(tenths) : frames[std::min(i, frames.size() - 1)];
+  }
+  if (!frames.empty() && poses.size() > frames.size()) poses.resize(frames.size());
+  return PoseFile(PoseFormat::kTum, std::move(poses));
+}
+
+Truth readTruth(const TrajectoryOptions& options) {
+  Truth truth;
+  std::optional<PoseFile> own;
+  if (!options.data.empty()) truth.frames = frameTimes(options.data, options.sequence, nullptr);
+  if (fs::is_directory(options.truth)) {
+    truth.frames = frameTimes(options.truth, options.sequence, &own);
+    if (!own) {
+      throw StartupError(ExitCode::kUnavailable,
+                         options.truth + " holds no true trajectory; give a pose file to --truth");
+    }
+  }
+  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth), truth.frames);
+  return truth;
+}
+
+struct Compared {
+  TrajectoryScore score;
+  double coverage = 0.0;
+  std::size_t expected = 0;
+};
+
+Compared compare(const TrajectoryOptions& options) {
+  const Truth truth = readTruth(options);
+  const PoseFile file = PoseFile::read(options.tum);
+  if (file.format() != PoseFormat::kTum) {
+    throw StartupError(ExitCode::kUsage, options.tum + " is no TUM file: t x y z qx qy qz qw");
+  }
+  const auto& poses = truth.poses.poses();
+  const auto& frames = truth.frames;
+  const TimePoint begin = (frames.empty() ? file.poses().front().time : frames.front()) +
+                          durationFromSeconds(options.skip_s);
+  std::vector<PosePair> pairs;
+  for (const auto& pose : file.poses()) {
+    if (pose.time < begin) continue;
+    const auto there = truth.poses.at(0, pose.time);
+    if (there) pairs.push_back({pose.time, pose.T_WB, *there});
+  }
+  if (pairs.size() < 2) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options.tum + " and " + options.truth +
+                           " have fewer than two times in common; name the dataset with --data "
+                           "where the truth has no times");
+  }
+  Compared result;
+  result.score =
+      scoreTrajectory(pairs, options.align == "yaw" ? Alignment::kYaw : Alignment::kRigid);
+  // Frames that ought to have a pose: those of the dataset that the truth spans.
+  const auto expected = [&](TimePoint t) {
+    return t >= begin && t >= poses.front().time && t <= poses.back().time;
+  };
+  for (const TimePoint t : frames) result.expected += expected(t) ? 1 : 0;
+  if (frames.empty()) result.expected = pairs.size();
+  result.coverage =
+      std::min(1.0, static_cast<double>(pairs.size()) /
+                        static_cast<double>(std::max<std::size_t>(1, result.expected)));
+  return result;
+}
+
+nlohmann::ordered_json toJson(const Compared& result) {
+  const TrajectoryScore& s = result.score;
+  return {{"poses", s.poses},
+          {"frames_expected", result.expected},
+          {"coverage", result.coverage},
+          {"length_m", s.length_m},
+          {"ate_rmse_m", s.ate_rmse_m},
+          {"ate_max_m", s.ate_max_m},
+          {"ate_rotation_deg", s.ate_rotation_deg},
+          {"rpe_1s_m", s.rpe_m},
+          {"rpe_1s_deg", s.rpe_deg},
+          {"end_drift_m", s.end_drift_m},
+          {"segments", s.segments.segments},
+          {"segment_lengths_m", s.segments.lengths_m},
+          {"t_err_percent", s.segments.t_err_percent},
+          {"r_err_deg_per_m", s.segments.r_err_deg_per_m}};
+}
+
+void print(const Compared& result, const TrajectoryOptions& options) {
+  const TrajectoryScore& s = result.score;
+  std::printf("poses %zu of %zu frames (coverage %.4f), %.1f m\n", s.poses, result.expected,
+              result.coverage, s.length_m);
+  std::printf("ATE (aligned in position and %s): RMSE %.4f m, max %.4f m, rotation %.3f deg\n",
+              options.align == "yaw" ? "yaw" : "rotation", s.ate_rmse_m, s.ate_max_m,
+              s.ate_rotation_deg);
+  std::printf("RPE over 1 s: %.4f m, %.3f deg; drift at the end %.4f m\n", s.rpe_m, s.rpe_deg,
+              s.end_drift_m);
+  std::printf("KITTI: t_err %.3f %%, r_err %.5f deg/m (%zu segments of %g to %g m)\n",
+              s.segments.t_err_percent, s.segments.r_err_deg_per_m, s.segments.segments,
+              s.segments.lengths_m.front(), s.segments.lengths_m.back());
+}
+
+}  // namespace
+
+void addEvaluateTrajectory(CLI::App& evaluate_app) {
+  auto options = std::make_shared<TrajectoryOptions>();
+  CLI::App* app = evaluate_app.add_subcommand("trajectory", "ATE, RPE and KITTI's segment errors");
+  app->add_option("tum", options->tum, "trajectory.tum of a run")->required();
+  app->add_option("--truth", options->truth, "TUM or KITTI pose file, or a dataset folder")
+      ->required();
+  app->add_option("--sequence", options->sequence, "Of a KITTI tracking folder");
+  app->add_option("--data", options->data, "Dataset folder whose frames time KITTI's pose lines");
+  app->add_option("--align", options->align, "Alignment besides position")
+      ->check(CLI::IsMember({"yaw", "rigid"}))
+      ->capture_default_str();
+  app->add_option("--skip", options->skip_s, "Seconds at the start to leave out")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app->add_flag("--json", options->json, "Print JSON");
+  app->callback([options] {
+    const Compared result = compare(*options);
+    if (options->json)
+      std::cout << toJson(result).dump(2) << std::endl;
+    else
+      print(result, *options);
+  });
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,37 @@
+// The `perdure` command: each subcommand is one line here and lives in its own folder of tools/.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+
+#include "common/base/errors.h"
+#include "tools/evaluate/command.h"
+
+namespace {
+
+int run(CLI::App& app, int argc, char** argv) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::RuntimeError& error) {
+    return error.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = app.exit(error) == 0;
+    return static_cast<int>(asked_for_help ? perdure::ExitCode::kOk : perdure::ExitCode::kUsage);
+  } catch (const perdure::StartupError& error) {
+    std::cerr << "perdure: " << error.what() << std::endl;
+    return static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    std::cerr << "perdure: " << error.what() << std::endl;
+    return static_cast<int>(perdure::ExitCode::kFailure);
+  }
+  return static_cast<int>(perdure::ExitCode::kOk);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Perdure: a persistent, metric map of objects from a camera and an IMU");
+  app.set_version_flag("--version", PERDURE_VERSION);
+  app.require_subcommand(1);
+  perdure::tools::addEvaluateCommand(app);
+  return run(app, argc, argv);
+}
