@@ -1,0 +1,45 @@
+#include "common/service/health.h"
+
+#include <unistd.h>
+
+#include "common/service/process.h"
+
+namespace perdure::service {
+
+HealthMeter::HealthMeter(std::string process, InstanceId instance)
+    : process_(std::move(process)), instance_(instance) {}
+
+void HealthMeter::state(HealthState state, const std::string& message) {
+  const std::lock_guard lock(mutex_);
+  state_ = state;
+  message_ = message;
+}
+
+Health HealthMeter::sample(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  Health health;
+  health.process = process_;
+  health.instance = instance_;
+  health.pid = static_cast<std::uint32_t>(getpid());
+  health.state = state_;
+  health.message = message_;
+  health.frames_in = frames_in_;
+  health.frames_out = frames_out_;
+  health.dropped = dropped_;
+  health.rate_hz = rateAt(now);
+  health.cpu_s = processorSeconds();
+  health.rss_bytes = residentBytes();
+  return health;
+}
+
+/// Over the last five seconds.
+double HealthMeter::rateAt(Clock::time_point now) {
+  constexpr std::chrono::seconds kWindow{5};
+  history_.emplace_back(now, frames_out_);
+  while (history_.size() > 2 && now - history_.front().first > kWindow) history_.pop_front();
+  const double seconds = std::chrono::duration<double>(now - history_.front().first).count();
+  const auto frames = static_cast<double>(history_.back().second - history_.front().second);
+  return seconds > 0 ? frames / seconds : 0.0;
+}
+
+}  // namespace perdure::service

@@ -1,0 +1,45 @@
+// What a process says of itself once a second: counted by its handlers, completed from the system.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <deque>
+#include <mutex>
+#include <string>
+
+#include "common/types/health.h"
+
+namespace perdure::service {
+
+/// Counts may be changed from any thread.
+class HealthMeter {
+ public:
+  HealthMeter(std::string process, InstanceId instance);
+
+  void frameIn() { ++frames_in_; }
+  void frameOut() { ++frames_out_; }
+  void dropped(std::uint64_t n = 1) { dropped_ += n; }
+  void setDropped(std::uint64_t total) { dropped_ = total; }
+  /// What the process is, with one sentence: what is wrong and the mend, or what it waits for.
+  void state(HealthState state, const std::string& message = {});
+
+  std::uint64_t framesIn() const { return frames_in_; }
+  std::uint64_t framesOut() const { return frames_out_; }
+
+  /// The message of this second; reasons are the caller's.
+  Health sample(std::chrono::steady_clock::time_point now);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double rateAt(Clock::time_point now);
+
+  const std::string process_;
+  const InstanceId instance_;
+  std::atomic<std::uint64_t> frames_in_{0}, frames_out_{0}, dropped_{0};
+  std::mutex mutex_;
+  HealthState state_ = HealthState::kStarting;
+  std::string message_;
+  std::deque<std::pair<Clock::time_point, std::uint64_t>> history_;
+};
+
+}  // namespace perdure::service

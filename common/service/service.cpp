@@ -1,0 +1,176 @@
+#include "common/service/service.h"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+
+#include "common/base/errors.h"
+#include "common/service/process.h"
+#include "common/service/signals.h"
+
+namespace perdure::service {
+namespace {
+
+struct Common {
+  bus::Options bus;
+  std::string log_level = "info";
+};
+
+void describe(Common& common, config::Fields& fields) {
+  bus::describe(common.bus, fields);
+  fields.choice("log.level", common.log_level,
+                {"trace", "debug", "info", "warning", "error", "off"},
+                {"how much is logged to standard error"});
+}
+
+/// "semantic_filter" → "perdure-semantic-filter".
+std::string executableOf(const Program& program) {
+  std::string name = "perdure-" + program.process;
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+struct CommandLine {
+  std::string config_file;
+  std::vector<std::string> assignments;
+  bool check_config = false, print_config = false, markdown = false;
+};
+
+void addOptions(CLI::App& app, CommandLine& line) {
+  app.add_option("--config", line.config_file, "YAML file; --print-config shows what it may hold")
+      ->type_name("FILE");
+  app.add_option("--set", line.assignments, "one value, after the file; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+  app.add_flag("--check-config", line.check_config,
+               "read the configuration, report all that is wrong, and exit (78 or 0)");
+  app.add_flag("--print-config", line.print_config, "print the configuration in force and exit");
+  app.add_flag("--print-config-table", line.markdown,
+               "print the fields as the Markdown table of the README and exit");
+  app.set_version_flag("--version", std::string(PERDURE_VERSION));
+}
+
+/// Reads file and assignments; throws StartupError with everything that is wrong.
+void readConfiguration(config::Fields& fields, const CommandLine& line) {
+  std::vector<config::Problem> problems;
+  const auto append = [&](std::vector<config::Problem> more) {
+    problems.insert(problems.end(), more.begin(), more.end());
+  };
+  if (!line.config_file.empty()) append(config::readFile(fields, line.config_file));
+  for (const std::string& assignment : line.assignments) append(assign(fields, assignment));
+  append(missing(fields, line.config_file.empty() ? "configuration" : line.config_file));
+  config::refuse(problems);
+}
+
+std::shared_ptr<spdlog::logger> makeLog(const std::string& process, const std::string& level) {
+  auto log =
+      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
+  log->set_level(spdlog::level::from_str(level));
+  log->flush_on(spdlog::level::trace);
+  return log;
+}
+
+/// Everything after the command line is read; throws StartupError.
+void start(const Program& program, const CommandLine& line) {
+  const BlockedSignals blocked;
+  Common common;
+  config::Fields fields;
+  if (program.describe) program.describe(fields);
+  describe(common, fields);
+  if (line.markdown) {
+    std::cout << config::toMarkdown(fields);
+    return;
+  }
+  readConfiguration(fields, line);
+  if (program.verify) program.verify();
+  if (line.print_config) std::cout << config::toYaml(fields);
+  if (line.check_config || line.print_config) return;
+
+  Context context(program.process, common.bus, makeLog(program.process, common.log_level));
+  const SignalThread signals(blocked, [&] { context.stop(); });
+  context.log().info("version {}, instance {}, configuration {}", PERDURE_VERSION,
+                     toHex(context.instance()), toHex(digest(config::toYaml(fields))));
+  program.body(context);
+  context.log().info("ends");
+}
+
+}  // namespace
+
+Context::Context(const std::string& process, const bus::Options& options,
+                 std::shared_ptr<spdlog::logger> log)
+    : instance_(makeInstanceId()),
+      log_(std::move(log)),
+      domain_(options),
+      participant_(domain_, process),
+      health_(process, instance_),
+      health_writer_(participant_, bus::topics::kHealth),
+      loop_(participant_) {
+  countReasons([this](ReasonCounts& counts) { health_writer_.report(counts); });
+  every(std::chrono::seconds(1), [this] { publishHealth(); });
+  publishHealth();
+}
+
+Context::~Context() = default;
+
+void Context::countReasons(std::function<void(ReasonCounts&)> source) {
+  reason_sources_.push_back(std::move(source));
+}
+
+void Context::countReasons(std::function<const ReasonCounts&()> source) {
+  reason_sources_.push_back([source = std::move(source)](ReasonCounts& counts) {
+    for (const auto& [reason, n] : source().all()) counts.add(reason, n);
+  });
+}
+
+void Context::run() {
+  if (health_.sample(std::chrono::steady_clock::now()).state == HealthState::kStarting) {
+    health_.state(HealthState::kOk);
+  }
+  notifyReady();
+  publishHealth();
+  loop_.run();
+  notifyStopping();
+  publishHealth();
+}
+
+ReasonCounts Context::reasons() const {
+  ReasonCounts counts;
+  for (const auto& source : reason_sources_) source(counts);
+  return counts;
+}
+
+void Context::publishHealth() {
+  if (on_health_) on_health_();
+  Health health = health_.sample(std::chrono::steady_clock::now());
+  health.reasons = reasons().all();
+  (void)health_writer_.write(health);
+  notifyWatchdog();
+}
+
+int runService(int argc, char** argv, const Program& program) {
+  CLI::App app(program.summary, executableOf(program));
+  CommandLine line;
+  addOptions(app, line);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ExitCode::kUsage);
+  }
+  try {
+    start(program, line);
+    return static_cast<int>(ExitCode::kOk);
+  } catch (const StartupError& error) {
+    std::cerr << error.what() << '\n';
+    return static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    std::cerr << executableOf(program) << " ends by an error: " << error.what() << '\n';
+    return static_cast<int>(ExitCode::kFailure);
+  }
+}
+
+}  // namespace perdure::service

@@ -1,0 +1,100 @@
+// What every service's main has in common: options, configuration, log, signals, health, watchdog.
+// README.md beside this file shows how a main looks.
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+
+#include "common/base/sink.h"
+#include "common/bus/once.h"
+#include "common/bus/wait_loop.h"
+#include "common/service/health.h"
+
+namespace perdure::service {
+
+/// Given to a service's body: its endpoints, its loop, its health and its log.
+class Context {
+ public:
+  Context(const std::string& process, const bus::Options& options,
+          std::shared_ptr<spdlog::logger> log);
+  ~Context();
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+
+  InstanceId instance() const { return instance_; }
+  bus::Participant& participant() { return participant_; }
+  bus::WaitLoop& loop() { return loop_; }
+  HealthMeter& health() { return health_; }
+  spdlog::logger& log() { return *log_; }
+
+  /// A reader whose messages go to `handler` in the loop's thread. Counted in Health.
+  template <class T>
+  bus::Reader<T>& on(const bus::Topic<T>& topic, std::type_identity_t<Sink<T>> handler,
+                     std::type_identity_t<Sink<T>> on_gone = {}) {
+    auto reader = std::make_shared<bus::Reader<T>>(participant_, topic);
+    loop_.on(*reader, std::move(handler), std::move(on_gone));
+    countReasons([reader](ReasonCounts& counts) { reader->report(counts); });
+    return *reader;
+  }
+  /// A writer. Counted in Health.
+  template <class T>
+  bus::Writer<T>& writer(const bus::Topic<T>& topic, const bus::WriterOptions& options = {}) {
+    auto writer = std::make_shared<bus::Writer<T>>(participant_, topic, options);
+    countReasons([writer](ReasonCounts& counts) { writer->report(counts); });
+    return *writer;
+  }
+  /// A writer as a node's output. What cannot be written is counted in Health.
+  template <class T>
+  Sink<T> sink(const bus::Topic<T>& topic) {
+    return [&to = writer(topic)](const T& value) { (void)to.write(value); };
+  }
+
+  /// Counts that Health publishes besides; asked once a second in the loop's thread.
+  void countReasons(std::function<void(ReasonCounts&)> source);
+  void countReasons(std::function<const ReasonCounts&()> source);
+  /// Called once a second before Health is published: to set its state.
+  void onHealth(std::function<void()> update) { on_health_ = std::move(update); }
+
+  void every(std::chrono::nanoseconds period, std::function<void()> tick) {
+    loop_.every(period, std::move(tick));
+  }
+  /// Says that the service is ready and runs the loop until SIGTERM, SIGINT or stop().
+  void run();
+  /// From any thread.
+  void stop() { loop_.stop(); }
+  bool stopping() const { return loop_.stopped(); }
+
+ private:
+  void publishHealth();
+  ReasonCounts reasons() const;
+
+  const InstanceId instance_;
+  std::shared_ptr<spdlog::logger> log_;
+  bus::Domain domain_;
+  bus::Participant participant_;
+  HealthMeter health_;
+  bus::Writer<Health> health_writer_;
+  std::list<std::function<void(ReasonCounts&)>> reason_sources_;  // own the endpoints
+  bus::WaitLoop loop_;
+  std::function<void()> on_health_;
+};
+
+struct Program {
+  std::string process;  ///< "capture", "vio", …: the name in Health and in the log
+  std::string summary;  ///< one sentence for --help
+  /// The service's own fields; those of bus.* and log.* are added.
+  std::function<void(config::Fields&)> describe;
+  /// Makes the nodes, wires them, and calls context.run(). May throw StartupError before that.
+  std::function<void(Context&)> body;
+  /// Checks between fields, after reading; may throw StartupError. Part of --check-config.
+  std::function<void()> verify = {};
+};
+
+/// The whole main of a service; returns its exit status.
+int runService(int argc, char** argv, const Program& program);
+
+}  // namespace perdure::service

@@ -1,0 +1,38 @@
+#include "common/service/signals.h"
+
+#include <pthread.h>
+
+#include <csignal>
+
+namespace perdure::service {
+namespace {
+
+sigset_t endSignals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGINT);
+  return set;
+}
+
+}  // namespace
+
+BlockedSignals::BlockedSignals() {
+  const sigset_t set = endSignals();
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+}
+
+SignalThread::SignalThread(const BlockedSignals&, std::function<void()> on_signal)
+    : thread_([on_signal = std::move(on_signal)] {
+        const sigset_t set = endSignals();
+        int signal = 0;
+        sigwait(&set, &signal);
+        on_signal();
+      }) {}
+
+SignalThread::~SignalThread() {
+  pthread_kill(thread_.native_handle(), SIGTERM);  // wakes it where no signal came
+  thread_.join();
+}
+
+}  // namespace perdure::service
