@@ -1,0 +1,317 @@
+#include "services/vio/core/estimator.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+#include "common/base/check.h"
+#include "common/math/so3.h"
+#include "services/vio/core/imu_propagator.h"
+#include "services/vio/core/triangulation.h"
+#include "services/vio/core/updater_msckf.h"
+#include "services/vio/core/updater_slam.h"
+#include "services/vio/core/updates.h"
+#include "services/vio/core/visual.h"
+
+namespace perdure::vio {
+namespace {
+
+// Beyond these a filter is lost, whatever it believes.
+constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
+
+std::int64_t asInt(std::size_t n) { return static_cast<std::int64_t>(n); }
+
+}  // namespace
+
+Estimator::Estimator(const Options& options, const std::vector<RigidTransform>& T_BC,
+                     double time_offset_s)
+    : options_(options), T_BC_(T_BC), time_offset_s_(time_offset_s) {
+  check(!T_BC.empty() && T_BC.size() <= kMaxCameras, "one or two cameras");
+}
+
+void Estimator::start(const Start& start) {
+  state_.emplace(T_BC_, time_offset_s_, static_cast<int>(options_.window.clones),
+                 static_cast<int>(options_.window.slam_features));
+  state_->nav = state_->nav_first = start.nav;
+  state_->time = start.time;
+  auto P = state_->P();
+  P.topLeftCorner<15, 15>() = start.covariance;
+  const CalibrationOptions& c = options_.calibration;
+  if (c.estimate_extrinsics) {
+    double factor = 1.0;
+    for (int i = 0; i < static_cast<int>(T_BC_.size()); ++i) {
+      const double r = c.extrinsic_rotation * factor, p = c.extrinsic_position_m * factor;
+      const int at = state_->extrinsicsAt(i);
+      P.diagonal().segment<3>(at).setConstant(r * r);
+      P.diagonal().segment<3>(at + 3).setConstant(p * p);
+      factor = c.second_camera_factor;
+    }
+    // The second camera errs with the first, and a little by itself.
+    if (T_BC_.size() == 2) {
+      const int a = state_->extrinsicsAt(0), b = state_->extrinsicsAt(1);
+      const RigidTransform T_01 = T_BC_[0].inverse() * T_BC_[1];
+      Matrix6d J = Matrix6d::Zero();  // T_BC1 = T_BC0 · T_01
+      J.topLeftCorner<3, 3>() = T_01.R().transpose();
+      J.bottomLeftCorner<3, 3>() = -T_BC_[0].R() * skew(T_01.p);
+      J.bottomRightCorner<3, 3>().setIdentity();
+      const Matrix6d P_a = P.block<6, 6>(a, a);
+      P.block<6, 6>(b, a) = J * P_a;
+      P.block<6, 6>(a, b) = (J * P_a).transpose();
+      P.block<6, 6>(b, b) += J * P_a * J.transpose();
+    }
+  }
+  if (c.estimate_time_offset) {
+    P(state_->timeOffsetAt(), state_->timeOffsetAt()) = c.time_offset_s * c.time_offset_s;
+  }
+  database_.clear();
+  previous_frame_.reset();
+}
+
+Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) const {
+  if (!state_ || to <= state_->time || imu.empty()) return Eigen::Matrix3d::Identity();
+  const ImuIncrement x = integrate(imu.between(state_->time, to), state_->nav.gyro_bias,
+                                   state_->nav.accel_bias, options_.imu);
+  return x.dq.toRotationMatrix().transpose();
+}
+
+Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& imu) {
+  const TimePoint to = input.image_time + durationFromSeconds(state_->time_offset_s);
+  if (imu.empty()) return fail("imu_missing");
+  Eigen::Vector3d rate;
+  if (to > state_->time) {
+    const ImuIncrement x = integrate(imu.between(state_->time, to), state_->nav.gyro_bias,
+                                     state_->nav.accel_bias, options_.imu);
+    propagate(*state_, x, to, options_.gravity, options_.window.first_estimates);
+    rate = x.end_rate;
+  } else if (to == state_->time) {
+    rate = imu.between(to, to + Duration(1)).front().gyro - state_->nav.gyro_bias;
+  } else {
+    return fail("frame_not_after_state");
+  }
+  state_->addClone(input.frame, input.image_time, rate, options_.window.first_estimates);
+  database_.add(input.frame, input.tracked);
+  return {};
+}
+
+bool Estimator::restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePoint from) {
+  const RestOptions& o = options_.rest;
+  if (!o.enabled || !input.motion_px || *input.motion_px > o.disparity_px) return false;
+  if (!previous_frame_ || !state_->clone(*previous_frame_) || state_->time <= from) return false;
+  if (input.speed && std::abs(input.speed->speed) > 0.1) return false;
+  if (state_->nav.v_WB.norm() > o.max_speed) return false;
+  const RestSample sample = restSample(imu.between(from, state_->time), options_.imu);
+  if ((sample.rate - state_->nav.gyro_bias).norm() > o.max_rate) return false;
+  State before = *state_;
+  auto done = updateRest(*state_, sample, o, options_.gravity);
+  if (done) done = updateNoMotion(*state_, *previous_frame_, input.frame, o);
+  if (!done) {
+    reasons_.add(done.error());
+    *state_ = std::move(before);
+  }
+  return done.has_value();
+}
+
+std::vector<Track> Estimator::takeOnceUsed(std::uint64_t frame, bool window_full) {
+  std::vector<Track> ended, leaving;
+  const std::uint64_t oldest = state_->clones.front().frame;
+  std::vector<std::uint64_t> erase;
+  for (const auto& [id, track] : database_.tracks()) {
+    if (state_->point(id)) continue;
+    const bool enough = asInt(track.views()) >= options_.window.min_observations;
+    if (!track.seenAt(frame)) {
+      if (enough) ended.push_back(track);
+      erase.push_back(id);
+    } else if (window_full && enough && track.observations.front().frame == oldest) {
+      leaving.push_back(track);
+    }
+  }
+  for (const std::uint64_t id : erase) database_.erase(id);
+  const auto longer = [](const Track& a, const Track& b) { return a.views() > b.views(); };
+  std::stable_sort(ended.begin(), ended.end(), longer);
+  std::stable_sort(leaving.begin(), leaving.end(), longer);
+  ended.insert(ended.end(), leaving.begin(), leaving.end());
+  const auto limit = static_cast<std::size_t>(options_.window.msckf_features);
+  if (ended.size() > limit) ended.resize(limit);
+  for (const Track& track : ended) database_.erase(track.id);
+  return ended;
+}
+
+void Estimator::dropLostPoints(std::uint64_t frame) {
+  std::vector<std::uint64_t> lost;
+  for (const PointState& point : state_->points) {
+    const Track* track = database_.find(point.id);
+    if (!track || !track->seenAt(frame)) lost.push_back(point.id);
+  }
+  for (const std::uint64_t id : lost) {
+    state_->removePoint(id);
+    database_.erase(id);
+  }
+}
+
+Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
+  if (!window_full) return {};
+  const std::uint64_t oldest = state_->clones.front().frame;
+  std::vector<Track> candidates;
+  for (const auto& [id, track] : database_.tracks()) {
+    if (state_->point(id) || !track.seenAt(frame)) continue;
+    if (track.observations.front().frame != oldest) continue;
+    candidates.push_back(track);
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Track& a, const Track& b) { return a.views() > b.views(); });
+  for (const Track& track : candidates) {
+    if (asInt(state_->points.size()) >= options_.window.slam_features) break;
+    const auto added = initialisePoint(*state_, track, options_.vision);
+    if (!added) {
+      reasons_.add(added.error());
+      if (added.error().code.starts_with("update_")) return added;
+    }
+    database_.erase(track.id);
+  }
+  return {};
+}
+
+Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out) {
+  const bool full = asInt(state_->clones.size()) > options_.window.clones;
+  dropLostPoints(input.frame);
+  const auto slam = updateSlam(*state_, database_, options_.vision, reasons_);
+  if (!slam) return tl::unexpected(slam.error());
+  for (const PointState& point : state_->points) database_.erase(point.id);
+  if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;
+  const auto once = updateMsckf(*state_, takeOnceUsed(input.frame, full), options_.vision,
+                                reasons_);
+  if (!once) return tl::unexpected(once.error());
+  out.points_used = slam->used + once->used;
+  return {};
+}
+
+void Estimator::report(const FrameInput& input, FrameEstimate& out) {
+  const auto P = state_->P();
+  // The pose at the image is the newest clone's: unlike nav's it knows the time offset's error.
+  const Clone& newest = state_->clones.back();
+  out.nav = state_->nav;
+  out.covariance = state_->covarianceOf({{newest.at, 6}, {kVelocity, 3}});
+  const Clone* previous = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
+  const Matrix6d P_now = P.block<6, 6>(newest.at, newest.at);
+  if (previous) {
+    // E[e_now e_prevᵀ] is that with the clone's error after the update, too: what the update
+    // took from the clone is uncorrelated with what is left of the present error.
+    const Matrix6d cross = P.block<6, 6>(newest.at, previous->at);
+    Matrix6d P_before = previous_pose_covariance_;
+    P_before.diagonal().array() += 1e-12;
+    out.transition = P_before.ldlt().solve(cross.transpose()).transpose();
+    const Matrix6d Q = P_now - out.transition * cross.transpose();
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (Q + Q.transpose()));
+    out.increment_covariance = eigen.eigenvectors() *
+                               eigen.eigenvalues().cwiseMax(1e-12).asDiagonal() *
+                               eigen.eigenvectors().transpose();
+    out.has_increment = out.transition.allFinite() && out.increment_covariance.allFinite();
+    out.increment_from = previous->frame;
+  }
+  previous_frame_ = input.frame;
+  previous_pose_covariance_ = P_now;
+}
+
+void Estimator::marginalise(bool at_rest) {
+  const std::size_t n = state_->clones.size();
+  if (at_rest && n >= 2) {
+    // The newest pose repeats the one before: keep the newest and the window's baseline.
+    const std::uint64_t frame = state_->clones[n - 2].frame;
+    database_.removeFrame(frame);
+    state_->removeClone(frame);
+  } else if (asInt(n) > options_.window.clones) {
+    const std::uint64_t frame = state_->clones.front().frame;
+    database_.removeFrame(frame);
+    state_->removeClone(frame);
+  }
+}
+
+Result<void> Estimator::sane() const {
+  if (!state_->healthy()) return fail("numbers_not_finite");
+  if (state_->nav.v_WB.norm() > kMaxSpeed) return fail("numbers_speed_absurd");
+  if (state_->nav.gyro_bias.norm() > kMaxGyroBias) return fail("numbers_gyro_bias_absurd");
+  if (state_->nav.accel_bias.norm() > kMaxAccelBias) return fail("numbers_accel_bias_absurd");
+  return {};
+}
+
+Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffer& imu) {
+  check(started(), "the estimator has been started");
+  FrameEstimate out;
+  const TimePoint from = state_->time;
+  if (const auto done = propagateTo(input, imu); !done) return tl::unexpected(done.error());
+  if (options_.speed.enabled && input.speed) {
+    const auto done =
+        updateSpeed(*state_, input.speed->speed, input.speed->sigma, options_.speed);
+    if (!done) reasons_.add(done.error());
+  }
+  out.at_rest = restUpdate(input, imu, from);
+  if (out.at_rest) {
+    dropLostPoints(input.frame);
+  } else if (const auto done = visionUpdate(input, out); !done) {
+    stop();
+    return fail("numbers_" + done.error().code);
+  }
+  if (const auto fine = sane(); !fine) {
+    stop();
+    return tl::unexpected(fine.error());
+  }
+  newest_ = input.tracked;
+  report(input, out);
+  marginalise(out.at_rest);
+  return out;
+}
+
+LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& seen) const {
+  const auto P = state_->P();
+  LandmarkEstimate l;
+  l.id = point.id;
+  l.p_W = point.p_W;
+  l.pixel = seen.pixel;
+  l.cross_pose = P.block<3, 6>(point.at, state_->clones.back().at);
+  const int pose = state_->clones.back().at;
+  Matrix6d P_pose = P.block<6, 6>(pose, pose);
+  P_pose.diagonal().array() += 1e-12;
+  const Eigen::Matrix3d given = P.block<3, 3>(point.at, point.at) -
+                                l.cross_pose * P_pose.ldlt().solve(l.cross_pose.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(0.5 * (given + given.transpose()));
+  l.covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(1e-10).asDiagonal() *
+                 eigen.eigenvectors().transpose();
+  return l;
+}
+
+std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
+                                                   const ImagePoint& seen) const {
+  const auto point =
+      triangulate(raysOf(track, *state_, options_.vision.sigma_px), options_.vision);
+  if (!point || point->rms > 2.0) return std::nullopt;
+  const RigidTransform T_WB = state_->nav.T_WB();
+  LandmarkEstimate l;
+  l.id = track.id;
+  l.p_W = point->p_W;
+  l.pixel = seen.pixel;
+  l.covariance = point->covariance;
+  // The point moves rigidly with the body's pose: δp_W = −R [p_B]× θ + δp + R δp_B.
+  Eigen::Matrix<double, 3, 6> J;
+  J << -T_WB.R() * skew(T_WB.inverse() * point->p_W), Eigen::Matrix3d::Identity();
+  const int pose = state_->clones.back().at;
+  l.cross_pose = J * state_->P().block<6, 6>(pose, pose);
+  return l;
+}
+
+std::vector<LandmarkEstimate> Estimator::landmarks() const {
+  std::vector<LandmarkEstimate> result;
+  if (!state_ || state_->clones.empty()) return result;
+  std::map<std::uint64_t, const PointState*> points;
+  for (const PointState& p : state_->points) points[p.id] = &p;
+  for (const TrackedPoint& seen : newest_.points) {
+    if (const auto it = points.find(seen.id); it != points.end()) {
+      result.push_back(ofState(*it->second, *seen.seen[0]));
+      continue;
+    }
+    const Track* track = database_.find(seen.id);
+    if (!track || asInt(track->views()) < options_.window.min_observations) continue;
+    if (const auto landmark = ofTrack(*track, *seen.seen[0])) result.push_back(*landmark);
+  }
+  return result;
+}
+
+}  // namespace perdure::vio

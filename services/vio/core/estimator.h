@@ -1,0 +1,106 @@
+// The filter over tracked points: propagates to each image, clones, updates, marginalises, and
+// says where the body is (paper, eq. 3 and 5). Knows no images, threads or clocks.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/types/odometry.h"
+#include "services/vio/core/imu_buffer.h"
+#include "services/vio/core/options.h"
+#include "services/vio/core/state.h"
+#include "services/vio/core/tracks.h"
+
+namespace perdure::vio {
+
+/// Where a filter begins: at `time` of the IMU clock.
+struct Start {
+  TimePoint time;
+  Nav nav;
+  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
+};
+
+struct SpeedReading {
+  double speed = 0.0, sigma = 0.1;  ///< m/s, body x
+};
+
+struct FrameInput {
+  std::uint64_t frame = 0;  ///< counts up
+  TimePoint image_time;
+  TrackedFrame tracked;
+  std::optional<double> motion_px;  ///< median image motion over the last frames
+  std::optional<SpeedReading> speed;
+};
+
+struct FrameEstimate {
+  Nav nav;
+  Matrix9d covariance = Matrix9d::Zero();  ///< [θ, p, v]
+  bool has_increment = false;
+  std::uint64_t increment_from = 0;
+  Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
+  bool at_rest = false;
+  int points_used = 0;  ///< of this image, by all updates
+};
+
+struct LandmarkEstimate {
+  std::uint64_t id = 0;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< given the pose
+  Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+};
+
+class Estimator {
+ public:
+  /// One or two cameras.
+  Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s);
+
+  /// Begins (anew) at a start; the window is empty.
+  void start(const Start& start);
+  bool started() const { return state_.has_value(); }
+  void stop() { state_.reset(); }
+
+  /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state",
+  /// "imu_missing", or, where the numbers have gone bad, with "numbers_…": then the estimator has
+  /// stopped.
+  Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
+
+  /// The rotation R_B1_B0 of the body from the newest frame to an IMU time, by the gyroscope.
+  Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to) const;
+
+  /// Points seen in the newest image whose position is known.
+  std::vector<LandmarkEstimate> landmarks() const;
+
+  const State& state() const { return *state_; }
+  State& state() { return *state_; }
+  const Options& options() const { return options_; }
+  const ReasonCounts& reasons() const { return reasons_; }
+
+ private:
+  Result<void> propagateTo(const FrameInput& input, const ImuBuffer& imu);
+  bool restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePoint from);
+  Result<void> visionUpdate(const FrameInput& input, FrameEstimate& out);
+  std::vector<Track> takeOnceUsed(std::uint64_t frame, bool window_full);
+  Result<void> admitPoints(std::uint64_t frame, bool window_full);
+  void dropLostPoints(std::uint64_t frame);
+  void report(const FrameInput& input, FrameEstimate& out);
+  void marginalise(bool at_rest);
+  Result<void> sane() const;
+  LandmarkEstimate ofState(const PointState& point, const ImagePoint& seen) const;
+  std::optional<LandmarkEstimate> ofTrack(const Track& track, const ImagePoint& seen) const;
+
+  Options options_;
+  std::vector<RigidTransform> T_BC_;
+  double time_offset_s_;
+  std::optional<State> state_;
+  FeatureDatabase database_;
+  TrackedFrame newest_;
+  ReasonCounts reasons_;
+  std::optional<std::uint64_t> previous_frame_;
+  Matrix6d previous_pose_covariance_ = Matrix6d::Zero();
+};
+
+}  // namespace perdure::vio

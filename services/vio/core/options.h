@@ -1,0 +1,90 @@
+// What the filter's core can be told. Defaults suit a 20 Hz camera with a 200 Hz MEMS IMU.
+#pragma once
+
+#include <cstdint>
+
+namespace perdure::vio {
+
+/// Continuous-time densities of the inertial noise.
+struct ImuNoise {
+  double gyro = 1.7e-4;        ///< rad/s/√Hz
+  double gyro_walk = 2.0e-5;   ///< rad/s²/√Hz
+  double accel = 2.0e-3;       ///< m/s²/√Hz
+  double accel_walk = 3.0e-3;  ///< m/s³/√Hz
+  /// Samples further apart than this are treated as sampled, not averaged: the error of the
+  /// linear interpolation between them joins the noise.
+  double interpolation_from_s = 0.02;
+  double interpolation_gyro = 0.005;  ///< rad/s per sample, floor of that error
+  double interpolation_accel = 0.1;   ///< m/s² per sample, floor of that error
+};
+
+struct WindowOptions {
+  std::int64_t clones = 11;            ///< poses in the sliding window
+  std::int64_t slam_features = 40;     ///< points kept in the state
+  std::int64_t msckf_features = 30;    ///< points used once, per frame
+  std::int64_t min_observations = 4;   ///< of a track that is used once
+  bool first_estimates = true;         ///< first-estimate Jacobians
+};
+
+struct VisionOptions {
+  double sigma_px = 1.0;
+  double gate_probability = 0.95;
+  double min_depth_m = 0.1, max_depth_m = 75.0;
+  double max_condition = 10000.0;  ///< of a triangulation's normal matrix
+  /// Largest standard deviation along the ray, relative to the depth, at which a point may enter
+  /// the state.
+  double max_relative_sigma = 0.4;
+};
+
+/// Standard deviations of what the calibration says.
+struct CalibrationOptions {
+  bool estimate_extrinsics = true, estimate_time_offset = true;
+  double extrinsic_rotation = 0.005;     ///< rad
+  double extrinsic_position_m = 0.01;
+  double second_camera_factor = 0.1;     ///< a stereo pair is calibrated better among itself
+  double time_offset_s = 0.005;
+};
+
+struct StartOptions {
+  double rest_window_s = 0.5;       ///< time at rest before a start at rest
+  double rest_disparity_px = 0.7;   ///< median image motion over that window
+  double rest_accel_m_s2 = 1.0;     ///< largest difference of the mean force from gravity
+  double motion_window_s = 1.0;     ///< window of a start in motion
+  double tilt_sigma = 0.03;         ///< rad, at a start with speed
+  double gyro_bias_sigma = 0.02;    ///< rad/s
+  double accel_bias_sigma = 0.1;    ///< m/s²
+  double velocity_sigma = 0.3;      ///< m/s
+};
+
+struct RestOptions {
+  bool enabled = true;
+  double disparity_px = 0.5;    ///< median image motion over the last frames
+  std::int64_t frames = 5;      ///< how many of them
+  double speed_sigma = 0.02;    ///< m/s
+  double position_sigma_m = 0.005;
+  double rotation_sigma = 0.001;  ///< rad
+  double max_rate = 0.15;         ///< rad/s, mean over a frame, bias removed
+  double max_speed = 0.5;         ///< m/s: the filter's own belief must not exceed it
+};
+
+struct SpeedOptions {
+  bool enabled = true;
+  double sigma_factor = 1.0;      ///< on the sigma that comes with each sample
+  double min_sigma = 0.05;        ///< m/s
+  bool planar = false;            ///< lateral and vertical velocity are about zero
+  double lateral_sigma = 0.15, vertical_sigma = 0.15;  ///< m/s
+  double max_age_s = 0.15;
+};
+
+struct Options {
+  ImuNoise imu;
+  WindowOptions window;
+  VisionOptions vision;
+  CalibrationOptions calibration;
+  StartOptions start;
+  RestOptions rest;
+  SpeedOptions speed;
+  double gravity = 9.81;  ///< m/s²
+};
+
+}  // namespace perdure::vio

@@ -1,0 +1,167 @@
+#include "services/vio/core/state.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/math/so3.h"
+
+namespace perdure::vio {
+
+State::State(const std::vector<RigidTransform>& cameras, double offset, int max_clones,
+             int max_points)
+    : T_BC(cameras), time_offset_s(offset),
+      size_(kNavSize + 6 * static_cast<int>(cameras.size()) + 1) {
+  const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
+  P_ = Eigen::MatrixXd::Zero(capacity, capacity);
+}
+
+const Clone* State::clone(std::uint64_t frame) const {
+  for (const Clone& c : clones) {
+    if (c.frame == frame) return &c;
+  }
+  return nullptr;
+}
+
+PointState* State::point(std::uint64_t id) {
+  for (PointState& p : points) {
+    if (p.id == id) return &p;
+  }
+  return nullptr;
+}
+
+int State::append(int size) {
+  check(size_ + size <= P_.rows(), "the state's capacity suffices");
+  const int at = size_;
+  size_ += size;
+  return at;
+}
+
+void State::remove(int at, int size) {
+  const int tail = size_ - at - size;
+  P_.block(at, 0, tail, size_) = P_.block(at + size, 0, tail, size_).eval();
+  P_.block(0, at, size_ - size, tail) = P_.block(0, at + size, size_ - size, tail).eval();
+  size_ -= size;
+  for (Clone& c : clones) {
+    if (c.at > at) c.at -= size;
+  }
+  for (PointState& p : points) {
+    if (p.at > at) p.at -= size;
+  }
+}
+
+void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
+                     bool first_estimates) {
+  const int n = size_, at = append(6), offset = timeOffsetAt();
+  const RigidTransform first =
+      first_estimates ? RigidTransform(nav_first.q_WB, nav_first.p_WB) : nav.T_WB();
+  Eigen::Matrix<double, 6, 1> J_offset;
+  J_offset << rate_B, (first_estimates ? nav_first.v_WB : nav.v_WB);
+  P_.block(at, 0, 6, n) = P_.block(0, 0, 6, n) + J_offset * P_.row(offset).head(n);
+  P_.block(0, at, n, 6) = P_.block(at, 0, 6, n).transpose();
+  P_.block(at, at, 6, 6) =
+      P_.block(at, 0, 6, 6) + P_.block(at, offset, 6, 1) * J_offset.transpose();
+  clones.push_back({frame, image_time, nav.T_WB(), first, at});
+}
+
+void State::removeClone(std::uint64_t frame) {
+  const auto it = std::find_if(clones.begin(), clones.end(),
+                               [&](const Clone& c) { return c.frame == frame; });
+  if (it == clones.end()) return;
+  const int at = it->at;
+  clones.erase(it);
+  remove(at, 6);
+}
+
+void State::addPoint(std::uint64_t id, const Eigen::Vector3d& p_W,
+                     const Eigen::Matrix3d& covariance, const Eigen::MatrixXd& cross) {
+  const int n = size_, at = append(3);
+  P_.block(at, 0, 3, n) = cross;
+  P_.block(0, at, n, 3) = cross.transpose();
+  P_.block(at, at, 3, 3) = covariance;
+  points.push_back({id, p_W, p_W, at, 0});
+}
+
+void State::removePoint(std::uint64_t id) {
+  const auto it =
+      std::find_if(points.begin(), points.end(), [&](const PointState& p) { return p.id == id; });
+  if (it == points.end()) return;
+  const int at = it->at;
+  points.erase(it);
+  remove(at, 3);
+}
+
+void State::apply(const Eigen::VectorXd& dx) {
+  nav.q_WB = (nav.q_WB * expQuaternion(dx.segment<3>(kTheta))).normalized();
+  nav.p_WB += dx.segment<3>(kPosition);
+  nav.v_WB += dx.segment<3>(kVelocity);
+  nav.gyro_bias += dx.segment<3>(kGyroBias);
+  nav.accel_bias += dx.segment<3>(kAccelBias);
+  for (int i = 0; i < static_cast<int>(T_BC.size()); ++i) {
+    T_BC[static_cast<std::size_t>(i)] =
+        boxPlus(T_BC[static_cast<std::size_t>(i)], dx.segment<6>(extrinsicsAt(i)));
+  }
+  time_offset_s += dx[timeOffsetAt()];
+  for (Clone& c : clones) c.T_WB = boxPlus(c.T_WB, dx.segment<6>(c.at));
+  for (PointState& p : points) p.p_W += dx.segment<3>(p.at);
+}
+
+Eigen::MatrixXd State::covarianceOf(const std::vector<Block>& blocks) const {
+  int n = 0;
+  for (const Block& b : blocks) n += b.size;
+  Eigen::MatrixXd result(n, n);
+  int row = 0;
+  for (const Block& a : blocks) {
+    int column = 0;
+    for (const Block& b : blocks) {
+      result.block(row, column, a.size, b.size) = P_.block(a.at, b.at, a.size, b.size);
+      column += b.size;
+    }
+    row += a.size;
+  }
+  return result;
+}
+
+Eigen::MatrixXd State::project(const Eigen::MatrixXd& H, const std::vector<Block>& blocks) const {
+  return H * covarianceOf(blocks) * H.transpose();
+}
+
+Result<void> State::update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
+                           const Eigen::VectorXd& r) {
+  const Eigen::Index m = r.size();
+  Eigen::MatrixXd PHt = Eigen::MatrixXd::Zero(size_, m);
+  Eigen::Index column = 0;
+  for (const Block& b : blocks) {
+    PHt.noalias() += P_.block(0, b.at, size_, b.size) * H.middleCols(column, b.size).transpose();
+    column += b.size;
+  }
+  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(m, m);
+  column = 0;
+  for (const Block& b : blocks) {
+    S.noalias() += H.middleCols(column, b.size) * PHt.middleRows(b.at, b.size);
+    column += b.size;
+  }
+  const Eigen::LLT<Eigen::MatrixXd> llt(S);
+  if (llt.info() != Eigen::Success) return fail("update_not_positive");
+  // K S Kᵀ = W Wᵀ with W = P Hᵀ L⁻ᵀ; dx = W L⁻¹ r.
+  const Eigen::MatrixXd Wt = llt.matrixL().solve(PHt.transpose());
+  const Eigen::VectorXd dx = Wt.transpose() * llt.matrixL().solve(r);
+  if (!dx.allFinite()) return fail("update_not_finite");
+  auto active = P_.topLeftCorner(size_, size_);
+  active.selfadjointView<Eigen::Lower>().rankUpdate(Wt.transpose(), -1.0);
+  active.triangularView<Eigen::StrictlyUpper>() = active.transpose();
+  apply(dx);
+  return {};
+}
+
+bool State::healthy() const {
+  if (!nav.T_WB().finite() || !nav.v_WB.allFinite() || !nav.gyro_bias.allFinite() ||
+      !nav.accel_bias.allFinite() || !std::isfinite(time_offset_s)) {
+    return false;
+  }
+  const auto active = P_.topLeftCorner(size_, size_);
+  return active.allFinite() && active.diagonal().minCoeff() >= 0.0;
+}
+
+}  // namespace perdure::vio

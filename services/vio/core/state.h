@@ -1,0 +1,103 @@
+// The filter's state: navigation, camera-IMU calibration, a window of past poses and points, and
+// the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
+// Order of the error: nav [θ, p, v, b_g, b_a], per camera [θ_BC, p_BC], time offset, then clones
+// and points in the order in which they came. Rotations err on the right, R = R̂ Exp(θ).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/base/time.h"
+#include "common/math/rigid_transform.h"
+
+namespace perdure::vio {
+
+struct Nav {
+  Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+
+  RigidTransform T_WB() const { return RigidTransform(q_WB, p_WB); }
+};
+
+/// The body's pose at an image. `first` is the estimate at which Jacobians are taken.
+struct Clone {
+  std::uint64_t frame = 0;
+  TimePoint image_time;
+  RigidTransform T_WB, first;
+  int at = 0;  ///< where its error begins
+};
+
+struct PointState {
+  std::uint64_t id = 0;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), first = Eigen::Vector3d::Zero();
+  int at = 0;
+  int failed_gates = 0;
+};
+
+/// Where a block of columns of a Jacobian lies in the error.
+struct Block {
+  int at = 0, size = 0;
+};
+
+inline constexpr int kNavSize = 15;
+inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
+
+class State {
+ public:
+  State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
+        int max_points);
+
+  Nav nav, nav_first;                ///< nav_first: q, p, v as predicted, before their update
+  TimePoint time;                    ///< IMU clock
+  std::vector<RigidTransform> T_BC;  ///< one for each camera
+  double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
+  std::vector<Clone> clones;         ///< oldest first
+  std::vector<PointState> points;
+
+  int size() const { return size_; }
+  int extrinsicsAt(int camera) const { return kNavSize + 6 * camera; }
+  int timeOffsetAt() const { return kNavSize + 6 * static_cast<int>(T_BC.size()); }
+  auto P() { return P_.topLeftCorner(size_, size_); }
+  auto P() const { return P_.topLeftCorner(size_, size_); }
+
+  const Clone* clone(std::uint64_t frame) const;
+  PointState* point(std::uint64_t id);
+
+  /// Adds a clone of the present pose. rate_B: angular rate, which ties it to the time offset.
+  void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
+                bool first_estimates);
+  void removeClone(std::uint64_t frame);
+  /// Adds a point with its covariance and its cross-covariance (3 × size()).
+  void addPoint(std::uint64_t id, const Eigen::Vector3d& p_W, const Eigen::Matrix3d& covariance,
+                const Eigen::MatrixXd& cross);
+  void removePoint(std::uint64_t id);
+
+  /// x ← x ⊞ dx.
+  void apply(const Eigen::VectorXd& dx);
+  /// EKF update with residual r = H·error + noise of unit covariance; H's columns are those of
+  /// `blocks`, one after another. Fails with "update_not_positive" or "update_not_finite", and
+  /// then leaves the state as it was.
+  Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
+                      const Eigen::VectorXd& r);
+  /// H P Hᵀ for such an H.
+  Eigen::MatrixXd project(const Eigen::MatrixXd& H, const std::vector<Block>& blocks) const;
+  /// The covariance of the error of `blocks`.
+  Eigen::MatrixXd covarianceOf(const std::vector<Block>& blocks) const;
+  /// All numbers finite and all variances positive.
+  bool healthy() const;
+
+ private:
+  int append(int size);
+  void remove(int at, int size);
+
+  int size_;
+  Eigen::MatrixXd P_;  ///< capacity; the upper left size_ × size_ counts
+};
+
+}  // namespace perdure::vio

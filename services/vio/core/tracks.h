@@ -1,0 +1,66 @@
+// What the tracker hands to the filter, and the memory of which image saw which point where.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "common/camera/camera_model.h"
+
+namespace perdure::vio {
+
+inline constexpr std::size_t kMaxCameras = 2;
+
+/// One point in one image of one camera.
+struct ImagePoint {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< as seen, distorted
+  Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
+  double scale = 1.0;  ///< pixels per unit of the normalised image, there
+};
+
+/// Undistorts; nothing where that is impossible.
+std::optional<ImagePoint> imagePoint(const CameraModel& camera, const Eigen::Vector2d& pixel);
+
+/// One tracked point at one time, in the cameras that see it. The first camera always does.
+struct TrackedPoint {
+  std::uint64_t id = 0;
+  std::array<std::optional<ImagePoint>, kMaxCameras> seen;
+};
+
+struct TrackedFrame {
+  std::vector<TrackedPoint> points;  ///< by rising id
+};
+
+struct Observation {
+  std::uint64_t frame = 0;
+  std::array<std::optional<ImagePoint>, kMaxCameras> seen;
+};
+
+struct Track {
+  std::uint64_t id = 0;
+  std::vector<Observation> observations;  ///< oldest first
+  /// Number of image points in all cameras.
+  std::size_t views() const;
+  bool seenAt(std::uint64_t frame) const {
+    return !observations.empty() && observations.back().frame == frame;
+  }
+};
+
+class FeatureDatabase {
+ public:
+  void add(std::uint64_t frame, const TrackedFrame& tracked);
+  /// Forgets what was seen at a frame, and tracks that are then empty.
+  void removeFrame(std::uint64_t frame);
+  void erase(std::uint64_t id) { tracks_.erase(id); }
+  void clear() { tracks_.clear(); }
+  const std::map<std::uint64_t, Track>& tracks() const { return tracks_; }
+  const Track* find(std::uint64_t id) const;
+
+ private:
+  std::map<std::uint64_t, Track> tracks_;
+};
+
+}  // namespace perdure::vio

@@ -1,0 +1,138 @@
+#include "services/vio/core/estimator.h"
+
+#include <gtest/gtest.h>
+
+#include "common/math/chi2.h"
+#include "common/math/so3.h"
+#include "tests/services/vio/simulated_drive.h"
+
+namespace perdure::vio {
+namespace {
+
+using Eigen::Vector3d;
+
+struct RunResult {
+  double position_error = 0.0, largest_error = 0.0;
+  double nees_pose = 0.0;  ///< mean over frames of the NEES of [θ, p]
+  int frames = 0;
+  std::vector<FrameEstimate> estimates;
+};
+
+struct RunOptions {
+  double seconds = 20.0;
+  bool speed = false;
+  double start_sigma_scale = 1.0;
+};
+
+Start startAt(const test::SimulatedDrive& drive, double t, unsigned seed, double scale) {
+  std::mt19937 random(seed + 99);
+  std::normal_distribution<double> n;
+  const auto draw = [&](double s) { return Vector3d(s * n(random), s * n(random), s * n(random)); };
+  Start start;
+  start.time = drive.time(t);
+  start.nav = drive.truth(t);
+  const double theta = 0.01 * scale, v = 0.05 * scale, bg = 0.005 * scale, ba = 0.05 * scale;
+  Vector3d tilt = draw(theta);
+  // Yaw is a gauge: it is known at the start.
+  tilt = start.nav.q_WB * tilt;
+  tilt.z() = 0.0;
+  tilt = start.nav.q_WB.conjugate() * tilt;
+  start.nav.q_WB = start.nav.q_WB * expQuaternion(tilt);
+  start.nav.v_WB += draw(v);
+  start.nav.gyro_bias += draw(bg);
+  start.nav.accel_bias += draw(ba);
+  start.covariance.setZero();
+  const Eigen::Matrix3d R = start.nav.q_WB.toRotationMatrix();
+  start.covariance.block<3, 3>(0, 0) =
+      R.transpose() * Vector3d(theta * theta, theta * theta, 1e-10).asDiagonal() * R;
+  start.covariance.diagonal().segment<3>(3).setConstant(1e-10);
+  start.covariance.diagonal().segment<3>(6).setConstant(v * v);
+  start.covariance.diagonal().segment<3>(9).setConstant(bg * bg);
+  start.covariance.diagonal().segment<3>(12).setConstant(ba * ba);
+  return start;
+}
+
+RunResult run(const test::DriveOptions& drive_options, const Options& options,
+              const RunOptions& how) {
+  test::SimulatedDrive drive(drive_options);
+  ImuBuffer imu;
+  for (const ImuReading& r : drive.imu(how.seconds + 1.0)) EXPECT_TRUE(imu.add(r));
+  Estimator estimator(options, drive.T_BC(), 0.0);
+  estimator.start(startAt(drive, 0.2, drive_options.seed, how.start_sigma_scale));
+  RunResult result;
+  std::uint64_t frame = 0;
+  for (double t = 0.25; t < how.seconds; t += 1.0 / drive_options.camera_rate_hz) {
+    FrameInput input{++frame, drive.time(t), drive.see(t), {}, {}};
+    const Nav truth = drive.truth(t + drive_options.time_offset_s);
+    if (how.speed) input.speed = SpeedReading{(truth.q_WB.conjugate() * truth.v_WB).x(), 0.05};
+    const auto out = estimator.process(input, imu);
+    EXPECT_TRUE(out) << out.error().code;
+    if (!out) break;
+    Eigen::Matrix<double, 6, 1> e;
+    e << logSo3(out->nav.q_WB.conjugate() * truth.q_WB), truth.p_WB - out->nav.p_WB;
+    result.position_error = e.tail<3>().norm();
+    result.largest_error = std::max(result.largest_error, result.position_error);
+    result.nees_pose += e.dot(out->covariance.topLeftCorner<6, 6>().ldlt().solve(e));
+    ++result.frames;
+    result.estimates.push_back(*out);
+  }
+  result.nees_pose /= result.frames;
+  return result;
+}
+
+TEST(Estimator, FollowsTheSimulatedDriveWithOneCamera) {
+  const RunResult r = run({}, Options{}, {.seconds = 30.0});
+  EXPECT_LT(r.position_error, 0.25);
+  EXPECT_LT(r.nees_pose, 15.0);
+}
+
+TEST(Estimator, FollowsTheSimulatedDriveWithTwoCameras) {
+  test::DriveOptions drive;
+  drive.stereo = true;
+  const RunResult r = run(drive, Options{}, {.seconds = 20.0});
+  EXPECT_LT(r.position_error, 0.15);
+}
+
+TEST(Estimator, FindsTheTimeOffset) {
+  test::DriveOptions drive;
+  drive.time_offset_s = 0.006;
+  test::SimulatedDrive world(drive);
+  ImuBuffer imu;
+  for (const ImuReading& r : world.imu(16.0)) ASSERT_TRUE(imu.add(r));
+  Estimator estimator(Options{}, world.T_BC(), 0.0);
+  estimator.start(startAt(world, 0.2, 1, 1.0));
+  std::uint64_t frame = 0;
+  for (double t = 0.25; t < 15.0; t += 0.05) {
+    ASSERT_TRUE(estimator.process({++frame, world.time(t), world.see(t), {}, {}}, imu));
+  }
+  EXPECT_NEAR(estimator.state().time_offset_s, 0.006, 0.001);
+}
+
+TEST(Estimator, PoseErrorsLieInTheBandOfTheirCovarianceOverSeededRuns) {
+  constexpr int kRuns = 12;
+  double sum = 0.0;
+  for (int seed = 1; seed <= kRuns; ++seed) {
+    test::DriveOptions drive;
+    drive.seed = static_cast<unsigned>(seed);
+    sum += run(drive, Options{}, {.seconds = 10.0}).nees_pose;
+  }
+  // Frames of one run are correlated: the band is that of the runs alone, 99 %.
+  const double mean = sum / kRuns;
+  EXPECT_GT(mean, chi2Quantile(0.005, 6 * kRuns) / kRuns);
+  EXPECT_LT(mean, chi2Quantile(0.995, 6 * kRuns) / kRuns);
+}
+
+TEST(Estimator, TheIncrementExplainsThePoseCovariance) {
+  const RunResult r = run({}, Options{}, {.seconds = 5.0});
+  for (std::size_t k = 1; k < r.estimates.size(); ++k) {
+    const FrameEstimate &a = r.estimates[k - 1], &b = r.estimates[k];
+    ASSERT_TRUE(b.has_increment);
+    const Matrix6d P = b.transition * a.covariance.topLeftCorner<6, 6>() *
+                           b.transition.transpose() + b.increment_covariance;
+    const Matrix6d P_b = b.covariance.topLeftCorner<6, 6>();
+    EXPECT_LT((P - P_b).norm(), 1e-2 * P_b.norm() + 1e-9) << k;
+  }
+}
+
+}  // namespace
+}  // namespace perdure::vio

@@ -1,0 +1,150 @@
+#include "tests/services/vio/simulated_drive.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/so3.h"
+
+namespace perdure::vio::test {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+CameraCalibration testCamera(int index) {
+  CameraCalibration c;
+  c.name = index == 0 ? "cam0" : "cam1";
+  c.width = 752;
+  c.height = 480;
+  c.fx = 458.654;
+  c.fy = 457.296;
+  c.cx = 367.215;
+  c.cy = 248.375;
+  c.distortion = DistortionModel::kRadialTangential;
+  c.distortion_coefficients = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  // Body x forward, y left, z up; camera z forward.
+  Matrix3d R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  c.T_BC = RigidTransform(R, Vector3d(0.05, 0.06 - 0.11 * index, 0.02));
+  c.rate_hz = 20.0;
+  return c;
+}
+
+SimulatedDrive::SimulatedDrive(const DriveOptions& options)
+    : options_(options), random_(options.seed) {
+  cameras_.emplace_back(testCamera(0));
+  if (options.stereo) cameras_.emplace_back(testCamera(1));
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  // On the walls, floor and ceiling of a room of 12 × 12 × 6 m.
+  for (int i = 0; i < options.points; ++i) {
+    Vector3d p(6.0 * u(random_), 6.0 * u(random_), 3.0 * u(random_));
+    const int wall = i % 6;
+    p[wall % 3] = (wall < 3 ? 1.0 : -1.0) * (wall % 3 == 2 ? 3.0 : 6.0);
+    points_.push_back(p);
+  }
+  ids_.assign(points_.size(), 0);
+}
+
+std::vector<RigidTransform> SimulatedDrive::T_BC() const {
+  std::vector<RigidTransform> result;
+  for (const CameraModel& c : cameras_) result.push_back(c.T_BC());
+  return result;
+}
+
+// Time along the path: none until rest ends, then rising smoothly (three times differentiable).
+double SimulatedDrive::phase(double t) const {
+  const double s = t - options_.rest_s;
+  if (options_.rest_s <= 0.0) return t;
+  if (s <= 0.0) return 0.0;
+  constexpr double kRise = 2.0;
+  if (s >= kRise) return s - 0.5 * kRise;
+  const double x = s / kRise;  // speed 10x³ − 15x⁴ + 6x⁵, integrated
+  return kRise * (2.5 * x * x * x * x - 3.0 * std::pow(x, 5) + std::pow(x, 6));
+}
+
+Vector3d SimulatedDrive::position(double t) const {
+  const double s = phase(t);
+  return {2.5 * std::cos(0.5 * s), 2.0 * std::sin(0.5 * s) + 0.3 * std::sin(1.7 * s),
+          0.5 * std::sin(0.9 * s)};
+}
+
+Matrix3d SimulatedDrive::rotation(double t) const {
+  const double s = phase(t);
+  return rotationAboutZ(0.5 * s + 0.2) * expSo3(Vector3d(0, 0.15 * std::sin(1.1 * s), 0)) *
+         expSo3(Vector3d(0.2 * std::sin(0.8 * s), 0, 0));
+}
+
+Vector3d SimulatedDrive::rateTruth(double t) const {
+  constexpr double h = 1e-4;
+  return logSo3(Matrix3d(rotation(t - h).transpose() * rotation(t + h))) / (2.0 * h);
+}
+
+Vector3d SimulatedDrive::forceTruth(double t) const {
+  constexpr double h = 1e-3;
+  const Vector3d a = (-position(t - 2 * h) + 16.0 * position(t - h) - 30.0 * position(t) +
+                      16.0 * position(t + h) - position(t + 2 * h)) /
+                     (12.0 * h * h);
+  return rotation(t).transpose() * (a + Vector3d(0, 0, 9.81));
+}
+
+Nav SimulatedDrive::truth(double t) const {
+  constexpr double h = 1e-4;
+  Nav nav;
+  nav.q_WB = Eigen::Quaterniond(rotation(t));
+  nav.p_WB = position(t);
+  nav.v_WB = (position(t + h) - position(t - h)) / (2.0 * h);
+  nav.gyro_bias = options_.gyro_bias;
+  nav.accel_bias = options_.accel_bias;
+  return nav;
+}
+
+Vector3d SimulatedDrive::noise(double sigma) {
+  return sigma * Vector3d(normal_(random_), normal_(random_), normal_(random_));
+}
+
+std::vector<ImuReading> SimulatedDrive::imu(double until) {
+  std::vector<ImuReading> result;
+  const double dt = 1.0 / options_.imu_rate_hz, root = std::sqrt(options_.imu_rate_hz);
+  for (int i = 0; i * dt <= until; ++i) {
+    const double t = i * dt;
+    result.push_back({time(t),
+                      rateTruth(t) + options_.gyro_bias + noise(options_.noise.gyro * root),
+                      forceTruth(t) + options_.accel_bias + noise(options_.noise.accel * root)});
+  }
+  return result;
+}
+
+Eigen::Vector2d SimulatedDrive::pixelOf(std::size_t point, double t) const {
+  const RigidTransform T_WC = truth(t).T_WB() * cameras_[0].T_BC();
+  return cameras_[0].project(T_WC.inverse() * points_[point]).value_or(Eigen::Vector2d(-1, -1));
+}
+
+TrackedFrame SimulatedDrive::see(double t) {
+  const RigidTransform T_WB = truth(t + options_.time_offset_s).T_WB();
+  std::vector<std::size_t> seen, fresh;
+  std::vector<std::array<std::optional<ImagePoint>, kMaxCameras>> views(points_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      const auto pixel = cameras_[c].project((T_WB * cameras_[c].T_BC()).inverse() * points_[i]);
+      if (!pixel || !cameras_[c].inImage(*pixel, 5.0)) continue;
+      const Eigen::Vector2d noisy = *pixel + noise(options_.pixel_sigma).head<2>();
+      views[i][c] = imagePoint(cameras_[c], noisy);
+    }
+    if (!views[i][0]) {
+      ids_[i] = 0;
+    } else {
+      (ids_[i] ? seen : fresh).push_back(i);
+    }
+  }
+  for (const std::size_t i : fresh) {
+    if (static_cast<int>(seen.size()) >= options_.points_per_image) break;
+    ids_[i] = next_id_++;
+    seen.push_back(i);
+  }
+  TrackedFrame frame;
+  for (const std::size_t i : seen) frame.points.push_back({ids_[i], views[i]});
+  std::sort(frame.points.begin(), frame.points.end(),
+            [](const TrackedPoint& a, const TrackedPoint& b) { return a.id < b.id; });
+  return frame;
+}
+
+}  // namespace perdure::vio::test

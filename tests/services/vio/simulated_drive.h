@@ -1,0 +1,67 @@
+// A seeded drive with exact truth for the tests: an analytic trajectory, an IMU with noise and
+// bias, and a cloud of points seen by one or two cameras with pixel noise.
+#pragma once
+
+#include <Eigen/Core>
+#include <random>
+#include <vector>
+
+#include "common/camera/camera_model.h"
+#include "services/vio/core/estimator.h"
+#include "services/vio/core/imu_buffer.h"
+
+namespace perdure::vio::test {
+
+struct DriveOptions {
+  unsigned seed = 1;
+  double imu_rate_hz = 200.0, camera_rate_hz = 20.0;
+  ImuNoise noise;
+  double pixel_sigma = 1.0;
+  bool stereo = false;
+  double time_offset_s = 0.0;  ///< true t_imu − t_image
+  double rest_s = 0.0;         ///< stands still this long at the start
+  int points = 600;
+  int points_per_image = 100;
+  Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
+};
+
+class SimulatedDrive {
+ public:
+  explicit SimulatedDrive(const DriveOptions& options);
+
+  /// Truth at a time of the IMU clock, in seconds from the start.
+  Nav truth(double t) const;
+  Eigen::Vector3d rateTruth(double t) const;
+  /// Specific force in B without bias.
+  Eigen::Vector3d forceTruth(double t) const;
+
+  TimePoint time(double t) const { return fromNanoseconds(1'000'000'000) + durationFromSeconds(t); }
+  /// All samples in [0, until].
+  std::vector<ImuReading> imu(double until);
+  /// What the cameras see at image time `t` (their clock).
+  TrackedFrame see(double t);
+  Eigen::Vector2d pixelOf(std::size_t point, double t) const;
+
+  const std::vector<CameraModel>& cameras() const { return cameras_; }
+  std::vector<RigidTransform> T_BC() const;
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+
+ private:
+  double phase(double t) const;
+  Eigen::Vector3d position(double t) const;
+  Eigen::Matrix3d rotation(double t) const;
+  Eigen::Vector3d noise(double sigma);
+
+  DriveOptions options_;
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_;
+  std::vector<CameraModel> cameras_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<std::uint64_t> ids_;  ///< 0: not tracked at the moment
+  std::uint64_t next_id_ = 1;
+};
+
+/// A camera of EuRoC's kind looking along body z; index 1 stands 11 cm beside it.
+CameraCalibration testCamera(int index);
+
+}  // namespace perdure::vio::test
