@@ -110,9 +110,9 @@ class Decoder : public Checked {
     std::copy(w, w + N, d.begin());
   }
   void pixels(const char* name, Frame& d, const perdure_msg_Frame& w) {
-    if (failed() || !checkBuffer(name, w.pixels, kImageBytes)) return;
     const std::size_t expected = std::size_t{d.width} * d.height * channelsOf(d.encoding);
     if (w.pixels._length != expected) return refuse(name, "size_mismatch");
+    if (failed() || !checkBuffer(name, w.pixels, kImageBytes)) return;
     d.data = std::make_shared<const std::vector<std::uint8_t>>(w.pixels._buffer,
                                                                w.pixels._buffer + w.pixels._length);
   }

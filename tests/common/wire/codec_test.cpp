@@ -1,0 +1,129 @@
+#include "common/wire/codec.h"
+
+#include <gtest/gtest.h>
+
+#include "common/wire/json.h"
+#include "tests/common/wire/examples.h"
+
+namespace perdure::wire {
+namespace {
+
+template <class T>
+class Codec : public testing::Test {};
+
+using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
+                                Detections, ModelInfo, Objects, ObjectState, Recalled, Event,
+                                Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+TYPED_TEST_SUITE(Codec, Messages);
+
+TYPED_TEST(Codec, BringsEveryFieldThereAndBackToTheBit) {
+  Arena arena;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    TypeParam message;
+    Examples(seed).fill(message);
+    typename Type<TypeParam>::Wire wire;
+    const Result<void> encoded = encode(message, wire, arena);
+    ASSERT_TRUE(encoded) << encoded.error().code << " " << encoded.error().detail;
+    const Result<TypeParam> back = decode<TypeParam>(wire);
+    ASSERT_TRUE(back) << back.error().code << " " << back.error().detail;
+    ASSERT_EQ(toJson(*back), toJson(message));
+  }
+}
+
+/// Converts to anything but T's own kind: counts the members of an aggregate.
+template <class Not>
+struct Any {
+  template <class X>
+  requires(!std::same_as<X, Not>) operator X&() const;
+  template <class X>
+  requires(!std::same_as<X, Not>) operator X&&() const;
+};
+
+template <class T, std::size_t... I>
+constexpr bool initialisable(std::index_sequence<I...>) {
+  return requires { T{(static_cast<void>(I), Any<T>{})...}; };
+}
+
+template <class T, std::size_t N = 0>
+constexpr std::size_t members() {
+  if constexpr (initialisable<T>(std::make_index_sequence<N + 1>())) {
+    return members<T, N + 1>();
+  } else {
+    return N;
+  }
+}
+
+/// Members of the domain type, corrected by fields that are one member but several names.
+template <class T>
+constexpr int kNamesBeyondMembers = 0;
+template <>
+constexpr int kNamesBeyondMembers<ObjectState> = 1;  // the key beside the object
+
+TYPED_TEST(Codec, DescribesAsManyFieldsAsTheTypeHas) {
+  TypeParam message;
+  Examples(1).fill(message);
+  EXPECT_EQ(static_cast<int>(toJson(message).size()),
+            static_cast<int>(members<TypeParam>()) + kNamesBeyondMembers<TypeParam>);
+}
+
+TYPED_TEST(Codec, ADefaultMessageIsAValueOrAReasonButNeverACrash) {
+  Arena arena;
+  typename Type<TypeParam>::Wire wire;
+  (void)encode(TypeParam{}, wire, arena);
+  typename Type<TypeParam>::Wire nothing{};
+  (void)decode<TypeParam>(nothing);
+}
+
+TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
+  Examples examples(3);
+  Objects objects;
+  objects.objects = {examples.belief()};
+  const auto object = toJson(objects)["objects"][0];
+  EXPECT_EQ(object.size(), members<ObjectBelief>());
+  EXPECT_EQ(object["classes"][0].size(), members<ClassBelief>());
+  Calibration calibration;
+  calibration.cameras = {examples.camera()};
+  calibration.imu.emplace();
+  calibration.anchor.emplace();
+  const auto json = toJson(calibration);
+  EXPECT_EQ(json["cameras"][0].size(), members<CameraCalibration>());
+  EXPECT_EQ(json["imu"].size(), members<ImuCalibration>());
+  EXPECT_EQ(json["anchor"].size(), members<GeoAnchor>());
+  Detections detections;
+  detections.detections = {examples.detection()};
+  EXPECT_EQ(toJson(detections)["detections"][0].size(), members<Detection>() + 3);  // 4 corners
+  Landmarks landmarks;
+  landmarks.landmarks = {examples.landmark()};
+  EXPECT_EQ(toJson(landmarks)["landmarks"][0].size(), members<Landmark>());
+  MapTile tile;
+  tile.objects = {examples.mapObject()};
+  EXPECT_EQ(toJson(tile)["objects"][0].size(), members<MapObject>());
+}
+
+TEST(CodecOfKeys, CarryTheKeyOfADisposedObject) {
+  Arena arena;
+  ObjectState gone;
+  gone.object.id = 42;
+  perdure_msg_ObjectState wire;
+  encodeKey(gone, wire, arena);
+  EXPECT_EQ(wire.object_id, 42u);
+  perdure_msg_ObjectState key_only{};
+  key_only.object_id = 43;
+  EXPECT_EQ(decodeKey<ObjectState>(key_only).object.id, 43u);
+}
+
+TEST(CodecOfObjects, IsValidForAsLongAsTheValueAndTheArenaLive) {
+  Arena arena;
+  Examples examples(5);
+  Objects big;
+  examples.fill(big);
+  for (int i = 0; i < 500; ++i) big.objects.push_back(examples.belief());
+  perdure_msg_Objects wire;
+  for (int round = 0; round < 3; ++round) {  // the arena's memory is used again
+    ASSERT_TRUE(encode(big, wire, arena));
+    ASSERT_EQ(toJson(*decode<Objects>(wire)), toJson(big));
+  }
+}
+
+}  // namespace
+}  // namespace perdure::wire

@@ -1,0 +1,164 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/wire/bounds.h"
+#include "common/wire/codec.h"
+#include "tests/common/wire/examples.h"
+
+namespace perdure::wire {
+namespace {
+
+/// "code detail" of the refusal of a message, on both ways; "" where it is accepted.
+template <class T>
+std::string refusal(const T& message) {
+  Arena arena;
+  typename Type<T>::Wire wire;
+  const Result<void> encoded = encode(message, wire, arena);
+  return encoded ? "" : encoded.error().code + " " + encoded.error().detail;
+}
+
+template <class T, class Change>
+std::string decodeRefusal(T message, Change change) {
+  Arena arena;
+  typename Type<T>::Wire wire;
+  if (!encode(message, wire, arena)) return "not encodable";
+  change(wire);
+  const Result<T> decoded = decode<T>(wire);
+  return decoded ? "" : decoded.error().code + " " + decoded.error().detail;
+}
+
+template <class T>
+T example(unsigned seed = 4) {
+  T message;
+  Examples(seed).fill(message);
+  return message;
+}
+
+Detections twoDetections() {
+  Examples examples(2);
+  Detections message = example<Detections>();
+  message.detections = {examples.detection(), examples.detection()};
+  message.detections[1].activations = {0.0F, 1.0F};
+  return message;
+}
+
+TEST(Refusals, NameTheReasonAndThePathOfTheField) {
+  Detections message = twoDetections();
+  message.detections[1].activations[1] = NAN;
+  EXPECT_EQ(refusal(message), "not_finite detections[1].activations");
+  message = twoDetections();
+  message.detections[1].box.x1 = message.detections[1].box.x2;
+  EXPECT_EQ(refusal(message), "out_of_range detections[1].box");
+  message = twoDetections();
+  message.camera.clear();
+  EXPECT_EQ(refusal(message), "empty camera");
+}
+
+TEST(Refusals, OfMalformedDetectionsFromOutside) {
+  const auto of = [](auto change) { return decodeRefusal(twoDetections(), change); };
+  EXPECT_EQ(of([](auto&) {}), "");
+  EXPECT_EQ(of([](auto& w) { w.items._buffer[0].corners[2] = NAN; }),
+            "not_finite detections[0].x2");
+  EXPECT_EQ(of([](auto& w) { w.items._buffer[0].corners[0] = 1e300; }),
+            "out_of_range detections[0].x1");
+  EXPECT_EQ(of([](auto& w) { w.items._length = kDetections + 1; }), "over_bound detections");
+  EXPECT_EQ(of([](auto& w) { w.items._buffer = nullptr; }), "size_mismatch detections");
+  EXPECT_EQ(of([](auto& w) { w.camera = nullptr; }), "empty camera");
+  std::string text = "\xff";
+  EXPECT_EQ(of([&](auto& w) { w.camera = text.data(); }), "bad_text camera");
+  text.assign(kNameLength + 1, 'a');
+  EXPECT_EQ(of([&](auto& w) { w.camera = text.data(); }), "over_bound camera");
+}
+
+TEST(Refusals, OfImagesWhoseSizeIsNotThatOfTheirPixels) {
+  const auto of = [](auto change) { return decodeRefusal(example<Frame>(), change); };
+  EXPECT_EQ(of([](auto& w) { ++w.width; }), "size_mismatch pixels");
+  EXPECT_EQ(of([](auto& w) { --w.pixels._length; }), "size_mismatch pixels");
+  EXPECT_EQ(of([](auto& w) { w.pixels._length = 0; }), "size_mismatch pixels");
+  EXPECT_EQ(of([](auto& w) { w.width = w.height = 0xffffffff; }), "out_of_range width");
+  EXPECT_EQ(of([](auto& w) { w.encoding = 2; }), "bad_enum encoding");
+  Frame no_pixels = example<Frame>();
+  no_pixels.data = nullptr;
+  EXPECT_EQ(refusal(no_pixels), "size_mismatch pixels");
+}
+
+TEST(Refusals, OfCovariancesThatAreNone) {
+  Odometry odometry = example<Odometry>();
+  odometry.covariance(8, 8) = -1;
+  EXPECT_EQ(refusal(odometry), "bad_covariance covariance");
+  odometry = example<Odometry>();
+  odometry.covariance(0, 3) = NAN;
+  EXPECT_EQ(refusal(odometry), "not_finite covariance");
+  odometry = example<Odometry>();
+  odometry.covariance.setZero();  // known exactly, as a truth file says
+  EXPECT_EQ(refusal(odometry), "");
+  ObjectState state = example<ObjectState>();
+  state.object.classes[0].covariance.setZero();
+  EXPECT_EQ(refusal(state), "bad_covariance object.classes[0].covariance");
+  EXPECT_EQ(decodeRefusal(example<ObjectState>(),
+                          [](auto& w) { w.belief.classes._buffer[0].covariance[1] = 1e9; }),
+            "bad_covariance object.classes[0].covariance");
+}
+
+TEST(Refusals, OfRotationsThatAreNone) {
+  Odometry odometry = example<Odometry>();
+  odometry.T_WB.q.coeffs() *= 1.1;
+  EXPECT_EQ(refusal(odometry), "bad_rotation T_WB");
+  odometry = example<Odometry>();
+  odometry.up_W.setZero();
+  EXPECT_EQ(refusal(odometry), "bad_rotation up_W");
+}
+
+TEST(Refusals, OfBeliefsThatAreNoProbabilities) {
+  ObjectState state = example<ObjectState>();
+  state.object.classes[0].probability *= 0.5;
+  EXPECT_EQ(refusal(state), "bad_probabilities object.classes");
+  state.object.classes.clear();
+  EXPECT_EQ(refusal(state), "bad_probabilities object.classes");
+  state = example<ObjectState>();
+  state.object.existence = 1.5;
+  EXPECT_EQ(refusal(state), "out_of_range object.existence");
+  state = example<ObjectState>();
+  state.object.id = 0;
+  EXPECT_EQ(refusal(state), "out_of_range object.id");
+}
+
+TEST(Refusals, OfTwoIdsInOneState) {
+  EXPECT_EQ(decodeRefusal(example<ObjectState>(), [](auto& w) { ++w.object_id; }),
+            "size_mismatch id");
+}
+
+TEST(Refusals, OfEnumsOutOfRange) {
+  EXPECT_EQ(decodeRefusal(example<Event>(), [](auto& w) { w.kind = 200; }), "bad_enum kind");
+  EXPECT_EQ(decodeRefusal(example<MapQuery>(), [](auto& w) { w.kind = 6; }), "bad_enum kind");
+  EXPECT_EQ(decodeRefusal(example<Odometry>(), [](auto& w) { w.state = 3; }), "bad_enum state");
+  EXPECT_EQ(decodeRefusal(example<Health>(), [](auto& w) { w.state = 4; }), "bad_enum state");
+}
+
+TEST(Refusals, OfTilesThatHoldTooMuch) {
+  Examples examples(1);
+  MapTile tile = example<MapTile>();
+  tile.objects.assign(kMapTileCapacity, examples.mapObject());
+  EXPECT_EQ(refusal(tile), "");
+  tile.objects.push_back(examples.mapObject());
+  EXPECT_EQ(refusal(tile), "over_bound objects");
+  tile = example<MapTile>();
+  tile.part = -1;
+  EXPECT_EQ(refusal(tile), "out_of_range part");
+}
+
+TEST(Refusals, OfCalibrationsThatProjectNothing) {
+  Examples examples(1);
+  Calibration calibration;
+  calibration.cameras = {examples.camera()};
+  EXPECT_EQ(refusal(calibration), "");
+  calibration.cameras[0].fx = 0;
+  EXPECT_EQ(refusal(calibration), "out_of_range cameras[0].fx");
+  calibration.cameras[0] = examples.camera();
+  calibration.cameras[0].distortion_coefficients.pop_back();
+  EXPECT_EQ(refusal(calibration), "size_mismatch cameras[0].distortion_coefficients");
+}
+
+}  // namespace
+}  // namespace perdure::wire
