@@ -31,7 +31,7 @@ void requireImages(replay::Dataset& drive, const std::string& path) {
     const auto* frame = std::get_if<Frame>(&*message);
     if (!frame) continue;
     if (!frame->data) break;
-    return drive.seek(0);
+    return;
   }
   throw StartupError(ExitCode::kUnavailable,
                      path + " has no readable images; capture needs a drive with images (a drive "
@@ -60,9 +60,8 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
   options.source = source;
   options.encoding = encodingOf(config.image.cam0);
   options.second_encoding = encodingOf(config.image.cam1);
-  auto drive = replay::Dataset::open(options);
-  requireImages(*drive, config.dataset.path);
-  return drive;
+  requireImages(*replay::Dataset::open(options), config.dataset.path);
+  return replay::Dataset::open(options);
 }
 
 Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,

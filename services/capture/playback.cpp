@@ -1,0 +1,157 @@
+#include "services/capture/playback.h"
+
+#include <time.h>
+
+#include <algorithm>
+
+#include "services/capture/run_file.h"
+
+namespace perdure::capture {
+namespace {
+
+std::int64_t monotonicNs() {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+Duration periodOf(const Calibration& calibration) {
+  const double rate = calibration.cameras.empty() ? 0.0 : calibration.cameras.front().rate_hz;
+  return durationFromSeconds(rate > 0 ? 1.0 / rate : 0.1);
+}
+
+std::string listOf(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+Playback::Playback(service::Context& context, const Config& config)
+    : context_(context),
+      config_(config),
+      drive_(openDrive(config, context.instance())),
+      frame_count_(drive_->frameCount()),
+      period_(periodOf(drive_->calibration())),
+      resume_(readRunState(config)),
+      gate_(context.participant(), config.start, std::chrono::steady_clock::now()) {
+  Calibration calibration = drive_->calibration();
+  if (config_.dataset.cameras == "mono" && calibration.cameras.size() > 1) {
+    calibration.cameras.resize(1);
+  }
+  for (const CameraCalibration& camera : calibration.cameras) {
+    frames_[camera.name] = &context_.writer(bus::topics::frame(camera.name));
+  }
+  outputs_ = outputs();
+  (void)context_.writer(bus::topics::kCalibration).write(calibration);
+  context_.on(bus::topics::kOdometry, [this](const Odometry& m) {
+    if (node_) node_->onAnswer("odometry", m.stamp);
+  });
+  context_.on(bus::topics::kDetections, [this](const Detections& m) {
+    if (node_) node_->onAnswer("detections", m.stamp);
+  });
+  context_.countReasons([this](ReasonCounts& counts) { report(counts); });
+  context_.onHealth([this] { updateHealth(); });
+  context_.loop().onWake([this] { pump(); });
+  context_.every(std::chrono::milliseconds(2), [this] { pump(); });
+}
+
+Outputs Playback::outputs() {
+  return {context_.sink(bus::topics::kImu), context_.sink(bus::topics::kSpeed),
+          [this](const Frame& frame) {
+            const auto it = frames_.find(frame.camera);
+            if (it != frames_.end() && it->second->write(frame) && frame.camera == "cam0") {
+              context_.health().frameOut();
+            }
+          }};
+}
+
+void Playback::begin() {
+  for (const std::string& name : gate_.missing()) reasons_.add("reader_missing_" + name);
+  if (resume_) {
+    context_.log().info("carries on at frame {} of {}", resume_->next_sequence, frame_count_);
+  } else {
+    context_.log().info("starts a drive of {} frames", frame_count_);
+  }
+  node_ = std::make_unique<Node>(config_, period_, resume_, outputs_);
+  const auto isThere = [&](const std::string& name) {
+    const auto in = [&](const auto& list) {
+      return std::find(list.begin(), list.end(), name) != list.end();
+    };
+    return in(config_.start.readers) && !in(gate_.missing());
+  };
+  if (isThere("vio")) node_->expect("odometry");
+  if (isThere("inference")) node_->expect("detections");
+  if (resume_ && resume_->finished) return node_->end();
+  loader_ = std::make_unique<Loader>(config_, std::move(drive_),
+                                     resume_ ? resume_->next_sequence : 0,
+                                     [&loop = context_.loop()] { loop.wake(); });
+}
+
+void Playback::feed() {
+  if (!node_->wants()) return;
+  const bool ended = loader_->ended();  // asked before taking: nothing comes after
+  if (auto message = loader_->take()) {
+    if (std::holds_alternative<Frame>(*message)) {
+      if (std::get<Frame>(*message).camera == "cam0") context_.health().frameIn();
+    }
+    node_->offer(*std::move(message));
+  } else if (ended) {
+    node_->end();
+  }
+}
+
+void Playback::pump() {
+  if (finished_ || !gate_.open(std::chrono::steady_clock::now())) return;
+  if (!node_) begin();
+  const std::int64_t before = node_->state().last_ns;
+  while (!context_.stopping()) {
+    if (loader_) feed();
+    if (node_->tick(monotonicNs()) > Duration{0}) break;
+  }
+  if (node_->finished()) return finish();
+  if (node_->state().last_ns != before) saveState(false);
+}
+
+void Playback::saveState(bool finished) {
+  if (config_.run.state.empty()) return;
+  RunState state = node_->state();
+  state.drive = driveOf(config_);
+  state.boot = bootId();
+  state.finished = finished;
+  if (!writeRunState(config_.run.state, state)) reasons_.add("run_state_unwritable");
+}
+
+void Playback::finish() {
+  finished_ = true;
+  saveState(true);
+  context_.log().info("end of drive after {} frames", node_->framesGiven());
+  if (config_.run.on_end != "exit") return;
+  constexpr double kLongest = 0.5;  // SIGTERM ends a service within a second
+  for (const auto& [camera, writer] : frames_) writer->waitForAcknowledgement(kLongest);
+  context_.stop();
+}
+
+void Playback::updateHealth() {
+  auto& health = context_.health();
+  if (finished_) {
+    health.state(HealthState::kOk, "end of drive");
+  } else if (!node_) {
+    health.state(HealthState::kStarting, "waits for readers: " + listOf(gate_.missing()));
+  } else {
+    const std::string problem = loader_ ? loader_->lastProblem() : std::string();
+    health.state(problem.empty() ? HealthState::kOk : HealthState::kDegraded, problem);
+  }
+}
+
+void Playback::report(ReasonCounts& counts) const {
+  const auto add = [&](const ReasonCounts& more) {
+    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
+  };
+  add(reasons_);
+  if (node_) add(node_->reasons());
+  if (loader_) add(loader_->reasons());
+}
+
+}  // namespace perdure::capture

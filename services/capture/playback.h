@@ -1,0 +1,47 @@
+// A drive on the bus: waits for readers, loads ahead, gives messages at their time, keeps the
+// state of the run, and says in Health where it is.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "common/service/service.h"
+#include "services/capture/loader.h"
+#include "services/capture/node.h"
+#include "services/capture/start_gate.h"
+
+namespace perdure::capture {
+
+class Playback {
+ public:
+  /// Opens the drive and publishes its calibration. Throws StartupError.
+  Playback(service::Context& context, const Config& config);
+
+ private:
+  void begin();
+  void pump();
+  void feed();
+  void saveState(bool finished);
+  void finish();
+  void updateHealth();
+  void report(ReasonCounts& counts) const;
+  Outputs outputs();
+
+  service::Context& context_;
+  const Config config_;
+  std::unique_ptr<replay::Dataset> drive_;  ///< until the loader takes it
+  std::size_t frame_count_ = 0;
+  Duration period_{0};
+  std::optional<RunState> resume_;
+  RunState saved_;
+  StartGate gate_;
+  std::map<std::string, bus::Writer<Frame>*> frames_;
+  Outputs outputs_;
+  std::unique_ptr<Node> node_;
+  std::unique_ptr<Loader> loader_;
+  ReasonCounts reasons_;
+  bool finished_ = false;
+};
+
+}  // namespace perdure::capture
