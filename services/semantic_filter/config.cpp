@@ -1,0 +1,130 @@
+#include "services/semantic_filter/config.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using config::atLeast;
+using config::between;
+using config::Fields;
+using config::positive;
+
+void describeBox(BoxParameters& p, Fields& fields) {
+  fields.number("box.sigma_px", p.sigma_px, positive(), {"floor of a side's deviation", "px"});
+  fields.number("box.sigma_relative", p.sigma_relative, positive(),
+                {"a side's deviation relative to the box, where the model does not say"});
+  fields.number("box.border_px", p.border_px, atLeast(0),
+                {"a side this near to the image border is cut by it", "px"});
+  fields.number("box.gate", p.gate, between(0.5, 0.999999),
+                {"probability inside the gate of the normalised innovation"});
+  fields.number("box.min_height_px", p.min_height_px, positive(),
+                {"height at which detection is half as likely", "px"});
+  fields.number("box.min_network_px", p.min_network_px, positive(),
+                {"the same in the network's input, where its size is known", "px"});
+  fields.integer("box.iterations", p.iterations, between(1, 20), {"of the iterated EKF"});
+}
+
+void describeClutter(ClutterParameters& p, Fields& fields) {
+  fields.number("clutter.per_frame", p.per_frame, positive(), {"expected false boxes in an image"});
+  fields.number("clutter.min_size_px", p.min_size_px, positive(),
+                {"least side of a false box", "px"});
+  fields.number("clutter.censored_probability", p.censored_probability, between(1e-6, 1),
+                {"that a false box is cut at a given side"});
+  fields.number("clutter.max_log_ratio", p.max_log_ratio, positive(),
+                {"activations are clamped to this against clutter", "nats"});
+  fields.number("clutter.other_lookalike", p.other_lookalike, between(0, 1),
+                {"share of things of no known class that look like a known one"});
+  fields.number("clutter.other_prior", p.other_prior, between(1e-6, 0.999999),
+                {"probability of \"other\" at birth"});
+}
+
+void describeBirth(BirthParameters& p, Fields& fields) {
+  fields.number("birth.odds", p.odds, positive(), {"new objects in a box against false alarms"});
+  fields.number("birth.min_log_ratio", p.min_log_ratio, {},
+                {"weaker boxes support objects that are there, and give no birth", "nats"});
+  fields.number("birth.claimed", p.claimed, between(0, 1),
+                {"a box claimed with more than this gives no birth"});
+  fields.integer("birth.max_classes", p.max_classes, between(1, 1000),
+                 {"classes of the network kept for an object, \"other\" beside them"});
+  fields.number("birth.class_ratio", p.class_ratio, between(0, 1),
+                {"classes below this share of the best are not kept"});
+  fields.number("birth.landmark_decay", p.landmark_decay, positive(),
+                {"e-folding distance of a landmark's weight, in half boxes"});
+  fields.integer("birth.min_landmarks", p.min_landmarks, between(1, 100000),
+                 {"inside a box, before they give its depth"});
+  fields.number("birth.min_distance_m", p.min_distance_m, positive(),
+                {"least depth of a new object", "m"});
+}
+
+void describeMotion(Parameters& p, Fields& fields) {
+  auto& m = p.motion;
+  fields.number("motion.position_walk", m.position_walk, atLeast(0),
+                {"random walk of a static object", "m/√s"});
+  fields.number("motion.yaw_walk", m.yaw_walk, atLeast(0), {"the same of its yaw", "rad/√s"});
+  fields.number("motion.acceleration", m.acceleration, positive(),
+                {"white acceleration of a moving object", "m/s²/√Hz"});
+  fields.number("motion.survival_s", m.survival_s, positive(),
+                {"mean time for which a thing stays where it is", "s"});
+  fields.number("motion.min_speed", m.min_speed, positive(),
+                {"slower objects count as static", "m/s"});
+  fields.number("motion.start_probability", m.start_probability, between(1e-9, 0.5),
+                {"of a moving hypothesis that is added to a static object"});
+  fields.number("motion.start_nis", m.start_nis, positive(),
+                {"running innovation above which it is added"});
+  fields.number("pose.walk_position", p.pose.walk_position, atLeast(0),
+                {"random walk of poses that come without covariance", "m/√m"});
+  fields.number("pose.walk_rotation", p.pose.walk_rotation, atLeast(0),
+                {"the same of their rotation", "rad/√m"});
+  fields.number("looks.correlation", p.looks.correlation, between(0, 1),
+                {"share of a look's error that the next look from the same place has too"});
+  fields.number("looks.angle", p.looks.angle, positive(),
+                {"change of view after which looks are independent", "rad"});
+  fields.number("looks.log_distance", p.looks.log_distance, positive(),
+                {"the same for the logarithm of the distance"});
+}
+
+void describeTend(Parameters& p, Fields& fields) {
+  auto& v = p.visibility;
+  fields.integer("visibility.cell_px", v.cell_px, between(1, 256),
+                 {"cell of the depth buffer", "px"});
+  fields.number("visibility.minimum", v.minimum, between(0, 1),
+                {"visible fraction below which a frame says nothing"});
+  fields.number("visibility.full", v.full, between(0, 1), {"fraction that is called visible"});
+  fields.number("visibility.solid", v.solid, between(0, 1),
+                {"existence from which an object hides others"});
+  auto& t = p.tend;
+  fields.number("tend.confirm", t.confirm, between(0, 1), {"existence that confirms an object"});
+  fields.integer("tend.confirm_hits", t.confirm_hits, between(1, 1000),
+                 {"and the looks at it that it takes"});
+  fields.number("tend.gone", t.gone, between(0, 1), {"existence below which an object is gone"});
+  fields.number("tend.gone_tentative", t.gone_tentative, between(0, 1),
+                {"the same for one that was never confirmed"});
+  fields.number("tend.class_dominates", t.class_dominates, between(0.5, 1),
+                {"a class above this ends the others"});
+  fields.number("tend.hypothesis_floor", t.hypothesis_floor, between(0, 0.5),
+                {"weight below which a hypothesis is pruned"});
+  fields.number("tend.hypothesis_merge", t.hypothesis_merge, atLeast(0),
+                {"squared Mahalanobis distance at which two hypotheses are one"});
+  fields.number("tend.merge_overlap", t.merge_overlap, between(0, 1),
+                {"shared over joint volume at which two objects are one"});
+  fields.integer("tend.max_objects", t.max_objects, between(1, 1000000),
+                 {"in the working set; the least likely go"});
+}
+
+}  // namespace
+
+void describe(Config& c, Fields& fields) {
+  fields.text("class_priors", c.class_priors,
+              {"file of sizes and detection probabilities by class"});
+  fields.integer("history.frames", c.history.frames, between(2, 1000),
+                 {"frames for which late detections are still applied"});
+  fields.boolean("history.wait_for_detections", c.history.wait_for_detections,
+                 {"publish a frame with its detections, or else when the next frame comes; "
+                  "false: publish at once, detections show in the next frame"});
+  describeBox(c.filter.box, fields);
+  describeClutter(c.filter.clutter, fields);
+  describeBirth(c.filter.birth, fields);
+  describeMotion(c.filter, fields);
+  describeTend(c.filter, fields);
+}
+
+}  // namespace perdure::semantic_filter

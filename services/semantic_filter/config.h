@@ -1,0 +1,25 @@
+// What can be set of the semantic filter.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/config/fields.h"
+#include "services/semantic_filter/core/parameters.h"
+
+namespace perdure::semantic_filter {
+
+struct HistoryConfig {
+  std::int64_t frames = 32;          ///< how far back a late detection is still applied
+  bool wait_for_detections = true;   ///< a frame is published with its detections, or at the next
+};
+
+struct Config {
+  std::string class_priors = "config/class_priors.yaml";
+  HistoryConfig history;
+  Parameters filter;
+};
+
+void describe(Config& config, config::Fields& fields);
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,295 @@
+#include "services/semantic_filter/core/birth.h"
+
+#include <ceres/tiny_solver.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using Vector7 = Eigen::Matrix<double, 7, 1>;
+
+/// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range.
+class BirthCost {
+ public:
+  using Scalar = double;
+  enum { NUM_RESIDUALS = 12, NUM_PARAMETERS = 7 };
+  using Residuals = Eigen::Matrix<double, NUM_RESIDUALS, 1>;
+  using Jacobian = Eigen::Matrix<double, NUM_RESIDUALS, NUM_PARAMETERS>;
+
+  BirthCost(const Evidence& evidence, const ClassPrior& prior, double yaw, double yaw_sigma,
+            const std::optional<RangeHint>& range, const FrameContext& frame,
+            const Eigen::Vector3d& start)
+      : z_(evidence.z), view_(frame.view), yaw_(yaw), yaw_sigma_(yaw_sigma), range_(range),
+        log_size_(prior.log_size), start_(start) {
+    position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
+    const Eigen::Matrix3d L = prior.log_size_covariance.llt().matrixL();
+    size_whitening_ = L.inverse();
+  }
+
+  bool operator()(const double* parameters, double* residuals, double* jacobian) const {
+    State x = State::Zero();
+    x.head<7>() = Eigen::Map<const Vector7>(parameters);
+    const auto box = projectCuboid(x, view_);
+    if (!box) return false;
+    Eigen::Map<Residuals> r(residuals);
+    Jacobian J = Jacobian::Zero();
+    r.setZero();
+    sides(*box, r, J);
+    r.segment<3>(4) = position_weight_ * (x.head<3>() - start_);
+    J.block<3, 3>(4, 0).diagonal().setConstant(position_weight_);
+    r[7] = wrapAngle(x[kYaw] - yaw_) / yaw_sigma_;
+    J(7, kYaw) = 1.0 / yaw_sigma_;
+    r.segment<3>(8) = size_whitening_ * (x.segment<3>(kSize) - log_size_);
+    J.block<3, 3>(8, kSize) = size_whitening_;
+    if (range_) {
+      const Eigen::Vector3d ray = x.head<3>() - view_.T_WC().p;
+      r[11] = (ray.norm() - range_->distance_m) / range_->sigma_m;
+      J.block<1, 3>(11, 0) = ray.normalized().transpose() / range_->sigma_m;
+    }
+    if (jacobian) std::copy(J.data(), J.data() + J.size(), jacobian);
+    return r.allFinite();
+  }
+
+ private:
+  void sides(const ProjectedBox& box, Eigen::Map<Residuals>& r, Jacobian& J) const {
+    for (int i = 0; i < 4; ++i) {
+      const double inside = i < 2 ? box.sides[i] - z_.sides[i] : z_.sides[i] - box.sides[i];
+      if (!box.exact[i] || (!z_.measured[i] && inside <= 0.0)) continue;
+      const double weight = 1.0 / std::sqrt(z_.variance[i]);
+      r[i] = weight * (box.sides[i] - z_.sides[i]);
+      J.row(i) = weight * box.H.row(i).head<7>();
+    }
+  }
+
+  const BoxMeasurement& z_;
+  const View& view_;
+  double yaw_, yaw_sigma_;
+  std::optional<RangeHint> range_;
+  Eigen::Vector3d log_size_, start_;
+  double position_weight_ = 1.0;
+  Eigen::Matrix3d size_whitening_;
+};
+
+/// Unit ray in W through the box's centre.
+std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view) {
+  const Eigen::Vector2d centre(0.5 * (z.sides[0] + z.sides[2]), 0.5 * (z.sides[1] + z.sides[3]));
+  const auto normalised = view.camera->unproject(centre);
+  if (!normalised) return std::nullopt;
+  const Eigen::Vector3d ray(normalised->x(), normalised->y(), 1.0);
+  return Eigen::Vector3d(view.T_WC().R() * ray);  // its length is per metre of depth
+}
+
+/// Depth at which an object of the prior's size has the box's height, or else its width.
+std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& prior,
+                                    const CameraModel& camera) {
+  if (z.measured[1] && z.measured[3]) return camera.fy() * std::exp(prior.log_size[2]) / z.height();
+  if (z.measured[0] && z.measured[2]) {
+    return camera.fx() * std::exp(0.5 * (prior.log_size[0] + prior.log_size[1])) / z.width();
+  }
+  return std::nullopt;
+}
+
+/// The pose error enters what was seen from the body: δp = δp_B + R [·]x θ, δψ = up · R θ.
+void addPoseError(Hypothesis& h, const FrameContext& frame) {
+  Eigen::Matrix<double, kStateDim, 6> A = Eigen::Matrix<double, kStateDim, 6>::Zero();
+  const Eigen::Matrix3d R_WB = frame.view.T_WB.R();
+  const Eigen::Vector3d p_B = frame.view.T_WB.inverse() * Eigen::Vector3d(h.x.head<3>());
+  A.block<3, 3>(0, 0) = -R_WB * skew(p_B);
+  A.block<3, 3>(0, 3).setIdentity();
+  A.block<1, 3>(kYaw, 0) = frame.view.up_W.transpose() * R_WB;
+  h.C = A * frame.pose_error.covariance;
+  h.P += A * frame.pose_error.covariance * A.transpose();
+  makeSymmetric(h.P);
+}
+
+struct YawStart {
+  double yaw, sigma, weight;
+};
+
+std::vector<YawStart> yawStarts(const Evidence& evidence, const ClassPrior& prior,
+                                const FrameContext& frame, const Eigen::Vector3d& ray) {
+  const Eigen::Vector3d level = levelling(frame.view.up_W) * ray;
+  const double bearing = std::atan2(level.y(), level.x());
+  if (!prior.has_yaw) return {{bearing, 1.0, 1.0}};
+  if (evidence.azimuth) {
+    const Eigen::Vector3d centre = frame.view.T_WC().p + 10.0 * ray;
+    const double yaw = yawFromAzimuth(*evidence.azimuth, centre, frame.view);
+    const double sigma = std::max(evidence.azimuth_sigma, prior.azimuth_sigma);
+    return {{yaw, sigma, 0.9}, {wrapAngle(yaw + M_PI / 2), sigma, 0.1}};
+  }
+  std::vector<YawStart> starts;
+  for (int i = 0; i < 4; ++i) starts.push_back({wrapAngle(bearing + i * M_PI / 4), 0.35, 0.25});
+  return starts;
+}
+
+void addMovingTwin(Object& object, const Hypothesis& still, const ClassPrior& prior) {
+  if (prior.moving <= 0.0 || prior.speed_sigma <= 0.0) return;
+  Hypothesis twin = still;
+  object.hypotheses.back().weight *= 1.0 - prior.moving;
+  twin.weight *= prior.moving;
+  twin.moving = true;
+  const Eigen::Vector2d along(std::cos(twin.x[kYaw]), std::sin(twin.x[kYaw]));
+  const double s2 = prior.speed_sigma * prior.speed_sigma;
+  twin.P.block<2, 2>(kVelocity, kVelocity) =
+      s2 * along * along.transpose() + 0.04 * s2 * Eigen::Matrix2d::Identity();
+  twin.P(kVelocity + 2, kVelocity + 2) = 0.04;
+  object.hypotheses.push_back(twin);
+}
+
+void addClass(Object& object, const ClassPrior& prior, double probability, const Evidence& evidence,
+              const std::vector<YawStart>& starts, const std::optional<RangeHint>& range,
+              const FrameContext& frame) {
+  for (const auto& start : starts) {
+    const auto fit = fitCuboid(evidence, prior, start.yaw, start.sigma, range, frame);
+    if (!fit) continue;
+    Hypothesis h = fit->hypothesis;
+    h.weight = probability * start.weight * std::exp(-fit->cost);
+    if (h.weight < 1e-12) continue;
+    object.hypotheses.push_back(h);
+    addMovingTwin(object, h, prior);
+  }
+}
+
+/// "other" has three starts of size, so that each Gaussian is narrow enough to be linear in depth.
+void addOther(Object& object, double probability, const Evidence& evidence,
+              const Eigen::Vector3d& ray, const std::optional<RangeHint>& range,
+              const FrameContext& frame) {
+  constexpr double kScales[3] = {-1.2, 0.0, 1.2};
+  ClassPrior prior = frame.priors->other;
+  const Eigen::Vector3d middle = prior.log_size;
+  for (const double scale : kScales) {
+    prior.log_size = middle.array() + scale;
+    addClass(object, prior, probability / 3.0, evidence,
+             yawStarts(evidence, prior, frame, ray), range, frame);
+  }
+}
+
+struct Candidate {
+  ClassPrior prior;
+  double log_weight;
+};
+
+std::vector<Candidate> candidates(const Evidence& evidence, const FrameContext& frame) {
+  std::vector<Candidate> all;
+  for (const auto& name : frame.model->classes) {
+    const ClassPrior prior = frame.priors->of(name);
+    all.push_back({prior, std::log(prior.frequency) + logRatio(evidence, *frame.model, name)});
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.log_weight > b.log_weight; });
+  const auto& birth = frame.parameters->birth;
+  const auto limit = static_cast<std::size_t>(birth.max_classes);
+  if (all.size() > limit) all.resize(limit);
+  const double floor = all.empty() ? 0.0 : all.front().log_weight + std::log(birth.class_ratio);
+  std::erase_if(all, [&](const auto& c) { return c.log_weight < floor; });
+  return all;
+}
+
+}  // namespace
+
+std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
+                                            const std::vector<SightPoint>& points,
+                                            const BirthParameters& parameters) {
+  const auto& z = evidence.z;
+  const Eigen::Vector2d centre(0.5 * (z.sides[0] + z.sides[2]), 0.5 * (z.sides[1] + z.sides[3]));
+  double sum = 0.0, mean = 0.0, square = 0.0;
+  std::int64_t n = 0;
+  for (const auto& p : points) {
+    const double u = (p.pixel.x() - centre.x()) / (0.5 * z.width());
+    const double v = (p.pixel.y() - centre.y()) / (0.5 * z.height());
+    if (std::abs(u) > 1.0 || std::abs(v) > 1.0 || p.distance_m <= 0.0) continue;
+    const double weight = std::exp(-std::hypot(u, v) / parameters.landmark_decay) /
+                          (1.0 + p.sigma_m * p.sigma_m / (p.distance_m * p.distance_m));
+    const double inverse = 1.0 / p.distance_m;  // the mean of the inverse: far points pull less
+    sum += weight, mean += weight * inverse, square += weight * inverse * inverse;
+    ++n;
+  }
+  if (n < parameters.min_landmarks) return std::nullopt;
+  mean /= sum;
+  const double spread = std::sqrt(std::max(square / sum - mean * mean, 0.0)) / mean;
+  return RangeHint{1.0 / mean, (0.1 + spread) / mean};
+}
+
+double logBirthRatio(const Evidence& evidence, const FrameContext& frame) {
+  const auto& p = *frame.parameters;
+  double frequency = 0.0, sum = 0.0;
+  for (const auto& name : frame.model->classes) {
+    const double f = frame.priors->of(name).frequency;
+    frequency += f;
+    sum += f * std::exp(logRatio(evidence, *frame.model, name));
+  }
+  // A network with K classes spreads the prior over those it reports at all: the mean is taken over
+  // the classes' frequencies, bounded below by one class's share in ten.
+  const double named = sum / std::max(std::min(frequency, 10.0), 1e-9);
+  return std::log(p.birth.odds) +
+         std::log((1.0 - p.clutter.other_prior) * named +
+                  p.clutter.other_prior * std::exp(evidence.log_ratio_other));
+}
+
+std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, double yaw,
+                             double yaw_sigma, const std::optional<RangeHint>& range,
+                             const FrameContext& frame) {
+  const auto depth = depthFromSize(evidence.z, prior, *frame.view.camera);
+  const auto ray = centreRay(evidence.z, frame.view);
+  if (!depth || !ray) return std::nullopt;
+  const double minimum = frame.parameters->birth.min_distance_m;
+  const double start_depth = range ? range->distance_m / ray->norm() : *depth;
+  const Eigen::Vector3d start =
+      frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
+  const BirthCost cost(evidence, prior, yaw, yaw_sigma, range, frame, start);
+  Vector7 x;
+  x << start, yaw, prior.log_size;
+  ceres::TinySolver<BirthCost> solver;
+  solver.options.max_num_iterations = 15;
+  solver.Solve(cost, &x);
+  BirthCost::Residuals r;
+  BirthCost::Jacobian J;
+  if (!x.allFinite() || !cost(x.data(), r.data(), J.data())) return std::nullopt;
+  const Eigen::LDLT<Matrix7d> hessian(J.transpose() * J);
+  if (hessian.info() != Eigen::Success || !hessian.isPositive()) return std::nullopt;
+  Fit fit;
+  fit.cost = 0.5 * r.squaredNorm();
+  fit.hypothesis.class_name = prior.name;
+  fit.hypothesis.x.head<7>() = x;
+  fit.hypothesis.x[kYaw] = wrapAngle(x[kYaw]);
+  fit.hypothesis.P.setZero();
+  fit.hypothesis.P.topLeftCorner<7, 7>() = hessian.solve(Matrix7d::Identity());
+  addPoseError(fit.hypothesis, frame);
+  if (!fit.hypothesis.P.allFinite()) return std::nullopt;
+  return fit;
+}
+
+std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHint>& range,
+                           TimePoint now, const FrameContext& frame) {
+  const auto ray = centreRay(evidence.z, frame.view);
+  if (!ray) return std::nullopt;
+  const auto kept = candidates(evidence, frame);
+  Object object;
+  double total = 0.0;
+  for (const auto& c : kept) total += std::exp(c.log_weight);
+  const double other = frame.parameters->clutter.other_prior;
+  for (const auto& c : kept) {
+    addClass(object, c.prior, (1.0 - other) * std::exp(c.log_weight) / total, evidence,
+             yawStarts(evidence, c.prior, frame, *ray), range, frame);
+  }
+  addOther(object, other, evidence, *ray, range, frame);
+  if (object.hypotheses.empty()) return std::nullopt;
+  const double ratio = std::exp(logBirthRatio(evidence, frame));
+  object.existence = ratio / (1.0 + ratio);
+  object.first_seen = object.last_seen = object.as_of = now;
+  object.pose_product = frame.pose_error.product;
+  object.hits = 1;
+  normalise(object);
+  object.view = viewPointNow(object, frame.view, frame.parameters->looks);
+  object.view.looks = 1.0;
+  return object;
+}
+
+}  // namespace perdure::semantic_filter

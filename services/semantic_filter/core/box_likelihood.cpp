@@ -1,0 +1,113 @@
+#include "services/semantic_filter/core/box_likelihood.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/chi2.h"
+#include "common/math/gaussian.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+/// log P(X < 0) for X ~ N(mean, variance).
+double logBelowZero(double mean, double variance) {
+  return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
+}
+
+/// χ² quantiles of one gate for 1..4 degrees of freedom, computed once per gate value.
+double gateThreshold(double gate, int dof) {
+  thread_local double cached_gate = -1.0;
+  thread_local std::array<double, 5> quantile{};
+  if (cached_gate != gate) {
+    for (int i = 1; i <= 4; ++i) quantile[i] = chi2Quantile(gate, i);
+    cached_gate = gate;
+  }
+  return quantile[dof];
+}
+
+}  // namespace
+
+int BoxMeasurement::count() const {
+  return static_cast<int>(std::count(measured.begin(), measured.end(), true));
+}
+
+BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
+                       double relative_sigma) {
+  BoxMeasurement z;
+  z.sides << std::clamp(box.x1, 0.0, width), std::clamp(box.y1, 0.0, height),
+      std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
+  const double relative = relative_sigma > 0.0 ? relative_sigma : parameters.sigma_relative;
+  const double sx = parameters.sigma_px + relative * z.width();
+  const double sy = parameters.sigma_px + relative * z.height();
+  z.variance << sx * sx, sy * sy, sx * sx, sy * sy;
+  const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
+  z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,
+                z.sides[3] < height - my};
+  return z;
+}
+
+double logClutter(const BoxMeasurement& z, double width, double height,
+                  const ClutterParameters& parameters) {
+  const double size[2] = {std::max(z.width(), 1.0), std::max(z.height(), 1.0)};
+  const double extent[2] = {width, height};
+  double log_measure = std::log(parameters.per_frame);
+  for (int axis = 0; axis < 2; ++axis) {
+    const int censored = !z.measured[axis] + !z.measured[axis + 2];
+    const double log_uniform = std::log(std::log(extent[axis] / parameters.min_size_px));
+    if (censored < 2) log_measure -= std::log(extent[axis]);
+    if (censored == 0) log_measure -= std::log(size[axis]) + log_uniform;
+    log_measure += censored * std::log(parameters.censored_probability);
+  }
+  return log_measure;
+}
+
+Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
+                                    const Eigen::Matrix<double, 6, 6>& P_pose) {
+  const Eigen::Matrix4d cross = box.H * h.C * box.H_pose.transpose();
+  Eigen::Matrix4d S = box.H * h.P * box.H.transpose() + cross + cross.transpose() +
+                      box.H_pose * P_pose * box.H_pose.transpose();
+  makeSymmetric(S);
+  return S;
+}
+
+std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                    const std::array<bool, 4>& hidden) {
+  std::array<bool, 4> use;
+  for (int i = 0; i < 4; ++i) use[i] = z.measured[i] && !hidden[i] && predicted.exact[i];
+  return use;
+}
+
+std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                 const Eigen::Matrix4d& covariance,
+                                 const std::array<bool, 4>& hidden, double gate) {
+  const auto use = comparableSides(z, predicted, hidden);
+  const int n = static_cast<int>(std::count(use.begin(), use.end(), true));
+  if (n == 0) return std::nullopt;
+  Eigen::VectorXd nu(n);
+  Eigen::MatrixXd S(n, n);
+  BoxScore score;
+  for (int i = 0, a = 0; i < 4; ++i) {
+    if (!use[i]) {
+      // The true side lies at or beyond the observed end: left and top to smaller coordinates.
+      const double beyond = i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
+      if (predicted.exact[i]) {
+        score.log_density += logBelowZero(beyond, covariance(i, i) + z.variance[i]);
+      }
+      continue;
+    }
+    nu[a] = z.sides[i] - predicted.sides[i];
+    for (int j = 0, b = 0; j < 4; ++j) {
+      if (use[j]) S(a, b++) = covariance(i, j) + (i == j ? z.variance[i] : 0.0);
+    }
+    ++a;
+  }
+  const Eigen::LLT<Eigen::MatrixXd> llt(S);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  score.nis = llt.matrixL().solve(nu).squaredNorm();
+  score.dof = n;
+  if (score.nis > gateThreshold(gate, n)) return std::nullopt;
+  score.log_density += logGaussian(nu, S);
+  return score;
+}
+
+}  // namespace perdure::semantic_filter

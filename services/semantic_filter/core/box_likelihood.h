@@ -1,0 +1,58 @@
+// L_k(z): how much better a box is explained by a hypothesis than by clutter (eq. 6, 7).
+//
+// A side of a box is *measured* (a density in px⁻¹) or *censored*: cut by the image border or by a
+// nearer object, where only "the true side lies beyond" is known (a probability). Clutter is
+// measured in the same event, so that units agree (DESIGN 5, item 5).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "common/types/detections.h"
+#include "services/semantic_filter/core/cuboid.h"
+#include "services/semantic_filter/core/parameters.h"
+
+namespace perdure::semantic_filter {
+
+struct BoxMeasurement {
+  Eigen::Vector4d sides = Eigen::Vector4d::Zero();     ///< x1, y1, x2, y2, pixels
+  Eigen::Vector4d variance = Eigen::Vector4d::Ones();  ///< px², of each side
+  std::array<bool, 4> measured{true, true, true, true};
+
+  int count() const;
+  double width() const { return sides[2] - sides[0]; }
+  double height() const { return sides[3] - sides[1]; }
+};
+
+/// The box of a detection, its sides cut at the border of a width × height image marked censored.
+/// `relative_sigma` > 0 (a network's own figure) replaces the default.
+BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
+                       double relative_sigma = 0.0);
+
+/// log of the clutter measure of the box: expected false boxes times the density (measured sides)
+/// or probability (censored ones) of one of them being this one.
+double logClutter(const BoxMeasurement& z, double width, double height,
+                  const ClutterParameters& parameters);
+
+/// Covariance of the four predicted sides: S without R of DESIGN 5, item 2.
+Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
+                                    const Eigen::Matrix<double, 6, 6>& P_pose);
+
+struct BoxScore {
+  double log_density = 0.0;  ///< of measured sides, with the probability of the censored ones
+  double nis = 0.0;          ///< squared Mahalanobis distance of the measured sides
+  int dof = 0;
+};
+
+/// log N(z; h(x), S) with censoring. `hidden` are sides that a nearer object hides. Nothing where no
+/// side can be compared, or outside the gate.
+std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                 const Eigen::Matrix4d& covariance,
+                                 const std::array<bool, 4>& hidden, double gate);
+
+/// Sides that can be compared: measured, not hidden, and exact in the projection.
+std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                    const std::array<bool, 4>& hidden);
+
+}  // namespace perdure::semantic_filter

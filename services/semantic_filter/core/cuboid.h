@@ -1,0 +1,44 @@
+// The image of a cuboid: the box around its eight corners, with Jacobians (b = π(g s) of eq. 7).
+// The cuboid stands upright: its z axis is against gravity; yaw 0 has its length along W's x.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "common/camera/camera_model.h"
+#include "services/semantic_filter/core/object.h"
+
+namespace perdure::semantic_filter {
+
+/// From where the scene is seen: everything that a projection needs.
+struct View {
+  const CameraModel* camera = nullptr;
+  RigidTransform T_WB;
+  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
+
+  RigidTransform T_WC() const { return T_WB * camera->T_BC(); }
+};
+
+struct ProjectedBox {
+  Eigen::Vector4d sides = Eigen::Vector4d::Zero();  ///< x1, y1, x2, y2; may lie outside the image
+  Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
+  Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();  ///< by [θ, p] of T_WB
+  std::array<bool, 4> exact{true, true, true, true};  ///< false: set by the near plane's cut
+  double nearest_m = 0.0;  ///< least depth of a corner that is in front
+  std::vector<Eigen::Vector2d> points;  ///< images of corners and cuts, for the outline
+};
+
+/// R_WO of an upright cuboid.
+Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
+/// The eight corners in W.
+std::array<Eigen::Vector3d, 8> corners(const State& x, const Eigen::Vector3d& up_W);
+/// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
+std::optional<ProjectedBox> projectCuboid(const State& x, const View& view);
+
+/// Yaw in W from KITTI's alpha seen at `centre_W`: alpha = rotation_y - atan2(x, z) of the centre,
+/// in the gravity-levelled camera frame (DESIGN 5, item 8).
+double yawFromAzimuth(double azimuth, const Eigen::Vector3d& centre_W, const View& view);
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,48 @@
+#include "services/semantic_filter/core/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perdure::semantic_filter {
+
+Model makeModel(const ModelInfo& info) {
+  Model model;
+  model.classes = info.classes;
+  for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
+  model.input_width = info.input_width;
+  model.box_sigma = info.box_sigma;
+  return model;
+}
+
+std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
+                                     double height, const BoxParameters& box,
+                                     const ClutterParameters& clutter) {
+  const Box& b = detection.box;
+  if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return std::nullopt;
+  if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
+  Evidence e;
+  e.z = measure(b, width, height, box, model.box_sigma);
+  if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
+  e.log_clutter = logClutter(e.z, width, height, clutter);
+  const double zero = detection.activations[0];
+  double best = -clutter.max_log_ratio;
+  for (std::size_t k = 0; k < model.classes.size(); ++k) {
+    const double ratio = detection.activations[k + 1] - zero;
+    if (std::isnan(ratio)) return std::nullopt;
+    e.log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
+    best = std::max(best, e.log_ratio.back());
+  }
+  // A thing of no known class looks to the network like clutter, or like one of its classes.
+  e.log_ratio_other =
+      std::log(1.0 - clutter.other_lookalike + clutter.other_lookalike * std::exp(best));
+  e.azimuth = detection.azimuth;
+  e.azimuth_sigma = detection.azimuth_sigma;
+  return e;
+}
+
+double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name) {
+  const auto it = model.index.find(class_name);
+  return it == model.index.end() ? evidence.log_ratio_other : evidence.log_ratio[it->second];
+}
+
+}  // namespace perdure::semantic_filter

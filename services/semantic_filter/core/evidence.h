@@ -1,0 +1,42 @@
+// One box of the network as the filter reads it: geometry and log-likelihood ratios by class.
+// Eq. 6: activations before the soft-max are marginal likelihoods; only differences to the clutter
+// activation matter, so that any constant added to all of them changes nothing.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/types/detections.h"
+#include "services/semantic_filter/core/box_likelihood.h"
+
+namespace perdure::semantic_filter {
+
+/// What the filter keeps of a ModelInfo.
+struct Model {
+  std::vector<std::string> classes;
+  std::map<std::string, std::size_t> index;  ///< name to position in `classes`
+  double input_width = 0.0;                  ///< of the network, 0 = unknown
+  double box_sigma = 0.0;
+};
+Model makeModel(const ModelInfo& info);
+
+struct Evidence {
+  BoxMeasurement z;
+  double log_clutter = 0.0;
+  std::vector<double> log_ratio;  ///< by the model's class, clamped
+  double log_ratio_other = 0.0;   ///< of a real thing of no known class
+  std::optional<double> azimuth;
+  double azimuth_sigma = 0.35;
+};
+
+/// Nothing for a detection that is not usable: an empty box, or a wrong number of activations.
+std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
+                                     double height, const BoxParameters& box,
+                                     const ClutterParameters& clutter);
+
+/// log g_k; classes that the model does not know are seen as "other".
+double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name);
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,54 @@
+// Score: how each hypothesis of an object explains each box (eq. 7 at b = π(g s)), and how much a
+// look is worth beside earlier looks from the same place (DESIGN 5, items 5 and 7).
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "services/semantic_filter/core/evidence.h"
+#include "services/semantic_filter/core/predict.h"
+#include "services/semantic_filter/core/priors.h"
+#include "services/semantic_filter/core/visibility.h"
+
+namespace perdure::semantic_filter {
+
+/// One hypothesis in one frame.
+struct HypothesisLook {
+  std::optional<ProjectedBox> box;
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
+  double detection = 0.0;          ///< v P_D: probability that the network reports it
+  std::vector<double> likelihood;  ///< L(z) for each box, 0 outside the gate
+  std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
+};
+
+struct ObjectLook {
+  Sight sight;
+  double worth = 1.0;  ///< τ in (0, 1]: the exponent of the evidence, and 1/τ the factor of R
+  std::vector<HypothesisLook> hypotheses;
+};
+
+/// Everything about one frame that scoring, updating and birth need.
+struct FrameContext {
+  View view;
+  PoseError pose_error;
+  const Model* model = nullptr;
+  const ClassPriors* priors = nullptr;
+  const Parameters* parameters = nullptr;
+};
+
+/// P_D of a class for an instance of this height in pixels, fully visible.
+double detectionProbability(const ClassPrior& prior, double height_px, const FrameContext& frame);
+
+ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
+                const FrameContext& frame);
+
+/// "Object made box z" against "object made none, or is not there": a row of associate's psi.
+double associationWeight(const Object& object, const ObjectLook& look, std::size_t z);
+
+/// Where the object is looked at from now, with the looks that share this view (none counted yet).
+ViewPoint viewPointNow(const Object& object, const View& view, const LooksParameters& parameters);
+/// Information of one more look after n correlated ones, in units of the first:
+/// I(n) = n / (ρ n + 1 - ρ), worth = I(n+1) - I(n).
+double worthOfLook(double looks, double correlation);
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,138 @@
+#include "services/semantic_filter/core/object.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+State difference(const State& a, const State& b) {
+  State d = a - b;
+  d[kYaw] = wrapAngle(d[kYaw]);
+  return d;
+}
+
+/// A hypothesis turned by 180° describes the same cuboid: choose the turn that is nearer.
+State nearestTurn(const State& x, const State& reference) {
+  State y = x;
+  if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2) y[kYaw] = wrapAngle(x[kYaw] + M_PI);
+  return y;
+}
+
+ClassBelief classBelief(const Object& object, const std::string& name) {
+  ClassBelief belief;
+  belief.name = name;
+  Hypothesis merged;
+  for (const auto& h : object.hypotheses) {  // heaviest first: its mode is the reference
+    if (h.class_name != name) continue;
+    belief.probability += h.weight;
+    if (merged.class_name.empty()) merged = h;
+  }
+  belief.mean = merged.x.head<7>();
+  belief.covariance = merged.P.topLeftCorner<7, 7>();
+  belief.cross_pose = merged.C.topRows<7>();
+  return belief;
+}
+
+}  // namespace
+
+double classProbability(const Object& object, const std::string& class_name) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) sum += h.class_name == class_name ? h.weight : 0.0;
+  return sum;
+}
+
+double movingProbability(const Object& object) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) sum += h.moving ? h.weight : 0.0;
+  return std::min(sum, 1.0);
+}
+
+void normalise(Object& object) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) sum += h.weight;
+  check(sum > 0.0, "an object keeps a hypothesis of positive weight");
+  for (auto& h : object.hypotheses) h.weight /= sum;
+  std::stable_sort(object.hypotheses.begin(), object.hypotheses.end(),
+                   [](const auto& a, const auto& b) { return a.weight > b.weight; });
+}
+
+void mergeInto(Hypothesis& a, const Hypothesis& b) {
+  const double weight = a.weight + b.weight;
+  const double wa = a.weight / weight, wb = b.weight / weight;
+  const State delta = difference(nearestTurn(b.x, a.x), a.x);
+  a.x += wb * delta;
+  a.x[kYaw] = wrapAngle(a.x[kYaw]);
+  a.P = (wa * a.P + wb * b.P + wa * wb * delta * delta.transpose()).eval();
+  makeSymmetric(a.P);
+  a.C = wa * a.C + wb * b.C;
+  a.head = wa * a.head + wb * b.head;
+  a.weight = weight;
+}
+
+ObjectBelief toBelief(const Object& object) {
+  ObjectBelief belief;
+  belief.id = object.id;
+  belief.existence = object.existence;
+  belief.confirmed = object.confirmed;
+  for (const auto& h : object.hypotheses) {
+    const auto same = [&](const auto& c) { return c.name == h.class_name; };
+    if (std::none_of(belief.classes.begin(), belief.classes.end(), same)) {
+      belief.classes.push_back(classBelief(object, h.class_name));
+    }
+  }
+  std::stable_sort(belief.classes.begin(), belief.classes.end(),
+                   [](const auto& a, const auto& b) { return a.probability > b.probability; });
+  belief.visibility = object.visibility;
+  belief.visible_fraction = object.visible_fraction;
+  belief.blocked_by = object.blocked_by;
+  belief.first_seen = object.first_seen;
+  belief.last_seen = object.last_seen;
+  belief.as_of = object.as_of;
+  belief.hits = object.hits;
+  belief.visible_misses = object.visible_misses;
+  belief.moving = movingProbability(object);
+  if (object.best().moving) belief.velocity = object.best().x.tail<3>();
+  belief.recalled = object.recalled;
+  return belief;
+}
+
+Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product) {
+  Object object;
+  object.id = belief.id;
+  object.existence = belief.existence;
+  object.confirmed = belief.confirmed;
+  for (const auto& c : belief.classes) {
+    Hypothesis h;
+    h.class_name = c.name;
+    h.weight = c.probability;
+    h.x.head<7>() = c.mean;
+    h.P.setZero();
+    h.P.topLeftCorner<7, 7>() = c.covariance;
+    h.C.topRows<7>() = c.cross_pose;
+    h.moving = belief.moving > 0.5;
+    if (h.moving) {
+      h.x.tail<3>() = belief.velocity;
+      h.P.diagonal().tail<3>().setConstant(1.0);  // the message does not carry it: (1 m/s)²
+    }
+    object.hypotheses.push_back(h);
+  }
+  object.first_seen = belief.first_seen;
+  object.last_seen = belief.last_seen;
+  object.as_of = belief.as_of;
+  object.pose_product = pose_product;
+  object.hits = belief.hits;
+  object.visible_misses = belief.visible_misses;
+  object.visibility = belief.visibility;
+  object.visible_fraction = belief.visible_fraction;
+  object.blocked_by = belief.blocked_by;
+  object.recalled = true;
+  normalise(object);
+  return object;
+}
+
+}  // namespace perdure::semantic_filter

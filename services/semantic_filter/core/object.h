@@ -1,0 +1,72 @@
+// The belief about one object as a plain value: existence × PMF × bank of Gaussians (eq. 9).
+// Beyond the paper, the bank is a mixture over (class, static or moving, yaw or scale mode): the
+// PMF over classes and the probability of moving are sums of the weights of its hypotheses.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/types/objects.h"
+#include "common/types/odometry.h"
+
+namespace perdure::semantic_filter {
+
+/// x = [p_WO, yaw about gravity, log l, log w, log h, v_W]; v and its covariance are zero while
+/// the hypothesis is a static one.
+inline constexpr int kStateDim = 10;
+using State = Eigen::Matrix<double, kStateDim, 1>;
+using StateCovariance = Eigen::Matrix<double, kStateDim, kStateDim>;
+using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< P_xg with the pose error [θ, p]
+inline constexpr int kYaw = 3, kSize = 4, kVelocity = 7;
+
+struct Hypothesis {
+  std::string class_name;
+  bool moving = false;
+  double weight = 0.0;  ///< of this hypothesis given that the object exists; they sum to 1
+  State x = State::Zero();
+  StateCovariance P = StateCovariance::Identity();
+  CrossPose C = CrossPose::Zero();
+  double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
+};
+
+/// Where the object was last looked at from, for the correlation of looks (DESIGN 5, item 7).
+struct ViewPoint {
+  Eigen::Vector3d direction_W = Eigen::Vector3d::Zero();  ///< unit, object to camera
+  double log_distance = 0.0;
+  double looks = 0.0;  ///< number of looks that share this view, discounted
+};
+
+struct Object {
+  ObjectId id = 0;
+  double existence = 0.0;
+  std::vector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
+  bool confirmed = false;
+  TimePoint first_seen, last_seen, as_of;
+  Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
+  std::uint32_t hits = 0, visible_misses = 0;
+  double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
+  ViewPoint view;
+  Visibility visibility = Visibility::kVisible;
+  double visible_fraction = 1.0;
+  ObjectId blocked_by = 0;
+  bool recalled = false;
+
+  const Hypothesis& best() const { return hypotheses.front(); }
+};
+
+/// π of a class: the sum of its hypotheses' weights.
+double classProbability(const Object& object, const std::string& class_name);
+/// Probability that the object moves, given that it exists.
+double movingProbability(const Object& object);
+/// Divides the weights by their sum and puts the heaviest first (stable).
+void normalise(Object& object);
+/// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.
+void mergeInto(Hypothesis& a, const Hypothesis& b);
+/// The published belief: per class its hypotheses as one Gaussian around the heaviest one.
+ObjectBelief toBelief(const Object& object);
+/// A belief that came back (restart, recall) as an object with one hypothesis for each class.
+Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product);
+
+}  // namespace perdure::semantic_filter

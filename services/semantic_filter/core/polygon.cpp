@@ -1,0 +1,53 @@
+#include "services/semantic_filter/core/polygon.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perdure::semantic_filter {
+
+double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return (a.x() - o.x()) * (b.y() - o.y()) - (a.y() - o.y()) * (b.x() - o.x());
+}
+
+Polygon convexHull(Polygon points) {
+  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
+    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+  });
+  Polygon hull(2 * points.size() + 1);
+  std::size_t k = 0;
+  const auto extend = [&](const Eigen::Vector2d& p, std::size_t floor) {
+    while (k >= floor + 2 && cross(hull[k - 2], hull[k - 1], p) <= 0) --k;
+    hull[k++] = p;
+  };
+  for (const auto& p : points) extend(p, 0);
+  const std::size_t lower = k - 1;
+  for (auto it = points.rbegin() + 1; it != points.rend(); ++it) extend(*it, lower);
+  hull.resize(k > 1 ? k - 1 : k);
+  return hull;
+}
+
+double polygonArea(const Polygon& p) {
+  double twice = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const auto& a = p[i];
+    const auto& b = p[(i + 1) % p.size()];
+    twice += a.x() * b.y() - b.x() * a.y();
+  }
+  return 0.5 * std::abs(twice);
+}
+
+Polygon clip(const Polygon& p, int axis, double at, bool keep_greater) {
+  Polygon result;
+  const auto inside = [&](const Eigen::Vector2d& a) {
+    return keep_greater ? a[axis] >= at : a[axis] <= at;
+  };
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const auto& a = p[i];
+    const auto& b = p[(i + 1) % p.size()];
+    if (inside(a)) result.push_back(a);
+    if (inside(a) != inside(b)) result.push_back(a + (at - a[axis]) / (b[axis] - a[axis]) * (b - a));
+  }
+  return result;
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,24 @@
+// Predict, lazily (DESIGN 5, items 1, 2 and 11): process noise, motion, survival and the transition
+// of the pose error are applied when an object can next be seen; hidden beliefs stay untouched.
+#pragma once
+
+#include "services/semantic_filter/core/object.h"
+#include "services/semantic_filter/core/parameters.h"
+
+namespace perdure::semantic_filter {
+
+/// The error of the body's pose at one frame, [θ, p].
+struct PoseError {
+  Matrix6d covariance = Matrix6d::Zero();
+  /// Product of the transitions of all frames so far: an object that was brought up to date at
+  /// product A has at product B the cross-covariance C (B A⁻¹)ᵀ.
+  Matrix6d product = Matrix6d::Identity();
+};
+
+/// x at a later time: static ones stay, moving ones go on at constant velocity.
+State stateAt(const Hypothesis& h, double dt);
+/// Brings the object up to `now`: noise on every hypothesis, P_xg, survival of its existence.
+void predict(Object& object, TimePoint now, const PoseError& pose_error,
+             const MotionParameters& parameters);
+
+}  // namespace perdure::semantic_filter

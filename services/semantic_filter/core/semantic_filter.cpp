@@ -1,0 +1,170 @@
+#include "services/semantic_filter/core/semantic_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/semantic_filter/core/association.h"
+#include "services/semantic_filter/core/update.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+Outline outlineOf(const Object& object, TimePoint now, const View& view) {
+  const Hypothesis& h = object.best();
+  const State x = stateAt(h, toSeconds(now - object.as_of));
+  const Eigen::Vector3d ray = x.head<3>() - view.T_WC().p;
+  Outline o;
+  o.id = object.id;
+  o.existence = object.existence;
+  o.distance_m = ray.norm();
+  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
+  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
+  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
+  o.box = projectCuboid(x, view);
+  return o;
+}
+
+/// How much another look of the same detector at one object may overlap with its box.
+bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
+  const Box box_a{a.sides[0], a.sides[1], a.sides[2], a.sides[3]};
+  const Box box_b{b.sides[0], b.sides[1], b.sides[2], b.sides[3]};
+  return intersectionOverUnion(box_a, box_b) > 0.65;
+}
+
+}  // namespace
+
+ObjectId IdBook::idFor(std::uint64_t frame_sequence, std::size_t box) {
+  const auto [it, fresh] = given_.try_emplace({frame_sequence, box}, next_);
+  if (fresh) ++next_;
+  return it->second;
+}
+
+void IdBook::forgetBefore(std::uint64_t frame_sequence) {
+  given_.erase(given_.begin(), given_.lower_bound({frame_sequence, 0}));
+}
+
+FrameContext SemanticFilter::contextOf(const FrameInput& input) const {
+  return {input.view, input.pose_error, &input.model, &priors_, &parameters_};
+}
+
+std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
+  std::vector<Outline> outlines;
+  for (const auto& o : belief.objects) {
+    outlines.push_back(outlineOf(o, input.stamp.time, input.view));
+  }
+  const auto& camera = *input.view.camera;
+  auto sights =
+      see(outlines, input.points, camera.width(), camera.height(), parameters_.visibility);
+  for (std::size_t j = 0; j < sights.size(); ++j) {
+    Object& o = belief.objects[j];
+    o.visibility = sights[j].visibility;
+    o.visible_fraction = sights[j].fraction;
+    o.blocked_by = sights[j].blocked_by;
+  }
+  return sights;
+}
+
+std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
+                                                        const std::vector<Sight>& sights,
+                                                        const FrameInput& input,
+                                                        const FrameContext& frame) const {
+  std::vector<Seen> seen;
+  for (std::size_t j = 0; j < sights.size(); ++j) {
+    if (sights[j].fraction <= 0.0) continue;
+    predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion);
+    seen.push_back({j, look(belief.objects[j], sights[j], *input.boxes, frame)});
+  }
+  return seen;
+}
+
+Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
+                                                   const FrameInput& input,
+                                                   const FrameContext& frame) const {
+  const auto& boxes = *input.boxes;
+  const auto n = static_cast<Eigen::Index>(seen.size());
+  const auto m = static_cast<Eigen::Index>(boxes.size());
+  Eigen::MatrixXd psi(n, m);
+  Eigen::VectorXd fresh(m);
+  for (Eigen::Index z = 0; z < m; ++z) {
+    fresh[z] = 1.0 + std::exp(logBirthRatio(boxes[static_cast<std::size_t>(z)], frame));
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Seen& s = seen[static_cast<std::size_t>(j)];
+      psi(j, z) =
+          associationWeight(belief.objects[s.object], s.look, static_cast<std::size_t>(z));
+    }
+  }
+  const Association association = associate(psi, fresh);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Seen& s = seen[static_cast<std::size_t>(j)];
+    update(belief.objects[s.object], s.look, association.eta.row(j), boxes, frame);
+  }
+  return association.claimed;
+}
+
+bool SemanticFilter::explainedByHidden(const Belief& belief, const std::vector<Sight>& sights,
+                                       const Evidence& box, const FrameContext& frame) const {
+  for (std::size_t j = 0; j < sights.size(); ++j) {
+    const Object& o = belief.objects[j];
+    if (sights[j].visibility != Visibility::kOccluded || o.existence < 0.5) continue;
+    const auto predicted = projectCuboid(o.best().x, frame.view);
+    if (!predicted) continue;
+    const auto covariance =
+        predictedCovariance(o.best(), *predicted, frame.pose_error.covariance);
+    if (scoreBox(box.z, *predicted, covariance, sights[j].hidden, parameters_.box.gate)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
+                            const Eigen::VectorXd& claimed, const FrameInput& input,
+                            const FrameContext& frame, IdBook& ids) const {
+  const auto& boxes = *input.boxes;
+  std::vector<Object> born;
+  std::vector<std::size_t> accepted;
+  for (std::size_t z = 0; z < boxes.size(); ++z) {
+    if (claimed[static_cast<Eigen::Index>(z)] > parameters_.birth.claimed) accepted.push_back(z);
+  }
+  for (std::size_t z = 0; z < boxes.size(); ++z) {
+    const Evidence& e = boxes[z];
+    if (claimed[static_cast<Eigen::Index>(z)] > parameters_.birth.claimed) continue;
+    if (logBirthRatio(e, frame) - std::log(parameters_.birth.odds) <
+        parameters_.birth.min_log_ratio) {
+      continue;
+    }
+    const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
+      return sameThing(boxes[other].z, e.z);
+    });
+    if (doubled || explainedByHidden(belief, sights, e, frame)) continue;
+    auto object = bear(e, rangeFromLandmarks(e, input.points, parameters_.birth),
+                       input.stamp.time, frame);
+    if (!object) continue;
+    object->id = ids.idFor(input.stamp.sequence, z);
+    object->existence *= 1.0 - claimed[static_cast<Eigen::Index>(z)];
+    tendHypotheses(*object, priors_, parameters_);
+    born.push_back(std::move(*object));
+    accepted.push_back(z);
+  }
+  std::move(born.begin(), born.end(), std::back_inserter(belief.objects));
+  std::stable_sort(belief.objects.begin(), belief.objects.end(),
+                   [](const auto& a, const auto& b) { return a.id < b.id; });
+}
+
+std::vector<MergeRecord> SemanticFilter::step(Belief& belief, const FrameInput& input,
+                                              IdBook& ids) const {
+  const FrameContext frame = contextOf(input);
+  const auto sights = seeAll(belief, input);
+  if (!input.boxes) return {};
+  const auto seen = score(belief, sights, input, frame);
+  const auto claimed = associateAndUpdate(belief, seen, input, frame);
+  for (const auto& s : seen) {
+    tendHypotheses(belief.objects[s.object], priors_, parameters_);
+  }
+  births(belief, sights, claimed, input, frame, ids);
+  auto merges = mergeObjects(belief.objects, frame);
+  confirmAndBury(belief.objects, parameters_.tend);
+  return merges;
+}
+
+}  // namespace perdure::semantic_filter

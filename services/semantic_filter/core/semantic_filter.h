@@ -1,0 +1,81 @@
+// The semantic filter in five verbs: predict, see, associate, update, tend (eq. 4, 8, 9).
+//
+// The belief is a plain value and a step is a function of (belief, frame): a late frame is applied
+// by taking the belief before it and stepping again (DESIGN 5, item 14).
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "services/semantic_filter/core/birth.h"
+#include "services/semantic_filter/core/tend.h"
+
+namespace perdure::semantic_filter {
+
+/// One image's worth of input. Without `boxes` it is no evidence; with an empty list it is.
+struct FrameInput {
+  FrameStamp stamp;
+  View view;
+  PoseError pose_error;
+  std::vector<SightPoint> points;  ///< landmarks seen in this image
+  std::optional<std::vector<Evidence>> boxes;
+  Model model;  ///< that the boxes' classes refer to
+};
+
+struct Belief {
+  std::vector<Object> objects;  ///< in order of id
+};
+
+/// Gives ids to births. The same box of the same frame always gets the same id, so that stepping
+/// again after a late detection does not rename objects, and no id is ever used twice.
+class IdBook {
+ public:
+  ObjectId idFor(std::uint64_t frame_sequence, std::size_t box);
+  ObjectId next() const { return next_; }
+  void atLeast(ObjectId next) { next_ = std::max(next_, next); }
+  /// Forgets frames before this one; they cannot be stepped again.
+  void forgetBefore(std::uint64_t frame_sequence);
+
+ private:
+  ObjectId next_ = 1;
+  std::map<std::pair<std::uint64_t, std::size_t>, ObjectId> given_;
+};
+
+class SemanticFilter {
+ public:
+  SemanticFilter(const Parameters& parameters, const ClassPriors& priors)
+      : parameters_(parameters), priors_(priors) {}
+
+  /// Belief after the frame. Returns what was merged.
+  std::vector<MergeRecord> step(Belief& belief, const FrameInput& input, IdBook& ids) const;
+
+  const Parameters& parameters() const { return parameters_; }
+  const ClassPriors& priors() const { return priors_; }
+
+ private:
+  struct Seen {
+    std::size_t object;
+    ObjectLook look;
+  };
+
+  FrameContext contextOf(const FrameInput& input) const;
+  /// Visibility of all objects, published with them; one Sight for each.
+  std::vector<Sight> seeAll(Belief& belief, const FrameInput& input) const;
+  std::vector<Seen> score(Belief& belief, const std::vector<Sight>& sights, const FrameInput& input,
+                          const FrameContext& frame) const;
+  /// Updates what is seen; returns for each box how much of it is claimed.
+  Eigen::VectorXd associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
+                                     const FrameInput& input, const FrameContext& frame) const;
+  /// Boxes that match an object which a nearer one should hide say that visibility was misjudged:
+  /// they give no birth.
+  bool explainedByHidden(const Belief& belief, const std::vector<Sight>& sights,
+                         const Evidence& box, const FrameContext& frame) const;
+  void births(Belief& belief, const std::vector<Sight>& sights, const Eigen::VectorXd& claimed,
+              const FrameInput& input, const FrameContext& frame, IdBook& ids) const;
+
+  Parameters parameters_;
+  ClassPriors priors_;
+};
+
+}  // namespace perdure::semantic_filter

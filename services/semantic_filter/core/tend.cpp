@@ -1,0 +1,227 @@
+#include "services/semantic_filter/core/tend.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/polygon.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr int kGeometry = 7;  // dimensions without velocity
+
+Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
+  Vector7d d = (a.x - b.x).head<kGeometry>();
+  d[kYaw] = wrapAngle(d[kYaw]);
+  if (std::abs(d[kYaw]) > M_PI / 2) d[kYaw] = wrapAngle(d[kYaw] + M_PI);
+  return d;
+}
+
+/// Squared Mahalanobis distance of the lighter hypothesis in the heavier one's covariance.
+double distance2(const Hypothesis& a, const Hypothesis& b) {
+  const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();
+  const Vector7d d = geometryDifference(a, b);
+  double result = d.dot(P.ldlt().solve(d));
+  if (a.moving) {
+    const Eigen::Vector3d dv = (a.x - b.x).tail<3>();
+    const Eigen::Matrix3d Pv = a.P.bottomRightCorner<3, 3>();
+    result += dv.dot(Pv.ldlt().solve(dv));
+  }
+  return result;
+}
+
+void settleSlowOnes(Object& object, double min_speed) {
+  for (auto& h : object.hypotheses) {
+    if (!h.moving) continue;
+    const Eigen::Matrix2d P = h.P.block<2, 2>(kVelocity, kVelocity);
+    const double sigma = std::sqrt(std::max(P.trace(), 0.0));
+    if (h.x.segment<2>(kVelocity).norm() + sigma > min_speed) continue;
+    h.moving = false;
+    h.x.tail<3>().setZero();
+    h.P.bottomRows<3>().setZero();
+    h.P.rightCols<3>().setZero();
+    h.C.bottomRows<3>().setZero();
+  }
+}
+
+void mergeNearOnes(Object& object, double threshold) {
+  auto& hs = object.hypotheses;
+  for (std::size_t i = 0; i < hs.size(); ++i) {
+    for (std::size_t j = hs.size() - 1; j > i; --j) {
+      if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
+      if (distance2(hs[i], hs[j]) > threshold) continue;
+      mergeInto(hs[i], hs[j]);
+      hs.erase(hs.begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  }
+}
+
+void pruneLightOnes(Object& object, const TendParameters& tend) {
+  const std::string best_class = object.best().class_name;
+  const bool dominant =
+      object.hits >= 3 && classProbability(object, best_class) > tend.class_dominates;
+  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+    return h.weight < tend.hypothesis_floor || (dominant && h.class_name != best_class);
+  });
+}
+
+void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
+  if (object.running_nis < motion.start_nis || movingProbability(object) > 1e-6) return;
+  const ClassPrior prior = priors.of(object.best().class_name);
+  if (prior.moving <= 0.0 || object.hits < 3) return;
+  Hypothesis twin = object.best();
+  twin.moving = true;
+  twin.weight *= motion.start_probability;
+  twin.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;  // (3 m/s)²: just driving off
+  twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
+  object.hypotheses.push_back(twin);
+  object.running_nis = 1.0;
+}
+
+bool sameKind(const Object& a, const Object& b) {
+  return a.best().class_name == b.best().class_name && a.best().moving == b.best().moving;
+}
+
+/// Weights of a's hypotheses once b's PMF is taken in as well.
+void multiplyPmf(Object& a, const Object& b) {
+  for (auto& h : a.hypotheses) {
+    h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
+  }
+  normalise(a);
+}
+
+void absorb(Object& a, const Object& b, const FrameContext& frame) {
+  const ClassPrior prior = frame.priors->of(a.best().class_name);
+  const double weight = a.best().weight;
+  a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
+  a.hypotheses.front().weight = weight;
+  multiplyPmf(a, b);
+  a.existence = std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), 1.0 - 1e-6);
+  a.hits += b.hits;
+  a.confirmed = a.confirmed || b.confirmed;
+  a.last_seen = std::max(a.last_seen, b.last_seen);
+  a.view.looks = std::max(a.view.looks, b.view.looks);
+}
+
+bool older(const Object& a, const Object& b) {
+  return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
+}
+
+}  // namespace
+
+void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters) {
+  settleSlowOnes(object, parameters.motion.min_speed);
+  mergeNearOnes(object, parameters.tend.hypothesis_merge);
+  normalise(object);
+  pruneLightOnes(object, parameters.tend);
+  addMovingTwin(object, priors, parameters.motion);
+  normalise(object);
+}
+
+double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+  const Eigen::Vector3d size_a = a.segment<3>(kSize).array().exp();
+  const Eigen::Vector3d size_b = b.segment<3>(kSize).array().exp();
+  const Eigen::Vector3d offset =
+      uprightRotation(a[kYaw], up_W).transpose() * (b.head<3>() - a.head<3>());
+  const double turn = b[kYaw] - a[kYaw];
+  const Eigen::Matrix2d R = rotationAboutZ(turn).topLeftCorner<2, 2>();
+  Polygon footprint;
+  constexpr double kSigns[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+  for (const auto& s : kSigns) {
+    footprint.push_back(offset.head<2>() +
+                        R * Eigen::Vector2d(0.5 * s[0] * size_b.x(), 0.5 * s[1] * size_b.y()));
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    footprint = clip(footprint, axis, -0.5 * size_a[axis], true);
+    footprint = clip(footprint, axis, 0.5 * size_a[axis], false);
+  }
+  const double top = std::min(0.5 * size_a.z(), offset.z() + 0.5 * size_b.z());
+  const double bottom = std::max(-0.5 * size_a.z(), offset.z() - 0.5 * size_b.z());
+  const double shared = polygonArea(footprint) * std::max(top - bottom, 0.0);
+  return shared / (size_a.prod() + size_b.prod() - shared);
+}
+
+Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
+                const Matrix6d& P_pose) {
+  // Given the pose error g the beliefs are x | g ~ N(x̂ + B g, P - B P_g Bᵀ) with B = C P_g⁻¹.
+  Eigen::Matrix<double, 7, 6> B_a = Eigen::Matrix<double, 7, 6>::Zero(), B_b = B_a;
+  const Eigen::LDLT<Matrix6d> pose(P_pose);
+  if (pose.isPositive() && pose.vectorD().minCoeff() > 1e-18) {
+    B_a = pose.solve(a.C.topRows<7>().transpose()).transpose();
+    B_b = pose.solve(b.C.topRows<7>().transpose()).transpose();
+  }
+  const Matrix7d P_a = a.P.topLeftCorner<7, 7>() - B_a * P_pose * B_a.transpose();
+  const Matrix7d P_b = b.P.topLeftCorner<7, 7>() - B_b * P_pose * B_b.transpose();
+  if (!isCovariance(P_a) || !isCovariance(P_b)) return a;
+  const Matrix7d J_a = P_a.inverse();
+  const Matrix7d J_b = P_b.inverse();
+  Matrix7d J_prior = Matrix7d::Zero();
+  J_prior.block<3, 3>(kSize, kSize) = prior.log_size_covariance.inverse();
+  Matrix7d J_new = J_b - J_prior;  // what b knows beyond the prior that a has used already
+  if (Eigen::SelfAdjointEigenSolver<Matrix7d>(J_new).eigenvalues().minCoeff() < 0.0) {
+    J_new = 0.5 * J_b;  // its own information is not separable: count half of it
+    J_prior = 0.5 * J_b;
+  }
+  const Matrix7d P = (J_a + J_new).inverse();
+  Vector7d prior_mean = Vector7d::Zero();  // relative to a
+  prior_mean.segment<3>(kSize) = prior.log_size - a.x.segment<3>(kSize);
+  const Vector7d d = geometryDifference(b, a);
+  const Vector7d pull = J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d)
+                                                  : Vector7d(J_b * d - J_prior * prior_mean);
+  Hypothesis fused = a;
+  fused.x.head<7>() += P * pull;
+  fused.x[kYaw] = wrapAngle(fused.x[kYaw]);
+  const Eigen::Matrix<double, 7, 6> B = P * (J_a * B_a + J_new * B_b);
+  if (!a.moving) fused.P.setZero();
+  fused.P.topLeftCorner<7, 7>() = P + B * P_pose * B.transpose();
+  fused.C.topRows<7>() = B * P_pose;
+  makeSymmetric(fused.P);
+  return isCovariance(fused.P.topLeftCorner<7, 7>()) && fused.x.allFinite() ? fused : a;
+}
+
+std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
+  std::vector<MergeRecord> merges;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (objects[i].visible_fraction <= 0.0) continue;
+    for (std::size_t j = i + 1; j < objects.size();) {
+      if (objects[j].visible_fraction <= 0.0) {
+        ++j;
+        continue;
+      }
+      const State& a = objects[i].best().x;
+      const State& b = objects[j].best().x;
+      const double reach = a.segment<3>(kSize).array().exp().matrix().norm() +
+                           b.segment<3>(kSize).array().exp().matrix().norm();
+      if ((a - b).head<3>().norm() > 0.5 * reach || !sameKind(objects[i], objects[j]) ||
+          overlap(a, b, frame.view.up_W) < frame.parameters->tend.merge_overlap) {
+        ++j;
+        continue;
+      }
+      if (older(objects[j], objects[i])) std::swap(objects[i], objects[j]);
+      absorb(objects[i], objects[j], frame);
+      merges.push_back({objects[i].id, objects[j].id});
+      objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  }
+  return merges;
+}
+
+void confirmAndBury(std::vector<Object>& objects, const TendParameters& parameters) {
+  for (auto& o : objects) {
+    if (o.existence >= parameters.confirm && o.hits >= parameters.confirm_hits) o.confirmed = true;
+  }
+  std::erase_if(objects, [&](const Object& o) {
+    return o.existence < (o.confirmed ? parameters.gone : parameters.gone_tentative);
+  });
+  const auto limit = static_cast<std::size_t>(parameters.max_objects);
+  if (objects.size() <= limit) return;
+  std::stable_sort(objects.begin(), objects.end(),
+                   [](const auto& a, const auto& b) { return a.existence > b.existence; });
+  objects.resize(limit);
+}
+
+}  // namespace perdure::semantic_filter

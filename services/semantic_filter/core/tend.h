@@ -1,0 +1,34 @@
+// Tend: merge, prune, confirm, die (paper, "Merge" and "Termination"; DESIGN 5, items 11 and 12).
+#pragma once
+
+#include <vector>
+
+#include "services/semantic_filter/core/look.h"
+
+namespace perdure::semantic_filter {
+
+struct MergeRecord {
+  ObjectId survivor = 0, absorbed = 0;
+};
+
+/// Merges and prunes an object's hypotheses: near ones of the same class and motion become one,
+/// light ones go, a dominant class ends the others, a moving one that stands still is static, and a
+/// static object that its boxes contradict gets a moving twin.
+void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters);
+
+/// Shared volume over joint volume of two upright cuboids.
+double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
+
+/// Merges visible objects of the same best class that occupy the same space; the older survives.
+/// Hidden ones wait: a frame that does not see them does not change them.
+std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame);
+
+/// The state of two beliefs about one object whose errors are independent but for the size prior
+/// and the pose error, both of which are counted once.
+Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
+                const Matrix6d& P_pose);
+
+/// Confirms, and removes those whose existence has gone.
+void confirmAndBury(std::vector<Object>& objects, const TendParameters& parameters);
+
+}  // namespace perdure::semantic_filter

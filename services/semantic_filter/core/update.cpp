@@ -1,0 +1,255 @@
+#include "services/semantic_filter/core/update.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kNegligible = 0.01;      // share of a box in an update
+constexpr double kAzimuthOutlier = 0.1;   // share of azimuths that say nothing
+constexpr double kAzimuthFlip = 0.1;      // share of azimuths that are turned by 180°
+constexpr double kMaxHead = 6.0;          // nats
+constexpr double kMaxExistence = 1.0 - 1e-6;  // beyond it rounding would make belief immovable
+
+/// Rows of the measurement that take part, stacked.
+struct Innovation {
+  Eigen::VectorXd residual, variance;
+  Eigen::MatrixXd H, H_pose;
+};
+
+/// Measured sides, and those cut sides whose prediction wrongly ends inside the cut.
+Innovation innovation(const BoxMeasurement& z, const ProjectedBox& p,
+                      const std::array<bool, 4>& hidden) {
+  std::vector<int> rows;
+  const auto use = comparableSides(z, p, hidden);
+  for (int i = 0; i < 4; ++i) {
+    const double inside = i < 2 ? p.sides[i] - z.sides[i] : z.sides[i] - p.sides[i];
+    if (use[i] || (p.exact[i] && inside > 0.0)) rows.push_back(i);
+  }
+  Innovation result;
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  result.residual.resize(n);
+  result.variance.resize(n);
+  result.H.resize(n, kStateDim);
+  result.H_pose.resize(n, 6);
+  for (Eigen::Index a = 0; a < n; ++a) {
+    result.residual[a] = z.sides[rows[a]] - p.sides[rows[a]];
+    result.variance[a] = z.variance[rows[a]];
+    result.H.row(a) = p.H.row(rows[a]);
+    result.H_pose.row(a) = p.H_pose.row(rows[a]);
+  }
+  return result;
+}
+
+struct Gain {
+  Eigen::MatrixXd K, S;
+};
+
+Gain gainOf(const Hypothesis& h, const Innovation& y, double worth, const Matrix6d& P_pose) {
+  const Eigen::MatrixXd PHt = h.P * y.H.transpose() + h.C * y.H_pose.transpose();
+  Gain gain;
+  gain.S = y.H * PHt + y.H_pose * (h.C.transpose() * y.H.transpose() + P_pose * y.H_pose.transpose());
+  gain.S.diagonal() += y.variance / worth;
+  makeSymmetric(gain.S);
+  gain.K = gain.S.ldlt().solve(PHt.transpose()).transpose();
+  return gain;
+}
+
+/// Moment match of "no box" and each box by their shares (the second half of PDA).
+Hypothesis mix(const Hypothesis& none, double share_none,
+               const std::vector<std::pair<double, Hypothesis>>& parts) {
+  Hypothesis result = none;
+  result.weight = share_none;
+  if (share_none <= kNegligible) {
+    result = parts.front().second;
+    result.weight = parts.front().first;
+  } else if (!parts.empty()) {
+    Hypothesis first = parts.front().second;
+    first.weight = parts.front().first;
+    mergeInto(result, first);
+  }
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    Hypothesis part = parts[i].second;
+    part.weight = parts[i].first;
+    mergeInto(result, part);
+  }
+  return result;
+}
+
+struct Shares {
+  double A = 1.0, none = 1.0;
+  std::vector<double> box;
+};
+
+Shares sharesOf(const HypothesisLook& h, const Eigen::VectorXd& eta) {
+  Shares shares;
+  shares.A = 1.0 - h.detection;
+  for (std::size_t z = 0; z < h.likelihood.size(); ++z) {
+    shares.box.push_back(h.detection * eta[static_cast<Eigen::Index>(z)] * h.likelihood[z]);
+    shares.A += shares.box.back();
+  }
+  for (auto& b : shares.box) b /= shares.A;
+  shares.none = (1.0 - h.detection) / shares.A;
+  return shares;
+}
+
+void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
+                 const std::vector<Evidence>& boxes, const FrameContext& frame) {
+  std::vector<std::pair<double, Hypothesis>> parts;
+  for (std::size_t z = 0; z < boxes.size(); ++z) {
+    if (shares.box[z] < kNegligible) continue;
+    parts.emplace_back(shares.box[z],
+                       updateWithBox(h, boxes[z].z, look.sight.hidden, look.worth, frame));
+  }
+  if (parts.empty()) return;
+  const double weight = h.weight;
+  h = mix(h, shares.none, parts);
+  h.weight = weight;
+}
+
+/// Within each (class, static or moving) the azimuth may weigh the yaw modes; never across, so that
+/// neither existence nor class nor motion can learn from it.
+void weighYawModes(Object& object, const std::vector<double>& likelihood) {
+  std::map<std::pair<std::string, bool>, std::pair<double, double>> totals;
+  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
+    const auto& h = object.hypotheses[i];
+    auto& [before, after] = totals[{h.class_name, h.moving}];
+    before += h.weight;
+    after += h.weight * likelihood[i];
+  }
+  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
+    auto& h = object.hypotheses[i];
+    const auto& [before, after] = totals[{h.class_name, h.moving}];
+    if (after > 0.0) h.weight *= likelihood[i] * before / after;
+  }
+}
+
+void updateAzimuths(Object& object, const std::vector<Shares>& shares, const ObjectLook& look,
+                    const std::vector<Evidence>& boxes, const FrameContext& frame) {
+  std::vector<double> likelihood(object.hypotheses.size(), 1.0);
+  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
+    const ClassPrior prior = frame.priors->of(object.hypotheses[i].class_name);
+    if (!prior.has_yaw) continue;
+    for (std::size_t z = 0; z < boxes.size(); ++z) {
+      if (!boxes[z].azimuth || shares[i].box[z] < 0.2) continue;
+      const double sigma = std::max(boxes[z].azimuth_sigma, prior.azimuth_sigma);
+      const double weight = shares[i].box[z] * look.worth;
+      likelihood[i] *= std::pow(
+          updateWithAzimuth(object.hypotheses[i], *boxes[z].azimuth, sigma, weight, frame), weight);
+    }
+  }
+  weighYawModes(object, likelihood);
+}
+
+void count(Object& object, const std::vector<Shares>& shares, const ObjectLook& look,
+           TimePoint now) {
+  double seen = 0.0, total = 0.0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    const double weight = object.hypotheses[i].weight * shares[i].A;
+    seen += weight * (1.0 - shares[i].none);
+    total += weight;
+  }
+  if (seen < 0.5 * total) {
+    ++object.visible_misses;
+    return;
+  }
+  ++object.hits;
+  object.recalled = false;
+  object.last_seen = now;
+  const auto& box = shares.front().box;
+  const auto z = std::max_element(box.begin(), box.end()) - box.begin();
+  if (box[z] > 0.5) {
+    object.running_nis = 0.85 * object.running_nis + 0.15 * look.hypotheses.front().nis[z];
+  }
+}
+
+}  // namespace
+
+Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
+                         const std::array<bool, 4>& hidden, double worth,
+                         const FrameContext& frame) {
+  Hypothesis posterior = prior;
+  State x = prior.x;
+  for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
+    const auto box = projectCuboid(x, frame.view);
+    if (!box) break;
+    Innovation y = innovation(z, *box, hidden);
+    if (y.residual.size() == 0) break;
+    const Gain gain = gainOf(prior, y, worth, frame.pose_error.covariance);
+    State back = prior.x - x;
+    back[kYaw] = wrapAngle(back[kYaw]);
+    State next = prior.x + gain.K * (y.residual - y.H * back);
+    next[kYaw] = wrapAngle(next[kYaw]);
+    if (!next.allFinite()) break;
+    const double step = (next.head<3>() - x.head<3>()).norm();
+    x = next;
+    posterior.x = x;
+    posterior.P = prior.P - gain.K * gain.S * gain.K.transpose();
+    posterior.C = prior.C - gain.K * (y.H * prior.C + y.H_pose * frame.pose_error.covariance);
+    if (step < 0.01) break;
+  }
+  makeSymmetric(posterior.P);
+  return posterior;
+}
+
+double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
+                         const FrameContext& frame) {
+  const double measured = yawFromAzimuth(azimuth, h.x.head<3>(), frame.view);
+  const double full = wrapAngle(measured - h.x[kYaw]);
+  const bool same_head = std::abs(full) <= M_PI / 2;
+  const double residual = same_head ? full : wrapAngle(full + M_PI);
+  const double variance = sigma * sigma + h.P(kYaw, kYaw);
+  const double density = std::exp(-0.5 * residual * residual / variance) /
+                         std::sqrt(2.0 * M_PI * variance);
+  const double uniform = 1.0 / M_PI;
+  const double likelihood = (1.0 - kAzimuthOutlier) * density + kAzimuthOutlier * uniform;
+  const double inlier = (1.0 - kAzimuthOutlier) * density / likelihood;
+  const double head = std::log((1.0 - kAzimuthFlip) / kAzimuthFlip) * weight * inlier;
+  h.head = std::clamp(h.head + (same_head ? head : -head), -kMaxHead, kMaxHead);
+  const double R = sigma * sigma / std::max(weight * inlier, 1e-9);
+  const double S = h.P(kYaw, kYaw) + R;
+  const State K = h.P.col(kYaw) / S;
+  h.x += K * residual;
+  h.P = (h.P - S * K * K.transpose()).eval();
+  h.C = (h.C - K * h.C.row(kYaw)).eval();
+  if (h.head < 0.0) {
+    h.head = -h.head;
+    h.x[kYaw] += M_PI;
+  }
+  h.x[kYaw] = wrapAngle(h.x[kYaw]);
+  makeSymmetric(h.P);
+  return likelihood;
+}
+
+void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
+            const std::vector<Evidence>& boxes, const FrameContext& frame) {
+  if (look.sight.fraction <= 0.0) return;
+  std::vector<Shares> shares;
+  for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, eta));
+  if (!boxes.empty()) {
+    count(object, shares, look, object.as_of);
+  } else {
+    ++object.visible_misses;
+  }
+  double mean_A = 0.0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    Hypothesis& h = object.hypotheses[i];
+    h.weight *= std::pow(shares[i].A, look.worth);
+    mean_A += h.weight;
+    updateState(h, shares[i], look, boxes, frame);
+  }
+  const double r = object.existence;
+  object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), kMaxExistence);
+  updateAzimuths(object, shares, look, boxes, frame);
+  object.view = viewPointNow(object, frame.view, frame.parameters->looks);
+  object.view.looks += 1.0;
+  normalise(object);
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,30 @@
+// Update, once each, from the same A (DESIGN 5, item 6; eq. 4 and 9 of the paper):
+//   A_k = 1 - v P_Dk + v P_Dk Σ_z η_j(z) L_k(z),   π_k ∝ π_k A_k,   r ← r Ā / (1 - r + r Ā),
+// and the EKF of hypothesis k weighs box z by v P_Dk η_j(z) L_k(z) / A_k.
+// There is no other rule for class or existence. Looks that are correlated with earlier ones enter
+// with an exponent τ <= 1, and with R / τ in the EKF.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "services/semantic_filter/core/look.h"
+
+namespace perdure::semantic_filter {
+
+/// Everything at once for one object that can be seen (look.sight.fraction > 0). `eta` is the
+/// object's row of Association::eta. Does nothing at v = 0.
+void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
+            const std::vector<Evidence>& boxes, const FrameContext& frame);
+
+/// One hypothesis against one box: the iterated consider-EKF with R / worth.
+Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
+                         const std::array<bool, 4>& hidden, double worth,
+                         const FrameContext& frame);
+
+/// A network's azimuth as a weak measurement of yaw modulo 180°, with `weight` in (0, 1]; head or
+/// tail is kept as log-odds. Returns the likelihood of the azimuth, for weighing yaw modes only.
+double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
+                         const FrameContext& frame);
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,179 @@
+#include "services/semantic_filter/core/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "services/semantic_filter/core/polygon.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+struct Cell {
+  double transmittance = 1.0;  ///< probability that nothing nearer stands here
+  double distance_m = 0.0, sigma_m = 0.0;  ///< of the blocker that hides most
+  double strongest = 0.0;
+  ObjectId blocker = 0;
+};
+
+class DepthBuffer {
+ public:
+  DepthBuffer(double width, double height, double cell_px)
+      : cell_(cell_px),
+        columns_(static_cast<int>(std::ceil(width / cell_px))),
+        rows_(static_cast<int>(std::ceil(height / cell_px))),
+        cells_(static_cast<std::size_t>(columns_) * rows_) {}
+
+  /// Calls f(cell, x, y) for each cell whose centre lies in the polygon; at least one cell of a
+  /// polygon that is smaller than the grid.
+  template <class F>
+  void visit(const Polygon& hull, const F& f) {
+    int visited = 0;
+    double low = 1e30, high = -1e30;
+    for (const auto& p : hull) low = std::min(low, p.y()), high = std::max(high, p.y());
+    for (int row = rowOf(low); row <= rowOf(high); ++row) {
+      const double y = (row + 0.5) * cell_;
+      double left = 1e30, right = -1e30;
+      spanAt(hull, y, left, right);
+      const int first = std::max(0, static_cast<int>(std::ceil(left / cell_ - 0.5)));
+      const int last = std::min(columns_ - 1, static_cast<int>(std::floor(right / cell_ - 0.5)));
+      for (int column = first; column <= last; ++column, ++visited) {
+        f(at(row, column), (column + 0.5) * cell_, y);
+      }
+    }
+    if (visited > 0 || hull.empty()) return;
+    const Eigen::Vector2d centre =
+        std::accumulate(hull.begin(), hull.end(), Eigen::Vector2d(0, 0)) / double(hull.size());
+    f(at(rowOf(centre.y()), columnOf(centre.x())), centre.x(), centre.y());
+  }
+
+ private:
+  int rowOf(double y) const { return std::clamp(static_cast<int>(y / cell_), 0, rows_ - 1); }
+  int columnOf(double x) const { return std::clamp(static_cast<int>(x / cell_), 0, columns_ - 1); }
+  Cell& at(int row, int column) { return cells_[static_cast<std::size_t>(row) * columns_ + column]; }
+  static void spanAt(const Polygon& hull, double y, double& left, double& right) {
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+      const auto& a = hull[i];
+      const auto& b = hull[(i + 1) % hull.size()];
+      if ((a.y() <= y) == (b.y() <= y)) continue;
+      const double x = a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+      left = std::min(left, x), right = std::max(right, x);
+    }
+  }
+
+  double cell_;
+  int columns_, rows_;
+  std::vector<Cell> cells_;
+};
+
+/// P(the blocker in the cell stands nearer than the object).
+double nearer(const Cell& cell, const Outline& o) {
+  const double sigma = std::hypot(cell.sigma_m, o.depth_sigma_m) + 1e-3;
+  return 0.5 * std::erfc((cell.distance_m - o.distance_m) / (std::sqrt(2.0) * sigma));
+}
+
+struct Tally {
+  double total = 0.0, hidden = 0.0;
+  std::map<ObjectId, double> by_blocker;
+  std::array<double, 4> side_total{}, side_hidden{};
+};
+
+void addToTally(Tally& tally, const Cell& cell, double x, double y, const Outline& o) {
+  const double hidden = cell.strongest > 0.0 ? (1.0 - cell.transmittance) * nearer(cell, o) : 0.0;
+  tally.total += 1.0;
+  tally.hidden += hidden;
+  if (hidden > 0.0) tally.by_blocker[cell.blocker] += hidden;
+  const auto& s = o.box->sides;
+  const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
+  const bool in_band[4] = {x < s[0] + band_x, y < s[1] + band_y, x > s[2] - band_x,
+                           y > s[3] - band_y};
+  for (int i = 0; i < 4; ++i) {
+    if (!in_band[i]) continue;
+    tally.side_total[i] += 1.0;
+    tally.side_hidden[i] += hidden;
+  }
+}
+
+void paint(Cell& cell, const Outline& o) {
+  if (o.existence > cell.strongest) {
+    cell.strongest = o.existence;
+    cell.blocker = o.id;
+    cell.distance_m = o.distance_m;
+    cell.sigma_m = o.depth_sigma_m;
+  }
+  cell.transmittance *= 1.0 - o.existence;
+}
+
+/// Share of the outline's landmarks that stand in front of the object (nearer than its surface);
+/// those seen through it speak against (paper, line 190: the co-visibility cue).
+double hiddenByPoints(const Outline& o, const Polygon& hull, const std::vector<SightPoint>& points) {
+  double before = 0.0, through = 0.0;
+  const double surface = o.distance_m - o.extent_m;
+  for (const auto& p : points) {
+    bool inside = !hull.empty();
+    for (std::size_t i = 0; i < hull.size() && inside; ++i) {
+      inside = cross(hull[i], hull[(i + 1) % hull.size()], p.pixel) >= 0;
+    }
+    if (!inside) continue;
+    const double margin = 2.0 * std::hypot(p.sigma_m, o.depth_sigma_m) + 0.1 * surface;
+    (p.distance_m < surface - margin ? before : through) += 1.0;
+  }
+  return before / (before + through + 3.0);  // three pseudo-points of "free" keep a few from ruling
+}
+
+Sight classify(const Tally& tally, double in_image, double by_points,
+               const VisibilityParameters& parameters) {
+  Sight sight;
+  const double free = tally.total > 0.0 ? 1.0 - tally.hidden / tally.total : 0.0;
+  sight.fraction = in_image * free * (1.0 - by_points);
+  double most = 0.0;
+  for (const auto& [id, hidden] : tally.by_blocker) {
+    if (hidden > most) most = hidden, sight.blocked_by = id;
+  }
+  if (most < 0.1 * tally.total) sight.blocked_by = 0;
+  for (int i = 0; i < 4; ++i) {
+    sight.hidden[i] = tally.side_total[i] > 0.0 && tally.side_hidden[i] > 0.5 * tally.side_total[i];
+  }
+  if (sight.fraction < parameters.minimum) {
+    sight.fraction = 0.0;
+    sight.visibility =
+        in_image < parameters.minimum ? Visibility::kOutOfView : Visibility::kOccluded;
+  } else {
+    sight.visibility =
+        sight.fraction >= parameters.full ? Visibility::kVisible : Visibility::kPartial;
+  }
+  return sight;
+}
+
+}  // namespace
+
+std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
+                       double width, double height, const VisibilityParameters& parameters) {
+  std::vector<std::size_t> order(outlines.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return outlines[a].distance_m < outlines[b].distance_m;
+  });
+  DepthBuffer buffer(width, height, static_cast<double>(parameters.cell_px));
+  std::vector<Sight> sights(outlines.size());
+  for (const std::size_t j : order) {
+    const Outline& o = outlines[j];
+    if (!o.box) continue;
+    const Polygon hull = convexHull(o.box->points);
+    Polygon inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
+    inside = clip(clip(inside, 1, 0.0, true), 1, height, false);
+    const double in_image = polygonArea(inside) / std::max(polygonArea(hull), 1e-9);
+    Tally tally;
+    if (!inside.empty()) {
+      buffer.visit(inside, [&](Cell& cell, double x, double y) { addToTally(tally, cell, x, y, o); });
+    }
+    const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
+    sights[j] = classify(tally, in_image, by_points, parameters);
+    if (o.existence < parameters.solid || inside.empty()) continue;
+    buffer.visit(inside, [&](Cell& cell, double, double) { paint(cell, o); });
+  }
+  return sights;
+}
+
+}  // namespace perdure::semantic_filter

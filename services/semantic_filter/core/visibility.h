@@ -1,0 +1,41 @@
+// See: which objects the camera can see now, by a coarse depth buffer of cuboids painted nearest
+// first (DESIGN 5, item 3; the paper's π that must take occlusions into account, line 182).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "services/semantic_filter/core/cuboid.h"
+#include "services/semantic_filter/core/parameters.h"
+
+namespace perdure::semantic_filter {
+
+/// One object as the depth buffer wants it.
+struct Outline {
+  ObjectId id = 0;
+  double existence = 0.0;
+  double distance_m = 0.0;   ///< from the camera to the centre
+  double depth_sigma_m = 0.0;  ///< standard deviation of that distance
+  double extent_m = 0.0;     ///< half of the cuboid's largest side
+  std::optional<ProjectedBox> box;
+};
+
+struct Sight {
+  Visibility visibility = Visibility::kBehind;
+  double fraction = 0.0;  ///< v; exactly 0 where a frame says nothing about the object
+  ObjectId blocked_by = 0;
+  std::array<bool, 4> hidden{};  ///< sides (x1, y1, x2, y2) that lie behind a nearer object
+};
+
+/// A landmark in the image: what stands between the camera and an object, or behind it.
+struct SightPoint {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double distance_m = 0.0;
+  double sigma_m = 0.0;
+};
+
+/// One Sight for each outline, in the same order; `width`, `height` of the image in pixels.
+std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
+                       double width, double height, const VisibilityParameters& parameters);
+
+}  // namespace perdure::semantic_filter

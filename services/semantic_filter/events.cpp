@@ -1,0 +1,115 @@
+#include "services/semantic_filter/events.h"
+
+#include <algorithm>
+#include <set>
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kResolved = 0.9;      // of a class
+constexpr double kMissingBelow = 0.5;  // existence of a confirmed object
+
+bool isHidden(Visibility v) { return v != Visibility::kVisible && v != Visibility::kPartial; }
+
+Event make(const Event& blank, EventKind kind, const ObjectBelief& object, double probability) {
+  Event e = blank;
+  e.kind = kind;
+  e.object_id = object.id;
+  e.class_name = object.best().name;
+  e.probability = probability;
+  return e;
+}
+
+}  // namespace
+
+void EventTracker::recalled(ObjectId id, bool restored) { recalled_[id] = restored; }
+
+void EventTracker::clear() {
+  known_.clear();
+  recalled_.clear();
+}
+
+void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Event>& events,
+                           const Event& blank) {
+  const auto add = [&](EventKind kind, double p) { events.push_back(make(blank, kind, o, p)); };
+  if (o.confirmed && !known.confirmed) add(EventKind::kConfirmed, o.existence);
+  const double pi = o.best().probability;
+  if (o.confirmed && pi >= kResolved && (!known.resolved || known.class_name != o.best().name)) {
+    add(EventKind::kClassResolved, pi);
+    known.resolved = true;
+  }
+  const bool hidden = isHidden(o.visibility);
+  if (o.confirmed && hidden && !known.hidden) {
+    add(o.visibility == Visibility::kOccluded ? EventKind::kOccluded : EventKind::kLeftView,
+        o.existence);
+    events.back().other_id = o.blocked_by;
+  }
+  if (o.confirmed && !hidden && known.hidden && known.confirmed) {
+    add(EventKind::kReappeared, o.existence);
+  }
+  const bool missing = o.confirmed && o.existence < kMissingBelow;
+  if (missing && !known.missing) add(EventKind::kMissing, o.existence);
+  const bool moving = o.moving > 0.5;
+  if (o.confirmed && moving && !known.moving && known.static_once) add(EventKind::kMoved, o.moving);
+  known.static_once = known.static_once || (o.confirmed && !moving);
+  known.confirmed = o.confirmed;
+  known.hidden = hidden;
+  known.missing = missing;
+  known.moving = moving;
+  known.class_name = o.best().name;
+}
+
+std::vector<Event> EventTracker::update(const Objects& objects,
+                                        const std::vector<MergeRecord>& merges) {
+  Event blank;
+  blank.stamp = objects.stamp;
+  blank.instance = objects.instance;
+  blank.world = objects.world;
+  std::vector<Event> events;
+  for (const auto& m : merges) {
+    const auto it = known_.find(m.absorbed);
+    if (it == known_.end()) continue;  // born and merged within one frame: never published
+    Event e = blank;
+    e.kind = EventKind::kMerged;
+    e.object_id = m.survivor;
+    e.other_id = m.absorbed;
+    e.class_name = it->second.class_name;
+    e.probability = 1.0;
+    events.push_back(e);
+    known_.erase(it);
+  }
+  std::set<ObjectId> present;
+  for (const auto& o : objects.objects) {
+    present.insert(o.id);
+    const auto [it, fresh] = known_.try_emplace(o.id);
+    if (fresh) {
+      const auto back = recalled_.find(o.id);
+      const EventKind kind = back == recalled_.end() ? EventKind::kBorn
+                             : back->second          ? EventKind::kRestored
+                                                     : EventKind::kRecalled;
+      events.push_back(make(blank, kind, o, o.existence));
+      if (back != recalled_.end()) {
+        it->second.confirmed = o.confirmed;
+        recalled_.erase(back);
+      }
+    }
+    compare(o, it->second, events, blank);
+  }
+  for (auto it = known_.begin(); it != known_.end();) {
+    if (present.contains(it->first)) {
+      ++it;
+      continue;
+    }
+    if (it->second.confirmed) {
+      Event e = blank;
+      e.kind = EventKind::kGone;
+      e.object_id = it->first;
+      e.class_name = it->second.class_name;
+      events.push_back(e);
+    }
+    it = known_.erase(it);
+  }
+  return events;
+}
+
+}  // namespace perdure::semantic_filter

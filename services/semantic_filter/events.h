@@ -1,0 +1,34 @@
+// Events are differences between what was published for one frame and for the next.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "common/types/objects.h"
+#include "services/semantic_filter/core/tend.h"
+
+namespace perdure::semantic_filter {
+
+class EventTracker {
+ public:
+  /// Events since the last call, in order of object id. `merges` happened since then.
+  std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
+  /// Objects that came back from the map with this id; the next update says so.
+  void recalled(ObjectId id, bool restored);
+  void clear();
+
+ private:
+  struct Known {
+    bool confirmed = false, resolved = false, missing = false, moving = false, hidden = false;
+    bool static_once = false;
+    std::string class_name;
+  };
+
+  void compare(const ObjectBelief& object, Known& known, std::vector<Event>& events,
+               const Event& blank);
+
+  std::map<ObjectId, Known> known_;
+  std::map<ObjectId, bool> recalled_;
+};
+
+}  // namespace perdure::semantic_filter

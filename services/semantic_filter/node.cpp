@@ -1,0 +1,279 @@
+#include "services/semantic_filter/node.h"
+
+#include <algorithm>
+
+#include "common/base/check.h"
+#include "common/math/so3.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr std::size_t kMaxEarly = 16;
+constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not primed
+
+}  // namespace
+
+Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance, Outputs outputs)
+    : config_(config),
+      instance_(instance),
+      outputs_(std::move(outputs)),
+      filter_(config.filter, priors) {}
+
+void Node::onCalibration(const Calibration& calibration) {
+  if (calibration.cameras.empty()) {
+    reasons_.add("calibration_without_camera");
+    return;
+  }
+  flush();
+  camera_ = std::make_shared<const CameraModel>(calibration.cameras.front());
+  camera_name_ = calibration.cameras.front().name;
+}
+
+void Node::onModel(const ModelInfo& model) {
+  const bool changed = newest_model_ != 0 && newest_model_ != model.hash;
+  models_[model.hash] = makeModel(model);
+  newest_model_ = model.hash;
+  if (!changed || history_.empty()) return;
+  Event event;
+  event.stamp = history_.back().input.stamp;
+  event.instance = instance_;
+  event.world = *world_;
+  event.kind = EventKind::kModelChanged;
+  event.detail = model.name;
+  if (outputs_.events) outputs_.events(event);
+}
+
+void Node::advancePoseError(const Odometry& odometry) {
+  if (odometry.has_increment) {
+    pose_error_.covariance = odometry.covariance.topLeftCorner<6, 6>();
+    pose_error_.product = (odometry.transition * pose_error_.product).eval();
+  } else if (last_T_WB_) {
+    // Poses from a file: their error is a random walk in W, by distance travelled.
+    const auto& walk = config_.filter.pose;
+    const double metres = (odometry.T_WB.p - last_T_WB_->p).norm();
+    Eigen::Matrix<double, 6, 1> q;
+    q << Eigen::Vector3d::Constant(walk.walk_rotation * walk.walk_rotation),
+        Eigen::Vector3d::Constant(walk.walk_position * walk.walk_position);
+    pose_error_.covariance.diagonal() += metres * q;
+  }
+  last_T_WB_ = odometry.T_WB;
+}
+
+FrameInput Node::makeInput(const Odometry& odometry) {
+  FrameInput input;
+  input.stamp = odometry.stamp;
+  input.view.camera = camera_.get();
+  input.view.T_WB = odometry.T_WB;
+  input.view.up_W = odometry.up_W;
+  input.pose_error = pose_error_;
+  return input;
+}
+
+void Node::beginWorld(const WorldId& world) {
+  if (world_) reasons_.add("world_changed");
+  world_ = world;
+  belief_.objects.clear();
+  history_.clear();
+  pose_error_ = {};
+  last_T_WB_.reset();
+  events_.clear();
+  if (waiting_recalled_ && waiting_recalled_->world == world) insertRecalled(*waiting_recalled_);
+  waiting_recalled_.reset();
+}
+
+void Node::onOdometry(const Odometry& odometry) {
+  if (!camera_) return reasons_.add("odometry_before_calibration");
+  if (odometry.state == OdometryState::kInitialising) return reasons_.add("odometry_initialising");
+  if (!odometry.T_WB.finite() || !odometry.up_W.allFinite() || odometry.up_W.norm() < 0.5) {
+    return reasons_.add("odometry_not_finite");
+  }
+  flush();
+  if (!world_ || *world_ != odometry.world) beginWorld(odometry.world);
+  if (!history_.empty() && odometry.stamp.time <= history_.back().input.stamp.time) {
+    return reasons_.add("odometry_not_newer");
+  }
+  advancePoseError(odometry);
+  history_.push_back({makeInput(odometry), odometry.world, camera_, {}, false});
+  if (history_.size() > static_cast<std::size_t>(config_.history.frames)) {
+    history_.pop_front();
+    ids_.forgetBefore(history_.front().input.stamp.sequence);
+  }
+  Entry& entry = history_.back();
+  const auto early = std::find_if(early_.begin(), early_.end(), [&](const Detections& d) {
+    return d.stamp.sameFrame(entry.input.stamp);
+  });
+  if (early != early_.end()) {
+    attach(entry, *early);
+    early_.erase(early);
+  }
+  if (entry.input.boxes || !config_.history.wait_for_detections) flush();
+}
+
+void Node::onLandmarks(const Landmarks& landmarks) {
+  for (auto& entry : history_) {
+    if (!entry.input.stamp.sameFrame(landmarks.stamp)) continue;
+    if (entry.stepped) reasons_.add("landmarks_after_step");
+    const Eigen::Vector3d centre = entry.input.view.T_WC().p;
+    entry.input.points.clear();
+    for (const auto& landmark : landmarks.landmarks) {
+      if (!landmark.p_W.allFinite() || !landmark.covariance.allFinite()) continue;
+      const Eigen::Vector3d ray = landmark.p_W - centre;
+      const Eigen::Vector3d along = ray.normalized();
+      const double variance = along.dot(landmark.covariance * along);
+      entry.input.points.push_back({landmark.pixel, ray.norm(), std::sqrt(std::max(variance, 0.0))});
+    }
+    return;
+  }
+  reasons_.add("landmarks_of_unknown_frame");
+}
+
+bool Node::attach(Entry& entry, const Detections& detections) {
+  if (entry.input.boxes) {
+    reasons_.add("detections_repeated");
+    return false;
+  }
+  if (!detections.camera.empty() && detections.camera != camera_name_) {
+    reasons_.add("detections_of_other_camera");
+    return false;
+  }
+  const auto model = models_.find(detections.model_hash);
+  if (model == models_.end()) {
+    reasons_.add("detections_of_unknown_model");
+    return false;
+  }
+  entry.input.model = model->second;
+  entry.input.boxes.emplace();
+  for (const auto& detection : detections.detections) {
+    auto evidence =
+        makeEvidence(detection, entry.input.model, entry.camera->width(), entry.camera->height(),
+                     config_.filter.box, config_.filter.clutter);
+    if (evidence) {
+      entry.input.boxes->push_back(std::move(*evidence));
+    } else {
+      reasons_.add("detection_malformed");
+    }
+  }
+  return true;
+}
+
+void Node::onDetections(const Detections& detections) {
+  for (std::size_t i = history_.size(); i-- > 0;) {
+    Entry& entry = history_[i];
+    if (!entry.input.stamp.sameFrame(detections.stamp)) continue;
+    if (!attach(entry, detections)) return;
+    if (!entry.stepped) return flush();
+    reasons_.add("detections_late");
+    return stepAgainFrom(i);
+  }
+  if (!history_.empty() && detections.stamp.time <= history_.back().input.stamp.time) {
+    return reasons_.add("detections_too_late");
+  }
+  early_.push_back(detections);
+  if (early_.size() > kMaxEarly) {
+    early_.pop_front();
+    reasons_.add("detections_without_odometry");
+  }
+}
+
+void Node::stepEntry(Entry& entry) {
+  entry.before = belief_;
+  entry.merges = filter_.step(belief_, entry.input, ids_);
+  entry.stepped = true;
+}
+
+void Node::stepAgainFrom(std::size_t index) {
+  belief_ = history_[index].before;
+  for (std::size_t i = index; i < history_.size(); ++i) {
+    if (!history_[i].stepped) break;
+    stepEntry(history_[i]);
+    late_merges_.insert(late_merges_.end(), history_[i].merges.begin(), history_[i].merges.end());
+  }
+}
+
+void Node::flush() {
+  if (history_.empty() || history_.back().stepped) return;
+  stepEntry(history_.back());
+  publish(history_.back());
+}
+
+void Node::publish(const Entry& entry) {
+  Objects objects;
+  objects.stamp = entry.input.stamp;
+  objects.instance = instance_;
+  objects.world = entry.world;
+  objects.T_WB = entry.input.view.T_WB;
+  objects.up_W = entry.input.view.up_W;
+  objects.next_id = ids_.next();
+  for (const auto& object : belief_.objects) {
+    objects.objects.push_back(toBelief(object));
+    if (objects.objects.back().moving <= 0.5) continue;
+    const double dt = toSeconds(entry.input.stamp.time - object.as_of);
+    for (auto& c : objects.objects.back().classes) {
+      c.mean.head<3>() += dt * objects.objects.back().velocity;
+    }
+  }
+  late_merges_.insert(late_merges_.end(), entry.merges.begin(), entry.merges.end());
+  const auto events = events_.update(objects, late_merges_);
+  late_merges_.clear();
+  if (outputs_.objects) outputs_.objects(objects);
+  for (const auto& event : events) {
+    if (outputs_.events) outputs_.events(event);
+  }
+  publishPredictions(entry);
+}
+
+void Node::publishPredictions(const Entry& entry) {
+  if (!outputs_.predictions) return;
+  Predictions predictions;
+  predictions.stamp = entry.input.stamp;
+  predictions.instance = instance_;
+  predictions.camera = camera_name_;
+  for (const auto& object : belief_.objects) {
+    const auto& best = object.best();
+    const double probability = object.existence * classProbability(object, best.class_name) *
+                               object.visible_fraction;
+    if (probability < kPredictionFloor) continue;
+    const State x = stateAt(best, toSeconds(entry.input.stamp.time - object.as_of));
+    const auto box = projectCuboid(x, entry.input.view);
+    if (!box) continue;
+    const auto& s = box->sides;
+    predictions.predictions.push_back(
+        {object.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability});
+  }
+  outputs_.predictions(predictions);
+}
+
+void Node::insertRecalled(const Recalled& recalled) {
+  ids_.atLeast(recalled.next_id);
+  for (const auto& belief : recalled.objects) {
+    if (belief.classes.empty() || belief.id == 0) {
+      reasons_.add("recalled_malformed");
+      continue;
+    }
+    ids_.atLeast(belief.id + 1);
+    const auto same = [&](const Object& o) { return o.id == belief.id; };
+    if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) continue;
+    const Object object = fromBelief(belief, pose_error_.product);
+    events_.recalled(belief.id, recalled.restore);
+    const auto insert = [&](Belief& b) {
+      const auto at = std::find_if(b.objects.begin(), b.objects.end(),
+                                   [&](const Object& o) { return o.id > object.id; });
+      b.objects.insert(at, object);
+    };
+    insert(belief_);
+    for (auto& entry : history_) insert(entry.before);
+  }
+}
+
+void Node::onRecalled(const Recalled& recalled) {
+  if (recalled.restore && recalled.client != instance_) return;
+  ids_.atLeast(recalled.next_id);
+  if (!world_) {
+    waiting_recalled_ = recalled;
+    return;
+  }
+  if (recalled.world != *world_) return reasons_.add("recalled_of_other_world");
+  insertRecalled(recalled);
+}
+
+}  // namespace perdure::semantic_filter

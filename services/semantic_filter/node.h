@@ -1,0 +1,88 @@
+// The semantic filter as a node: odometry, landmarks, detections and recalled objects in; objects,
+// events and predictions out. Single-threaded; time enters by messages only.
+//
+// Frames are kept with the belief before them. Detections belong to a frame; those that come late
+// (or out of order) are applied at their own frame's pose by stepping again from there, which gives
+// the posterior that they would have given on time (DESIGN 5, item 14).
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "common/base/result.h"
+#include "common/base/sink.h"
+#include "common/types/map.h"
+#include "services/semantic_filter/config.h"
+#include "services/semantic_filter/core/semantic_filter.h"
+#include "services/semantic_filter/events.h"
+
+namespace perdure::semantic_filter {
+
+struct Outputs {
+  Sink<Objects> objects;          ///< one for each odometry frame, in order
+  Sink<Event> events;
+  Sink<Predictions> predictions;
+};
+
+class Node {
+ public:
+  Node(const Config& config, const ClassPriors& priors, InstanceId instance, Outputs outputs);
+
+  void onCalibration(const Calibration& calibration);
+  void onModel(const ModelInfo& model);
+  void onOdometry(const Odometry& odometry);
+  void onLandmarks(const Landmarks& landmarks);
+  void onDetections(const Detections& detections);
+  void onRecalled(const Recalled& recalled);
+  /// Publishes the newest frame even though its detections have not come: the end of the data, or
+  /// a tick of a service whose detections have stopped.
+  void flush();
+
+  const ReasonCounts& reasons() const { return reasons_; }
+  InstanceId instance() const { return instance_; }
+  const Belief& belief() const { return belief_; }
+
+ private:
+  struct Entry {
+    FrameInput input;
+    WorldId world;
+    std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
+    Belief before;
+    bool stepped = false;
+    std::vector<MergeRecord> merges = {};
+  };
+
+  FrameInput makeInput(const Odometry& odometry);
+  void advancePoseError(const Odometry& odometry);
+  void beginWorld(const WorldId& world);
+  bool attach(Entry& entry, const Detections& detections);
+  void stepEntry(Entry& entry);
+  void stepAgainFrom(std::size_t index);
+  void publish(const Entry& entry);
+  void publishPredictions(const Entry& entry);
+  void insertRecalled(const Recalled& recalled);
+
+  Config config_;
+  InstanceId instance_;
+  Outputs outputs_;
+  SemanticFilter filter_;
+  std::shared_ptr<const CameraModel> camera_;  // shared with the entries that were made with it
+  std::string camera_name_;
+  std::map<std::uint64_t, Model> models_;
+  std::uint64_t newest_model_ = 0;
+  std::optional<WorldId> world_;
+  PoseError pose_error_;
+  std::optional<RigidTransform> last_T_WB_;
+  Belief belief_;
+  IdBook ids_;
+  std::deque<Entry> history_;
+  std::deque<Detections> early_;
+  std::vector<MergeRecord> late_merges_;
+  std::optional<Recalled> waiting_recalled_;
+  EventTracker events_;
+  ReasonCounts reasons_;
+};
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,156 @@
+#include "services/semantic_filter/priors.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "common/base/errors.h"
+#include "common/types/objects.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+class Reader {
+ public:
+  explicit Reader(std::string file) : file_(std::move(file)) {}
+
+  void complain(const YAML::Node& node, const std::string& message) {
+    const auto mark = node.Mark();
+    problems_ += file_ + ":" + std::to_string(mark.line + 1) + ":" +
+                 std::to_string(mark.column + 1) + ": " + message + "\n";
+  }
+
+  double number(const YAML::Node& parent, const std::string& key, double standard, double low,
+                double high) {
+    const YAML::Node node = parent[key];
+    if (!node) return standard;
+    double value = 0.0;
+    if (!YAML::convert<double>::decode(node, value) || !(value >= low && value <= high)) {
+      std::ostringstream text;
+      text << key << ": is not a number from " << low << " to " << high;
+      complain(node, text.str());
+      return standard;
+    }
+    return value;
+  }
+
+  void threeNumbers(const YAML::Node& parent, const std::string& key, double low, double high,
+                    Eigen::Vector3d& target) {
+    const YAML::Node node = parent[key];
+    if (!node) return;
+    if (!node.IsSequence() || node.size() != 3) {
+      return complain(node, key + ": write three numbers, for length, width and height");
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      double value = 0.0;
+      if (!YAML::convert<double>::decode(node[i], value) || !(value >= low && value <= high)) {
+        std::ostringstream text;
+        text << key << ": each is a number from " << low << " to " << high;
+        return complain(node[i], text.str());
+      }
+      target[static_cast<Eigen::Index>(i)] = value;
+    }
+  }
+
+  ClassPrior prior(const YAML::Node& node, const ClassPrior& standard) {
+    ClassPrior p = standard;
+    if (!node.IsMap()) {
+      complain(node, "a class is a mapping: {size: [l, w, h], …}");
+      return p;
+    }
+    checkKeys(node);
+    Eigen::Vector3d size = standard.log_size.array().exp();
+    Eigen::Vector3d spread = standard.log_size_covariance.diagonal().array().sqrt();
+    threeNumbers(node, "size", 0.005, 500.0, size);
+    threeNumbers(node, "spread", 0.01, 3.0, spread);
+    const double old_common = standard.log_size_covariance(0, 1);
+    const double common = number(node, "common", std::sqrt(std::max(old_common, 0.0)), 0.0, 3.0);
+    p.log_size = size.array().log();
+    p.log_size_covariance = Eigen::Vector3d(spread.array().square()).asDiagonal();
+    p.log_size_covariance.array() += common * common;
+    if (!node["spread"] && !node["common"]) p.log_size_covariance = standard.log_size_covariance;
+    p.frequency = number(node, "frequency", standard.frequency, 1e-6, 1e6);
+    p.detection_probability = number(node, "detection", standard.detection_probability, 0.01, 0.99);
+    p.moving = number(node, "moving", standard.moving, 0.0, 0.99);
+    p.speed_sigma = number(node, "speed", standard.speed_sigma, 0.0, 100.0);
+    p.azimuth_sigma = number(node, "azimuth_sigma", standard.azimuth_sigma, 0.01, 3.2);
+    const YAML::Node yaw = node["yaw"];
+    if (yaw && !YAML::convert<bool>::decode(yaw, p.has_yaw)) complain(yaw, "yaw: is true or false");
+    return p;
+  }
+
+  void throwIfAny() const {
+    if (!problems_.empty()) throw StartupError(ExitCode::kConfiguration, problems_);
+  }
+
+ private:
+  void checkKeys(const YAML::Node& node) {
+    static const std::vector<std::string> known = {"size",   "spread", "common",        "frequency",
+                                                   "moving", "speed",  "azimuth_sigma", "yaw",
+                                                   "detection"};
+    for (const auto& item : node) {
+      const auto key = item.first.as<std::string>();
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        complain(item.first, key + ": unknown; keys are size, spread, common, frequency, "
+                                   "detection, moving, speed, azimuth_sigma, yaw");
+      }
+    }
+  }
+
+  std::string file_, problems_;
+};
+
+bool isLowerCase(const std::string& name) {
+  return std::none_of(name.begin(), name.end(),
+                      [](unsigned char c) { return std::isupper(c) != 0; });
+}
+
+}  // namespace
+
+ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(yaml);
+  } catch (const YAML::ParserException& e) {
+    throw StartupError(ExitCode::kConfiguration, file + ":" + std::to_string(e.mark.line + 1) + ":" +
+                                                     std::to_string(e.mark.column + 1) + ": " +
+                                                     e.msg);
+  }
+  Reader reader(file);
+  ClassPriors priors;
+  if (!root.IsMap() || !root["fallback"] || !root["other"] || !root["classes"] ||
+      !root["classes"].IsMap()) {
+    throw StartupError(ExitCode::kConfiguration,
+                       file + ": holds the mappings fallback, other and classes");
+  }
+  priors.fallback = reader.prior(root["fallback"], ClassPrior{});
+  priors.other = reader.prior(root["other"], priors.fallback);
+  priors.other.name = kOtherClass;
+  for (const auto& item : root["classes"]) {
+    ClassPrior p = reader.prior(item.second, priors.fallback);
+    p.name = item.first.as<std::string>();
+    if (!isLowerCase(p.name)) reader.complain(item.first, p.name + ": names are lower-case");
+    priors.classes.push_back(p);
+  }
+  reader.throwIfAny();
+  return priors;
+}
+
+ClassPriors loadClassPriors(const std::string& path) {
+  std::ifstream in(path);
+  if (!in) {
+    throw StartupError(ExitCode::kUnavailable,
+                       path + ": cannot be read; set class_priors to the file of class priors "
+                              "(config/class_priors.yaml in the sources).");
+  }
+  std::stringstream text;
+  text << in.rdbuf();
+  return parseClassPriors(text.str(), path);
+}
+
+}  // namespace perdure::semantic_filter
