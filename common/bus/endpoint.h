@@ -43,7 +43,7 @@ class RawReader : public Endpoint {
   /// How many writers are matched now.
   std::size_t matched() const;
   /// Adds what DDS and the checks counted since the start: <topic>_malformed_<reason>,
-  /// _incompatible_qos, _sample_lost, _liveliness_lost (times a writer went silent).
+  /// _incompatible_qos, _sample_lost, _writers_silent (how many are now).
   void report(ReasonCounts& counts) const;
 
  protected:

@@ -65,7 +65,7 @@ const TopicInfo* findTopic(std::string_view name) {
   for (const TopicInfo& info : topicTable()) {
     const bool camera = info.name == kFramePrefix && name.starts_with(kFramePrefix) &&
                         name.size() > kFramePrefix.size();
-    if (camera || info.name == name) return &info;
+    if (camera || (info.name == name && name != kFramePrefix)) return &info;
   }
   return nullptr;
 }

@@ -1,0 +1,65 @@
+// The other process of the bus tests: publishes what its arguments say until it is killed or done.
+#include <iostream>
+#include <thread>
+
+#include "common/bus/endpoint.h"
+
+namespace perdure::bus {
+namespace {
+
+void pause(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+/// Detections at 20 Hz for ever; the process's instance is its strength.
+void publishDetections(const Participant& participant, std::int32_t strength) {
+  constexpr double kRate = 20.0;
+  Writer<Detections> writer(participant, topics::kDetections,
+                            {.strength = strength, .lease_s = leaseFor(kRate)});
+  Detections message;
+  message.camera = "cam0";
+  message.instance = static_cast<InstanceId>(strength);
+  for (;; ++message.stamp.sequence) {
+    (void)writer.write(message);
+    pause(1.0 / kRate);
+  }
+}
+
+void publishImu(const Participant& participant, int count) {
+  Writer<ImuSample> writer(participant, topics::kImu);
+  for (int i = 0; i < count; ++i) {
+    ImuSample sample;
+    sample.sequence = static_cast<std::uint64_t>(i);
+    (void)writer.write(sample);
+  }
+  std::cout << "written" << std::endl;
+  pause(3600);
+}
+
+void publishTiles(const Participant& participant, int count) {
+  Writer<MapTile> writer(participant, topics::kMap);
+  for (int i = 0; i < count; ++i) {
+    MapTile tile;
+    tile.x = i;
+    (void)writer.write(tile);
+  }
+  MapTile gone;
+  gone.x = 0;
+  (void)writer.dispose(gone);
+  std::cout << "written" << std::endl;
+  pause(3600);
+}
+
+}  // namespace
+}  // namespace perdure::bus
+
+int main(int argc, char** argv) {
+  using namespace perdure::bus;
+  if (argc != 3) return 64;
+  const std::string what = argv[1];
+  const int argument = std::atoi(argv[2]);
+  const Domain domain{Options{}};
+  const Participant participant(domain, "peer");
+  if (what == "detections") publishDetections(participant, argument);
+  if (what == "imu") publishImu(participant, argument);
+  if (what == "tiles") publishTiles(participant, argument);
+  return 64;
+}

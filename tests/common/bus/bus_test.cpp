@@ -1,0 +1,231 @@
+// The bus within one process: what is counted, what is disposed, and how the loop ends.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <thread>
+
+#include "common/base/errors.h"
+#include "common/bus/dds.h"
+#include "common/bus/discovery.h"
+#include "common/bus/wait_loop.h"
+#include "tests/common/bus/isolation.h"
+
+namespace perdure::bus {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+
+class Isolation : public testing::Environment {
+ public:
+  void SetUp() override { tests::isolateNetwork(); }
+};
+const auto* const kIsolation = testing::AddGlobalTestEnvironment(new Isolation);
+
+constexpr std::chrono::milliseconds kStep{20};
+
+/// Steps the loop until `done`, or gives up after ten seconds.
+template <class Done>
+bool runUntil(WaitLoop& loop, Done done) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!done() && std::chrono::steady_clock::now() < end) loop.runOnce(kStep);
+  return done();
+}
+
+ReasonCounts reportOf(const auto& endpoint) {
+  ReasonCounts counts;
+  endpoint.report(counts);
+  return counts;
+}
+
+class Bus : public testing::Test {
+ protected:
+  Domain domain{Options{}};
+  Participant here{domain, "here"}, there{domain, "there"};
+  WaitLoop loop{here};
+};
+
+TEST_F(Bus, CarriesAMessageFromWriterToReader) {
+  Reader<ImuSample> reader(here, topics::kImu);
+  std::vector<std::uint64_t> got;
+  loop.on(reader, [&](const ImuSample& m) { got.push_back(m.sequence); });
+  Writer<ImuSample> writer(there, topics::kImu);
+  ImuSample sample;
+  sample.sequence = 7;
+  EXPECT_TRUE(writer.write(sample));
+  EXPECT_TRUE(runUntil(loop, [&] { return !got.empty(); }));
+  EXPECT_THAT(got, ElementsAre(7));
+  EXPECT_EQ(reader.matched(), 1u);
+  EXPECT_EQ(writer.matched(), 1u);
+}
+
+TEST_F(Bus, RefusesToSendWhatIsNotSoundAndCountsIt) {
+  Writer<ImuSample> writer(there, topics::kImu);
+  ImuSample sample;
+  sample.gyro.x() = NAN;
+  const Result<void> written = writer.write(sample);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, "not_finite");
+  EXPECT_EQ(reportOf(writer).of("imu_refused_not_finite"), 1u);
+}
+
+/// A program of somebody else: Cyclone's C API and the generated type, no checks.
+class RawDetections {
+ public:
+  explicit RawDetections(const Participant& participant)
+      : topic_(dds_create_topic(participant.handle(), &perdure_msg_Detections_desc,
+                                participant.wireName("detections").c_str(), nullptr, nullptr)) {
+    const QosPtr qos(dds_create_qos());
+    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+    dds_qset_ownership(qos.get(), DDS_OWNERSHIP_EXCLUSIVE);
+    dds_qset_ownership_strength(qos.get(), 5);
+    dds_qset_liveliness(qos.get(), DDS_LIVELINESS_MANUAL_BY_TOPIC, DDS_MSECS(300));
+    writer_ = Entity(dds_create_writer(participant.handle(), topic_.handle(), qos.get(), nullptr));
+  }
+  void write(double x2, const char* camera) {
+    perdure_msg_Detection item{};
+    item.corners[2] = x2;
+    item.corners[3] = 1;
+    perdure_msg_Detections message{};
+    message.camera = const_cast<char*>(camera);
+    message.items = {1, 1, &item, false};
+    ASSERT_EQ(dds_write(writer_.handle(), &message), DDS_RETCODE_OK);
+  }
+
+ private:
+  Entity topic_, writer_;
+};
+
+TEST_F(Bus, CountsMalformedDetectionsOfAStrangerAndHearsItsSoundOnes) {
+  Reader<Detections> reader(here, topics::kDetections);
+  int sound = 0;
+  loop.on(reader, [&](const Detections&) { ++sound; });
+  RawDetections stranger(there);
+  stranger.write(NAN, "cam0");
+  stranger.write(-1.0, "cam0");
+  stranger.write(1.0, "\xff\xfe");
+  stranger.write(1.0, "cam0");
+  EXPECT_TRUE(runUntil(loop, [&] { return sound == 1; }));
+  const ReasonCounts counts = reportOf(reader);
+  EXPECT_EQ(counts.of("detections_malformed_not_finite"), 1u);
+  EXPECT_EQ(counts.of("detections_malformed_out_of_range"), 1u);
+  EXPECT_EQ(counts.of("detections_malformed_bad_text"), 1u);
+}
+
+TEST_F(Bus, CountsAWriterWhoseQualityOfServiceDoesNotFit) {
+  Reader<Detections> reader(here, topics::kDetections);
+  const Entity topic(dds_create_topic(there.handle(), &perdure_msg_Detections_desc,
+                                      there.wireName("detections").c_str(), nullptr, nullptr));
+  const Entity shared(dds_create_writer(there.handle(), topic.handle(), nullptr, nullptr));
+  EXPECT_TRUE(
+      runUntil(loop, [&] { return reportOf(reader).of("detections_incompatible_qos") == 1; }));
+  EXPECT_EQ(reader.matched(), 0u);
+}
+
+TEST_F(Bus, TellsTheKeyOfADisposedObjectAfterItsLastState) {
+  Reader<MapTile> reader(here, topics::kMap);
+  std::vector<std::string> story;
+  loop.on(
+      reader, [&](const MapTile& m) { story.push_back("tile " + std::to_string(m.x)); },
+      [&](const MapTile& m) { story.push_back("gone " + std::to_string(m.x)); });
+  Writer<MapTile> writer(there, topics::kMap);
+  MapTile tile;
+  tile.x = 3;
+  EXPECT_TRUE(writer.write(tile));
+  EXPECT_TRUE(writer.dispose(tile));
+  EXPECT_TRUE(runUntil(loop, [&] { return story.size() == 2; }));
+  EXPECT_THAT(story, ElementsAre("tile 3", "gone 3"));
+}
+
+TEST_F(Bus, ADeadWriterDoesNotDisposeWhatItWrote) {
+  Reader<MapTile> reader(here, topics::kMap);
+  int tiles = 0, gone = 0, silent = 0;
+  loop.on(
+      reader, [&](const MapTile&) { ++tiles; }, [&](const MapTile&) { ++gone; });
+  {
+    Writer<MapTile> writer(there, topics::kMap);
+    EXPECT_TRUE(writer.write(MapTile{}));
+    EXPECT_TRUE(runUntil(loop, [&] { return tiles == 1; }));
+  }
+  EXPECT_TRUE(runUntil(loop, [&] { return ++silent > 5 && reader.matched() == 0; }));
+  EXPECT_EQ(gone, 0);
+}
+
+TEST_F(Bus, StrengthDecidesWhoIsHeardAndMayChange) {
+  Reader<Detections> reader(here, topics::kDetections);
+  std::vector<InstanceId> heard;
+  loop.on(reader, [&](const Detections& m) { heard.push_back(m.instance); });
+  Writer<Detections> weak(there, topics::kDetections, {.strength = 1, .lease_s = 20});
+  Writer<Detections> strong(there, topics::kDetections, {.strength = 2, .lease_s = 20});
+  const auto bothWrite = [&] {
+    Detections m;
+    m.camera = "cam0";
+    m.instance = 2;
+    EXPECT_TRUE(strong.write(m));
+    m.instance = 1;
+    EXPECT_TRUE(weak.write(m));
+    loop.runOnce(kStep);
+  };
+  for (int i = 0; i < 3; ++i) bothWrite();
+  EXPECT_THAT(heard, ElementsAre(2, 2, 2));
+  strong.setStrength(0);
+  EXPECT_EQ(strong.strength(), 0);
+  heard.clear();
+  EXPECT_TRUE(runUntil(loop, [&] {
+    bothWrite();
+    return !heard.empty() && heard.back() == 1;
+  }));
+}
+
+TEST_F(Bus, AnOwnerThatMissesItsLeaseIsTold) {
+  Reader<Detections> reader(here, topics::kDetections);
+  Writer<Detections> writer(there, topics::kDetections, {.lease_s = 0.1});
+  Detections m;
+  m.camera = "cam0";
+  EXPECT_TRUE(writer.write(m));
+  EXPECT_TRUE(runUntil(loop, [&] { return writer.livelinessLost() == 1; }));
+  EXPECT_EQ(reportOf(writer).of("detections_liveliness_lost"), 1u);
+  EXPECT_TRUE(
+      runUntil(loop, [&] { return reportOf(reader).of("detections_writers_silent") == 1; }));
+}
+
+TEST_F(Bus, DiscoveryNamesProcessesAndTheirEndpoints) {
+  Discovery discovery(here);
+  Writer<ImuSample> writer(there, topics::kImu);
+  EXPECT_TRUE(runUntil(loop, [&] {
+    const auto endpoints = discovery.endpoints();
+    return std::any_of(endpoints.begin(), endpoints.end(), [](const RemoteEndpoint& e) {
+      return e.wire_name == "perdure/ego/imu" && e.writer && e.process == "there" &&
+             e.type_name == "perdure::msg::ImuSample";
+    });
+  }));
+  EXPECT_THAT(discovery.participants(), Contains("there"));
+}
+
+TEST_F(Bus, TheLoopTicksWakesAndStops) {
+  int ticks = 0, wakes = 0;
+  loop.every(std::chrono::milliseconds(1), [&] { ++ticks; });
+  loop.onWake([&] {
+    if (++wakes == 1) loop.stop();
+  });
+  EXPECT_TRUE(runUntil(loop, [&] { return ticks >= 3; }));
+  std::thread other([&] { loop.wake(); });
+  loop.run();
+  other.join();
+  EXPECT_EQ(wakes, 1);
+  EXPECT_TRUE(loop.stopped());
+}
+
+TEST(BusWithoutInterface, SaysWhichInterfaceItCannotUse) {
+  try {
+    const Domain domain({.interface = "nosuch0", .domain = 7});
+    FAIL() << "must throw";
+  } catch (const StartupError& error) {
+    EXPECT_EQ(error.code(), ExitCode::kUnavailable);
+    EXPECT_NE(std::string(error.what()).find("nosuch0"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace perdure::bus
