@@ -12,7 +12,7 @@ namespace {
 constexpr char kHeader[] =
     "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible";
 
-std::optional<ObjectRow> readRow(const std::string& text) {
+std::optional<EstimateRow> readRow(const std::string& text) {
   const auto fields = replay::split(text, ',');
   if (fields.size() != 14) return std::nullopt;
   const auto frame = replay::parseInteger(fields[1]);
@@ -20,7 +20,7 @@ std::optional<ObjectRow> readRow(const std::string& text) {
   const auto id = replay::parseInteger(fields[3]);
   const auto v = replay::parseNumbers({fields.begin() + 5, fields.begin() + 13});
   if (!frame || *frame < 0 || !time || !id || *id < 0 || !v) return std::nullopt;
-  ObjectRow row;
+  EstimateRow row;
   row.frame = static_cast<std::uint64_t>(*frame);
   row.time = fromNanoseconds(*time);
   row.id = static_cast<std::uint64_t>(*id);
@@ -33,7 +33,7 @@ std::optional<ObjectRow> readRow(const std::string& text) {
 
 using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // line of the trajectory, frame
 
-Ties tieLines(const std::vector<replay::StampedPose>& poses, const std::vector<ObjectRow>& rows) {
+Ties tieLines(const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows) {
   std::map<TimePoint, std::uint64_t> frame_at;
   for (const auto& row : rows) frame_at[row.time] = row.frame;
   Ties ties;
@@ -76,14 +76,14 @@ std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::St
 
 }  // namespace
 
-std::vector<ObjectRow> readObjectRows(const std::filesystem::path& file) {
+std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file) {
   const auto lines = replay::readLines(file, "`perdure pipeline` writes objects_final.csv");
   replay::Complaints wrong(file);
   if (lines.empty() || lines[0].text != kHeader) {
     wrong.add(1, std::string("the header is ") + kHeader);
     wrong.throwIfAny();
   }
-  std::vector<ObjectRow> rows;
+  std::vector<EstimateRow> rows;
   for (std::size_t i = 1; i < lines.size(); ++i) {
     const auto row = readRow(lines[i].text);
     if (row)
@@ -96,7 +96,7 @@ std::vector<ObjectRow> readObjectRows(const std::filesystem::path& file) {
 }
 
 std::map<std::uint64_t, RigidTransform> posesByFrame(const std::vector<replay::StampedPose>& poses,
-                                                     const std::vector<ObjectRow>& rows) {
+                                                     const std::vector<EstimateRow>& rows) {
   const Ties ties = tieLines(poses, rows);
   std::map<std::uint64_t, RigidTransform> result;
   for (std::size_t i = 0; i < poses.size(); ++i) {

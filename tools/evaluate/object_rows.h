@@ -13,7 +13,7 @@
 
 namespace perdure::tools {
 
-struct ObjectRow {
+struct EstimateRow {
   std::uint64_t frame = 0;
   TimePoint time;
   std::uint64_t id = 0;
@@ -24,12 +24,12 @@ struct ObjectRow {
 };
 
 /// Throws StartupError(kUnavailable) that names each wrong line.
-std::vector<ObjectRow> readObjectRows(const std::filesystem::path& file);
+std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file);
 
 /// The body's pose by frame index. A trajectory has times only; the rows of the CSV tie times to
 /// frames, stamps that are multiples of 0.1 s from 0 (KITTI tracking) tie themselves, and lines
 /// between tied ones are consecutive frames, or where they cannot be, placed by time.
 std::map<std::uint64_t, RigidTransform> posesByFrame(const std::vector<replay::StampedPose>& poses,
-                                                     const std::vector<ObjectRow>& rows);
+                                                     const std::vector<EstimateRow>& rows);
 
 }  // namespace perdure::tools

@@ -137,7 +137,7 @@ double Cell::precision() const {
   return claimed == 0 ? 1.0 : static_cast<double>(matched) / static_cast<double>(claimed);
 }
 
-std::optional<Estimate> toCamera(const ObjectRow& row, const RigidTransform& T_RW,
+std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
                                  const replay::KittiCalibration& calibration) {
   constexpr double kClosest = 0.1;  // metres before the camera, for corners behind it
   const auto project = [&](const Eigen::Vector3d& point) -> Eigen::Vector2d {
@@ -186,7 +186,7 @@ bool isNeutral(const Estimate& estimate, const TruthFrame& truth) {
   return belongs && bestOverlap(estimate.box, truth.counted) <= overlap;
 }
 
-ObjectScore scoreObjects(const std::vector<ObjectRow>& rows,
+ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
                          const std::map<std::uint64_t, TruthFrame>& truth,
                          const PosesByFrame& poses, const replay::KittiCalibration& calibration,
                          const ScoreOptions& options) {

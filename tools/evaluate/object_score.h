@@ -51,12 +51,12 @@ struct Estimate {
 };
 
 /// Maps a row from W into the camera; nothing where the centre is behind or outside the image.
-std::optional<Estimate> toCamera(const ObjectRow& row, const RigidTransform& T_RW,
+std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
                                  const replay::KittiCalibration& calibration);
 /// Whether an unmatched estimate belongs to an ignored label rather than to a counted one.
 bool isNeutral(const Estimate& estimate, const TruthFrame& truth);
 
-ObjectScore scoreObjects(const std::vector<ObjectRow>& rows,
+ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
                          const std::map<std::uint64_t, TruthFrame>& truth,
                          const PosesByFrame& poses, const replay::KittiCalibration& calibration,
                          const ScoreOptions& options);

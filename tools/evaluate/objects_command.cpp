@@ -44,7 +44,7 @@ Evaluated evaluate(const ObjectsOptions& options) {
   const auto calibration = readCalibration(options);
   auto rows = readObjectRows(csv);
   const auto poses = posesByFrame(replay::PoseFile::read(tum).poses(), rows);
-  std::erase_if(rows, [&](const ObjectRow& row) { return row.class_name != options.class_name; });
+  std::erase_if(rows, [&](const EstimateRow& row) { return row.class_name != options.class_name; });
   const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
   return {scoreObjects(rows, truth, poses, calibration, options.score), rows.size(), poses.size()};
 }

@@ -7,9 +7,9 @@
 
 namespace perdure::tools {
 namespace {
-constexpr double kA = 6378137.0;                 // semi-major axis, m
-constexpr double kF = 1.0 / 298.257223563;       // flattening
-constexpr double kE2 = kF * (2.0 - kF);          // first eccentricity squared
+constexpr double kA = 6378137.0;            // semi-major axis, m
+constexpr double kF = 1.0 / 298.257223563;  // flattening
+constexpr double kE2 = kF * (2.0 - kF);     // first eccentricity squared
 constexpr double kDeg = std::numbers::pi / 180.0;
 }  // namespace
 
@@ -44,8 +44,7 @@ Eigen::Matrix3d enuAxes(const Geodetic& g) {
   return axes;
 }
 
-GeoReference::GeoReference(const GeoAnchor& anchor, const RigidTransform& T_WB)
-    : p_WB_(T_WB.p) {
+GeoReference::GeoReference(const GeoAnchor& anchor, const RigidTransform& T_WB) : p_WB_(T_WB.p) {
   const Geodetic origin{anchor.latitude_deg, anchor.longitude_deg, anchor.height_m};
   origin_ecef_ = toEcef(origin);
   enu_axes_ = enuAxes(origin);

@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 
-#include "common/types/sensors.h"
 #include "common/math/rigid_transform.h"
+#include "common/types/sensors.h"
 
 namespace perdure::tools {
 

@@ -45,8 +45,8 @@ void drawFootprint(Canvas& canvas, const ClassBelief& belief, const cv::Scalar& 
   const Eigen::Matrix2d R = rotationAboutZ(belief.mean[3]).topLeftCorner<2, 2>();
   std::vector<cv::Point> corners;
   for (const auto& [sx, sy] : {std::pair{1, 1}, {1, -1}, {-1, -1}, {-1, 1}}) {
-    corners.emplace_back(canvas.at(belief.mean.head<2>() +
-                                   R * Eigen::Vector2d(sx * half.x(), sy * half.y())));
+    corners.emplace_back(
+        canvas.at(belief.mean.head<2>() + R * Eigen::Vector2d(sx * half.x(), sy * half.y())));
   }
   cv::polylines(canvas.image(), corners, true, colour, 2, cv::LINE_AA);
   cv::line(canvas.image(), canvas.at(belief.mean.head<2>()),
@@ -57,14 +57,14 @@ void drawFootprint(Canvas& canvas, const ClassBelief& belief, const cv::Scalar& 
 void drawUncertainty(Canvas& canvas, const ClassBelief& belief, const cv::Scalar& colour) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
       Eigen::Matrix2d(belief.covariance.topLeftCorner<2, 2>()));
-  const Eigen::Vector2d axes =
-      2.0 * canvas.scale() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector2d axes = 2.0 * canvas.scale() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   if (!axes.allFinite() || axes.maxCoeff() > 4.0 * kLongSide) return;
   const Eigen::Vector2d major = eigen.eigenvectors().col(1);
   const double degrees = -std::atan2(major.y(), major.x()) * 180.0 / std::numbers::pi;
-  cv::ellipse(canvas.image(), canvas.at(belief.mean.head<2>()),
-              cv::Size(std::max(1, static_cast<int>(axes[1])), std::max(1, static_cast<int>(axes[0]))),
-              degrees, 0, 360, colour, 1, cv::LINE_AA);
+  cv::ellipse(
+      canvas.image(), canvas.at(belief.mean.head<2>()),
+      cv::Size(std::max(1, static_cast<int>(axes[1])), std::max(1, static_cast<int>(axes[0]))),
+      degrees, 0, 360, colour, 1, cv::LINE_AA);
 }
 
 void drawScaleBar(Canvas& canvas) {
@@ -87,8 +87,8 @@ bool drawMap(const std::vector<Eigen::Vector3d>& path, const std::vector<ObjectB
   const Eigen::Vector2d room = Eigen::Vector2d::Constant(4.0);
   Canvas canvas(bounds.min() - room, bounds.max() + room);
   for (std::size_t i = 1; i < path.size(); ++i) {
-    cv::line(canvas.image(), canvas.at(path[i - 1].head<2>()), canvas.at(path[i].head<2>()), kPath, 2,
-             cv::LINE_AA);
+    cv::line(canvas.image(), canvas.at(path[i - 1].head<2>()), canvas.at(path[i].head<2>()), kPath,
+             2, cv::LINE_AA);
   }
   for (const ObjectBelief& object : objects) {
     const cv::Scalar& colour = object.moving >= 0.5 ? kMoving : kStatic;

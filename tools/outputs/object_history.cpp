@@ -37,7 +37,8 @@ void ObjectHistory::add(const Objects& message) {
       newest = message.stamp.sequence;
       last_[object.id] = object;
     }
-    if (!object.confirmed || object.moving >= kMovingAbove || !isInSight(object.visibility)) continue;
+    if (!object.confirmed || object.moving >= kMovingAbove || !isInSight(object.visibility))
+      continue;
     ObjectRow row = rowOf(object);
     row.frame = message.stamp.sequence;
     row.time = message.stamp.time;
@@ -48,12 +49,21 @@ void ObjectHistory::add(const Objects& message) {
 
 void ObjectHistory::add(const Event& event) {
   switch (event.kind) {
-    case EventKind::kMerged: merged_into_[event.other_id] = event.object_id; break;
-    case EventKind::kGone: gone_.insert(event.object_id); break;
-    case EventKind::kArchived: archived_.insert(event.object_id); break;
+    case EventKind::kMerged:
+      merged_into_[event.other_id] = event.object_id;
+      break;
+    case EventKind::kGone:
+      gone_.insert(event.object_id);
+      break;
+    case EventKind::kArchived:
+      archived_.insert(event.object_id);
+      break;
     case EventKind::kRecalled:
-    case EventKind::kRestored: archived_.erase(event.object_id); break;
-    default: break;
+    case EventKind::kRestored:
+      archived_.erase(event.object_id);
+      break;
+    default:
+      break;
   }
 }
 

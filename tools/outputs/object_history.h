@@ -1,5 +1,6 @@
 // What the filter said of each object in each frame, and the two tables made of it: INST (the
-// causal estimate at the frame) and FINAL (the object's last estimate, mapped back; paper, line 337).
+// causal estimate at the frame) and FINAL (the object's last estimate, mapped back; paper, line
+// 337).
 #pragma once
 
 #include <cstdint>

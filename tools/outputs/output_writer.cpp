@@ -46,9 +46,10 @@ Json featureOf(const ObjectBelief& belief, const GeoReference& reference) {
           {"id", belief.id},
           {"geometry",
            {{"type", "Point"},
-            {"coordinates", {std::stod(fmt::format("{:.9f}", g.longitude_deg)),
-                             std::stod(fmt::format("{:.9f}", g.latitude_deg)),
-                             std::stod(fmt::format("{:.3f}", g.height_m))}}}},
+            {"coordinates",
+             {std::stod(fmt::format("{:.9f}", g.longitude_deg)),
+              std::stod(fmt::format("{:.9f}", g.latitude_deg)),
+              std::stod(fmt::format("{:.3f}", g.height_m))}}}},
           {"properties",
            {{"class", best.name},
             {"existence", rounded(belief.existence)},
@@ -141,10 +142,10 @@ void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectR
   std::ofstream file = openForWriting(folder_ / name);
   file << "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible\n";
   for (const ObjectRow& r : rows) {
-    file << fmt::format("{},{},{},{},{},{:.6f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.5f},{}\n",
-                        sequence_, r.frame, toNanoseconds(r.time), r.object_id, r.class_name,
-                        r.score, r.p_W.x(), r.p_W.y(), r.p_W.z(), r.size.x(), r.size.y(),
-                        r.size.z(), r.yaw, r.visible ? 1 : 0);
+    file << fmt::format(
+        "{},{},{},{},{},{:.6f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.5f},{}\n", sequence_,
+        r.frame, toNanoseconds(r.time), r.object_id, r.class_name, r.score, r.p_W.x(), r.p_W.y(),
+        r.p_W.z(), r.size.x(), r.size.y(), r.size.z(), r.yaw, r.visible ? 1 : 0);
   }
 }
 

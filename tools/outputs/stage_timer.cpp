@@ -15,10 +15,10 @@ double nowMs(clockid_t clock) {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-nlohmann::ordered_json summary(const std::vector<double>& values) {
+nlohmann::ordered_json summary(const std::vector<double>& values, double begun) {
   return {{"median", quantile(values, 0.5)},
           {"p99", quantile(values, 0.99)},
-          {"total", std::accumulate(values.begin(), values.end(), 0.0)}};
+          {"total", std::accumulate(values.begin(), values.end(), begun)}};
 }
 
 }  // namespace
@@ -33,22 +33,29 @@ double quantile(std::vector<double> values, double q) {
   return (1.0 - part) * values[low] + part * values[high];
 }
 
-StageTimer::Span::Span(StageTimer& timer, const std::string& stage)
-    : timer_(timer), stage_(stage), cpu_start_ms_(nowMs(CLOCK_PROCESS_CPUTIME_ID)),
+StageTimer::Span::Span(StageTimer& timer, const std::string& stage, bool whole)
+    : timer_(timer),
+      stage_(stage),
+      whole_(whole),
+      cpu_start_ms_(nowMs(CLOCK_PROCESS_CPUTIME_ID)),
       wall_start_ms_(nowMs(CLOCK_MONOTONIC)) {}
 
 StageTimer::Span::~Span() {
   Samples& samples = timer_.stages_[stage_];
-  samples.cpu_ms.push_back(nowMs(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_ms_);
-  samples.wall_ms.push_back(nowMs(CLOCK_MONOTONIC) - wall_start_ms_);
+  samples.cpu_begun_ms += nowMs(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_ms_;
+  samples.wall_begun_ms += nowMs(CLOCK_MONOTONIC) - wall_start_ms_;
+  if (!whole_) return;
+  samples.cpu_ms.push_back(samples.cpu_begun_ms);
+  samples.wall_ms.push_back(samples.wall_begun_ms);
+  samples.cpu_begun_ms = samples.wall_begun_ms = 0.0;
 }
 
 nlohmann::ordered_json StageTimer::toJson() const {
   nlohmann::ordered_json stages = nlohmann::ordered_json::object();
   for (const auto& [name, samples] : stages_) {
     stages[name] = {{"calls", samples.cpu_ms.size()},
-                    {"cpu_ms", summary(samples.cpu_ms)},
-                    {"wall_ms", summary(samples.wall_ms)}};
+                    {"cpu_ms", summary(samples.cpu_ms, samples.cpu_begun_ms)},
+                    {"wall_ms", summary(samples.wall_ms, samples.wall_begun_ms)}};
   }
   return {{"stages", stages}};
 }

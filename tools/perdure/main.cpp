@@ -5,6 +5,8 @@
 
 #include "common/base/errors.h"
 #include "tools/evaluate/command.h"
+#include "tools/map/command.h"
+#include "tools/pipeline/command.h"
 
 namespace {
 
@@ -32,6 +34,8 @@ int main(int argc, char** argv) {
   CLI::App app("Perdure: a persistent, metric map of objects from a camera and an IMU");
   app.set_version_flag("--version", PERDURE_VERSION);
   app.require_subcommand(1);
+  perdure::tools::addPipelineCommand(app);
   perdure::tools::addEvaluateCommand(app);
+  perdure::tools::addMapCommand(app);
   return run(app, argc, argv);
 }

@@ -1,0 +1,81 @@
+#include "tools/pipeline/command.h"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "tools/pipeline/pipeline.h"
+#include "tools/pipeline/report.h"
+
+namespace perdure::tools {
+namespace {
+
+void addOptions(CLI::App& app, PipelineOptions& options) {
+  app.add_option("--data", options.data, "Dataset folder: EuRoC, KITTI raw or KITTI tracking")
+      ->required();
+  app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000");
+  app.add_option("--odometry", options.odometry, "vio, truth, or a pose file (TUM or KITTI lines)")
+      ->required();
+  app.add_option("--detections", options.detections, "model, none, simulated, or a CSV")
+      ->required();
+  app.add_option("--model", options.model, "Network for --detections model (.onnx, .cfg)");
+  app.add_option("--class", options.class_name, "Class of a headerless CSV, for example Car");
+  app.add_option("--box-origin", options.box_origin,
+                 "First pixel's coordinate in the CSV; RRC counts from 1")
+      ->capture_default_str();
+  app.add_option("--image-size", options.image_size, "Width and height, KITTI tracking only")
+      ->expected(2)
+      ->check(CLI::Range(1, 65535));
+  app.add_option("--out", options.out, "Folder for the results")->required();
+  app.add_option("--seconds", options.seconds, "Stop after so many seconds of data")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--config", options.configs, "service=FILE in place of config/service.yaml")
+      ->take_all();
+  app.add_option("--set", options.assignments, "service.key=value")->take_all();
+  app.add_flag("--quiet", options.quiet, "No progress");
+}
+
+/// A line that rewrites itself on a terminal; elsewhere one line each 50 frames.
+void showProgress(const Pipeline& pipeline, const PipelineCounts& counts) {
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  if (!terminal && counts.frames % 50 != 0) return;
+  std::fprintf(stderr, "%sframe %llu of %zu, %llu poses, %llu detections, %zu objects%s",
+               terminal ? "\r" : "", static_cast<unsigned long long>(counts.frames),
+               pipeline.dataset().frameCount(), static_cast<unsigned long long>(counts.odometry),
+               static_cast<unsigned long long>(counts.detections),
+               pipeline.outputs().history().confirmedNow(), terminal ? "\033[K" : "\n");
+}
+
+void run(const PipelineOptions& options) {
+  Pipeline pipeline(options);
+  pipeline.run([&](const PipelineCounts& counts) {
+    if (!options.quiet) showProgress(pipeline, counts);
+  });
+  if (!options.quiet && isatty(STDERR_FILENO) != 0) std::fputc('\n', stderr);
+  pipeline.finish();
+  pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
+  for (const auto& [service, reasons] : pipeline.reasons()) {
+    for (const auto& [code, count] : reasons.all()) {
+      std::fprintf(stderr, "%s: %s %llu times\n", service.c_str(), code.c_str(),
+                   static_cast<unsigned long long>(count));
+    }
+  }
+  std::printf("%llu frames, %llu poses, %llu detections, %zu objects on the map: %s\n",
+              static_cast<unsigned long long>(pipeline.counts().frames),
+              static_cast<unsigned long long>(pipeline.counts().odometry),
+              static_cast<unsigned long long>(pipeline.counts().detections),
+              pipeline.outputs().history().lastBeliefs().size(), options.out.c_str());
+}
+
+}  // namespace
+
+void addPipelineCommand(CLI::App& app) {
+  auto options = std::make_shared<PipelineOptions>();
+  CLI::App* pipeline = app.add_subcommand(
+      "pipeline", "Run the services' nodes in one process over a dataset, repeatably");
+  addOptions(*pipeline, *options);
+  pipeline->callback([options] { run(*options); });
+}
+
+}  // namespace perdure::tools

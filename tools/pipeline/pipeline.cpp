@@ -1,0 +1,278 @@
+#include "tools/pipeline/pipeline.h"
+
+#include <chrono>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+
+#include "common/base/errors.h"
+#include "common/replay/class_aliases.h"
+#include "services/semantic_filter/priors.h"
+
+namespace perdure::tools {
+namespace {
+
+// Fixed, so that nothing in the outputs depends on the run.
+constexpr InstanceId kCapture = 1, kVio = 2, kInference = 3, kFilter = 4;
+
+double wallMs() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double, std::milli>(now).count();
+}
+
+std::string sequenceName(const PipelineOptions& options) {
+  if (!options.sequence.empty()) return options.sequence;
+  const auto path = std::filesystem::absolute(options.data).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
+}  // namespace
+
+Pipeline::Pipeline(const PipelineOptions& options)
+    : options_(options), configs_(readServiceConfigs(options)) {
+  cv::setNumThreads(1);
+  if (options.odometry != "vio" && options.odometry != "truth") {
+    pose_file_ = replay::PoseFile::read(options.odometry);
+  }
+  openData(options);
+  openOdometry(options);
+  openDetections(options);
+  const auto priors = semantic_filter::loadClassPriors(configs_.semantic_filter.class_priors);
+  outputs_ = std::make_unique<OutputWriter>(options.out, sequenceName(options));
+  semantic_filter::Outputs sinks;
+  sinks.objects = [this](const Objects& objects) {
+    ++counts_.objects;
+    outputs_->onObjects(objects);
+    const auto started = started_ms_.find(objects.stamp.sequence);
+    if (started == started_ms_.end()) return;
+    counts_.latency_ms.push_back(wallMs() - started->second);
+    started_ms_.erase(started);
+  };
+  sinks.events = [this](const Event& event) { outputs_->onEvent(event); };
+  sinks.predictions = [](const Predictions&) {};
+  filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors, kFilter,
+                                                    std::move(sinks));
+  outputs_->onCalibration(dataset_->calibration());
+  filter_->onCalibration(dataset_->calibration());
+  if (inference_) filter_->onModel(inference_->model());
+}
+
+Pipeline::~Pipeline() = default;
+
+void Pipeline::openData(const PipelineOptions& options) {
+  replay::DatasetOptions data;
+  data.path = options.data;
+  data.sequence = options.sequence;
+  if (!options.image_size.empty()) data.image_size = {options.image_size[0], options.image_size[1]};
+  if (pose_file_ && pose_file_->format() == replay::PoseFormat::kKitti) {
+    data.frame_count = pose_file_->poses().size();
+  }
+  data.source = kCapture;
+  data.second_encoding = ImageEncoding::kMono8;
+  data.decode = options.odometry == "vio" || options.detections == "model";
+  dataset_ = replay::Dataset::open(data);
+}
+
+void Pipeline::openOdometry(const PipelineOptions& options) {
+  if (options.odometry == "truth") {
+    if (!dataset_->truth()) {
+      throw StartupError(
+          ExitCode::kUnavailable,
+          options.data + " holds no true poses; give --odometry a pose file, or vio");
+    }
+    pose_file_ = dataset_->truth();
+  }
+  if (pose_file_) {
+    poses_ = std::make_unique<PoseOdometry>(*pose_file_, kVio);
+    return;
+  }
+  uses_vio_ = true;
+  if (!dataset_->calibration().imu) {
+    throw StartupError(ExitCode::kUnavailable, options.data +
+                                                   " has no inertial samples, which vio "
+                                                   "needs; give --odometry a pose file");
+  }
+#ifdef PERDURE_HAS_VIO
+  vio::Outputs sinks;
+  sinks.odometry = [this](const Odometry& odometry) { new_odometry_.push_back(odometry); };
+  sinks.landmarks = [this](const Landmarks& landmarks) {
+    landmarks_[landmarks.stamp.sequence] = landmarks;
+  };
+  vio_ = std::make_unique<vio::Node>(configs_.vio, kVio, std::move(sinks));
+  vio_->setWorld({1, 0});
+  vio_->onCalibration(dataset_->calibration());
+#else
+  throw StartupError(ExitCode::kUnavailable, "this build has no vio; give --odometry a pose file");
+#endif
+}
+
+void Pipeline::openDetections(const PipelineOptions& options) {
+  if (options.detections == "none") return;
+  if (options.detections == "simulated") {
+    throw StartupError(ExitCode::kUnavailable,
+                       "--detections simulated needs a simulated folder (objects_truth.json, "
+                       "visibility_truth.csv), which this version does not make yet; give a CSV, "
+                       "model or none");
+  }
+  if (options.detections != "model") {
+    const auto aliases = replay::ClassAliases::load(configFolder() / "class_aliases.yaml");
+    replay::DetectionFileOptions file;
+    file.file = options.detections;
+    file.class_name = options.class_name;
+    file.box_origin = options.box_origin;
+    detection_file_ = replay::DetectionFile::read(file, aliases);
+    return;
+  }
+  if (options.model.empty() && configs_.inference.model.path.empty()) {
+    throw StartupError(ExitCode::kUsage,
+                       "--detections model needs a network: give --model FILE.onnx");
+  }
+  if (!options.model.empty()) configs_.inference.model.path = options.model;
+  if (dataset_->kind() == replay::DatasetKind::kKittiTracking &&
+      !std::filesystem::is_directory(std::filesystem::path(options.data) / "image_02")) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options.data +
+                           " has no images (image_02), which --detections model needs; "
+                           "give --detections a CSV");
+  }
+  inference_ = std::make_unique<inference::Node>(configs_.inference, kInference);
+}
+
+void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
+  while (auto message = timer_.timeTowardsNext("decode", [&] { return dataset_->next(); })) {
+    const Frame* frame = std::get_if<Frame>(&*message);
+    const bool first_camera =
+        frame != nullptr && frame->camera == dataset_->calibration().cameras.front().name;
+    if (first_camera) {
+      timer_.time("decode", [] {});
+      if (!first_frame_) first_frame_ = frame->stamp.time;
+      if (options_.seconds && toSeconds(frame->stamp.time - *first_frame_) > *options_.seconds)
+        break;
+    }
+    handle(*message);
+    if (first_camera) progress(counts_);
+  }
+#ifdef PERDURE_HAS_VIO
+  if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
+#endif
+  deliver();
+  timer_.timeTowardsNext("semantic_filter", [&] { filter_->flush(); });
+}
+
+void Pipeline::handle(const replay::Message& message) {
+  if (const auto* frame = std::get_if<Frame>(&message)) return handleFrame(*frame);
+#ifdef PERDURE_HAS_VIO
+  if (!vio_) return;
+  timer_.timeTowardsNext("vio", [&] {
+    if (const auto* imu = std::get_if<ImuSample>(&message)) vio_->onImu(*imu);
+    if (const auto* speed = std::get_if<SpeedSample>(&message)) vio_->onSpeed(*speed);
+  });
+  deliver();
+#endif
+}
+
+void Pipeline::handleFrame(const Frame& frame) {
+  const bool first_camera = frame.camera == dataset_->calibration().cameras.front().name;
+  if (first_camera) {
+    ++counts_.frames;
+    started_ms_[frame.stamp.sequence] = wallMs();
+  }
+#ifdef PERDURE_HAS_VIO
+  if (vio_) {
+    const auto work = [&] { vio_->onFrame(frame); };
+    if (first_camera)
+      timer_.time("vio", work);
+    else
+      timer_.timeTowardsNext("vio", work);
+  }
+#endif
+  if (!first_camera) return deliver();
+  if (poses_) {
+    if (const auto odometry = poses_->at(frame.stamp))
+      new_odometry_.push_back(*odometry);
+    else
+      reasons_.add("frame_without_pose");
+  }
+  detect(frame);
+  deliver();
+  timer_.time("semantic_filter", [] {});
+}
+
+void Pipeline::detect(const Frame& frame) {
+  if (inference_) {
+    auto detections = timer_.time("inference", [&] { return inference_->infer(frame); });
+    if (detections)
+      offer(*std::move(detections));
+    else
+      reasons_.add(detections.error());
+    return;
+  }
+  if (!detection_file_) return;
+  const auto found = detection_file_->at(frame.stamp.sequence);
+  const ModelInfo model = detection_file_->modelAt(frame.stamp.sequence);
+  if (!found || model.classes.empty()) return;
+  if (model.hash != model_hash_) {
+    filter_->onModel(model);
+    model_hash_ = model.hash;
+  }
+  Detections detections;
+  detections.stamp = frame.stamp;
+  detections.camera = frame.camera;
+  detections.instance = kInference;
+  detections.model_hash = model.hash;
+  detections.detections = *found;
+  offer(std::move(detections));
+}
+
+void Pipeline::offer(Detections detections) {
+  ++counts_.inferred;
+  counts_.detections += detections.detections.size();
+  waiting_[detections.stamp.sequence] = std::move(detections);
+}
+
+/// Hands on what has come, each frame's odometry first, then its landmarks, then its detections.
+void Pipeline::deliver() {
+  for (const Odometry& odometry : std::exchange(new_odometry_, {})) {
+    const std::uint64_t frame = odometry.stamp.sequence;
+    outputs_->onOdometry(odometry);
+    ++counts_.odometry;
+    timer_.timeTowardsNext("semantic_filter", [&] { filter_->onOdometry(odometry); });
+    const auto landmarks = landmarks_.find(frame);
+    if (landmarks != landmarks_.end()) {
+      timer_.timeTowardsNext("semantic_filter", [&] { filter_->onLandmarks(landmarks->second); });
+    }
+    waits_for_detections_.insert(frame);
+    if (waits_for_detections_.size() > 64)
+      waits_for_detections_.erase(waits_for_detections_.begin());
+    timer_.timeTowardsNext("semantic_filter", [&] { deliverDetections(frame); });
+    landmarks_.erase(landmarks_.begin(), landmarks_.upper_bound(frame));
+  }
+  while (!waiting_.empty() && waits_for_detections_.contains(waiting_.begin()->first)) {
+    timer_.timeTowardsNext("semantic_filter", [&] { deliverDetections(waiting_.begin()->first); });
+  }
+  while (waiting_.size() > 256) waiting_.erase(waiting_.begin());
+}
+
+void Pipeline::deliverDetections(std::uint64_t frame) {
+  const auto found = waiting_.find(frame);
+  if (found == waiting_.end()) return;
+  filter_->onDetections(found->second);
+  waiting_.erase(found);
+  waits_for_detections_.erase(frame);
+}
+
+void Pipeline::finish() {
+  outputs_->finish();
+  outputs_->writeJson("timing.json", timer_.toJson());
+}
+
+std::map<std::string, ReasonCounts> Pipeline::reasons() const {
+  std::map<std::string, ReasonCounts> all{{"capture", dataset_->reasons()},
+                                          {"semantic_filter", filter_->reasons()},
+                                          {"pipeline", reasons_}};
+#ifdef PERDURE_HAS_VIO
+  if (vio_) all["vio"] = vio_->reasons();
+#endif
+  return all;
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,89 @@
+// The services' nodes in one process, lock-step: a frame is taken only when everything that follows
+// from the one before is done. No clock enters, instance ids are fixed: two runs give the same
+// bytes.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "common/replay/dataset.h"
+#include "common/replay/detection_file.h"
+#include "services/inference/node.h"
+#include "services/semantic_filter/node.h"
+#include "tools/outputs/output_writer.h"
+#include "tools/outputs/stage_timer.h"
+#include "tools/pipeline/odometry_source.h"
+#include "tools/pipeline/settings.h"
+#ifdef PERDURE_HAS_VIO
+#include "services/vio/node.h"
+#endif
+
+namespace perdure::tools {
+
+/// What went through, for report.json and the progress line.
+struct PipelineCounts {
+  std::uint64_t frames = 0, frames_unreadable = 0, odometry = 0, inferred = 0, detections = 0,
+                objects = 0;
+  std::vector<double> latency_ms;  ///< wall time from a decoded frame to its `objects`
+};
+
+class Pipeline {
+ public:
+  /// Throws StartupError with the mend: data, poses, detections, model, configuration.
+  explicit Pipeline(const PipelineOptions& options);
+  ~Pipeline();
+
+  /// Until the data or --seconds end; `progress` is called after each frame of cam0.
+  void run(const std::function<void(const PipelineCounts&)>& progress);
+  /// Writes every file but report.json.
+  void finish();
+
+  const PipelineCounts& counts() const { return counts_; }
+  const replay::Dataset& dataset() const { return *dataset_; }
+  const OutputWriter& outputs() const { return *outputs_; }
+  OutputWriter& outputs() { return *outputs_; }
+  std::uint64_t configurationDigest() const { return configs_.digest; }
+  bool usesVio() const { return uses_vio_; }
+  bool usesModel() const { return inference_ != nullptr; }
+  /// Counted reasons by service.
+  std::map<std::string, ReasonCounts> reasons() const;
+
+ private:
+  void openOdometry(const PipelineOptions& options);
+  void openDetections(const PipelineOptions& options);
+  void openData(const PipelineOptions& options);
+  void handle(const replay::Message& message);
+  void handleFrame(const Frame& frame);
+  void detect(const Frame& frame);
+  void offer(Detections detections);
+  void deliver();
+  void deliverDetections(std::uint64_t frame);
+
+  PipelineOptions options_;
+  ServiceConfigs configs_;
+  StageTimer timer_;
+  std::unique_ptr<replay::Dataset> dataset_;
+  std::unique_ptr<OutputWriter> outputs_;
+  std::unique_ptr<PoseOdometry> poses_;
+  std::optional<replay::PoseFile> pose_file_;
+  std::optional<replay::DetectionFile> detection_file_;
+  std::unique_ptr<inference::Node> inference_;
+#ifdef PERDURE_HAS_VIO
+  std::unique_ptr<vio::Node> vio_;
+#endif
+  std::unique_ptr<semantic_filter::Node> filter_;
+  bool uses_vio_ = false;
+  std::uint64_t model_hash_ = 0;
+  std::optional<TimePoint> first_frame_;
+  std::vector<Odometry> new_odometry_;            // of vio, not yet handed on
+  std::map<std::uint64_t, Landmarks> landmarks_;  // by frame, waiting for the filter
+  std::map<std::uint64_t, Detections> waiting_;   // detections whose odometry has not come
+  std::set<std::uint64_t> waits_for_detections_;  // frames whose odometry has come
+  std::map<std::uint64_t, double> started_ms_;    // wall clock, by frame
+  ReasonCounts reasons_;
+  PipelineCounts counts_;
+};
+
+}  // namespace perdure::tools

@@ -1,0 +1,97 @@
+#include "tools/pipeline/report.h"
+
+#include <filesystem>
+
+#include "common/base/ids.h"
+#include "tools/evaluate/object_score.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+Json serviceCounts(std::uint64_t in, std::uint64_t out, std::uint64_t dropped) {
+  return {{"frames_in", in}, {"frames_out", out}, {"dropped", dropped}, {"restarts", 0}};
+}
+
+std::uint64_t unreadable(const ReasonCounts& reasons) {
+  std::uint64_t count = 0;
+  for (const auto& [code, times] : reasons.all()) {
+    if (code.starts_with("image_")) count += times;
+  }
+  return count;
+}
+
+Json services(const Pipeline& pipeline, const std::map<std::string, ReasonCounts>& reasons) {
+  const PipelineCounts& counts = pipeline.counts();
+  Json json;
+  const std::uint64_t lost = unreadable(reasons.at("capture"));
+  json["capture"] = serviceCounts(counts.frames + lost, counts.frames, lost);
+  json["vio"] = serviceCounts(counts.frames, counts.odometry,
+                              counts.frames - std::min(counts.frames, counts.odometry));
+  json["inference"] =
+      serviceCounts(pipeline.usesModel() ? counts.frames : counts.inferred, counts.inferred, 0);
+  json["semantic_filter"] = serviceCounts(
+      counts.odometry, counts.objects, counts.odometry - std::min(counts.odometry, counts.objects));
+  for (const auto& [service, counted] : reasons) {
+    if (counted.all().empty()) continue;
+    json[service]["reasons"] = counted.all();
+  }
+  return json;
+}
+
+void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequence) {
+  std::error_code ignored;
+  for (const char* folder : {"label_02", "calib"}) {
+    fs::create_directories(to / folder, ignored);
+    fs::copy_file(from / folder / (sequence + ".txt"), to / folder / (sequence + ".txt"),
+                  fs::copy_options::overwrite_existing, ignored);
+  }
+}
+
+Json objectScore(const PipelineOptions& options, const fs::path& labels_file) {
+  const fs::path out = options.out;
+  const auto labels = replay::readKittiLabels(labels_file);
+  auto calibration = replay::readTrackingCalibration(fs::path(options.data) / "calib" /
+                                                     (options.sequence + ".txt"));
+  const auto size = replay::trackingImageSize(options.sequence);
+  calibration.width = options.image_size.empty() ? size.width : options.image_size[0];
+  calibration.height = options.image_size.empty() ? size.height : options.image_size[1];
+  auto rows = readObjectRows(out / "objects_final.csv");
+  const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
+  std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
+  const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+  const ObjectScore score = scoreObjects(rows, truth, poses, calibration, {});
+  const Cell& at_one_metre = score.cells[1][2];
+  return {{"recall", at_one_metre.recall()},
+          {"precision", at_one_metre.precision()},
+          {"duplicates", score.duplicates},
+          {"position_error_m", score.position_error_m}};
+}
+
+}  // namespace
+
+Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
+  Json report = {{"program", "perdure pipeline"},
+                 {"version", PERDURE_VERSION},
+                 {"configuration", toHex(pipeline.configurationDigest())},
+                 {"data", options.data},
+                 {"sequence", options.sequence},
+                 {"odometry", options.odometry},
+                 {"detections", options.detections},
+                 {"model", options.model}};
+  const auto& latency = pipeline.counts().latency_ms;
+  report["services"] = services(pipeline, pipeline.reasons());
+  report["latency_ms"] = {{"median", quantile(latency, 0.5)}, {"p99", quantile(latency, 0.99)}};
+  const fs::path labels = fs::path(options.data) / "label_02" / (options.sequence + ".txt");
+  const bool has_truth =
+      pipeline.dataset().kind() == replay::DatasetKind::kKittiTracking && fs::exists(labels);
+  if (has_truth && pipeline.outputs().odometryFrames() > 0) {
+    report["objects"] = objectScore(options, labels);
+    copyTruth(options.data, fs::path(options.out) / "truth", options.sequence);
+  }
+  return report;
+}
+
+}  // namespace perdure::tools

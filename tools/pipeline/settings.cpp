@@ -1,0 +1,107 @@
+#include "tools/pipeline/settings.h"
+
+#include <cstdlib>
+
+#include "common/base/errors.h"
+#include "common/base/ids.h"
+#include "common/config/fields.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Service {
+  std::string name;
+  config::Fields fields;
+};
+
+std::vector<Service> describeAll(ServiceConfigs& configs) {
+  std::vector<Service> services;
+#ifdef PERDURE_HAS_VIO
+  vio::describe(configs.vio, services.emplace_back(Service{"vio", {}}).fields);
+#endif
+  semantic_filter::describe(configs.semantic_filter,
+                            services.emplace_back(Service{"semantic_filter", {}}).fields);
+  inference::describe(configs.inference, services.emplace_back(Service{"inference", {}}).fields);
+  return services;
+}
+
+/// Splits `text` at the first `separator`; the service of the part before it.
+Service& serviceOf(std::vector<Service>& services, const std::string& text, char separator,
+                   const char* option) {
+  const std::string name = text.substr(0, text.find(separator));
+  std::string known;
+  for (auto& service : services) {
+    if (service.name == name && name.size() < text.size()) return service;
+    known += (known.empty() ? "" : ", ") + service.name;
+  }
+  throw StartupError(ExitCode::kUsage, std::string(option) + " " + text +
+                                           ": does not begin with a service and `" + separator +
+                                           "`; services are " + known);
+}
+
+void readFiles(std::vector<Service>& services, const PipelineOptions& options,
+               std::vector<config::Problem>& problems) {
+  std::vector<std::pair<Service*, std::string>> files;
+  for (auto& service : services) {
+    const fs::path file = configFolder() / (service.name + ".yaml");
+    if (fs::exists(file)) files.emplace_back(&service, file.string());
+  }
+  for (const auto& entry : options.configs) {
+    Service& service = serviceOf(services, entry, '=', "--config");
+    std::erase_if(files, [&](const auto& file) { return file.first == &service; });
+    files.emplace_back(&service, entry.substr(service.name.size() + 1));
+  }
+  for (const auto& [service, file] : files) {
+    const auto found = config::readFile(service->fields, file);
+    problems.insert(problems.end(), found.begin(), found.end());
+  }
+}
+
+}  // namespace
+
+fs::path configFolder() {
+  const auto holds = [](const fs::path& folder) {
+    std::error_code ignored;
+    return fs::exists(folder / "class_aliases.yaml", ignored);
+  };
+  if (const char* given = std::getenv("PERDURE_CONFIG_DIR"); given != nullptr && *given != '\0') {
+    if (holds(given)) return given;
+    throw StartupError(ExitCode::kUnavailable,
+                       "PERDURE_CONFIG_DIR=" + std::string(given) +
+                           " holds no class_aliases.yaml; name Perdure's folder `config`");
+  }
+  if (holds("config")) return "config";
+  std::error_code error;
+  fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (int up = 0; up < 5 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
+    for (const char* there : {"config", "share/perdure", "etc/perdure"}) {
+      if (holds(folder / there)) return folder / there;
+    }
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     "the folder `config` with class_aliases.yaml is not found; name it in the "
+                     "environment variable PERDURE_CONFIG_DIR");
+}
+
+ServiceConfigs readServiceConfigs(const PipelineOptions& options) {
+  ServiceConfigs configs;
+  auto services = describeAll(configs);
+  std::vector<config::Problem> problems;
+  readFiles(services, options, problems);
+  for (const auto& assignment : options.assignments) {
+    Service& service = serviceOf(services, assignment, '.', "--set");
+    const auto found = config::assign(service.fields, assignment.substr(service.name.size() + 1));
+    problems.insert(problems.end(), found.begin(), found.end());
+  }
+  config::refuse(problems);
+  auto& priors = configs.semantic_filter.class_priors;
+  if (!fs::exists(priors)) priors = (configFolder() / fs::path(priors).filename()).string();
+  std::string values;
+  for (const auto& service : services) values += config::toYaml(service.fields);
+  configs.digest = digest(values);
+  return configs;
+}
+
+}  // namespace perdure::tools

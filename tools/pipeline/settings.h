@@ -1,0 +1,49 @@
+// What `perdure pipeline` is told, and the configuration of the services that it runs.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/inference/config.h"
+#include "services/semantic_filter/config.h"
+#ifdef PERDURE_HAS_VIO
+#include "services/vio/config.h"
+#endif
+
+namespace perdure::tools {
+
+struct PipelineOptions {
+  std::string data, sequence, out;
+  std::string odometry;    ///< vio, truth, or a pose file
+  std::string detections;  ///< model, simulated, none, or a CSV
+  std::string model, class_name;
+  std::vector<std::uint32_t> image_size;
+  double box_origin = 0.0;
+  std::optional<double> seconds;
+  std::vector<std::string> configs;      ///< service=FILE
+  std::vector<std::string> assignments;  ///< service.key=value
+  bool quiet = false;
+};
+
+/// The services' configurations after files and assignments.
+struct ServiceConfigs {
+#ifdef PERDURE_HAS_VIO
+  vio::Config vio;
+#endif
+  semantic_filter::Config semantic_filter;
+  inference::Config inference;
+  std::uint64_t digest = 0;  ///< of all values
+};
+
+/// Throws StartupError: kConfiguration with all that is wrong, kUsage for an unknown service.
+/// Files: config/SERVICE.yaml of the configuration folder where there is one, or --config.
+ServiceConfigs readServiceConfigs(const PipelineOptions& options);
+
+/// The folder `config`: $PERDURE_CONFIG_DIR, else the one of the working directory, of the source
+/// tree or installation above the program. Throws StartupError(kUnavailable) with the mend.
+std::filesystem::path configFolder();
+
+}  // namespace perdure::tools
