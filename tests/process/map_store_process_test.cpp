@@ -1,0 +1,132 @@
+// perdure-map-store as a process: killed and started again, asked over DDS and by its file.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "common/bus/topics.h"
+#include "common/bus/wait_loop.h"
+#include "tests/process/support.h"
+#include "tests/services/map_store/beliefs.h"
+#include "tools/map/map_source.h"
+
+namespace perdure::test {
+namespace {
+
+using namespace std::chrono_literals;
+using map_store::test::carAt;
+using map_store::test::workingSet;
+using ::testing::HasSubstr;
+
+class MapStoreProcess : public ::testing::Test {
+ protected:
+  std::unique_ptr<Child> start() {
+    const std::string log = folder_.file("log-" + std::to_string(++starts_));
+    auto child = std::make_unique<Child>(
+        std::vector<std::string>{(programs() / "perdure-map-store").string(), "--set",
+                                 "store.path=" + folder_.file("map.sqlite")},
+        log);
+    EXPECT_TRUE(eventually(10s, [&] { return objects_.matched() > 0; })) << child->log();
+    return child;
+  }
+
+  /// Beliefs as they come through the wire: symmetric covariances, PMFs that sum to one.
+  static Objects frame(std::uint64_t sequence, ObjectId objects) {
+    std::vector<ObjectBelief> cars;
+    for (ObjectId id = 1; id <= objects; ++id) {
+      cars.push_back(carAt(id, {static_cast<double>(id), 0.5, 0}));
+    }
+    return workingSet(sequence, cars);
+  }
+
+  std::size_t objectsOnTheMap() {
+    const auto reply = tools::askMapStore(participant_, MapQuery{}, 10.0);
+    return reply ? reply->objects.size() : SIZE_MAX;
+  }
+
+  bus::Domain domain_{ownNetwork()};
+  bus::Participant participant_{domain_, "test"};
+  bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
+  Folder folder_;
+  int starts_ = 0;
+};
+
+TEST_F(MapStoreProcess, HasEveryObjectAgainAfterItIsKilledASecondAfterItsConfirmation) {
+  const auto first = start();
+  ASSERT_TRUE(objects_.write(frame(1, 5)).has_value());
+  ASSERT_TRUE(eventually(1s, [&] { return objectsOnTheMap() == 5; })) << first->log();
+  first->signal(SIGKILL);
+  ASSERT_EQ(first->wait(5s), 128 + SIGKILL);
+  ASSERT_TRUE(eventually(15s, [&] { return objects_.matched() == 0; }));
+  const auto second = start();
+  EXPECT_EQ(objectsOnTheMap(), 5u) << second->log();
+}
+
+TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
+  const auto child = start();
+  bus::Reader<Recalled> recalled(participant_, bus::topics::kRecalled);
+  bus::Writer<MapQuery> queries(participant_, bus::topics::kMapQuery);
+  ASSERT_TRUE(eventually(5s, [&] { return recalled.matched() > 0 && queries.matched() > 0; }));
+  ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
+  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
+  MapQuery restore;
+  restore.client = 99;
+  restore.request = 1;
+  restore.kind = MapQueryKind::kRestore;
+  ASSERT_TRUE(queries.write(restore).has_value());
+  std::vector<Recalled> answers;
+  ASSERT_TRUE(eventually(5s, [&] {
+    recalled.drain([&](const Recalled& r) { answers.push_back(r); });
+    return !answers.empty();
+  })) << child->log();
+  EXPECT_EQ(answers[0].client, 99u);
+  EXPECT_TRUE(answers[0].restore);
+  EXPECT_EQ(answers[0].next_id, 4u);
+  ASSERT_EQ(answers[0].objects.size(), 3u);
+  EXPECT_EQ(answers[0].objects[2].best().mean, frame(1, 3).objects[2].best().mean);
+}
+
+TEST_F(MapStoreProcess, ShowsItsTilesToALateJoiner) {
+  const auto child = start();
+  ASSERT_TRUE(objects_.write(frame(1, 40)).has_value());
+  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 40; }));
+  bus::Reader<MapTile> tiles(participant_, bus::topics::kMap);
+  bus::Reader<MapHeader> headers(participant_, bus::topics::kMapHeader);
+  std::map<std::pair<int, int>, std::size_t> counts;
+  MapHeader header;
+  EXPECT_TRUE(eventually(5s, [&] {
+    tiles.drain([&](const MapTile& t) { counts[{t.x, t.y}] = t.objects.size(); });
+    headers.drain([&](const MapHeader& h) { header = h; });
+    std::size_t sum = 0;
+    for (const auto& [square, count] : counts) sum += count;
+    return header.objects == 40 && sum == 40;
+  })) << child->log();
+  EXPECT_EQ(header.tiles, counts.size());
+}
+
+TEST_F(MapStoreProcess, EndsWithinASecondAndLeavesAFileThatTheCommandReads) {
+  const auto child = start();
+  ASSERT_TRUE(objects_.write(frame(1, 4)).has_value());
+  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 4; }));
+  child->signal(SIGTERM);
+  EXPECT_EQ(child->wait(1s), 0) << child->log();
+  Child command({(programs() / "perdure").string(), "map", "list", "--db",
+                 folder_.file("map.sqlite")},
+                folder_.file("list"));
+  EXPECT_EQ(command.wait(10s), 0) << command.log();
+  EXPECT_THAT(command.log(), HasSubstr("car"));
+}
+
+TEST_F(MapStoreProcess, SaysWhatToDoWhenNobodyAnswersOrTheFileIsMissing) {
+  const std::string perdure = (programs() / "perdure").string();
+  Child asking({perdure, "map", "list", "--wait", "1"}, folder_.file("asking"));
+  EXPECT_EQ(asking.wait(10s), 69);
+  EXPECT_THAT(asking.log(), HasSubstr("start perdure-map-store"));
+  Child reading({perdure, "map", "list", "--db", folder_.file("none")}, folder_.file("reading"));
+  EXPECT_EQ(reading.wait(10s), 69);
+  EXPECT_THAT(reading.log(), HasSubstr("store.path"));
+  Child vague({perdure, "map", "query"}, folder_.file("vague"));
+  EXPECT_EQ(vague.wait(10s), 64);
+}
+
+}  // namespace
+}  // namespace perdure::test

@@ -1,0 +1,10 @@
+// `perdure map`: what the map store holds, asked over DDS or read from its file.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace perdure::tools {
+
+void addMapCommand(CLI::App& app);
+
+}  // namespace perdure::tools

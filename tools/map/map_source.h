@@ -1,0 +1,22 @@
+// Where questions about the map go: to the running map_store over DDS, or to its file.
+#pragma once
+
+#include <string>
+
+#include "common/base/result.h"
+#include "common/bus/domain.h"
+#include "common/types/map.h"
+
+namespace perdure::tools {
+
+/// Asks map_store on the bus: waits until both directions are matched, then sends the same request
+/// until it is answered (a question sent before that is lost silently). After `patience_s` the
+/// reason is "no_map_store" or "no_answer".
+Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
+                             double patience_s);
+
+/// Reads a map's file, also beside the running service. Places are looked for in query.world, or
+/// where it names none in the newest frame of reference.
+MapReply askMapFile(const std::string& path, const MapQuery& query);
+
+}  // namespace perdure::tools
