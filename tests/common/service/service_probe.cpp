@@ -1,0 +1,31 @@
+// A small service for the tests of runService: turns each IMU sample into a speed sample.
+#include "common/service/service.h"
+
+using namespace perdure;
+
+int main(int argc, char** argv) {
+  double gain = 1.0;
+  std::int64_t points = 100;
+  bool verbose = false;
+  const auto describe = [&](config::Fields& fields) {
+    fields.number("gain", gain, config::positive(), {"factor", "m/s", "use 1"});
+    fields.integer("points", points, config::between(1, 200), {"how many"});
+    fields.boolean("verbose", verbose, {"says more"});
+  };
+  const auto body = [&](service::Context& context) {
+    ReasonCounts reasons;
+    const Sink<SpeedSample> speed = context.sink(bus::topics::kSpeed);
+    context.countReasons([&]() -> const ReasonCounts& { return reasons; });
+    context.on(bus::topics::kImu, [&](const ImuSample& m) {
+      context.health().frameIn();
+      reasons.add("seen");
+      SpeedSample sample;
+      sample.sequence = m.sequence;
+      sample.speed = gain * m.accel.x();
+      speed(sample);
+      context.health().frameOut();
+    });
+    context.run();
+  };
+  return service::runService(argc, argv, {"probe", "A service for tests.", describe, body});
+}

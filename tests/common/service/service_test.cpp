@@ -1,0 +1,200 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include "common/bus/wait_loop.h"
+#include "tests/common/bus/isolation.h"
+
+namespace perdure::service {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class Isolation : public testing::Environment {
+ public:
+  void SetUp() override { tests::isolateNetwork(); }
+};
+const auto* const kIsolation = testing::AddGlobalTestEnvironment(new Isolation);
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;  // both streams
+};
+
+Outcome runProbe(const std::string& arguments) {
+  const std::string command =
+      std::string(std::getenv("PERDURE_SERVICE_PROBE")) + " " + arguments + " 2>&1";
+  Outcome outcome;
+  FILE* pipe = popen(command.c_str(), "r");
+  std::array<char, 4096> buffer{};
+  for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
+    outcome.output.append(buffer.data(), n);
+  }
+  const int status = pclose(pipe);
+  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+/// The probe as a running process.
+class Probe {
+ public:
+  Probe() {
+    pid_ = fork();
+    if (pid_ == 0) {
+      const char* program = std::getenv("PERDURE_SERVICE_PROBE");
+      execl(program, program, "--set", "log.level=off", nullptr);
+      _exit(127);
+    }
+  }
+  ~Probe() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+  }
+  Probe(const Probe&) = delete;
+  Probe& operator=(const Probe&) = delete;
+  pid_t pid() const { return pid_; }
+  /// Ends it by a signal; its exit status, or -1.
+  int end(int signal) {
+    kill(pid_, signal);
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t pid_ = 0;
+};
+
+class Service : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::getenv("PERDURE_SERVICE_PROBE") == nullptr) GTEST_SKIP() << "run by ctest";
+  }
+};
+
+TEST_F(Service, ChecksAConfigurationAndTellsEverythingThatIsWrongAtOnce) {
+  const std::string path = testing::TempDir() + "perdure_service_test.yaml";
+  std::ofstream(path) << "gian: 2\npoints: many\nlog:\n  level: loud\nbus: {domain: 999}\n";
+  const Outcome outcome = runProbe("--check-config --config " + path + " --set gain=-1");
+  EXPECT_EQ(outcome.exit_code, 78);
+  EXPECT_EQ(outcome.output, path + ":1:1: gian: is not a known key; did you mean gain?\n" + path +
+                                ":2:9: points: many is not a whole number\n" + path +
+                                ":4:10: log.level: loud is not one of trace, debug, info, "
+                                "warning, error, off\n" +
+                                path + ":5:15: bus.domain: 999 is not 0 … 230\n" +
+                                "--set gain=-1: gain: -1 is not > 0 m/s; use 1\n");
+  std::remove(path.c_str());
+}
+
+TEST_F(Service, AcceptsASoundConfigurationAndPrintsItBack) {
+  EXPECT_EQ(runProbe("--check-config --set gain=2 --set points=7").exit_code, 0);
+  const Outcome printed = runProbe("--print-config --set gain=2 --set points=7");
+  EXPECT_EQ(printed.exit_code, 0);
+  EXPECT_THAT(printed.output, StartsWith("# factor [m/s] (> 0)\ngain: 2\n# how many"));
+  EXPECT_THAT(printed.output, HasSubstr("bus:\n  # network interface"));
+}
+
+TEST_F(Service, ExplainsItselfAndRefusesAWrongCommandLine) {
+  EXPECT_EQ(runProbe("--help").exit_code, 0);
+  EXPECT_THAT(runProbe("--help").output, HasSubstr("A service for tests."));
+  EXPECT_EQ(runProbe("--version").exit_code, 0);
+  EXPECT_EQ(runProbe("--no-such-option").exit_code, 64);
+  EXPECT_EQ(runProbe("--config").exit_code, 64);
+  EXPECT_EQ(runProbe("--config /nonexistent.yaml").exit_code, 78);
+}
+
+TEST_F(Service, SaysWhatToMendWhereItCannotStart) {
+  const Outcome outcome = runProbe("--set bus.interface=nosuch0");
+  EXPECT_EQ(outcome.exit_code, 69);
+  EXPECT_THAT(outcome.output, HasSubstr("bus.interface names an interface"));
+}
+
+TEST_F(Service, WorksTellsItsHealthAndEndsInOrderAtSigterm) {
+  const bus::Domain domain{bus::Options{}};
+  const bus::Participant participant(domain, "test");
+  bus::WaitLoop loop(participant);
+  bus::Reader<Health> health(participant, bus::topics::kHealth);
+  bus::Reader<SpeedSample> speed(participant, bus::topics::kSpeed);
+  bus::Writer<ImuSample> imu(participant, bus::topics::kImu);
+  Health last;
+  int samples = 0;
+  loop.on(health, [&](const Health& m) { last = m; });
+  loop.on(speed, [&](const SpeedSample&) { ++samples; });
+  Probe probe;
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while ((samples == 0 || last.reasons.count("seen") == 0) &&
+         std::chrono::steady_clock::now() < deadline) {
+    if (samples == 0) {
+      EXPECT_TRUE(imu.write(ImuSample{}));
+    }
+    loop.runOnce(std::chrono::milliseconds(20));
+  }
+  EXPECT_GT(samples, 0);
+  EXPECT_EQ(last.process, "probe");
+  EXPECT_EQ(last.pid, static_cast<std::uint32_t>(probe.pid()));
+  EXPECT_EQ(last.state, HealthState::kOk);
+  EXPECT_GT(last.frames_in, 0u);
+  EXPECT_EQ(last.frames_in, last.frames_out);
+  EXPECT_GT(last.rss_bytes, 1u << 20);
+  EXPECT_EQ(probe.end(SIGTERM), 0);
+}
+
+/// Where systemd would listen.
+class NotifySocket {
+ public:
+  NotifySocket() : path_(testing::TempDir() + "perdure_notify") {
+    unlink(path_.c_str());
+    socket_ = socket(AF_UNIX, SOCK_DGRAM, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path_.copy(address.sun_path, sizeof(address.sun_path) - 1);
+    EXPECT_EQ(bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+    timeval patience{20, 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    setenv("NOTIFY_SOCKET", path_.c_str(), 1);
+  }
+  ~NotifySocket() {
+    unsetenv("NOTIFY_SOCKET");
+    close(socket_);
+    unlink(path_.c_str());
+  }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+  std::string next() const {
+    std::array<char, 256> buffer{};
+    const auto n = recv(socket_, buffer.data(), buffer.size(), 0);
+    return n > 0 ? std::string(buffer.data(), static_cast<std::size_t>(n)) : "";
+  }
+
+ private:
+  std::string path_;
+  int socket_ = -1;
+};
+
+TEST_F(Service, TellsSystemdThatItIsReadyAliveAndStopping) {
+  const NotifySocket systemd;
+  Probe probe;
+  std::string message;
+  while ((message = systemd.next()) == "WATCHDOG=1") {
+  }
+  EXPECT_EQ(message, "READY=1");
+  EXPECT_EQ(systemd.next(), "WATCHDOG=1");
+  EXPECT_EQ(probe.end(SIGINT), 0);
+}
+
+}  // namespace
+}  // namespace perdure::service
