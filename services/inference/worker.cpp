@@ -53,9 +53,10 @@ void Worker::run() {
 }
 
 void Worker::publish(const Detections& detections, Duration age) {
-  noteLapse(Clock::now());
+  const auto now = Clock::now();
+  noteLapse(now);
   const auto strength = static_cast<std::int32_t>(
-      ownership_.strengthFor(age, writer_.livelinessLost() + lapses_.load()));
+      ownership_.strengthFor(now, age, writer_.livelinessLost() + lapses_.load()));
   if (strength != writer_.strength()) writer_.setStrength(strength);
   if (in_form_ != ownership_.inForm()) {
     in_form_ = ownership_.inForm();

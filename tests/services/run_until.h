@@ -1,0 +1,23 @@
+// Waits for messages in a test.
+#pragma once
+
+#include <chrono>
+#include <functional>
+
+#include "common/bus/wait_loop.h"
+
+namespace perdure::test {
+
+/// Runs the loop until `done`; false where that takes longer than `limit`, which is generous: it
+/// ends a test that would hang, and asserts nothing about speed.
+inline bool runUntil(bus::WaitLoop& loop, const std::function<bool()>& done,
+                     std::chrono::seconds limit = std::chrono::seconds(20)) {
+  const auto end = std::chrono::steady_clock::now() + limit;
+  while (!done()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    loop.runOnce(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+}  // namespace perdure::test
