@@ -57,14 +57,21 @@ void Worker::publish(const Detections& detections, Duration age) {
   noteLapse(now);
   const auto strength = static_cast<std::int32_t>(
       ownership_.strengthFor(now, age, writer_.livelinessLost() + lapses_.load()));
+  // A change of strength travels apart from the data: what is written with it may overtake it.
+  if (strength < writer_.strength()) hold_until_ = now + lease_;
   if (strength != writer_.strength()) writer_.setStrength(strength);
   if (in_form_ != ownership_.inForm()) {
     in_form_ = ownership_.inForm();
-    const std::lock_guard lock(mutex_);
-    reasons_.add(in_form_ ? "form_regained" : "form_lost");
+    count(in_form_ ? "form_regained" : "form_lost");
   }
+  if (now < hold_until_) return count("held_back");
   if (writer_.write(detections)) health_.frameOut();
   last_alive_ = Clock::now();  // a write says "I live" too
+}
+
+void Worker::count(const char* code) {
+  const std::lock_guard lock(mutex_);
+  reasons_.add(code);
 }
 
 void Worker::report(ReasonCounts& counts) const {

@@ -45,10 +45,12 @@ class Worker {
   void run();
   void publish(const Detections& detections, Duration age);
   void noteLapse(Clock::time_point now);
+  void count(const char* code);
 
   Node& node_;
   const Duration lease_;
   Ownership ownership_;
+  Clock::time_point hold_until_{};  ///< results are kept back after the strength was lowered
   bus::Writer<Detections>& writer_;
   service::HealthMeter& health_;
   BoundedQueue<Job> queue_{1, Overflow::kDropOldest};
