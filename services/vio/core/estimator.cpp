@@ -17,6 +17,7 @@ namespace {
 
 // Beyond these a filter is lost, whatever it believes.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
+constexpr double kMaxSpeedSigma = 10.0;
 
 std::int64_t asInt(std::size_t n) { return static_cast<std::int64_t>(n); }
 
@@ -64,6 +65,26 @@ void Estimator::start(const Start& start) {
   }
   database_.clear();
   previous_frame_.reset();
+}
+
+void Estimator::restore(const SavedState& saved) {
+  check(saved.T_BC.size() == T_BC_.size(), "as many cameras as were saved");
+  start({saved.time, saved.nav, saved.covariance.topLeftCorner<15, 15>()});
+  state_->T_BC = saved.T_BC;
+  state_->time_offset_s = saved.time_offset_s;
+  state_->P() = saved.covariance;
+}
+
+SavedState Estimator::save() const {
+  check(started(), "there is a state");
+  SavedState s;
+  s.time = state_->time;
+  s.nav = state_->nav;
+  s.T_BC = state_->T_BC;
+  s.time_offset_s = state_->time_offset_s;
+  const int n = state_->timeOffsetAt() + 1;
+  s.covariance = state_->P().topLeftCorner(n, n);
+  return s;
 }
 
 Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) const {
@@ -230,6 +251,9 @@ Result<void> Estimator::sane() const {
   if (state_->nav.v_WB.norm() > kMaxSpeed) return fail("numbers_speed_absurd");
   if (state_->nav.gyro_bias.norm() > kMaxGyroBias) return fail("numbers_gyro_bias_absurd");
   if (state_->nav.accel_bias.norm() > kMaxAccelBias) return fail("numbers_accel_bias_absurd");
+  if (state_->P().diagonal().segment<3>(kVelocity).maxCoeff() > kMaxSpeedSigma * kMaxSpeedSigma) {
+    return fail("numbers_velocity_unknown");
+  }
   return {};
 }
 

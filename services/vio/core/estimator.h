@@ -11,6 +11,7 @@
 #include "common/types/odometry.h"
 #include "services/vio/core/imu_buffer.h"
 #include "services/vio/core/options.h"
+#include "services/vio/core/saved_state.h"
 #include "services/vio/core/state.h"
 #include "services/vio/core/tracks.h"
 
@@ -60,6 +61,10 @@ class Estimator {
 
   /// Begins (anew) at a start; the window is empty.
   void start(const Start& start);
+  /// Begins with a saved state of as many cameras.
+  void restore(const SavedState& saved);
+  /// What restore takes; world and next_track are the caller's. Needs started().
+  SavedState save() const;
   bool started() const { return state_.has_value(); }
   void stop() { state_.reset(); }
 

@@ -32,6 +32,10 @@ Densities densities(const ImuReading& a, const ImuReading& b, double dt, const I
   const double gyro = noise.interpolation_gyro, accel = noise.interpolation_accel;
   d.gyro2 += dt * (gyro * gyro + (b.gyro - a.gyro).squaredNorm() / 12.0);
   d.accel2 += dt * (accel * accel + (b.accel - a.accel).squaredNorm() / 12.0);
+  if (dt > noise.gap_from_s) {
+    d.gyro2 += dt * noise.gap_gyro * noise.gap_gyro;
+    d.accel2 += dt * noise.gap_accel * noise.gap_accel;
+  }
   return d;
 }
 

@@ -16,6 +16,10 @@ struct ImuNoise {
   double interpolation_from_s = 0.02;
   double interpolation_gyro = 0.005;  ///< rad/s per sample, floor of that error
   double interpolation_accel = 0.1;   ///< m/s² per sample, floor of that error
+  /// A longer time without samples is a gap, in which the body may have done this:
+  double gap_from_s = 0.2;
+  double gap_gyro = 0.3;   ///< rad/s
+  double gap_accel = 1.5;  ///< m/s²
 };
 
 struct WindowOptions {

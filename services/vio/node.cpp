@@ -1,0 +1,410 @@
+#include "services/vio/node.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/vision/image.h"
+
+namespace perdure::vio {
+namespace {
+
+constexpr int kDegradedFrames = 20;  // after a gap or a resumption
+constexpr std::size_t kSpeeds = 512;
+
+double seconds(Duration d) { return toSeconds(d); }
+
+bool sameCamera(const CameraCalibration& a, const CameraCalibration& b) {
+  return a.name == b.name && a.width == b.width && a.height == b.height && a.fx == b.fx &&
+         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion &&
+         a.distortion_coefficients == b.distortion_coefficients &&
+         a.T_BC.matrix() == b.T_BC.matrix() && a.time_offset_s == b.time_offset_s;
+}
+
+bool sameCameras(const Calibration& a, const Calibration& b) {
+  return std::equal(a.cameras.begin(), a.cameras.end(), b.cameras.begin(), b.cameras.end(),
+                    sameCamera);
+}
+
+}  // namespace
+
+/// What exists once the cameras are known.
+struct Node::Cameras {
+  Cameras(const Config& config, const Options& options, const std::vector<CameraModel>& all)
+      : tracker(config.tracker, all),
+        estimator(options, extrinsics(all), all[0].calibration().time_offset_s),
+        models(all) {}
+  static std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
+    std::vector<RigidTransform> T_BC;
+    for (const CameraModel& m : all) T_BC.push_back(m.T_BC());
+    return T_BC;
+  }
+  Tracker tracker;
+  Estimator estimator;
+  std::vector<CameraModel> models;
+};
+
+Node::Node(const Config& config, InstanceId instance, Outputs outputs)
+    : config_(config), instance_(instance), outputs_(std::move(outputs)), world_{instance, 0},
+      motion_initialiser_(config.core) {}
+
+Node::~Node() = default;
+
+bool Node::started() const { return cameras_ && cameras_->estimator.started(); }
+
+const ReasonCounts& Node::reasons() const {
+  all_reasons_ = reasons_;
+  if (cameras_) {
+    for (const auto* more : {&cameras_->estimator.reasons(), &cameras_->tracker.reasons()}) {
+      for (const auto& [code, count] : more->all()) all_reasons_.add(code, count);
+    }
+  }
+  return all_reasons_;
+}
+
+void Node::onCalibration(const Calibration& calibration) {
+  if (calibration.cameras.empty()) return reasons_.add("calibration_without_camera");
+  if (calibration_ && sameCameras(*calibration_, calibration)) return;
+  if (calibration_) {
+    if (started()) lose({"calibration_changed", ""});
+    pending_.clear();
+    seconds_.clear();
+  }
+  calibration_ = calibration;
+  std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
+  if (config_.stereo && calibration.cameras.size() > 1) models.emplace_back(calibration.cameras[1]);
+  Options options = config_.core;
+  if (config_.prefer_calibration && calibration.imu && calibration.imu->gyro_noise > 0 &&
+      calibration.imu->accel_noise > 0) {
+    options.imu.gyro = calibration.imu->gyro_noise;
+    options.imu.accel = calibration.imu->accel_noise;
+    options.imu.gyro_walk = std::max(calibration.imu->gyro_bias_walk, 1e-7);
+    options.imu.accel_walk = std::max(calibration.imu->accel_bias_walk, 1e-6);
+  }
+  cameras_ = std::make_unique<Cameras>(config_, options, models);
+  motion_initialiser_ = MotionInitialiser(options);
+}
+
+void Node::onImu(const ImuSample& sample) {
+  const auto added = imu_.add({sample.time, sample.gyro, sample.accel});
+  if (!added) return reasons_.add(added.error());
+  if (!last_imu_time_) {
+    // Before the first frame only the last seconds matter.
+    imu_.dropBefore(sample.time - std::chrono::seconds(5));
+  }
+  drain(false);
+}
+
+void Node::onSpeed(const SpeedSample& sample) {
+  if (!std::isfinite(sample.speed) || !(sample.sigma > 0) || !std::isfinite(sample.sigma)) {
+    return reasons_.add("speed_not_finite");
+  }
+  if (!speeds_.empty() && sample.time <= speeds_.back().time) {
+    return reasons_.add("speed_out_of_order");
+  }
+  speeds_.push_back({sample.time, sample.speed, sample.sigma});
+  while (speeds_.size() > kSpeeds) speeds_.pop_front();
+  drain(false);
+}
+
+void Node::onFrame(const Frame& frame) {
+  if (!cameras_) return reasons_.add("frame_before_calibration");
+  const bool second = cameras_->models.size() == 2 &&
+                      frame.camera == cameras_->models[1].calibration().name;
+  if (!second && frame.camera != cameras_->models[0].calibration().name) {
+    if (!calibration_->camera(frame.camera)) reasons_.add("frame_of_unknown_camera");
+    return;
+  }
+  const CameraModel& model = cameras_->models[second ? 1 : 0];
+  if (frame.width != static_cast<std::uint32_t>(model.width()) ||
+      frame.height != static_cast<std::uint32_t>(model.height())) {
+    return reasons_.add("frame_size_differs");
+  }
+  if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
+  if (second) return addSecond(frame);
+  const auto later = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& p) {
+    return p.first.stamp.time >= frame.stamp.time;
+  });
+  if (later != pending_.end()) {
+    if (later->first.stamp.time == frame.stamp.time) return reasons_.add("frame_duplicate");
+    reasons_.add("frame_reordered");
+  }
+  pending_.insert(later, Pending{frame, {}});
+  if (static_cast<std::int64_t>(pending_.size()) > config_.max_pending) {
+    reasons_.add("frame_without_imu");
+    publishWaiting(pending_.front().first.stamp);
+    pending_.pop_front();
+  }
+  for (const Frame& waiting : std::exchange(seconds_, {})) addSecond(waiting);
+  drain(false);
+}
+
+void Node::addSecond(const Frame& frame) {
+  for (Pending& p : pending_) {
+    const double apart = std::abs(seconds(frame.stamp.time - p.first.stamp.time));
+    if (apart > config_.pair_tolerance_s) continue;
+    p.second = frame;
+    return drain(false);
+  }
+  seconds_.push_back(frame);
+  if (seconds_.size() > 4) {
+    seconds_.pop_front();
+    reasons_.add("stereo_unpaired");
+  }
+}
+
+TimePoint Node::imuTime(TimePoint image_time) const {
+  const double offset = started() ? cameras_->estimator.state().time_offset_s
+                                  : cameras_->models[0].calibration().time_offset_s;
+  return image_time + durationFromSeconds(offset);
+}
+
+bool Node::waitsForPair(const Pending& p) const {
+  if (cameras_->models.size() < 2 || p.second) return false;
+  // A later frame of either camera, or half a second of samples, says that none will come.
+  if (pending_.size() > 1 && pending_.front().first.stamp.time == p.first.stamp.time) {
+    if (pending_[1].second || pending_.size() > 3) return false;
+  }
+  const Duration tolerance = durationFromSeconds(config_.pair_tolerance_s);
+  for (const Frame& f : seconds_) {
+    if (f.stamp.time > p.first.stamp.time + tolerance) return false;
+  }
+  return imu_.empty() || imu_.last() < p.first.stamp.time + std::chrono::milliseconds(500);
+}
+
+bool Node::ready(const Pending& p) const {
+  const TimePoint now = imuTime(p.first.stamp.time);
+  if (imu_.empty() || imu_.last() < now + durationFromSeconds(config_.imu_slack_s)) return false;
+  if (waitsForPair(p)) return false;
+  if (!config_.core.speed.enabled || !calibration_->has_speed) return true;
+  return (!speeds_.empty() && speeds_.back().time >= now) ||
+         imu_.last() >= now + durationFromSeconds(config_.speed_wait_s);
+}
+
+void Node::drain(bool all) {
+  while (cameras_ && !pending_.empty() && (all || ready(pending_.front()))) {
+    Pending next = std::move(pending_.front());
+    pending_.pop_front();
+    process(next);
+  }
+}
+
+void Node::flush() { drain(true); }
+
+std::optional<SpeedReading> Node::speedAt(TimePoint image_time) const {
+  if (!config_.core.speed.enabled || speeds_.empty()) return std::nullopt;
+  const TimePoint t = imuTime(image_time);
+  const auto after = std::find_if(speeds_.begin(), speeds_.end(),
+                                  [&](const TimedSpeed& s) { return s.time >= t; });
+  const double max_age = config_.core.speed.max_age_s;
+  if (after != speeds_.end() && after != speeds_.begin()) {
+    const TimedSpeed &a = *(after - 1), &b = *after;
+    const double span = seconds(b.time - a.time);
+    if (span <= 2.0 * max_age) {
+      const double s = seconds(t - a.time) / span;
+      return SpeedReading{a.speed + s * (b.speed - a.speed), std::max(a.sigma, b.sigma)};
+    }
+  }
+  const TimedSpeed& nearest = after == speeds_.end() ? speeds_.back() : *after;
+  const double age = std::abs(seconds(nearest.time - t));
+  if (age > max_age) return std::nullopt;
+  return SpeedReading{nearest.speed, nearest.sigma + 2.0 * age};  // 2 m/s² unknown
+}
+
+void Node::noteGaps(TimePoint now) {
+  const TimePoint from = started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
+  if (from >= now || imu_.empty()) return;
+  const double gap = seconds(imu_.longestGap(from, now));
+  if (gap <= config_.core.imu.gap_from_s) return;
+  reasons_.add("imu_gap");
+  degraded_frames_ = kDegradedFrames;
+  if (gap > config_.longest_gap_s && started()) lose({"imu_gap_too_long", ""});
+}
+
+TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now) {
+  std::optional<Eigen::Matrix3d> R;
+  if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time) {
+    R = cameras_->estimator.predictRotation(imu_, now);
+  }
+  return cameras_->tracker.track(first, second, R);
+}
+
+void Node::process(Pending& p) {
+  const FrameStamp& stamp = p.first.stamp;
+  last_image_ = stamp.time;
+  const auto first = vision::monoOf(p.first);
+  if (!first) {
+    reasons_.add(first.error());
+    return publishWaiting(stamp);
+  }
+  cv::Mat second;
+  if (p.second) {
+    if (const auto image = vision::monoOf(*p.second)) {
+      second = *image;
+    } else {
+      reasons_.add(image.error());
+    }
+  } else if (cameras_->models.size() == 2) {
+    reasons_.add("stereo_unpaired");
+  }
+  const TimePoint now = imuTime(stamp.time);
+  noteGaps(now);
+  FrameInput input{++frame_, stamp.time, trackImages(*first, second, now), {}, {}};
+  input.motion_px = cameras_->tracker.motionSince(
+      static_cast<std::size_t>(config_.core.rest.frames));
+  input.speed = speedAt(stamp.time);
+  if (!started()) begin(now, input);
+  if (!started()) {
+    last_imu_time_ = now;
+    imu_.dropBefore(now - std::chrono::seconds(3));
+    return publishWaiting(stamp);
+  }
+  const auto estimate = cameras_->estimator.process(input, imu_);
+  last_imu_time_ = now;
+  if (!estimate) {
+    if (started()) {
+      reasons_.add(estimate.error());
+    } else {
+      lose(estimate.error());
+    }
+    return publishWaiting(stamp);
+  }
+  imu_.dropBefore(cameras_->estimator.state().time - std::chrono::seconds(1));
+  publish(stamp, *estimate);
+  publishLandmarks(stamp, *first);
+}
+
+bool Node::resume(TimePoint now) {
+  if (!saved_) return false;
+  SavedState saved = *std::exchange(saved_, std::nullopt);
+  const double age = seconds(now - saved.time);
+  if (age < 0.0 || age > config_.restore_age_s || imu_.empty()) {
+    reasons_.add("state_too_old");
+    world_.epoch = saved.world.epoch + 1;
+    return false;
+  }
+  if (saved.T_BC.size() != cameras_->models.size()) {
+    reasons_.add("state_other_cameras");
+    world_.epoch = saved.world.epoch + 1;
+    return false;
+  }
+  const double gap = seconds(std::min(imu_.first(), now) - saved.time);
+  coast(saved, gap);
+  cameras_->estimator.restore(saved);
+  cameras_->tracker.continueIdsFrom(saved.next_track);
+  degraded_frames_ = kDegradedFrames;
+  reasons_.add("state_resumed");
+  return true;
+}
+
+void Node::begin(TimePoint now, const FrameInput& input) {
+  if (resume(now)) return;
+  const Options& options = cameras_->estimator.options();
+  motion_initialiser_.add(input, now);
+  std::optional<double> rest_motion;
+  const double rate = calibration_->cameras[0].rate_hz > 0 ? calibration_->cameras[0].rate_hz : 20;
+  const auto frames = std::clamp<std::int64_t>(
+      std::lround(options.start.rest_window_s * rate) - 1, 2, config_.tracker.memory);
+  rest_motion = cameras_->tracker.motionSince(static_cast<std::size_t>(frames));
+  const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
+  Result<Start> start = fail("start_waits");
+  if (rest_motion && *rest_motion < options.start.rest_disparity_px && slow) {
+    start = startAtRest(imu_, now, options);
+  } else if (input.speed && !slow) {
+    start = startWithSpeed(imu_, now, *input.speed, {speeds_.begin(), speeds_.end()}, options);
+  } else if (!input.speed && rest_motion) {
+    start = motion_initialiser_.start(imu_, cameras_->models);
+  }
+  if (!start) return reasons_.add(start.error());
+  cameras_->estimator.start(*start);
+  motion_initialiser_.clear();
+}
+
+void Node::lose(const Reason& reason) {
+  reasons_.add(reason);
+  reasons_.add("reset");
+  if (cameras_) {
+    cameras_->estimator.stop();
+    cameras_->tracker.reset();
+  }
+  motion_initialiser_.clear();
+  ++world_.epoch;
+  last_sequence_.reset();
+}
+
+void Node::publishWaiting(const FrameStamp& stamp) {
+  Odometry o;
+  o.stamp = stamp;
+  o.instance = instance_;
+  o.world = world_;
+  o.covariance = Matrix9d::Identity();
+  last_state_ = o.state;
+  last_sequence_.reset();
+  if (outputs_.odometry) outputs_.odometry(o);
+}
+
+void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
+  Odometry o;
+  o.stamp = stamp;
+  o.instance = instance_;
+  o.world = world_;
+  const bool degraded = degraded_frames_ > 0 || (!e.at_rest && e.points_used == 0);
+  if (degraded_frames_ > 0) --degraded_frames_;
+  o.state = degraded ? OdometryState::kDegraded : OdometryState::kTracking;
+  o.T_WB = e.nav.T_WB();
+  o.v_WB = e.nav.v_WB;
+  o.covariance = e.covariance;
+  o.gyro_bias = e.nav.gyro_bias;
+  o.accel_bias = e.nav.accel_bias;
+  if (e.has_increment && last_sequence_) {
+    o.has_increment = true;
+    o.increment_from = *last_sequence_;
+    o.transition = e.transition;
+    o.increment_covariance = e.increment_covariance;
+  }
+  last_sequence_ = stamp.sequence;
+  last_state_ = o.state;
+  if (outputs_.odometry) outputs_.odometry(o);
+}
+
+void Node::publishLandmarks(const FrameStamp& stamp, const cv::Mat& image) {
+  if (!outputs_.landmarks) return;
+  Landmarks out;
+  out.stamp = stamp;
+  out.instance = instance_;
+  out.world = world_;
+  out.camera = cameras_->models[0].calibration().name;
+  const DescriptorExtractor descriptors(image);
+  for (const LandmarkEstimate& e : cameras_->estimator.landmarks()) {
+    if (!e.p_W.allFinite() || !e.covariance.allFinite() || !e.cross_pose.allFinite()) continue;
+    Landmark l;
+    l.id = e.id;
+    l.p_W = e.p_W;
+    l.covariance = e.covariance;
+    l.cross_pose = e.cross_pose;
+    l.pixel = e.pixel;
+    l.descriptor = descriptors.at(e.pixel).value_or(Descriptor{});
+    out.landmarks.push_back(l);
+  }
+  outputs_.landmarks(out);
+}
+
+std::string Node::saveState() const {
+  if (!started()) return {};
+  SavedState saved = cameras_->estimator.save();
+  saved.world = world_;
+  saved.next_track = cameras_->tracker.nextId();
+  return toText(saved);
+}
+
+Result<void> Node::restoreState(const std::string& text) {
+  auto saved = fromText(text);
+  if (!saved) return tl::unexpected(saved.error());
+  if (cameras_ && saved->T_BC.size() != cameras_->models.size()) {
+    return fail("state_other_cameras", "the saved state has another number of cameras");
+  }
+  world_ = saved->world;
+  saved_ = std::move(*saved);
+  return {};
+}
+
+}  // namespace perdure::vio

@@ -1,0 +1,98 @@
+// vio's node: inertial samples, speed and frames in; odometry and landmarks out. Waits until a
+// frame's time is covered by inertial samples, pairs stereo frames, starts, resets, resumes.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/base/sink.h"
+#include "common/types/odometry.h"
+#include "common/types/sensors.h"
+#include "services/vio/config.h"
+#include "services/vio/core/descriptor.h"
+#include "services/vio/core/estimator.h"
+#include "services/vio/core/initialiser.h"
+#include "services/vio/core/motion_initialiser.h"
+#include "services/vio/core/tracker.h"
+
+namespace perdure::vio {
+
+struct Outputs {
+  Sink<Odometry> odometry;    ///< one for each frame of the first camera, in order
+  Sink<Landmarks> landmarks;  ///< after its odometry, once there is a start
+};
+
+class Node {
+ public:
+  Node(const Config& config, InstanceId instance, Outputs outputs);
+  ~Node();
+
+  void onCalibration(const Calibration& calibration);
+  void onImu(const ImuSample& sample);
+  void onSpeed(const SpeedSample& sample);
+  void onFrame(const Frame& frame);
+  /// End of data: processes what still waits, with the last inertial sample held.
+  void flush();
+
+  /// Names the frame of reference; before the first output.
+  void setWorld(WorldId world) { world_ = world; }
+  /// Text for restoreState of another process; empty before there is a start.
+  std::string saveState() const;
+  /// Resumes at the next frame, if that is not too far away. Fails with "state_malformed" or
+  /// "state_other_cameras".
+  Result<void> restoreState(const std::string& text);
+
+  const ReasonCounts& reasons() const;
+  bool started() const;
+  OdometryState state() const { return last_state_; }
+
+ private:
+  struct Pending {
+    Frame first;
+    std::optional<Frame> second;
+  };
+  struct Cameras;
+
+  void drain(bool all);
+  bool ready(const Pending& pending) const;
+  bool waitsForPair(const Pending& pending) const;
+  void addSecond(const Frame& frame);
+  void process(Pending& pending);
+  TrackedFrame trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now);
+  void begin(TimePoint now, const FrameInput& input);
+  bool resume(TimePoint now);
+  std::optional<SpeedReading> speedAt(TimePoint image_time) const;
+  void noteGaps(TimePoint now);
+  void lose(const Reason& reason);
+  void publish(const FrameStamp& stamp, const FrameEstimate& estimate);
+  void publishWaiting(const FrameStamp& stamp);
+  void publishLandmarks(const FrameStamp& stamp, const cv::Mat& image);
+  TimePoint imuTime(TimePoint image_time) const;
+
+  Config config_;
+  InstanceId instance_;
+  Outputs outputs_;
+  WorldId world_;
+  std::optional<Calibration> calibration_;
+  std::unique_ptr<Cameras> cameras_;
+  ImuBuffer imu_;
+  std::deque<TimedSpeed> speeds_;
+  std::deque<Pending> pending_;
+  std::deque<Frame> seconds_;  ///< of the second camera, unpaired yet
+  MotionInitialiser motion_initialiser_;
+  std::optional<SavedState> saved_;
+  std::optional<TimePoint> last_image_, last_imu_time_;
+  std::optional<std::uint64_t> last_sequence_;  ///< of the last output with a pose
+  std::uint64_t frame_ = 0;
+  int degraded_frames_ = 0;
+  OdometryState last_state_ = OdometryState::kInitialising;
+  mutable ReasonCounts all_reasons_;
+  ReasonCounts reasons_;
+};
+
+}  // namespace perdure::vio
