@@ -31,13 +31,6 @@ std::string networkXml(const std::string& interface) {
          std::to_string(kMaxParticipantIndex) + "</MaxAutoParticipantIndex></Discovery>";
 }
 
-Options withEnvironment(Options options) {
-  if (const char* domain = std::getenv("PERDURE_DOMAIN")) {
-    options.domain = std::strtol(domain, nullptr, 10);
-  }
-  return options;
-}
-
 bool isInterfaceName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
 }
@@ -47,17 +40,17 @@ std::int32_t createDomain(const Options& options) {
     throw StartupError(ExitCode::kConfiguration,
                        "bus.interface: \"" + options.interface + "\" is not an interface's name");
   }
-  std::string configuration = configurationXml(options);
-  if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri != nullptr && *uri != '\0') {
-    configuration += std::string(",") + uri;
-  }
+  const char* uri = std::getenv("CYCLONEDDS_URI");
+  const bool given = uri != nullptr && *uri != '\0';
+  const std::string configuration = given ? uri : configurationXml(options);
   const auto id = static_cast<dds_domainid_t>(options.domain);
   const dds_entity_t domain = dds_create_domain(id, configuration.c_str());
   if (domain < 0) {
     throw StartupError(ExitCode::kUnavailable,
                        "DDS cannot open domain " + std::to_string(options.domain) +
                            " on interface " + options.interface + " (" + dds_strretcode(-domain) +
-                           "); bus.interface names an interface that `ip link` shows as up");
+                           "); bus.interface names an interface that `ip link` shows as up" +
+                           (given ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
   }
   return domain;
 }
@@ -82,9 +75,17 @@ void describe(Options& options, config::Fields& fields) {
   fields.text("bus.vehicle", options.vehicle, {"the vehicle's name in the topics' names"});
 }
 
+Options withEnvironment(Options options) {
+  if (const char* domain = std::getenv("PERDURE_DOMAIN")) {
+    options.domain = std::strtol(domain, nullptr, 10);
+  }
+  return options;
+}
+
 std::string configurationXml(const Options& options) {
   const bool loopback = options.interface == "lo";
-  return "<CycloneDDS><Domain Id=\"any\">" +
+  const std::string id = options.domain == 0 ? "any" : std::to_string(options.domain);
+  return "<CycloneDDS><Domain Id=\"" + id + "\">" +
          (loopback ? loopbackXml() : networkXml(options.interface)) +
          "<Internal><SocketReceiveBufferSize max=\"10MB\"/>"
          "<Watermarks><WhcHigh>32MB</WhcHigh></Watermarks></Internal>"

@@ -29,10 +29,13 @@ struct Options {
 /// bus.interface, bus.domain, bus.vehicle. The variable PERDURE_DOMAIN goes before bus.domain.
 void describe(Options& options, config::Fields& fields);
 
-/// Cyclone's configuration for these options, as it stands in CYCLONEDDS_URI.
+/// The options with PERDURE_DOMAIN in force.
+Options withEnvironment(Options options);
+
+/// Cyclone's configuration for these options, as it may stand in CYCLONEDDS_URI.
 std::string configurationXml(const Options& options);
 
-/// One a process. What CYCLONEDDS_URI holds is merged after our configuration and wins.
+/// One a process. Where CYCLONEDDS_URI is set it is used instead of bus.interface, as Cyclone does.
 class Domain {
  public:
   /// Throws StartupError (69) where DDS cannot use the interface.

@@ -4,6 +4,8 @@
 #include <iostream>
 
 #include "common/base/errors.h"
+#include "tools/bus_tools/command.h"
+#include "tools/demo/command.h"
 #include "tools/evaluate/command.h"
 #include "tools/map/command.h"
 #include "tools/pipeline/command.h"
@@ -37,5 +39,7 @@ int main(int argc, char** argv) {
   perdure::tools::addPipelineCommand(app);
   perdure::tools::addEvaluateCommand(app);
   perdure::tools::addMapCommand(app);
+  perdure::tools::addDemoCommand(app);
+  perdure::tools::addBusCommands(app);
   return run(app, argc, argv);
 }

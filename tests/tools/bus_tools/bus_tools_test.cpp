@@ -1,0 +1,161 @@
+// The commands as a user runs them, against topics that this test publishes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "common/bus/wait_loop.h"
+#include "tests/common/bus/isolation.h"
+#include "tools/bus_tools/doctor.h"
+
+namespace perdure::tools {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+class Isolation : public testing::Environment {
+ public:
+  void SetUp() override { tests::isolateNetwork(); }
+};
+const auto* const kIsolation = testing::AddGlobalTestEnvironment(new Isolation);
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;
+};
+
+Outcome shell(const std::string& command) {
+  Outcome outcome;
+  FILE* pipe = popen(("(" + command + ") 2>&1").c_str(), "r");
+  std::array<char, 4096> buffer{};
+  for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
+    outcome.output.append(buffer.data(), n);
+  }
+  const int status = pclose(pipe);
+  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+class BusTools : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::getenv("PERDURE_TOOL") == nullptr) GTEST_SKIP() << "run by ctest";
+    perdure = std::getenv("PERDURE_TOOL");
+  }
+
+  /// Runs a command while objects and odometry are published at 50 Hz.
+  Outcome shellWhilePublishing(const std::string& command) {
+    std::atomic<bool> done = false;
+    std::thread publisher([&] {
+      const bus::Domain domain{bus::Options{}};
+      const bus::Participant participant(domain, "semantic_filter");
+      bus::Writer<Objects> objects(participant, bus::topics::kObjects);
+      bus::Writer<Odometry> odometry(participant, bus::topics::kOdometry);
+      bus::WaitLoop loop(participant);
+      loop.every(std::chrono::milliseconds(20), [&] {
+        (void)objects.write(oneCar());
+        (void)odometry.write(Odometry{});
+        if (done) loop.stop();
+      });
+      loop.run();
+    });
+    Outcome outcome = shell(command);
+    done = true;
+    publisher.join();
+    return outcome;
+  }
+
+  static Objects oneCar() {
+    Objects message;
+    message.stamp.sequence = 9;
+    ObjectBelief car;
+    car.id = 5;
+    car.existence = 1.0;
+    car.classes.push_back({"car", 1.0, Vector7d::Ones(), Matrix7d::Identity()});
+    message.objects = {car};
+    return message;
+  }
+
+  std::string perdure;
+};
+
+TEST_F(BusTools, EchoPrintsJsonLinesAndEndsAfterItsCount) {
+  const Outcome outcome = shellWhilePublishing(perdure + " echo objects --count 2 --seconds 20");
+  EXPECT_EQ(outcome.exit_code, 0);
+  std::istringstream lines(outcome.output);
+  std::string line;
+  int count = 0;
+  while (std::getline(lines, line)) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json["objects"][0]["classes"][0]["name"], "car");
+    EXPECT_EQ(json["objects"][0]["visibility"], "visible");
+    ++count;
+  }
+  EXPECT_EQ(count, 2);
+}
+
+TEST_F(BusTools, HzTellsTheRate) {
+  const Outcome outcome = shellWhilePublishing(perdure + " hz odometry --seconds 2.5");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, HasSubstr("odometry: "));
+  EXPECT_THAT(outcome.output, HasSubstr(" Hz, interval "));
+}
+
+TEST_F(BusTools, TopicsListsTheTableAndWhoIsThere) {
+  const Outcome outcome = shellWhilePublishing(perdure + " topics");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, testing::ContainsRegex("objects +perdure::msg::Objects +reliable 8 "
+                                                     "+10 Hz +1 \\(semantic_filter\\) +0"));
+  EXPECT_THAT(outcome.output, testing::ContainsRegex("map/header +perdure::msg::MapHeader"));
+}
+
+TEST_F(BusTools, AnUnknownTopicIsRefusedWithTheKnownOnes) {
+  const Outcome outcome = shell(perdure + " echo objcts");
+  EXPECT_EQ(outcome.exit_code, 64);
+  EXPECT_THAT(outcome.output, HasSubstr("there is no topic objcts; the topics are frame/<camera>"));
+}
+
+TEST_F(BusTools, TheEnvironmentLetsAProgramOfSomebodyElseFindTheTopics) {
+  const std::string example = std::getenv("PERDURE_EXAMPLE");
+  const Outcome outcome = shellWhilePublishing("eval \"$(" + perdure + " env)\"; timeout 3 " +
+                                               example + " | head -n 1");
+  EXPECT_EQ(outcome.output, "frame 9: object 5 is a car (100 %) at 1.0 1.0 1.0 m\n");
+}
+
+TEST_F(BusTools, TheEnvironmentSuitsOurOwnProgramsToo) {
+  const Outcome outcome = shellWhilePublishing("eval \"$(" + perdure + " env)\"; " + perdure +
+                                               " echo odometry --count 1 --seconds 20");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, StartsWith("{\"stamp\":"));
+}
+
+TEST_F(BusTools, DoctorNamesWhoIsThereAndWhoIsNot) {
+  const Outcome outcome = shellWhilePublishing(perdure + " doctor --data-dir /nonexistent");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("OK   semantic_filter is on the bus"));
+  EXPECT_THAT(outcome.output, HasSubstr("WARN vio is not on the bus"));
+  EXPECT_THAT(outcome.output, HasSubstr("FAIL /nonexistent is not a folder: `mkdir -p"));
+  EXPECT_THAT(outcome.output, HasSubstr("OK   65500-byte datagrams pass over loopback"));
+}
+
+TEST_F(BusTools, DoctorFindsAnInterfaceThatIsNotThere) {
+  const Findings findings = checkHost({.interface = "nosuch0"});
+  EXPECT_EQ(findings[1].verdict, Verdict::kFail);
+  EXPECT_THAT(findings[1].text, HasSubstr("there is no interface nosuch0"));
+}
+
+TEST_F(BusTools, DoctorAcceptsAFolderThatCanBeWritten) {
+  EXPECT_NE(checkWritable(testing::TempDir()).verdict, Verdict::kFail);
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,18 @@
+// `perdure topics`, `hz`, `echo`, `env`, `doctor`: what people expect of a DDS system's command
+// line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace perdure::tools {
+
+void addTopicsCommand(CLI::App& app);
+void addHzCommand(CLI::App& app);
+void addEchoCommand(CLI::App& app);
+void addEnvCommand(CLI::App& app);
+void addDoctorCommand(CLI::App& app);
+
+/// All of them.
+void addBusCommands(CLI::App& app);
+
+}  // namespace perdure::tools

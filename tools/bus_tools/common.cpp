@@ -1,0 +1,49 @@
+#include "tools/bus_tools/common.h"
+
+#include "common/base/errors.h"
+#include "common/service/signals.h"
+#include "tools/bus_tools/command.h"
+
+namespace perdure::tools {
+
+void addBusOptions(CLI::App& command, bus::Options& options) {
+  command.add_option("--interface", options.interface, "network interface of the topics")
+      ->capture_default_str();
+  command.add_option("--domain", options.domain, "DDS domain (PERDURE_DOMAIN goes before it)")
+      ->capture_default_str();
+  command.add_option("--vehicle", options.vehicle, "the vehicle's name")->capture_default_str();
+}
+
+void runLoop(bus::WaitLoop& loop, double seconds) {
+  const service::BlockedSignals blocked;
+  const service::SignalThread signals(blocked, [&] { loop.stop(); });
+  if (seconds > 0) {
+    loop.every(std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9)),
+               [&] { loop.stop(); });
+  }
+  loop.run();
+}
+
+std::string knownTopics() {
+  std::string names;
+  for (const bus::TopicInfo& info : bus::topicTable()) {
+    names += (names.empty() ? "" : ", ") + std::string(info.name);
+    if (info.name.ends_with('/')) names += "<camera>";
+  }
+  return names;
+}
+
+void refuseTopic(const std::string& topic) {
+  throw StartupError(ExitCode::kUsage,
+                     "there is no topic " + topic + "; the topics are " + knownTopics());
+}
+
+void addBusCommands(CLI::App& app) {
+  addTopicsCommand(app);
+  addHzCommand(app);
+  addEchoCommand(app);
+  addEnvCommand(app);
+  addDoctorCommand(app);
+}
+
+}  // namespace perdure::tools

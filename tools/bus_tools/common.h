@@ -1,0 +1,22 @@
+// What the subcommands share: the bus's options, and waiting with an end by time or by signal.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "common/bus/wait_loop.h"
+
+namespace perdure::tools {
+
+/// --interface, --domain, --vehicle.
+void addBusOptions(CLI::App& command, bus::Options& options);
+
+/// Runs the loop until it is stopped, a signal comes, or the seconds (0 = for ever) are over.
+void runLoop(bus::WaitLoop& loop, double seconds);
+
+/// The names that exist, for the error message of an unknown one.
+std::string knownTopics();
+[[noreturn]] void refuseTopic(const std::string& topic);
+
+}  // namespace perdure::tools

@@ -1,0 +1,33 @@
+#include <iostream>
+#include <memory>
+
+#include "tools/bus_tools/command.h"
+#include "tools/bus_tools/common.h"
+
+namespace perdure::tools {
+namespace {
+
+/// For a POSIX shell.
+std::string singleQuoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+void printEnvironment(const bus::Options& given) {
+  const bus::Options options = bus::withEnvironment(given);
+  std::cout << "export CYCLONEDDS_URI=" << singleQuoted(bus::configurationXml(options)) << '\n';
+  if (options.domain != 0) std::cout << "export PERDURE_DOMAIN=" << options.domain << '\n';
+}
+
+}  // namespace
+
+void addEnvCommand(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "env", "print the DDS configuration as shell variables: eval \"$(perdure env)\"");
+  auto options = std::make_shared<bus::Options>();
+  addBusOptions(*command, *options);
+  command->callback([options] { printEnvironment(*options); });
+}
+
+}  // namespace perdure::tools
