@@ -20,13 +20,14 @@ namespace perdure::replay {
 using Message = std::variant<ImuSample, SpeedSample, Frame>;
 
 struct DatasetOptions {
-  std::filesystem::path path;
-  std::string sequence;                                               ///< KITTI tracking only
-  std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size;  ///< tracking without images
-  std::optional<std::size_t> frame_count;        ///< tracking without images and labels: how many
-  InstanceId source = 1;                         ///< of the messages
-  std::optional<ImageEncoding> encoding;         ///< of cam0; as the files are where not given
-  std::optional<ImageEncoding> second_encoding;  ///< of cam1
+  std::filesystem::path path = {};
+  std::string sequence = {};  ///< KITTI tracking only
+  /// Width and height, tracking without images.
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size = {};
+  std::optional<std::size_t> frame_count = {};  ///< tracking without images and labels: how many
+  InstanceId source = 1;                        ///< of the messages
+  std::optional<ImageEncoding> encoding = {};   ///< of cam0; as the files are where not given
+  std::optional<ImageEncoding> second_encoding = {};  ///< of cam1
   bool decode = true;  ///< false: frames carry stamp and size, but no pixels
 };
 

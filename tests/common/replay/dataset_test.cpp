@@ -1,0 +1,124 @@
+#include "common/replay/dataset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/common/replay/tiny_datasets.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::vector<std::uint64_t> frameIndices(Dataset& dataset) {
+  std::vector<std::uint64_t> indices;
+  while (auto message = dataset.next()) {
+    if (const auto* frame = std::get_if<Frame>(&*message)) indices.push_back(frame->stamp.sequence);
+  }
+  return indices;
+}
+
+TEST(Dataset, FoldersThatAreNoneAreToldWhatTheyCouldBe) {
+  const auto folder = freshFolder("nothing");
+  const auto error = startupErrorOf([&] { Dataset::open({.path = folder}); });
+  EXPECT_THAT(error, HasSubstr("EuRoC"));
+  EXPECT_THAT(error, HasSubstr("KITTI"));
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = folder / "no"}); }),
+              HasSubstr("the dataset folder is missing"));
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = folder / "run.mcap"}); }),
+              HasSubstr("dataset folders only"));
+}
+
+TEST(Dataset, ATruncatedImageIsCountedAndItsIndexNotGivenAgain) {
+  const auto root = tinyEuroc("truncated");
+  truncate(root / "mav0/cam0/data/1050000000.png", 0.6);
+  fs::remove(root / "mav0/cam0/data/1100000000.png");
+  writeText(root / "mav0/cam0/data/1150000000.png", "no image at all");
+  const auto dataset = Dataset::open({.path = root});
+  EXPECT_THAT(frameIndices(*dataset), ElementsAre(0, 4));
+  EXPECT_EQ(dataset->reasons().of("image_truncated"), 1U);
+  EXPECT_EQ(dataset->reasons().of("image_missing"), 1U);
+  EXPECT_EQ(dataset->reasons().of("image_corrupt"), 1U);
+  EXPECT_THAT(dataset->lastProblem(), HasSubstr("1150000000.png"));
+}
+
+TEST(Dataset, ATruncatedJpegIsCountedToo) {
+  const auto drive = tinyKittiRaw("truncated_jpeg");
+  truncate(drive / "image_02/data/0000000002.jpg", 0.7);
+  fs::remove_all(drive / "image_03");
+  const auto dataset = Dataset::open({.path = drive});
+  EXPECT_THAT(frameIndices(*dataset), ElementsAre(0, 1, 3));
+  EXPECT_EQ(dataset->reasons().of("image_truncated"), 1U);
+}
+
+TEST(Dataset, AnImageOfAnotherSizeThanTheCalibrationsIsCounted) {
+  const auto root = tinyEuroc("size");
+  writeImage(root / "mav0/cam0/data/1050000000.png", 16, 24, 1);
+  const auto dataset = Dataset::open({.path = root});
+  EXPECT_THAT(frameIndices(*dataset), ElementsAre(0, 2, 3, 4));
+  EXPECT_EQ(dataset->reasons().of("image_size"), 1U);
+}
+
+TEST(Dataset, AGapOfTheInertialSamplesIsCountedWhenItIsOver) {
+  const auto root = tinyEuroc("gap");
+  const auto file = root / "mav0/imu0/data.csv";
+  std::string text = readText(file);
+  const auto from = text.find("1050000000"), to = text.find("1150000000");
+  writeText(file, text.erase(from, to - from));
+  const auto dataset = Dataset::open({.path = root});
+  EXPECT_EQ(dataset->reasons().of("imu_gap"), 0U);
+  EXPECT_THAT(frameIndices(*dataset), ElementsAre(0, 1, 2, 3, 4));
+  EXPECT_EQ(dataset->reasons().of("imu_gap"), 1U);
+}
+
+TEST(Dataset, WithoutDecodingFramesKeepStampsAndSizes) {
+  const auto dataset = Dataset::open({.path = tinyEuroc("no_decode"), .decode = false});
+  std::size_t frames = 0;
+  while (auto message = dataset->next()) {
+    const auto* frame = std::get_if<Frame>(&*message);
+    if (frame == nullptr) continue;
+    ++frames;
+    EXPECT_FALSE(frame->data);
+    EXPECT_EQ(frame->width, 32U);
+  }
+  EXPECT_EQ(frames, 5U);
+}
+
+TEST(Dataset, MessagesCarryTheSourceThatWasAskedFor) {
+  const auto dataset = Dataset::open({.path = tinyEuroc("source"), .source = 42});
+  EXPECT_EQ(dataset->calibration().source, 42U);
+  while (auto message = dataset->next()) {
+    if (const auto* frame = std::get_if<Frame>(&*message)) {
+      EXPECT_EQ(frame->stamp.source, 42U);
+    } else {
+      EXPECT_EQ(std::get<ImuSample>(*message).source, 42U);
+    }
+  }
+}
+
+TEST(Dataset, SeekGoesOnWhereAnotherStopped) {
+  const auto root = tinyEuroc("seek");
+  const auto whole = Dataset::open({.path = root}), late = Dataset::open({.path = root});
+  while (auto message = whole->next()) {
+    const auto* frame = std::get_if<Frame>(&*message);
+    if (frame != nullptr && frame->stamp.sequence == 2) break;
+  }
+  late->seek(3);
+  while (auto expected = whole->next()) {
+    const auto message = late->next();
+    ASSERT_TRUE(message);
+    ASSERT_EQ(message->index(), expected->index());
+    if (const auto* imu = std::get_if<ImuSample>(&*message)) {
+      EXPECT_EQ(imu->sequence, std::get<ImuSample>(*expected).sequence);
+    } else {
+      EXPECT_EQ(std::get<Frame>(*message).stamp.sequence,
+                std::get<Frame>(*expected).stamp.sequence);
+    }
+  }
+  EXPECT_FALSE(late->next());
+}
+
+}  // namespace
+}  // namespace perdure::replay

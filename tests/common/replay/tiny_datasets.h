@@ -1,0 +1,28 @@
+// Dataset folders of a few frames, made for tests: each format with every part that a reader needs.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+namespace perdure::replay {
+
+/// An empty folder under the test's own temporary folder; what was there is removed.
+std::filesystem::path freshFolder(const std::string& name);
+void writeText(const std::filesystem::path& file, const std::string& text);
+std::string readText(const std::filesystem::path& file);
+/// A grey ramp; .png or .jpg, one or three channels.
+void writeImage(const std::filesystem::path& file, int width, int height, int channels);
+void truncate(const std::filesystem::path& file, double share);
+
+/// EuRoC: five 32×24 frames at 20 Hz from 1 s, IMU at 200 Hz from 0.95 s to 1.25 s, truth.
+std::filesystem::path tinyEuroc(const std::string& name, bool stereo = false);
+/// KITTI raw: four 48×16 frames at 10 Hz, JPEG on the left, PNG on the right, OXTS 7 ms later.
+std::filesystem::path tinyKittiRaw(const std::string& name);
+/// KITTI tracking: sequences 0000 (three frames, images) and 0001 (labels only, up to frame 4).
+std::filesystem::path tinyKittiTracking(const std::string& name);
+
+/// The message of the StartupError that `action` throws, or "" where it throws none.
+std::string startupErrorOf(const std::function<void()>& action);
+
+}  // namespace perdure::replay

@@ -1,0 +1,100 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "common/vision/decode.h"
+#include "common/vision/image.h"
+
+namespace perdure::vision {
+namespace {
+
+cv::Mat colours() {
+  cv::Mat image(6, 8, CV_8UC3);
+  for (int r = 0; r < image.rows; ++r) {
+    for (int c = 0; c < image.cols; ++c) {
+      image.at<cv::Vec3b>(r, c) = cv::Vec3b(static_cast<uchar>(20 * r), static_cast<uchar>(30 * c),
+                                            static_cast<uchar>(10 * (r + c)));
+    }
+  }
+  return image;
+}
+
+std::string encoded(const char* extension, const cv::Mat& image) {
+  std::vector<uchar> bytes;
+  cv::imencode(extension, image, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(Image, PixelsComeBackAsTheyWentInAlsoFromPaddedRows) {
+  const cv::Mat wide = colours();
+  const cv::Mat part = wide.colRange(2, 7);
+  Frame frame;
+  ASSERT_TRUE(setPixels(frame, part));
+  EXPECT_EQ(frame.width, 5U);
+  EXPECT_EQ(frame.height, 6U);
+  EXPECT_EQ(frame.encoding, ImageEncoding::kBgr8);
+  EXPECT_EQ(cv::norm(*viewOf(frame), part, cv::NORM_INF), 0.0);
+}
+
+TEST(Image, AMonoViewOfAMonoFrameIsNotACopy) {
+  Frame frame;
+  ASSERT_TRUE(setPixels(frame, cv::Mat(4, 4, CV_8UC1, cv::Scalar(9))));
+  EXPECT_EQ(monoOf(frame)->data, frame.data->data());
+}
+
+TEST(Image, ColourAndGreyAreConvertedIntoEachOther) {
+  Frame frame;
+  ASSERT_TRUE(setPixels(frame, cv::Mat(4, 4, CV_8UC3, cv::Scalar(70, 70, 70))));
+  const auto mono = monoOf(frame);
+  ASSERT_EQ(mono->type(), CV_8UC1);
+  EXPECT_EQ(mono->at<uchar>(2, 2), 70);
+  ASSERT_TRUE(setPixels(frame, *mono));
+  EXPECT_EQ(bgrOf(frame)->at<cv::Vec3b>(1, 1), cv::Vec3b(70, 70, 70));
+}
+
+TEST(Image, AFrameWhoseBytesDoNotFitItsSizeIsRefused) {
+  Frame frame;
+  EXPECT_EQ(viewOf(frame).error().code, "image_missing");
+  ASSERT_TRUE(setPixels(frame, cv::Mat(4, 4, CV_8UC1, cv::Scalar(0))));
+  frame.width = 5;
+  EXPECT_EQ(viewOf(frame).error().code, "image_malformed");
+  EXPECT_EQ(setPixels(frame, cv::Mat(2, 2, CV_16UC1)).error().code, "image_malformed");
+}
+
+TEST(Decode, KeepsTheFilesChannelsUnlessToldOtherwise) {
+  const std::string colour = encoded(".png", colours());
+  const std::string grey = encoded(".png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(5)));
+  EXPECT_EQ(decodeImage(colour, std::nullopt)->channels(), 3);
+  EXPECT_EQ(decodeImage(colour, ImageEncoding::kMono8)->channels(), 1);
+  EXPECT_EQ(decodeImage(grey, std::nullopt)->channels(), 1);
+  EXPECT_EQ(decodeImage(grey, ImageEncoding::kBgr8)->channels(), 3);
+}
+
+TEST(Decode, ATruncatedImageIsRefusedHoweverMuchOfItIsThere) {
+  for (const char* extension : {".png", ".jpg"}) {
+    const std::string whole = encoded(extension, colours());
+    ASSERT_TRUE(decodeImage(whole, std::nullopt)) << extension;
+    for (const std::size_t size :
+         {std::size_t{0}, std::size_t{3}, whole.size() / 2, whole.size() - 2}) {
+      const auto image = decodeImage(whole.substr(0, size), std::nullopt);
+      ASSERT_FALSE(image) << extension << " of " << size << " bytes";
+      EXPECT_TRUE(image.error().code == "image_truncated" || size < 4);
+    }
+  }
+}
+
+TEST(Decode, BytesThatAreNoImageAreCorrupt) {
+  EXPECT_EQ(decodeImage("this is a text, not an image", std::nullopt).error().code,
+            "image_corrupt");
+}
+
+TEST(Decode, AMissingFileIsNamed) {
+  const auto image = decodeImageFile("/nowhere/7.png", std::nullopt);
+  EXPECT_EQ(image.error().code, "image_missing");
+  EXPECT_NE(image.error().detail.find("/nowhere/7.png"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace perdure::vision
