@@ -1,0 +1,97 @@
+#include "tools/demo/plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/base/errors.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class DemoPlan : public ::testing::Test {
+ protected:
+  DemoPlan() {
+    std::string name = (fs::temp_directory_path() / "perdure-plan-XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+    for (const char* program : {"capture", "inference", "vio", "semantic-filter", "map-store"}) {
+      std::ofstream(folder_ / (std::string("perdure-") + program)) << "";
+    }
+    options_.data = "/data/drive";
+    options_.model = "/models/net.onnx";
+    options_.out = (folder_ / "out").string();
+    options_.programs = folder_.string();
+    options_.root = folder_.string();
+  }
+  ~DemoPlan() override { fs::remove_all(folder_); }
+
+  std::vector<std::string> commandOf(const std::string& service) {
+    for (const auto& plan : planServices(options_, prepareFolders(options_))) {
+      if (plan.name == service) return plan.command;
+    }
+    return {};
+  }
+
+  fs::path folder_;
+  DemoOptions options_;
+};
+
+TEST_F(DemoPlan, PacesCaptureByTheClockOrLetsItFollow) {
+  options_.rate = "0.5";
+  EXPECT_THAT(commandOf("capture"), Contains("pace.rate=0.5"));
+  EXPECT_THAT(commandOf("capture"), Contains("pace.mode=clock"));
+  options_.rate = "max";
+  EXPECT_THAT(commandOf("capture"), Contains("pace.mode=follow"));
+  for (const char* wrong : {"fast", "0", "-1", "2x", "nan"}) {
+    options_.rate = wrong;
+    EXPECT_THROW(commandOf("capture"), StartupError) << wrong;
+  }
+}
+
+TEST_F(DemoPlan, GivesEachServiceWhatItNeeds) {
+  EXPECT_THAT(commandOf("inference"), Contains("model.path=/models/net.onnx"));
+  EXPECT_THAT(commandOf("capture"), Contains("dataset.path=/data/drive"));
+  EXPECT_THAT(commandOf("map_store"), Contains(HasSubstr("out/run/state/map.sqlite")));
+}
+
+TEST_F(DemoPlan, NamesTheProgramThatIsMissing) {
+  fs::remove(folder_ / "perdure-vio");
+  try {
+    commandOf("capture");
+    FAIL() << "it was not refused";
+  } catch (const StartupError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("perdure-vio is missing"));
+    EXPECT_EQ(error.code(), ExitCode::kUnavailable);
+  }
+}
+
+TEST_F(DemoPlan, EmptiesAnEarlierRunButNoFolderOfSomeoneElse) {
+  const DemoFolders folders = prepareFolders(options_);
+  std::ofstream(folders.run / "supervisord.conf") << "";
+  std::ofstream(folders.state / "old") << "";
+  prepareFolders(options_);
+  EXPECT_FALSE(fs::exists(folders.state / "old"));
+  std::ofstream(folders.run / "precious") << "";
+  EXPECT_THROW(prepareFolders(options_), StartupError);
+  EXPECT_TRUE(fs::exists(folders.run / "precious"));
+}
+
+TEST_F(DemoPlan, QuotesWordsForSupervisord) {
+  options_.model = "/odd \"name\" 100%/net.onnx";
+  const auto folders = prepareFolders(options_);
+  const std::string config =
+      supervisorConfig(planServices(options_, folders), folders, "/tmp/s.sock", options_.root);
+  EXPECT_THAT(config, HasSubstr(R"("model.path=/odd \"name\" 100%%/net.onnx")"));
+  EXPECT_THAT(config, HasSubstr("[program:semantic_filter]"));
+  EXPECT_THAT(config, HasSubstr("file=/tmp/s.sock"));
+}
+
+}  // namespace
+}  // namespace perdure::tools

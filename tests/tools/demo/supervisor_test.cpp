@@ -1,0 +1,172 @@
+#include "tools/demo/supervisor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <thread>
+
+#include "tools/demo/plan.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+// As supervisord 4.2.5 answers.
+constexpr char kAnswer[] = R"xml(<?xml version='1.0'?>
+<methodResponse>
+<params>
+<param>
+<value><array><data>
+<value><struct>
+<member>
+<name>name</name>
+<value><string>vio</string></value>
+</member>
+<member>
+<name>exitstatus</name>
+<value><int>78</int></value>
+</member>
+<member>
+<name>statename</name>
+<value><string>BACKOFF</string></value>
+</member>
+<member>
+<name>spawnerr</name>
+<value><string>Exited too quickly</string></value>
+</member>
+</struct></value>
+<value><struct>
+<member>
+<name>name</name>
+<value><string>capture</string></value>
+</member>
+<member>
+<name>exitstatus</name>
+<value><int>0</int></value>
+</member>
+<member>
+<name>statename</name>
+<value><string>RUNNING</string></value>
+</member>
+<member>
+<name>spawnerr</name>
+<value><string></string></value>
+</member>
+</struct></value>
+</data></array></value>
+</param>
+</params>
+</methodResponse>)xml";
+
+TEST(SupervisorAnswers, GiveStateExitStatusAndSpawnErrorOfEachProcess) {
+  const auto states = readProcessInfo(kAnswer);
+  ASSERT_EQ(states.size(), 2u);
+  EXPECT_EQ(states.at("vio").state, "BACKOFF");
+  EXPECT_EQ(states.at("vio").exit_status, 78);
+  EXPECT_EQ(states.at("vio").spawn_error, "Exited too quickly");
+  EXPECT_EQ(states.at("capture").state, "RUNNING");
+  EXPECT_TRUE(states.at("capture").spawn_error.empty());
+}
+
+TEST(SupervisorAnswers, GiveNothingForWhatIsCutShort) {
+  const std::string whole = kAnswer;
+  for (std::size_t size = 0; size < whole.size(); size += 7) {
+    EXPECT_LE(readProcessInfo(whole.substr(0, size)).size(), 2u);
+  }
+  EXPECT_TRUE(readProcessInfo("<struct>").empty());
+}
+
+TEST(SupervisorAnswers, CountStartsInTheLog) {
+  const auto counts = countSpawns(
+      "2026-01-01 INFO spawned: 'vio' with pid 10\n2026-01-01 INFO success: vio entered\n"
+      "2026-01-01 INFO spawned: 'capture' with pid 11\n2026-01-01 INFO spawned: 'vio' with pid 12");
+  EXPECT_EQ(counts.at("vio"), 2);
+  EXPECT_EQ(counts.at("capture"), 1);
+}
+
+/// Real supervisord over shell programs.
+class Supervision : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::system("command -v supervisord > /dev/null") != 0) {
+      GTEST_SKIP() << "supervisord is not installed: deploy/install --runtime";
+    }
+    std::string name = (fs::temp_directory_path() / "perdure-sv-XXXXXX").string();
+    folders_.out = mkdtemp(name.data());
+    folders_.run = folders_.state = folders_.out;
+  }
+  void TearDown() override {
+    if (!folders_.out.empty()) fs::remove_all(folders_.out);
+  }
+
+  std::unique_ptr<Supervisor> start(const std::string& script) {
+    const std::vector<ServicePlan> services = {
+        {"worker", {"/bin/sh", "-c", script}, (folders_.out / "worker.log").string()}};
+    const std::string socket = (folders_.out / "s").string();
+    const std::string config = (folders_.out / "supervisord.conf").string();
+    std::ofstream(config) << supervisorConfig(services, folders_, socket, folders_.out);
+    return std::make_unique<Supervisor>(config, socket, (folders_.out / "out").string());
+  }
+
+  std::string log() {
+    std::ifstream file(folders_.out / "supervisord.log");
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  static bool eventually(const std::function<bool()>& so) {
+    for (int i = 0; i < 400 && !so(); ++i) std::this_thread::sleep_for(50ms);
+    return so();
+  }
+
+  DemoFolders folders_;
+};
+
+TEST_F(Supervision, StartsAKilledProgramAgainHoweverOften) {
+  const std::string pid_file = (folders_.out / "pid").string();
+  const auto supervisor = start("echo $$ > " + pid_file + "; exec sleep 100");
+  for (int round = 1; round <= 5; ++round) {
+    ASSERT_TRUE(eventually([&] {
+      const auto states = supervisor->states();
+      return states && states->at("worker").state == "RUNNING" &&
+             countSpawns(log())["worker"] == round;
+    })) << log();
+    pid_t pid = 0;
+    std::ifstream(pid_file) >> pid;
+    ASSERT_GT(pid, 1);
+    kill(pid, SIGKILL);
+  }
+}
+
+TEST_F(Supervision, TellsOfAProgramThatCannotStartAndOfOneThatWasStopped) {
+  const auto failing = start("exit 78");
+  EXPECT_TRUE(eventually([&] {
+    const auto states = failing->states();
+    return states && states->at("worker").state == "BACKOFF" &&
+           states->at("worker").exit_status == 78;
+  }));
+}
+
+TEST_F(Supervision, StopsAProgramWhenTold) {
+  const auto supervisor = start("trap 'exit 0' TERM; while :; do sleep 0.1; done");
+  ASSERT_TRUE(eventually([&] {
+    const auto states = supervisor->states();
+    return states && states->at("worker").state == "RUNNING";
+  }));
+  supervisor->stop("worker");
+  EXPECT_TRUE(eventually([&] {
+    const auto states = supervisor->states();
+    return states && states->at("worker").ended();
+  }));
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,262 @@
+#include "tools/demo/demo.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "common/base/errors.h"
+#include "common/base/ids.h"
+#include "common/replay/dataset.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+std::string contentsOf(const fs::path& file) {
+  std::ifstream stream(file);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// A domain that no other demo of this machine uses; the lock lasts as long as this process.
+void leaseDomain() {
+  if (std::getenv("PERDURE_DOMAIN") != nullptr) return;
+  constexpr int kFirst = 60, kLast = 99;
+  for (int domain = kFirst; domain <= kLast; ++domain) {
+    const auto path = fs::temp_directory_path() / fmt::format("perdure-domain-{}", domain);
+    const int file = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+    if (file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0) {
+      setenv("PERDURE_DOMAIN", std::to_string(domain).c_str(), 1);
+      return;
+    }
+    if (file >= 0) close(file);
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     "DDS domains 60 to 99 are all used by demos; end one of them, or set "
+                     "PERDURE_DOMAIN to a free one");
+}
+
+std::string shellQuoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+struct Answer {
+  int status = 0;
+  std::string text;
+};
+
+Answer answerOf(const std::string& command) {
+  Answer answer;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return {127, command};
+  char buffer[4096];
+  for (std::size_t n = 0; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
+    answer.text.append(buffer, n);
+  }
+  const int status = pclose(pipe);
+  answer.status = WIFEXITED(status) ? WEXITSTATUS(status) : 127;
+  return answer;
+}
+
+/// What a service said last, without the log's own lines.
+std::string lastWords(const std::string& log_file) {
+  std::istringstream lines(contentsOf(log_file));
+  std::string last, line;
+  while (std::getline(lines, line)) {
+    if (!line.empty() && line.find(" info: ") == std::string::npos) last = line;
+  }
+  return last;
+}
+
+/// A short path: a unix socket's has at most 107 bytes.
+std::string socketFolder() {
+  std::string name = (fs::temp_directory_path() / "perdure-demo-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) {
+    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " +
+                       fs::temp_directory_path().string() + "; set TMPDIR to one that can be written");
+  }
+  return name;
+}
+
+bool meansCannotStart(const ServiceState& state) {
+  if (state.state == "FATAL") return true;
+  const bool said_why = state.exit_status == static_cast<int>(ExitCode::kUsage) ||
+                        state.exit_status == static_cast<int>(ExitCode::kUnavailable) ||
+                        state.exit_status == static_cast<int>(ExitCode::kConfiguration);
+  return state.state == "BACKOFF" && said_why;
+}
+
+}  // namespace
+
+Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
+    : options_(options), interrupted_(interrupted) {
+  openData();
+  folders_ = prepareFolders(options_);
+  services_ = planServices(options_, folders_);
+  checkConfigurations();
+  leaseDomain();
+  outputs_ = std::make_unique<OutputWriter>(
+      folders_.out, truth_ ? truth_->sequence : fs::path(options_.data).filename().string());
+  domain_ = std::make_unique<bus::Domain>(bus::Options{});
+  participant_ = std::make_unique<bus::Participant>(*domain_, "demo");
+  loop_ = std::make_unique<bus::WaitLoop>(*participant_);
+  reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_);
+
+  socket_ = socketFolder() + "/supervisor.sock";
+  const fs::path config = folders_.run / "supervisord.conf";
+  std::ofstream(config) << supervisorConfig(services_, folders_, socket_, options_.root);
+  supervisor_ = std::make_unique<Supervisor>(config.string(), socket_,
+                                             (folders_.run / "supervisord.out").string());
+  std::cerr << fmt::format("demo: {} frames, services on DDS domain {}; listen with: "
+                           "PERDURE_DOMAIN={} {}/perdure topics\n",
+                           frames_, domain_->options().domain, domain_->options().domain,
+                           options_.programs);
+}
+
+Demo::~Demo() {
+  supervisor_.reset();
+  std::error_code ignored;
+  if (!socket_.empty()) fs::remove_all(fs::path(socket_).parent_path(), ignored);
+}
+
+void Demo::openData() {
+  replay::DatasetOptions data;
+  data.path = options_.data;
+  data.sequence = options_.sequence;
+  data.decode = false;
+  frames_ = replay::Dataset::open(data)->frameCount();
+  if (!fs::exists(options_.model)) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options_.model + " does not exist; give --model a network, FILE.onnx");
+  }
+  truth_ = findTruth(options_);
+}
+
+void Demo::checkConfigurations() {
+  for (const ServicePlan& service : services_) {
+    std::string command;
+    for (const std::string& word : service.command) command += shellQuoted(word) + " ";
+    const std::string folder = shellQuoted(fs::absolute(options_.root).string());
+    const Answer answer = answerOf("cd " + folder + " && " + command + "--print-config 2>&1");
+    if (answer.status != 0) {
+      const auto code = answer.status == 127 ? ExitCode::kUnavailable
+                                             : static_cast<ExitCode>(answer.status);
+      throw StartupError(code, service.name + " cannot start: " + answer.text);
+    }
+    configurations_ += answer.text;
+  }
+}
+
+void Demo::run() {
+  while (!over()) {
+    loop_->runOnce(50ms);
+    watch();
+  }
+  showProgress(true);
+  if (interrupted_) std::cerr << "demo: ends early\n";
+  endInOrder();
+  write();
+}
+
+void Demo::watch() {
+  const std::int64_t now = monotonicNs();
+  if (now - checked_ns_ > kSecond / 2) {
+    checked_ns_ = now;
+    checkServices();
+  }
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  if (now - shown_ns_ > (terminal ? kSecond / 4 : 2 * kSecond)) {
+    shown_ns_ = now;
+    showProgress(false);
+  }
+}
+
+bool Demo::over() {
+  if (interrupted_) return true;
+  if (options_.seconds > 0 && reporter_->secondsOfDrive() >= options_.seconds) return true;
+  const Health* capture = reporter_->healthOf("capture");
+  if (capture == nullptr || capture->message != "end of drive") return false;
+  // Late detections may still come; what never comes is not waited for longer than the second.
+  const std::int64_t quiet = monotonicNs() - reporter_->lastMessageNs();
+  return quiet > (reporter_->drained() ? kSecond : 5 * kSecond);
+}
+
+void Demo::checkServices() {
+  const auto states = supervisor_->states();
+  if (!states) {
+    if (supervisor_->alive()) return;  // busy; asked again soon
+    throw StartupError(ExitCode::kFailure, "supervisord has ended; see " +
+                       (folders_.run / "supervisord.log").string());
+  }
+  for (const ServicePlan& service : services_) {
+    const auto found = states->find(service.name);
+    if (found == states->end() || !meansCannotStart(found->second)) continue;
+    const std::string why = found->second.spawn_error.empty() ? lastWords(service.log)
+                                                              : found->second.spawn_error;
+    const int status = found->second.exit_status;
+    throw StartupError(status == 0 ? ExitCode::kFailure : static_cast<ExitCode>(status),
+                       fmt::format("{} does not start: {} (its log: {})", service.name, why,
+                                   service.log));
+  }
+}
+
+void Demo::showProgress(bool last) {
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  const std::string line = reporter_->progressLine(frames_);
+  std::cerr << (terminal ? "\r\033[K" : "") << "demo: " << line
+            << (terminal && !last ? "" : "\n") << std::flush;
+}
+
+void Demo::endInOrder() {
+  for (const char* service : kServices) endOne(service);
+}
+
+void Demo::endOne(const std::string& service) {
+  supervisor_->stop(service);
+  const std::int64_t end = monotonicNs() + 6 * kSecond;
+  while (monotonicNs() < end) {
+    loop_->runOnce(50ms);
+    const auto states = supervisor_->states();
+    if (!states || !states->contains(service) || states->at(service).ended()) return;
+  }
+}
+
+void Demo::write() {
+  outputs_->finish();
+  outputs_->writeJson("timing.json", reporter_->timing());
+  nlohmann::ordered_json report = {{"program", "perdure demo"},
+                                   {"version", PERDURE_VERSION},
+                                   {"configuration", toHex(digest(configurations_))},
+                                   {"data", fs::absolute(options_.data).string()},
+                                   {"model", fs::absolute(options_.model).string()},
+                                   {"rate", options_.rate},
+                                   {"frames", frames_},
+                                   {"complete", !interrupted_ && options_.seconds == 0.0}};
+  report.update(reporter_->report());
+  const auto spawns = countSpawns(contentsOf(folders_.run / "supervisord.log"));
+  for (const auto& [service, count] : spawns) {
+    report["services"][service]["restarts"] = count - 1;
+  }
+  if (truth_ && reporter_->odometryFrames() > 0) {
+    report["objects"] = scoreAgainst(*truth_, folders_.out);
+  }
+  outputs_->writeJson("report.json", report);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,53 @@
+// One run of the demo, from starting the services to the report.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "tools/demo/plan.h"
+#include "tools/demo/reporter.h"
+#include "tools/demo/supervisor.h"
+#include "tools/demo/truth.h"
+
+namespace perdure::tools {
+
+class Demo {
+ public:
+  /// Checks data, model and configuration, starts everything. Throws StartupError with the mend.
+  Demo(const DemoOptions& options, const std::atomic<bool>& interrupted);
+  ~Demo();
+
+  /// Until the drive ends and everything is drained, --seconds are over, or interrupted; then ends
+  /// the services in order and writes the outputs. Throws StartupError where a service cannot run.
+  void run();
+
+ private:
+  void openData();
+  void checkConfigurations();
+  void watch();
+  bool over();
+  void checkServices();
+  void showProgress(bool last);
+  void endInOrder();
+  void endOne(const std::string& service);
+  void write();
+
+  const DemoOptions options_;
+  const std::atomic<bool>& interrupted_;
+  DemoFolders folders_;
+  std::vector<ServicePlan> services_;
+  std::optional<TruthFiles> truth_;
+  std::size_t frames_ = 0;
+  std::string configurations_, socket_;
+  std::unique_ptr<OutputWriter> outputs_;
+  std::unique_ptr<bus::Domain> domain_;
+  std::unique_ptr<bus::Participant> participant_;
+  std::unique_ptr<bus::WaitLoop> loop_;
+  std::unique_ptr<Reporter> reporter_;
+  std::unique_ptr<Supervisor> supervisor_;
+  std::int64_t shown_ns_ = 0, checked_ns_ = 0;
+};
+
+}  // namespace perdure::tools

@@ -1,0 +1,143 @@
+#include "tools/demo/plan.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "common/base/errors.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Where a folder of ours may be emptied: it holds this file.
+constexpr char kMark[] = "supervisord.conf";
+
+[[noreturn]] void cannotUse(const fs::path& folder, const std::string& why) {
+  throw StartupError(ExitCode::kUnavailable,
+                     fmt::format("{} cannot be used: {}; give --out another folder",
+                                 folder.string(), why));
+}
+
+/// "--set" arguments that make capture's pace of --rate.
+std::vector<std::string> paceOf(const std::string& rate) {
+  if (rate == "max") return {"pace.mode=follow"};
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(rate.data(), rate.data() + rate.size(), value);
+  if (error != std::errc() || end != rate.data() + rate.size() || !(value > 0.0)) {
+    throw StartupError(ExitCode::kUsage, fmt::format("--rate {}: give max, or how many seconds of "
+                                                     "the drive pass in one second", rate));
+  }
+  return {"pace.mode=clock", "pace.rate=" + rate};
+}
+
+std::string programName(const std::string& service) {
+  std::string name = "perdure-" + service;
+  for (char& c : name) {
+    if (c == '_') c = '-';
+  }
+  return name;
+}
+
+std::vector<std::string> settingsOf(const std::string& service, const DemoOptions& options,
+                                    const DemoFolders& folders) {
+  if (service == "map_store") return {"store.path=" + (folders.state / "map.sqlite").string()};
+  if (service == "vio") return {"state.directory=" + folders.state.string()};
+  if (service == "inference") return {"model.path=" + fs::absolute(options.model).string()};
+  if (service != "capture") return {};
+  std::vector<std::string> settings = {
+      "dataset.path=" + fs::absolute(options.data).string(),
+      "run.state=" + (folders.state / "capture.json").string(),
+      "run.on_end=stay",
+      "start.readers=[vio, inference, semantic_filter, map_store, demo]"};
+  if (!options.sequence.empty()) {
+    settings.push_back(fmt::format("dataset.sequence=\"{}\"", options.sequence));
+  }
+  for (std::string& setting : paceOf(options.rate)) settings.push_back(std::move(setting));
+  return settings;
+}
+
+/// As supervisord reads a command: in double quotes, with % doubled.
+std::string quoted(const std::string& word) {
+  std::string text = "\"";
+  for (const char c : word) {
+    if (c == '"' || c == '\\') text += '\\';
+    if (c == '%') text += '%';
+    text += c;
+  }
+  return text + "\"";
+}
+
+std::string escaped(const std::string& path) {
+  std::string text;
+  for (const char c : path) text += c == '%' ? "%%" : std::string(1, c);
+  return text;
+}
+
+}  // namespace
+
+DemoFolders prepareFolders(const DemoOptions& options) {
+  DemoFolders folders;
+  folders.out = fs::absolute(options.out);
+  folders.run = folders.out / "run";
+  folders.state = folders.run / "state";
+  std::error_code error;
+  if (fs::exists(folders.run)) {
+    if (!fs::exists(folders.run / kMark)) {
+      cannotUse(folders.run, "it was not made by a demo, so it is not emptied");
+    }
+    fs::remove_all(folders.run, error);
+  }
+  fs::create_directories(folders.state, error);
+  if (error) cannotUse(folders.out, error.message());
+  return folders;
+}
+
+std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders) {
+  std::vector<ServicePlan> plans;
+  const fs::path root = fs::absolute(options.root);
+  for (const std::string name : kServices) {
+    const fs::path program = fs::absolute(options.programs) / programName(name);
+    if (!fs::exists(program)) {
+      throw StartupError(ExitCode::kUnavailable,
+                         fmt::format("{} is missing; build it: cmake --preset release && cmake "
+                                     "--build --preset release", program.string()));
+    }
+    ServicePlan plan{name, {program.string()}, (folders.run / (name + ".log")).string()};
+    const fs::path config = root / "config" / (name + ".yaml");
+    if (fs::exists(config)) plan.command.insert(plan.command.end(), {"--config", config.string()});
+    for (const std::string& setting : settingsOf(name, options, folders)) {
+      plan.command.insert(plan.command.end(), {"--set", setting});
+    }
+    plans.push_back(std::move(plan));
+  }
+  return plans;
+}
+
+std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,
+                             const std::string& socket, const fs::path& root) {
+  std::string text = fmt::format(
+      "[unix_http_server]\nfile={}\nchmod=0700\n\n"
+      "[supervisord]\nnodaemon=true\nlogfile={}\nlogfile_maxbytes=0\npidfile={}\n\n"
+      "[rpcinterface:supervisor]\n"
+      "supervisor.rpcinterface_factory=supervisor.rpcinterface:make_main_rpcinterface\n",
+      escaped(socket), escaped((folders.run / "supervisord.log").string()),
+      escaped((folders.run / "supervisord.pid").string()));
+  int priority = 100;
+  for (const ServicePlan& service : services) {
+    std::string command;
+    for (const std::string& word : service.command) command += quoted(word) + " ";
+    // Ended by a fault after its first second, a program is started again without delay, however
+    // often. One that cannot start is tried six times, 1, 2, 3, … seconds apart.
+    text += fmt::format(
+        "\n[program:{}]\ncommand={}\ndirectory={}\npriority={}\nautorestart=unexpected\n"
+        "exitcodes=0\nstartsecs=1\nstartretries=5\nstopsignal=TERM\nstopwaitsecs=5\n"
+        "redirect_stderr=true\nstdout_logfile={}\nstdout_logfile_maxbytes=0\n",
+        service.name, command, escaped(fs::absolute(root).string()), priority--,
+        escaped(service.log));
+  }
+  return text;
+}
+
+}  // namespace perdure::tools

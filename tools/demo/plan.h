@@ -1,0 +1,46 @@
+// What the demo is asked for, and how the services are to be started for it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace perdure::tools {
+
+struct DemoOptions {
+  std::string data, sequence, model, out, rate = "1";
+  std::string root = ".";    ///< where config/ is
+  std::string programs;      ///< folder of the services; empty: that of this program
+  std::string truth;         ///< root of KITTI tracking; empty: looked for beside the data
+  std::string truth_sequence;
+  double seconds = 0.0;      ///< of the drive; 0: all of it
+  bool headless = false;
+};
+
+/// The services in the order in which they are ended: from the source to the store.
+inline constexpr const char* kServices[] = {"capture", "inference", "vio", "semantic_filter",
+                                            "map_store"};
+
+struct ServicePlan {
+  std::string name;                  ///< "semantic_filter"
+  std::vector<std::string> command;  ///< program and arguments
+  std::string log;                   ///< file
+};
+
+/// Folders of a demo's run, all absolute.
+struct DemoFolders {
+  std::filesystem::path out, run, state;
+};
+
+/// Makes OUT and empties OUT/run, which is this command's own. Throws StartupError.
+DemoFolders prepareFolders(const DemoOptions& options);
+
+/// In the order of kServices. Throws StartupError where a program is missing or --rate is wrong.
+std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
+
+/// The configuration of supervisord: a service that ends by a fault is started again at once.
+std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,
+                             const std::string& socket, const std::filesystem::path& root);
+
+}  // namespace perdure::tools

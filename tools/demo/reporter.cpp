@@ -1,0 +1,160 @@
+#include "tools/demo/reporter.h"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+
+#include "common/bus/topics.h"
+#include "tools/outputs/stage_timer.h"
+
+namespace perdure::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double rounded(double value) { return std::round(value * 1000.0) / 1000.0; }
+
+}  // namespace
+
+std::int64_t monotonicNs() {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+std::uint64_t ServiceCounts::sum(std::uint64_t Health::*field) const {
+  std::uint64_t total = 0;
+  for (const auto& [instance, health] : by_instance_) total += health.*field;
+  return total;
+}
+
+double ServiceCounts::cpuSeconds() const {
+  double total = 0.0;
+  for (const auto& [instance, health] : by_instance_) total += health.cpu_s;
+  return total;
+}
+
+std::map<std::string, std::uint64_t> ServiceCounts::reasons() const {
+  std::map<std::string, std::uint64_t> total;
+  for (const auto& [instance, health] : by_instance_) {
+    for (const auto& [reason, count] : health.reasons) total[reason] += count;
+  }
+  return total;
+}
+
+Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs)
+    : outputs_(outputs),
+      calibration_reader_(participant, bus::topics::kCalibration),
+      odometry_reader_(participant, bus::topics::kOdometry),
+      detections_reader_(participant, bus::topics::kDetections),
+      objects_reader_(participant, bus::topics::kObjects),
+      events_reader_(participant, bus::topics::kEvents),
+      health_reader_(participant, bus::topics::kHealth) {
+  loop.on(calibration_reader_, [this](const Calibration& c) { outputs_.onCalibration(c); });
+  loop.on(odometry_reader_, [this](const Odometry& o) { onOdometry(o); });
+  loop.on(detections_reader_, [this](const Detections& d) {
+    detections_.insert(d.stamp.sequence);
+    last_message_ns_ = monotonicNs();
+  });
+  loop.on(objects_reader_, [this](const Objects& o) { onObjects(o); });
+  loop.on(events_reader_, [this](const Event& e) { outputs_.onEvent(e); });
+  loop.on(health_reader_, [this](const Health& h) { onHealth(h); });
+}
+
+void Reporter::onOdometry(const Odometry& odometry) {
+  if (odometry_.empty()) first_time_ = odometry.stamp.time;
+  odometry_.insert(odometry.stamp.sequence);
+  newest_frame_ = std::max(newest_frame_, odometry.stamp.sequence);
+  newest_time_ = std::max(newest_time_, odometry.stamp.time);
+  last_message_ns_ = monotonicNs();
+  outputs_.onOdometry(odometry);
+}
+
+void Reporter::onObjects(const Objects& objects) {
+  last_message_ns_ = monotonicNs();
+  outputs_.onObjects(objects);
+  if (!objects_.insert(objects.stamp.sequence).second) return;
+  const std::int64_t age_ns = last_message_ns_ - objects.stamp.captured_ns;
+  latency_ms_.push_back(static_cast<double>(age_ns) * 1e-6);
+}
+
+void Reporter::onHealth(const Health& health) {
+  if (health.instance == 0) return;
+  const auto before = newest_health_.find(health.process);
+  if (before != newest_health_.end() && before->second.instance == health.instance) {
+    const std::uint64_t frames = health.frames_out - before->second.frames_out;
+    const double cpu_ms = 1000.0 * (health.cpu_s - before->second.cpu_s);
+    if (frames > 0) spans_[health.process].push_back({frames, cpu_ms});
+  }
+  newest_health_[health.process] = health;
+  services_[health.process].add(health);
+}
+
+const Health* Reporter::healthOf(const std::string& process) const {
+  const auto found = newest_health_.find(process);
+  return found == newest_health_.end() ? nullptr : &found->second;
+}
+
+bool Reporter::drained() const {
+  const Health* capture = healthOf("capture");
+  if (capture == nullptr || capture->message != "end of drive") return false;
+  return std::includes(objects_.begin(), objects_.end(), odometry_.begin(), odometry_.end());
+}
+
+std::string Reporter::progressLine(std::size_t frames_in_all) const {
+  const Health* capture = healthOf("capture");
+  if (odometry_.empty()) {
+    const std::string what = capture == nullptr ? "starting" : capture->message;
+    return what.empty() ? "running, no odometry yet" : what;
+  }
+  const Health* vio = healthOf("vio");
+  const Health* inference = healthOf("inference");
+  return fmt::format(
+      "frame {}/{}  odometry {:.1f} Hz  detections {:.1f} Hz  objects {}  latency {:.0f} ms",
+      newest_frame_ + 1, frames_in_all, vio == nullptr ? 0.0 : vio->rate_hz,
+      inference == nullptr ? 0.0 : inference->rate_hz, outputs_.history().confirmedNow(),
+      latency_ms_.empty() ? 0.0 : latency_ms_.back());
+}
+
+Json Reporter::report() const {
+  Json services = Json::object();
+  for (const auto& [name, counts] : services_) {
+    services[name] = {{"frames_in", counts.framesIn()},
+                      {"frames_out", counts.framesOut()},
+                      {"dropped", counts.dropped()},
+                      {"restarts", 0},
+                      {"cpu_s", rounded(counts.cpuSeconds())},
+                      {"reasons", counts.reasons()}};
+  }
+  return {{"services", services},
+          {"messages",
+           {{"odometry", odometry_.size()},
+            {"detections", detections_.size()},
+            {"objects", objects_.size()}}},
+          {"latency_ms",
+           {{"median", rounded(quantile(latency_ms_, 0.5))},
+            {"p99", rounded(quantile(latency_ms_, 0.99))}}}};
+}
+
+Json Reporter::timing() const {
+  Json stages = Json::object();
+  for (const auto& [name, spans] : spans_) {
+    std::uint64_t calls = 0;
+    double total = 0.0;
+    std::vector<double> each;
+    for (const Span& span : spans) {
+      calls += span.frames;
+      total += span.cpu_ms;
+      each.push_back(span.cpu_ms / static_cast<double>(span.frames));
+    }
+    stages[name] = {{"calls", calls},
+                    {"cpu_ms",
+                     {{"median", rounded(quantile(each, 0.5))},
+                      {"p99", rounded(quantile(each, 0.99))},
+                      {"total", rounded(total)}}}};
+  }
+  return {{"stages", stages}, {"of", "means a frame over each second, from Health"}};
+}
+
+}  // namespace perdure::tools

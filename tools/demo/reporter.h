@@ -1,0 +1,85 @@
+// Listens to a running system and writes down what came out: DESIGN section 3's files.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/bus/wait_loop.h"
+#include "common/types/health.h"
+#include "tools/outputs/output_writer.h"
+
+namespace perdure::tools {
+
+/// Figures of one service over all of its processes: each start counts from 0.
+class ServiceCounts {
+ public:
+  void add(const Health& health) { by_instance_[health.instance] = health; }
+  std::uint64_t framesIn() const { return sum(&Health::frames_in); }
+  std::uint64_t framesOut() const { return sum(&Health::frames_out); }
+  std::uint64_t dropped() const { return sum(&Health::dropped); }
+  double cpuSeconds() const;
+  std::map<std::string, std::uint64_t> reasons() const;
+
+ private:
+  std::uint64_t sum(std::uint64_t Health::*field) const;
+  std::map<InstanceId, Health> by_instance_;
+};
+
+class Reporter {
+ public:
+  /// Subscribes. `loop` must outlive it and be run by the caller.
+  Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs);
+
+  /// Of what came so far.
+  std::size_t odometryFrames() const { return odometry_.size(); }
+  std::size_t objectFrames() const { return objects_.size(); }
+  /// Index and sensor time of the newest frame with odometry.
+  std::uint64_t newestFrame() const { return newest_frame_; }
+  double secondsOfDrive() const { return toSeconds(newest_time_ - first_time_); }
+  /// The drive was given out to its end, and every frame that has odometry has objects.
+  bool drained() const;
+  /// When the last message about a frame came, CLOCK_MONOTONIC.
+  std::int64_t lastMessageNs() const { return last_message_ns_; }
+  const Health* healthOf(const std::string& process) const;
+
+  /// "frame 57/154  10.0 Hz  objects 9  latency 83 ms".
+  std::string progressLine(std::size_t frames_in_all) const;
+  /// services, latency_ms, counts of messages; restarts are the caller's.
+  nlohmann::ordered_json report() const;
+  /// Processor time a frame by service, as means over each second.
+  nlohmann::ordered_json timing() const;
+
+ private:
+  void onOdometry(const Odometry& odometry);
+  void onObjects(const Objects& objects);
+  void onHealth(const Health& health);
+
+  OutputWriter& outputs_;
+  bus::Reader<Calibration> calibration_reader_;
+  bus::Reader<Odometry> odometry_reader_;
+  bus::Reader<Detections> detections_reader_;
+  bus::Reader<Objects> objects_reader_;
+  bus::Reader<Event> events_reader_;
+  bus::Reader<Health> health_reader_;
+  std::set<std::uint64_t> odometry_, objects_, detections_;
+  std::uint64_t newest_frame_ = 0;
+  TimePoint first_time_, newest_time_;
+  std::int64_t last_message_ns_ = 0;
+  std::vector<double> latency_ms_;
+  std::map<std::string, Health> newest_health_;
+  std::map<std::string, ServiceCounts> services_;
+  struct Span {
+    std::uint64_t frames = 0;
+    double cpu_ms = 0.0;
+  };
+  std::map<std::string, std::vector<Span>> spans_;
+};
+
+/// CLOCK_MONOTONIC, as in FrameStamp::captured_ns.
+std::int64_t monotonicNs();
+
+}  // namespace perdure::tools

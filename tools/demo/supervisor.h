@@ -1,0 +1,50 @@
+// supervisord as a child: started, asked and told over its unix socket (XML-RPC), ended.
+#pragma once
+
+#include <sys/types.h>
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace perdure::tools {
+
+struct ServiceState {
+  std::string state;  ///< STOPPED, STARTING, RUNNING, BACKOFF, STOPPING, EXITED, FATAL, UNKNOWN
+  int exit_status = 0;
+  std::string spawn_error;
+  bool ended() const { return state == "STOPPED" || state == "EXITED" || state == "FATAL"; }
+};
+
+/// The processes of an answer to supervisor.getAllProcessInfo. Empty where it is malformed.
+std::map<std::string, ServiceState> readProcessInfo(const std::string& xml);
+
+/// How often supervisord's log says that each program was started.
+std::map<std::string, int> countSpawns(const std::string& log);
+
+class Supervisor {
+ public:
+  /// Throws StartupError where supervisord is not installed or does not answer.
+  Supervisor(const std::string& config_file, const std::string& socket, const std::string& log);
+  /// Ends supervisord, and with it what still runs.
+  ~Supervisor();
+  Supervisor(const Supervisor&) = delete;
+  Supervisor& operator=(const Supervisor&) = delete;
+
+  Result<std::map<std::string, ServiceState>> states() const;
+  /// SIGTERM; returns at once.
+  void stop(const std::string& service) const;
+  bool alive();
+
+ private:
+  Result<std::string> call(const std::string& method, const std::string& parameters) const;
+  void waitForEnd();
+
+  std::string socket_;
+  pid_t pid_ = 0;
+};
+
+}  // namespace perdure::tools
