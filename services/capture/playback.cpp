@@ -35,6 +35,8 @@ Playback::Playback(service::Context& context, const Config& config)
       frame_count_(drive_->frameCount()),
       period_(periodOf(drive_->calibration())),
       resume_(readRunState(config)),
+      drive_identity_(driveOf(config)),
+      boot_(bootId()),
       gate_(context.participant(), config.start, std::chrono::steady_clock::now()) {
   Calibration calibration = drive_->calibration();
   if (config_.dataset.cameras == "mono" && calibration.cameras.size() > 1) {
@@ -45,12 +47,9 @@ Playback::Playback(service::Context& context, const Config& config)
   }
   outputs_ = outputs();
   (void)context_.writer(bus::topics::kCalibration).write(calibration);
-  context_.on(bus::topics::kOdometry, [this](const Odometry& m) {
-    if (node_) node_->onAnswer("odometry", m.stamp);
-  });
-  context_.on(bus::topics::kDetections, [this](const Detections& m) {
-    if (node_) node_->onAnswer("detections", m.stamp);
-  });
+  context_.on(bus::topics::kOdometry, [this](const Odometry& m) { credit("odometry", m.stamp); });
+  context_.on(bus::topics::kDetections,
+              [this](const Detections& m) { credit("detections", m.stamp); });
   context_.countReasons([this](ReasonCounts& counts) { report(counts); });
   context_.onHealth([this] { updateHealth(); });
   context_.loop().onWake([this] { pump(); });
@@ -102,30 +101,44 @@ void Playback::feed() {
   }
 }
 
+void Playback::credit(const std::string& answerer, const FrameStamp& stamp) {
+  if (!node_ || finished_) return;
+  node_->onAnswer(answerer, stamp);
+  saveState();
+  pump();
+}
+
 void Playback::pump() {
   if (finished_ || !gate_.open(std::chrono::steady_clock::now())) return;
   if (!node_) begin();
-  const std::int64_t before = node_->state().last_ns;
-  while (!context_.stopping()) {
+  constexpr int kMost = 256;  // then Health and signals have their turn
+  for (int i = 0; i < kMost && !context_.stopping(); ++i) {
     if (loader_) feed();
     if (node_->tick(monotonicNs()) > Duration{0}) break;
+    saveState();
   }
-  if (node_->finished()) return finish();
-  if (node_->state().last_ns != before) saveState(false);
+  if (node_->finished()) finish();
 }
 
-void Playback::saveState(bool finished) {
-  if (config_.run.state.empty()) return;
+/// Writes the file where it would not say the same again. Samples alone wait for the next frame:
+/// a few of them coming twice does no harm.
+void Playback::saveState() {
   RunState state = node_->state();
-  state.drive = driveOf(config_);
-  state.boot = bootId();
-  state.finished = finished;
+  if (config_.run.state.empty() || (state.next_sequence == saved_.next_sequence &&
+                                    frames_saved_ == node_->framesGiven() && !finished_)) {
+    return;
+  }
+  frames_saved_ = node_->framesGiven();
+  saved_ = state;
+  state.drive = drive_identity_;
+  state.boot = boot_;
+  state.finished = finished_;
   if (!writeRunState(config_.run.state, state)) reasons_.add("run_state_unwritable");
 }
 
 void Playback::finish() {
   finished_ = true;
-  saveState(true);
+  saveState();
   context_.log().info("end of drive after {} frames", node_->framesGiven());
   if (config_.run.on_end != "exit") return;
   constexpr double kLongest = 0.5;  // SIGTERM ends a service within a second

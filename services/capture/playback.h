@@ -22,7 +22,8 @@ class Playback {
   void begin();
   void pump();
   void feed();
-  void saveState(bool finished);
+  void credit(const std::string& answerer, const FrameStamp& stamp);
+  void saveState();
   void finish();
   void updateHealth();
   void report(ReasonCounts& counts) const;
@@ -34,7 +35,9 @@ class Playback {
   std::size_t frame_count_ = 0;
   Duration period_{0};
   std::optional<RunState> resume_;
+  const std::string drive_identity_, boot_;
   RunState saved_;
+  std::uint64_t frames_saved_ = 0;
   StartGate gate_;
   std::map<std::string, bus::Writer<Frame>*> frames_;
   Outputs outputs_;
