@@ -75,11 +75,13 @@ void describeMotion(Parameters& p, Fields& fields) {
   fields.number("pose.walk_rotation", p.pose.walk_rotation, atLeast(0),
                 {"the same of their rotation", "rad/√m"});
   fields.number("looks.correlation", p.looks.correlation, between(0, 1),
-                {"share of a look's error that the next look from the same place has too"});
+                {"of the errors of two looks from the same place"});
   fields.number("looks.angle", p.looks.angle, positive(),
-                {"change of view after which looks are independent", "rad"});
+                {"change of aspect after which that has fallen to 1/e", "rad"});
   fields.number("looks.log_distance", p.looks.log_distance, positive(),
                 {"the same for the logarithm of the distance"});
+  fields.number("looks.image_angle", p.looks.image_angle, positive(),
+                {"the same for the place in the image", "rad"});
 }
 
 void describeTend(Parameters& p, Fields& fields) {
@@ -95,6 +97,8 @@ void describeTend(Parameters& p, Fields& fields) {
   fields.number("tend.confirm", t.confirm, between(0, 1), {"existence that confirms an object"});
   fields.integer("tend.confirm_hits", t.confirm_hits, between(1, 1000),
                  {"and the looks at it that it takes"});
+  fields.number("tend.certain", t.certain, between(0.9, 0.999999),
+                {"existence is kept below it, so that misses can still be heard"});
   fields.number("tend.gone", t.gone, between(0, 1), {"existence below which an object is gone"});
   fields.number("tend.gone_tentative", t.gone_tentative, between(0, 1),
                 {"the same for one that was never confirmed"});

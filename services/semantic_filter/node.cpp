@@ -177,7 +177,9 @@ void Node::onDetections(const Detections& detections) {
 
 void Node::stepEntry(Entry& entry) {
   entry.before = belief_;
-  entry.merges = filter_.step(belief_, entry.input, ids_);
+  StepReport report = filter_.step(belief_, entry.input, ids_);
+  entry.merges = std::move(report.merges);
+  if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
   entry.stepped = true;
 }
 
@@ -205,7 +207,7 @@ void Node::publish(const Entry& entry) {
   objects.up_W = entry.input.view.up_W;
   objects.next_id = ids_.next();
   for (const auto& object : belief_.objects) {
-    objects.objects.push_back(toBelief(object));
+    objects.objects.push_back(toBelief(object, config_.filter.motion.min_speed));
     if (objects.objects.back().moving <= 0.5) continue;
     const double dt = toSeconds(entry.input.stamp.time - object.as_of);
     for (auto& c : objects.objects.back().classes) {

@@ -9,6 +9,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/update.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -113,19 +114,14 @@ struct YawStart {
   double yaw, sigma, weight;
 };
 
-std::vector<YawStart> yawStarts(const Evidence& evidence, const ClassPrior& prior,
-                                const FrameContext& frame, const Eigen::Vector3d& ray) {
+/// Four starts that cover a half turn: the cuboid is the same when turned by 180°.
+std::vector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& frame,
+                                const Eigen::Vector3d& ray) {
   const Eigen::Vector3d level = levelling(frame.view.up_W) * ray;
   const double bearing = std::atan2(level.y(), level.x());
   if (!prior.has_yaw) return {{bearing, 1.0, 1.0}};
-  if (evidence.azimuth) {
-    const Eigen::Vector3d centre = frame.view.T_WC().p + 10.0 * ray;
-    const double yaw = yawFromAzimuth(*evidence.azimuth, centre, frame.view);
-    const double sigma = std::max(evidence.azimuth_sigma, prior.azimuth_sigma);
-    return {{yaw, sigma, 0.9}, {wrapAngle(yaw + M_PI / 2), sigma, 0.1}};
-  }
   std::vector<YawStart> starts;
-  for (int i = 0; i < 4; ++i) starts.push_back({wrapAngle(bearing + i * M_PI / 4), 0.35, 0.25});
+  for (int i = 0; i < 4; ++i) starts.push_back({wrapAngle(bearing + i * M_PI / 4), 0.39, 0.25});
   return starts;
 }
 
@@ -143,14 +139,32 @@ void addMovingTwin(Object& object, const Hypothesis& still, const ClassPrior& pr
   object.hypotheses.push_back(twin);
 }
 
+/// The azimuth chooses among the yaw starts of a class; the class's own weight does not change.
+void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
+                    const ClassPrior& prior, const FrameContext& frame) {
+  if (!evidence.azimuth || !prior.has_yaw) return;
+  const double sigma = std::max(evidence.azimuth_sigma, prior.azimuth_sigma);
+  double before = 0.0, after = 0.0;
+  for (auto& h : fits) {
+    before += h.weight;
+    h.weight *= updateWithAzimuth(h, *evidence.azimuth, sigma, 1.0, frame);
+    after += h.weight;
+  }
+  for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
+}
+
 void addClass(Object& object, const ClassPrior& prior, double probability, const Evidence& evidence,
               const std::vector<YawStart>& starts, const std::optional<RangeHint>& range,
               const FrameContext& frame) {
+  std::vector<Hypothesis> fits;
   for (const auto& start : starts) {
     const auto fit = fitCuboid(evidence, prior, start.yaw, start.sigma, range, frame);
     if (!fit) continue;
-    Hypothesis h = fit->hypothesis;
-    h.weight = probability * start.weight * std::exp(-fit->cost);
+    fits.push_back(fit->hypothesis);
+    fits.back().weight = probability * start.weight * std::exp(-fit->cost);
+  }
+  weighByAzimuth(fits, evidence, prior, frame);
+  for (const auto& h : fits) {
     if (h.weight < 1e-12) continue;
     object.hypotheses.push_back(h);
     addMovingTwin(object, h, prior);
@@ -167,7 +181,7 @@ void addOther(Object& object, double probability, const Evidence& evidence,
   for (const double scale : kScales) {
     prior.log_size = middle.array() + scale;
     addClass(object, prior, probability / 3.0, evidence,
-             yawStarts(evidence, prior, frame, ray), range, frame);
+             yawStarts(prior, frame, ray), range, frame);
   }
 }
 
@@ -277,7 +291,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   const double other = frame.parameters->clutter.other_prior;
   for (const auto& c : kept) {
     addClass(object, c.prior, (1.0 - other) * std::exp(c.log_weight) / total, evidence,
-             yawStarts(evidence, c.prior, frame, *ray), range, frame);
+             yawStarts(c.prior, frame, *ray), range, frame);
   }
   addOther(object, other, evidence, *ray, range, frame);
   if (object.hypotheses.empty()) return std::nullopt;

@@ -85,11 +85,12 @@ ViewPoint viewPointNow(const Object& object, const View& view, const LooksParame
   ViewPoint now;
   now.direction_W = ray / distance;
   now.log_distance = std::log(distance);
+  now.direction_C = -(view.T_WC().q.conjugate() * now.direction_W);
   if (object.view.looks <= 0.0) return now;
-  const double cosine = std::clamp(now.direction_W.dot(object.view.direction_W), -1.0, 1.0);
-  const double change = std::acos(cosine) / parameters.angle +
-                        std::abs(now.log_distance - object.view.log_distance) /
-                            parameters.log_distance;
+  const double change =
+      (now.direction_W - object.view.direction_W).norm() / parameters.angle +
+      (now.direction_C - object.view.direction_C).norm() / parameters.image_angle +
+      std::abs(now.log_distance - object.view.log_distance) / parameters.log_distance;
   now.looks = object.view.looks * std::exp(-change);
   return now;
 }

@@ -46,10 +46,26 @@ double classProbability(const Object& object, const std::string& class_name) {
   return sum;
 }
 
-double movingProbability(const Object& object) {
+double movingProbability(const Object& object, double min_speed) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) sum += h.moving ? h.weight : 0.0;
+  for (const auto& h : object.hypotheses) {
+    if (!h.moving) continue;
+    const Eigen::Vector2d v = h.x.segment<2>(kVelocity);
+    const double speed = v.norm();
+    const Eigen::Vector2d along = speed > 0.0 ? Eigen::Vector2d(v / speed) : Eigen::Vector2d::UnitX();
+    const double sigma = std::sqrt(along.dot(h.P.block<2, 2>(kVelocity, kVelocity) * along)) + 1e-6;
+    sum += h.weight * 0.5 * std::erfc((min_speed - speed) / (std::sqrt(2.0) * sigma));
+  }
   return std::min(sum, 1.0);
+}
+
+bool sound(const Object& object) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) {
+    if (!h.x.allFinite() || !h.P.allFinite() || !h.C.allFinite()) return false;
+    sum += h.weight;
+  }
+  return std::isfinite(sum) && sum > 0.0 && std::isfinite(object.existence);
 }
 
 void normalise(Object& object) {
@@ -74,7 +90,7 @@ void mergeInto(Hypothesis& a, const Hypothesis& b) {
   a.weight = weight;
 }
 
-ObjectBelief toBelief(const Object& object) {
+ObjectBelief toBelief(const Object& object, double min_speed) {
   ObjectBelief belief;
   belief.id = object.id;
   belief.existence = object.existence;
@@ -95,7 +111,7 @@ ObjectBelief toBelief(const Object& object) {
   belief.as_of = object.as_of;
   belief.hits = object.hits;
   belief.visible_misses = object.visible_misses;
-  belief.moving = movingProbability(object);
+  belief.moving = movingProbability(object, min_speed);
   if (object.best().moving) belief.velocity = object.best().x.tail<3>();
   belief.recalled = object.recalled;
   return belief;

@@ -34,6 +34,7 @@ struct Hypothesis {
 /// Where the object was last looked at from, for the correlation of looks (DESIGN 5, item 7).
 struct ViewPoint {
   Eigen::Vector3d direction_W = Eigen::Vector3d::Zero();  ///< unit, object to camera
+  Eigen::Vector3d direction_C = Eigen::Vector3d::Zero();  ///< unit, camera to object, in the image
   double log_distance = 0.0;
   double looks = 0.0;  ///< number of looks that share this view, discounted
 };
@@ -58,14 +59,16 @@ struct Object {
 
 /// π of a class: the sum of its hypotheses' weights.
 double classProbability(const Object& object, const std::string& class_name);
-/// Probability that the object moves, given that it exists.
-double movingProbability(const Object& object);
+/// Probability that the object moves faster than `min_speed`, given that it exists.
+double movingProbability(const Object& object, double min_speed);
+/// All numbers are finite and some weight is left.
+bool sound(const Object& object);
 /// Divides the weights by their sum and puts the heaviest first (stable).
 void normalise(Object& object);
 /// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.
 void mergeInto(Hypothesis& a, const Hypothesis& b);
 /// The published belief: per class its hypotheses as one Gaussian around the heaviest one.
-ObjectBelief toBelief(const Object& object);
+ObjectBelief toBelief(const Object& object, double min_speed);
 /// A belief that came back (restart, recall) as an object with one hypothesis for each class.
 Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product);
 

@@ -151,20 +151,22 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
                    [](const auto& a, const auto& b) { return a.id < b.id; });
 }
 
-std::vector<MergeRecord> SemanticFilter::step(Belief& belief, const FrameInput& input,
-                                              IdBook& ids) const {
+StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook& ids) const {
   const FrameContext frame = contextOf(input);
   const auto sights = seeAll(belief, input);
   if (!input.boxes) return {};
   const auto seen = score(belief, sights, input, frame);
   const auto claimed = associateAndUpdate(belief, seen, input, frame);
   for (const auto& s : seen) {
-    tendHypotheses(belief.objects[s.object], priors_, parameters_);
+    Object& object = belief.objects[s.object];
+    if (sound(object)) tendHypotheses(object, priors_, parameters_);
   }
   births(belief, sights, claimed, input, frame, ids);
-  auto merges = mergeObjects(belief.objects, frame);
+  StepReport report;
+  report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
+  report.merges = mergeObjects(belief.objects, frame);
   confirmAndBury(belief.objects, parameters_.tend);
-  return merges;
+  return report;
 }
 
 }  // namespace perdure::semantic_filter

@@ -42,13 +42,18 @@ class IdBook {
   std::map<std::pair<std::uint64_t, std::size_t>, ObjectId> given_;
 };
 
+struct StepReport {
+  std::vector<MergeRecord> merges;
+  std::size_t broken = 0;  ///< objects whose numbers went bad, and which were dropped
+};
+
 class SemanticFilter {
  public:
   SemanticFilter(const Parameters& parameters, const ClassPriors& priors)
       : parameters_(parameters), priors_(priors) {}
 
-  /// Belief after the frame. Returns what was merged.
-  std::vector<MergeRecord> step(Belief& belief, const FrameInput& input, IdBook& ids) const;
+  /// Belief after the frame.
+  StepReport step(Belief& belief, const FrameInput& input, IdBook& ids) const;
 
   const Parameters& parameters() const { return parameters_; }
   const ClassPriors& priors() const { return priors_; }

@@ -69,8 +69,13 @@ void pruneLightOnes(Object& object, const TendParameters& tend) {
   });
 }
 
+bool hasMoving(const Object& object) {
+  return std::any_of(object.hypotheses.begin(), object.hypotheses.end(),
+                     [](const auto& h) { return h.moving; });
+}
+
 void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
-  if (object.running_nis < motion.start_nis || movingProbability(object) > 1e-6) return;
+  if (object.running_nis < motion.start_nis || hasMoving(object)) return;
   const ClassPrior prior = priors.of(object.best().class_name);
   if (prior.moving <= 0.0 || object.hits < 3) return;
   Hypothesis twin = object.best();
@@ -82,8 +87,12 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
   object.running_nis = 1.0;
 }
 
+bool isOther(const Object& o) { return o.best().class_name == kOtherClass; }
+
+/// "other" is no class of its own: it may turn out to be the known thing in the same place.
 bool sameKind(const Object& a, const Object& b) {
-  return a.best().class_name == b.best().class_name && a.best().moving == b.best().moving;
+  if (a.best().moving != b.best().moving) return false;
+  return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
 }
 
 /// Weights of a's hypotheses once b's PMF is taken in as well.
@@ -95,12 +104,17 @@ void multiplyPmf(Object& a, const Object& b) {
 }
 
 void absorb(Object& a, const Object& b, const FrameContext& frame) {
-  const ClassPrior prior = frame.priors->of(a.best().class_name);
-  const double weight = a.best().weight;
-  a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
-  a.hypotheses.front().weight = weight;
-  multiplyPmf(a, b);
-  a.existence = std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), 1.0 - 1e-6);
+  if (isOther(a) != isOther(b)) {
+    if (isOther(a)) a.hypotheses = b.hypotheses;
+  } else {
+    const ClassPrior prior = frame.priors->of(a.best().class_name);
+    const double weight = a.best().weight;
+    a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
+    a.hypotheses.front().weight = weight;
+    multiplyPmf(a, b);
+  }
+  a.existence = std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence),
+                         frame.parameters->tend.certain);
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);

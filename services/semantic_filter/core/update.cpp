@@ -15,7 +15,6 @@ constexpr double kNegligible = 0.01;      // share of a box in an update
 constexpr double kAzimuthOutlier = 0.1;   // share of azimuths that say nothing
 constexpr double kAzimuthFlip = 0.1;      // share of azimuths that are turned by 180°
 constexpr double kMaxHead = 6.0;          // nats
-constexpr double kMaxExistence = 1.0 - 1e-6;  // beyond it rounding would make belief immovable
 
 /// Rows of the measurement that take part, stacked.
 struct Innovation {
@@ -245,11 +244,11 @@ void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
     updateState(h, shares[i], look, boxes, frame);
   }
   const double r = object.existence;
-  object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), kMaxExistence);
+  object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
   updateAzimuths(object, shares, look, boxes, frame);
   object.view = viewPointNow(object, frame.view, frame.parameters->looks);
   object.view.looks += 1.0;
-  normalise(object);
+  if (sound(object)) normalise(object);
 }
 
 }  // namespace perdure::semantic_filter
