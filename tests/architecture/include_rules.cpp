@@ -1,0 +1,97 @@
+#include "tests/architecture/include_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+#include <string_view>
+
+namespace perdure::tests {
+namespace {
+
+/// Bottom to top: a folder uses only itself and those before it.
+constexpr std::array kCommon{"base",   "math", "types", "camera", "sim",    "config",
+                             "vision", "wire", "bus",   "replay", "service"};
+
+std::string part(const std::string& path, std::size_t index) {
+  std::istringstream stream(path);
+  std::string word;
+  for (std::size_t i = 0; i <= index; ++i) {
+    if (!std::getline(stream, word, '/')) return {};
+  }
+  return word;
+}
+
+std::ptrdiff_t heightOf(const std::string& folder) {
+  return std::find(kCommon.begin(), kCommon.end(), folder) - kCommon.begin();
+}
+
+bool startsWith(const std::string& text, std::initializer_list<std::string_view> prefixes) {
+  return std::any_of(prefixes.begin(), prefixes.end(),
+                     [&](std::string_view prefix) { return text.starts_with(prefix); });
+}
+
+/// core/ and node.{h,cpp}: the pure part of a service.
+bool isPure(const std::string& path) {
+  return part(path, 0) == "services" &&
+         (part(path, 2) == "core" || startsWith(part(path, 2), {"node.", "node_"}));
+}
+
+std::string whyNotIncluded(const std::string& path, const std::string& include) {
+  const std::string room = part(path, 0), used = part(include, 0);
+  if (include.starts_with("dds/") &&
+      !startsWith(path, {"common/bus/", "tools/examples/", "tests/"})) {
+    return "only common/bus speaks DDS";
+  }
+  if (room != "tests" && used == "tests") return "nobody includes tests";
+  if ((room == "common" || room == "services") && used == "tools") return "nobody includes tools";
+  if (room == "common" && used == "services") return "common knows no service";
+  if (room == "services" && used == "services" && part(path, 1) != part(include, 1)) {
+    return "no service includes another";
+  }
+  if (room == "common" && used == "common" &&
+      heightOf(part(include, 1)) > heightOf(part(path, 1))) {
+    return "a folder of common uses only those below it";
+  }
+  if (used == "idl" && !startsWith(path, {"common/wire/", "tools/examples/", "tests/"})) {
+    return "only common/wire knows the generated types";
+  }
+  if (!isPure(path)) return {};
+  if (startsWith(include,
+                 {"common/wire/", "common/bus/", "common/service/", "yaml-cpp/", "spdlog/"})) {
+    return "core and node know no wire, bus, YAML or log";
+  }
+  if (startsWith(include, {"thread", "mutex", "condition_variable", "future", "iostream"})) {
+    return "core and node have no threads and print nothing";
+  }
+  return {};
+}
+
+/// The text between the quotes or angles of an include line, or "".
+std::string includeOf(const std::string& line) {
+  constexpr std::string_view kDirective = "#include ";
+  if (!line.starts_with(kDirective) || line.size() < kDirective.size() + 2) return {};
+  const char close = line[kDirective.size()] == '<' ? '>' : '"';
+  const std::size_t begin = kDirective.size() + 1, end = line.find(close, begin);
+  return end == std::string::npos ? "" : line.substr(begin, end - begin);
+}
+
+}  // namespace
+
+std::vector<std::string> violations(const std::string& path, const std::string& content) {
+  std::vector<std::string> found;
+  std::istringstream lines(content);
+  std::string line;
+  while (std::getline(lines, line)) {
+    const std::string include = includeOf(line);
+    const std::string why = include.empty() ? "" : whyNotIncluded(path, include);
+    if (!why.empty()) found.push_back(path + " includes " + include + ": " + why);
+    const bool reads_clock = line.find("_clock::now") != std::string::npos ||
+                             line.find("clock_gettime") != std::string::npos;
+    if (isPure(path) && reads_clock) {
+      found.push_back(path + " reads a clock: time enters core and node by messages");
+    }
+  }
+  return found;
+}
+
+}  // namespace perdure::tests
