@@ -48,7 +48,7 @@ Table makeTable() {
       row(kMapHeader, latched(1), 0, kNotRecorded),
       row(kMapQuery, reliable(16), 0, kRecorded),
       row(kMapReply, reliable(16), 0, kRecorded),
-      row(kHealth, latched(1, 2.0), 1.0, kRecorded),
+      row(kHealth, latched(1, 1.0), 1.0, kRecorded),
   };
 }
 
