@@ -102,7 +102,8 @@ void describeStart(Options& o, Fields& f) {
            {"a start in motion looks at so much time", "s"});
   f.number("start.tilt_sigma", o.start.tilt_sigma, positive(), {"at a start with speed", "rad"});
   f.number("start.gyro_bias_sigma", o.start.gyro_bias_sigma, positive(), {"in motion", "rad/s"});
-  f.number("start.accel_bias_sigma", o.start.accel_bias_sigma, positive(), {"", "m/s²"});
+  f.number("start.accel_bias_sigma", o.start.accel_bias_sigma, positive(),
+           {"deviation of the accelerometer bias", "m/s²"});
   f.number("start.velocity_sigma", o.start.velocity_sigma, positive(),
            {"across the body, at a start with speed", "m/s"});
 }
@@ -111,20 +112,26 @@ void describeAids(Options& o, Config& c, Fields& f) {
   f.boolean("rest.enabled", o.rest.enabled, {"zero-velocity updates"});
   f.number("rest.disparity", o.rest.disparity_px, positive(),
            {"less median image motion over rest.frames is rest", "px"});
-  f.integer("rest.frames", o.rest.frames, between(1, 10), {""});
-  f.number("rest.speed_sigma", o.rest.speed_sigma, positive(), {"", "m/s"});
-  f.number("rest.position_sigma", o.rest.position_sigma_m, positive(), {"between frames", "m"});
-  f.number("rest.rotation_sigma", o.rest.rotation_sigma, positive(), {"between frames", "rad"});
+  f.integer("rest.frames", o.rest.frames, between(1, 10), {"over which images must rest"});
+  f.number("rest.speed_sigma", o.rest.speed_sigma, positive(),
+           {"deviation of the velocity at rest", "m/s"});
+  f.number("rest.position_sigma", o.rest.position_sigma_m, positive(),
+           {"deviation between frames at rest", "m"});
+  f.number("rest.rotation_sigma", o.rest.rotation_sigma, positive(),
+           {"deviation between frames at rest", "rad"});
   f.number("rest.max_rate", o.rest.max_rate, positive(), {"turning faster is no rest", "rad/s"});
   f.number("rest.max_speed", o.rest.max_speed, positive(),
            {"a filter that believes to be faster does not rest", "m/s"});
   f.boolean("speed.enabled", o.speed.enabled, {"use the speed topic"});
   f.number("speed.sigma_factor", o.speed.sigma_factor, positive(), {"on the samples' own sigma"});
-  f.number("speed.min_sigma", o.speed.min_sigma, positive(), {"", "m/s"});
+  f.number("speed.min_sigma", o.speed.min_sigma, positive(),
+           {"deviation of a speed sample, at least", "m/s"});
   f.boolean("speed.planar", o.speed.planar,
             {"with each speed sample: no lateral and no vertical velocity of the body"});
-  f.number("speed.lateral_sigma", o.speed.lateral_sigma, positive(), {"", "m/s"});
-  f.number("speed.vertical_sigma", o.speed.vertical_sigma, positive(), {"", "m/s"});
+  f.number("speed.lateral_sigma", o.speed.lateral_sigma, positive(),
+           {"deviation of the lateral velocity from zero", "m/s"});
+  f.number("speed.vertical_sigma", o.speed.vertical_sigma, positive(),
+           {"deviation of the vertical velocity from zero", "m/s"});
   f.number("speed.max_age", o.speed.max_age_s, positive(),
            {"a sample is used for frames no further away", "s"});
   f.number("speed.wait", c.speed_wait_s, atLeast(0), {"a frame waits so long for a sample", "s"});
@@ -140,6 +147,7 @@ void describe(Config& c, Fields& f) {
   describeTracker(c.tracker, c, f);
   describeStart(c.core, f);
   describeAids(c.core, c, f);
+  f.texts("input.cameras", c.cameras, {"whose frames are read; the first one leads"});
   f.integer("input.max_pending", c.max_pending, between(2, 1000),
             {"frames that may wait for their inertial samples"});
   f.text("state.directory", c.state_directory,

@@ -9,6 +9,7 @@ namespace perdure::vio {
 namespace {
 
 constexpr int kDegradedFrames = 20;  // after a gap or a resumption
+constexpr int kUnaidedFrames = 5;    // without an image's help
 constexpr std::size_t kSpeeds = 512;
 
 double seconds(Duration d) { return toSeconds(d); }
@@ -44,7 +45,10 @@ struct Node::Cameras {
 };
 
 Node::Node(const Config& config, InstanceId instance, Outputs outputs)
-    : config_(config), instance_(instance), outputs_(std::move(outputs)), world_{instance, 0},
+    : config_(config),
+      instance_(instance),
+      outputs_(std::move(outputs)),
+      world_{instance, 0},
       motion_initialiser_(config.core) {}
 
 Node::~Node() = default;
@@ -84,7 +88,38 @@ void Node::onCalibration(const Calibration& calibration) {
   motion_initialiser_ = MotionInitialiser(options);
 }
 
+HealthState Node::health() const {
+  if (last_state_ == OdometryState::kTracking) return HealthState::kOk;
+  return last_state_ == OdometryState::kDegraded ? HealthState::kDegraded : HealthState::kStarting;
+}
+
+std::string Node::status() const {
+  if (!cameras_) return "waits for the calibration; start capture";
+  if (imu_.empty()) return "waits for inertial samples; start capture, or mend the IMU";
+  if (!last_image_) return "waits for frames; start capture, or mend the camera";
+  if (!started()) {
+    return "has no start yet (" + last_start_reason_ +
+           "); stand still for a second, or move with the camera on things that stand";
+  }
+  if (last_state_ != OdometryState::kDegraded) return {};
+  return degraded_frames_ > 0 ? "has just come over a gap or a restart"
+                              : "sees no points; it goes by inertia (and speed)";
+}
+
+/// A new run of the same clock: nothing that came before helps.
+void Node::clockJumpedBack() {
+  if (!started()) reasons_.add("clock_jumped_back");
+  imu_.clear();
+  speeds_.clear();
+  pending_.clear();
+  seconds_.clear();
+  last_image_.reset();
+  last_imu_time_.reset();
+  if (started()) lose({"clock_jumped_back", ""});
+}
+
 void Node::onImu(const ImuSample& sample) {
+  if (!imu_.empty() && sample.time < imu_.last() - std::chrono::seconds(1)) clockJumpedBack();
   const auto added = imu_.add({sample.time, sample.gyro, sample.accel});
   if (!added) return reasons_.add(added.error());
   if (!last_imu_time_) {
@@ -108,8 +143,8 @@ void Node::onSpeed(const SpeedSample& sample) {
 
 void Node::onFrame(const Frame& frame) {
   if (!cameras_) return reasons_.add("frame_before_calibration");
-  const bool second = cameras_->models.size() == 2 &&
-                      frame.camera == cameras_->models[1].calibration().name;
+  const bool second =
+      cameras_->models.size() == 2 && frame.camera == cameras_->models[1].calibration().name;
   if (!second && frame.camera != cameras_->models[0].calibration().name) {
     if (!calibration_->camera(frame.camera)) reasons_.add("frame_of_unknown_camera");
     return;
@@ -211,7 +246,8 @@ std::optional<SpeedReading> Node::speedAt(TimePoint image_time) const {
 }
 
 void Node::noteGaps(TimePoint now) {
-  const TimePoint from = started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
+  const TimePoint from =
+      started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
   if (from >= now || imu_.empty()) return;
   const double gap = seconds(imu_.longestGap(from, now));
   if (gap <= config_.core.imu.gap_from_s) return;
@@ -249,8 +285,8 @@ void Node::process(Pending& p) {
   const TimePoint now = imuTime(stamp.time);
   noteGaps(now);
   FrameInput input{++frame_, stamp.time, trackImages(*first, second, now), {}, {}};
-  input.motion_px = cameras_->tracker.motionSince(
-      static_cast<std::size_t>(config_.core.rest.frames));
+  input.motion_px =
+      cameras_->tracker.motionSince(static_cast<std::size_t>(config_.core.rest.frames));
   input.speed = speedAt(stamp.time);
   if (!started()) begin(now, input);
   if (!started()) {
@@ -302,8 +338,8 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   motion_initialiser_.add(input, now);
   std::optional<double> rest_motion;
   const double rate = calibration_->cameras[0].rate_hz > 0 ? calibration_->cameras[0].rate_hz : 20;
-  const auto frames = std::clamp<std::int64_t>(
-      std::lround(options.start.rest_window_s * rate) - 1, 2, config_.tracker.memory);
+  const auto frames = std::clamp<std::int64_t>(std::lround(options.start.rest_window_s * rate) - 1,
+                                               2, config_.tracker.memory);
   rest_motion = cameras_->tracker.motionSince(static_cast<std::size_t>(frames));
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
   Result<Start> start = fail("start_waits");
@@ -314,7 +350,10 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   } else if (!input.speed && rest_motion) {
     start = motion_initialiser_.start(imu_, cameras_->models);
   }
-  if (!start) return reasons_.add(start.error());
+  if (!start) {
+    last_start_reason_ = start.error().code;
+    return reasons_.add(start.error());
+  }
   cameras_->estimator.start(*start);
   motion_initialiser_.clear();
 }
@@ -347,7 +386,8 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
   o.stamp = stamp;
   o.instance = instance_;
   o.world = world_;
-  const bool degraded = degraded_frames_ > 0 || (!e.at_rest && e.points_used == 0);
+  unaided_frames_ = e.at_rest || e.points_used > 0 ? 0 : unaided_frames_ + 1;
+  const bool degraded = degraded_frames_ > 0 || unaided_frames_ > kUnaidedFrames;
   if (degraded_frames_ > 0) --degraded_frames_;
   o.state = degraded ? OdometryState::kDegraded : OdometryState::kTracking;
   o.T_WB = e.nav.T_WB();

@@ -11,6 +11,7 @@
 
 #include "common/base/result.h"
 #include "common/base/sink.h"
+#include "common/types/health.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
 #include "services/vio/config.h"
@@ -49,7 +50,9 @@ class Node {
 
   const ReasonCounts& reasons() const;
   bool started() const;
-  OdometryState state() const { return last_state_; }
+  HealthState health() const;
+  /// One sentence: what it waits for, or what is wrong; empty when all is well.
+  std::string status() const;
 
  private:
   struct Pending {
@@ -58,6 +61,7 @@ class Node {
   };
   struct Cameras;
 
+  void clockJumpedBack();
   void drain(bool all);
   bool ready(const Pending& pending) const;
   bool waitsForPair(const Pending& pending) const;
@@ -89,7 +93,8 @@ class Node {
   std::optional<TimePoint> last_image_, last_imu_time_;
   std::optional<std::uint64_t> last_sequence_;  ///< of the last output with a pose
   std::uint64_t frame_ = 0;
-  int degraded_frames_ = 0;
+  int degraded_frames_ = 0, unaided_frames_ = 0;
+  std::string last_start_reason_;
   OdometryState last_state_ = OdometryState::kInitialising;
   mutable ReasonCounts all_reasons_;
   ReasonCounts reasons_;

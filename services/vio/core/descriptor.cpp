@@ -35,9 +35,7 @@ std::array<Pair, 256> makePattern() {
 
 }  // namespace
 
-DescriptorExtractor::DescriptorExtractor(const cv::Mat& image) {
-  cv::blur(image, smooth_, {5, 5});
-}
+DescriptorExtractor::DescriptorExtractor(const cv::Mat& image) { cv::blur(image, smooth_, {5, 5}); }
 
 std::optional<Descriptor> DescriptorExtractor::at(const Eigen::Vector2d& pixel) const {
   static const std::array<Pair, 256> kPattern = makePattern();
@@ -49,8 +47,8 @@ std::optional<Descriptor> DescriptorExtractor::at(const Eigen::Vector2d& pixel) 
   Descriptor d{};
   for (std::size_t i = 0; i < kPattern.size(); ++i) {
     const Pair& p = kPattern[i];
-    const bool bit = smooth_.at<std::uint8_t>(y + p.y0, x + p.x0) <
-                     smooth_.at<std::uint8_t>(y + p.y1, x + p.x1);
+    const bool bit =
+        smooth_.at<std::uint8_t>(y + p.y0, x + p.x0) < smooth_.at<std::uint8_t>(y + p.y1, x + p.x1);
     d[i / 8] = static_cast<std::uint8_t>(d[i / 8] | (bit << (i % 8)));
   }
   return d;

@@ -120,7 +120,9 @@ bool Estimator::restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePo
   if (input.speed && std::abs(input.speed->speed) > 0.1) return false;
   if (state_->nav.v_WB.norm() > o.max_speed) return false;
   const RestSample sample = restSample(imu.between(from, state_->time), options_.imu);
-  if ((sample.rate - state_->nav.gyro_bias).norm() > o.max_rate) return false;
+  if ((sample.rate - state_->nav.gyro_bias).norm() > o.max_rate + 3.0 * sample.rate_sigma) {
+    return false;
+  }
   State before = *state_;
   auto done = updateRest(*state_, sample, o, options_.gravity);
   if (done) done = updateNoMotion(*state_, *previous_frame_, input.frame, o);
@@ -198,8 +200,8 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   if (!slam) return tl::unexpected(slam.error());
   for (const PointState& point : state_->points) database_.erase(point.id);
   if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;
-  const auto once = updateMsckf(*state_, takeOnceUsed(input.frame, full), options_.vision,
-                                reasons_);
+  const auto once =
+      updateMsckf(*state_, takeOnceUsed(input.frame, full), options_.vision, reasons_);
   if (!once) return tl::unexpected(once.error());
   out.points_used = slam->used + once->used;
   return {};
@@ -263,8 +265,7 @@ Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffe
   const TimePoint from = state_->time;
   if (const auto done = propagateTo(input, imu); !done) return tl::unexpected(done.error());
   if (options_.speed.enabled && input.speed) {
-    const auto done =
-        updateSpeed(*state_, input.speed->speed, input.speed->sigma, options_.speed);
+    const auto done = updateSpeed(*state_, input.speed->speed, input.speed->sigma, options_.speed);
     if (!done) reasons_.add(done.error());
   }
   out.at_rest = restUpdate(input, imu, from);
@@ -304,8 +305,7 @@ LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& s
 
 std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
                                                    const ImagePoint& seen) const {
-  const auto point =
-      triangulate(raysOf(track, *state_, options_.vision.sigma_px), options_.vision);
+  const auto point = triangulate(raysOf(track, *state_, options_.vision.sigma_px), options_.vision);
   if (!point || point->rms > 2.0) return std::nullopt;
   const RigidTransform T_WB = state_->nav.T_WB();
   LandmarkEstimate l;

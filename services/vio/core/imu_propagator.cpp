@@ -137,8 +137,8 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
 
   auto P = state.P();
   const Eigen::Index rest = state.size() - kNavSize;
-  Matrix15d P_nav = Phi * P.topLeftCorner<kNavSize, kNavSize>() * Phi.transpose() +
-                    G * x.Q * G.transpose();
+  Matrix15d P_nav =
+      Phi * P.topLeftCorner<kNavSize, kNavSize>() * Phi.transpose() + G * x.Q * G.transpose();
   P.topLeftCorner<kNavSize, kNavSize>() = 0.5 * (P_nav + P_nav.transpose());
   P.topRightCorner(kNavSize, rest) = (Phi * P.topRightCorner(kNavSize, rest)).eval();
   P.bottomLeftCorner(rest, kNavSize) = P.topRightCorner(kNavSize, rest).transpose();

@@ -17,14 +17,14 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
 /// Increment from body frame B0 to B1; gravity and the initial velocity are not in it.
 struct ImuIncrement {
-  double dt = 0.0;  ///< s
-  Eigen::Quaterniond dq = Eigen::Quaterniond::Identity();  ///< R_B0_B1
+  double dt = 0.0;                                                             ///< s
+  Eigen::Quaterniond dq = Eigen::Quaterniond::Identity();                      ///< R_B0_B1
   Eigen::Vector3d dv = Eigen::Vector3d::Zero(), dp = Eigen::Vector3d::Zero();  ///< in B0
   Matrix15d F = Matrix15d::Identity();  ///< d [θ, dp, dv, bg, ba] at the end / at the start
   Matrix15d Q = Matrix15d::Zero();      ///< noise of the same
-  Eigen::Vector3d end_rate = Eigen::Vector3d::Zero();   ///< w_WB_B at the end, bias removed
-  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();  ///< bias removed
-  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero(); ///< bias removed, in B
+  Eigen::Vector3d end_rate = Eigen::Vector3d::Zero();    ///< w_WB_B at the end, bias removed
+  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();   ///< bias removed
+  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();  ///< bias removed, in B
 };
 
 /// readings: at least two, in time order, as ImuBuffer::between gives them.

@@ -47,8 +47,7 @@ Eigen::Matrix<double, 15, 15> startCovariance(const Nav& nav, double tilt, doubl
   P.block<3, 3>(kTheta, kTheta) =
       R.transpose() * Vector3d(tilt * tilt, tilt * tilt, kGauge * kGauge).asDiagonal() * R;
   P.block<3, 3>(kPosition, kPosition) = kGauge * kGauge * Matrix3d::Identity();
-  P.block<3, 3>(kVelocity, kVelocity) =
-      R * velocity_B.cwiseAbs2().asDiagonal() * R.transpose();
+  P.block<3, 3>(kVelocity, kVelocity) = R * velocity_B.cwiseAbs2().asDiagonal() * R.transpose();
   P.block<3, 3>(kGyroBias, kGyroBias) = gyro_bias * gyro_bias * Matrix3d::Identity();
   P.block<3, 3>(kAccelBias, kAccelBias) = accel_bias * accel_bias * Matrix3d::Identity();
   return P;
@@ -95,9 +94,9 @@ Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedRea
   start.nav.q_WB = levelAttitude(up);
   start.nav.v_WB = start.nav.q_WB * Vector3d(speed.speed, 0, 0);
   const double lateral = std::min(options.start.velocity_sigma, 0.1 + 0.1 * std::abs(speed.speed));
-  start.covariance = startCovariance(
-      start.nav, options.start.tilt_sigma, options.start.gyro_bias_sigma,
-      options.start.accel_bias_sigma, Vector3d(speed.sigma + 0.05, lateral, lateral));
+  start.covariance = startCovariance(start.nav, options.start.tilt_sigma,
+                                     options.start.gyro_bias_sigma, options.start.accel_bias_sigma,
+                                     Vector3d(speed.sigma + 0.05, lateral, lateral));
   return start;
 }
 

@@ -38,7 +38,7 @@ double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
 }
 
 struct View {
-  Matrix3d R_CB0;  ///< rotates B0 into this camera
+  Matrix3d R_CB0;    ///< rotates B0 into this camera
   Vector3d p_BC_B0;  ///< the camera relative to the body, in B0
   std::size_t keyframe;
   Eigen::Vector2d normalised;
@@ -226,7 +226,8 @@ Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d
     constexpr double kStep = 1e-4;
     for (int i = 0; i < 3; ++i) {
       J.col(i) = (residuals(bias + kStep * Vector3d::Unit(i)) -
-                  residuals(bias - kStep * Vector3d::Unit(i))) / (2.0 * kStep);
+                  residuals(bias - kStep * Vector3d::Unit(i))) /
+                 (2.0 * kStep);
     }
     Matrix3d A = J.transpose() * J;
     A.diagonal() *= 1.0 + lambda;
@@ -282,8 +283,8 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   for (std::size_t i = 0; i < count; ++i) {
     Keyframe k{0.0, Matrix3d::Identity(), Vector3d::Zero(), Vector3d::Zero(), tracked[i]};
     if (i > 0) {
-      const ImuIncrement x = integrate(imu.between(times[0], times[i]), gyro_bias,
-                                       Vector3d::Zero(), options_.imu);
+      const ImuIncrement x =
+          integrate(imu.between(times[0], times[i]), gyro_bias, Vector3d::Zero(), options_.imu);
       k = {x.dt, x.dq.toRotationMatrix(), x.dp, x.dv, tracked[i]};
     }
     keyframes.push_back(k);
@@ -314,8 +315,8 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   start.nav.v_WB = start.nav.q_WB * (last.R.transpose() * v_B0);
   start.nav.gyro_bias = gyro_bias;
   const double velocity = 2.0 * sigma_v + bias * t + 0.05;
-  start.covariance = startCovariance(start.nav, 0.02 + (sigma_g + bias) / options_.gravity,
-                                     0.01, bias, Vector3d::Constant(velocity));
+  start.covariance = startCovariance(start.nav, 0.02 + (sigma_g + bias) / options_.gravity, 0.01,
+                                     bias, Vector3d::Constant(velocity));
   return start;
 }
 

@@ -37,8 +37,8 @@ Eigen::Vector3d solveOnSphere(const Eigen::Matrix3d& M, const Eigen::Vector3d& d
 /// Matches between two times, as bearings of one camera, and the increment between them.
 struct BearingPair {
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> bearings;  ///< in C, unit
-  Eigen::Matrix3d R_B0_B1;  ///< at bias zero
-  Eigen::Matrix3d J_bias;   ///< right tangent of R_B0_B1 by the gyro bias
+  Eigen::Matrix3d R_B0_B1;                                            ///< at bias zero
+  Eigen::Matrix3d J_bias;  ///< right tangent of R_B0_B1 by the gyro bias
 };
 /// The gyro bias that makes each pair's epipolar normals most nearly coplanar.
 Eigen::Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs,

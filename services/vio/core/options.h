@@ -23,11 +23,11 @@ struct ImuNoise {
 };
 
 struct WindowOptions {
-  std::int64_t clones = 11;            ///< poses in the sliding window
-  std::int64_t slam_features = 40;     ///< points kept in the state
-  std::int64_t msckf_features = 30;    ///< points used once, per frame
-  std::int64_t min_observations = 4;   ///< of a track that is used once
-  bool first_estimates = true;         ///< first-estimate Jacobians
+  std::int64_t clones = 11;           ///< poses in the sliding window
+  std::int64_t slam_features = 40;    ///< points kept in the state
+  std::int64_t msckf_features = 30;   ///< points used once, per frame
+  std::int64_t min_observations = 4;  ///< of a track that is used once
+  bool first_estimates = true;        ///< first-estimate Jacobians
 };
 
 struct VisionOptions {
@@ -43,28 +43,28 @@ struct VisionOptions {
 /// Standard deviations of what the calibration says.
 struct CalibrationOptions {
   bool estimate_extrinsics = true, estimate_time_offset = true;
-  double extrinsic_rotation = 0.005;     ///< rad
+  double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
-  double second_camera_factor = 0.1;     ///< a stereo pair is calibrated better among itself
+  double second_camera_factor = 0.1;  ///< a stereo pair is calibrated better among itself
   double time_offset_s = 0.005;
 };
 
 struct StartOptions {
-  double rest_window_s = 0.5;       ///< time at rest before a start at rest
-  double rest_disparity_px = 0.7;   ///< median image motion over that window
-  double rest_accel_m_s2 = 1.0;     ///< largest difference of the mean force from gravity
-  double motion_window_s = 1.0;     ///< window of a start in motion
-  double tilt_sigma = 0.03;         ///< rad, at a start with speed
-  double gyro_bias_sigma = 0.02;    ///< rad/s
-  double accel_bias_sigma = 0.1;    ///< m/s²
-  double velocity_sigma = 0.3;      ///< m/s
+  double rest_window_s = 0.5;      ///< time at rest before a start at rest
+  double rest_disparity_px = 0.7;  ///< median image motion over that window
+  double rest_accel_m_s2 = 1.0;    ///< largest difference of the mean force from gravity
+  double motion_window_s = 1.0;    ///< window of a start in motion
+  double tilt_sigma = 0.03;        ///< rad, at a start with speed
+  double gyro_bias_sigma = 0.02;   ///< rad/s
+  double accel_bias_sigma = 0.1;   ///< m/s²
+  double velocity_sigma = 0.3;     ///< m/s
 };
 
 struct RestOptions {
   bool enabled = true;
-  double disparity_px = 0.5;    ///< median image motion over the last frames
-  std::int64_t frames = 5;      ///< how many of them
-  double speed_sigma = 0.02;    ///< m/s
+  double disparity_px = 0.5;  ///< median image motion over the last frames
+  std::int64_t frames = 5;    ///< how many of them
+  double speed_sigma = 0.02;  ///< m/s
   double position_sigma_m = 0.005;
   double rotation_sigma = 0.001;  ///< rad
   double max_rate = 0.15;         ///< rad/s, mean over a frame, bias removed
@@ -73,9 +73,9 @@ struct RestOptions {
 
 struct SpeedOptions {
   bool enabled = true;
-  double sigma_factor = 1.0;      ///< on the sigma that comes with each sample
-  double min_sigma = 0.05;        ///< m/s
-  bool planar = false;            ///< lateral and vertical velocity are about zero
+  double sigma_factor = 1.0;  ///< on the sigma that comes with each sample
+  double min_sigma = 0.05;    ///< m/s
+  bool planar = false;        ///< lateral and vertical velocity are about zero
   double lateral_sigma = 0.15, vertical_sigma = 0.15;  ///< m/s
   double max_age_s = 0.15;
 };

@@ -11,7 +11,8 @@ namespace perdure::vio {
 
 State::State(const std::vector<RigidTransform>& cameras, double offset, int max_clones,
              int max_points)
-    : T_BC(cameras), time_offset_s(offset),
+    : T_BC(cameras),
+      time_offset_s(offset),
       size_(kNavSize + 6 * static_cast<int>(cameras.size()) + 1) {
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
@@ -66,8 +67,8 @@ void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vec
 }
 
 void State::removeClone(std::uint64_t frame) {
-  const auto it = std::find_if(clones.begin(), clones.end(),
-                               [&](const Clone& c) { return c.frame == frame; });
+  const auto it =
+      std::find_if(clones.begin(), clones.end(), [&](const Clone& c) { return c.frame == frame; });
   if (it == clones.end()) return;
   const int at = it->at;
   clones.erase(it);

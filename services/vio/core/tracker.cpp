@@ -90,8 +90,8 @@ void Tracker::follow(const std::vector<cv::Mat>& now, const std::optional<Eigen:
   std::vector<std::uint8_t> status;
   const int w = static_cast<int>(options_.window_px);
   cv::calcOpticalFlowPyrLK(previous_, now, from, to, status, cv::noArray(), {w, w},
-                           static_cast<int>(options_.pyramid_levels),
-                           criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+                           static_cast<int>(options_.pyramid_levels), criteria(options_.iterations),
+                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   std::vector<Point> kept;
   std::vector<Match> matches;
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -140,8 +140,8 @@ void Tracker::detect(const cv::Mat& image) {
     const cv::Rect inner(static_cast<int>(cell % columns * cell_w),
                          static_cast<int>(cell / columns * cell_h), static_cast<int>(cell_w),
                          static_cast<int>(cell_h));
-    const cv::Rect roi = (inner + cv::Size(6, 6) - cv::Point(3, 3)) &
-                         cv::Rect(0, 0, image.cols, image.rows);
+    const cv::Rect roi =
+        (inner + cv::Size(6, 6) - cv::Point(3, 3)) & cv::Rect(0, 0, image.cols, image.rows);
     cv::FAST(image(roi), corners, static_cast<int>(options_.fast_threshold), true);
     if (corners.empty()) cv::FAST(image(roi), corners, 7, true);
     std::stable_sort(corners.begin(), corners.end(),

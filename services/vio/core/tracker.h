@@ -28,7 +28,7 @@ struct TrackerOptions {
   std::int64_t fast_threshold = 15;
   double min_distance_px = 12.0;
   double ransac_px = 1.5;
-  double stereo_px = 2.0;  ///< from the epipolar line of the calibration
+  double stereo_px = 2.0;    ///< from the epipolar line of the calibration
   std::int64_t memory = 10;  ///< frames over which motion can be asked
 };
 

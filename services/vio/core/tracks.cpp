@@ -31,8 +31,7 @@ void FeatureDatabase::add(std::uint64_t frame, const TrackedFrame& tracked) {
 
 void FeatureDatabase::removeFrame(std::uint64_t frame) {
   for (auto it = tracks_.begin(); it != tracks_.end();) {
-    std::erase_if(it->second.observations,
-                  [&](const Observation& o) { return o.frame == frame; });
+    std::erase_if(it->second.observations, [&](const Observation& o) { return o.frame == frame; });
     it = it->second.observations.empty() ? tracks_.erase(it) : std::next(it);
   }
 }

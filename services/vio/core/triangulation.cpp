@@ -106,8 +106,8 @@ Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptio
   J << depth, 0, -m.x() * depth * depth, 0, depth, -m.y() * depth * depth, 0, 0, -depth * depth;
   const Matrix3d J_W = T_WA.R() * J;
   const double rms = std::sqrt(n.cost / (2.0 * static_cast<double>(rays.size())));
-  return Triangulated{T_WA * (depth * Vector3d(m.x(), m.y(), 1.0)),
-                      J_W * cov_m * J_W.transpose(), relative, rms};
+  return Triangulated{T_WA * (depth * Vector3d(m.x(), m.y(), 1.0)), J_W * cov_m * J_W.transpose(),
+                      relative, rms};
 }
 
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px) {
@@ -118,8 +118,8 @@ std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px)
     if (!clone) continue;
     for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
       if (!o.seen[c]) continue;
-      rays.push_back({clone->T_WB * state.T_BC[c], o.seen[c]->normalised,
-                      o.seen[c]->scale / sigma_px});
+      rays.push_back(
+          {clone->T_WB * state.T_BC[c], o.seen[c]->normalised, o.seen[c]->scale / sigma_px});
     }
   }
   return rays;

@@ -23,7 +23,8 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   const Clone& clone = state.clones.back();
   const auto cameras = static_cast<Eigen::Index>(state.T_BC.size());
   PointRows rows{Eigen::MatrixXd::Zero(2 * cameras, 6 * cameras + 9),
-                 Eigen::VectorXd(2 * cameras), {point.at, 3}};
+                 Eigen::VectorXd(2 * cameras),
+                 {point.at, 3}};
   Eigen::Index row = 0;
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
     if (!seen.seen[c]) continue;
@@ -136,8 +137,7 @@ Result<void> initialisePoint(State& state, const Track& track, const VisionOptio
     cross.noalias() += J.middleCols(column, b.size) * state.P().middleRows(b.at, b.size);
     column += b.size;
   }
-  const Eigen::Matrix3d covariance =
-      state.project(J, blocks) + R_inverse * R_inverse.transpose();
+  const Eigen::Matrix3d covariance = state.project(J, blocks) + R_inverse * R_inverse.transpose();
   state.addPoint(track.id, point->p_W + R_inverse * r_1, covariance, cross);
   state.points.back().first = point->p_W;
   compress(s.H_x, s.r);

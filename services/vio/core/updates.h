@@ -17,8 +17,8 @@ Result<void> updateSpeed(State& state, double speed, double sigma, const SpeedOp
 
 /// What the inertial samples of an interval at rest say, as means, with the deviation of samples.
 struct RestSample {
-  Eigen::Vector3d rate, force;      ///< means of gyro and accelerometer, with bias
-  double rate_sigma, force_sigma;   ///< of the means, rad/s and m/s²
+  Eigen::Vector3d rate, force;     ///< means of gyro and accelerometer, with bias
+  double rate_sigma, force_sigma;  ///< of the means, rad/s and m/s²
 };
 RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& noise);
 

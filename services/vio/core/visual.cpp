@@ -29,8 +29,7 @@ double gate(int dof, double probability) {
 }  // namespace
 
 bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
-                  const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised,
-                  ProjectionJacobians* J) {
+                  const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised, ProjectionJacobians* J) {
   const Eigen::Matrix3d R_BW = T_WB.R().transpose(), R_CB = T_BC.R().transpose();
   const Eigen::Vector3d p_B = R_BW * (p_W - T_WB.p), p_C = R_CB * (p_B - T_BC.p);
   if (!(p_C.z() > 1e-3)) return false;

@@ -127,8 +127,9 @@ TEST(Estimator, TheIncrementExplainsThePoseCovariance) {
   for (std::size_t k = 1; k < r.estimates.size(); ++k) {
     const FrameEstimate &a = r.estimates[k - 1], &b = r.estimates[k];
     ASSERT_TRUE(b.has_increment);
-    const Matrix6d P = b.transition * a.covariance.topLeftCorner<6, 6>() *
-                           b.transition.transpose() + b.increment_covariance;
+    const Matrix6d P =
+        b.transition * a.covariance.topLeftCorner<6, 6>() * b.transition.transpose() +
+        b.increment_covariance;
     const Matrix6d P_b = b.covariance.topLeftCorner<6, 6>();
     EXPECT_LT((P - P_b).norm(), 1e-2 * P_b.norm() + 1e-9) << k;
   }

@@ -57,8 +57,8 @@ TEST(ImuPropagator, PredictsTheAnalyticTrajectoryWithinTolerance) {
   ImuBuffer buffer;
   for (const ImuReading& r : drive.imu(5.2)) ASSERT_TRUE(buffer.add(r));
   Nav nav = drive.truth(0.1);
-  const ImuIncrement x = integrate(buffer.between(drive.time(0.1), drive.time(5.1)),
-                                   nav.gyro_bias, nav.accel_bias, ImuNoise{});
+  const ImuIncrement x = integrate(buffer.between(drive.time(0.1), drive.time(5.1)), nav.gyro_bias,
+                                   nav.accel_bias, ImuNoise{});
   const Nav end = predict(nav, x, 9.81), truth = drive.truth(5.1);
   EXPECT_NEAR(x.dt, 5.0, 1e-9);
   EXPECT_LT(logSo3(truth.q_WB.conjugate() * end.q_WB).norm(), 2e-5);
@@ -78,8 +78,7 @@ TEST(ImuPropagator, TransitionIsTheDerivativeOfThePrediction) {
   };
   const Eigen::MatrixXd numeric = numericJacobian(f, VectorXd::Zero(15), 1e-5);
   const ImuIncrement x = integrate(readings, nav.gyro_bias, nav.accel_bias, ImuNoise{});
-  const Matrix15d analytic =
-      transition(nav, reference, x, nav.q_WB.toRotationMatrix(), 9.81);
+  const Matrix15d analytic = transition(nav, reference, x, nav.q_WB.toRotationMatrix(), 9.81);
   EXPECT_LT((numeric - analytic).cwiseAbs().maxCoeff(), 1e-6) << numeric - analytic;
 }
 
@@ -152,9 +151,9 @@ TEST(ImuBuffer, RefusesWhatIsDoubledOutOfOrderOrNotFinite) {
             "imu_duplicate");
   EXPECT_EQ(buffer.add({fromNanoseconds(5), Vector3d::Zero(), Vector3d::Zero()}).error().code,
             "imu_out_of_order");
-  EXPECT_EQ(buffer.add({fromNanoseconds(20), Vector3d::Constant(NAN), Vector3d::Zero()})
-                .error().code,
-            "imu_not_finite");
+  EXPECT_EQ(
+      buffer.add({fromNanoseconds(20), Vector3d::Constant(NAN), Vector3d::Zero()}).error().code,
+      "imu_not_finite");
 }
 
 TEST(ImuBuffer, FindsTheLongestGap) {

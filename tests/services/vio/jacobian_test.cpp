@@ -178,8 +178,7 @@ TEST(Triangulation, FindsThePointWithinItsCovariance) {
     const Vector3d p_W = state.clones[5].T_WB * (state.T_BC[0] * p_C);
     track.observations.clear();
     for (const Clone& c : state.clones) {
-      const auto pixel =
-          drive.cameras()[0].project((c.T_WB * state.T_BC[0]).inverse() * p_W);
+      const auto pixel = drive.cameras()[0].project((c.T_WB * state.T_BC[0]).inverse() * p_W);
       if (!pixel) continue;
       const Vector2d noisy = *pixel + Vector2d(normal(random), normal(random));
       track.observations.push_back({c.frame, {imagePoint(drive.cameras()[0], noisy), {}}});

@@ -1,0 +1,63 @@
+// perdure-vio: where the body is, from camera, IMU and speed.
+#include <chrono>
+#include <opencv2/core/utility.hpp>
+
+#include "common/bus/topics.h"
+#include "common/service/service.h"
+#include "services/vio/node.h"
+#include "services/vio/state_file.h"
+
+namespace {
+
+using namespace perdure;
+namespace topics = bus::topics;
+
+void serve(service::Context& context, const vio::Config& config) {
+  cv::setNumThreads(1);  // images of this size are not worth the threads
+  const vio::StateFile file(config.state_directory);
+  const auto odometry = context.sink(topics::kOdometry);
+  vio::Node node(config, context.instance(),
+                 {.odometry =
+                      [&](const Odometry& m) {
+                        odometry(m);
+                        context.health().frameOut();
+                      },
+                  .landmarks = context.sink(topics::kLandmarks)});
+  ReasonCounts own;
+  if (const auto text = file.read()) {
+    if (const auto restored = node.restoreState(*text); !restored) {
+      context.log().warn("the saved state is left aside: {}", restored.error().detail);
+      own.add(restored.error());
+    }
+  }
+  context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
+  context.countReasons([&]() -> const ReasonCounts& { return own; });
+  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  context.on(topics::kImu, [&](const ImuSample& m) { node.onImu(m); });
+  context.on(topics::kSpeed, [&](const SpeedSample& m) { node.onSpeed(m); });
+  std::vector<bus::Once> once(config.cameras.size());
+  for (std::size_t i = 0; i < config.cameras.size(); ++i) {
+    context.on(topics::frame(config.cameras[i]), [&, i](const Frame& m) {
+      if (!once[i].first(m.stamp.source, m.stamp.sequence)) return;
+      if (i == 0) context.health().frameIn();
+      node.onFrame(m);
+    });
+  }
+  context.every(std::chrono::seconds(1), [&] {
+    if (const auto kept = file.write(node.saveState()); !kept) own.add(kept.error());
+  });
+  context.onHealth([&] { context.health().state(node.health(), node.status()); });
+  context.run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  vio::Config config;
+  return service::runService(
+      argc, argv,
+      {.process = "vio",
+       .summary = "Where the body is: odometry and sparse points from camera, IMU and speed.",
+       .describe = [&](config::Fields& fields) { vio::describe(config, fields); },
+       .body = [&](service::Context& context) { serve(context, config); }});
+}
