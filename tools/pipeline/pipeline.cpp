@@ -91,7 +91,6 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
                                                    " has no inertial samples, which vio "
                                                    "needs; give --odometry a pose file");
   }
-#ifdef PERDURE_HAS_VIO
   vio::Outputs sinks;
   sinks.odometry = [this](const Odometry& odometry) { new_odometry_.push_back(odometry); };
   sinks.landmarks = [this](const Landmarks& landmarks) {
@@ -100,9 +99,6 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   vio_ = std::make_unique<vio::Node>(configs_.vio, kVio, std::move(sinks));
   vio_->setWorld({1, 0});
   vio_->onCalibration(dataset_->calibration());
-#else
-  throw StartupError(ExitCode::kUnavailable, "this build has no vio; give --odometry a pose file");
-#endif
 }
 
 void Pipeline::openDetections(const PipelineOptions& options) {
@@ -151,23 +147,19 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
     handle(*message);
     if (first_camera) progress(counts_);
   }
-#ifdef PERDURE_HAS_VIO
   if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
-#endif
   deliver();
   timer_.timeTowardsNext("semantic_filter", [&] { filter_->flush(); });
 }
 
 void Pipeline::handle(const replay::Message& message) {
   if (const auto* frame = std::get_if<Frame>(&message)) return handleFrame(*frame);
-#ifdef PERDURE_HAS_VIO
   if (!vio_) return;
   timer_.timeTowardsNext("vio", [&] {
     if (const auto* imu = std::get_if<ImuSample>(&message)) vio_->onImu(*imu);
     if (const auto* speed = std::get_if<SpeedSample>(&message)) vio_->onSpeed(*speed);
   });
   deliver();
-#endif
 }
 
 void Pipeline::handleFrame(const Frame& frame) {
@@ -176,7 +168,6 @@ void Pipeline::handleFrame(const Frame& frame) {
     ++counts_.frames;
     started_ms_[frame.stamp.sequence] = wallMs();
   }
-#ifdef PERDURE_HAS_VIO
   if (vio_) {
     const auto work = [&] { vio_->onFrame(frame); };
     if (first_camera)
@@ -184,7 +175,6 @@ void Pipeline::handleFrame(const Frame& frame) {
     else
       timer_.timeTowardsNext("vio", work);
   }
-#endif
   if (!first_camera) return deliver();
   if (poses_) {
     if (const auto odometry = poses_->at(frame.stamp))
@@ -234,7 +224,7 @@ void Pipeline::deliver() {
   for (const Odometry& odometry : std::exchange(new_odometry_, {})) {
     const std::uint64_t frame = odometry.stamp.sequence;
     outputs_->onOdometry(odometry);
-    ++counts_.odometry;
+    if (odometry.state != OdometryState::kInitialising) ++counts_.odometry;
     timer_.timeTowardsNext("semantic_filter", [&] { filter_->onOdometry(odometry); });
     const auto landmarks = landmarks_.find(frame);
     if (landmarks != landmarks_.end()) {
@@ -269,9 +259,7 @@ std::map<std::string, ReasonCounts> Pipeline::reasons() const {
   std::map<std::string, ReasonCounts> all{{"capture", dataset_->reasons()},
                                           {"semantic_filter", filter_->reasons()},
                                           {"pipeline", reasons_}};
-#ifdef PERDURE_HAS_VIO
   if (vio_) all["vio"] = vio_->reasons();
-#endif
   return all;
 }
 

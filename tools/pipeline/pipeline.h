@@ -12,13 +12,11 @@
 #include "common/replay/detection_file.h"
 #include "services/inference/node.h"
 #include "services/semantic_filter/node.h"
+#include "services/vio/node.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
 #include "tools/pipeline/odometry_source.h"
 #include "tools/pipeline/settings.h"
-#ifdef PERDURE_HAS_VIO
-#include "services/vio/node.h"
-#endif
 
 namespace perdure::tools {
 
@@ -70,9 +68,7 @@ class Pipeline {
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;
   std::unique_ptr<inference::Node> inference_;
-#ifdef PERDURE_HAS_VIO
   std::unique_ptr<vio::Node> vio_;
-#endif
   std::unique_ptr<semantic_filter::Node> filter_;
   bool uses_vio_ = false;
   std::uint64_t model_hash_ = 0;

@@ -18,9 +18,7 @@ struct Service {
 
 std::vector<Service> describeAll(ServiceConfigs& configs) {
   std::vector<Service> services;
-#ifdef PERDURE_HAS_VIO
   vio::describe(configs.vio, services.emplace_back(Service{"vio", {}}).fields);
-#endif
   semantic_filter::describe(configs.semantic_filter,
                             services.emplace_back(Service{"semantic_filter", {}}).fields);
   inference::describe(configs.inference, services.emplace_back(Service{"inference", {}}).fields);

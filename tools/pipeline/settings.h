@@ -9,9 +9,7 @@
 
 #include "services/inference/config.h"
 #include "services/semantic_filter/config.h"
-#ifdef PERDURE_HAS_VIO
 #include "services/vio/config.h"
-#endif
 
 namespace perdure::tools {
 
@@ -30,9 +28,7 @@ struct PipelineOptions {
 
 /// The services' configurations after files and assignments.
 struct ServiceConfigs {
-#ifdef PERDURE_HAS_VIO
   vio::Config vio;
-#endif
   semantic_filter::Config semantic_filter;
   inference::Config inference;
   std::uint64_t digest = 0;  ///< of all values
