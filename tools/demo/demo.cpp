@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -94,11 +95,11 @@ std::string socketFolder() {
   return name;
 }
 
-bool meansCannotStart(const ServiceState& state) {
+bool meansCannotStart(const ServiceState& state, int exit_status) {
   if (state.state == "FATAL") return true;
-  const bool said_why = state.exit_status == static_cast<int>(ExitCode::kUsage) ||
-                        state.exit_status == static_cast<int>(ExitCode::kUnavailable) ||
-                        state.exit_status == static_cast<int>(ExitCode::kConfiguration);
+  const bool said_why = exit_status == static_cast<int>(ExitCode::kUsage) ||
+                        exit_status == static_cast<int>(ExitCode::kUnavailable) ||
+                        exit_status == static_cast<int>(ExitCode::kConfiguration);
   return state.state == "BACKOFF" && said_why;
 }
 
@@ -204,14 +205,19 @@ void Demo::checkServices() {
     throw StartupError(ExitCode::kFailure, "supervisord has ended; see " +
                        (folders_.run / "supervisord.log").string());
   }
+  const bool all_well = std::all_of(states->begin(), states->end(), [](const auto& one) {
+    return one.second.state != "BACKOFF" && one.second.state != "FATAL";
+  });
+  if (all_well) return;
+  auto exits = lastExits(contentsOf(folders_.run / "supervisord.log"));
   for (const ServicePlan& service : services_) {
     const auto found = states->find(service.name);
-    if (found == states->end() || !meansCannotStart(found->second)) continue;
-    const std::string why = found->second.spawn_error.empty() ? lastWords(service.log)
-                                                              : found->second.spawn_error;
-    const int status = found->second.exit_status;
+    const int status = exits[service.name];
+    if (found == states->end() || !meansCannotStart(found->second, status)) continue;
+    const std::string words = lastWords(service.log);
     throw StartupError(status == 0 ? ExitCode::kFailure : static_cast<ExitCode>(status),
-                       fmt::format("{} does not start: {} (its log: {})", service.name, why,
+                       fmt::format("{} does not start: {} (its log: {})", service.name,
+                                   words.empty() ? found->second.spawn_error : words,
                                    service.log));
   }
 }

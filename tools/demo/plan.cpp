@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <fstream>
 
 #include "common/base/errors.h"
 
@@ -91,6 +92,7 @@ DemoFolders prepareFolders(const DemoOptions& options) {
   }
   fs::create_directories(folders.state, error);
   if (error) cannotUse(folders.out, error.message());
+  std::ofstream(folders.run / kMark) << "";
   return folders;
 }
 

@@ -10,6 +10,7 @@
 
 #include <chrono>
 #include <cstring>
+#include <regex>
 #include <sstream>
 #include <thread>
 
@@ -86,9 +87,9 @@ std::map<std::string, ServiceState> readProcessInfo(const std::string& xml) {
     const auto end = xml.find("</struct>", at);
     if (end == std::string::npos) break;
     const std::string one = xml.substr(at, end - at);
-    ServiceState state{member(one, "statename"), 0, member(one, "spawnerr")};
-    std::istringstream(member(one, "exitstatus")) >> state.exit_status;
-    if (!member(one, "name").empty()) states[member(one, "name")] = state;
+    if (const std::string name = member(one, "name"); !name.empty()) {
+      states[name] = {member(one, "statename"), member(one, "spawnerr")};
+    }
     at = xml.find("<struct>", end);
   }
   return states;
@@ -105,6 +106,15 @@ std::map<std::string, int> countSpawns(const std::string& log) {
     ++counts[line.substr(begin, line.find('\'', begin) - begin)];
   }
   return counts;
+}
+
+std::map<std::string, int> lastExits(const std::string& log) {
+  static const std::regex pattern("exited: ([^ ]+) \\(exit status ([0-9]+)");
+  std::map<std::string, int> exits;
+  for (std::sregex_iterator it(log.begin(), log.end(), pattern), end; it != end; ++it) {
+    exits[(*it)[1]] = std::stoi((*it)[2]);
+  }
+  return exits;
 }
 
 Supervisor::Supervisor(const std::string& config_file, const std::string& socket,

@@ -14,7 +14,6 @@ namespace perdure::tools {
 
 struct ServiceState {
   std::string state;  ///< STOPPED, STARTING, RUNNING, BACKOFF, STOPPING, EXITED, FATAL, UNKNOWN
-  int exit_status = 0;
   std::string spawn_error;
   bool ended() const { return state == "STOPPED" || state == "EXITED" || state == "FATAL"; }
 };
@@ -24,6 +23,10 @@ std::map<std::string, ServiceState> readProcessInfo(const std::string& xml);
 
 /// How often supervisord's log says that each program was started.
 std::map<std::string, int> countSpawns(const std::string& log);
+
+/// The last exit status of each program that exited, by supervisord's log (its answers do not tell
+/// that of a program that ended too quickly).
+std::map<std::string, int> lastExits(const std::string& log);
 
 class Supervisor {
  public:

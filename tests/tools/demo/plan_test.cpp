@@ -74,13 +74,14 @@ TEST_F(DemoPlan, NamesTheProgramThatIsMissing) {
 
 TEST_F(DemoPlan, EmptiesAnEarlierRunButNoFolderOfSomeoneElse) {
   const DemoFolders folders = prepareFolders(options_);
-  std::ofstream(folders.run / "supervisord.conf") << "";
   std::ofstream(folders.state / "old") << "";
   prepareFolders(options_);
   EXPECT_FALSE(fs::exists(folders.state / "old"));
-  std::ofstream(folders.run / "precious") << "";
+  options_.out = (folder_ / "other").string();
+  fs::create_directories(folder_ / "other" / "run");
+  std::ofstream(folder_ / "other" / "run" / "precious") << "";
   EXPECT_THROW(prepareFolders(options_), StartupError);
-  EXPECT_TRUE(fs::exists(folders.run / "precious"));
+  EXPECT_TRUE(fs::exists(folder_ / "other" / "run" / "precious"));
 }
 
 TEST_F(DemoPlan, QuotesWordsForSupervisord) {
