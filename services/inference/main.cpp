@@ -15,7 +15,8 @@ void run(service::Context& context, const inference::Config& config) {
   const auto strength = static_cast<std::int32_t>(ownership.strength - (ownership.standby ? 1 : 0));
   auto& detections = context.writer(bus::topics::kDetections, {strength, lease_s});
   (void)context.writer(bus::topics::kModel).write(node.model());
-  inference::Worker worker(node, ownership, detections, context.health());
+  const auto& rivals = context.on(bus::topics::kDetections, [](const Detections&) {});
+  inference::Worker worker(node, ownership, detections, rivals, context.health());
 
   context.on(bus::topics::frame(config.detection.camera),
              [&](const Frame& frame) { worker.offer(frame); });
@@ -25,7 +26,8 @@ void run(service::Context& context, const inference::Config& config) {
     const bool in_form = worker.inForm();
     context.health().state(in_form ? HealthState::kOk : HealthState::kDegraded,
                            in_form ? worker.lastProblem()
-                                   : "results came late, a standby is heard instead");
+                                   : "results came later than the lease: give it a core of its own, a "
+                                     "smaller network, or a longer ownership.period_s");
   });
   context.run();
 }

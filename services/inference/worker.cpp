@@ -3,11 +3,12 @@
 namespace perdure::inference {
 
 Worker::Worker(Node& node, const OwnershipConfig& ownership, bus::Writer<Detections>& writer,
-               service::HealthMeter& health)
+               const bus::RawReader& rivals, service::HealthMeter& health)
     : node_(node),
       lease_(durationFromSeconds(leaseSeconds(ownership))),
       ownership_(ownership.strength, ownership.standby, lease_),
       writer_(writer),
+      rivals_(rivals),
       health_(health) {
   thread_ = std::thread([this] { run(); });
 }
@@ -58,7 +59,7 @@ void Worker::publish(const Detections& detections, Duration age) {
   const auto strength = static_cast<std::int32_t>(
       ownership_.strengthFor(now, age, writer_.livelinessLost() + lapses_.load()));
   // A change of strength travels apart from the data: what is written with it may overtake it.
-  if (strength < writer_.strength()) hold_until_ = now + lease_;
+  if (strength < writer_.strength() && rivals_.matched() > 1) hold_until_ = now + lease_;
   if (strength != writer_.strength()) writer_.setStrength(strength);
   if (in_form_ != ownership_.inForm()) {
     in_form_ = ownership_.inForm();

@@ -18,8 +18,9 @@ namespace perdure::inference {
 
 class Worker {
  public:
+  /// `rivals` reads `detections`: it matches our own writer, and those of other processes.
   Worker(Node& node, const OwnershipConfig& ownership, bus::Writer<Detections>& writer,
-         service::HealthMeter& health);
+         const bus::RawReader& rivals, service::HealthMeter& health);
   /// Ends within the time of one frame.
   ~Worker();
   Worker(const Worker&) = delete;
@@ -52,6 +53,7 @@ class Worker {
   Ownership ownership_;
   Clock::time_point hold_until_{};  ///< results are kept back after the strength was lowered
   bus::Writer<Detections>& writer_;
+  const bus::RawReader& rivals_;
   service::HealthMeter& health_;
   BoundedQueue<Job> queue_{1, Overflow::kDropOldest};
   std::atomic<Clock::time_point> last_alive_{Clock::now()};
