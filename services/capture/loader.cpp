@@ -34,8 +34,9 @@ void requireImages(replay::Dataset& drive, const std::string& path) {
     return;
   }
   throw StartupError(ExitCode::kUnavailable,
-                     path + " has no readable images; capture needs a drive with images (a drive "
-                            "without them runs in `perdure pipeline`).");
+                     path +
+                         " has no readable images; capture needs a drive with images (a drive "
+                         "without them runs in `perdure pipeline`).");
 }
 
 /// Times of the first and the last frame of cam0.
@@ -66,7 +67,9 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
 
 Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
                std::function<void()> notify)
-    : mono_(config.dataset.cameras == "mono"), drive_(std::move(drive)), notify_(std::move(notify)) {
+    : mono_(config.dataset.cameras == "mono"),
+      drive_(std::move(drive)),
+      notify_(std::move(notify)) {
   const auto [begin, end] = spanOf(*drive_);
   from_ = begin - durationFromSeconds(config.dataset.lead_s);
   until_ = end + durationFromSeconds(config.dataset.trail_s);

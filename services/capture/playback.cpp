@@ -83,9 +83,9 @@ void Playback::begin() {
   if (isThere("vio")) node_->expect("odometry");
   if (isThere("inference")) node_->expect("detections");
   if (resume_ && resume_->finished) return node_->end();
-  loader_ = std::make_unique<Loader>(config_, std::move(drive_),
-                                     resume_ ? resume_->next_sequence : 0,
-                                     [&loop = context_.loop()] { loop.wake(); });
+  loader_ =
+      std::make_unique<Loader>(config_, std::move(drive_), resume_ ? resume_->next_sequence : 0,
+                               [&loop = context_.loop()] { loop.wake(); });
 }
 
 void Playback::feed() {

@@ -15,7 +15,8 @@ void describe(Config& config, config::Fields& fields) {
                  {"threads of OpenCV for one image", "", "use at most the cores of the machine"});
   fields.text("detection.camera", config.detection.camera,
               {"the camera whose frames are looked at"});
-  fields.number("detection.score_threshold", config.detection.score_threshold, between(0.001, 0.999),
+  fields.number("detection.score_threshold", config.detection.score_threshold,
+                between(0.001, 0.999),
                 {"lax: boxes whose best class scores less are left out", "",
                  "0.05 keeps the evidence that the filter wants; above 0.3 objects are lost"});
   fields.number("detection.merge_iou", config.detection.merge_iou, between(0.1, 1.0),

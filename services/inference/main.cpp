@@ -25,9 +25,10 @@ void run(service::Context& context, const inference::Config& config) {
   context.onHealth([&] {
     const bool in_form = worker.inForm();
     context.health().state(in_form ? HealthState::kOk : HealthState::kDegraded,
-                           in_form ? worker.lastProblem()
-                                   : "results came later than the lease: give it a core of its own, a "
-                                     "smaller network, or a longer ownership.period_s");
+                           in_form
+                               ? worker.lastProblem()
+                               : "results came later than the lease: give it a core of its own, a "
+                                 "smaller network, or a longer ownership.period_s");
   });
   context.run();
 }

@@ -68,18 +68,19 @@ std::vector<std::string> standardModelFolders() {
 ModelFile readModelFile(const std::string& path, const std::string& description,
                         const std::vector<std::string>& folders) {
   if (path.empty()) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "No network is configured; set model.path to an .onnx or Darknet .cfg file.");
+    throw StartupError(
+        ExitCode::kConfiguration,
+        "No network is configured; set model.path to an .onnx or Darknet .cfg file.");
   }
   const fs::path model = path;
   ModelFile file;
   file.network = readBytes(model, "The network", "set model.path to an .onnx or .cfg file.");
   if (model.extension() == ".cfg") {
-    file.darknet_weights = readBytes(fs::path(model).replace_extension(".weights"),
-                                     "The weights", "put them beside their .cfg file.");
+    file.darknet_weights = readBytes(fs::path(model).replace_extension(".weights"), "The weights",
+                                     "put them beside their .cfg file.");
   }
-  const fs::path described = description.empty() ? findDescription(model, folders)
-                                                 : fs::path(description);
+  const fs::path described =
+      description.empty() ? findDescription(model, folders) : fs::path(description);
   const std::string text =
       readBytes(described, "The description", "set model.description to a model.json.");
   file.description = parseModelDescription(text, described.string());

@@ -11,14 +11,14 @@ namespace perdure::inference {
 namespace {
 
 Network loadNetwork(const Config& config, const ModelFile& file) {
-  auto network =
-      Network::load(file.network, file.darknet_weights, tensorNames(file.description));
+  auto network = Network::load(file.network, file.darknet_weights, tensorNames(file.description));
   if (network) return std::move(*network);
   const bool tensor = network.error().code == "model_without_tensor";
   throw StartupError(
       ExitCode::kConfiguration,
       config.model.path +
-          (tensor ? " does not fit its description: " : " is not a network that OpenCV can load: ") +
+          (tensor ? " does not fit its description: "
+                  : " is not a network that OpenCV can load: ") +
           network.error().detail +
           (tensor ? "; correct the names in its model.json."
                   : "; give a whole .onnx file (opset 11 or so) or a Darknet .cfg with its "
@@ -65,11 +65,12 @@ void Node::chooseClasses() {
   for (const std::string& name : wanted) {
     const auto it = std::find(known.begin(), known.end(), name);
     if (it == known.end()) {
-      throw StartupError(ExitCode::kConfiguration,
-                         "detection.classes: the network " + description_.name +
-                             " knows no class \"" + name + "\"; use names of its model.json.");
+      throw StartupError(ExitCode::kConfiguration, "detection.classes: the network " +
+                                                       description_.name + " knows no class \"" +
+                                                       name + "\"; use names of its model.json.");
     }
-    if (std::find(info_.classes.begin(), info_.classes.end(), name) != info_.classes.end()) continue;
+    if (std::find(info_.classes.begin(), info_.classes.end(), name) != info_.classes.end())
+      continue;
     options_.wanted.push_back(static_cast<std::size_t>(it - known.begin()));
     info_.classes.push_back(name);
   }
@@ -79,10 +80,10 @@ void Node::testItself() {
   const Frame image = testImage(description_.input);
   for (int round = 0; round < 2; ++round) {  // the first one allocates
     if (const auto result = candidatesIn(image); !result) {
-      throw StartupError(ExitCode::kConfiguration,
-                         config_.model.path + " fails its test at the start: " +
-                             result.error().detail + " (" + result.error().code +
-                             "); correct its model.json or give another network.");
+      throw StartupError(
+          ExitCode::kConfiguration,
+          config_.model.path + " fails its test at the start: " + result.error().detail + " (" +
+              result.error().code + "); correct its model.json or give another network.");
     }
   }
 }
@@ -104,8 +105,8 @@ Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame) {
 Result<Detections> Node::infer(const Frame& frame) {
   auto candidates = candidatesIn(frame);
   if (!candidates) return tl::unexpected(candidates.error());
-  const ImageFit fit = fitOf(description_.input, static_cast<int>(frame.width),
-                             static_cast<int>(frame.height));
+  const ImageFit fit =
+      fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
   Detections out;
   out.stamp = frame.stamp;
   out.camera = frame.camera;

@@ -25,7 +25,7 @@ struct Candidate {
 };
 
 struct DecodeOptions {
-  double score_threshold = 0.05;  ///< boxes whose best wanted class scores less are left out
+  double score_threshold = 0.05;    ///< boxes whose best wanted class scores less are left out
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 

@@ -20,9 +20,9 @@ enum class Fit {
 struct Input {
   int width = 0, height = 0;  ///< pixels, multiples of every stride
   Fit fit = Fit::kResize;
-  bool rgb = false;            ///< colour order that the network was trained with
-  double pad = 0.0;            ///< value of padding, before mean and scale
-  double scale = 1.0;          ///< input = (pixel - mean) * scale
+  bool rgb = false;                            ///< colour order that the network was trained with
+  double pad = 0.0;                            ///< value of padding, before mean and scale
+  double scale = 1.0;                          ///< input = (pixel - mean) * scale
   std::vector<double> mean = {0.0, 0.0, 0.0};  ///< in the network's colour order
 };
 

@@ -10,8 +10,7 @@ namespace {
 constexpr std::uint32_t kMaxSide = 16384;
 
 Result<cv::Mat> viewOf(const Frame& frame) {
-  const std::size_t size =
-      std::size_t{frame.width} * frame.height * channelsOf(frame.encoding);
+  const std::size_t size = std::size_t{frame.width} * frame.height * channelsOf(frame.encoding);
   if (frame.width == 0 || frame.height == 0 || frame.width > kMaxSide || frame.height > kMaxSide ||
       !frame.data || frame.data->size() != size) {
     return fail("frame_malformed", "the image's size and its data do not agree");

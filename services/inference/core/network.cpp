@@ -52,10 +52,10 @@ Result<Network> Network::load(const std::string& file, const std::string& darkne
   const QuietOpenCv quiet;
   cv::dnn::Net net;
   try {
-    net = darknet_weights.empty() ? cv::dnn::readNetFromONNX(file.data(), file.size())
-                                  : cv::dnn::readNetFromDarknet(file.data(), file.size(),
-                                                                darknet_weights.data(),
-                                                                darknet_weights.size());
+    net = darknet_weights.empty()
+              ? cv::dnn::readNetFromONNX(file.data(), file.size())
+              : cv::dnn::readNetFromDarknet(file.data(), file.size(), darknet_weights.data(),
+                                            darknet_weights.size());
   } catch (const std::exception& e) {  // cv::Exception, and what protobuf and std throw
     return fail("model_unreadable", firstLine(e.what()));
   }
@@ -89,8 +89,8 @@ Result<std::vector<Tensor>> Network::forward(const cv::Mat& blob) {
   for (cv::Mat& output : outputs_) {
     if (output.type() != CV_32F) return fail("model_output_shape", "an output is not float32");
     if (!output.isContinuous()) output = output.clone();
-    tensors.push_back({{output.size.p, output.size.p + output.dims},
-                       {output.ptr<float>(), output.total()}});
+    tensors.push_back(
+        {{output.size.p, output.size.p + output.dims}, {output.ptr<float>(), output.total()}});
   }
   return tensors;
 }

@@ -14,9 +14,9 @@ namespace perdure::capture {
 namespace {
 
 using namespace std::chrono_literals;
-using ::testing::HasSubstr;
 using test::Child;
 using test::runUntil;
+using ::testing::HasSubstr;
 
 /// Plays the part of "vio" on the bus.
 class CaptureProcess : public ::testing::Test {
@@ -37,15 +37,15 @@ class CaptureProcess : public ::testing::Test {
     odometry.instance = 5;
     EXPECT_TRUE(odometry_.write(odometry));
   }
-  std::unique_ptr<Child> start(const testing::TinyDrive& drive, std::vector<std::string> more = {}) {
-    std::vector<std::string> command = {
-        (test::programs() / "perdure-capture").string(),
-        "--set",
-        "dataset.path=" + drive.write(folder_.file("drive")),
-        "--set",
-        "start.readers=[vio]",
-        "--set",
-        "run.state=" + folder_.file("run")};
+  std::unique_ptr<Child> start(const testing::TinyDrive& drive,
+                               std::vector<std::string> more = {}) {
+    std::vector<std::string> command = {(test::programs() / "perdure-capture").string(),
+                                        "--set",
+                                        "dataset.path=" + drive.write(folder_.file("drive")),
+                                        "--set",
+                                        "start.readers=[vio]",
+                                        "--set",
+                                        "run.state=" + folder_.file("run")};
     for (const std::string& assignment : more) {
       command.push_back("--set");
       command.push_back(assignment);
@@ -156,16 +156,17 @@ TEST_F(CaptureProcess, FollowsItsReadersAndResumesAtTheFirstFrameWithoutAnAnswer
   std::vector<std::uint64_t> expected = upTo(200);
   expected.insert(expected.begin() + static_cast<std::ptrdiff_t>(open), open);  // it comes again
   EXPECT_EQ(sequences_.size(), expected.size());
-  const auto [got, wanted] = std::mismatch(sequences_.begin(), sequences_.end(), expected.begin(),
-                                           expected.end());
+  const auto [got, wanted] =
+      std::mismatch(sequences_.begin(), sequences_.end(), expected.begin(), expected.end());
   EXPECT_TRUE(got == sequences_.end() && wanted == expected.end())
       << "they part at " << (got == sequences_.end() ? 0 : *got) << ", killed at " << open;
 }
 
 TEST_F(CaptureProcess, SaysWhomItWaitsFor) {
   auto capture = start({.frames = 3}, {"start.readers=[vio, inference]"});
-  ASSERT_TRUE(runUntil(loop_, [&] { return last_health_.message == "waits for readers: inference"; }))
-      << last_health_.message;
+  ASSERT_TRUE(runUntil(loop_, [&] {
+    return last_health_.message == "waits for readers: inference";
+  })) << last_health_.message;
   EXPECT_EQ(last_health_.state, HealthState::kStarting);
   EXPECT_TRUE(sequences_.empty());
 }

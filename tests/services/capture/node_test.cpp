@@ -32,7 +32,8 @@ class NodeTest : public ::testing::Test {
   }
   Outputs outputs() {
     return {[this](const ImuSample& s) { samples_.push_back(s.sequence); },
-            [](const SpeedSample&) {}, [this](const Frame& f) {
+            [](const SpeedSample&) {},
+            [this](const Frame& f) {
               frames_.push_back(f.stamp.sequence);
               captured_ns_.push_back(f.stamp.captured_ns);
             }};

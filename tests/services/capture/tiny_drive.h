@@ -15,7 +15,7 @@ struct TinyDrive {
   std::int64_t start_ns = 1'000'000'000'000;
   std::int64_t imu_before_ns = 20'000'000, imu_after_ns = 100'000'000;
   bool stereo = false;
-  int truncated = -1;  ///< index of a frame whose file is cut off
+  int truncated = -1;                                ///< index of a frame whose file is cut off
   int imu_gap_after = -1, imu_gap_ns = 500'000'000;  ///< index of a frame
 
   std::string write(const std::filesystem::path& folder) const {

@@ -156,8 +156,8 @@ TEST(Decode, RefusesTensorsOfAnotherShape) {
 TEST(Decode, RefusesNumbersThatAreNotFinite) {
   for (const Family family : {Family::kYolox, Family::kYoloFastest, Family::kFastestDet}) {
     const auto m = model(family);
-    for (const float bad : {std::numeric_limits<float>::quiet_NaN(),
-                            std::numeric_limits<float>::infinity()}) {
+    for (const float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
       Head head(m);
       head.values.back()[5] = bad;
       const auto out = decode(m, all(), head.tensors());

@@ -60,8 +60,8 @@ Frame frameOf(int index) {
   frame.width = static_cast<std::uint32_t>(pixels.cols);
   frame.height = static_cast<std::uint32_t>(pixels.rows);
   frame.encoding = ImageEncoding::kBgr8;
-  frame.data = std::make_shared<const std::vector<std::uint8_t>>(
-      pixels.data, pixels.data + pixels.total() * 3);
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(pixels.data,
+                                                                 pixels.data + pixels.total() * 3);
   return frame;
 }
 
@@ -164,8 +164,9 @@ INSTANTIATE_TEST_SUITE_P(All, Networks,
                                            Expectation{"FastestDet_352_coco.onnx", 0.95}),
                          [](const auto& network) {
                            std::string name = fs::path(network.param.file).stem().string();
-                           std::replace_if(name.begin(), name.end(),
-                                           [](char c) { return !std::isalnum(c); }, '_');
+                           std::replace_if(
+                               name.begin(), name.end(), [](char c) { return !std::isalnum(c); },
+                               '_');
                            return name;
                          });
 

@@ -12,18 +12,18 @@ Candidate candidate(Box box, std::vector<float> activations) {
 }
 
 TEST(Suppress, KeepsTheBoxOfMostTotalEvidenceAndTheEvidenceOfBoth) {
-  const auto kept = suppress({candidate({0, 0, 10, 10}, {0, 1.0F, 2.0F}),
-                              candidate({0, 0, 10, 9}, {0, 3.0F, -4.0F})},
-                             0.6, 100);
+  const auto kept = suppress(
+      {candidate({0, 0, 10, 10}, {0, 1.0F, 2.0F}), candidate({0, 0, 10, 9}, {0, 3.0F, -4.0F})}, 0.6,
+      100);
   ASSERT_EQ(kept.size(), 1u);
   EXPECT_EQ(kept[0].box.y2, 9);
   EXPECT_EQ(kept[0].activations, (std::vector<float>{0, 3.0F, 2.0F}));
 }
 
 TEST(Suppress, LeavesNeighboursApart) {
-  const auto kept = suppress({candidate({0, 0, 10, 10}, {0, 1.0F}),
-                              candidate({3, 0, 13, 10}, {0, 2.0F})},  // IoU 7/13
-                             0.6, 100);
+  const auto kept = suppress(
+      {candidate({0, 0, 10, 10}, {0, 1.0F}), candidate({3, 0, 13, 10}, {0, 2.0F})},  // IoU 7/13
+      0.6, 100);
   EXPECT_EQ(kept.size(), 2u);
 }
 

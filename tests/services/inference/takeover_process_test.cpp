@@ -162,7 +162,8 @@ TEST(InferenceProgram, SaysTheMendAndTheStatusWhereItCannotStart) {
   const std::string program = (test::programs() / "perdure-inference").string();
   std::ofstream(folder.file("not.onnx")) << "this is no network";
   std::ofstream(folder.file("not.onnx.model.json")) << testing::TinyModel{}.json();
-  Child garbage({program, "--set", "model.path=" + folder.file("not.onnx")}, folder.file("garbage"));
+  Child garbage({program, "--set", "model.path=" + folder.file("not.onnx")},
+                folder.file("garbage"));
   EXPECT_EQ(garbage.wait(10s), 78);
   EXPECT_THAT(garbage.log(), ::testing::HasSubstr("not a network that OpenCV can load"));
   Child missing({program, "--set", "model.path=/nowhere.onnx"}, folder.file("missing"));

@@ -26,7 +26,7 @@ struct TinyModel {
     std::ofstream weights(folder / "tiny.weights", std::ios::binary);
     const std::int32_t header[5] = {0, 2, 0, 0, 0};  // version 0.2.0 and a 64-bit count
     weights.write(reinterpret_cast<const char*>(header), sizeof header);
-    std::vector<float> values = head;                // biases, then 7×3 weights
+    std::vector<float> values = head;  // biases, then 7×3 weights
     values.resize(head.size() + 7 * 3, 0.0F);
     weights.write(reinterpret_cast<const char*>(values.data()),
                   static_cast<std::streamsize>(values.size() * sizeof(float)));
