@@ -50,13 +50,14 @@ std::optional<std::uint64_t> multipleOfTenth(TimePoint time) {
   return static_cast<std::uint64_t>(ns / tenth);
 }
 
-/// The frame of line i by its nearest tie, `seconds` a frame where lines are not consecutive.
+/// The frame of line i by the ties around it, by time where its neighbours are not consecutive.
 std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::StampedPose>& poses,
                                      const Ties& ties) {
   if (ties.empty()) return multipleOfTenth(poses[i].time).value_or(i);
   const auto after =
       std::lower_bound(ties.begin(), ties.end(), i,
                        [](const auto& tie, std::size_t line) { return tie.first < line; });
+  if (after != ties.end() && after->first == i) return after->second;
   const auto& b = after == ties.end() ? ties.back() : *after;
   const auto& a = after == ties.begin() ? b : *(after - 1);
   const auto steps = [](std::size_t from, std::size_t to) {

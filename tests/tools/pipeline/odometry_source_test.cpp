@@ -1,0 +1,44 @@
+#include "tools/pipeline/odometry_source.h"
+
+#include <gtest/gtest.h>
+
+#include "common/math/so3.h"
+
+namespace perdure::tools {
+namespace {
+
+FrameStamp stampOf(std::uint64_t frame) {
+  FrameStamp stamp;
+  stamp.source = 1;
+  stamp.sequence = frame;
+  stamp.time = fromNanoseconds(static_cast<std::int64_t>(frame) * 100'000'000);
+  return stamp;
+}
+
+TEST(PoseOdometry, SaysWhatAFileOfPosesKnowsAndNoMore) {
+  std::vector<replay::StampedPose> poses(2);
+  poses[1].T_WB.p = Eigen::Vector3d(1, 0, 0);
+  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2);
+  ASSERT_TRUE(source.at(stampOf(0)));
+  const auto odometry = source.at(stampOf(1));
+  ASSERT_TRUE(odometry);
+  EXPECT_EQ(odometry->state, OdometryState::kTracking);
+  EXPECT_FALSE(odometry->has_increment);
+  EXPECT_TRUE(odometry->v_WB.isApprox(Eigen::Vector3d(10, 0, 0)));
+  EXPECT_GT(odometry->covariance.diagonal().minCoeff(), 0.0);
+  EXPECT_FALSE(source.at(stampOf(2))) << "the file has two lines";
+}
+
+TEST(PoseOdometry, UpIsTheMeanOfTheBodysZAxisSoFar) {
+  std::vector<replay::StampedPose> poses(3);
+  poses[1].T_WB.q = expQuaternion({0.2, 0, 0});
+  poses[2].T_WB.q = expQuaternion({-0.2, 0, 0});
+  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2);
+  EXPECT_TRUE(source.at(stampOf(0))->up_W.isApprox(Eigen::Vector3d::UnitZ()));
+  const Eigen::Vector3d tilted = source.at(stampOf(1))->up_W;
+  EXPECT_NEAR(std::atan2(-tilted.y(), tilted.z()), 0.1, 1e-9);
+  EXPECT_NEAR(source.at(stampOf(2))->up_W.z(), 1.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,252 @@
+// The pipeline over a street of one parked car, made here: exact boxes of a known cuboid.
+#include "tools/pipeline/pipeline.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "common/camera/camera_model.h"
+#include "common/math/so3.h"
+#include "common/replay/kitti_calibration.h"
+#include "common/replay/text_file.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tools/evaluate/object_rows.h"
+#include "tools/pipeline/report.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::readText;
+using replay::startupErrorOf;
+using replay::writeText;
+using ::testing::HasSubstr;
+
+constexpr int kFrames = 60;
+const Eigen::Vector3d kCarCentre(32.0, 3.5, -0.9), kCarSize(4.2, 1.7, 1.5);
+constexpr double kCarYaw = 0.1;
+
+RigidTransform poseOf(int frame) {
+  return RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * frame, 0, 0));
+}
+
+/// The box of the car in a frame, or nothing where it is not wholly in the image.
+std::optional<Box> boxOf(const CameraModel& camera, int frame) {
+  const RigidTransform T_CW = (poseOf(frame) * camera.T_BC()).inverse();
+  Box box{1e9, 1e9, -1e9, -1e9};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d half(corner & 1 ? .5 : -.5, corner & 2 ? .5 : -.5, corner & 4 ? .5 : -.5);
+    const auto pixel =
+        camera.project(T_CW * (kCarCentre + rotationAboutZ(kCarYaw) * half.cwiseProduct(kCarSize)));
+    if (!pixel || !camera.inImage(*pixel)) return std::nullopt;
+    box = Box{std::min(box.x1, pixel->x()), std::min(box.y1, pixel->y()),
+              std::max(box.x2, pixel->x()), std::max(box.y2, pixel->y())};
+  }
+  return box;
+}
+
+/// The folder with a calibration, poses.txt and boxes.csv.
+fs::path makeStreet(const std::string& name) {
+  const fs::path root = replay::tinyKittiTracking(name);
+  fs::remove_all(root / "label_02");
+  fs::remove_all(root / "image_02");
+  writeText(root / "calib/0000.txt",
+            "P2: 720 0 620 44 0 720 180 0.2 0 0 1 0\nP3: 720 0 620 -340 0 720 180 0.2 0 0 1 0\n"
+            "R0_rect: 1 0 0 0 1 0 0 0 1\n"
+            "Tr_velo_to_cam: 0 -1 0 0 0 0 -1 -0.1 1 0 0 -0.3\n"
+            "Tr_imu_to_velo: 1 0 0 -0.8 0 1 0 0.3 0 0 1 -0.8\n");
+  auto calibration = replay::readTrackingCalibration(root / "calib/0000.txt");
+  calibration.width = 1242, calibration.height = 375;
+  const CameraModel camera(calibration.camera("cam0"));
+  std::string poses, boxes = "frame,class,x1,y1,x2,y2,score\n";
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const double x = poseOf(frame).p.x();
+    poses += "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n";
+    const auto box = boxOf(camera, frame);
+    if (!box) continue;
+    boxes += std::to_string(frame) + ",Car," + std::to_string(box->x1) + "," +
+             std::to_string(box->y1) + "," + std::to_string(box->x2) + "," +
+             std::to_string(box->y2) + ",0.95\n";
+  }
+  writeText(root / "poses.txt", poses);
+  writeText(root / "boxes.csv", boxes);
+  return root;
+}
+
+PipelineOptions streetOptions(const fs::path& street, const std::string& out) {
+  PipelineOptions options;
+  options.data = street.string();
+  options.sequence = "0000";
+  options.odometry = (street / "poses.txt").string();
+  options.detections = (street / "boxes.csv").string();
+  options.out = (street / out).string();
+  return options;
+}
+
+void runPipeline(const PipelineOptions& options) {
+  Pipeline pipeline(options);
+  pipeline.run([](const PipelineCounts&) {});
+  pipeline.finish();
+  pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
+}
+
+std::string errorOf(const PipelineOptions& options) {
+  return startupErrorOf([&] { Pipeline pipeline(options); });
+}
+
+TEST(Pipeline, AParkedCarIsOneObjectWhereItStands) {
+  const auto street = makeStreet("parked");
+  const auto options = streetOptions(street, "out");
+  runPipeline(options);
+  const auto rows = readObjectRows(fs::path(options.out) / "objects_final.csv");
+  ASSERT_GT(rows.size(), 40U);
+  for (const auto& row : rows) {
+    EXPECT_EQ(row.id, rows.front().id);
+    EXPECT_EQ(row.class_name, "car");
+    EXPECT_LT((row.centre_W - kCarCentre).norm(), 1.0) << row.centre_W.transpose();
+    EXPECT_EQ(toNanoseconds(row.time), static_cast<std::int64_t>(row.frame) * 100'000'000);
+  }
+  const auto objects = nlohmann::json::parse(readText(fs::path(options.out) / "objects.json"));
+  ASSERT_EQ(objects["objects"].size(), 1U);
+  EXPECT_GT(objects["objects"][0]["existence"], 0.5);
+  EXPECT_GT(objects["objects"][0]["pmf"]["car"], 0.5);
+}
+
+TEST(Pipeline, EveryDeclaredFileIsThereAndParses) {
+  const auto options = streetOptions(makeStreet("files"), "out");
+  runPipeline(options);
+  const fs::path out = options.out;
+  for (const char* file : {"objects.json", "map.geojson", "timing.json", "report.json"}) {
+    EXPECT_TRUE(nlohmann::json::accept(readText(out / file))) << file;
+  }
+  const auto report = nlohmann::json::parse(readText(out / "report.json"));
+  EXPECT_EQ(report["services"]["capture"]["frames_in"], kFrames);
+  EXPECT_EQ(report["services"]["semantic_filter"]["frames_out"], kFrames);
+  const auto timing = nlohmann::json::parse(readText(out / "timing.json"));
+  EXPECT_EQ(timing["stages"]["semantic_filter"]["calls"], kFrames);
+  EXPECT_EQ(replay::PoseFile::read(out / "trajectory.tum").poses().size(), std::size_t{kFrames});
+  EXPECT_TRUE(fs::exists(out / "events.jsonl"));
+  EXPECT_TRUE(fs::exists(out / "objects_inst.csv"));
+}
+
+TEST(Pipeline, TwoRunsGiveIdenticalBytes) {
+  const auto street = makeStreet("twice");
+  runPipeline(streetOptions(street, "one"));
+  runPipeline(streetOptions(street, "two"));
+  for (const char* file : {"objects_inst.csv", "objects_final.csv", "objects.json", "events.jsonl",
+                           "trajectory.tum", "map.geojson"}) {
+    EXPECT_EQ(readText(street / "one" / file), readText(street / "two" / file)) << file;
+  }
+}
+
+TEST(Pipeline, InstUpToAFrameDoesNotDependOnWhatComesLater) {
+  const auto street = makeStreet("prefix");
+  runPipeline(streetOptions(street, "whole"));
+  // From frame 30 on there are only boxes of another class elsewhere.
+  std::string csv;
+  for (const auto& line : replay::readLines(street / "boxes.csv", "")) {
+    const auto frame = replay::parseInteger(replay::split(line.text, ',')[0]);
+    if (frame.value_or(0) < 30) csv += line.text + "\n";
+  }
+  writeText(street / "cut.csv", csv + "30,Van,100,100,200,180,0.9\n");
+  auto options = streetOptions(street, "cut");
+  options.detections = (street / "cut.csv").string();
+  runPipeline(options);
+  const auto upTo = [&](const char* run) {
+    std::string text;
+    for (const auto& line : replay::readLines(street / run / "objects_inst.csv", "")) {
+      const auto frame = replay::parseInteger(replay::split(line.text, ',')[1]);
+      if (frame.value_or(0) < 30) text += line.text + "\n";
+    }
+    return text;
+  };
+  EXPECT_EQ(upTo("whole"), upTo("cut"));
+  EXPECT_GT(upTo("whole").size(), 200U) << "there is something to compare";
+}
+
+TEST(Pipeline, SecondsEndTheRun) {
+  auto options = streetOptions(makeStreet("seconds"), "out");
+  options.seconds = 1.0;
+  runPipeline(options);
+  const auto poses = replay::PoseFile::read(fs::path(options.out) / "trajectory.tum").poses();
+  EXPECT_EQ(poses.size(), 11U);
+}
+
+TEST(Pipeline, FramesWithoutAPoseAreCountedAndLeaveNoLine) {
+  const auto street = makeStreet("few_poses");
+  std::string tum;
+  for (int frame = 0; frame < 20; ++frame) {
+    tum += std::to_string(0.1 * frame) + " " + std::to_string(0.4 * frame) + " 0 0 0 0 0 1\n";
+  }
+  writeText(street / "poses.tum", tum);
+  writeText(street / "label_02/0000.txt",
+            "29 3 Car 0 0 -1.5 10 20 60 70 1.5 1.6 4.0 1.0 1.65 10.0 -1.57\n");
+  auto options = streetOptions(street, "out");
+  options.odometry = (street / "poses.tum").string();
+  Pipeline pipeline(options);
+  pipeline.run([](const PipelineCounts&) {});
+  EXPECT_EQ(pipeline.counts().frames, 30U) << "the labels end at frame 29";
+  EXPECT_EQ(pipeline.counts().odometry, 20U);
+  EXPECT_EQ(pipeline.reasons().at("pipeline").of("frame_without_pose"), 10U);
+}
+
+TEST(Pipeline, WhatCannotStartSaysTheMend) {
+  const auto street = makeStreet("errors");
+  auto options = streetOptions(street, "out");
+  options.detections = "simulated";
+  EXPECT_THAT(errorOf(options), HasSubstr("needs a simulated folder"));
+  options = streetOptions(street, "out");
+  options.detections = "model";
+  EXPECT_THAT(errorOf(options), HasSubstr("--model FILE.onnx"));
+  options.model = "net.onnx";
+  EXPECT_THAT(errorOf(options), HasSubstr("no images (image_02)"));
+  options = streetOptions(street, "out");
+  options.odometry = "truth";
+  EXPECT_THAT(errorOf(options), HasSubstr("number of frames is known"));
+  options.odometry = "vio";
+  options.image_size = {1242, 375};
+  writeText(street / "label_02/0000.txt", "9 -1 DontCare -1 -1 0 1 2 3 4 -1 -1 -1 0 0 0 0\n");
+  EXPECT_THAT(errorOf(options), HasSubstr("no inertial samples"));
+  options = streetOptions(street, "out");
+  options.assignments = {"planner.speed=3"};
+  EXPECT_THAT(errorOf(options), HasSubstr("services are vio, semantic_filter, inference"));
+  options.assignments = {"semantic_filter.no_such_key=3"};
+  EXPECT_THAT(errorOf(options), HasSubstr("no_such_key"));
+  options = streetOptions(street, "out");
+  options.data = (street / "nowhere").string();
+  EXPECT_THAT(errorOf(options), HasSubstr("the dataset folder is missing"));
+}
+
+TEST(Pipeline, ANetworkFileThatIsNoneIsRefusedWithASentence) {
+  const auto root = replay::tinyEuroc("no_network");
+  writeText(root / "net.onnx", "this is no network");
+  PipelineOptions options;
+  options.data = root.string();
+  options.odometry = "truth";
+  options.detections = "model";
+  options.model = (root / "net.onnx").string();
+  options.out = (root / "out").string();
+  EXPECT_THAT(errorOf(options), HasSubstr("net.onnx"));
+}
+
+TEST(Pipeline, ATruncatedImageCostsOneFrame) {
+  const auto root = replay::tinyEuroc("pipeline_truncated");
+  replay::truncate(root / "mav0/cam0/data/1050000000.png", 0.5);
+  PipelineOptions options;
+  options.data = root.string();
+  options.odometry = "vio";
+  options.detections = "none";
+  options.out = (root / "out").string();
+  Pipeline pipeline(options);
+  pipeline.run([](const PipelineCounts&) {});
+  pipeline.finish();
+  EXPECT_EQ(pipeline.counts().frames, 4U);
+  EXPECT_EQ(pipeline.reasons().at("capture").of("image_truncated"), 1U);
+  const auto report = makeReport(pipeline, options);
+  EXPECT_EQ(report["services"]["capture"]["dropped"], 1);
+}
+
+}  // namespace
+}  // namespace perdure::tools

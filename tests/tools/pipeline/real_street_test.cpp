@@ -1,0 +1,104 @@
+// The pipeline on KITTI tracking with given poses and boxes, where the data are at hand.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "common/replay/text_file.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tools/evaluate/object_score.h"
+#include "tools/pipeline/pipeline.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RealStreet : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::is_directory(root()))
+      GTEST_SKIP() << root() << " is absent: the real street is not run";
+  }
+  static fs::path root() {
+    return fs::path(std::getenv("PERDURE_SOURCE")) / "../shared/data/kitti_tracking";
+  }
+  static PipelineOptions options(const std::string& sequence, const fs::path& out) {
+    PipelineOptions options;
+    options.data = root().string();
+    options.sequence = sequence;
+    options.odometry = (root() / "poses_orb" / (sequence + ".txt")).string();
+    options.detections = (root() / "det_rrc_azimuth" / (sequence + ".csv")).string();
+    options.out = out.string();
+    return options;
+  }
+  static void run(const PipelineOptions& options) {
+    Pipeline pipeline(options);
+    pipeline.run([](const PipelineCounts&) {});
+    pipeline.finish();
+  }
+  static Cell cellOf(const fs::path& out, const char* csv, const std::string& sequence) {
+    const auto labels = replay::readKittiLabels(root() / "label_02" / (sequence + ".txt"));
+    auto calibration = replay::readTrackingCalibration(root() / "calib" / (sequence + ".txt"));
+    const auto size = replay::trackingImageSize(sequence);
+    calibration.width = size.width, calibration.height = size.height;
+    const auto rows = readObjectRows(out / csv);
+    const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
+    const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+    return scoreObjects(rows, truth, poses, calibration, {}).cells[2][2];
+  }
+};
+
+TEST_F(RealStreet, TheParkedCarsOfSequence0000AreFound) {
+  const fs::path out = replay::freshFolder("street_0000");
+  run(options("0000", out));
+  const Cell final_rows = cellOf(out, "objects_final.csv", "0000");
+  const Cell inst = cellOf(out, "objects_inst.csv", "0000");
+  EXPECT_EQ(final_rows.truth, 61U);
+  EXPECT_GE(final_rows.recall(), 0.95);
+  EXPECT_GE(final_rows.precision(), 0.80);
+  EXPECT_GE(inst.recall(), 0.90);
+  EXPECT_GE(inst.precision(), 0.80);
+}
+
+TEST_F(RealStreet, TwoRunsGiveIdenticalBytes) {
+  const fs::path out = replay::freshFolder("street_twice");
+  run(options("0003", out / "one"));
+  run(options("0003", out / "two"));
+  for (const char* file : {"objects_inst.csv", "objects_final.csv", "objects.json", "events.jsonl",
+                           "trajectory.tum", "map.geojson"}) {
+    EXPECT_EQ(replay::readText(out / "one" / file), replay::readText(out / "two" / file)) << file;
+  }
+}
+
+TEST_F(RealStreet, InstUpToFrame100IsTheSameWhenTheDetectionsAreCutThere) {
+  const fs::path out = replay::freshFolder("street_prefix");
+  const auto upTo100 = [](const fs::path& file, std::size_t column) {
+    std::string text;
+    for (const auto& line : replay::readLines(file, "")) {
+      const auto frame = replay::parseInteger(replay::split(line.text, ',')[column]);
+      if (frame.value_or(0) <= 100) text += line.text + "\n";
+    }
+    return text;
+  };
+  auto cut = options("0000", out / "cut");
+  replay::writeText(out / "cut.csv", upTo100(cut.detections, 0));
+  cut.detections = (out / "cut.csv").string();
+  run(options("0000", out / "whole"));
+  run(cut);
+  EXPECT_EQ(upTo100(out / "whole/objects_inst.csv", 1), upTo100(out / "cut/objects_inst.csv", 1));
+}
+
+TEST_F(RealStreet, EverySequenceRunsWithoutLabelsToo) {
+  const fs::path folder = replay::freshFolder("street_unlabelled");
+  fs::create_directories(folder / "data");
+  fs::create_directory_symlink(fs::canonical(root() / "calib"), folder / "data/calib");
+  for (const std::string sequence : {"0012", "0017"}) {
+    auto unlabelled = options(sequence, folder / sequence);
+    unlabelled.data = (folder / "data").string();
+    run(unlabelled);
+    EXPECT_TRUE(fs::exists(folder / sequence / "objects_final.csv"));
+  }
+}
+
+}  // namespace
+}  // namespace perdure::tools
