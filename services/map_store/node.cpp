@@ -83,7 +83,8 @@ void Node::onObjects(const Objects& objects) {
   std::erase_if(next.objects, [this](const ObjectBelief& b) { return !acceptable(b); });
   leaveBehind(next);
   if (newest_ && !same_filter) previous_ = std::move(newest_);
-  next_id_ = std::max(next_id_, next.next_id);
+  // The filter whose ids these are knows the next one; another one may not have been restored yet.
+  next_id_ = same_filter ? next.next_id : std::max(next_id_, next.next_id);
   newest_ = std::move(next);
   dirty_ = true;
 }

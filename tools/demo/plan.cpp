@@ -131,10 +131,10 @@ std::string supervisorConfig(const std::vector<ServicePlan>& services, const Dem
     std::string command;
     for (const std::string& word : service.command) command += quoted(word) + " ";
     // Ended by a fault after its first second, a program is started again without delay, however
-    // often. One that cannot start is tried six times, 1, 2, 3, … seconds apart.
+    // often. One that cannot start is tried five times, 1, 2, 3, 4 seconds apart.
     text += fmt::format(
         "\n[program:{}]\ncommand={}\ndirectory={}\npriority={}\nautorestart=unexpected\n"
-        "exitcodes=0\nstartsecs=1\nstartretries=5\nstopsignal=TERM\nstopwaitsecs=5\n"
+        "exitcodes=0\nstartsecs=1\nstartretries=4\nstopsignal=TERM\nstopwaitsecs=5\n"
         "redirect_stderr=true\nstdout_logfile={}\nstdout_logfile_maxbytes=0\n",
         service.name, command, escaped(fs::absolute(root).string()), priority--,
         escaped(service.log));

@@ -121,6 +121,18 @@ TEST_F(MapStoreNode, NeverGivesOutAnIdAgainThatMayHaveBeenGivenBeforeItDied) {
   EXPECT_GT(heard_.recalled.at(0).next_id, 500u);
 }
 
+TEST_F(MapStoreNode, SkipsNoIdsOnceTheSameFilterHasSpokenAgain) {
+  {
+    const auto node = start();
+    node->onObjects(workingSet(1, {carAt(10, {0, 0, 0})}));
+    node->tick(0ms);
+  }
+  const auto node = start();
+  node->onObjects(workingSet(2, {carAt(11, {0, 0, 0})}));
+  node->onQuery(restoreFor(12));
+  EXPECT_EQ(heard_.recalled.at(0).next_id, 12u);
+}
+
 TEST_F(MapStoreNode, GivesAFilterThatAlreadyPublishedWhatItsPredecessorKnew) {
   const auto node = start();
   node->onObjects(workingSet(1, {carAt(10, {0, 0, 0})}, 11));

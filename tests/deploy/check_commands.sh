@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# The commands of deploy/ say what is wrong with their arguments.
+set -euo pipefail
+cd "$PERDURE_SOURCE"
+expect() { # STATUS WORDS COMMAND …
+  local wanted=$1 words=$2 status=0 out
+  shift 2
+  out=$("$@" 2>&1) || status=$?
+  if [ "$status" -ne "$wanted" ] || ! grep -qF -- "$words" <<< "$out"; then
+    echo "$*: status $status instead of $wanted, or not \"$words\": $out"
+    exit 1
+  fi
+}
+expect 64 "--data DIR" deploy/demo
+expect 64 "--data DIR" deploy/demo --headless
+expect 64 "unknown option '--everything'" deploy/install --everything
+expect 0 "--runtime" deploy/install --help
+for script in deploy/demo deploy/install tests/run .ci/run; do bash -n "$script"; done
