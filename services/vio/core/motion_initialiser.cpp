@@ -17,7 +17,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t kKeyframes = 12, kFewestTracks = 15;
-constexpr double kFewestParallaxPx = 8.0;
+constexpr double kFewestParallaxPx = 2.0;
 
 struct Keyframe {
   double t = 0.0;  ///< since the first
@@ -160,31 +160,22 @@ Solution solveOnce(const Views& views, const std::vector<Keyframe>& keyframes,
   return s;
 }
 
-std::vector<BearingPair> pairsOf(const std::vector<const TrackedFrame*>& tracked,
-                                 const std::vector<ImuIncrement>& between, double& parallax_px) {
-  std::vector<BearingPair> pairs;
-  std::vector<double> moved;
-  for (std::size_t k = 0; k + 1 < tracked.size(); ++k) {
-    BearingPair pair;
-    pair.R_B0_B1 = between[k].dq.toRotationMatrix();
-    pair.J_bias = between[k].F.block<3, 3>(kTheta, kGyroBias);
-    auto b = tracked[k + 1]->points.begin();
-    for (const TrackedPoint& a : tracked[k]->points) {
-      while (b != tracked[k + 1]->points.end() && b->id < a.id) ++b;
-      if (b == tracked[k + 1]->points.end()) break;
-      if (b->id != a.id) continue;
-      pair.bearings.emplace_back(a.seen[0]->normalised.homogeneous().normalized(),
-                                 b->seen[0]->normalised.homogeneous().normalized());
-      moved.push_back((a.seen[0]->pixel - b->seen[0]->pixel).norm());
-    }
-    if (pair.bearings.size() >= kFewestTracks) pairs.push_back(std::move(pair));
+/// Matches of points seen in both frames; distances in pixels are added to `moved`.
+BearingPair pairOf(const TrackedFrame& first, const TrackedFrame& second, const ImuIncrement& x,
+                   std::vector<double>& moved) {
+  BearingPair pair;
+  pair.R_B0_B1 = x.dq.toRotationMatrix();
+  pair.J_bias = x.F.block<3, 3>(kTheta, kGyroBias);
+  auto b = second.points.begin();
+  for (const TrackedPoint& a : first.points) {
+    while (b != second.points.end() && b->id < a.id) ++b;
+    if (b == second.points.end()) break;
+    if (b->id != a.id) continue;
+    pair.bearings.emplace_back(a.seen[0]->normalised.homogeneous().normalized(),
+                               b->seen[0]->normalised.homogeneous().normalized());
+    moved.push_back((a.seen[0]->pixel - b->seen[0]->pixel).norm());
   }
-  if (!moved.empty()) {
-    std::nth_element(moved.begin(), moved.begin() + static_cast<long>(moved.size() / 2),
-                     moved.end());
-    parallax_px = moved[moved.size() / 2];
-  }
-  return pairs;
+  return pair;
 }
 
 }  // namespace
@@ -268,15 +259,19 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
     tracked.push_back(&s.tracked);
     times.push_back(s.time);
   }
-  std::vector<ImuIncrement> between;
-  for (std::size_t i = 0; i + 1 < count; ++i) {
-    between.push_back(integrate(imu.between(times[i], times[i + 1]), Vector3d::Zero(),
-                                Vector3d::Zero(), options_.imu));
+  std::vector<BearingPair> pairs;
+  std::vector<double> moved;
+  for (const std::size_t span : {1u, 3u, 6u}) {  // long ones weigh the bias, short ones are many
+    for (std::size_t i = 0; i + span < count; ++i) {
+      const ImuIncrement x = integrate(imu.between(times[i], times[i + span]), Vector3d::Zero(),
+                                       Vector3d::Zero(), options_.imu);
+      BearingPair pair = pairOf(*tracked[i], *tracked[i + span], x, moved);
+      if (pair.bearings.size() >= kFewestTracks) pairs.push_back(std::move(pair));
+    }
   }
-  double moved_px = 0.0;
-  const auto pairs = pairsOf(tracked, between, moved_px);
-  if (pairs.size() + 2 < count) return fail("start_few_tracks");
-  if (moved_px * static_cast<double>(count) < kFewestParallaxPx) return fail("start_no_parallax");
+  if (pairs.size() < count) return fail("start_few_tracks");
+  std::nth_element(moved.begin(), moved.begin() + static_cast<long>(moved.size() / 2), moved.end());
+  if (moved[moved.size() / 2] < kFewestParallaxPx) return fail("start_no_parallax");
   const Vector3d gyro_bias = gyroBiasFromPairs(pairs, cameras[0].T_BC().R());
 
   std::vector<Keyframe> keyframes;
@@ -314,7 +309,9 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   start.nav.q_WB = levelAttitude(last.R.transpose() * up_B0);
   start.nav.v_WB = start.nav.q_WB * (last.R.transpose() * v_B0);
   start.nav.gyro_bias = gyro_bias;
-  const double velocity = 2.0 * sigma_v + bias * t + 0.05;
+  // The gyro bias that is left turns gravity while the window lasts.
+  const double turned = options_.start.gyro_bias_sigma * t;
+  const double velocity = 2.0 * sigma_v + (bias + 0.5 * turned * options_.gravity) * t + 0.05;
   start.covariance = startCovariance(start.nav, 0.02 + (sigma_g + bias) / options_.gravity, 0.01,
                                      bias, Vector3d::Constant(velocity));
   return start;

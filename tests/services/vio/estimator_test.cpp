@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+#include <cmath>
+
 #include "common/math/chi2.h"
 #include "common/math/so3.h"
 #include "tests/services/vio/simulated_drive.h"
@@ -133,6 +136,111 @@ TEST(Estimator, TheIncrementExplainsThePoseCovariance) {
     const Matrix6d P_b = b.covariance.topLeftCorner<6, 6>();
     EXPECT_LT((P - P_b).norm(), 1e-2 * P_b.norm() + 1e-9) << k;
   }
+}
+
+TEST(Estimator, SpeedHoldsTheScaleOfOneCamera) {
+  test::DriveOptions drive;
+  drive.noise.accel = 0.1;  // an accelerometer that tells nothing of the scale
+  Options options;
+  options.imu.accel = 0.1;
+  const RunResult without = run(drive, options, {.seconds = 20.0});
+  const RunResult with = run(drive, options, {.seconds = 20.0, .speed = true});
+  EXPECT_LT(with.position_error, 0.5);
+  const auto uncertainty = [](const RunResult& r) {
+    return r.estimates.back().covariance.diagonal().segment<3>(3).sum();
+  };
+  EXPECT_LT(uncertainty(with), uncertainty(without));
+}
+
+TEST(Estimator, StandsStillAtRestAndThenFollows) {
+  test::DriveOptions drive_options;
+  drive_options.rest_s = 4.0;
+  test::SimulatedDrive drive(drive_options);
+  ImuBuffer imu;
+  for (const ImuReading& r : drive.imu(13.0)) ASSERT_TRUE(imu.add(r));
+  Estimator estimator(Options{}, drive.T_BC(), 0.0);
+  estimator.start(startAt(drive, 0.2, 3, 1.0));
+  const Vector3d origin = drive.truth(0.2).p_WB;
+  std::uint64_t frame = 0;
+  int rests = 0;
+  for (double t = 0.25; t < 12.0; t += 0.05) {
+    FrameInput input{++frame, drive.time(t), drive.see(t), {}, {}};
+    input.motion_px = t < 4.0 ? 0.1 : 20.0;
+    const auto out = estimator.process(input, imu);
+    ASSERT_TRUE(out) << out.error().code;
+    rests += out->at_rest;
+    if (t < 4.0) {
+      EXPECT_LT((out->nav.p_WB - origin).norm(), 0.05) << t;
+    }
+    EXPECT_TRUE(out->has_increment || frame == 1);
+    if (t > 11.9) {
+      EXPECT_LT((out->nav.p_WB - drive.truth(t).p_WB).norm(), 0.3);
+    }
+  }
+  EXPECT_GT(rests, 60);
+}
+
+TEST(Estimator, ImageMotionAloneDoesNotMakeARestOfADrive) {
+  test::SimulatedDrive drive({});
+  ImuBuffer imu;
+  for (const ImuReading& r : drive.imu(3.0)) ASSERT_TRUE(imu.add(r));
+  Estimator estimator(Options{}, drive.T_BC(), 0.0);
+  estimator.start(startAt(drive, 0.2, 3, 1.0));
+  for (std::uint64_t k = 1; k < 40; ++k) {
+    const double t = 0.2 + 0.05 * static_cast<double>(k);
+    // A lorry ahead fills the image and moves along.
+    const auto out = estimator.process({k, drive.time(t), drive.see(t), 0.1, {}}, imu);
+    ASSERT_TRUE(out);
+    EXPECT_FALSE(out->at_rest);
+  }
+}
+
+TEST(Estimator, LandmarksLieWithinTheirCovariance) {
+  test::DriveOptions options;
+  options.stereo = true;
+  test::SimulatedDrive drive(options);
+  ImuBuffer imu;
+  for (const ImuReading& r : drive.imu(6.0)) ASSERT_TRUE(imu.add(r));
+  Estimator estimator(Options{}, drive.T_BC(), 0.0);
+  estimator.start(startAt(drive, 0.2, 5, 1.0));
+  for (std::uint64_t k = 1; k < 100; ++k) {
+    const double t = 0.2 + 0.05 * static_cast<double>(k);
+    ASSERT_TRUE(estimator.process({k, drive.time(t), drive.see(t), {}, {}}, imu));
+  }
+  const double t = 0.2 + 0.05 * 99;
+  const Matrix6d P = estimator.state().covarianceOf({{estimator.state().clones.back().at, 6}});
+  double nees = 0.0;
+  int count = 0;
+  for (const LandmarkEstimate& l : estimator.landmarks()) {
+    std::size_t nearest = 0;
+    double best = 1e9;
+    for (std::size_t i = 0; i < drive.points().size(); ++i) {
+      const double d = (drive.pixelOf(i, t) - l.pixel).norm();
+      if (d < best) best = d, nearest = i;
+    }
+    if (best > 4.0) continue;
+    const Eigen::Matrix3d marginal =
+        l.covariance + l.cross_pose * P.ldlt().solve(l.cross_pose.transpose());
+    const Vector3d e = l.p_W - drive.points()[nearest];
+    nees += std::min(e.dot(marginal.ldlt().solve(e)), 50.0);
+    ++count;
+  }
+  EXPECT_GT(count, 40);
+  EXPECT_LT(nees / count, 6.0);
+}
+
+TEST(Estimator, BadNumbersStopItWithAReason) {
+  test::SimulatedDrive drive({});
+  ImuBuffer imu;
+  for (const ImuReading& r : drive.imu(3.0)) ASSERT_TRUE(imu.add(r));
+  Estimator estimator(Options{}, drive.T_BC(), 0.0);
+  estimator.start(startAt(drive, 0.2, 3, 1.0));
+  ASSERT_TRUE(estimator.process({1, drive.time(0.25), drive.see(0.25), {}, {}}, imu));
+  estimator.state().nav.accel_bias.x() = std::nan("");
+  const auto out = estimator.process({2, drive.time(0.3), drive.see(0.3), {}, {}}, imu);
+  ASSERT_FALSE(out);
+  EXPECT_TRUE(out.error().code.starts_with("numbers_")) << out.error().code;
+  EXPECT_FALSE(estimator.started());
 }
 
 }  // namespace

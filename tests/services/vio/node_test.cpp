@@ -1,0 +1,317 @@
+// The node with images: starts, faults of its inputs, restarts.
+#include "services/vio/node.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+
+#include "common/math/gaussian.h"
+#include "common/vision/image.h"
+#include "tests/services/vio/simulated_drive.h"
+
+namespace perdure::vio {
+namespace {
+
+/// The simulated drive's points as discs of different greys.
+Frame draw(const test::SimulatedDrive& drive, double t, std::uint64_t sequence) {
+  constexpr int kShift = 4;
+  cv::Mat image(480, 752, CV_8UC1, cv::Scalar(90));
+  for (std::size_t i = 0; i < drive.points().size(); ++i) {
+    const Eigen::Vector2d p = drive.pixelOf(i, t);
+    if (p.x() < -20 || p.y() < -20 || p.x() > 772 || p.y() > 500) continue;
+    const cv::Point at(static_cast<int>(p.x() * (1 << kShift)),
+                       static_cast<int>(p.y() * (1 << kShift)));
+    const int radius = (4 + static_cast<int>(i % 4)) << kShift;
+    cv::circle(image, at, radius, static_cast<double>(i % 2 ? 130 + i * 37 % 120 : i * 53 % 60),
+               cv::FILLED, cv::LINE_AA, kShift);
+  }
+  Frame frame;
+  frame.stamp = {1, sequence, drive.time(t), 0};
+  frame.camera = "cam0";
+  EXPECT_TRUE(vision::setPixels(frame, image));
+  return frame;
+}
+
+struct Recorder {
+  std::vector<Odometry> odometry;
+  std::vector<Landmarks> landmarks;
+  Outputs outputs() {
+    return {[this](const Odometry& o) { odometry.push_back(o); },
+            [this](const Landmarks& l) { landmarks.push_back(l); }};
+  }
+};
+
+Calibration calibration() {
+  Calibration c;
+  c.cameras = {test::testCamera(0)};
+  c.imu = ImuCalibration{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
+  return c;
+}
+
+test::DriveOptions restThenDrive() {
+  test::DriveOptions options;
+  options.rest_s = 1.0;
+  options.points = 400;
+  return options;
+}
+
+/// Plays the drive from `from` to `until`; edit may change or drop (return false) a message.
+class Player {
+ public:
+  explicit Player(double until) : drive_(restThenDrive()), readings_(drive_.imu(until + 0.1)) {}
+
+  using EditImu = std::function<bool(ImuSample&, double)>;
+  using EditFrame = std::function<bool(Frame&, double)>;
+
+  void play(Node& node, double from, double until, const EditImu& imu = {},
+            const EditFrame& frame = {}) {
+    auto next_frame = static_cast<std::uint64_t>(std::lround(from / 0.05));
+    for (std::size_t i = 0; i < readings_.size(); ++i) {
+      const double t = 0.005 * static_cast<double>(i);
+      if (t < from) continue;
+      if (t > until) break;
+      const double t_frame = 0.05 * static_cast<double>(next_frame);
+      if (t >= t_frame) {
+        Frame f = draw(drive_, t_frame, next_frame++);
+        if (!frame || frame(f, t_frame)) node.onFrame(f);
+      }
+      ImuSample s{1, i, readings_[i].time, readings_[i].gyro, readings_[i].accel};
+      if (!imu || imu(s, t)) node.onImu(s);
+    }
+  }
+  const test::SimulatedDrive& drive() const { return drive_; }
+
+ private:
+  test::SimulatedDrive drive_;
+  std::vector<ImuReading> readings_;
+};
+
+std::size_t usable(const Recorder& r) {
+  return static_cast<std::size_t>(
+      std::count_if(r.odometry.begin(), r.odometry.end(),
+                    [](const Odometry& o) { return o.state != OdometryState::kInitialising; }));
+}
+
+void expectFinite(const Recorder& r) {
+  for (const Odometry& o : r.odometry) {
+    EXPECT_TRUE(o.T_WB.finite());
+    EXPECT_TRUE(o.v_WB.allFinite());
+    EXPECT_TRUE(o.covariance.allFinite());
+    EXPECT_TRUE(o.increment_covariance.allFinite());
+    EXPECT_TRUE(o.transition.allFinite());
+  }
+}
+
+double travelled(const Odometry& a, const Odometry& b) { return (a.T_WB.p - b.T_WB.p).norm(); }
+
+TEST(VioNode, StartsAtRestWithinASecondAndFollowsTheDrive) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(6.0);
+  player.play(node, 0.0, 6.0);
+  node.flush();
+  ASSERT_GT(usable(r), 100u);
+  const auto first = std::find_if(r.odometry.begin(), r.odometry.end(), [](const Odometry& o) {
+    return o.state != OdometryState::kInitialising;
+  });
+  EXPECT_LT(toSeconds(first->stamp.time - player.drive().time(0.0)), 0.8);
+  const Odometry& last = r.odometry.back();
+  const double t = toSeconds(last.stamp.time - player.drive().time(0.0));
+  const Nav truth = player.drive().truth(t), begin = player.drive().truth(0.5);
+  EXPECT_NEAR(travelled(last, *first), (truth.p_WB - begin.p_WB).norm(), 0.25);
+  EXPECT_TRUE(isCovariance(last.covariance));
+  EXPECT_TRUE(last.has_increment);
+  EXPECT_EQ(last.increment_from + 1, last.stamp.sequence);
+  EXPECT_GT(r.landmarks.back().landmarks.size(), 15u);
+  EXPECT_NE(r.landmarks.back().landmarks.front().descriptor, Descriptor{});
+  expectFinite(r);
+}
+
+TEST(VioNode, TwoRunsGiveIdenticalOutput) {
+  Recorder a, b;
+  for (Recorder* r : {&a, &b}) {
+    Node node(Config{}, 5, r->outputs());
+    node.onCalibration(calibration());
+    Player(3.0).play(node, 0.0, 3.0);
+    node.flush();
+  }
+  ASSERT_EQ(a.odometry.size(), b.odometry.size());
+  for (std::size_t i = 0; i < a.odometry.size(); ++i) {
+    EXPECT_EQ(a.odometry[i].T_WB.p, b.odometry[i].T_WB.p);
+    EXPECT_EQ(a.odometry[i].covariance, b.odometry[i].covariance);
+  }
+}
+
+TEST(VioNode, EveryFrameIsAnsweredOnceAndInOrder) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player(2.0).play(node, 0.0, 2.0);
+  node.flush();
+  ASSERT_EQ(r.odometry.size(), 41u);
+  for (std::size_t i = 0; i < r.odometry.size(); ++i) {
+    EXPECT_EQ(r.odometry[i].stamp.sequence, i);
+  }
+}
+
+TEST(VioNode, BridgesAnInertialGapOfHalfASecondAndSaysSo) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player(6.0).play(node, 0.0, 6.0, [](ImuSample&, double t) { return t < 3.0 || t > 3.5; });
+  node.flush();
+  EXPECT_GE(node.reasons().of("imu_gap"), 1u);
+  EXPECT_EQ(r.odometry.size(), 121u);
+  EXPECT_TRUE(std::any_of(r.odometry.begin(), r.odometry.end(),
+                          [](const Odometry& o) { return o.state == OdometryState::kDegraded; }));
+  expectFinite(r);
+}
+
+TEST(VioNode, AnInertialGapThatIsTooLongBeginsANewEpoch) {
+  Config config;
+  config.longest_gap_s = 0.4;
+  Recorder r;
+  Node node(config, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player(6.0).play(node, 0.0, 6.0, [](ImuSample&, double t) { return t < 2.5 || t > 3.1; });
+  node.flush();
+  EXPECT_EQ(node.reasons().of("imu_gap_too_long"), 1u);
+  EXPECT_EQ(r.odometry.back().world.epoch, 1u);
+  EXPECT_EQ(r.odometry.front().world.epoch, 0u);
+  expectFinite(r);
+}
+
+TEST(VioNode, CountsNotFiniteDoubledAndMisorderedInput) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Frame kept;
+  Player(2.0).play(
+      node, 0.0, 2.0,
+      [&](ImuSample& s, double t) {
+        if (std::abs(t - 1.0) < 1e-6) s.gyro.x() = std::nan("");
+        if (std::abs(t - 1.5) < 1e-6) node.onImu(s);
+        return true;
+      },
+      [&](Frame& f, double t) {
+        if (std::abs(t - 1.0) < 1e-6) kept = f;
+        if (std::abs(t - 1.2) < 1e-6) node.onFrame(kept);
+        if (std::abs(t - 1.4) < 1e-6) node.onFrame(f);
+        if (std::abs(t - 1.6) < 1e-6) f.data = nullptr;
+        if (std::abs(t - 1.7) < 1e-6) f.width = 640;
+        return true;
+      });
+  node.flush();
+  EXPECT_EQ(node.reasons().of("imu_not_finite"), 1u);
+  EXPECT_EQ(node.reasons().of("imu_duplicate"), 1u);
+  EXPECT_EQ(node.reasons().of("frame_late"), 1u);
+  EXPECT_EQ(node.reasons().of("frame_duplicate"), 1u);
+  EXPECT_EQ(node.reasons().of("image_missing"), 1u);
+  EXPECT_EQ(node.reasons().of("frame_size_differs"), 1u);
+  expectFinite(r);
+}
+
+TEST(VioNode, ASpikeInTheInertialSamplesLeavesTheOutputFinite) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player(5.0).play(node, 0.0, 5.0, [&](ImuSample& s, double t) {
+    if (std::abs(t - 3.0) < 0.02) s.accel = Eigen::Vector3d::Constant(1e7);
+    return true;
+  });
+  node.flush();
+  EXPECT_EQ(r.odometry.size(), 101u);
+  EXPECT_GE(node.reasons().of("reset"), 1u);
+  EXPECT_GE(r.odometry.back().world.epoch, 1u);
+  expectFinite(r);
+}
+
+TEST(VioNode, FramesWithoutInertialSamplesAreGivenUpNotPiledUp) {
+  Config config;
+  config.max_pending = 10;
+  Recorder r;
+  Node node(config, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player(2.0).play(node, 0.0, 2.0, [](ImuSample&, double) { return false; });
+  EXPECT_EQ(node.reasons().of("frame_without_imu"), 31u);
+  EXPECT_EQ(r.odometry.size(), 31u);
+}
+
+TEST(VioNode, ANewRunOfTheClockBeginsANewEpoch) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(3.0);
+  player.play(node, 0.0, 3.0);
+  player.play(node, 0.0, 3.0);
+  node.flush();
+  EXPECT_EQ(node.reasons().of("clock_jumped_back"), 1u);
+  EXPECT_EQ(r.odometry.back().world.epoch, 1u);
+  EXPECT_NE(r.odometry.back().state, OdometryState::kInitialising);
+}
+
+TEST(VioNode, ResumesWhereAnotherProcessStopped) {
+  Recorder before, after;
+  Player player(6.0);
+  Node first(Config{}, 5, before.outputs());
+  first.setWorld({77, 2});
+  first.onCalibration(calibration());
+  player.play(first, 0.0, 4.0);
+  const std::string saved = first.saveState();
+  ASSERT_FALSE(saved.empty());
+
+  Node second(Config{}, 6, after.outputs());
+  ASSERT_TRUE(second.restoreState(saved));
+  second.onCalibration(calibration());
+  player.play(second, 3.5, 6.0, {}, [](Frame&, double t) { return t > 4.5; });
+  second.flush();
+  ASSERT_GT(usable(after), 20u);
+  EXPECT_EQ(after.odometry.front().world, (WorldId{77, 2}));
+  EXPECT_EQ(after.odometry.front().state, OdometryState::kDegraded);
+  EXPECT_EQ(after.odometry.front().instance, 6u);
+  // Half a second on inertia alone, in the same W.
+  const Nav a = player.drive().truth(4.0);
+  const double t = toSeconds(after.odometry.front().stamp.time - player.drive().time(0.0));
+  EXPECT_NEAR(travelled(before.odometry.back(), after.odometry.front()),
+              (player.drive().truth(t).p_WB - a.p_WB).norm(), 0.1);
+  const auto uncertainty = [](const Odometry& o) {
+    return o.covariance.diagonal().segment<3>(3).sum();
+  };
+  EXPECT_GT(uncertainty(after.odometry.front()), uncertainty(before.odometry.back()));
+  expectFinite(after);
+}
+
+TEST(VioNode, AnOldStateIsLeftAsideAndTheEpochGoesUp) {
+  Recorder before, after;
+  Player player(3.0);
+  Node first(Config{}, 5, before.outputs());
+  first.setWorld({77, 2});
+  first.onCalibration(calibration());
+  player.play(first, 0.0, 3.0);
+  Config config;
+  config.restore_age_s = 0.5;
+  Node second(config, 6, after.outputs());
+  ASSERT_TRUE(second.restoreState(first.saveState()));
+  second.onCalibration(calibration());
+  player.play(second, 0.0, 2.0);  // before it: another run
+  EXPECT_EQ(second.reasons().of("state_too_old"), 1u);
+  EXPECT_EQ(after.odometry.back().world, (WorldId{77, 3}));
+}
+
+TEST(VioNode, SaysWhatItWaitsFor) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  EXPECT_NE(node.status().find("calibration"), std::string::npos);
+  node.onCalibration(calibration());
+  EXPECT_NE(node.status().find("inertial"), std::string::npos);
+  EXPECT_EQ(node.health(), HealthState::kStarting);
+  EXPECT_TRUE(node.saveState().empty());
+  EXPECT_EQ(node.restoreState("nonsense").error().code, "state_malformed");
+}
+
+}  // namespace
+}  // namespace perdure::vio
