@@ -22,7 +22,7 @@ Findings checkServices(const std::vector<std::string>& participants) {
     } else {
       findings.push_back({Verdict::kWarn, std::string(service) +
                                               " is not on the bus; is it running, with the same "
-                                              "bus.interface, bus.domain and user's firewall?"});
+                                              "bus.interface and bus.domain?"});
     }
   }
   return findings;
