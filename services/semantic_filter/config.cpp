@@ -97,6 +97,8 @@ void describeTend(Parameters& p, Fields& fields) {
   fields.number("tend.confirm", t.confirm, between(0, 1), {"existence that confirms an object"});
   fields.integer("tend.confirm_hits", t.confirm_hits, between(1, 1000),
                  {"and the looks at it that it takes"});
+  fields.number("tend.confirm_sigma_m", t.confirm_sigma_m, positive(),
+                {"and how well its place beside the body is known; given up at twice that", "m"});
   fields.number("tend.certain", t.certain, between(0.9, 0.999999),
                 {"existence is kept below it, so that misses can still be heard"});
   fields.number("tend.gone", t.gone, between(0, 1), {"existence below which an object is gone"});
@@ -124,6 +126,8 @@ void describe(Config& c, Fields& fields) {
   fields.boolean("history.wait_for_detections", c.history.wait_for_detections,
                  {"publish a frame with its detections, or else when the next frame comes; "
                   "false: publish at once, detections show in the next frame"});
+  fields.number("restore.timeout_s", c.restore.timeout_s, atLeast(0),
+                {"wait so long at the start for the working set of an earlier run", "s"});
   describeBox(c.filter.box, fields);
   describeClutter(c.filter.clutter, fields);
   describeBirth(c.filter.birth, fields);

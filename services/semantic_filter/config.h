@@ -14,9 +14,14 @@ struct HistoryConfig {
   bool wait_for_detections = true;   ///< a frame is published with its detections, or at the next
 };
 
+struct RestoreConfig {
+  double timeout_s = 5.0;  ///< for the map store's answer at the start
+};
+
 struct Config {
   std::string class_priors = "config/class_priors.yaml";
   HistoryConfig history;
+  RestoreConfig restore;
   Parameters filter;
 };
 

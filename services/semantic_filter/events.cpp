@@ -32,7 +32,7 @@ void EventTracker::clear() {
 void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Event>& events,
                            const Event& blank) {
   const auto add = [&](EventKind kind, double p) { events.push_back(make(blank, kind, o, p)); };
-  if (o.confirmed && !known.confirmed) add(EventKind::kConfirmed, o.existence);
+  if (o.confirmed && !known.ever_confirmed) add(EventKind::kConfirmed, o.existence);
   const double pi = o.best().probability;
   if (o.confirmed && pi >= kResolved && (!known.resolved || known.class_name != o.best().name)) {
     add(EventKind::kClassResolved, pi);
@@ -47,7 +47,8 @@ void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Even
   if (o.confirmed && !hidden && known.hidden && known.confirmed) {
     add(EventKind::kReappeared, o.existence);
   }
-  const bool missing = o.confirmed && o.existence < kMissingBelow;
+  known.ever_confirmed = known.ever_confirmed || o.confirmed;
+  const bool missing = known.ever_confirmed && o.existence < kMissingBelow;
   if (missing && !known.missing) add(EventKind::kMissing, o.existence);
   const bool moving = o.moving > 0.5;
   if (o.confirmed && moving && !known.moving && known.static_once) add(EventKind::kMoved, o.moving);
@@ -89,7 +90,7 @@ std::vector<Event> EventTracker::update(const Objects& objects,
                                                      : EventKind::kRecalled;
       events.push_back(make(blank, kind, o, o.existence));
       if (back != recalled_.end()) {
-        it->second.confirmed = o.confirmed;
+        it->second.confirmed = it->second.ever_confirmed = o.confirmed;
         recalled_.erase(back);
       }
     }
@@ -100,7 +101,7 @@ std::vector<Event> EventTracker::update(const Objects& objects,
       ++it;
       continue;
     }
-    if (it->second.confirmed) {
+    if (it->second.ever_confirmed) {
       Event e = blank;
       e.kind = EventKind::kGone;
       e.object_id = it->first;

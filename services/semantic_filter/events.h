@@ -20,7 +20,7 @@ class EventTracker {
  private:
   struct Known {
     bool confirmed = false, resolved = false, missing = false, moving = false, hidden = false;
-    bool static_once = false;
+    bool static_once = false, ever_confirmed = false;
     std::string class_name;
   };
 

@@ -139,7 +139,8 @@ void addMovingTwin(Object& object, const Hypothesis& still, const ClassPrior& pr
   object.hypotheses.push_back(twin);
 }
 
-/// The azimuth chooses among the yaw starts of a class; the class's own weight does not change.
+/// One azimuth alone may be far off: it counts half. It weighs the yaw starts
+/// of a class among each other; the class's own weight does not change.
 void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
                     const ClassPrior& prior, const FrameContext& frame) {
   if (!evidence.azimuth || !prior.has_yaw) return;
@@ -147,7 +148,7 @@ void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
   double before = 0.0, after = 0.0;
   for (auto& h : fits) {
     before += h.weight;
-    h.weight *= updateWithAzimuth(h, *evidence.azimuth, sigma, 1.0, frame);
+    h.weight *= updateWithAzimuth(h, *evidence.azimuth, sigma, 0.5, frame);
     after += h.weight;
   }
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
@@ -301,8 +302,8 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.pose_product = frame.pose_error.product;
   object.hits = 1;
   normalise(object);
-  object.view = viewPointNow(object, frame.view, frame.parameters->looks);
-  object.view.looks = 1.0;
+  object.hit_view = viewPointNow(object, {}, frame.view, frame.parameters->looks);
+  object.hit_view.looks = 1.0;
   return object;
 }
 

@@ -49,8 +49,11 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
   ObjectLook result;
   result.sight = sight;
   const auto& looks = frame.parameters->looks;
-  result.worth =
-      worthOfLook(viewPointNow(object, frame.view, looks).looks, looks.correlation);
+  const auto worth = [&](const ViewPoint& last) {
+    return worthOfLook(viewPointNow(object, last, frame.view, looks).looks, looks.correlation);
+  };
+  result.worth = worth(object.hit_view);
+  result.worth_of_miss = worth(object.miss_view);
   for (const auto& hypothesis : object.hypotheses) {
     HypothesisLook h;
     h.likelihood.assign(boxes.size(), 0.0);
@@ -79,19 +82,20 @@ double associationWeight(const Object& object, const ObjectLook& look, std::size
   return r * made / std::max(1.0 - r + r * silent, 1e-12);
 }
 
-ViewPoint viewPointNow(const Object& object, const View& view, const LooksParameters& parameters) {
+ViewPoint viewPointNow(const Object& object, const ViewPoint& last, const View& view,
+                       const LooksParameters& parameters) {
   const Eigen::Vector3d ray = view.T_WC().p - object.best().x.head<3>();
   const double distance = std::max(ray.norm(), 1e-3);
   ViewPoint now;
   now.direction_W = ray / distance;
   now.log_distance = std::log(distance);
   now.direction_C = -(view.T_WC().q.conjugate() * now.direction_W);
-  if (object.view.looks <= 0.0) return now;
+  if (last.looks <= 0.0) return now;
   const double change =
-      (now.direction_W - object.view.direction_W).norm() / parameters.angle +
-      (now.direction_C - object.view.direction_C).norm() / parameters.image_angle +
-      std::abs(now.log_distance - object.view.log_distance) / parameters.log_distance;
-  now.looks = object.view.looks * std::exp(-change);
+      (now.direction_W - last.direction_W).norm() / parameters.angle +
+      (now.direction_C - last.direction_C).norm() / parameters.image_angle +
+      std::abs(now.log_distance - last.log_distance) / parameters.log_distance;
+  now.looks = last.looks * std::exp(-change);
   return now;
 }
 

@@ -23,7 +23,9 @@ struct HypothesisLook {
 
 struct ObjectLook {
   Sight sight;
-  double worth = 1.0;  ///< τ in (0, 1]: the exponent of the evidence, and 1/τ the factor of R
+  /// τ in (0, 1] of a look that shows the object, and of one that does not: the exponent of the
+  /// evidence, and 1/τ the factor of R. A look that shows what the last one did not is news.
+  double worth = 1.0, worth_of_miss = 1.0;
   std::vector<HypothesisLook> hypotheses;
 };
 
@@ -46,7 +48,8 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
 double associationWeight(const Object& object, const ObjectLook& look, std::size_t z);
 
 /// Where the object is looked at from now, with the looks that share this view (none counted yet).
-ViewPoint viewPointNow(const Object& object, const View& view, const LooksParameters& parameters);
+ViewPoint viewPointNow(const Object& object, const ViewPoint& last, const View& view,
+                       const LooksParameters& parameters);
 /// Information of one more look after n correlated ones, in units of the first:
 /// I(n) = n / (ρ n + 1 - ρ), worth = I(n+1) - I(n).
 double worthOfLook(double looks, double correlation);

@@ -48,7 +48,8 @@ struct Object {
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
   std::uint32_t hits = 0, visible_misses = 0;
   double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
-  ViewPoint view;
+  ViewPoint hit_view, miss_view;  ///< of the last look that showed it, and that did not
+  double support = 1.0;           ///< share of late visible looks that showed it
   Visibility visibility = Visibility::kVisible;
   double visible_fraction = 1.0;
   ObjectId blocked_by = 0;

@@ -7,7 +7,7 @@ namespace perdure::semantic_filter {
 
 struct BoxParameters {
   double sigma_px = 1.0;        ///< floor of a side's standard deviation
-  double sigma_relative = 0.03;  ///< of the box's width (x sides) or height (y sides)
+  double sigma_relative = 0.04;  ///< of the box's width (x sides) or height (y sides)
   double border_px = 6.0;       ///< a side this near to the image border is cut by it
   double gate = 0.9997;         ///< probability mass inside the gate of the innovation
   double min_height_px = 12.0;  ///< detection probability has fallen to one half here
@@ -20,8 +20,8 @@ struct ClutterParameters {
   double min_size_px = 8.0;      ///< of false boxes: sizes are log-uniform from here to the image
   double censored_probability = 0.1;  ///< that a false box is cut at a given side
   double max_log_ratio = 8.0;    ///< activations are clamped to this many nats against clutter
-  double other_lookalike = 0.25;  ///< share of things of no known class that look like a known one
-  double other_prior = 0.05;      ///< PMF of "other" at birth
+  double other_lookalike = 0.1;  ///< share of things of no known class that look like a known one
+  double other_prior = 0.03;      ///< PMF of "other" at birth
 };
 
 struct BirthParameters {
@@ -51,7 +51,7 @@ struct PoseParameters {
 };
 
 struct LooksParameters {
-  double correlation = 0.6;    ///< of the errors of two looks from the same place
+  double correlation = 0.8;    ///< of the errors of two looks from the same place
   double angle = 0.1;          ///< rad, change of aspect after which it has fallen to 1/e
   double log_distance = 0.1;   ///< the same for the logarithm of the distance
   double image_angle = 0.05;   ///< rad, the same for the place in the image
@@ -61,12 +61,13 @@ struct VisibilityParameters {
   std::int64_t cell_px = 8;
   double minimum = 0.15;    ///< v below this is 0: no evidence
   double full = 0.7;        ///< v from here on is called visible
-  double solid = 0.5;       ///< existence from which an object can hide others
+  double solid = 0.5;       ///< existence (times its late hit rate) from which an object can hide others
 };
 
 struct TendParameters {
   double confirm = 0.95;
   std::int64_t confirm_hits = 2;
+  double confirm_sigma_m = 2.5;  ///< of its place beside the body; one that is not known is no claim
   double certain = 0.999;   ///< existence is kept below it, so that misses can still be heard
   double gone = 0.02;       ///< existence below which an object is forgotten
   double gone_tentative = 0.05;

@@ -15,7 +15,7 @@ Outline outlineOf(const Object& object, TimePoint now, const View& view) {
   const Eigen::Vector3d ray = x.head<3>() - view.T_WC().p;
   Outline o;
   o.id = object.id;
-  o.existence = object.existence;
+  o.solidity = object.existence * object.support;
   o.distance_m = ray.norm();
   const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
   o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
@@ -101,25 +101,41 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
   return association.claimed;
 }
 
-bool SemanticFilter::explainedByHidden(const Belief& belief, const std::vector<Sight>& sights,
-                                       const Evidence& box, const FrameContext& frame) const {
+void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input,
+                            const FrameContext& frame) const {
+  const auto matches = [&](const Object& o, const Sight& sight, const Evidence& e) {
+    const State x = stateAt(o.best(), toSeconds(input.stamp.time - o.as_of));
+    const auto box = projectCuboid(x, frame.view);
+    if (!box) return false;
+    const auto covariance = predictedCovariance(o.best(), *box, frame.pose_error.covariance);
+    return scoreBox(e.z, *box, covariance, sight.hidden, parameters_.box.gate).has_value();
+  };
+  std::vector<std::size_t> hidden;
   for (std::size_t j = 0; j < sights.size(); ++j) {
-    const Object& o = belief.objects[j];
-    if (sights[j].visibility != Visibility::kOccluded || o.existence < 0.5) continue;
-    const auto predicted = projectCuboid(o.best().x, frame.view);
-    if (!predicted) continue;
-    const auto covariance =
-        predictedCovariance(o.best(), *predicted, frame.pose_error.covariance);
-    if (scoreBox(box.z, *predicted, covariance, sights[j].hidden, parameters_.box.gate)) {
-      return true;
+    const bool solid = belief.objects[j].existence >= parameters_.visibility.solid;
+    if (solid && sights[j].visibility == Visibility::kOccluded) hidden.push_back(j);
+  }
+  for (const auto& e : *input.boxes) {
+    if (hidden.empty()) return;
+    bool expected = false;
+    for (std::size_t j = 0; j < sights.size() && !expected; ++j) {
+      expected = sights[j].fraction > 0.0 && matches(belief.objects[j], sights[j], e);
+    }
+    if (expected) continue;
+    for (const std::size_t j : hidden) {
+      sights[j].hidden = {};
+      if (!matches(belief.objects[j], sights[j], e)) continue;
+      sights[j].fraction = parameters_.visibility.minimum;
+      sights[j].visibility = Visibility::kPartial;
+      belief.objects[j].visibility = Visibility::kPartial;
+      belief.objects[j].visible_fraction = sights[j].fraction;
     }
   }
-  return false;
 }
 
-void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
-                            const Eigen::VectorXd& claimed, const FrameInput& input,
-                            const FrameContext& frame, IdBook& ids) const {
+void SemanticFilter::births(Belief& belief, const Eigen::VectorXd& claimed,
+                            const FrameInput& input, const FrameContext& frame,
+                            IdBook& ids) const {
   const auto& boxes = *input.boxes;
   std::vector<Object> born;
   std::vector<std::size_t> accepted;
@@ -136,7 +152,7 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
     const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
       return sameThing(boxes[other].z, e.z);
     });
-    if (doubled || explainedByHidden(belief, sights, e, frame)) continue;
+    if (doubled) continue;
     auto object = bear(e, rangeFromLandmarks(e, input.points, parameters_.birth),
                        input.stamp.time, frame);
     if (!object) continue;
@@ -153,19 +169,20 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
 
 StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook& ids) const {
   const FrameContext frame = contextOf(input);
-  const auto sights = seeAll(belief, input);
+  auto sights = seeAll(belief, input);
   if (!input.boxes) return {};
+  reveal(belief, sights, input, frame);
   const auto seen = score(belief, sights, input, frame);
   const auto claimed = associateAndUpdate(belief, seen, input, frame);
   for (const auto& s : seen) {
     Object& object = belief.objects[s.object];
     if (sound(object)) tendHypotheses(object, priors_, parameters_);
   }
-  births(belief, sights, claimed, input, frame, ids);
+  births(belief, claimed, input, frame, ids);
   StepReport report;
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
   report.merges = mergeObjects(belief.objects, frame);
-  confirmAndBury(belief.objects, parameters_.tend);
+  confirmAndBury(belief.objects, frame);
   return report;
 }
 

@@ -72,12 +72,12 @@ class SemanticFilter {
   /// Updates what is seen; returns for each box how much of it is claimed.
   Eigen::VectorXd associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
                                      const FrameInput& input, const FrameContext& frame) const;
-  /// Boxes that match an object which a nearer one should hide say that visibility was misjudged:
-  /// they give no birth.
-  bool explainedByHidden(const Belief& belief, const std::vector<Sight>& sights,
-                         const Evidence& box, const FrameContext& frame) const;
-  void births(Belief& belief, const std::vector<Sight>& sights, const Eigen::VectorXd& claimed,
-              const FrameInput& input, const FrameContext& frame, IdBook& ids) const;
+  /// A box that no visible object expects and that matches a hidden one says that the blocker was
+  /// misjudged: that object can be seen.
+  void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input,
+              const FrameContext& frame) const;
+  void births(Belief& belief, const Eigen::VectorXd& claimed, const FrameInput& input,
+              const FrameContext& frame, IdBook& ids) const;
 
   Parameters parameters_;
   ClassPriors priors_;

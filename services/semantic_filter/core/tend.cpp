@@ -13,6 +13,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr int kGeometry = 7;  // dimensions without velocity
+constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
 
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
   Vector7d d = (a.x - b.x).head<kGeometry>();
@@ -118,7 +119,16 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);
-  a.view.looks = std::max(a.view.looks, b.view.looks);
+  a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
+  a.support = std::max(a.support, b.support);
+}
+
+/// Two things that the image shows side by side are two, however near their estimated depths are.
+bool sameInImage(const State& a, const State& b, const View& view) {
+  const auto box_a = projectCuboid(a, view), box_b = projectCuboid(b, view);
+  if (!box_a || !box_b) return true;
+  const auto toBox = [](const Eigen::Vector4d& s) { return Box{s[0], s[1], s[2], s[3]}; };
+  return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
 }
 
 bool older(const Object& a, const Object& b) {
@@ -211,7 +221,8 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
       const double reach = a.segment<3>(kSize).array().exp().matrix().norm() +
                            b.segment<3>(kSize).array().exp().matrix().norm();
       if ((a - b).head<3>().norm() > 0.5 * reach || !sameKind(objects[i], objects[j]) ||
-          overlap(a, b, frame.view.up_W) < frame.parameters->tend.merge_overlap) {
+          overlap(a, b, frame.view.up_W) < frame.parameters->tend.merge_overlap ||
+          !sameInImage(a, b, frame.view)) {
         ++j;
         continue;
       }
@@ -224,12 +235,28 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
   return merges;
 }
 
-void confirmAndBury(std::vector<Object>& objects, const TendParameters& parameters) {
+double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
+  Eigen::Matrix3d P = h.P.topLeftCorner<3, 3>();
+  const Eigen::LDLT<Matrix6d> pose(P_pose);
+  if (pose.isPositive() && pose.vectorD().minCoeff() > 1e-18) {
+    P -= h.C.topRows<3>() * pose.solve(h.C.topRows<3>().transpose());
+  }
+  return std::sqrt(std::max(P.trace(), 0.0));
+}
+
+void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
+  const TendParameters& parameters = frame.parameters->tend;
   for (auto& o : objects) {
-    if (o.existence >= parameters.confirm && o.hits >= parameters.confirm_hits) o.confirmed = true;
+    if (o.visible_fraction <= 0.0) continue;
+    const double sigma = placeSigma(o.best(), frame.pose_error.covariance);
+    if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) o.confirmed = false;
+    if (o.existence >= parameters.confirm && o.hits >= parameters.confirm_hits &&
+        sigma < parameters.confirm_sigma_m) {
+      o.confirmed = true;
+    }
   }
   std::erase_if(objects, [&](const Object& o) {
-    return o.existence < (o.confirmed ? parameters.gone : parameters.gone_tentative);
+    return o.existence < (o.hits > 1 ? parameters.gone : parameters.gone_tentative);
   });
   const auto limit = static_cast<std::size_t>(parameters.max_objects);
   if (objects.size() <= limit) return;

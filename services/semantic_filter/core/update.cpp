@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kNegligible = 0.01;      // share of a box in an update
-constexpr double kAzimuthOutlier = 0.1;   // share of azimuths that say nothing
+constexpr double kAzimuthOutlier = 0.2;   // share of azimuths that say nothing
 constexpr double kAzimuthFlip = 0.1;      // share of azimuths that are turned by 180°
 constexpr double kMaxHead = 6.0;          // nats
 
@@ -112,6 +112,9 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
   h.weight = weight;
 }
 
+// The errors of azimuths are less alike from look to look than those of boxes: their exponent is the
+// square root of the look's worth.
+
 /// Within each (class, static or moving) the azimuth may weigh the yaw modes; never across, so that
 /// neither existence nor class nor motion can learn from it.
 void weighYawModes(Object& object, const std::vector<double>& likelihood) {
@@ -138,7 +141,7 @@ void updateAzimuths(Object& object, const std::vector<Shares>& shares, const Obj
     for (std::size_t z = 0; z < boxes.size(); ++z) {
       if (!boxes[z].azimuth || shares[i].box[z] < 0.2) continue;
       const double sigma = std::max(boxes[z].azimuth_sigma, prior.azimuth_sigma);
-      const double weight = shares[i].box[z] * look.worth;
+      const double weight = shares[i].box[z] * std::sqrt(look.worth);
       likelihood[i] *= std::pow(
           updateWithAzimuth(object.hypotheses[i], *boxes[z].azimuth, sigma, weight, frame), weight);
     }
@@ -146,26 +149,39 @@ void updateAzimuths(Object& object, const std::vector<Shares>& shares, const Obj
   weighYawModes(object, likelihood);
 }
 
-void count(Object& object, const std::vector<Shares>& shares, const ObjectLook& look,
-           TimePoint now) {
+/// Probability that one of the boxes is the object's, given that it exists.
+double probabilitySeen(const Object& object, const std::vector<Shares>& shares) {
   double seen = 0.0, total = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const double weight = object.hypotheses[i].weight * shares[i].A;
     seen += weight * (1.0 - shares[i].none);
     total += weight;
   }
-  if (seen < 0.5 * total) {
+  return total > 0.0 ? seen / total : 0.0;
+}
+
+void count(Object& object, double seen, const std::vector<Shares>& shares, const ObjectLook& look) {
+  const double visible = std::min(1.0, look.sight.fraction);
+  object.support += 0.25 * visible * (seen - object.support);
+  if (seen < 0.5) {
     ++object.visible_misses;
     return;
   }
   ++object.hits;
   object.recalled = false;
-  object.last_seen = now;
+  object.last_seen = object.as_of;
   const auto& box = shares.front().box;
   const auto z = std::max_element(box.begin(), box.end()) - box.begin();
   if (box[z] > 0.5) {
     object.running_nis = 0.85 * object.running_nis + 0.15 * look.hypotheses.front().nis[z];
   }
+}
+
+void rememberView(Object& object, double seen, const FrameContext& frame) {
+  ViewPoint& last = seen >= 0.5 ? object.hit_view : object.miss_view;
+  const double looks = last.looks;
+  last = viewPointNow(object, last, frame.view, frame.parameters->looks);
+  last.looks = std::min(last.looks, looks) + 1.0;
 }
 
 }  // namespace
@@ -231,23 +247,21 @@ void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
   if (look.sight.fraction <= 0.0) return;
   std::vector<Shares> shares;
   for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, eta));
-  if (!boxes.empty()) {
-    count(object, shares, look, object.as_of);
-  } else {
-    ++object.visible_misses;
-  }
+  const double seen = probabilitySeen(object, shares);
+  const double worth = seen * look.worth + (1.0 - seen) * look.worth_of_miss;
+  count(object, seen, shares, look);
   double mean_A = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     Hypothesis& h = object.hypotheses[i];
-    h.weight *= std::pow(shares[i].A, look.worth);
+    h.weight *= std::pow(shares[i].A, worth);
     mean_A += h.weight;
     updateState(h, shares[i], look, boxes, frame);
   }
   const double r = object.existence;
-  object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
+  object.existence =
+      std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
   updateAzimuths(object, shares, look, boxes, frame);
-  object.view = viewPointNow(object, frame.view, frame.parameters->looks);
-  object.view.looks += 1.0;
+  rememberView(object, seen, frame);
   if (sound(object)) normalise(object);
 }
 

@@ -96,13 +96,13 @@ void addToTally(Tally& tally, const Cell& cell, double x, double y, const Outlin
 }
 
 void paint(Cell& cell, const Outline& o) {
-  if (o.existence > cell.strongest) {
-    cell.strongest = o.existence;
+  if (o.solidity > cell.strongest) {
+    cell.strongest = o.solidity;
     cell.blocker = o.id;
     cell.distance_m = o.distance_m;
     cell.sigma_m = o.depth_sigma_m;
   }
-  cell.transmittance *= 1.0 - o.existence;
+  cell.transmittance *= 1.0 - o.solidity;
 }
 
 /// Share of the outline's landmarks that stand in front of the object (nearer than its surface);
@@ -170,7 +170,7 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
     }
     const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
     sights[j] = classify(tally, in_image, by_points, parameters);
-    if (o.existence < parameters.solid || inside.empty()) continue;
+    if (o.solidity < parameters.solid || inside.empty()) continue;
     buffer.visit(inside, [&](Cell& cell, double, double) { paint(cell, o); });
   }
   return sights;

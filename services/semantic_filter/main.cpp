@@ -1,0 +1,106 @@
+// perdure-semantic-filter: the belief about objects, on the bus.
+#include <chrono>
+#include <deque>
+#include <functional>
+
+#include "common/bus/topics.h"
+#include "common/service/service.h"
+#include "services/semantic_filter/node.h"
+#include "services/semantic_filter/object_states.h"
+#include "services/semantic_filter/priors.h"
+
+namespace {
+
+using namespace perdure;
+namespace topics = bus::topics;
+
+/// Holds messages back, in order, until the working set of an earlier run has been asked for: what
+/// was born before would get ids that were given out already.
+class Gate {
+ public:
+  void pass(std::function<void()> message) {
+    if (open_) return message();
+    held_.push_back(std::move(message));
+  }
+  void open() {
+    open_ = true;
+    for (; !held_.empty(); held_.pop_front()) held_.front()();
+  }
+  bool isOpen() const { return open_; }
+
+ private:
+  bool open_ = false;
+  std::deque<std::function<void()>> held_;
+};
+
+void askForRestore(service::Context& context, const semantic_filter::Config& config, Gate& gate) {
+  auto& queries = context.writer(topics::kMapQuery);
+  context.every(std::chrono::milliseconds(100), [&, tries = 0]() mutable {
+    if (gate.isOpen()) return;
+    if (0.1 * tries++ > config.restore.timeout_s) {
+      context.log().warn("no map store answered; beginning with an empty working set");
+      return gate.open();
+    }
+    MapQuery query;
+    query.client = context.instance();
+    query.request = 1;
+    query.kind = MapQueryKind::kRestore;
+    (void)queries.write(query);
+  });
+}
+
+void serve(service::Context& context, const semantic_filter::Config& config) {
+  auto& states = context.writer(topics::kObjectState);
+  semantic_filter::ObjectStates changed;
+  const auto publish = [&, objects = context.sink(topics::kObjects)](const Objects& m) {
+    objects(m);
+    context.health().frameOut();
+    const auto changes = changed.update(m);
+    for (const auto& state : changes.written) (void)states.write(state);
+    for (const auto& state : changes.gone) (void)states.dispose(state);
+  };
+  semantic_filter::Node node(config, semantic_filter::loadClassPriors(config.class_priors),
+                             context.instance(),
+                             {.objects = publish,
+                              .events = context.sink(topics::kEvents),
+                              .predictions = context.sink(topics::kPredictions)});
+  Gate gate;
+  bus::Once odometry_once, detections_once;
+  context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
+  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
+  context.on(topics::kRecalled, [&](const Recalled& m) {
+    node.onRecalled(m);
+    if (m.restore && m.client == context.instance()) gate.open();
+  });
+  context.on(topics::kOdometry, [&](const Odometry& m) {
+    if (!odometry_once.first(m.stamp.source, m.stamp.sequence)) return;
+    context.health().frameIn();
+    gate.pass([&, m] { node.onOdometry(m); });
+  });
+  context.on(topics::kLandmarks,
+             [&](const Landmarks& m) { gate.pass([&, m] { node.onLandmarks(m); }); });
+  context.on(topics::kDetections, [&](const Detections& m) {
+    if (!detections_once.first(m.stamp.source, m.stamp.sequence)) return;
+    gate.pass([&, m] { node.onDetections(m); });
+  });
+  askForRestore(context, config, gate);
+  context.onHealth([&] {
+    context.health().state(gate.isOpen() ? HealthState::kOk : HealthState::kStarting,
+                           gate.isOpen() ? "" : "waits for the map store's working set");
+  });
+  context.run();
+  node.flush();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  semantic_filter::Config config;
+  return service::runService(
+      argc, argv,
+      {.process = "semantic_filter",
+       .summary = "What stands where: beliefs about objects from detections, odometry, landmarks.",
+       .describe = [&](config::Fields& fields) { semantic_filter::describe(config, fields); },
+       .body = [&](service::Context& context) { serve(context, config); }});
+}
