@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "common/base/errors.h"
@@ -167,11 +168,16 @@ void OutputWriter::writeObjects() const {
 }
 
 void OutputWriter::writeGeoJson() const {
-  RigidTransform T_WB;
+  // W meets the Earth at the pose nearest to the anchor's time; further away it would be a guess.
+  constexpr Duration kNear = std::chrono::seconds(1);
   const GeoAnchor anchor = anchor_.value_or(kDefaultAnchor);
+  RigidTransform T_WB;
+  auto nearest = Duration::max();
   for (const auto& [frame, pose] : poses_) {
+    const auto apart = std::chrono::abs(pose.time - anchor.time);
+    if (!anchor_ || apart >= nearest) continue;
+    nearest = apart;
     T_WB = pose.T_WB;
-    if (!anchor_ || pose.time >= anchor.time) break;
   }
   const GeoReference reference(anchor, T_WB);
   Json features = Json::array();
@@ -179,7 +185,7 @@ void OutputWriter::writeGeoJson() const {
     features.push_back(featureOf(belief, reference));
   }
   writeJson("map.geojson", {{"type", "FeatureCollection"},
-                            {"georeferenced", anchor_.has_value()},
+                            {"georeferenced", anchor_.has_value() && nearest <= kNear},
                             {"features", features}});
 }
 

@@ -190,6 +190,32 @@ TEST(OutputWriter, LeavesEveryFileWellFormed) {
   EXPECT_GT(std::filesystem::file_size(folder / "map.png"), 1000u);
 }
 
+TEST(OutputWriter, TheMapIsGeoreferencedAtThePoseNearestToTheAnchor) {
+  const auto folder = emptyFolder("perdure_outputs_geo");
+  Calibration calibration;
+  calibration.anchor.emplace();
+  calibration.anchor->time = fromNanoseconds(107'000'000);
+  for (const bool in_time : {true, false}) {
+    OutputWriter writer(folder, "0000");
+    if (!in_time) calibration.anchor->time += std::chrono::seconds(5);
+    writer.onCalibration(calibration);
+    for (int frame = 0; frame < 3; ++frame) {  // the body stands at x = 4 when the anchor is taken
+      Odometry odometry;
+      odometry.state = OdometryState::kTracking;
+      odometry.stamp.sequence = static_cast<std::uint64_t>(frame);
+      odometry.stamp.time = fromNanoseconds(100'000'000 * frame);
+      odometry.T_WB.p.x() = 4.0 * frame;
+      writer.onOdometry(odometry);
+    }
+    writer.onObjects(messageAt(1, {carAt(1, 4)}));
+    writer.finish();
+    const auto map = nlohmann::json::parse(textOf(folder / "map.geojson"));
+    EXPECT_EQ(map["georeferenced"], in_time);
+    if (!in_time) continue;
+    EXPECT_NEAR(map["features"][0]["geometry"]["coordinates"][0].get<double>(), 0.0, 1e-9);
+  }
+}
+
 TEST(OutputWriter, SaysTheMendWhereTheFolderCannotBeMade) {
   try {
     const OutputWriter writer("/proc/nowhere/out", "0000");
