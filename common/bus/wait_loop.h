@@ -19,7 +19,8 @@ class WaitLoop {
   template <class T>
   void on(Reader<T>& reader, typename Reader<T>::Handler handler,
           typename Reader<T>::Handler on_gone = {}) {
-    attach(reader, [&reader, handler = std::move(handler), on_gone = std::move(on_gone)] {
+    attach(reader, [&reader, handler = untilStopped<T>(std::move(handler)),
+                    on_gone = untilStopped<T>(std::move(on_gone))] {
       return reader.drainBatch(handler, on_gone);
     });
   }
@@ -32,7 +33,8 @@ class WaitLoop {
   void run();
   /// Waits once, at most `longest`, and handles what is there.
   void runOnce(std::chrono::nanoseconds longest);
-  /// From any thread (not from a signal handler); run() ends after the handler at work.
+  /// From any thread (not from a signal handler); run() ends after the handler at work, and what
+  /// was taken with its message is dropped.
   void stop();
   bool stopped() const { return stopped_; }
   /// From any thread (not from a signal handler).
@@ -50,6 +52,13 @@ class WaitLoop {
     std::function<void()> handler;
   };
 
+  template <class T>
+  typename Reader<T>::Handler untilStopped(typename Reader<T>::Handler handler) {
+    if (!handler) return {};
+    return [this, handler = std::move(handler)](const T& message) {
+      if (!stopped_) handler(message);
+    };
+  }
   void attach(const Endpoint& reader, std::function<bool()> drain);
   std::chrono::nanoseconds untilNextTick(std::chrono::nanoseconds longest) const;
   void handleMessages();

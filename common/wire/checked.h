@@ -15,7 +15,7 @@ namespace perdure::wire {
 class Checked {
  public:
   bool failed() const { return reason_.has_value(); }
-  const Reason& reason() const { return *reason_; }
+  const Reason& reason() const { return reason_.value(); }
 
   /// `holds` is asked only of values that were read.
   template <class Predicate>

@@ -203,6 +203,18 @@ TEST_F(Bus, DiscoveryNamesProcessesAndTheirEndpoints) {
   EXPECT_THAT(discovery.participants(), Contains("there"));
 }
 
+TEST_F(Bus, AStopEndsTheLoopAfterTheMessageAtWorkAlsoInTheMiddleOfABatch) {
+  Reader<ImuSample> reader(here, topics::kImu);
+  Writer<ImuSample> writer(there, topics::kImu);
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(writer.write(ImuSample{}));
+  int handled = 0;
+  loop.on(reader, [&](const ImuSample&) {
+    if (++handled == 3) loop.stop();
+  });
+  EXPECT_TRUE(runUntil(loop, [&] { return loop.stopped(); }));
+  EXPECT_EQ(handled, 3);
+}
+
 TEST_F(Bus, TheLoopTicksWakesAndStops) {
   int ticks = 0, wakes = 0;
   loop.every(std::chrono::milliseconds(1), [&] { ++ticks; });
