@@ -108,6 +108,8 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"a class above this ends the others"});
   fields.number("tend.hypothesis_floor", t.hypothesis_floor, between(0, 0.5),
                 {"weight below which a hypothesis is pruned"});
+  fields.number("tend.scale_resolved", t.scale_resolved, atLeast(0),
+                {"relative deviation of the distance until which \"other\" is not ruled out"});
   fields.number("tend.hypothesis_merge", t.hypothesis_merge, atLeast(0),
                 {"squared Mahalanobis distance at which two hypotheses are one"});
   fields.number("tend.merge_overlap", t.merge_overlap, between(0, 1),

@@ -21,7 +21,7 @@ struct ClutterParameters {
   double censored_probability = 0.1;  ///< that a false box is cut at a given side
   double max_log_ratio = 8.0;    ///< activations are clamped to this many nats against clutter
   double other_lookalike = 0.1;  ///< share of things of no known class that look like a known one
-  double other_prior = 0.03;      ///< PMF of "other" at birth
+  double other_prior = 0.01;      ///< PMF of "other" at birth
 };
 
 struct BirthParameters {
@@ -51,15 +51,15 @@ struct PoseParameters {
 };
 
 struct LooksParameters {
-  double correlation = 0.8;    ///< of the errors of two looks from the same place
+  double correlation = 0.7;    ///< of the errors of two looks from the same place
   double angle = 0.1;          ///< rad, change of aspect after which it has fallen to 1/e
   double log_distance = 0.1;   ///< the same for the logarithm of the distance
-  double image_angle = 0.05;   ///< rad, the same for the place in the image
+  double image_angle = 0.03;   ///< rad, the same for the place in the image
 };
 
 struct VisibilityParameters {
   std::int64_t cell_px = 8;
-  double minimum = 0.15;    ///< v below this is 0: no evidence
+  double minimum = 0.2;    ///< v below this is 0: no evidence
   double full = 0.7;        ///< v from here on is called visible
   double solid = 0.5;       ///< existence (times its late hit rate) from which an object can hide others
 };
@@ -68,11 +68,12 @@ struct TendParameters {
   double confirm = 0.95;
   std::int64_t confirm_hits = 2;
   double confirm_sigma_m = 2.5;  ///< of its place beside the body; one that is not known is no claim
-  double certain = 0.999;   ///< existence is kept below it, so that misses can still be heard
+  double certain = 0.99;   ///< existence is kept below it, so that misses can still be heard
   double gone = 0.02;       ///< existence below which an object is forgotten
   double gone_tentative = 0.05;
   double class_dominates = 0.995;
   double hypothesis_floor = 0.002;
+  double scale_resolved = 0.06;  ///< relative deviation of the distance; before it "other" stays
   double hypothesis_merge = 1.0;  ///< squared Mahalanobis distance
   double merge_overlap = 0.25;
   std::int64_t max_objects = 2000;

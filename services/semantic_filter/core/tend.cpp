@@ -61,11 +61,20 @@ void mergeNearOnes(Object& object, double threshold) {
   }
 }
 
+/// Without parallax nobody can tell a toy from a car: until the distance is known, "other" stays.
+bool scaleIsOpen(const Object& object, const TendParameters& tend) {
+  const double distance = std::exp(object.hit_view.log_distance);
+  const double variance = object.best().P.topLeftCorner<3, 3>().trace();
+  return std::sqrt(variance) > tend.scale_resolved * distance;
+}
+
 void pruneLightOnes(Object& object, const TendParameters& tend) {
   const std::string best_class = object.best().class_name;
   const bool dominant =
       object.hits >= 3 && classProbability(object, best_class) > tend.class_dominates;
+  const bool open = scaleIsOpen(object, tend);
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+    if (open && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
     return h.weight < tend.hypothesis_floor || (dominant && h.class_name != best_class);
   });
 }

@@ -1,0 +1,86 @@
+#include "services/semantic_filter/core/box_likelihood.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kWidth = 1242, kHeight = 375;
+
+ProjectedBox predictedBox(double x1, double y1, double x2, double y2) {
+  ProjectedBox p;
+  p.sides << x1, y1, x2, y2;
+  return p;
+}
+
+TEST(BoxLikelihood, ASideAtTheImageBorderIsCensored) {
+  const auto z = measure({0.0, 100, 200, 200}, kWidth, kHeight, {});
+  EXPECT_FALSE(z.measured[0]);
+  EXPECT_TRUE(z.measured[1] && z.measured[2] && z.measured[3]);
+}
+
+TEST(BoxLikelihood, ABoxThatLeavesTheImageIsCutThere) {
+  const auto z = measure({-40, 100, 200, 420}, kWidth, kHeight, {});
+  EXPECT_EQ(z.sides[0], 0.0);
+  EXPECT_EQ(z.sides[3], kHeight);
+  EXPECT_EQ(z.count(), 2);
+}
+
+TEST(BoxLikelihood, DensityOfAllSidesIsTheGaussian) {
+  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
+  const auto score =
+      scoreBox(z, predictedBox(102, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+  ASSERT_TRUE(score);
+  double expected = 0.0;
+  for (int i = 0; i < 4; ++i) expected -= 0.5 * std::log(2.0 * M_PI * z.variance[i]);
+  expected -= 0.5 * 4.0 / z.variance[0];
+  EXPECT_NEAR(score->log_density, expected, 1e-9);
+  EXPECT_NEAR(score->nis, 4.0 / z.variance[0], 1e-9);
+}
+
+TEST(BoxLikelihood, ACensoredSideCountsAsTheProbabilityThatItLiesBeyond) {
+  const auto z = measure({0.0, 100, 200, 180}, kWidth, kHeight, {});
+  const auto far = scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+  const auto edge = scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+  ASSERT_TRUE(far && edge);
+  EXPECT_EQ(far->dof, 3);
+  EXPECT_NEAR(far->log_density - edge->log_density, std::log(2.0), 1e-9);
+}
+
+TEST(BoxLikelihood, AHiddenSideMayLieBeyondTheBlocker) {
+  const auto z = measure({300, 100, 400, 180}, kWidth, kHeight, {});
+  const std::array<bool, 4> left_hidden{true, false, false, false};
+  const auto p = predictedBox(250, 100, 400, 180);
+  EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, 0.9999));
+  EXPECT_TRUE(scoreBox(z, p, Eigen::Matrix4d::Zero(), left_hidden, 0.9999));
+}
+
+TEST(BoxLikelihood, OutsideTheGateThereIsNoScore) {
+  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
+  EXPECT_FALSE(scoreBox(z, predictedBox(200, 100, 300, 180), Eigen::Matrix4d::Zero(), {}, 0.999));
+}
+
+TEST(BoxLikelihood, ClutterOfMeasuredSidesIntegratesToItsExpectedNumber) {
+  ClutterParameters clutter;
+  clutter.per_frame = 3.0;
+  // Boxes are uniform in centre and log-uniform in size: sum over a grid of sizes, any centre.
+  double total = 0.0;
+  constexpr int kSteps = 400;
+  const double lw = std::log(kWidth / clutter.min_size_px) / kSteps;
+  const double lh = std::log(kHeight / clutter.min_size_px) / kSteps;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      const double w = clutter.min_size_px * std::exp((i + 0.5) * lw);
+      const double h = clutter.min_size_px * std::exp((j + 0.5) * lh);
+      BoxMeasurement z;
+      z.sides << 0, 0, w, h;
+      total += std::exp(logClutter(z, kWidth, kHeight, clutter)) * w * lw * h * lh;
+    }
+  }
+  EXPECT_NEAR(total * kWidth * kHeight, clutter.per_frame, 1e-3 * clutter.per_frame);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,115 @@
+#include "services/semantic_filter/core/cuboid.h"
+
+#include <gtest/gtest.h>
+
+#include "common/math/numeric_jacobian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/box_likelihood.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeState;
+
+class Cuboid : public ::testing::Test {
+ protected:
+  Cuboid() {
+    view.camera = &camera;
+    view.T_WB = RigidTransform(expQuaternion({0.02, -0.03, 0.4}), {1.0, -2.0, 1.3});
+    view.up_W = Eigen::Vector3d(0.02, -0.04, 1.0).normalized();
+  }
+  CameraModel camera{makeCamera()};
+  View view;
+  State x = makeState(12.0, 4.5, 0.6, 0.9, 4.1, 1.7, 1.5);
+};
+
+TEST_F(Cuboid, JacobianByTheObjectMatchesDifferences) {
+  const auto box = projectCuboid(x, view);
+  ASSERT_TRUE(box);
+  const auto f = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    return projectCuboid(State(v), view)->sides;
+  };
+  const Eigen::MatrixXd numeric = numericJacobian(f, x);
+  EXPECT_LT((box->H - numeric).cwiseAbs().maxCoeff(), 1e-4 * (1.0 + numeric.cwiseAbs().maxCoeff()));
+  EXPECT_GT(box->H.cwiseAbs().maxCoeff(), 10.0);
+}
+
+TEST_F(Cuboid, JacobianByThePoseMatchesDifferences) {
+  const auto box = projectCuboid(x, view);
+  ASSERT_TRUE(box);
+  const auto f = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    View moved = view;
+    moved.T_WB = boxPlus(view.T_WB, v);
+    return projectCuboid(x, moved)->sides;
+  };
+  const Eigen::MatrixXd numeric = numericJacobian(f, Eigen::VectorXd::Zero(6));
+  EXPECT_LT((box->H_pose - numeric).cwiseAbs().maxCoeff(),
+            1e-4 * (1.0 + numeric.cwiseAbs().maxCoeff()));
+}
+
+TEST_F(Cuboid, LinearCovarianceOfTheBoxMatchesMonteCarlo) {
+  Hypothesis h;
+  h.x = x;
+  h.P.setZero();
+  h.P.diagonal() << 0.04, 0.04, 0.01, 0.0009, 0.0016, 0.0016, 0.0016, 0, 0, 0;
+  Matrix6d P_pose = Matrix6d::Zero();
+  P_pose.diagonal() << 1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3;
+  const auto box = projectCuboid(x, view);
+  const Eigen::Matrix4d linear = predictedCovariance(h, *box, P_pose);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  constexpr int kSamples = 20000;
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d squares = Eigen::Matrix4d::Zero();
+  for (int n = 0; n < kSamples; ++n) {
+    State y = x;
+    Eigen::Matrix<double, 6, 1> g;
+    for (int i = 0; i < 10; ++i) y[i] += std::sqrt(h.P(i, i)) * normal(random);
+    for (int i = 0; i < 6; ++i) g[i] = std::sqrt(P_pose(i, i)) * normal(random);
+    View moved = view;
+    moved.T_WB = boxPlus(view.T_WB, g);
+    const Eigen::Vector4d s = projectCuboid(y, moved)->sides - box->sides;
+    sum += s;
+    squares += s * s.transpose();
+  }
+  sum /= kSamples;
+  const Eigen::Matrix4d sampled = squares / kSamples - sum * sum.transpose();
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(linear(i, i) / sampled(i, i), 1.0, 0.1) << "side " << i;
+}
+
+TEST_F(Cuboid, SidesCutByTheNearPlaneAreNotExact) {
+  const State beside = makeState(view.T_WB.p.x() + 1.0, view.T_WB.p.y() - 2.0, 0.5, 0.4, 5.0, 2.0, 1.5);
+  const auto box = projectCuboid(beside, view);
+  ASSERT_TRUE(box);
+  EXPECT_FALSE(box->exact[0] && box->exact[1] && box->exact[2] && box->exact[3]);
+}
+
+TEST_F(Cuboid, WhatIsBehindHasNoImage) {
+  EXPECT_FALSE(projectCuboid(makeState(-20, -10, 0.5, 0, 4, 2, 1.5), view));
+}
+
+TEST_F(Cuboid, AzimuthAndYawAgreeWhateverTheRollOfTheCamera) {
+  // A car that stands across the view, straight ahead: rotation_y = 0 has its length along the
+  // camera's x axis, which is to the right of the body, yaw -90° in a level world.
+  View level;
+  level.camera = &camera;
+  const Eigen::Vector3d ahead(10.3, 0.0, 0.5);
+  const double yaw = yawFromAzimuth(0.0, ahead, level);
+  EXPECT_NEAR(yaw, -M_PI / 2, 1e-9);
+  View rolled = level;
+  rolled.T_WB = RigidTransform(expQuaternion({M_PI / 3, 0, 0}), Eigen::Vector3d(0, 0, 0));
+  const Eigen::Vector3d centre = rolled.T_WC().p + rolled.T_WC().R() * Eigen::Vector3d(0, 0, 10);
+  EXPECT_NEAR(yawFromAzimuth(0.0, centre, rolled), yaw, 1e-9);
+}
+
+TEST_F(Cuboid, AzimuthIsRotationMinusBearing) {
+  View level;
+  level.camera = &camera;
+  const Eigen::Vector3d right_ahead(10.3, -10.0, 0.5);  // 45° to the right of the optical axis
+  EXPECT_NEAR(yawFromAzimuth(0.0, right_ahead, level), -M_PI / 2 - M_PI / 4, 1e-9);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

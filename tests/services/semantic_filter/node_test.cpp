@@ -1,0 +1,237 @@
+#include "services/semantic_filter/node.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::detect;
+using testing::detectionsAt;
+using testing::driveTo;
+using testing::Harness;
+using testing::makeState;
+using testing::odometryAt;
+using testing::stampOf;
+using testing::TrueObject;
+
+const std::vector<TrueObject> kStreet = {
+    {makeState(18, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
+    {makeState(22, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
+    {makeState(30, 4.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
+
+std::vector<Detection> boxesAt(const std::vector<TrueObject>& objects, std::uint64_t k, double metres,
+                               std::uint32_t seed = 1, double noise = 0.5) {
+  static const CameraModel camera{testing::makeCamera()};
+  std::mt19937 random(seed * 1000 + static_cast<std::uint32_t>(k));
+  View view;
+  view.camera = &camera;
+  view.T_WB = driveTo(k, metres);
+  std::vector<Detection> list;
+  for (const auto& o : objects) {
+    if (auto d = detect(o, view, BoxParameters{}, noise, 3.0, random)) list.push_back(*d);
+  }
+  return list;
+}
+
+void drive(Harness& h, std::uint64_t from, std::uint64_t to, double metres = 0.4) {
+  for (std::uint64_t k = from; k < to; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(k, metres)));
+    h.node.onDetections(detectionsAt(k, boxesAt(kStreet, k, metres)));
+  }
+}
+
+double distanceBetween(const Belief& a, const Belief& b) {
+  if (a.objects.size() != b.objects.size()) return 1e9;
+  double worst = 0.0;
+  for (std::size_t j = 0; j < a.objects.size(); ++j) {
+    const Object &x = a.objects[j], &y = b.objects[j];
+    if (x.hypotheses.size() != y.hypotheses.size()) return 1e9;
+    worst = std::max(worst, std::abs(x.existence - y.existence));
+    for (std::size_t i = 0; i < x.hypotheses.size(); ++i) {
+      const Hypothesis &g = x.hypotheses[i], &h = y.hypotheses[i];
+      worst = std::max({worst, std::abs(g.weight - h.weight), (g.x - h.x).cwiseAbs().maxCoeff(),
+                        (g.P - h.P).cwiseAbs().maxCoeff(), (g.C - h.C).cwiseAbs().maxCoeff()});
+    }
+  }
+  return worst;
+}
+
+const ObjectBelief* nearest(const Objects& message, const State& x) {
+  const ObjectBelief* best = nullptr;
+  double distance = 5.0;
+  for (const auto& o : message.objects) {
+    const double d = (o.best().mean.head<3>() - x.head<3>()).norm();
+    if (d < distance) distance = d, best = &o;
+  }
+  return best;
+}
+
+TEST(Node, PublishesOneMessageForEachFrameInOrder) {
+  Harness h;
+  drive(h, 0, 12);
+  ASSERT_EQ(h.objects.size(), 12u);
+  for (std::uint64_t k = 0; k < 12; ++k) EXPECT_EQ(h.objects[k].stamp.sequence, k);
+  h.node.onOdometry(odometryAt(12, driveTo(12, 0.4)));
+  EXPECT_EQ(h.objects.size(), 12u);  // waits for its detections
+  h.node.flush();
+  EXPECT_EQ(h.objects.size(), 13u);
+}
+
+TEST(Node, MapsAStreetOfParkedCars) {
+  Harness h;
+  drive(h, 0, 30);
+  for (const auto& truth : kStreet) {
+    const ObjectBelief* o = nearest(h.objects.back(), truth.x);
+    ASSERT_TRUE(o) << "no object near x = " << truth.x[0];
+    EXPECT_TRUE(o->confirmed);
+    EXPECT_EQ(o->best().name, "car");
+    const double error = (o->best().mean.head<3>() - truth.x.head<3>()).norm();
+    const double sigma = std::sqrt(o->best().covariance.topLeftCorner<3, 3>().trace());
+    EXPECT_LT(error, 3.0 * sigma);
+    EXPECT_LT(error, 3.0);
+  }
+  const auto confirmed = std::count_if(h.objects.back().objects.begin(),
+                                       h.objects.back().objects.end(),
+                                       [](const auto& o) { return o.confirmed; });
+  EXPECT_EQ(confirmed, 3);
+}
+
+TEST(Node, LateAndDisorderedDetectionsGiveThePosteriorOfThoseOnTime) {
+  Harness on_time, late;
+  drive(on_time, 0, 30);
+  const auto detections = [](std::uint64_t k) { return detectionsAt(k, boxesAt(kStreet, k, 0.4)); };
+  for (std::uint64_t k = 0; k < 30; ++k) {
+    late.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
+    if (k >= 2 && k % 4 == 3) {  // two pairs arrive together, the newer first
+      late.node.onDetections(detections(k - 2));
+      late.node.onDetections(detections(k - 3));
+    } else if (k >= 2 && k % 4 == 1) {
+      late.node.onDetections(detections(k - 2));
+      late.node.onDetections(detections(k - 3));
+    }
+  }
+  late.node.flush();
+  late.node.onDetections(detections(28));
+  late.node.onDetections(detections(29));
+  ASSERT_GT(late.node.reasons().of("detections_late"), 20u);
+  EXPECT_LT(distanceBetween(on_time.node.belief(), late.node.belief()), 1e-9);
+  EXPECT_GE(on_time.node.belief().objects.size(), 3u);
+}
+
+TEST(Node, IdsOfObjectsSurviveARollback) {
+  Harness h;
+  drive(h, 0, 10);
+  h.node.onOdometry(odometryAt(10, driveTo(10, 0.4)));
+  drive(h, 11, 14);
+  const Objects before = h.objects.back();
+  h.node.onDetections(detectionsAt(10, boxesAt(kStreet, 10, 0.4)));
+  drive(h, 14, 15);
+  for (const auto& truth : kStreet) {
+    const auto *a = nearest(before, truth.x), *b = nearest(h.objects.back(), truth.x);
+    ASSERT_TRUE(a && b);
+    EXPECT_EQ(a->id, b->id);
+  }
+}
+
+TEST(Node, AFrameWithoutDetectionsIsNoEvidenceAndAnEmptyListIs) {
+  Harness silent, empty;
+  drive(silent, 0, 20);
+  drive(empty, 0, 20);
+  const Belief before = silent.node.belief();
+  for (std::uint64_t k = 20; k < 25; ++k) {
+    silent.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
+    empty.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
+    empty.node.onDetections(detectionsAt(k, {}));
+  }
+  silent.node.flush();
+  EXPECT_EQ(distanceBetween(before, silent.node.belief()), 0.0);
+  const auto existence = [](const Harness& h) { return h.node.belief().objects.front().existence; };
+  EXPECT_LT(existence(empty), existence(silent));
+}
+
+TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
+  Harness h;
+  drive(h, 0, 20);
+  const Belief before = h.node.belief();
+  RigidTransform away = driveTo(19, 0.4);
+  away.q = away.q * Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
+  for (std::uint64_t k = 20; k < 80; ++k) {
+    h.node.onOdometry(odometryAt(k, away));
+    h.node.onDetections(detectionsAt(k, {}));
+  }
+  EXPECT_EQ(distanceBetween(before, h.node.belief()), 0.0);
+  EXPECT_EQ(h.objects.back().objects.front().visibility, Visibility::kBehind);
+  for (std::uint64_t k = 80; k < 84; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(20, 0.4)));
+    h.node.onDetections(detectionsAt(k, boxesAt(kStreet, 20, 0.4)));
+  }
+  ASSERT_EQ(h.node.belief().objects.size(), before.objects.size());
+  for (std::size_t j = 0; j < before.objects.size(); ++j) {
+    EXPECT_EQ(h.node.belief().objects[j].id, before.objects[j].id);
+  }
+  const auto reappeared = std::count_if(h.events.begin(), h.events.end(), [](const Event& e) {
+    return e.kind == EventKind::kReappeared;
+  });
+  EXPECT_GE(reappeared, 3);
+}
+
+TEST(Node, ARestartedNodeGoesOnWithTheSameIds) {
+  Harness first;
+  drive(first, 0, 20);
+  Recalled recalled;
+  recalled.world = {5, 0};
+  recalled.restore = true;
+  recalled.client = 77;
+  recalled.next_id = first.objects.back().next_id;
+  recalled.objects = first.objects.back().objects;
+  Harness second({}, 77), stranger({}, 78);
+  second.node.onRecalled(recalled);
+  stranger.node.onRecalled(recalled);
+  drive(second, 20, 25);
+  drive(stranger, 20, 25);
+  for (const auto& truth : kStreet) {
+    const auto *a = nearest(first.objects.back(), truth.x);
+    const auto *b = nearest(second.objects.back(), truth.x);
+    ASSERT_TRUE(a && b);
+    EXPECT_EQ(a->id, b->id);
+  }
+  EXPECT_GE(second.objects.back().next_id, recalled.next_id);
+  EXPECT_EQ(stranger.objects.back().objects.front().id, 1u);
+}
+
+TEST(Node, WrongInputIsCountedAndHarmless) {
+  Harness h;
+  drive(h, 0, 5);
+  Odometry bad = odometryAt(5, driveTo(5, 0.4));
+  bad.T_WB.p.x() = std::nan("");
+  h.node.onOdometry(bad);
+  h.node.onOdometry(odometryAt(5, driveTo(5, 0.4)));
+  Detections d = detectionsAt(5, boxesAt(kStreet, 5, 0.4));
+  d.detections[0].activations.resize(2);
+  d.detections[1].box.x1 = std::nan("");
+  h.node.onDetections(d);
+  h.node.onDetections(d);
+  Detections unknown = detectionsAt(6, {});
+  unknown.model_hash = 99;
+  h.node.onOdometry(odometryAt(6, driveTo(6, 0.4)));
+  h.node.onDetections(unknown);
+  EXPECT_EQ(h.node.reasons().of("odometry_not_finite"), 1u);
+  EXPECT_EQ(h.node.reasons().of("detection_malformed"), 2u);
+  EXPECT_EQ(h.node.reasons().of("detections_repeated"), 1u);
+  EXPECT_EQ(h.node.reasons().of("detections_of_unknown_model"), 1u);
+}
+
+TEST(Node, TwoRunsGiveTheSameNumbers) {
+  Harness a, b;
+  drive(a, 0, 25);
+  drive(b, 0, 25);
+  EXPECT_EQ(distanceBetween(a.node.belief(), b.node.belief()), 0.0);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,70 @@
+#include "services/semantic_filter/priors.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <Eigen/LU>
+#include <cstdlib>
+
+#include "common/base/errors.h"
+#include "common/types/objects.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+std::string sourceFolder() {
+  const char* source = std::getenv("PERDURE_SOURCE");
+  return source ? source : ".";
+}
+
+TEST(ClassPriors, TheShippedFileLoadsAndIsMetric) {
+  const ClassPriors priors = loadClassPriors(sourceFolder() + "/config/class_priors.yaml");
+  const ClassPrior car = priors.of("car");
+  EXPECT_NEAR(std::exp(car.log_size[0]), 4.0, 0.5);
+  EXPECT_GT(car.log_size_covariance(0, 1), 0.0);
+  EXPECT_EQ(priors.of(kOtherClass).name, kOtherClass);
+  for (const auto& p : priors.classes) {
+    const double longest = std::exp(p.log_size.maxCoeff());
+    EXPECT_TRUE(longest > 0.03 && longest < 60.0) << p.name;
+    EXPECT_GT(p.log_size_covariance.determinant(), 0.0) << p.name;
+  }
+}
+
+TEST(ClassPriors, AClassThatIsNotListedIsTheFallbackUnderItsOwnName) {
+  const ClassPriors priors = loadClassPriors(sourceFolder() + "/config/class_priors.yaml");
+  const ClassPrior p = priors.of("zebra crossing");
+  EXPECT_EQ(p.name, "zebra crossing");
+  EXPECT_EQ(p.log_size, priors.fallback.log_size);
+}
+
+TEST(ClassPriors, EveryMistakeIsNamedWithItsPlace) {
+  const std::string yaml =
+      "fallback: {size: [1, 1, 1], spread: [0.3, 0.3, 0.3]}\n"
+      "other: {}\n"
+      "classes:\n"
+      "  Car: {size: [4, 2]}\n"
+      "  van: {siz: [4, 2, 2], detection: 1.5}\n";
+  try {
+    parseClassPriors(yaml, "priors.yaml");
+    FAIL() << "accepted";
+  } catch (const StartupError& e) {
+    const std::string text = e.what();
+    EXPECT_EQ(e.code(), ExitCode::kConfiguration);
+    EXPECT_NE(text.find("priors.yaml:4:3: Car: names are lower-case"), std::string::npos) << text;
+    EXPECT_NE(text.find("priors.yaml:4:15: size: write three numbers"), std::string::npos) << text;
+    EXPECT_NE(text.find("priors.yaml:5:9: siz: unknown"), std::string::npos) << text;
+    EXPECT_NE(text.find("detection: is not a number from 0.01 to 0.99"), std::string::npos) << text;
+  }
+}
+
+TEST(ClassPriors, AMissingFileIsNamed) {
+  try {
+    loadClassPriors("/nowhere/priors.yaml");
+    FAIL() << "accepted";
+  } catch (const StartupError& e) {
+    EXPECT_EQ(e.code(), ExitCode::kUnavailable);
+  }
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,160 @@
+#include "services/semantic_filter/core/tend.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "services/semantic_filter/core/birth.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeModelInfo;
+using testing::makePriors;
+using testing::makeState;
+
+Object makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
+  Object o;
+  o.id = id;
+  o.existence = 0.9;
+  o.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));
+  o.hits = 4;
+  o.visible_fraction = 1.0;
+  Hypothesis h;
+  h.class_name = name;
+  h.weight = 1.0;
+  h.x = x;
+  h.P.setZero();
+  h.P.diagonal().head<7>().setConstant(variance);
+  o.hypotheses = {h};
+  return o;
+}
+
+class Tending : public ::testing::Test {
+ protected:
+  Tending() {
+    frame.view.camera = &camera;
+    frame.model = &model;
+    frame.priors = &priors;
+    frame.parameters = &parameters;
+  }
+  CameraModel camera{makeCamera()};
+  Model model = makeModel(makeModelInfo());
+  ClassPriors priors = makePriors();
+  Parameters parameters;
+  FrameContext frame;
+};
+
+TEST_F(Tending, OverlapIsSharedOverJointVolume) {
+  const State a = makeState(0, 0, 0, 0, 4, 2, 1.5);
+  EXPECT_NEAR(overlap(a, a, Eigen::Vector3d::UnitZ()), 1.0, 1e-12);
+  EXPECT_NEAR(overlap(a, makeState(2, 0, 0, M_PI, 4, 2, 1.5), Eigen::Vector3d::UnitZ()), 1.0 / 3.0,
+              1e-9);
+  EXPECT_EQ(overlap(a, makeState(0, 0, 2, 0, 4, 2, 1.5), Eigen::Vector3d::UnitZ()), 0.0);
+}
+
+TEST_F(Tending, OfTwoOfOneClassInOnePlaceTheOlderStays) {
+  std::vector<Object> objects = {makeObject(5, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
+                                 makeObject(2, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
+  const auto merges = mergeObjects(objects, frame);
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].survivor, 2u);
+  EXPECT_EQ(merges[0].absorbed, 5u);
+  ASSERT_EQ(objects.size(), 1u);
+  EXPECT_EQ(objects[0].id, 2u);
+  EXPECT_EQ(objects[0].hits, 8u);
+  EXPECT_NEAR(objects[0].best().x[0], 10.15, 0.01);
+  EXPECT_GE(objects[0].existence, 0.9);
+}
+
+TEST_F(Tending, AChairUnderATableStaysTwoObjects) {
+  std::vector<Object> objects = {
+      makeObject(1, "dining table", makeState(3, 0, 0.4, 0, 1, 1.2, 0.75), 0.01),
+      makeObject(2, "chair", makeState(3.1, 0.1, 0.45, 0, 0.9, 0.9, 0.9), 0.01)};
+  EXPECT_TRUE(mergeObjects(objects, frame).empty());
+  EXPECT_EQ(objects.size(), 2u);
+}
+
+TEST_F(Tending, HiddenObjectsWaitWithMerging) {
+  std::vector<Object> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01),
+                                 makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01)};
+  objects[1].visible_fraction = 0.0;
+  EXPECT_TRUE(mergeObjects(objects, frame).empty());
+}
+
+TEST_F(Tending, FusionCountsThePriorOnSizeOnce) {
+  // Each belief is the prior on size plus one look of variance 0.02 at each of its dimensions.
+  const ClassPrior prior = priors.of("car");
+  const double p = prior.log_size_covariance(0, 0), look = 0.02;
+  const double one = 1.0 / (1.0 / p + 1.0 / look), both = 1.0 / (1.0 / p + 2.0 / look);
+  Hypothesis a = makeObject(1, "car", State::Zero(), 0.5).best(), b = a;
+  a.P.diagonal().segment<3>(kSize).setConstant(one);
+  b.P = a.P;
+  a.x.segment<3>(kSize) = b.x.segment<3>(kSize) = prior.log_size;
+  const Hypothesis fused = fuse(a, b, prior, Matrix6d::Zero());
+  EXPECT_NEAR(fused.P(kSize, kSize), both, 1e-9);
+  EXPECT_NEAR(fused.P(0, 0), 0.25, 1e-9);
+}
+
+TEST_F(Tending, FusionCountsTheSharedPoseErrorOnce) {
+  Matrix6d P_pose = Matrix6d::Zero();
+  P_pose.diagonal() << 1e-6, 1e-6, 1e-6, 0.09, 0.09, 0.09;
+  Hypothesis a = makeObject(1, "car", State::Zero(), 0.01).best();
+  a.x.segment<3>(kSize) = priors.of("car").log_size;
+  a.P.diagonal().segment<3>(kSize).setConstant(0.005);
+  a.P.diagonal().head<3>().array() += 0.09;
+  a.C.topRightCorner<3, 3>() = 0.09 * Eigen::Matrix3d::Identity();
+  const Hypothesis fused = fuse(a, a, priors.of("car"), P_pose);
+  EXPECT_NEAR(fused.P(0, 0), 0.09 + 0.005, 1e-6);
+  EXPECT_NEAR(fused.C(0, 3), 0.09, 1e-6);
+}
+
+TEST_F(Tending, ADominantClassEndsTheOthers) {
+  Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01);
+  Hypothesis van = o.best();
+  van.class_name = "van";
+  van.weight = 0.003;
+  o.hypotheses.push_back(van);
+  normalise(o);
+  tendHypotheses(o, priors, parameters);
+  EXPECT_EQ(o.hypotheses.size(), 1u);
+  EXPECT_EQ(classProbability(o, "car"), 1.0);
+}
+
+TEST_F(Tending, BirthRecoversSizeAndPlaceFromAnExactBoxAtTheTrueYaw) {
+  frame.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.2));
+  const State truth = makeState(14.0, 3.0, 0.75, 0.6, 4.2, 1.75, 1.5);  // the prior's mean size
+  const auto s = projectCuboid(truth, frame.view)->sides;
+  Detection d;
+  d.box = {s[0], s[1], s[2], s[3]};
+  d.activations = {0, 2, -2, -2, -2};
+  const auto e = *makeEvidence(d, model, camera.width(), camera.height(), parameters.box, {});
+  const auto fit = fitCuboid(e, priors.of("car"), 0.6, 0.05, std::nullopt, frame);
+  ASSERT_TRUE(fit);
+  EXPECT_LT((fit->hypothesis.x - truth).head<3>().norm(), 0.05);
+  EXPECT_LT((fit->hypothesis.x - truth).segment<3>(kSize).norm(), 0.01);
+  EXPECT_LT(fit->cost, 0.1);  // what is left is the weak pull to the start
+  const double depth_sigma = std::sqrt(fit->hypothesis.P(0, 0));
+  EXPECT_GT(depth_sigma, 0.05 * 14.0);  // no better than the size prior allows
+  EXPECT_LT(depth_sigma, 0.2 * 14.0);
+}
+
+TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
+  Evidence e;
+  e.z.sides << 100, 100, 200, 200;
+  std::vector<SightPoint> points;
+  for (int i = 0; i < 30; ++i) {
+    points.push_back({{140.0 + i % 6 * 4.0, 140.0 + i / 6 * 4.0}, 10.0, 0.2});
+  }
+  for (int i = 0; i < 12; ++i) points.push_back({{104.0, 104.0 + 8.0 * i}, 40.0, 0.2});
+  const auto hint = rangeFromLandmarks(e, points, parameters.birth);
+  ASSERT_TRUE(hint);
+  EXPECT_NEAR(hint->distance_m, 10.0, 0.6);
+  points.resize(3);
+  EXPECT_FALSE(rangeFromLandmarks(e, points, parameters.birth));
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,202 @@
+#include "services/semantic_filter/core/update.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "services/semantic_filter/core/association.h"
+#include "services/semantic_filter/core/tend.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeModelInfo;
+using testing::makePriors;
+using testing::makeState;
+
+class Update : public ::testing::Test {
+ protected:
+  Update() {
+    frame.view.camera = &camera;
+    frame.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.2));
+    frame.model = &model;
+    frame.priors = &priors;
+    frame.parameters = &parameters;
+    object.id = 1;
+    object.existence = 0.6;
+    object.hypotheses = {hypothesis("car", 0.7), hypothesis("van", 0.3)};
+    object.hypotheses[1].x[6] = std::log(1.7);
+  }
+  Hypothesis hypothesis(const std::string& name, double weight) const {
+    Hypothesis h;
+    h.class_name = name;
+    h.weight = weight;
+    h.x = makeState(15.0, 2.0, 0.75, 0.5, 4.2, 1.75, 1.5);
+    h.P.setZero();
+    h.P.diagonal() << 0.3, 0.3, 0.02, 0.03, 0.01, 0.01, 0.01, 0, 0, 0;
+    return h;
+  }
+  Evidence evidenceOf(const State& x, float shift = 0.0F) const {
+    const auto s = projectCuboid(x, frame.view)->sides;
+    Detection d;
+    d.box = {s[0], s[1], s[2], s[3]};
+    for (const float a : {0.0F, 1.5F, -2.0F, -1.0F, 0.5F}) d.activations.push_back(a + shift);
+    return *makeEvidence(d, model, camera.width(), camera.height(), parameters.box,
+                         parameters.clutter);
+  }
+  ObjectLook lookAt(const std::vector<Evidence>& boxes, double v) const {
+    Sight sight;
+    sight.fraction = v;
+    sight.visibility = v > 0 ? Visibility::kVisible : Visibility::kOccluded;
+    return look(object, sight, boxes, frame);
+  }
+
+  CameraModel camera{makeCamera()};
+  Model model = makeModel(makeModelInfo());
+  ClassPriors priors = makePriors();
+  Parameters parameters;
+  FrameContext frame;
+  Object object;
+};
+
+bool sameBits(const Object& a, const Object& b) {
+  if (a.hypotheses.size() != b.hypotheses.size()) return false;
+  if (std::memcmp(&a.existence, &b.existence, sizeof(double)) != 0) return false;
+  for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
+    const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
+    if (std::memcmp(&x.weight, &y.weight, sizeof(double)) != 0) return false;
+    if (std::memcmp(x.x.data(), y.x.data(), sizeof(double) * 10) != 0) return false;
+    if (std::memcmp(x.P.data(), y.P.data(), sizeof(double) * 100) != 0) return false;
+    if (std::memcmp(x.C.data(), y.C.data(), sizeof(double) * 60) != 0) return false;
+  }
+  return true;
+}
+
+TEST_F(Update, AtVisibilityZeroTheBeliefKeepsEveryBit) {
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const Object before = object;
+  update(object, lookAt(boxes, 0.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_TRUE(sameBits(before, object));
+  update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_FALSE(sameBits(before, object));
+}
+
+TEST_F(Update, TwoClassesFollowEquationFourByHand) {
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const ObjectLook l = lookAt(boxes, 0.8);
+  const double eta = 0.4;
+  double A[2];
+  for (int k = 0; k < 2; ++k) {
+    const auto& h = l.hypotheses[k];
+    const auto box = projectCuboid(object.hypotheses[k].x, frame.view);
+    const double height = box->sides[3] - box->sides[1];
+    const double P_D =
+        0.9 / (1.0 + std::exp(-(height - parameters.box.min_height_px) /
+                              (0.2 * parameters.box.min_height_px)));
+    const auto score = scoreBox(boxes[0].z, *box,
+                                predictedCovariance(object.hypotheses[k], *box, Matrix6d::Zero()),
+                                {}, parameters.box.gate);
+    ASSERT_TRUE(score);
+    const double g = k == 0 ? 1.5 : 0.5;
+    const double L = std::exp(g + score->log_density - boxes[0].log_clutter);
+    EXPECT_NEAR(h.likelihood[0] / L, 1.0, 1e-9);
+    A[k] = 1.0 - 0.8 * P_D + 0.8 * P_D * eta * L;
+  }
+  const double mean = 0.7 * A[0] + 0.3 * A[1];
+  update(object, l, Eigen::VectorXd::Constant(1, eta), boxes, frame);
+  EXPECT_NEAR(classProbability(object, "car"), 0.7 * A[0] / mean, 1e-9);
+  const double odds = 0.6 / 0.4 * mean;
+  EXPECT_NEAR(object.existence, std::min(odds / (1.0 + odds), parameters.tend.certain), 1e-12);
+}
+
+TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
+  const ObjectLook l = lookAt({}, 1.0);
+  const double P_D[2] = {l.hypotheses[0].detection, l.hypotheses[1].detection};
+  const double mean = 0.7 * (1 - P_D[0]) + 0.3 * (1 - P_D[1]);
+  const State before = object.best().x;
+  update(object, l, Eigen::VectorXd(0), {}, frame);
+  EXPECT_NEAR(object.existence, 0.6 * mean / (0.4 + 0.6 * mean), 1e-12);
+  EXPECT_EQ(object.best().x, before);
+}
+
+TEST_F(Update, AConstantAddedToAllActivationsChangesNothing) {
+  const std::vector<Evidence> plain = {evidenceOf(object.hypotheses[0].x)};
+  const std::vector<Evidence> shifted = {evidenceOf(object.hypotheses[0].x, 64.0F)};
+  const ObjectLook a = lookAt(plain, 1.0), b = lookAt(shifted, 1.0);
+  Object other = object;
+  update(object, a, Eigen::VectorXd::Ones(1), plain, frame);
+  update(other, b, Eigen::VectorXd::Ones(1), shifted, frame);
+  EXPECT_TRUE(sameBits(object, other));
+}
+
+TEST_F(Update, AzimuthNeverTouchesExistenceClassOrMotion) {
+  std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  Hypothesis turned = object.hypotheses[0];
+  turned.x[kYaw] += M_PI / 2;
+  turned.weight = 0.2;
+  object.hypotheses.push_back(turned);
+  normalise(object);
+  Object with = object;
+  const ObjectLook l = lookAt(boxes, 1.0);
+  update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
+  boxes[0].azimuth = 0.3;
+  update(with, l, Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_EQ(with.existence, object.existence);
+  EXPECT_NEAR(classProbability(with, "car"), classProbability(object, "car"), 1e-12);
+  EXPECT_NE(with.best().x[kYaw], object.best().x[kYaw]);
+}
+
+TEST_F(Update, ConfidenceNeverFallsOnConsistentPositives) {
+  double last = object.existence;
+  for (int k = 0; k < 20; ++k) {
+    frame.view.T_WB.p.x() += 0.3;
+    const std::vector<Evidence> boxes = {evidenceOf(makeState(15.0, 2.0, 0.75, 0.5, 4.2, 1.75, 1.5))};
+    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+    EXPECT_GE(object.existence, last);
+    last = object.existence;
+  }
+  EXPECT_GT(last, 0.99);
+}
+
+TEST_F(Update, ManyLooksFromOnePlaceAddLittle) {
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  double first = 0.0, last = 0.0;
+  for (int k = 0; k < 200; ++k) {
+    const double before = object.best().P.trace();
+    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+    last = before - object.best().P.trace();
+    if (k == 0) first = last;
+  }
+  EXPECT_LT(last, 1e-3 * first);
+}
+
+TEST_F(Update, ManyLooksUnderOnePoseErrorDoNotBeatIt) {
+  parameters.looks.correlation = 0.0;
+  frame.pose_error.covariance.diagonal() << 1e-8, 1e-8, 1e-8, 0.04, 0.04, 0.04;
+  for (auto& h : object.hypotheses) {  // as at birth: the position carries the pose's error
+    h.C.topRightCorner<3, 3>() = 0.04 * Eigen::Matrix3d::Identity();
+    h.P.diagonal().head<3>().array() += 0.04;
+  }
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  for (int k = 0; k < 100; ++k) {
+    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  }
+  EXPECT_GT(object.best().P(1, 1), 0.039);
+}
+
+TEST_F(Update, EkfShrinksTheErrorOfPositionFromASeriesOfViews) {
+  const State truth = makeState(15.3, 2.1, 0.7, 0.45, 4.3, 1.7, 1.55);
+  Hypothesis h = object.hypotheses[0];
+  const double before = (h.x - truth).head<3>().norm();
+  for (int k = 0; k < 30; ++k) {
+    frame.view.T_WB.p.x() += 0.3;
+    h = updateWithBox(h, evidenceOf(truth).z, {}, 1.0, frame);
+  }
+  EXPECT_LT((h.x - truth).head<3>().norm(), 0.5 * before);
+  EXPECT_LT((h.x - truth).head<3>().norm(), 3.0 * std::sqrt(h.P.topLeftCorner<3, 3>().trace()));
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,79 @@
+#include "services/semantic_filter/core/visibility.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeState;
+
+class Sighting : public ::testing::Test {
+ protected:
+  Sighting() {
+    view.camera = &camera;
+    view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.0));
+  }
+  Outline outline(ObjectId id, const State& x, double solidity = 1.0, double sigma = 0.1) const {
+    return {id, solidity, (x.head<3>() - view.T_WC().p).norm(), sigma,
+            0.5 * std::exp(x[4]), projectCuboid(x, view)};
+  }
+  std::vector<Sight> seeThem(const std::vector<Outline>& o,
+                             const std::vector<SightPoint>& points = {}) const {
+    return see(o, points, camera.width(), camera.height(), {});
+  }
+  CameraModel camera{makeCamera()};
+  View view;
+};
+
+TEST_F(Sighting, OfTwoCarsInLineTheRearOneIsHiddenByTheFront) {
+  const auto s = seeThem({outline(7, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5)),
+                          outline(3, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7))});
+  EXPECT_EQ(s[0].visibility, Visibility::kOccluded);
+  EXPECT_EQ(s[0].fraction, 0.0);
+  EXPECT_EQ(s[0].blocked_by, 3u);
+  EXPECT_EQ(s[1].visibility, Visibility::kVisible);
+  EXPECT_EQ(s[1].fraction, 1.0);
+}
+
+TEST_F(Sighting, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
+  const auto s = seeThem({outline(7, makeState(30, 1.5, 0.75, M_PI / 2, 4.2, 1.7, 1.5)),
+                          outline(3, makeState(10, 1.3, 0.75, 0, 3.0, 1.8, 2.5))});
+  EXPECT_EQ(s[0].visibility, Visibility::kPartial);
+  EXPECT_GT(s[0].fraction, 0.2);
+  EXPECT_LT(s[0].fraction, 0.8);
+  EXPECT_TRUE(s[0].hidden[0]);   // the body's left is the image's left
+  EXPECT_FALSE(s[0].hidden[2]);
+}
+
+TEST_F(Sighting, ADoubtfulObjectHidesNothing) {
+  const auto s = seeThem({outline(7, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5)),
+                          outline(3, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7), 0.3)});
+  EXPECT_EQ(s[0].fraction, 1.0);
+}
+
+TEST_F(Sighting, BehindAndBesideAreToldApart) {
+  const auto s = seeThem({outline(1, makeState(-25, 0, 0.75, 0, 4.2, 1.7, 1.5)),
+                          outline(2, makeState(12, 30, 0.75, 0, 4.2, 1.7, 1.5))});
+  EXPECT_EQ(s[0].visibility, Visibility::kBehind);
+  EXPECT_EQ(s[1].visibility, Visibility::kOutOfView);
+  EXPECT_EQ(s[1].fraction, 0.0);
+}
+
+TEST_F(Sighting, LandmarksInFrontHideAndLandmarksSeenThroughSpeakAgainst) {
+  const Outline car = outline(1, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5));
+  const auto& b = car.box->sides;
+  std::vector<SightPoint> points;
+  for (int i = 0; i < 40; ++i) {
+    const double s = 0.2 + 0.6 * i / 40.0;
+    points.push_back({{b[0] + s * (b[2] - b[0]), 0.5 * (b[1] + b[3])}, 6.0, 0.1});
+  }
+  EXPECT_EQ(seeThem({car}, points)[0].visibility, Visibility::kOccluded);
+  for (auto& p : points) p.distance_m = 26.0;
+  EXPECT_EQ(seeThem({car}, points)[0].visibility, Visibility::kVisible);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
