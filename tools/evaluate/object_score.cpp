@@ -126,6 +126,37 @@ void countUnmatched(const std::vector<Match>& matches, const std::vector<Estimat
   }
 }
 
+double nearestLabel(const Eigen::Vector3d& centre, const TruthFrame& truth) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const auto* labels : {&truth.counted, &truth.ignored}) {
+    for (const auto& label : *labels) nearest = std::min(nearest, (label.centre - centre).norm());
+  }
+  return nearest;
+}
+
+void noteMishaps(std::uint64_t frame, const std::vector<Match>& matches,
+                 const std::vector<Estimate>& estimates, const std::vector<bool>& neutral,
+                 const TruthFrame& truth, std::vector<Mishap>& mishaps) {
+  std::set<std::size_t> truths, used;
+  for (const Match& match : matches) {
+    truths.insert(match.truth);
+    used.insert(match.estimate);
+  }
+  for (std::size_t e = 0; e < estimates.size(); ++e) {
+    if (neutral[e] || used.contains(e)) continue;
+    mishaps.push_back({frame, false, static_cast<std::int64_t>(estimates[e].id),
+                       estimates[e].centre, nearestLabel(estimates[e].centre, truth)});
+  }
+  for (std::size_t t = 0; t < truth.counted.size(); ++t) {
+    if (truths.contains(t)) continue;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const auto& estimate : estimates) {
+      nearest = std::min(nearest, (truth.counted[t].centre - estimate.centre).norm());
+    }
+    mishaps.push_back({frame, true, truth.counted[t].track, truth.counted[t].centre, nearest});
+  }
+}
+
 }  // namespace
 
 double Cell::recall() const {
@@ -220,6 +251,7 @@ ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
     }
     followIdentities(matches, found, here, tracks, score);
     countUnmatched(matches, found, neutral, here, score);
+    noteMishaps(frame, matches, found, neutral, here, score.mishaps);
   }
   summarise(tracks, options, score);
   return score;

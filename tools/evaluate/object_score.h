@@ -22,6 +22,16 @@ struct Cell {
   double precision() const;  ///< 1 where there are no estimates
 };
 
+/// A false alarm (with the estimate's id) or a miss (with the truth's track), at 1.5 m, any angle.
+struct Mishap {
+  std::uint64_t frame = 0;
+  bool miss = false;
+  std::int64_t id = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< in rectified camera 0
+  double nearest_m =
+      0.0;  ///< to the nearest estimate (a miss) or label of any kind (a false alarm)
+};
+
 struct ObjectScore {
   std::array<std::array<Cell, 3>, 3> cells{};  ///< [distance][angle]
   // Under 1.5 m, any orientation:
@@ -34,6 +44,7 @@ struct ObjectScore {
   double mean_object_recall = 0.0;
   std::uint64_t objects = 0, objects_found = 0;  ///< true objects; those matched at least once
   std::uint64_t neutral = 0, outside = 0;        ///< estimates that were set aside (1.5 m, any)
+  std::vector<Mishap> mishaps;
 };
 
 struct ScoreOptions {
@@ -47,7 +58,6 @@ struct Estimate {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double rotation_y = 0;
   Box box;  ///< of the cuboid's corners, cut at the image
-  std::size_t nearest_ignored = 0;
 };
 
 /// Maps a row from W into the camera; nothing where the centre is behind or outside the image.

@@ -18,7 +18,7 @@ struct ObjectsOptions {
   std::string truth, sequence, csv, trajectory, class_name = "car";
   std::vector<std::uint32_t> image_size;
   ScoreOptions score;
-  bool json = false;
+  bool json = false, list = false;
 };
 
 struct Evaluated {
@@ -82,6 +82,15 @@ nlohmann::ordered_json toJson(const Evaluated& result) {
           {"frames_with_pose", result.poses}};
 }
 
+void printMishaps(const ObjectScore& score) {
+  for (const Mishap& m : score.mishaps) {
+    std::printf("frame %4llu %-11s %4lld at %6.1f %5.1f %6.1f m in the camera, nearest %s %.2f m\n",
+                static_cast<unsigned long long>(m.frame), m.miss ? "miss" : "false alarm",
+                static_cast<long long>(m.id), m.centre.x(), m.centre.y(), m.centre.z(),
+                m.miss ? "estimate" : "label", m.nearest_m);
+  }
+}
+
 void print(const Evaluated& result, const ObjectsOptions& options) {
   const ObjectScore& s = result.score;
   const auto json = toJson(result);
@@ -124,9 +133,11 @@ void addEvaluateObjects(CLI::App& evaluate_app) {
   app->add_option("--class", options->class_name, "Class of the estimates")->capture_default_str();
   app->add_option("--image-size", options->image_size, "Width and height in pixels")->expected(2);
   app->add_flag("--strict", options->score.strict, "Estimates on ignored labels are false alarms");
+  app->add_flag("--list", options->list, "List every false alarm and miss (1.5 m, any angle)");
   app->add_flag("--json", options->json, "Print JSON");
   app->callback([options] {
     const Evaluated result = evaluate(*options);
+    if (options->list && !options->json) printMishaps(result.score);
     if (options->json)
       std::cout << toJson(result).dump(2) << std::endl;
     else

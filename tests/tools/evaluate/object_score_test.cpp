@@ -134,6 +134,17 @@ TEST(ObjectScore, AnotherIdForTheSameTruthIsASwitchAndAGapAnInterruption) {
   EXPECT_NEAR(s.minutes, 0.4 / 60, 1e-12);
 }
 
+TEST(ObjectScore, FalseAlarmsAndMissesAreListedWithWhatIsNearest) {
+  const TruthFrame truth{{labelAt(0, 20, 7)}, {}, {}};
+  const auto s = score({rowAt(0, 23, 9)}, {truth});
+  ASSERT_EQ(s.mishaps.size(), 2U);
+  EXPECT_EQ(s.mishaps[0].id, 9);
+  EXPECT_FALSE(s.mishaps[0].miss);
+  EXPECT_NEAR(s.mishaps[0].nearest_m, 3.0, 1e-12);
+  EXPECT_EQ(s.mishaps[1].id, 7);
+  EXPECT_TRUE(s.mishaps[1].miss);
+}
+
 TEST(ObjectScore, RowsOfFramesWithoutAPoseCannotCount) {
   const auto s =
       score({rowAt(0, 20, 1, 9)}, {{.counted = {labelAt(0, 20)}, .ignored = {}, .dont_care = {}}});
