@@ -209,9 +209,9 @@ bool Node::waitsForPair(const Pending& p) const {
 bool Node::ready(const Pending& p) const {
   TimePoint now = imuTime(p.first.stamp.time);
   if (imu_.empty()) return false;
-  // The last sample may be held for a tenth of a period: a capture that waits for this frame's
+  // The last sample may be held for a quarter of a period: a capture that waits for this frame's
   // answer sends no sample beyond the next frame.
-  if (const auto period = imu_.period()) now -= *period / 10;
+  if (const auto period = imu_.period()) now -= *period / 4;
   if (imu_.last() < now + durationFromSeconds(config_.imu_slack_s)) return false;
   if (waitsForPair(p)) return false;
   if (!config_.core.speed.enabled || !calibration_->has_speed) return true;
