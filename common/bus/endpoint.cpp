@@ -104,8 +104,15 @@ Endpoint::Endpoint(std::string topic, Entity entity)
 }
 
 void Endpoint::count(const char* what, const Reason& reason) {
+  const std::string name = count_prefix_ + "_" + what + "_" + reason.code;
   const std::lock_guard lock(mutex_);
-  refusals_.add(count_prefix_ + "_" + what + "_" + reason.code);
+  refusals_.add(name);
+  first_details_.emplace(name, reason.detail);
+}
+
+std::map<std::string, std::string> Endpoint::firstDetails() const {
+  const std::lock_guard lock(mutex_);
+  return first_details_;
 }
 
 void Endpoint::add(ReasonCounts& counts, const char* what, std::uint64_t n) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 
@@ -23,6 +24,8 @@ class Endpoint {
  public:
   const std::string& topic() const { return topic_; }
   std::int32_t handle() const { return entity_.handle(); }
+  /// What a person needs to mend each refusal: the detail of its first one, by its count's name.
+  std::map<std::string, std::string> firstDetails() const;
 
  protected:
   Endpoint(std::string topic, Entity entity);
@@ -36,6 +39,7 @@ class Endpoint {
   Entity entity_;
   mutable std::mutex mutex_;
   ReasonCounts refusals_;
+  std::map<std::string, std::string> first_details_;
 };
 
 class RawReader : public Endpoint {

@@ -144,7 +144,17 @@ ReasonCounts Context::reasons() const {
   return counts;
 }
 
+/// Health counts refusals; the log says once of each kind which field it was.
+void Context::logNewRefusals() {
+  for (const auto& endpoint : endpoints_) {
+    for (const auto& [count, detail] : endpoint->firstDetails()) {
+      if (logged_refusals_.insert(count).second) log_->warn("{}, first: {}", count, detail);
+    }
+  }
+}
+
 void Context::publishHealth() {
+  logNewRefusals();
   if (on_health_) on_health_();
   Health health = health_.sample(std::chrono::steady_clock::now());
   health.reasons = reasons().all();

@@ -7,6 +7,7 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "common/base/sink.h"
@@ -38,6 +39,7 @@ class Context {
     auto reader = std::make_shared<bus::Reader<T>>(participant_, topic);
     loop_.on(*reader, std::move(handler), std::move(on_gone));
     countReasons([reader](ReasonCounts& counts) { reader->report(counts); });
+    endpoints_.push_back(reader);
     return *reader;
   }
   /// A writer. Counted in Health.
@@ -45,6 +47,7 @@ class Context {
   bus::Writer<T>& writer(const bus::Topic<T>& topic, const bus::WriterOptions& options = {}) {
     auto writer = std::make_shared<bus::Writer<T>>(participant_, topic, options);
     countReasons([writer](ReasonCounts& counts) { writer->report(counts); });
+    endpoints_.push_back(writer);
     return *writer;
   }
   /// A writer as a node's output. What cannot be written is counted in Health.
@@ -70,6 +73,7 @@ class Context {
 
  private:
   void publishHealth();
+  void logNewRefusals();
   ReasonCounts reasons() const;
 
   const InstanceId instance_;
@@ -78,7 +82,9 @@ class Context {
   bus::Participant participant_;
   HealthMeter health_;
   bus::Writer<Health> health_writer_;
-  std::list<std::function<void(ReasonCounts&)>> reason_sources_;  // own the endpoints
+  std::list<std::function<void(ReasonCounts&)>> reason_sources_;
+  std::list<std::shared_ptr<const bus::Endpoint>> endpoints_;
+  std::set<std::string> logged_refusals_;
   bus::WaitLoop loop_;
   std::function<void()> on_health_;
 };

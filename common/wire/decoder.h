@@ -20,6 +20,9 @@ class Decoder : public Checked {
     checkNumber(name, w, limits);
     d = w;
   }
+  void probability(const char* name, double& d, const double& w) {
+    number(name, d, w, kProbability);
+  }
   template <class E>
   void choice(const char* name, E& d, const std::uint8_t& w, E last) {
     if (w > static_cast<std::uint8_t>(last)) return refuse(name, "bad_enum");

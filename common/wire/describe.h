@@ -196,7 +196,7 @@ void describe(A& a, D& d, W& w) {
 template <class A, Is<ClassBelief> D, class W>
 void describe(A& a, D& d, W& w) {
   a.name("name", d.name, w.name);
-  a.number("probability", d.probability, w.probability, kProbability);
+  a.probability("probability", d.probability, w.probability);
   a.matrix("mean", d.mean, w.mean, kCoordinate);
   a.covariance("covariance", d.covariance, w.covariance);
   a.matrix("cross_pose", d.cross_pose, w.cross_pose, kMatrixEntry);
@@ -213,19 +213,19 @@ template <class A, Is<ObjectBelief> D, class W>
 void describe(A& a, D& d, W& w) {
   a.value("id", d.id, w.object_id);
   a.ensure("id", "out_of_range", [&] { return d.id != 0; });
-  a.number("existence", d.existence, w.existence, kProbability);
+  a.probability("existence", d.existence, w.existence);
   a.value("confirmed", d.confirmed, w.confirmed);
   a.list("classes", d.classes, w.classes, kClasses + 1);
   a.ensure("classes", "bad_probabilities", [&] { return sumsToOne(d.classes); });
   a.choice("visibility", d.visibility, w.visibility, Visibility::kBehind);
-  a.number("visible_fraction", d.visible_fraction, w.visible_fraction, kProbability);
+  a.probability("visible_fraction", d.visible_fraction, w.visible_fraction);
   a.value("blocked_by", d.blocked_by, w.blocked_by);
   a.time("first_seen_ns", d.first_seen, w.first_seen_ns);
   a.time("last_seen_ns", d.last_seen, w.last_seen_ns);
   a.time("as_of_ns", d.as_of, w.as_of_ns);
   a.value("hits", d.hits, w.hits);
   a.value("visible_misses", d.visible_misses, w.visible_misses);
-  a.number("moving", d.moving, w.moving, kProbability);
+  a.probability("moving", d.moving, w.moving);
   a.matrix("velocity", d.velocity, w.velocity, kSpeed);
   a.choice("memory", d.memory, w.memory, Memory::kLongTerm);
   a.value("recalled", d.recalled, w.recalled);
@@ -271,7 +271,7 @@ void describe(A& a, D& d, W& w) {
   a.value("object_id", d.object_id, w.object_id);
   a.value("other_id", d.other_id, w.other_id);
   a.text("class_name", d.class_name, w.class_name, kNameLength);
-  a.number("probability", d.probability, w.probability, kProbability);
+  a.probability("probability", d.probability, w.probability);
   a.text("detail", d.detail, w.detail, kTextLength);
 }
 
@@ -280,7 +280,7 @@ void describe(A& a, D& d, W& w) {
   a.value("object_id", d.object_id, w.object_id);
   a.text("class_name", d.class_name, w.class_name, kNameLength);
   describeBox(a, d.box, w.corners);
-  a.number("probability", d.probability, w.probability, kProbability);
+  a.probability("probability", d.probability, w.probability);
 }
 
 template <class A, Is<Predictions> D, class W>
@@ -299,8 +299,8 @@ void describe(A& a, D& d, W& w) {
   a.ensure("id", "out_of_range", [&] { return d.id != 0; });
   a.object("world", d.world, w.reference);
   a.name("class_name", d.class_name, w.class_name);
-  a.number("existence", d.existence, w.existence, kProbability);
-  a.number("class_probability", d.class_probability, w.class_probability, kProbability);
+  a.probability("existence", d.existence, w.existence);
+  a.probability("class_probability", d.class_probability, w.class_probability);
   a.matrix("mean", d.mean, w.mean, kCoordinate);
   a.covariance("covariance", d.covariance, w.covariance);
   a.time("first_seen_ns", d.first_seen, w.first_seen_ns);

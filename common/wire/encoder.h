@@ -1,6 +1,8 @@
 // Domain → wire, checking every field. Internal to common/wire.
 #pragma once
 
+#include <algorithm>
+
 #include "common/wire/arena.h"
 #include "common/wire/checked.h"
 #include "common/wire/describe.h"
@@ -19,6 +21,12 @@ class Encoder : public Checked {
   void number(const char* name, const double& d, double& w, const Limits& limits) {
     checkNumber(name, d, limits);
     w = d;
+  }
+  /// What rounding put a little outside is sent as 0 or 1.
+  void probability(const char* name, const double& d, double& w) {
+    constexpr double kRounding = 1e-9;
+    checkNumber(name, d, {kProbability.low - kRounding, kProbability.high + kRounding});
+    w = std::clamp(d, kProbability.low, kProbability.high);
   }
   template <class E>
   void choice(const char* name, const E& d, std::uint8_t& w, E last) {

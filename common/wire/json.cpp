@@ -35,6 +35,10 @@ class JsonWriter {
   void number(const char* name, const double& d, W&, const Limits&) {
     json_[name] = numberJson(d);
   }
+  template <class W>
+  void probability(const char* name, const double& d, W&) {
+    json_[name] = numberJson(d);
+  }
   template <class E, class W>
   void choice(const char* name, const E& d, W&, E) {
     json_[name] = choiceJson(d);

@@ -124,6 +124,15 @@ TEST(Refusals, OfBeliefsThatAreNoProbabilities) {
   EXPECT_EQ(refusal(state), "out_of_range object.id");
 }
 
+TEST(Refusals, AreNotForWhatRoundingPutALittleOutside) {
+  ObjectState state = example<ObjectState>();
+  state.object.existence = 1.0 + 1e-15;
+  Arena arena;
+  perdure_msg_ObjectState wire;
+  ASSERT_TRUE(encode(state, wire, arena));
+  EXPECT_EQ(decode<ObjectState>(wire)->object.existence, 1.0);
+}
+
 TEST(Refusals, OfTwoIdsInOneState) {
   EXPECT_EQ(decodeRefusal(example<ObjectState>(), [](auto& w) { ++w.object_id; }),
             "size_mismatch id");

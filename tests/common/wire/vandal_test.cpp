@@ -29,6 +29,7 @@ class Vandal {
     if (strikes()) w = static_cast<std::int64_t>(random_.bits());
   }
   void number(const char*, double&, double& w, const Limits&) { damage(w); }
+  void probability(const char*, double&, double& w) { damage(w); }
   template <class E>
   void choice(const char*, E&, std::uint8_t& w, E) {
     if (strikes()) w = static_cast<std::uint8_t>(random_.bits());
