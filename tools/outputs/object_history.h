@@ -39,9 +39,10 @@ class ObjectHistory {
 
   /// Confirmed, static objects that are claimed to be there and not hidden, by frame and id.
   std::vector<ObjectRow> inst() const;
-  /// The surviving id after merges, the last estimate, from the first detection on, in the frames
-  /// in which it projects into the image and was not known to be hidden. Objects that were judged
-  /// moving or gone at last give none.
+  /// The surviving id after merges, the last estimate, from the first detection on that made it
+  /// more likely there than not, in the frames in which it projects into the image and is not
+  /// hidden: neither known to be so at the time, nor more than half behind the last estimates of
+  /// nearer ones. Objects that were judged moving or gone at last give none.
   std::vector<ObjectRow> finalRows() const;
   /// The last belief of each confirmed object that is not gone and was not merged away, by id.
   std::vector<ObjectBelief> lastBeliefs() const;
@@ -51,7 +52,8 @@ class ObjectHistory {
 
  private:
   struct Look {
-    bool hidden = false;  ///< known to be occluded
+    bool hidden = false;    ///< known to be occluded
+    bool believed = false;  ///< more likely there than not
   };
   struct FrameRecord {
     TimePoint time;
@@ -60,6 +62,7 @@ class ObjectHistory {
     std::map<ObjectId, Look> looks;
   };
   bool endsAsStaticThing(ObjectId id) const;
+  std::vector<ObjectRow> finalRowsOf(const FrameRecord& record, std::set<ObjectId>& begun) const;
   std::map<ObjectId, Look> looksOfSurvivors(const FrameRecord& record) const;
 
   std::optional<CameraModel> camera_;

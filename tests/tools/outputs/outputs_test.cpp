@@ -114,6 +114,18 @@ TEST(ObjectHistory, FinalMapsTheLastEstimateBackToTheFirstDetectionAndIntoFrames
   EXPECT_NEAR(rows[0].p_W.x(), 5.0, 1e-12);
 }
 
+TEST(ObjectHistory, FinalBeginsWhenTheObjectIsMoreLikelyThereThanNot) {
+  ObjectHistory history;
+  ObjectBelief guess = carAt(1, 4, false);
+  guess.existence = 0.1;
+  history.add(messageAt(0, {guess}));
+  history.add(messageAt(1, {carAt(1, 4, false)}));
+  history.add(messageAt(2, {carAt(1, 5)}));
+  const auto rows = history.finalRows();
+  ASSERT_THAT(rows, SizeIs(2));
+  EXPECT_EQ(rows[0].frame, 1u);
+}
+
 TEST(ObjectHistory, FinalGivesTheSurvivorsIdOnceForMergedObjects) {
   ObjectHistory history;
   history.add(messageAt(0, {carAt(1, 4), carAt(2, 4.2)}));
@@ -137,7 +149,7 @@ TEST(ObjectHistory, FinalHasNoRowsOfObjectsThatProvedMovingOrGone) {
   EXPECT_THAT(history.inst(), SizeIs(3));
 }
 
-TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
+CameraCalibration aheadCamera() {
   CameraCalibration camera;
   camera.width = 640;
   camera.height = 480;
@@ -147,8 +159,12 @@ TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
   Eigen::Matrix3d R_BC;  // z of the camera ahead, x to the right
   R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d::Zero());
+  return camera;
+}
+
+TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
   ObjectHistory history;
-  history.setCamera(camera);
+  history.setCamera(aheadCamera());
   Objects passed = messageAt(1, {carAt(1, 10)});
   passed.T_WB.p.x() = 20.0;  // the object now lies behind
   history.add(messageAt(0, {carAt(1, 10)}));
@@ -156,6 +172,20 @@ TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
   const auto rows = history.finalRows();
   ASSERT_THAT(rows, SizeIs(1));
   EXPECT_EQ(rows[0].frame, 0u);
+}
+
+TEST(ObjectHistory, FinalDropsWhatIsMoreThanHalfBehindANearerObject) {
+  ObjectHistory history;
+  history.setCamera(aheadCamera());
+  ObjectBelief behind = carAt(2, 20), beside = carAt(3, 20);
+  behind.classes[0].mean[1] = 4.0;  // in line with the car at x = 10, y = 2
+  beside.classes[0].mean[1] = -4.0;
+  history.add(messageAt(0, {carAt(1, 10), behind, beside}));
+  const auto rows = history.finalRows();
+  ASSERT_THAT(rows, SizeIs(2));
+  EXPECT_EQ(rows[0].object_id, 1u);
+  EXPECT_EQ(rows[1].object_id, 3u);
+  EXPECT_THAT(history.inst(), SizeIs(3)) << "what was said at the time stays said";
 }
 
 TEST(ObjectHistory, ALaterMessageAboutTheSameFrameReplacesTheEarlier) {
@@ -177,8 +207,9 @@ TEST(OutputWriter, LeavesEveryFileWellFormed) {
   writer.onEvent(eventOf(EventKind::kBorn, 1));
   writer.finish();
 
-  EXPECT_THAT(textOf(folder / "objects_inst.csv"),
-              HasSubstr("0000,0,0,1,car,0.720000,4.0000,2.0000,0.5000,4.0000,1.6000,1.5000,0.10000,1"));
+  EXPECT_THAT(
+      textOf(folder / "objects_inst.csv"),
+      HasSubstr("0000,0,0,1,car,0.720000,4.0000,2.0000,0.5000,4.0000,1.6000,1.5000,0.10000,1"));
   EXPECT_THAT(textOf(folder / "trajectory.tum"), HasSubstr("1.500000000 0.000000000"));
   const auto objects = nlohmann::json::parse(textOf(folder / "objects.json"));
   EXPECT_EQ(objects["objects"][0]["classes"]["car"]["covariance"].size(), 7u);

@@ -41,7 +41,8 @@ class RealStreet : public ::testing::Test {
     auto calibration = replay::readTrackingCalibration(root() / "calib" / (sequence + ".txt"));
     const auto size = replay::trackingImageSize(sequence);
     calibration.width = size.width, calibration.height = size.height;
-    const auto rows = readObjectRows(out / csv);
+    auto rows = readObjectRows(out / csv);
+    std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
     const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
     const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
     return scoreObjects(rows, truth, poses, calibration, {}).cells[2][2];
