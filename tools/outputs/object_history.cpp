@@ -152,11 +152,13 @@ std::map<ObjectId, ObjectHistory::Look> ObjectHistory::looksOfSurvivors(
   return looks;
 }
 
-std::vector<ObjectRow> ObjectHistory::finalRowsOf(const FrameRecord& record) const {
+std::vector<ObjectRow> ObjectHistory::finalRowsOf(const FrameRecord& record,
+                                                  std::set<ObjectId>& begun) const {
   std::vector<ObjectRow> rows;
   std::vector<Outline> outlines;
   for (const auto& [id, look] : looksOfSurvivors(record)) {
-    if (!endsAsStaticThing(id)) continue;
+    if (look.believed) begun.insert(id);
+    if (!begun.contains(id) || !endsAsStaticThing(id)) continue;
     ObjectRow row = rowOf(last_.at(id));
     row.visible = !look.hidden;
     if (camera_) {
@@ -175,8 +177,9 @@ std::vector<ObjectRow> ObjectHistory::finalRowsOf(const FrameRecord& record) con
 
 std::vector<ObjectRow> ObjectHistory::finalRows() const {
   std::vector<ObjectRow> rows;
+  std::set<ObjectId> begun;
   for (const auto& [frame, record] : frames_) {
-    for (ObjectRow& row : finalRowsOf(record)) {
+    for (ObjectRow& row : finalRowsOf(record, begun)) {
       row.frame = frame;
       row.time = record.time;
       rows.push_back(std::move(row));
