@@ -10,8 +10,8 @@
 namespace perdure::semantic_filter {
 
 struct HistoryConfig {
-  std::int64_t frames = 32;          ///< how far back a late detection is still applied
-  bool wait_for_detections = true;   ///< a frame is published with its detections, or at the next
+  std::int64_t frames = 32;         ///< how far back a late detection is still applied
+  bool wait_for_detections = true;  ///< a frame is published with its detections, or at the next
 };
 
 struct RestoreConfig {

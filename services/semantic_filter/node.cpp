@@ -120,7 +120,8 @@ void Node::onLandmarks(const Landmarks& landmarks) {
       const Eigen::Vector3d ray = landmark.p_W - centre;
       const Eigen::Vector3d along = ray.normalized();
       const double variance = along.dot(landmark.covariance * along);
-      entry.input.points.push_back({landmark.pixel, ray.norm(), std::sqrt(std::max(variance, 0.0))});
+      entry.input.points.push_back(
+          {landmark.pixel, ray.norm(), std::sqrt(std::max(variance, 0.0))});
     }
     return;
   }
@@ -232,8 +233,8 @@ void Node::publishPredictions(const Entry& entry) {
   predictions.camera = camera_name_;
   for (const auto& object : belief_.objects) {
     const auto& best = object.best();
-    const double probability = object.existence * classProbability(object, best.class_name) *
-                               object.visible_fraction;
+    const double probability =
+        object.existence * classProbability(object, best.class_name) * object.visible_fraction;
     if (probability < kPredictionFloor) continue;
     const State x = stateAt(best, toSeconds(entry.input.stamp.time - object.as_of));
     const auto box = projectCuboid(x, entry.input.view);

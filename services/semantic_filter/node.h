@@ -21,7 +21,7 @@
 namespace perdure::semantic_filter {
 
 struct Outputs {
-  Sink<Objects> objects;          ///< one for each odometry frame, in order
+  Sink<Objects> objects;  ///< one for each odometry frame, in order
   Sink<Event> events;
   Sink<Predictions> predictions;
 };

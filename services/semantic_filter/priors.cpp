@@ -90,14 +90,15 @@ class Reader {
 
  private:
   void checkKeys(const YAML::Node& node) {
-    static const std::vector<std::string> known = {"size",   "spread", "common",        "frequency",
-                                                   "moving", "speed",  "azimuth_sigma", "yaw",
-                                                   "detection"};
+    static const std::vector<std::string> known = {"size",          "spread", "common",
+                                                   "frequency",     "moving", "speed",
+                                                   "azimuth_sigma", "yaw",    "detection"};
     for (const auto& item : node) {
       const auto key = item.first.as<std::string>();
       if (std::find(known.begin(), known.end(), key) == known.end()) {
-        complain(item.first, key + ": unknown; keys are size, spread, common, frequency, "
-                                   "detection, moving, speed, azimuth_sigma, yaw");
+        complain(item.first, key +
+                                 ": unknown; keys are size, spread, common, frequency, "
+                                 "detection, moving, speed, azimuth_sigma, yaw");
       }
     }
   }
@@ -117,9 +118,9 @@ ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
   try {
     root = YAML::Load(yaml);
   } catch (const YAML::ParserException& e) {
-    throw StartupError(ExitCode::kConfiguration, file + ":" + std::to_string(e.mark.line + 1) + ":" +
-                                                     std::to_string(e.mark.column + 1) + ": " +
-                                                     e.msg);
+    throw StartupError(ExitCode::kConfiguration, file + ":" + std::to_string(e.mark.line + 1) +
+                                                     ":" + std::to_string(e.mark.column + 1) +
+                                                     ": " + e.msg);
   }
   Reader reader(file);
   ClassPriors priors;
@@ -145,8 +146,9 @@ ClassPriors loadClassPriors(const std::string& path) {
   std::ifstream in(path);
   if (!in) {
     throw StartupError(ExitCode::kUnavailable,
-                       path + ": cannot be read; set class_priors to the file of class priors "
-                              "(config/class_priors.yaml in the sources).");
+                       path +
+                           ": cannot be read; set class_priors to the file of class priors "
+                           "(config/class_priors.yaml in the sources).");
   }
   std::stringstream text;
   text << in.rdbuf();

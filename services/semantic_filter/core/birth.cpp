@@ -27,8 +27,13 @@ class BirthCost {
   BirthCost(const Evidence& evidence, const ClassPrior& prior, double yaw, double yaw_sigma,
             const std::optional<RangeHint>& range, const FrameContext& frame,
             const Eigen::Vector3d& start)
-      : z_(evidence.z), view_(frame.view), yaw_(yaw), yaw_sigma_(yaw_sigma), range_(range),
-        log_size_(prior.log_size), start_(start) {
+      : z_(evidence.z),
+        view_(frame.view),
+        yaw_(yaw),
+        yaw_sigma_(yaw_sigma),
+        range_(range),
+        log_size_(prior.log_size),
+        start_(start) {
     position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
     const Eigen::Matrix3d L = prior.log_size_covariance.llt().matrixL();
     size_whitening_ = L.inverse();
@@ -181,8 +186,8 @@ void addOther(Object& object, double probability, const Evidence& evidence,
   const Eigen::Vector3d middle = prior.log_size;
   for (const double scale : kScales) {
     prior.log_size = middle.array() + scale;
-    addClass(object, prior, probability / 3.0, evidence,
-             yawStarts(prior, frame, ray), range, frame);
+    addClass(object, prior, probability / 3.0, evidence, yawStarts(prior, frame, ray), range,
+             frame);
   }
 }
 
@@ -256,8 +261,7 @@ std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, 
   if (!depth || !ray) return std::nullopt;
   const double minimum = frame.parameters->birth.min_distance_m;
   const double start_depth = range ? range->distance_m / ray->norm() : *depth;
-  const Eigen::Vector3d start =
-      frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
+  const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
   const BirthCost cost(evidence, prior, yaw, yaw_sigma, range, frame, start);
   Vector7 x;
   x << start, yaw, prior.log_size;
@@ -302,8 +306,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.pose_product = frame.pose_error.product;
   object.hits = 1;
   normalise(object);
-  object.hit_view = viewPointNow(object, {}, frame.view, frame.parameters->looks);
-  object.hit_view.looks = 1.0;
+  object.hit_view = {frame.view.T_WC(), 1.0};
   return object;
 }
 

@@ -89,7 +89,8 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
   for (int i = 0, a = 0; i < 4; ++i) {
     if (!use[i]) {
       // The true side lies at or beyond the observed end: left and top to smaller coordinates.
-      const double beyond = i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
+      const double beyond =
+          i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
       if (predicted.exact[i]) {
         score.log_density += logBelowZero(beyond, covariance(i, i) + z.variance[i]);
       }

@@ -45,8 +45,8 @@ struct BoxScore {
   int dof = 0;
 };
 
-/// log N(z; h(x), S) with censoring. `hidden` are sides that a nearer object hides. Nothing where no
-/// side can be compared, or outside the gate.
+/// log N(z; h(x), S) with censoring. `hidden` are sides that a nearer object hides. Nothing where
+/// no side can be compared, or outside the gate.
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,
                                  const std::array<bool, 4>& hidden, double gate);

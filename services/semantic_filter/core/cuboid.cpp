@@ -87,8 +87,8 @@ std::array<Eigen::Vector3d, 8> corners(const State& x, const Eigen::Vector3d& up
   std::array<Eigen::Vector3d, 8> result;
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector3d unit((i & 1) ? 0.5 : -0.5, (i & 2) ? 0.5 : -0.5, (i & 4) ? 0.5 : -0.5);
-    result[i] = x.head<3>() +
-                R_WO * Eigen::Vector3d(x.segment<3>(kSize).array().exp() * unit.array());
+    result[i] =
+        x.head<3>() + R_WO * Eigen::Vector3d(x.segment<3>(kSize).array().exp() * unit.array());
   }
   return result;
 }
@@ -125,8 +125,7 @@ double yawFromAzimuth(double azimuth, const Eigen::Vector3d& centre_W, const Vie
   const Eigen::Vector3d right = down.cross(forward);
   const Eigen::Vector3d ray = centre_W - T_WC.p;
   const double rotation_y = azimuth + std::atan2(ray.dot(right), ray.dot(forward));
-  const Eigen::Vector3d length_axis =
-      std::cos(rotation_y) * right - std::sin(rotation_y) * forward;
+  const Eigen::Vector3d length_axis = std::cos(rotation_y) * right - std::sin(rotation_y) * forward;
   const Eigen::Vector3d level = levelling(view.up_W) * length_axis;
   return std::atan2(level.y(), level.x());
 }

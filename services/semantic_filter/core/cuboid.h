@@ -26,7 +26,7 @@ struct ProjectedBox {
   Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
   Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();  ///< by [θ, p] of T_WB
   std::array<bool, 4> exact{true, true, true, true};  ///< false: set by the near plane's cut
-  double nearest_m = 0.0;  ///< least depth of a corner that is in front
+  double nearest_m = 0.0;                             ///< least depth of a corner that is in front
   std::vector<Eigen::Vector2d> points;  ///< images of corners and cuts, for the outline
 };
 

@@ -10,9 +10,9 @@ constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 
 bool mayMatch(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
   for (int axis = 0; axis < 2; ++axis) {
-    const double reach = 5.0 * std::sqrt(std::max(covariance(axis, axis),
-                                                  covariance(axis + 2, axis + 2)) +
-                                         z.variance[axis]);
+    const double reach =
+        5.0 * std::sqrt(std::max(covariance(axis, axis), covariance(axis + 2, axis + 2)) +
+                        z.variance[axis]);
     if (z.sides[axis] > p.sides[axis + 2] + reach) return false;
     if (p.sides[axis] > z.sides[axis + 2] + reach) return false;
   }
@@ -49,21 +49,18 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
   ObjectLook result;
   result.sight = sight;
   const auto& looks = frame.parameters->looks;
-  const auto worth = [&](const ViewPoint& last) {
-    return worthOfLook(viewPointNow(object, last, frame.view, looks).looks, looks.correlation);
-  };
-  result.worth = worth(object.hit_view);
-  result.worth_of_miss = worth(object.miss_view);
   for (const auto& hypothesis : object.hypotheses) {
     HypothesisLook h;
     h.likelihood.assign(boxes.size(), 0.0);
     h.nis.assign(boxes.size(), 0.0);
     h.box = projectCuboid(hypothesis.x, frame.view);
+    h.hit_looks = sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view, looks);
+    h.miss_looks = sharedLooks(hypothesis.x.head<3>(), object.miss_view, frame.view, looks);
     if (h.box) {
       h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
       const double height = h.box->sides[3] - h.box->sides[1];
-      h.detection = sight.fraction * detectionProbability(frame.priors->of(hypothesis.class_name),
-                                                          height, frame);
+      h.detection = sight.fraction *
+                    detectionProbability(frame.priors->of(hypothesis.class_name), height, frame);
       scoreBoxes(h, hypothesis.class_name, sight, boxes, frame);
     }
     result.hypotheses.push_back(std::move(h));
@@ -82,21 +79,18 @@ double associationWeight(const Object& object, const ObjectLook& look, std::size
   return r * made / std::max(1.0 - r + r * silent, 1e-12);
 }
 
-ViewPoint viewPointNow(const Object& object, const ViewPoint& last, const View& view,
-                       const LooksParameters& parameters) {
-  const Eigen::Vector3d ray = view.T_WC().p - object.best().x.head<3>();
-  const double distance = std::max(ray.norm(), 1e-3);
-  ViewPoint now;
-  now.direction_W = ray / distance;
-  now.log_distance = std::log(distance);
-  now.direction_C = -(view.T_WC().q.conjugate() * now.direction_W);
-  if (last.looks <= 0.0) return now;
-  const double change =
-      (now.direction_W - last.direction_W).norm() / parameters.angle +
-      (now.direction_C - last.direction_C).norm() / parameters.image_angle +
-      std::abs(now.log_distance - last.log_distance) / parameters.log_distance;
-  now.looks = last.looks * std::exp(-change);
-  return now;
+double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
+                   const LooksParameters& parameters) {
+  if (last.looks <= 0.0) return 0.0;
+  const Eigen::Vector3d ray_now = position - view.T_WC().p;
+  const Eigen::Vector3d ray_then = position - last.T_WC.p;
+  const double now = std::max(ray_now.norm(), 1e-3), then = std::max(ray_then.norm(), 1e-3);
+  const Eigen::Vector3d image_now = view.T_WC().q.conjugate() * ray_now / now;
+  const Eigen::Vector3d image_then = last.T_WC.q.conjugate() * ray_then / then;
+  const double change = (ray_now / now - ray_then / then).norm() / parameters.angle +
+                        (image_now - image_then).norm() / parameters.image_angle +
+                        std::abs(std::log(now / then)) / parameters.log_distance;
+  return last.looks * std::exp(-change);
 }
 
 double worthOfLook(double looks, double correlation) {

@@ -16,16 +16,14 @@ namespace perdure::semantic_filter {
 struct HypothesisLook {
   std::optional<ProjectedBox> box;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
-  double detection = 0.0;          ///< v P_D: probability that the network reports it
-  std::vector<double> likelihood;  ///< L(z) for each box, 0 outside the gate
-  std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
+  double detection = 0.0;                    ///< v P_D: probability that the network reports it
+  std::vector<double> likelihood;            ///< L(z) for each box, 0 outside the gate
+  std::vector<double> nis;                   ///< per degree of freedom, where likelihood > 0
+  double hit_looks = 0.0, miss_looks = 0.0;  ///< earlier looks that share this view, if it is true
 };
 
 struct ObjectLook {
   Sight sight;
-  /// τ in (0, 1] of a look that shows the object, and of one that does not: the exponent of the
-  /// evidence, and 1/τ the factor of R. A look that shows what the last one did not is news.
-  double worth = 1.0, worth_of_miss = 1.0;
   std::vector<HypothesisLook> hypotheses;
 };
 
@@ -47,9 +45,9 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
 /// "Object made box z" against "object made none, or is not there": a row of associate's psi.
 double associationWeight(const Object& object, const ObjectLook& look, std::size_t z);
 
-/// Where the object is looked at from now, with the looks that share this view (none counted yet).
-ViewPoint viewPointNow(const Object& object, const ViewPoint& last, const View& view,
-                       const LooksParameters& parameters);
+/// Earlier looks that a look at `position` from here shares its errors with.
+double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
+                   const LooksParameters& parameters);
 /// Information of one more look after n correlated ones, in units of the first:
 /// I(n) = n / (ρ n + 1 - ρ), worth = I(n+1) - I(n).
 double worthOfLook(double looks, double correlation);

@@ -19,7 +19,8 @@ State difference(const State& a, const State& b) {
 /// A hypothesis turned by 180° describes the same cuboid: choose the turn that is nearer.
 State nearestTurn(const State& x, const State& reference) {
   State y = x;
-  if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2) y[kYaw] = wrapAngle(x[kYaw] + M_PI);
+  if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2)
+    y[kYaw] = wrapAngle(x[kYaw] + M_PI);
   return y;
 }
 
@@ -52,7 +53,8 @@ double movingProbability(const Object& object, double min_speed) {
     if (!h.moving) continue;
     const Eigen::Vector2d v = h.x.segment<2>(kVelocity);
     const double speed = v.norm();
-    const Eigen::Vector2d along = speed > 0.0 ? Eigen::Vector2d(v / speed) : Eigen::Vector2d::UnitX();
+    const Eigen::Vector2d along =
+        speed > 0.0 ? Eigen::Vector2d(v / speed) : Eigen::Vector2d::UnitX();
     const double sigma = std::sqrt(along.dot(h.P.block<2, 2>(kVelocity, kVelocity) * along)) + 1e-6;
     sum += h.weight * 0.5 * std::erfc((min_speed - speed) / (std::sqrt(2.0) * sigma));
   }

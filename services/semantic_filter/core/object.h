@@ -31,11 +31,9 @@ struct Hypothesis {
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
 };
 
-/// Where the object was last looked at from, for the correlation of looks (DESIGN 5, item 7).
+/// From where the object was last looked at, for the correlation of looks (DESIGN 5, item 7).
 struct ViewPoint {
-  Eigen::Vector3d direction_W = Eigen::Vector3d::Zero();  ///< unit, object to camera
-  Eigen::Vector3d direction_C = Eigen::Vector3d::Zero();  ///< unit, camera to object, in the image
-  double log_distance = 0.0;
+  RigidTransform T_WC;
   double looks = 0.0;  ///< number of looks that share this view, discounted
 };
 
@@ -47,7 +45,7 @@ struct Object {
   TimePoint first_seen, last_seen, as_of;
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
   std::uint32_t hits = 0, visible_misses = 0;
-  double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
+  double running_nis = 1.0;       ///< per degree of freedom, of the boxes it claimed
   ViewPoint hit_view, miss_view;  ///< of the last look that showed it, and that did not
   double support = 1.0;           ///< share of late visible looks that showed it
   Visibility visibility = Visibility::kVisible;

@@ -45,7 +45,8 @@ Polygon clip(const Polygon& p, int axis, double at, bool keep_greater) {
     const auto& a = p[i];
     const auto& b = p[(i + 1) % p.size()];
     if (inside(a)) result.push_back(a);
-    if (inside(a) != inside(b)) result.push_back(a + (at - a[axis]) / (b[axis] - a[axis]) * (b - a));
+    if (inside(a) != inside(b))
+      result.push_back(a + (at - a[axis]) / (b[axis] - a[axis]) * (b - a));
   }
   return result;
 }

@@ -1,8 +1,7 @@
 #include "services/semantic_filter/core/predict.h"
 
-#include <cmath>
-
 #include <Eigen/LU>
+#include <cmath>
 
 namespace perdure::semantic_filter {
 namespace {

@@ -9,7 +9,7 @@
 namespace perdure::semantic_filter {
 
 struct ClassPrior {
-  std::string name;                                   ///< lower-case
+  std::string name;                                    ///< lower-case
   Eigen::Vector3d log_size = Eigen::Vector3d::Zero();  ///< mean of log(l, w, h), log metres
   Eigen::Matrix3d log_size_covariance = Eigen::Matrix3d::Identity();
   double frequency = 1.0;              ///< relative to other classes, > 0

@@ -89,8 +89,7 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
     fresh[z] = 1.0 + std::exp(logBirthRatio(boxes[static_cast<std::size_t>(z)], frame));
     for (Eigen::Index j = 0; j < n; ++j) {
       const Seen& s = seen[static_cast<std::size_t>(j)];
-      psi(j, z) =
-          associationWeight(belief.objects[s.object], s.look, static_cast<std::size_t>(z));
+      psi(j, z) = associationWeight(belief.objects[s.object], s.look, static_cast<std::size_t>(z));
     }
   }
   const Association association = associate(psi, fresh);
@@ -133,9 +132,8 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights, const Fr
   }
 }
 
-void SemanticFilter::births(Belief& belief, const Eigen::VectorXd& claimed,
-                            const FrameInput& input, const FrameContext& frame,
-                            IdBook& ids) const {
+void SemanticFilter::births(Belief& belief, const Eigen::VectorXd& claimed, const FrameInput& input,
+                            const FrameContext& frame, IdBook& ids) const {
   const auto& boxes = *input.boxes;
   std::vector<Object> born;
   std::vector<std::size_t> accepted;
@@ -153,8 +151,8 @@ void SemanticFilter::births(Belief& belief, const Eigen::VectorXd& claimed,
       return sameThing(boxes[other].z, e.z);
     });
     if (doubled) continue;
-    auto object = bear(e, rangeFromLandmarks(e, input.points, parameters_.birth),
-                       input.stamp.time, frame);
+    auto object =
+        bear(e, rangeFromLandmarks(e, input.points, parameters_.birth), input.stamp.time, frame);
     if (!object) continue;
     object->id = ids.idFor(input.stamp.sequence, z);
     object->existence *= 1.0 - claimed[static_cast<Eigen::Index>(z)];

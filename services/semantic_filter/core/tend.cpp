@@ -12,7 +12,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr int kGeometry = 7;  // dimensions without velocity
+constexpr int kGeometry = 7;          // dimensions without velocity
 constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
 
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
@@ -63,7 +63,7 @@ void mergeNearOnes(Object& object, double threshold) {
 
 /// Without parallax nobody can tell a toy from a car: until the distance is known, "other" stays.
 bool scaleIsOpen(const Object& object, const TendParameters& tend) {
-  const double distance = std::exp(object.hit_view.log_distance);
+  const double distance = (object.best().x.head<3>() - object.hit_view.T_WC.p).norm();
   const double variance = object.best().P.topLeftCorner<3, 3>().trace();
   return std::sqrt(variance) > tend.scale_resolved * distance;
 }
@@ -123,8 +123,8 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
     a.hypotheses.front().weight = weight;
     multiplyPmf(a, b);
   }
-  a.existence = std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence),
-                         frame.parameters->tend.certain);
+  a.existence =
+      std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), frame.parameters->tend.certain);
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);
@@ -203,8 +203,8 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   Vector7d prior_mean = Vector7d::Zero();  // relative to a
   prior_mean.segment<3>(kSize) = prior.log_size - a.x.segment<3>(kSize);
   const Vector7d d = geometryDifference(b, a);
-  const Vector7d pull = J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d)
-                                                  : Vector7d(J_b * d - J_prior * prior_mean);
+  const Vector7d pull =
+      J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d) : Vector7d(J_b * d - J_prior * prior_mean);
   Hypothesis fused = a;
   fused.x.head<7>() += P * pull;
   fused.x[kYaw] = wrapAngle(fused.x[kYaw]);

@@ -28,7 +28,8 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
 Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
                 const Matrix6d& P_pose);
 
-/// Standard deviation of the place relative to the body, metres: what the pose error does not share.
+/// Standard deviation of the place relative to the body, metres: what the pose error does not
+/// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
 /// Confirms what surely exists at a known place, takes that back where it is lost, and removes
 /// those whose existence has gone.

@@ -11,10 +11,10 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kNegligible = 0.01;      // share of a box in an update
-constexpr double kAzimuthOutlier = 0.2;   // share of azimuths that say nothing
-constexpr double kAzimuthFlip = 0.1;      // share of azimuths that are turned by 180°
-constexpr double kMaxHead = 6.0;          // nats
+constexpr double kNegligible = 0.01;     // share of a box in an update
+constexpr double kAzimuthOutlier = 0.2;  // share of azimuths that say nothing
+constexpr double kAzimuthFlip = 0.1;     // share of azimuths that are turned by 180°
+constexpr double kMaxHead = 6.0;         // nats
 
 /// Rows of the measurement that take part, stacked.
 struct Innovation {
@@ -53,7 +53,8 @@ struct Gain {
 Gain gainOf(const Hypothesis& h, const Innovation& y, double worth, const Matrix6d& P_pose) {
   const Eigen::MatrixXd PHt = h.P * y.H.transpose() + h.C * y.H_pose.transpose();
   Gain gain;
-  gain.S = y.H * PHt + y.H_pose * (h.C.transpose() * y.H.transpose() + P_pose * y.H_pose.transpose());
+  gain.S =
+      y.H * PHt + y.H_pose * (h.C.transpose() * y.H.transpose() + P_pose * y.H_pose.transpose());
   gain.S.diagonal() += y.variance / worth;
   makeSymmetric(gain.S);
   gain.K = gain.S.ldlt().solve(PHt.transpose()).transpose();
@@ -99,12 +100,12 @@ Shares sharesOf(const HypothesisLook& h, const Eigen::VectorXd& eta) {
 }
 
 void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
-                 const std::vector<Evidence>& boxes, const FrameContext& frame) {
+                 const std::vector<Evidence>& boxes, double worth, const FrameContext& frame) {
   std::vector<std::pair<double, Hypothesis>> parts;
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (shares.box[z] < kNegligible) continue;
     parts.emplace_back(shares.box[z],
-                       updateWithBox(h, boxes[z].z, look.sight.hidden, look.worth, frame));
+                       updateWithBox(h, boxes[z].z, look.sight.hidden, worth, frame));
   }
   if (parts.empty()) return;
   const double weight = h.weight;
@@ -112,8 +113,8 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
   h.weight = weight;
 }
 
-// The errors of azimuths are less alike from look to look than those of boxes: their exponent is the
-// square root of the look's worth.
+// The errors of azimuths are less alike from look to look than those of boxes: their exponent is
+// the square root of the look's worth.
 
 /// Within each (class, static or moving) the azimuth may weigh the yaw modes; never across, so that
 /// neither existence nor class nor motion can learn from it.
@@ -132,7 +133,7 @@ void weighYawModes(Object& object, const std::vector<double>& likelihood) {
   }
 }
 
-void updateAzimuths(Object& object, const std::vector<Shares>& shares, const ObjectLook& look,
+void updateAzimuths(Object& object, const std::vector<Shares>& shares, double worth,
                     const std::vector<Evidence>& boxes, const FrameContext& frame) {
   std::vector<double> likelihood(object.hypotheses.size(), 1.0);
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
@@ -141,7 +142,7 @@ void updateAzimuths(Object& object, const std::vector<Shares>& shares, const Obj
     for (std::size_t z = 0; z < boxes.size(); ++z) {
       if (!boxes[z].azimuth || shares[i].box[z] < 0.2) continue;
       const double sigma = std::max(boxes[z].azimuth_sigma, prior.azimuth_sigma);
-      const double weight = shares[i].box[z] * std::sqrt(look.worth);
+      const double weight = shares[i].box[z] * std::sqrt(worth);
       likelihood[i] *= std::pow(
           updateWithAzimuth(object.hypotheses[i], *boxes[z].azimuth, sigma, weight, frame), weight);
     }
@@ -177,11 +178,29 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
   }
 }
 
-void rememberView(Object& object, double seen, const FrameContext& frame) {
-  ViewPoint& last = seen >= 0.5 ? object.hit_view : object.miss_view;
-  const double looks = last.looks;
-  last = viewPointNow(object, last, frame.view, frame.parameters->looks);
-  last.looks = std::min(last.looks, looks) + 1.0;
+/// What a look is worth beside earlier ones, τ of a hit and of a miss. How much the view has
+/// changed depends on how far the object is: that is asked of the hypothesis that explains the look
+/// best. A look that shows what the last one did not is news: hits and misses are counted apart.
+struct Worth {
+  double hit = 1.0, miss = 1.0;
+  double hit_looks = 0.0, miss_looks = 0.0;
+};
+
+Worth worthOf(const Object& object, const ObjectLook& look, const std::vector<Shares>& shares,
+              double correlation) {
+  std::size_t best = 0;
+  const auto posterior = [&](std::size_t i) { return object.hypotheses[i].weight * shares[i].A; };
+  for (std::size_t i = 1; i < shares.size(); ++i) {
+    if (posterior(i) > posterior(best)) best = i;
+  }
+  const HypothesisLook& h = look.hypotheses[best];
+  return {worthOfLook(h.hit_looks, correlation), worthOfLook(h.miss_looks, correlation),
+          h.hit_looks, h.miss_looks};
+}
+
+void rememberView(Object& object, double seen, const Worth& worth, const FrameContext& frame) {
+  (seen >= 0.5 ? object.hit_view : object.miss_view) = {
+      frame.view.T_WC(), 1.0 + (seen >= 0.5 ? worth.hit_looks : worth.miss_looks)};
 }
 
 }  // namespace
@@ -220,8 +239,8 @@ double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double wei
   const bool same_head = std::abs(full) <= M_PI / 2;
   const double residual = same_head ? full : wrapAngle(full + M_PI);
   const double variance = sigma * sigma + h.P(kYaw, kYaw);
-  const double density = std::exp(-0.5 * residual * residual / variance) /
-                         std::sqrt(2.0 * M_PI * variance);
+  const double density =
+      std::exp(-0.5 * residual * residual / variance) / std::sqrt(2.0 * M_PI * variance);
   const double uniform = 1.0 / M_PI;
   const double likelihood = (1.0 - kAzimuthOutlier) * density + kAzimuthOutlier * uniform;
   const double inlier = (1.0 - kAzimuthOutlier) * density / likelihood;
@@ -248,20 +267,20 @@ void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
   std::vector<Shares> shares;
   for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, eta));
   const double seen = probabilitySeen(object, shares);
-  const double worth = seen * look.worth + (1.0 - seen) * look.worth_of_miss;
+  const Worth of = worthOf(object, look, shares, frame.parameters->looks.correlation);
+  const double worth = seen * of.hit + (1.0 - seen) * of.miss;
   count(object, seen, shares, look);
   double mean_A = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     Hypothesis& h = object.hypotheses[i];
     h.weight *= std::pow(shares[i].A, worth);
     mean_A += h.weight;
-    updateState(h, shares[i], look, boxes, frame);
+    updateState(h, shares[i], look, boxes, of.hit, frame);
   }
   const double r = object.existence;
-  object.existence =
-      std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
-  updateAzimuths(object, shares, look, boxes, frame);
-  rememberView(object, seen, frame);
+  object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
+  updateAzimuths(object, shares, of.hit, boxes, frame);
+  rememberView(object, seen, of, frame);
   if (sound(object)) normalise(object);
 }
 

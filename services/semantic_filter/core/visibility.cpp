@@ -11,7 +11,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 struct Cell {
-  double transmittance = 1.0;  ///< probability that nothing nearer stands here
+  double transmittance = 1.0;              ///< probability that nothing nearer stands here
   double distance_m = 0.0, sigma_m = 0.0;  ///< of the blocker that hides most
   double strongest = 0.0;
   ObjectId blocker = 0;
@@ -51,7 +51,9 @@ class DepthBuffer {
  private:
   int rowOf(double y) const { return std::clamp(static_cast<int>(y / cell_), 0, rows_ - 1); }
   int columnOf(double x) const { return std::clamp(static_cast<int>(x / cell_), 0, columns_ - 1); }
-  Cell& at(int row, int column) { return cells_[static_cast<std::size_t>(row) * columns_ + column]; }
+  Cell& at(int row, int column) {
+    return cells_[static_cast<std::size_t>(row) * columns_ + column];
+  }
   static void spanAt(const Polygon& hull, double y, double& left, double& right) {
     for (std::size_t i = 0; i < hull.size(); ++i) {
       const auto& a = hull[i];
@@ -86,8 +88,7 @@ void addToTally(Tally& tally, const Cell& cell, double x, double y, const Outlin
   if (hidden > 0.0) tally.by_blocker[cell.blocker] += hidden;
   const auto& s = o.box->sides;
   const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
-  const bool in_band[4] = {x < s[0] + band_x, y < s[1] + band_y, x > s[2] - band_x,
-                           y > s[3] - band_y};
+  const bool in_band[4] = {x<s[0] + band_x, y<s[1] + band_y, x> s[2] - band_x, y> s[3] - band_y};
   for (int i = 0; i < 4; ++i) {
     if (!in_band[i]) continue;
     tally.side_total[i] += 1.0;
@@ -107,7 +108,8 @@ void paint(Cell& cell, const Outline& o) {
 
 /// Share of the outline's landmarks that stand in front of the object (nearer than its surface);
 /// those seen through it speak against (paper, line 190: the co-visibility cue).
-double hiddenByPoints(const Outline& o, const Polygon& hull, const std::vector<SightPoint>& points) {
+double hiddenByPoints(const Outline& o, const Polygon& hull,
+                      const std::vector<SightPoint>& points) {
   double before = 0.0, through = 0.0;
   const double surface = o.distance_m - o.extent_m;
   for (const auto& p : points) {
@@ -166,7 +168,8 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
     const double in_image = polygonArea(inside) / std::max(polygonArea(hull), 1e-9);
     Tally tally;
     if (!inside.empty()) {
-      buffer.visit(inside, [&](Cell& cell, double x, double y) { addToTally(tally, cell, x, y, o); });
+      buffer.visit(inside,
+                   [&](Cell& cell, double x, double y) { addToTally(tally, cell, x, y, o); });
     }
     const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
     sights[j] = classify(tally, in_image, by_points, parameters);

@@ -13,10 +13,10 @@ namespace perdure::semantic_filter {
 /// One object as the depth buffer wants it.
 struct Outline {
   ObjectId id = 0;
-  double solidity = 0.0;     ///< probability that it is there and hides what is behind it
-  double distance_m = 0.0;   ///< from the camera to the centre
+  double solidity = 0.0;       ///< probability that it is there and hides what is behind it
+  double distance_m = 0.0;     ///< from the camera to the centre
   double depth_sigma_m = 0.0;  ///< standard deviation of that distance
-  double extent_m = 0.0;     ///< half of the cuboid's largest side
+  double extent_m = 0.0;       ///< half of the cuboid's largest side
   std::optional<ProjectedBox> box;
 };
 

@@ -20,8 +20,8 @@ struct Exact {
     visit(psi, fresh, 0, 1.0, choice);
     made /= total;
   }
-  void visit(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh, Eigen::Index j, double weight,
-             std::vector<int>& choice) {
+  void visit(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh, Eigen::Index j,
+             double weight, std::vector<int>& choice) {
     if (j == psi.rows()) {
       total += weight;
       for (Eigen::Index i = 0; i < psi.rows(); ++i) {
@@ -76,8 +76,7 @@ TEST(Association, IsNearTheExactMarginalsOnSmallCases) {
     for (Eigen::Index i = 0; i < psi.size(); ++i) psi(i) = std::exp(log_weight(random));
     const Eigen::VectorXd fresh = Eigen::VectorXd::Constant(4, 1.2);
     const Exact exact(psi, fresh);
-    const double error =
-        (marginals(psi, associate(psi, fresh)) - exact.made).cwiseAbs().maxCoeff();
+    const double error = (marginals(psi, associate(psi, fresh)) - exact.made).cwiseAbs().maxCoeff();
     worst = std::max(worst, error);
     mean += error / kCases;
   }

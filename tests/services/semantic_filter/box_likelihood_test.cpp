@@ -42,8 +42,10 @@ TEST(BoxLikelihood, DensityOfAllSidesIsTheGaussian) {
 
 TEST(BoxLikelihood, ACensoredSideCountsAsTheProbabilityThatItLiesBeyond) {
   const auto z = measure({0.0, 100, 200, 180}, kWidth, kHeight, {});
-  const auto far = scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
-  const auto edge = scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+  const auto far =
+      scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+  const auto edge =
+      scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
   ASSERT_TRUE(far && edge);
   EXPECT_EQ(far->dof, 3);
   EXPECT_NEAR(far->log_density - edge->log_density, std::log(2.0), 1e-9);

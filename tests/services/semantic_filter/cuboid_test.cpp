@@ -80,7 +80,8 @@ TEST_F(Cuboid, LinearCovarianceOfTheBoxMatchesMonteCarlo) {
 }
 
 TEST_F(Cuboid, SidesCutByTheNearPlaneAreNotExact) {
-  const State beside = makeState(view.T_WB.p.x() + 1.0, view.T_WB.p.y() - 2.0, 0.5, 0.4, 5.0, 2.0, 1.5);
+  const State beside =
+      makeState(view.T_WB.p.x() + 1.0, view.T_WB.p.y() - 2.0, 0.5, 0.4, 5.0, 2.0, 1.5);
   const auto box = projectCuboid(beside, view);
   ASSERT_TRUE(box);
   EXPECT_FALSE(box->exact[0] && box->exact[1] && box->exact[2] && box->exact[3]);

@@ -19,13 +19,12 @@ using testing::odometryAt;
 using testing::stampOf;
 using testing::TrueObject;
 
-const std::vector<TrueObject> kStreet = {
-    {makeState(18, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
-    {makeState(22, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
-    {makeState(30, 4.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
+const std::vector<TrueObject> kStreet = {{makeState(18, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
+                                         {makeState(22, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
+                                         {makeState(30, 4.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
 
-std::vector<Detection> boxesAt(const std::vector<TrueObject>& objects, std::uint64_t k, double metres,
-                               std::uint32_t seed = 1, double noise = 0.5) {
+std::vector<Detection> boxesAt(const std::vector<TrueObject>& objects, std::uint64_t k,
+                               double metres, std::uint32_t seed = 1, double noise = 0.5) {
   static const CameraModel camera{testing::makeCamera()};
   std::mt19937 random(seed * 1000 + static_cast<std::uint32_t>(k));
   View view;
@@ -95,9 +94,9 @@ TEST(Node, MapsAStreetOfParkedCars) {
     EXPECT_LT(error, 3.0 * sigma);
     EXPECT_LT(error, 3.0);
   }
-  const auto confirmed = std::count_if(h.objects.back().objects.begin(),
-                                       h.objects.back().objects.end(),
-                                       [](const auto& o) { return o.confirmed; });
+  const auto confirmed =
+      std::count_if(h.objects.back().objects.begin(), h.objects.back().objects.end(),
+                    [](const auto& o) { return o.confirmed; });
   EXPECT_EQ(confirmed, 3);
 }
 
@@ -195,8 +194,8 @@ TEST(Node, ARestartedNodeGoesOnWithTheSameIds) {
   drive(second, 20, 25);
   drive(stranger, 20, 25);
   for (const auto& truth : kStreet) {
-    const auto *a = nearest(first.objects.back(), truth.x);
-    const auto *b = nearest(second.objects.back(), truth.x);
+    const auto* a = nearest(first.objects.back(), truth.x);
+    const auto* b = nearest(second.objects.back(), truth.x);
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->id, b->id);
   }

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cstdlib>
 
 #include "common/base/errors.h"

@@ -1,4 +1,5 @@
-// Small scenes with exact truth: what the filter must tell apart, and whether its covariances are true.
+// Small scenes with exact truth: what the filter must tell apart, and whether its covariances are
+// true.
 #include <gtest/gtest.h>
 
 #include "common/math/chi2.h"
@@ -49,8 +50,8 @@ TEST(Scenario, AToyThatLooksLikeACarIsToldFromACarByItsSize) {
   double p_car = 0.0, p_toy = 0.0;
   for (const auto& o : h.objects.back().objects) {
     const Eigen::Vector3d p = o.best().mean.head<3>();
-    const double bearing = std::atan2(p.y() - h.objects.back().T_WB.p.y(),
-                                      p.x() - h.objects.back().T_WB.p.x());
+    const double bearing =
+        std::atan2(p.y() - h.objects.back().T_WB.p.y(), p.x() - h.objects.back().T_WB.p.x());
     (bearing > 0.0 ? p_toy : p_car) = std::max(bearing > 0.0 ? p_toy : p_car, probabilityOfCar(o));
   }
   EXPECT_GE(p_car, 0.95);

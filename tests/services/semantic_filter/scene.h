@@ -65,8 +65,9 @@ struct TrueObject {
 
 /// The box of a true object with noise on its sides, cut at the image; nothing where out of view.
 template <class Random>
-std::optional<Detection> detect(const TrueObject& object, const View& view, const BoxParameters& box,
-                                double noise, double log_ratio, Random& random) {
+std::optional<Detection> detect(const TrueObject& object, const View& view,
+                                const BoxParameters& box, double noise, double log_ratio,
+                                Random& random) {
   const auto p = projectCuboid(object.x, view);
   if (!p) return std::nullopt;
   const double w = view.camera->width(), h = view.camera->height();
@@ -137,7 +138,8 @@ struct Harness {
   explicit Harness(const Config& config = {}, InstanceId instance = 9)
       : node(config, makePriors(), instance,
              {[this](const Objects& m) { objects.push_back(m); },
-              [this](const Event& e) { events.push_back(e); }, {}}) {
+              [this](const Event& e) { events.push_back(e); },
+              {}}) {
     node.onCalibration(calibrationOf(makeCamera()));
     node.onModel(makeModelInfo());
   }

@@ -56,8 +56,9 @@ TEST_F(Tending, OverlapIsSharedOverJointVolume) {
 }
 
 TEST_F(Tending, OfTwoOfOneClassInOnePlaceTheOlderStays) {
-  std::vector<Object> objects = {makeObject(5, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
-                                 makeObject(2, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
+  std::vector<Object> objects = {
+      makeObject(5, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
+      makeObject(2, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
   const auto merges = mergeObjects(objects, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 2u);

@@ -17,8 +17,12 @@ class Sighting : public ::testing::Test {
     view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.0));
   }
   Outline outline(ObjectId id, const State& x, double solidity = 1.0, double sigma = 0.1) const {
-    return {id, solidity, (x.head<3>() - view.T_WC().p).norm(), sigma,
-            0.5 * std::exp(x[4]), projectCuboid(x, view)};
+    return {id,
+            solidity,
+            (x.head<3>() - view.T_WC().p).norm(),
+            sigma,
+            0.5 * std::exp(x[4]),
+            projectCuboid(x, view)};
   }
   std::vector<Sight> seeThem(const std::vector<Outline>& o,
                              const std::vector<SightPoint>& points = {}) const {
@@ -44,7 +48,7 @@ TEST_F(Sighting, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
   EXPECT_EQ(s[0].visibility, Visibility::kPartial);
   EXPECT_GT(s[0].fraction, 0.2);
   EXPECT_LT(s[0].fraction, 0.8);
-  EXPECT_TRUE(s[0].hidden[0]);   // the body's left is the image's left
+  EXPECT_TRUE(s[0].hidden[0]);  // the body's left is the image's left
   EXPECT_FALSE(s[0].hidden[2]);
 }
 
