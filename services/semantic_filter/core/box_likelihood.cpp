@@ -92,7 +92,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
       const double beyond =
           i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
       if (predicted.exact[i]) {
-        score.log_density += logBelowZero(beyond, covariance(i, i) + z.variance[i]);
+        score.log_density += logBelowZero(beyond, std::max(covariance(i, i), 0.0) + z.variance[i]);
       }
       continue;
     }

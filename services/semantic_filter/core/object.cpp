@@ -55,7 +55,8 @@ double movingProbability(const Object& object, double min_speed) {
     const double speed = v.norm();
     const Eigen::Vector2d along =
         speed > 0.0 ? Eigen::Vector2d(v / speed) : Eigen::Vector2d::UnitX();
-    const double sigma = std::sqrt(along.dot(h.P.block<2, 2>(kVelocity, kVelocity) * along)) + 1e-6;
+    const double variance = along.dot(h.P.block<2, 2>(kVelocity, kVelocity) * along);
+    const double sigma = std::sqrt(std::max(variance, 0.0)) + 1e-6;
     sum += h.weight * 0.5 * std::erfc((min_speed - speed) / (std::sqrt(2.0) * sigma));
   }
   return std::min(sum, 1.0);
