@@ -100,15 +100,18 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
   return association.claimed;
 }
 
-void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input,
-                            const FrameContext& frame) const {
-  const auto matches = [&](const Object& o, const Sight& sight, const Evidence& e) {
-    const State x = stateAt(o.best(), toSeconds(input.stamp.time - o.as_of));
-    const auto box = projectCuboid(x, frame.view);
-    if (!box) return false;
-    const auto covariance = predictedCovariance(o.best(), *box, frame.pose_error.covariance);
-    return scoreBox(e.z, *box, covariance, sight.hidden, parameters_.box.gate).has_value();
-  };
+bool SemanticFilter::matches(const Object& object, const Sight& sight, const Evidence& box,
+                             const FrameInput& input) const {
+  const State x = stateAt(object.best(), toSeconds(input.stamp.time - object.as_of));
+  const auto predicted = projectCuboid(x, input.view);
+  if (!predicted) return false;
+  const auto covariance =
+      predictedCovariance(object.best(), *predicted, input.pose_error.covariance);
+  return scoreBox(box.z, *predicted, covariance, sight.hidden, parameters_.box.gate).has_value();
+}
+
+void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
+                            const FrameInput& input) const {
   std::vector<std::size_t> hidden;
   for (std::size_t j = 0; j < sights.size(); ++j) {
     const bool solid = belief.objects[j].existence >= parameters_.visibility.solid;
@@ -118,12 +121,12 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights, const Fr
     if (hidden.empty()) return;
     bool expected = false;
     for (std::size_t j = 0; j < sights.size() && !expected; ++j) {
-      expected = sights[j].fraction > 0.0 && matches(belief.objects[j], sights[j], e);
+      expected = sights[j].fraction > 0.0 && matches(belief.objects[j], sights[j], e, input);
     }
     if (expected) continue;
     for (const std::size_t j : hidden) {
       sights[j].hidden = {};
-      if (!matches(belief.objects[j], sights[j], e)) continue;
+      if (!matches(belief.objects[j], sights[j], e, input)) continue;
       sights[j].fraction = parameters_.visibility.minimum;
       sights[j].visibility = Visibility::kPartial;
       belief.objects[j].visibility = Visibility::kPartial;
@@ -132,7 +135,18 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights, const Fr
   }
 }
 
-void SemanticFilter::births(Belief& belief, const Eigen::VectorXd& claimed, const FrameInput& input,
+bool SemanticFilter::leavesView(const Belief& belief, const std::vector<Sight>& sights,
+                                const Evidence& box, const FrameInput& input) const {
+  for (std::size_t j = 0; j < sights.size(); ++j) {
+    const Object& o = belief.objects[j];
+    if (sights[j].visibility != Visibility::kOutOfView || !o.confirmed) continue;
+    if (matches(o, sights[j], box, input)) return true;
+  }
+  return false;
+}
+
+void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
+                            const Eigen::VectorXd& claimed, const FrameInput& input,
                             const FrameContext& frame, IdBook& ids) const {
   const auto& boxes = *input.boxes;
   std::vector<Object> born;
@@ -150,7 +164,7 @@ void SemanticFilter::births(Belief& belief, const Eigen::VectorXd& claimed, cons
     const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
       return sameThing(boxes[other].z, e.z);
     });
-    if (doubled) continue;
+    if (doubled || leavesView(belief, sights, e, input)) continue;
     auto object =
         bear(e, rangeFromLandmarks(e, input.points, parameters_.birth), input.stamp.time, frame);
     if (!object) continue;
@@ -169,14 +183,14 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   const FrameContext frame = contextOf(input);
   auto sights = seeAll(belief, input);
   if (!input.boxes) return {};
-  reveal(belief, sights, input, frame);
+  reveal(belief, sights, input);
   const auto seen = score(belief, sights, input, frame);
   const auto claimed = associateAndUpdate(belief, seen, input, frame);
   for (const auto& s : seen) {
     Object& object = belief.objects[s.object];
     if (sound(object)) tendHypotheses(object, priors_, parameters_);
   }
-  births(belief, claimed, input, frame, ids);
+  births(belief, sights, claimed, input, frame, ids);
   StepReport report;
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
   report.merges = mergeObjects(belief.objects, frame);

@@ -74,10 +74,14 @@ class SemanticFilter {
                                      const FrameInput& input, const FrameContext& frame) const;
   /// A box that no visible object expects and that matches a hidden one says that the blocker was
   /// misjudged: that object can be seen.
-  void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input,
-              const FrameContext& frame) const;
-  void births(Belief& belief, const Eigen::VectorXd& claimed, const FrameInput& input,
-              const FrameContext& frame, IdBook& ids) const;
+  void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input) const;
+  bool matches(const Object& object, const Sight& sight, const Evidence& box,
+               const FrameInput& input) const;
+  /// The rest of an object that is almost out of the image is no new object.
+  bool leavesView(const Belief& belief, const std::vector<Sight>& sights, const Evidence& box,
+                  const FrameInput& input) const;
+  void births(Belief& belief, const std::vector<Sight>& sights, const Eigen::VectorXd& claimed,
+              const FrameInput& input, const FrameContext& frame, IdBook& ids) const;
 
   Parameters parameters_;
   ClassPriors priors_;

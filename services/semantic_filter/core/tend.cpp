@@ -119,7 +119,9 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   } else {
     const ClassPrior prior = frame.priors->of(a.best().class_name);
     const double weight = a.best().weight;
-    a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
+    if (!a.best().moving) {  // velocities are not fused: a moving one keeps its own state
+      a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
+    }
     a.hypotheses.front().weight = weight;
     multiplyPmf(a, b);
   }
