@@ -174,7 +174,7 @@ TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
   EXPECT_EQ(rows[0].frame, 0u);
 }
 
-TEST(ObjectHistory, FinalDropsWhatIsMoreThanHalfBehindANearerObject) {
+TEST(ObjectHistory, FinalDropsWhatIsLargelyBehindANearerObject) {
   ObjectHistory history;
   history.setCamera(aheadCamera());
   ObjectBelief behind = carAt(2, 20), beside = carAt(3, 20);
