@@ -8,7 +8,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kMovingAbove = 0.5;
-constexpr double kMostlySeen = 0.7;  // FINAL: less of it in sight is not called visible, as in the filter
+constexpr double kMostlySeen = 0.6;  // FINAL: with less of it in sight an object counts as hidden
 constexpr double kBelievedFrom = 0.5;
 
 bool isHidden(Visibility v) { return v == Visibility::kOccluded; }

@@ -41,7 +41,7 @@ class ObjectHistory {
   std::vector<ObjectRow> inst() const;
   /// The surviving id after merges, the last estimate, from the first detection on that made it
   /// more likely there than not, in the frames in which it projects into the image and is not
-  /// hidden: neither known to be so at the time, nor with under .7 of it in sight beside the last
+  /// hidden: neither known to be so at the time, nor with under .6 of it in sight beside the last
   /// estimates of nearer ones. Objects that were judged moving or gone at last give none.
   std::vector<ObjectRow> finalRows() const;
   /// The last belief of each confirmed object that is not gone and was not merged away, by id.
