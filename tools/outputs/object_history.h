@@ -40,7 +40,7 @@ class ObjectHistory {
   /// Confirmed, static objects that are claimed to be there and not hidden, by frame and id.
   std::vector<ObjectRow> inst() const;
   /// The surviving id after merges, the last estimate, from the first detection on that made it
-  /// more likely there than not, in the frames in which it projects into the image and is not
+  /// more than a faint guess (r of .1), in the frames in which it projects into the image and is not
   /// hidden: neither known to be so at the time, nor with under .6 of it in sight beside the last
   /// estimates of nearer ones. Objects that were judged moving or gone at last give none.
   std::vector<ObjectRow> finalRows() const;
@@ -53,7 +53,7 @@ class ObjectHistory {
  private:
   struct Look {
     bool hidden = false;    ///< known to be occluded
-    bool believed = false;  ///< more likely there than not
+    bool believed = false;  ///< more than a faint guess
   };
   struct FrameRecord {
     TimePoint time;

@@ -114,10 +114,10 @@ TEST(ObjectHistory, FinalMapsTheLastEstimateBackToTheFirstDetectionAndIntoFrames
   EXPECT_NEAR(rows[0].p_W.x(), 5.0, 1e-12);
 }
 
-TEST(ObjectHistory, FinalBeginsWhenTheObjectIsMoreLikelyThereThanNot) {
+TEST(ObjectHistory, FinalBeginsWhenTheObjectIsMoreThanAFaintGuess) {
   ObjectHistory history;
   ObjectBelief guess = carAt(1, 4, false);
-  guess.existence = 0.1;
+  guess.existence = 0.05;
   history.add(messageAt(0, {guess}));
   history.add(messageAt(1, {carAt(1, 4, false)}));
   history.add(messageAt(2, {carAt(1, 5)}));
