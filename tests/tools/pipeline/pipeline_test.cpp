@@ -32,7 +32,8 @@ RigidTransform poseOf(int frame) {
   return RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * frame, 0, 0));
 }
 
-/// The box of the car in a frame, or nothing where it is not wholly in the image.
+/// The box of the car in a frame, cut at the image's border as detectors do; nothing where less than
+/// a fifth of it is in the image.
 std::optional<Box> boxOf(const CameraModel& camera, int frame) {
   const RigidTransform T_CW = (poseOf(frame) * camera.T_BC()).inverse();
   Box box{1e9, 1e9, -1e9, -1e9};
@@ -40,11 +41,14 @@ std::optional<Box> boxOf(const CameraModel& camera, int frame) {
     const Eigen::Vector3d half(corner & 1 ? .5 : -.5, corner & 2 ? .5 : -.5, corner & 4 ? .5 : -.5);
     const auto pixel =
         camera.project(T_CW * (kCarCentre + rotationAboutZ(kCarYaw) * half.cwiseProduct(kCarSize)));
-    if (!pixel || !camera.inImage(*pixel)) return std::nullopt;
+    if (!pixel) return std::nullopt;
     box = Box{std::min(box.x1, pixel->x()), std::min(box.y1, pixel->y()),
               std::max(box.x2, pixel->x()), std::max(box.y2, pixel->y())};
   }
-  return box;
+  const Box cut{std::max(box.x1, 0.0), std::max(box.y1, 0.0), std::min(box.x2, camera.width() - 1),
+                std::min(box.y2, camera.height() - 1)};
+  if (cut.width() <= 0 || cut.height() <= 0 || cut.area() < 0.2 * box.area()) return std::nullopt;
+  return cut;
 }
 
 /// The folder with a calibration, poses.txt and boxes.csv.
