@@ -130,8 +130,11 @@ class Supervision : public ::testing::Test {
   }
 
   static bool eventually(const std::function<bool()>& so) {
-    for (int i = 0; i < 400 && !so(); ++i) std::this_thread::sleep_for(50ms);
-    return so();
+    for (int i = 0; i < 400; ++i) {
+      if (so()) return true;
+      std::this_thread::sleep_for(50ms);
+    }
+    return false;
   }
 
   DemoFolders folders_;
