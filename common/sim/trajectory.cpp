@@ -1,0 +1,143 @@
+#include "common/sim/trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/math/so3.h"
+
+namespace perdure::sim {
+namespace {
+
+constexpr double binomial(int n, int k) {
+  double value = 1.0;
+  for (int i = 1; i <= k; ++i) value = value * (n - k + i) / i;
+  return value;
+}
+
+constexpr double power(double base, int exponent) {
+  double value = 1.0;
+  for (int i = 0; i < exponent; ++i) value *= base;
+  return value;
+}
+
+/// Weights of `Order` neighbouring controls as polynomials in s: [control][power of s].
+/// Source: Sommer et al. 2020, eq. 14 (Qin's general matrix of uniform B-splines).
+template <int Order>
+constexpr std::array<std::array<double, Order>, Order> blendingMatrix() {
+  std::array<std::array<double, Order>, Order> m{};
+  double factorial = 1.0;
+  for (int i = 2; i < Order; ++i) factorial *= i;
+  for (int control = 0; control < Order; ++control) {
+    for (int n = 0; n < Order; ++n) {
+      double sum = 0.0;
+      for (int l = control; l < Order; ++l) {
+        const double sign = (l - control) % 2 == 0 ? 1.0 : -1.0;
+        sum += sign * binomial(Order, l - control) * power(Order - 1 - l, Order - 1 - n);
+      }
+      m[static_cast<std::size_t>(control)][static_cast<std::size_t>(n)] =
+          binomial(Order - 1, n) / factorial * sum;
+    }
+  }
+  return m;
+}
+
+/// Weights that multiply differences of neighbours instead (eq. 16): sums of the rows below.
+template <int Order>
+constexpr std::array<std::array<double, Order>, Order> cumulativeMatrix() {
+  auto m = blendingMatrix<Order>();
+  for (std::size_t row = Order - 1; row-- > 0;) {
+    for (std::size_t n = 0; n < Order; ++n) m[row][n] += m[row + 1][n];
+  }
+  return m;
+}
+
+/// A polynomial's value and first two derivatives at s.
+template <std::size_t N>
+std::array<double, 3> evaluate(const std::array<double, N>& coefficients, double s) {
+  std::array<double, 3> v{};
+  for (std::size_t i = N; i-- > 0;) {
+    v[2] = v[2] * s + 2.0 * v[1];
+    v[1] = v[1] * s + v[0];
+    v[0] = v[0] * s + coefficients[i];
+  }
+  return v;
+}
+
+constexpr int kPositionOrder = 6, kRotationOrder = 5;
+constexpr auto kPositionWeights = blendingMatrix<kPositionOrder>();
+constexpr auto kRotationWeights = cumulativeMatrix<kRotationOrder>();
+
+/// Controls around one time; those outside are the first or the last.
+class Controls {
+ public:
+  Controls(const std::vector<RigidTransform>& all, std::int64_t first) : all_(all), first_(first) {}
+  const RigidTransform& operator[](std::size_t i) const {
+    const auto last = static_cast<std::int64_t>(all_.size()) - 1;
+    const std::int64_t index = first_ + static_cast<std::int64_t>(i);
+    return all_[static_cast<std::size_t>(std::clamp<std::int64_t>(index, 0, last))];
+  }
+
+ private:
+  const std::vector<RigidTransform>& all_;
+  std::int64_t first_;
+};
+
+void evaluatePosition(const Controls& controls, double s, double interval, MotionState& state) {
+  // About one control, so that a position far from the origin costs no digits.
+  const Eigen::Vector3d base = controls[2].p;
+  state.T_WB.p = base;
+  for (std::size_t i = 0; i < kPositionOrder; ++i) {
+    const auto w = evaluate(kPositionWeights[i], s);
+    const Eigen::Vector3d offset = controls[i].p - base;
+    state.T_WB.p += w[0] * offset;
+    state.velocity_W += w[1] / interval * offset;
+    state.acceleration_W += w[2] / (interval * interval) * offset;
+  }
+}
+
+void evaluateRotation(const Controls& controls, double s, double interval, MotionState& state) {
+  Eigen::Quaterniond q = controls[0].q;
+  for (std::size_t i = 1; i < kRotationOrder; ++i) {
+    const auto w = evaluate(kRotationWeights[i], s);
+    const Eigen::Vector3d d = logSo3(controls[i - 1].q.conjugate() * controls[i].q);
+    const Eigen::Quaterniond step = expQuaternion(w[0] * d);
+    const double rate = w[1] / interval;
+    q = q * step;
+    state.angular_velocity_B = step.conjugate() * state.angular_velocity_B + rate * d;
+    state.angular_acceleration_B = step.conjugate() * state.angular_acceleration_B +
+                                   w[2] / (interval * interval) * d +
+                                   rate * state.angular_velocity_B.cross(d);
+  }
+  state.T_WB.q = q.normalized();
+}
+
+}  // namespace
+
+Trajectory::Trajectory(double start_s, double interval_s, std::vector<RigidTransform> control_poses)
+    : start_s_(start_s), interval_s_(interval_s), control_(std::move(control_poses)) {
+  check(!control_.empty(), "a trajectory has at least one control pose");
+  check(interval_s_ > 0.0 && std::isfinite(interval_s_) && std::isfinite(start_s_),
+        "a trajectory's interval is positive and its start finite");
+}
+
+MotionState Trajectory::at(double t_s) const {
+  check(std::isfinite(t_s), "a trajectory is asked for a finite time");
+  MotionState state;
+  if (control_.size() == 1) {
+    state.T_WB = control_.front();
+    return state;
+  }
+  const double u =
+      std::clamp((t_s - start_s_) / interval_s_, -8.0, static_cast<double>(control_.size()) + 8.0);
+  const double position_segment = std::floor(u), rotation_segment = std::floor(u + 0.5);
+  // The rotation's spline has its knots half-way between the controls: then both lag by nothing.
+  evaluatePosition(Controls(control_, static_cast<std::int64_t>(position_segment) - 2),
+                   u - position_segment, interval_s_, state);
+  evaluateRotation(Controls(control_, static_cast<std::int64_t>(rotation_segment) - 2),
+                   u + 0.5 - rotation_segment, interval_s_, state);
+  return state;
+}
+
+}  // namespace perdure::sim

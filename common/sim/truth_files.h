@@ -1,0 +1,10 @@
+// The names of the truth's files and of the columns.
+#pragma once
+
+namespace perdure::sim {
+
+inline constexpr char kObjectsTruthFile[] = "objects_truth.json";
+inline constexpr char kVisibilityTruthFile[] = "visibility_truth.csv";
+inline constexpr char kVisibilityHeader[] = "frame,object_id,visible_fraction,x1,y1,x2,y2";
+
+}  // namespace perdure::sim
