@@ -1,0 +1,30 @@
+// Random numbers that depend on a counter alone: the same for a pixel of a frame whatever was drawn
+// before it and by whichever thread. Mixing by SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
+#pragma once
+
+#include <cstdint>
+
+namespace perdure::tools {
+
+constexpr std::uint64_t mixBits(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31);
+}
+constexpr std::uint64_t mixBits(std::uint64_t a, std::uint64_t b) {
+  return mixBits(mixBits(a) ^ b);
+}
+
+/// In [0, 1).
+constexpr float uniformOf(std::uint64_t bits) {
+  return static_cast<float>(bits >> 40) * (1.0F / 16777216.0F);
+}
+/// Mean 0, standard deviation 1, within ±3.5: four uniform numbers summed.
+constexpr float normalOf(std::uint64_t bits) {
+  const auto sum = static_cast<float>((bits & 0xffff) + (bits >> 16 & 0xffff) +
+                                      (bits >> 32 & 0xffff) + (bits >> 48));
+  return (sum - 131070.0F) * (1.7320508F / 65536.0F);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,32 @@
+// What a ray meets that meets nothing: a sky with clouds outdoors, a ceiling with lamps indoors.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "common/sim/scene.h"
+
+namespace perdure::tools {
+
+class Sky {
+ public:
+  explicit Sky(const sim::Scene& scene);
+  /// Linear RGB radiance from unit direction `d_W`, seen from `origin_W`.
+  Eigen::Vector3f radiance(const Eigen::Vector3f& origin_W, const Eigen::Vector3f& d_W) const;
+  bool indoors() const { return indoors_; }
+  /// Of the haze far away.
+  const Eigen::Vector3f& horizon() const { return horizon_; }
+
+ private:
+  Eigen::Vector3f outdoors(const Eigen::Vector3f& d_W) const;
+  Eigen::Vector3f ceiling(const Eigen::Vector3f& origin_W, const Eigen::Vector3f& d_W) const;
+  void paintOutdoors(std::uint64_t seed);
+
+  bool indoors_;
+  float strength_;
+  Eigen::Vector3f sun_W_, horizon_;
+  std::vector<Eigen::Vector3f> map_;  ///< kHeight × kWidth; by azimuth and elevation above 0
+};
+
+}  // namespace perdure::tools

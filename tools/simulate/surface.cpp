@@ -1,0 +1,65 @@
+#include "tools/simulate/surface.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <stdexcept>
+
+namespace perdure::tools {
+namespace {
+
+void require(const Mesh& mesh) {
+  const std::size_t corners = mesh.positions.size();
+  bool fits = mesh.normals.size() == corners && mesh.uvs.size() == corners &&
+              mesh.material_of.size() == mesh.triangles.size();
+  for (const auto& triangle : mesh.triangles) {
+    for (const auto index : triangle) fits = fits && index < corners;
+  }
+  for (const auto index : mesh.material_of) fits = fits && index < mesh.materials.size();
+  if (!fits) throw std::invalid_argument("a mesh has lists that do not fit together");
+}
+
+/// Square root of the texture's area over the triangle's.
+float repeatsPerMetre(const Mesh& mesh, const std::array<std::uint32_t, 3>& t) {
+  const auto& p = mesh.positions;
+  const auto& uv = mesh.uvs;
+  const float area = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).norm();
+  const Eigen::Vector2f a = uv[t[1]] - uv[t[0]], b = uv[t[2]] - uv[t[0]];
+  return std::sqrt(std::abs(a.x() * b.y() - a.y() * b.x()) / std::max(area, 1e-12F));
+}
+
+}  // namespace
+
+void Surface::add(const Mesh& mesh, const RigidTransform& T_SM) {
+  require(mesh);
+  const auto first = static_cast<std::uint32_t>(positions.size());
+  const auto first_material = static_cast<std::uint32_t>(materials.size());
+  const Eigen::Matrix3f R = T_SM.R().cast<float>();
+  const Eigen::Vector3f p = T_SM.p.cast<float>();
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    positions.emplace_back(R * mesh.positions[i] + p);
+    normals.emplace_back(R * mesh.normals[i]);
+  }
+  uvs.insert(uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    triangles.push_back({first + t[0], first + t[1], first + t[2]});
+    material_of.push_back(first_material + mesh.material_of[i]);
+    repeats_per_metre.push_back(repeatsPerMetre(mesh, t));
+  }
+  materials.insert(materials.end(), mesh.materials.begin(), mesh.materials.end());
+}
+
+SurfacePoint pointOn(const Surface& surface, std::uint32_t triangle, float u, float v) {
+  const auto& t = surface.triangles[triangle];
+  const float w = 1.0F - u - v;
+  const auto& n = surface.normals;
+  SurfacePoint point;
+  point.normal = w * n[t[0]] + u * n[t[1]] + v * n[t[2]];
+  point.uv = w * surface.uvs[t[0]] + u * surface.uvs[t[1]] + v * surface.uvs[t[2]];
+  point.repeats_per_metre = surface.repeats_per_metre[triangle];
+  point.material_index = surface.material_of[triangle];
+  point.material = &surface.materials[point.material_index];
+  return point;
+}
+
+}  // namespace perdure::tools

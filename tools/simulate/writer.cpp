@@ -1,0 +1,134 @@
+#include "tools/simulate/writer.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "common/base/errors.h"
+#include "common/sim/truth_files.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string transformYaml(const RigidTransform& T_BS) {
+  const Eigen::Matrix4d m = T_BS.matrix();
+  std::string numbers;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      numbers += fmt::format("{}{}", numbers.empty() ? "" : ", ", m(row, column));
+    }
+  }
+  return fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", numbers);
+}
+
+const char* nameOf(DistortionModel model) {
+  switch (model) {
+    case DistortionModel::kNone:
+      return "none";
+    case DistortionModel::kRadialTangential:
+      return "radial-tangential";
+    case DistortionModel::kEquidistant:
+      return "equidistant";
+  }
+  return "none";
+}
+
+}  // namespace
+
+void writeWhole(const fs::path& file, std::span<const char> bytes) {
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  fs::path unfinished = file;
+  unfinished += ".part";
+  {
+    std::ofstream stream(unfinished, std::ios::binary | std::ios::trunc);
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    stream.close();
+    if (!stream) {
+      throw StartupError(
+          ExitCode::kUnavailable,
+          unfinished.string() + " cannot be written; is the disk full or read-only?");
+    }
+  }
+  fs::rename(unfinished, file);
+}
+
+std::string cameraYaml(const CameraCalibration& camera) {
+  std::string text = fmt::format("sensor_type: camera\ncomment: simulated {}\n\n", camera.name);
+  text += transformYaml(camera.T_BC);
+  text += fmt::format("\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n",
+                      camera.rate_hz, camera.width, camera.height);
+  text += fmt::format("intrinsics: [{}, {}, {}, {}]\n", camera.fx, camera.fy, camera.cx, camera.cy);
+  text += fmt::format("distortion_model: {}\n", nameOf(camera.distortion));
+  if (camera.distortion != DistortionModel::kNone) {
+    const auto& d = camera.distortion_coefficients;
+    text += fmt::format("distortion_coefficients: [{}, {}, {}, {}]\n", d[0], d[1], d[2], d[3]);
+  }
+  return text + fmt::format(
+                    "time_offset_s: {}  # t_imu = t_image + this\n"
+                    "readout_s: {}  # first to last row; the stamp is the middle row's\n",
+                    camera.time_offset_s, camera.readout_s);
+}
+
+std::string imuYaml(const ImuCalibration& imu) {
+  return fmt::format(
+      "sensor_type: imu\ncomment: simulated\n\n{}\nrate_hz: {}\ngyroscope_noise_density: {}\n"
+      "gyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+      transformYaml({}), imu.rate_hz, imu.gyro_noise, imu.gyro_bias_walk, imu.accel_noise,
+      imu.accel_bias_walk);
+}
+
+std::string speedYaml(const sim::SpeedErrors& speed) {
+  return fmt::format(
+      "sensor_type: speed\ncomment: along the body's x axis\n\nrate_hz: {}\nsigma: {}\n",
+      speed.rate_hz, speed.sigma);
+}
+
+std::string groundTruthYaml() {
+  return "sensor_type: visual-inertial\ncomment: exact states of the simulated body\n\n" +
+         transformYaml({});
+}
+
+std::string imageListCsv(const std::vector<TimePoint>& stamps, const std::string& extension) {
+  std::string text = "#timestamp [ns],filename\n";
+  for (const auto stamp : stamps) {
+    text += fmt::format("{0},{0}{1}\n", toNanoseconds(stamp), extension);
+  }
+  return text;
+}
+
+std::string visibilityCsv(const std::vector<std::vector<sim::TruthView>>& views_by_frame) {
+  std::string text = std::string(sim::kVisibilityHeader) + "\n";
+  for (std::size_t frame = 0; frame < views_by_frame.size(); ++frame) {
+    for (const auto& view : views_by_frame[frame]) {
+      text +=
+          fmt::format("{},{},{:.4f},{:.2f},{:.2f},{:.2f},{:.2f}\n", frame, view.object_id,
+                      view.visible_fraction, view.box.x1, view.box.y1, view.box.x2, view.box.y2);
+    }
+  }
+  return text;
+}
+
+std::string extensionOf(ImageFormat format) {
+  return format == ImageFormat::kPng ? ".png" : ".jpg";
+}
+
+void writeImage(const fs::path& file, int width, int height, int channels,
+                const std::vector<std::uint8_t>& pixels, ImageFormat format) {
+  const cv::Mat image(height, width, channels == 3 ? CV_8UC3 : CV_8UC1,
+                      const_cast<std::uint8_t*>(pixels.data()));
+  const std::vector<int> settings = format == ImageFormat::kPng
+                                        ? std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, 1}
+                                        : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 95};
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(extensionOf(format), image, bytes, settings)) {
+    throw std::runtime_error(file.string() + " cannot be encoded");
+  }
+  writeWhole(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+}  // namespace perdure::tools
