@@ -140,7 +140,7 @@ void readLevel(const Json& json, const std::string& where, Reader& parent,
   Reader reader(json, where, parent.problems());
   Level level;
   reader.positiveInteger("stride", level.stride);
-  if (level.stride > 0 &&
+  if (level.stride > 0 && model.family != Family::kPerdure &&
       (model.input.width % level.stride != 0 || model.input.height % level.stride != 0)) {
     reader.complain("stride", "does not divide the input's width and height");
   }
@@ -156,6 +156,10 @@ void readLevel(const Json& json, const std::string& where, Reader& parent,
       }
     }
     if (anchors && level.anchors.empty()) reader.complain("anchors", "is empty");
+  } else if (model.family == Family::kPerdure) {
+    level.box = reader.text("box", true);
+    level.logits = reader.text("logits", true);
+    if (model.azimuth.bins > 0) level.azimuth = reader.text("azimuth", true);
   } else {
     level.box = reader.text("box", true);
     level.objectness = reader.text("objectness", true);
@@ -208,17 +212,44 @@ void readActivation(const Json& json, Reader& parent, ModelDescription& model) {
   reader.rejectUnknown();
 }
 
+void readAzimuth(const Json& json, Reader& parent, ModelDescription& model) {
+  Reader reader(json, "azimuth.", parent.problems());
+  reader.positiveInteger("bins", model.azimuth.bins);
+  reader.number("sigma", model.azimuth.sigma, 0.001, 3.2);
+  model.azimuth.classes = model.classes;
+  if (const Json* classes = reader.find("classes")) {
+    model.azimuth.classes.clear();
+    for (const Json& name : *classes) {
+      const std::string text = name.is_string() ? name.get<std::string>() : "";
+      const auto& known = model.classes;
+      if (std::find(known.begin(), known.end(), text) == known.end()) {
+        reader.complain("classes", "\"" + text + "\" is not one of the model's classes");
+      }
+      model.azimuth.classes.push_back(text);
+    }
+  }
+  reader.rejectUnknown();
+}
+
+/// Soft-max over background and classes is the family's own; nothing is to be chosen.
+void readHeads(Reader& reader, ModelDescription& model) {
+  if (model.family == Family::kPerdure) {
+    if (const Json* azimuth = reader.find("azimuth")) readAzimuth(*azimuth, reader, model);
+  } else if (const Json* activation = reader.need("activation")) {
+    readActivation(*activation, reader, model);
+  }
+}
+
 void readAll(Reader& reader, const std::string& file, ModelDescription& model) {
   model.name = reader.text("name", false);
   reader.choice<Family>("family", model.family,
                         {{"yolox", Family::kYolox},
                          {"yolo-fastest", Family::kYoloFastest},
-                         {"fastestdet", Family::kFastestDet}});
+                         {"fastestdet", Family::kFastestDet},
+                         {"perdure", Family::kPerdure}});
   if (const Json* input = reader.need("input")) readInput(*input, reader, model.input);
   readClasses(reader, file, model);
-  if (const Json* activation = reader.need("activation")) {
-    readActivation(*activation, reader, model);
-  }
+  readHeads(reader, model);
   if (const Json* levels = reader.need("levels")) {
     for (std::size_t i = 0; levels->is_array() && i < levels->size(); ++i) {
       readLevel((*levels)[i], "levels[" + std::to_string(i) + "].", reader, model);

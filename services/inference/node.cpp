@@ -116,6 +116,8 @@ Result<Detections> Node::infer(const Frame& frame) {
     Detection detection;
     detection.box = fit.toImage(candidate.box);
     detection.activations = std::move(candidate.activations);
+    detection.azimuth = candidate.azimuth;
+    detection.azimuth_sigma = candidate.azimuth_sigma;
     out.detections.push_back(std::move(detection));
   }
   return out;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "services/inference/core/decode_perdure.h"
 #include "services/inference/core/evidence.h"
 
 namespace perdure::inference {
@@ -125,12 +126,22 @@ void decodeAnchors(const ModelDescription& model, const DecodeOptions& options, 
 
 }  // namespace
 
+std::pair<int, int> cellsOf(const ModelDescription& model, const Level& level) {
+  const int beyond = model.family == Family::kPerdure ? level.stride - 1 : 0;
+  return {(model.input.width + beyond) / level.stride,
+          (model.input.height + beyond) / level.stride};
+}
+
 std::vector<std::vector<int>> expectedShapes(const ModelDescription& model) {
   std::vector<std::vector<int>> shapes;
   const int classes = static_cast<int>(model.classes.size());
   for (const Level& level : model.levels) {
-    const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;
-    if (model.family == Family::kYoloFastest) {
+    const auto [columns, rows] = cellsOf(model, level);
+    if (model.family == Family::kPerdure) {
+      shapes.push_back({1, 4, rows, columns});
+      shapes.push_back({1, 1 + classes, rows, columns});
+      if (model.azimuth.bins > 0) shapes.push_back({1, 2 * model.azimuth.bins, rows, columns});
+    } else if (model.family == Family::kYoloFastest) {
       shapes.push_back({1, rows, columns, static_cast<int>(level.anchors.size()) * (5 + classes)});
     } else {
       for (const int channels : {4, 1, classes}) shapes.push_back({1, channels, rows, columns});
@@ -143,11 +154,13 @@ Result<std::vector<Candidate>> decode(const ModelDescription& model, const Decod
                                       const std::vector<Tensor>& tensors) {
   if (const auto valid = validate(model, tensors); !valid) return tl::unexpected(valid.error());
   std::vector<Candidate> candidates;
-  const std::size_t per_level = model.family == Family::kYoloFastest ? 1 : 3;
+  const std::size_t per_level = tensors.size() / model.levels.size();
   for (std::size_t i = 0; i < model.levels.size(); ++i) {
     const Tensor* first = &tensors[i * per_level];
     if (model.family == Family::kYoloFastest) {
       decodeAnchors(model, options, model.levels[i], *first, candidates);
+    } else if (model.family == Family::kPerdure) {
+      decodePerdure(model, options, model.levels[i], {first, per_level}, candidates);
     } else {
       decodePlanes(model, options, model.levels[i], first, candidates);
     }

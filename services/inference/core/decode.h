@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -22,12 +24,18 @@ struct Candidate {
   Box box;             ///< pixels of the network's input
   double score = 0.0;  ///< the highest class score, before calibration
   std::vector<float> activations;
+  std::optional<double> azimuth = {};  ///< alpha (KITTI), radians
+  double azimuth_sigma = 0.35;         ///< radians
 };
 
 struct DecodeOptions {
   double score_threshold = 0.05;    ///< boxes whose best wanted class scores less are left out
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
+
+/// Columns and rows of a level's cells. Those of the family perdure may reach beyond the input's
+/// border: 240 / 32 is 8 rows.
+std::pair<int, int> cellsOf(const ModelDescription& model, const Level& level);
 
 /// What a level's tensors must look like, in the order of tensorNames().
 std::vector<std::vector<int>> expectedShapes(const ModelDescription& model);

@@ -8,7 +8,7 @@
 namespace perdure::inference {
 
 /// How the network's heads are laid out; one decode rule each (core/decode.cpp).
-enum class Family { kYolox, kYoloFastest, kFastestDet };
+enum class Family { kYolox, kYoloFastest, kFastestDet, kPerdure };
 
 /// How an image is brought to the input size.
 enum class Fit {
@@ -34,12 +34,22 @@ struct Level {
   /// YOLO-Fastest: one tensor (1,H,W,A·(5+K)) and A anchors (width, height, pixels of input).
   std::string tensor;
   std::vector<std::pair<double, double>> anchors;
+  /// Perdure: `box` (1,4,H,W) and logits (1,1+K,H,W), background first; azimuth (1,2·bins,H,W)
+  /// where the model has one.
+  std::string logits, azimuth;
 };
 
 /// From the network's score to a log-likelihood ratio against clutter (core/evidence.h).
 struct Calibration {
   double temperature = 1.0;   ///< > 0; above 1 the network was overconfident
   double clutter_rate = 0.5;  ///< in (0, 1): share of the emitted boxes that are clutter
+};
+
+/// Azimuth as the likeliest of `bins` equal parts of the circle and a residual.
+struct Azimuth {
+  int bins = 0;                      ///< 0: the network has no azimuth
+  double sigma = 0.35;               ///< radians, what remains where one bin is certain
+  std::vector<std::string> classes;  ///< whose azimuth is reported
 };
 
 struct ModelDescription {
@@ -51,6 +61,7 @@ struct ModelDescription {
   double objectness_exponent = 1.0;  ///< score = objectness^a · class^b
   double class_exponent = 1.0;
   std::vector<Level> levels;
+  Azimuth azimuth;
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0 unknown
   Calibration calibration;
 };
@@ -61,6 +72,9 @@ inline std::vector<std::string> tensorNames(const ModelDescription& model) {
   for (const Level& level : model.levels) {
     if (model.family == Family::kYoloFastest) {
       names.push_back(level.tensor);
+    } else if (model.family == Family::kPerdure) {
+      names.insert(names.end(), {level.box, level.logits});
+      if (model.azimuth.bins > 0) names.push_back(level.azimuth);
     } else {
       names.insert(names.end(), {level.box, level.objectness, level.classes});
     }

@@ -1,0 +1,102 @@
+#include "services/inference/core/decode_perdure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <numeric>
+
+#include "services/inference/core/evidence.h"
+
+namespace perdure::inference {
+namespace {
+
+/// The values of one cell: channel i is at data[i * step].
+struct Cell {
+  const float* data;
+  std::size_t step;
+  double operator[](std::size_t channel) const { return data[channel * step]; }
+};
+
+/// Soft-max of the first `count` channels.
+std::vector<double> softMax(const Cell& cell, std::size_t count) {
+  std::vector<double> p(count);
+  for (std::size_t i = 0; i < count; ++i) p[i] = cell[i];
+  const double highest = *std::max_element(p.begin(), p.end());
+  for (double& value : p) value = std::exp(value - highest);
+  const double sum = std::accumulate(p.begin(), p.end(), 0.0);
+  for (double& value : p) value /= sum;
+  return p;
+}
+
+float evidence(const Calibration& calibration, double log_odds) {
+  const double tempered = std::clamp(log_odds, -kMaxLogit, kMaxLogit) / calibration.temperature;
+  return static_cast<float>(tempered + logit(calibration.clutter_rate));
+}
+
+/// Fills score and activations and returns the best wanted class; nothing below the threshold.
+std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOptions& options,
+                                 const Cell& logits, Candidate& candidate) {
+  const auto p = softMax(logits, model.classes.size() + 1);
+  std::optional<std::size_t> best;
+  for (const std::size_t k : options.wanted) {
+    if (!best || p[k + 1] > p[*best + 1]) best = k;
+  }
+  if (!best || p[*best + 1] < options.score_threshold) return std::nullopt;
+  candidate.score = p[*best + 1];
+  candidate.activations.assign(1, 0.0F);
+  for (const std::size_t k : options.wanted) {
+    candidate.activations.push_back(evidence(model.calibration, logits[k + 1] - logits[0]));
+  }
+  return best;
+}
+
+double softPlus(double x) { return -logSigmoid(-x); }
+
+Box boxOf(const Cell& raw, double x, double y, double stride) {
+  return {x - stride * softPlus(raw[0]), y - stride * softPlus(raw[1]),
+          x + stride * softPlus(raw[2]), y + stride * softPlus(raw[3])};
+}
+
+void readAzimuth(const Azimuth& azimuth, const Cell& raw, Candidate& candidate) {
+  const auto bins = static_cast<std::size_t>(azimuth.bins);
+  const auto p = softMax(raw, bins);
+  const double half = std::numbers::pi / azimuth.bins;
+  std::complex<double> doubled = 0;
+  const auto angle = [&](std::size_t i) {
+    return half * (2.0 * static_cast<double>(i) + raw[bins + i]);
+  };
+  for (std::size_t i = 0; i < bins; ++i) doubled += std::polar(p[i], 2 * angle(i));
+  const auto best = static_cast<std::size_t>(std::max_element(p.begin(), p.end()) - p.begin());
+  candidate.azimuth = std::remainder(angle(best), 2 * std::numbers::pi);
+  const double spread = std::sqrt(-2 * std::log(std::clamp(std::abs(doubled), 1e-6, 1.0))) / 2;
+  candidate.azimuth_sigma = std::hypot(azimuth.sigma, spread);
+}
+
+bool reportsAzimuth(const ModelDescription& model, std::size_t k) {
+  const auto& names = model.azimuth.classes;
+  return model.azimuth.bins > 0 &&
+         std::find(names.begin(), names.end(), model.classes[k]) != names.end();
+}
+
+}  // namespace
+
+void decodePerdure(const ModelDescription& model, const DecodeOptions& options, const Level& level,
+                   std::span<const Tensor> tensors, std::vector<Candidate>& out) {
+  const auto [columns, rows] = cellsOf(model, level);
+  const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  for (std::size_t i = 0; i < cells; ++i) {
+    Candidate candidate;
+    const auto best = weigh(model, options, {tensors[1].values.data() + i, cells}, candidate);
+    if (!best) continue;
+    const double x = (static_cast<int>(i) % columns + 0.5) * level.stride;
+    const double y = (static_cast<int>(i) / columns + 0.5) * level.stride;
+    candidate.box = boxOf({tensors[0].values.data() + i, cells}, x, y, level.stride);
+    if (reportsAzimuth(model, *best)) {
+      readAzimuth(model.azimuth, {tensors[2].values.data() + i, cells}, candidate);
+    }
+    out.push_back(std::move(candidate));
+  }
+}
+
+}  // namespace perdure::inference
