@@ -16,16 +16,22 @@ namespace perdure::sim {
 
 /// A thing that the map is to find (or to see through, as the toy): it is in the truth.
 struct SceneObject {
-  std::uint64_t id = 0;    ///< > 0
-  std::string class_name;  ///< truth: car, van, person, bicycle, chair, dining table, monitor, couch, toy
+  std::uint64_t id = 0;  ///< > 0
+  std::string
+      class_name;  ///< truth: car, van, person, bicycle, chair, dining table, monitor, couch, toy
   /// What a detector takes it for; the class itself but for the toy (a car).
   std::string looks_like;
-  std::string shape;  ///< body shape of the class: hatchback, sedan, estate, suv, box van, …
+  std::string
+      shape;  ///< of the class (catalogue.h): hatchback, sedan, …; empty: by the look's seed
   std::uint64_t look_seed = 0;  ///< colours, textures, details
-  Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres
+  Eigen::Vector3d size =
+      Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres
   /// Centre of its box, yaw about +z. Object frame O: x forwards, z up, origin in the centre.
   Trajectory motion{RigidTransform{}};
   bool moves = false;  ///< ever, while it is present
+  /// It moves at once, between two frames (someone moved it): the truth has two keys and no way
+  /// between them. `moves` is set too.
+  bool steps = false;
   double present_from_s = -1e9, present_until_s = 1e9;
 
   bool presentAt(double t_s) const { return t_s >= present_from_s && t_s < present_until_s; }
@@ -33,7 +39,8 @@ struct SceneObject {
 
 enum class PropKind { kFacade, kTree, kPole, kHedge, kWall, kKerb, kFloor, kCrate, kShelf };
 
-/// Scenery: seen and able to hide things, but in no truth. Pose of its box's centre.
+/// Scenery: seen and able to hide things, but in no truth. Pose of its box's centre. Long things
+/// (facades, walls, hedges, kerbs, shelves) have x along their length; their front is −y.
 struct Prop {
   PropKind kind = PropKind::kFacade;
   std::uint64_t look_seed = 0;
@@ -52,8 +59,8 @@ struct CameraErrors {
   double exposure_s = 0.008;      ///< motion blur over this time; stamps are its middle
   double noise_electrons = 12.0;  ///< read noise; shot noise follows from full_well
   double full_well_electrons = 10000.0;
-  double vignetting = 0.15;       ///< darkening at the corner, share
-  double gain_walk = 0.02;        ///< relative, 1/√s
+  double vignetting = 0.15;  ///< darkening at the corner, share
+  double gain_walk = 0.02;   ///< relative, 1/√s
 };
 struct ImuErrors {
   bool noise = true;  ///< white noise and bias walk by ImuCalibration's densities
@@ -64,6 +71,7 @@ struct ImuErrors {
 };
 struct SpeedErrors {
   double rate_hz = 50.0, sigma = 0.03, scale = 1.0;
+  bool noise = true;
 };
 
 /// The sensors. `calibration` is what the sensor.yaml files say; `true_calibration` what the world

@@ -99,11 +99,11 @@ std::vector<TruthObject> truthOf(const Scene& scene, TimePoint epoch) {
     truth.class_name = object.class_name;
     truth.looks_like = object.looks_like;
     truth.size = object.size;
-    truth.moves = object.moves;
+    truth.moves = object.moves && !object.steps;
     truth.present_from = epoch + durationFromSeconds(object.present_from_s);
     truth.present_until = epoch + durationFromSeconds(object.present_until_s);
-    truth.keys = object.moves ? keysOfMoving(object, scene.seconds, epoch)
-                              : keysOfStanding(object, scene.seconds, epoch);
+    truth.keys = truth.moves ? keysOfMoving(object, scene.seconds, epoch)
+                             : keysOfStanding(object, scene.seconds, epoch);
     objects.push_back(std::move(truth));
   }
   return objects;

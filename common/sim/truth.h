@@ -52,6 +52,7 @@ bool hasTruth(const std::filesystem::path& folder);
 Truth readTruth(const std::filesystem::path& folder);
 /// `epoch` is the sensor time of the scene's t = 0.
 std::vector<TruthObject> truthOf(const Scene& scene, TimePoint epoch);
-void writeObjectsTruth(const std::filesystem::path& folder, const std::vector<TruthObject>& objects);
+void writeObjectsTruth(const std::filesystem::path& folder,
+                       const std::vector<TruthObject>& objects);
 
 }  // namespace perdure::sim

@@ -1,0 +1,72 @@
+#include "common/sim/scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/errors.h"
+#include "common/sim/scenes/scenes.h"
+
+namespace perdure::sim {
+namespace {
+
+struct Entry {
+  SceneName name;
+  Scene (*make)(std::uint64_t seed, const SceneOptions& options);
+};
+
+const std::vector<Entry>& entries() {
+  static const std::vector<Entry> list{
+      {{"street",
+        "Objects on both sides of a loop are found once and are the same objects on the second "
+        "lap, "
+        "with other streets' cars kept on the map while they are out of sight."},
+       makeStreet},
+  };
+  return list;
+}
+
+std::string knownNames() {
+  std::string names;
+  for (const Entry& entry : entries()) names += (names.empty() ? "" : ", ") + entry.name.name;
+  return names;
+}
+
+[[noreturn]] void refuse(const std::string& what) { throw StartupError(ExitCode::kUsage, what); }
+
+void checkOptions(const SceneOptions& options) {
+  if (options.seconds && !(*options.seconds > 0.0 && *options.seconds <= 3600.0)) {
+    refuse("a scene lasts more than 0 and at most 3600 seconds; give other seconds");
+  }
+  if (!(options.rate_hz > 0.0 && options.rate_hz <= 200.0)) {
+    refuse("a camera takes more than 0 and at most 200 frames a second; give another rate");
+  }
+  const auto fits = [](std::uint32_t side) { return side >= 16 && side <= 4096; };
+  if (!fits(options.width) || !fits(options.height)) {
+    refuse("an image has 16 to 4096 pixels each way; give another size");
+  }
+}
+
+}  // namespace
+
+const std::vector<SceneName>& sceneNames() {
+  static const std::vector<SceneName> names = [] {
+    std::vector<SceneName> list;
+    for (const Entry& entry : entries()) list.push_back(entry.name);
+    return list;
+  }();
+  return names;
+}
+
+Scene makeScene(const std::string& name, std::uint64_t seed, const SceneOptions& options) {
+  const auto found = std::find_if(entries().begin(), entries().end(),
+                                  [&](const Entry& entry) { return entry.name.name == name; });
+  if (found == entries().end()) {
+    refuse("there is no scene \"" + name + "\"; the scenes are " + knownNames());
+  }
+  checkOptions(options);
+  Scene scene = found->make(seed, options);
+  scene.proves = found->name.proves;
+  return scene;
+}
+
+}  // namespace perdure::sim
