@@ -1,0 +1,17 @@
+// The pictures of what one walks and drives on.
+#pragma once
+
+#include "tools/simulate/shapes/dice.h"
+#include "tools/simulate/shapes/pattern.h"
+
+namespace perdure::tools::shapes {
+
+Pattern asphaltPattern(Dice& dice);
+Pattern pavingPattern(Dice& dice);
+Pattern grassPattern(Dice& dice);
+Pattern earthPattern(Dice& dice);
+Pattern tilesPattern(Dice& dice);
+Pattern markingsPattern(Dice& dice);
+Pattern woodPattern(Dice& dice);
+
+}  // namespace perdure::tools::shapes

@@ -1,0 +1,27 @@
+// From loose faces to a mesh: the size made exact, normals smoothed up to a crease, corners shared.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "tools/simulate/mesh.h"
+
+namespace perdure::tools::shapes {
+
+struct LooseFace {
+  std::array<Eigen::Vector3f, 3> corners;  ///< counter-clockwise seen from outside
+  std::array<Eigen::Vector2f, 3> uvs;
+  bool has_uvs = false;
+  std::uint16_t material = 0;
+  std::uint32_t part = 0;  ///< only faces of one part are smoothed together
+  float repeat_m = 1.0F, crease_deg = 40.0F;
+};
+
+/// Scales each axis so that the bounding box is exactly `size` (in float), centred.
+void fitTo(const Eigen::Vector3d& size, std::vector<LooseFace>& faces);
+/// Normals weighted by angle; texture coordinates from positions where a face brings none.
+Mesh joinFaces(const std::vector<LooseFace>& faces, const std::vector<Material>& materials);
+
+}  // namespace perdure::tools::shapes

@@ -1,0 +1,44 @@
+// The generators, one for each class of object or kind of scenery; `mesh.h` is their public face.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tools/simulate/mesh.h"
+
+namespace perdure::tools::shapes {
+
+/// What a generator is given: the size to fill exactly, the shape's name (empty: the look decides)
+/// and the seed of the look. Each throws std::invalid_argument for a shape that is not known.
+struct Order {
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();
+  std::string shape;
+  std::uint64_t look_seed = 0;
+};
+
+Mesh makeCar(const Order& order);
+Mesh makeVan(const Order& order);
+Mesh makePerson(const Order& order);
+Mesh makeBicycle(const Order& order);
+Mesh makeChair(const Order& order);
+Mesh makeTable(const Order& order);
+Mesh makeMonitor(const Order& order);
+Mesh makeCouch(const Order& order);
+
+Mesh makeFacade(const Order& order);
+Mesh makeTree(const Order& order);
+Mesh makeHedge(const Order& order);
+Mesh makePole(const Order& order);
+Mesh makeWall(const Order& order);
+Mesh makeKerb(const Order& order);
+Mesh makeFloor(const Order& order);
+Mesh makeCrate(const Order& order);
+Mesh makeShelf(const Order& order);
+
+/// The order's shape, or one that the look picks where it is empty; must be among `known`.
+std::string chosenShape(const Order& order, const std::string& class_name,
+                        const std::vector<std::string>& known);
+
+}  // namespace perdure::tools::shapes

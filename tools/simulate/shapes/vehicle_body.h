@@ -1,0 +1,44 @@
+// The lofted body of a road vehicle: cross-sections along its length, with bonnet, windscreen, roof
+// and rear, wheel arches cut out, glass, lights, seams and plates.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/simulate/shapes/dice.h"
+#include "tools/simulate/shapes/mesh_builder.h"
+
+namespace perdure::tools::shapes {
+
+struct Span {
+  float from = 0.0F, to = 0.0F;
+  bool holds(float x) const { return x > from && x < to; }
+};
+
+/// x is the share of the length from the front; z is the share of the height.
+struct BodyProfile {
+  std::vector<Vec2> top;   ///< outline seen from the side, x rising, from 0 to 1
+  std::vector<Vec2> belt;  ///< lower edge of the windows
+  Span windscreen, rear_glass;
+  std::vector<Span> side_glass;
+  std::vector<float> seams;  ///< of doors
+  float front_axle = 0.18F, rear_axle = 0.8F;
+  float wheel_radius = 0.22F, sill = 0.15F;  ///< of the height
+  float roof_width = 0.76F;                  ///< of the width
+  float nose_taper = 0.18F, tail_taper = 0.1F;
+  bool rear_doors_with_glass = false;  ///< the upright end of vans
+  bool split_grille = true;
+};
+
+struct BodyMaterials {
+  int paint, trim, glass, headlight, taillight, plate, dark;
+};
+
+/// From x = +length/2 (front) to −length/2, wheels' ground at z = 0. `size` in metres.
+void addBody(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size,
+             const BodyMaterials& materials);
+
+/// Value at x of the line through the points (held outside).
+float lineAt(const std::vector<Vec2>& points, float x);
+
+}  // namespace perdure::tools::shapes

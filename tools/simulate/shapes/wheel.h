@@ -1,0 +1,17 @@
+// A road vehicle's wheel: tyre, rim, spokes, hub.
+#pragma once
+
+#include "tools/simulate/shapes/mesh_builder.h"
+
+namespace perdure::tools::shapes {
+
+struct WheelLook {
+  int rubber = 0, rim = 0, dark = 0;  ///< materials
+  int spokes = 5;                     ///< 0: a closed disc
+  float rim_share = 0.66F;            ///< of the radius
+};
+/// The axle points to +y (outside) before the builder's placing.
+void addWheel(MeshBuilder& builder, const Vec3& centre, float radius, float width,
+              const WheelLook& look);
+
+}  // namespace perdure::tools::shapes
