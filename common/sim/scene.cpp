@@ -21,6 +21,15 @@ const std::vector<Entry>& entries() {
         "lap, "
         "with other streets' cars kept on the map while they are out of sight."},
        makeStreet},
+      {{"room",
+        "Furniture seen from all sides in a walk gets one belief each, of the right class and "
+        "size, "
+        "though chairs stand close together and hide each other."},
+       makeRoom},
+      {{"random",
+        "Single views for training, one a second: each looks at a thing of a class drawn evenly, "
+        "from any side and as large in the image as may be; the body rests in between."},
+       makeRandom},
   };
   return list;
 }

@@ -50,6 +50,28 @@ double distanceTo(const Solid& solid, const Eigen::Vector2d& point) {
   return outside.norm();
 }
 
+bool blocks(const Solid& solid, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector2d x = along(solid.yaw), y(-x.y(), x.x());
+  const auto local = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector2d offset = p.head<2>() - solid.centre;
+    return Eigen::Vector3d(offset.dot(x), offset.dot(y), p.z());
+  };
+  const Eigen::Vector3d low(-solid.half.x(), -solid.half.y(), solid.low);
+  const Eigen::Vector3d high(solid.half.x(), solid.half.y(), solid.high);
+  const Eigen::Vector3d start = local(from), way = local(to) - start;
+  double enters = 0.0, leaves = 1.0;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (std::abs(way[i]) < 1e-12) {
+      if (start[i] <= low[i] || start[i] >= high[i]) return false;
+      continue;
+    }
+    const double a = (low[i] - start[i]) / way[i], b = (high[i] - start[i]) / way[i];
+    enters = std::max(enters, std::min(a, b));
+    leaves = std::min(leaves, std::max(a, b));
+  }
+  return enters < leaves;
+}
+
 Solid solidOf(const SceneObject& object, double t_s) {
   const RigidTransform T_WO = object.motion.poseAt(t_s);
   return {T_WO.p.head<2>(), yawOf(T_WO.R()), 0.5 * object.size.head<2>(),

@@ -26,6 +26,9 @@ bool meet(const Solid& a, const Solid& b, double margin = 0.0);
 /// Distance on the ground from a point to the outline; 0 inside.
 double distanceTo(const Solid& solid, const Eigen::Vector2d& point);
 
+/// Whether the straight line from `from` to `to` (W) goes through it.
+bool blocks(const Solid& solid, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 Solid solidOf(const SceneObject& object, double t_s);
 /// What it fills: a tree is a thin trunk and a crown above it, the rest their boxes.
 std::vector<Solid> solidsOf(const Prop& prop);

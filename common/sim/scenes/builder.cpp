@@ -88,12 +88,12 @@ bool SceneBuilder::put(PropKind kind, const Eigen::Vector3d& size, const Place& 
 }
 
 SceneObject& SceneBuilder::mustPut(SceneObject object, const Place& place) {
-  check(put(std::move(object), place, 0.0), "there is room for what the scene is about");
+  check(put(std::move(object), place, -1e-6), "there is room for what the scene is about");
   return scene_.objects.back();
 }
 
 void SceneBuilder::mustPut(PropKind kind, const Eigen::Vector3d& size, const Place& place) {
-  check(put(kind, size, place, 0.0), "there is room for what the scene is about");
+  check(put(kind, size, place, -1e-6), "there is room for what the scene is about");
 }
 
 SceneObject& SceneBuilder::putMoving(SceneObject object, Trajectory motion) {

@@ -8,5 +8,7 @@
 namespace perdure::sim {
 
 Scene makeStreet(std::uint64_t seed, const SceneOptions& options);
+Scene makeRoom(std::uint64_t seed, const SceneOptions& options);
+Scene makeRandom(std::uint64_t seed, const SceneOptions& options);
 
 }  // namespace perdure::sim
