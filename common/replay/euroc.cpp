@@ -1,4 +1,5 @@
-// EuRoC ASL folders: mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}, CSVs and sensor.yaml.
+// EuRoC ASL folders: mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}, CSVs and sensor.yaml, and
+// where there is one speed0 (`#timestamp [ns],speed [m s^-1]`), which simulated vehicles have.
 // The body is the IMU: where imu0's T_BS is not the identity, everything is moved to it.
 #include <yaml-cpp/yaml.h>
 
@@ -153,6 +154,23 @@ void readImu(const fs::path& folder, Recording& recording) {
     throwMissing(folder / "data.csv", "any inertial sample", "fetch it again");
 }
 
+void readSpeed(const fs::path& folder, Recording& recording) {
+  const double sigma = SensorFile(folder / "sensor.yaml").number("sigma", 1e-6);
+  const auto row = [&](TimePoint time, const std::vector<std::string_view>& fields) {
+    const auto value = parseNumber(fields[1]);
+    if (!value || (!recording.speed.empty() && time <= recording.speed.back().time)) return false;
+    SpeedSample sample;
+    sample.time = time;
+    sample.sequence = recording.speed.size();
+    sample.speed = *value;
+    sample.sigma = sigma;
+    recording.speed.push_back(sample);
+    return true;
+  };
+  readCsv(folder / "data.csv", 2, "speed_malformed", recording.reasons, row);
+  recording.calibration.has_speed = !recording.speed.empty();
+}
+
 /// Frames of one camera; cam1's frames take the index of cam0's frame at the same time.
 void readFrames(const fs::path& folder, std::size_t camera, Recording& recording) {
   constexpr Duration kSame = std::chrono::milliseconds(5);
@@ -229,7 +247,7 @@ Recording readEuroc(const DatasetOptions& options) {
   readImu(mav0 / "imu0", recording);
   for (const std::string name : {"cam0", "cam1"}) {
     if (!fs::exists(mav0 / name / "data.csv")) continue;
-    if (!fs::is_directory(mav0 / name / "data")) {
+    if (options.decode && !fs::is_directory(mav0 / name / "data")) {
       throwMissing(mav0 / name / "data", "the folder of images",
                    "unpack the images (or the video) into it");
     }
@@ -238,6 +256,7 @@ Recording readEuroc(const DatasetOptions& options) {
     recording.calibration.cameras.back().T_BC = imu.T_BS().inverse() * file.T_BS();
     readFrames(mav0 / name, recording.calibration.cameras.size() - 1, recording);
   }
+  if (fs::exists(mav0 / "speed0" / "data.csv")) readSpeed(mav0 / "speed0", recording);
   sortFrames(recording);
   readTruth(mav0, imu.T_BS(), recording);
   return recording;

@@ -2,7 +2,9 @@
 // is the OXTS unit's IMU: x forward, y left, z up. Stamps are as the files say (OXTS runs 7 ms
 // after the images); the right image takes the left one's, for one trigger exposes both.
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "common/base/errors.h"
 #include "common/replay/kitti_calibration.h"
@@ -15,7 +17,17 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kOxtsFields = 30;
-enum OxtsField : std::size_t { kLat = 0, kLon, kAlt, kYaw = 5, kVf = 8, kAx = 11, kWx = 17 };
+enum OxtsField : std::size_t {
+  kLat = 0,
+  kLon,
+  kAlt,
+  kRoll,
+  kPitch,
+  kYaw,
+  kVf = 8,
+  kAx = 11,
+  kWx = 17
+};
 
 std::string tenDigits(std::size_t number) {
   char text[24];
@@ -103,6 +115,32 @@ std::vector<OxtsRecord> readOxts(const fs::path& folder, ReasonCounts& reasons) 
   return records;
 }
 
+/// East, north and up of the first record: a Mercator map of its latitude's scale, as KITTI's own
+/// development kit makes poses.
+RigidTransform poseOf(const OxtsRecord& record, const OxtsRecord& first) {
+  constexpr double kEarthRadius = 6378137.0, kRadians = std::numbers::pi / 180.0;
+  const double* v = record.values.data();
+  const double* o = first.values.data();
+  const auto north = [](double latitude_deg) {
+    return std::log(std::tan((90.0 + latitude_deg) * kRadians / 2.0));
+  };
+  const double metres = kEarthRadius * std::cos(o[kLat] * kRadians);
+  const Eigen::Quaterniond q = Eigen::AngleAxisd(v[kYaw], Eigen::Vector3d::UnitZ()) *
+                               Eigen::AngleAxisd(v[kPitch], Eigen::Vector3d::UnitY()) *
+                               Eigen::AngleAxisd(v[kRoll], Eigen::Vector3d::UnitX());
+  return RigidTransform(q, {metres * (v[kLon] - o[kLon]) * kRadians,
+                            metres * (north(v[kLat]) - north(o[kLat])), v[kAlt] - o[kAlt]});
+}
+
+PoseFile truthOf(const std::vector<OxtsRecord>& records) {
+  std::vector<StampedPose> poses;
+  for (const auto& record : records) {
+    if (!poses.empty() && record.time <= poses.back().time) continue;
+    poses.push_back({record.time, poseOf(record, records.front())});
+  }
+  return PoseFile(PoseFormat::kTum, std::move(poses));
+}
+
 void addOxts(const std::vector<OxtsRecord>& records, Recording& recording) {
   for (const auto& record : records) {
     const double* v = record.values.data();
@@ -171,6 +209,7 @@ Recording readKittiRaw(const DatasetOptions& options) {
   const auto records = readOxts(drive / "oxts", recording.reasons);
   if (records.empty()) throwMissing(drive / "oxts" / "data", "any OXTS record", "fetch it again");
   addOxts(records, recording);
+  recording.truth = truthOf(records);
   return recording;
 }
 

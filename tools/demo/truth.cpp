@@ -10,7 +10,7 @@
 #include "common/replay/kitti_calibration.h"
 #include "common/replay/kitti_labels.h"
 #include "common/replay/pose_file.h"
-#include "tools/evaluate/object_score.h"
+#include "tools/evaluate/kitti_score.h"
 
 namespace perdure::tools {
 namespace {

@@ -18,15 +18,20 @@ struct Match {
   double distance = 0.0;
 };
 
+bool mayBe(const Estimate& estimate, const TruthLabel& label) {
+  return label.class_name.empty() || label.class_name == estimate.class_name;
+}
+
 /// Pairs closer than d and a, greedily by increasing distance, one to one.
-std::vector<Match> matchGreedily(const std::vector<replay::KittiLabel>& truth,
+std::vector<Match> matchGreedily(const std::vector<TruthLabel>& truth,
                                  const std::vector<Estimate>& estimates, double d, double angle) {
   std::vector<Match> pairs;
   for (std::size_t t = 0; t < truth.size(); ++t) {
     for (std::size_t e = 0; e < estimates.size(); ++e) {
       const double distance = (truth[t].centre - estimates[e].centre).norm();
-      const double turn = std::abs(wrapAngle(truth[t].rotation_y - estimates[e].rotation_y));
+      const double turn = std::abs(wrapAngle(truth[t].heading - estimates[e].heading));
       const bool close_in_angle = angle >= std::numbers::pi || turn < angle;
+      if (!mayBe(estimates[e], truth[t])) continue;
       if (distance < d && close_in_angle) pairs.push_back({t, e, distance});
     }
   }
@@ -48,7 +53,7 @@ double shareInside(const Box& box, const Box& region) {
   return box.area() > 0 && w > 0 && h > 0 ? w * h / box.area() : 0.0;
 }
 
-double bestOverlap(const Box& box, const std::vector<replay::KittiLabel>& labels) {
+double bestOverlap(const Box& box, const std::vector<TruthLabel>& labels) {
   double best = 0.0;
   for (const auto& label : labels) best = std::max(best, intersectionOverUnion(box, label.box));
   return best;
@@ -168,41 +173,6 @@ double Cell::precision() const {
   return claimed == 0 ? 1.0 : static_cast<double>(matched) / static_cast<double>(claimed);
 }
 
-std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
-                                 const replay::KittiCalibration& calibration) {
-  constexpr double kClosest = 0.1;  // metres before the camera, for corners behind it
-  const auto project = [&](const Eigen::Vector3d& point) -> Eigen::Vector2d {
-    const Eigen::Vector3d front(point.x(), point.y(), std::max(point.z(), kClosest));
-    const Eigen::Vector3d pixel = calibration.P2 * front.homogeneous();
-    return pixel.head<2>() / pixel.z();
-  };
-  const double width = calibration.width, height = calibration.height;
-  Estimate estimate;
-  estimate.id = row.id;
-  estimate.centre = T_RW * row.centre_W;
-  if (estimate.centre.z() < kClosest) return std::nullopt;
-  const Eigen::Vector2d centre = project(estimate.centre);
-  if (centre.x() < 0 || centre.y() < 0 || centre.x() >= width || centre.y() >= height) {
-    return std::nullopt;
-  }
-  const Eigen::Vector3d forward = T_RW.q * Eigen::Vector3d(std::cos(row.yaw), std::sin(row.yaw), 0);
-  estimate.rotation_y = std::atan2(-forward.z(), forward.x());
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                               corner & 4 ? 0.5 : -0.5);
-    const Eigen::Vector3d size(row.length, row.width, row.height);
-    const Eigen::Vector3d offset = rotationAboutZ(row.yaw) * half.cwiseProduct(size);
-    const Eigen::Vector2d pixel = project(T_RW * (row.centre_W + offset));
-    box.x1 = std::min(box.x1, pixel.x()), box.x2 = std::max(box.x2, pixel.x());
-    box.y1 = std::min(box.y1, pixel.y()), box.y2 = std::max(box.y2, pixel.y());
-  }
-  estimate.box = Box{std::clamp(box.x1, 0.0, width), std::clamp(box.y1, 0.0, height),
-                     std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height)};
-  return estimate;
-}
-
 bool isNeutral(const Estimate& estimate, const TruthFrame& truth) {
   double overlap = bestOverlap(estimate.box, truth.ignored);
   bool belongs = overlap >= kSameBox;
@@ -210,48 +180,33 @@ bool isNeutral(const Estimate& estimate, const TruthFrame& truth) {
     belongs = belongs || (label.centre - estimate.centre).norm() < kNear_m;
   }
   for (const auto& region : truth.dont_care) {
-    const double share = shareInside(estimate.box, region.box);
+    const double share = shareInside(estimate.box, region);
     belongs = belongs || share >= kSameBox;
     overlap = std::max(overlap, share);
   }
   return belongs && bestOverlap(estimate.box, truth.counted) <= overlap;
 }
 
-ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
-                         const std::map<std::uint64_t, TruthFrame>& truth,
-                         const PosesByFrame& poses, const replay::KittiCalibration& calibration,
-                         const ScoreOptions& options) {
+ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
+                        const ScoreOptions& options) {
   ObjectScore score;
-  std::map<std::uint64_t, std::vector<Estimate>> estimates;
-  for (const auto& [frame, labels] : truth) estimates[frame];
-  for (const auto& row : rows) {
-    const auto pose = poses.find(row.frame);
-    std::optional<Estimate> estimate;
-    if (pose != poses.end()) {
-      estimate = toCamera(row, calibration.T_RI * pose->second.inverse(), calibration);
-    }
-    if (estimate)
-      estimates[row.frame].push_back(*estimate);
-    else
-      ++score.outside;
-  }
   std::map<std::int64_t, Track> tracks;
-  for (const auto& [frame, found] : estimates) {
-    const auto labels = truth.find(frame);
-    const TruthFrame here = labels == truth.end() ? TruthFrame{} : labels->second;
+  for (const auto& [frame, scored] : frames) {
+    const TruthFrame& truth = scored.truth;
+    const auto& estimates = scored.estimates;
     std::vector<bool> neutral;
-    for (const auto& estimate : found) neutral.push_back(isNeutral(estimate, here));
+    for (const auto& estimate : estimates) neutral.push_back(isNeutral(estimate, truth));
     std::vector<Match> matches;
     for (std::size_t d = 0; d < 3; ++d) {
       for (std::size_t a = 0; a < 3; ++a) {
-        matches = matchGreedily(here.counted, found, kDistances_m[d],
+        matches = matchGreedily(truth.counted, estimates, kDistances_m[d],
                                 kAngles_deg[a] * std::numbers::pi / 180.0);
-        countCell(matches, here.counted.size(), neutral, options.strict, score.cells[d][a]);
+        countCell(matches, truth.counted.size(), neutral, options.strict, score.cells[d][a]);
       }
     }
-    followIdentities(matches, found, here, tracks, score);
-    countUnmatched(matches, found, neutral, here, score);
-    noteMishaps(frame, matches, found, neutral, here, score.mishaps);
+    followIdentities(matches, estimates, truth, tracks, score);
+    countUnmatched(matches, estimates, neutral, truth, score);
+    noteMishaps(frame, matches, estimates, neutral, truth, score.mishaps);
   }
   summarise(tracks, options, score);
   return score;

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <string>
 #include <vector>
 
-#include "tools/evaluate/object_rows.h"
 #include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
@@ -27,7 +27,7 @@ struct Mishap {
   std::uint64_t frame = 0;
   bool miss = false;
   std::int64_t id = 0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< in rectified camera 0
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< in the camera
   double nearest_m =
       0.0;  ///< to the nearest estimate (a miss) or label of any kind (a false alarm)
 };
@@ -52,23 +52,26 @@ struct ScoreOptions {
   double frame_interval_s = 0.1;
 };
 
-/// An estimate in rectified camera 0.
+/// An estimate in the truth's frame of reference.
 struct Estimate {
   std::uint64_t id = 0;
+  std::string class_name;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double rotation_y = 0;
+  double heading = 0;
   Box box;  ///< of the cuboid's corners, cut at the image
 };
 
-/// Maps a row from W into the camera; nothing where the centre is behind or outside the image.
-std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
-                                 const replay::KittiCalibration& calibration);
+/// One frame, ready to be scored.
+struct ScoredFrame {
+  TruthFrame truth;
+  std::vector<Estimate> estimates;
+};
+
 /// Whether an unmatched estimate belongs to an ignored label rather than to a counted one.
 bool isNeutral(const Estimate& estimate, const TruthFrame& truth);
 
-ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
-                         const std::map<std::uint64_t, TruthFrame>& truth,
-                         const PosesByFrame& poses, const replay::KittiCalibration& calibration,
-                         const ScoreOptions& options);
+/// Frames by index.
+ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
+                        const ScoreOptions& options);
 
 }  // namespace perdure::tools

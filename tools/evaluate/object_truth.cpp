@@ -54,13 +54,17 @@ std::set<std::int64_t> staticTracks(const std::vector<replay::KittiLabel>& label
 
 std::map<std::uint64_t, TruthFrame> sortTruth(const std::vector<replay::KittiLabel>& labels,
                                               const std::set<std::int64_t>& static_tracks) {
-  constexpr double kMinHeight_px = 25.0;
   std::map<std::uint64_t, TruthFrame> frames;
   for (const auto& label : labels) {
     TruthFrame& frame = frames[label.frame];
+    if (label.dontCare()) {
+      frame.dont_care.push_back(label.box);
+      continue;
+    }
     const bool counts = label.type == "Car" && label.occluded == 0 && label.truncated == 0 &&
                         label.box.height() >= kMinHeight_px && static_tracks.contains(label.track);
-    (label.dontCare() ? frame.dont_care : counts ? frame.counted : frame.ignored).push_back(label);
+    (counts ? frame.counted : frame.ignored)
+        .push_back({label.track, "", label.centre, label.rotation_y, label.box});
   }
   return frames;
 }

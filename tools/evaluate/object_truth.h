@@ -1,8 +1,9 @@
-// Which labelled cars count, and which labels are ignored (design, section 7).
+// Which true objects count in a frame, and which are ignored (design, section 7).
 #pragma once
 
 #include <map>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "common/math/rigid_transform.h"
@@ -11,12 +12,23 @@
 
 namespace perdure::tools {
 
-/// Labels of one frame; all in rectified camera 0, boxes in image 2.
-struct TruthFrame {
-  std::vector<replay::KittiLabel> counted;
-  std::vector<replay::KittiLabel> ignored;    ///< other labels
-  std::vector<replay::KittiLabel> dont_care;  ///< regions without 3D
+/// A true object in one frame, in the frame of reference in which estimates are compared with it.
+struct TruthLabel {
+  std::int64_t track = -1;
+  std::string class_name;  ///< that an estimate must have; empty: estimates are not asked
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double heading = 0;  ///< radians, about the vertical
+  Box box;             ///< in the image
 };
+
+/// Truth of one frame. Of KITTI: all in rectified camera 0, boxes in image 2, heading `rotation_y`.
+struct TruthFrame {
+  std::vector<TruthLabel> counted;
+  std::vector<TruthLabel> ignored;  ///< other labels
+  std::vector<Box> dont_care;       ///< regions without 3D
+};
+
+inline constexpr double kMinHeight_px = 25.0;  ///< of what counts
 
 using PosesByFrame = std::map<std::uint64_t, RigidTransform>;  ///< T_WB
 

@@ -1,4 +1,5 @@
-// `perdure evaluate objects`: the nine cells and the identities, as text or JSON.
+// `perdure evaluate objects`: the nine cells and the identities, as text or JSON, against a
+// simulated folder or KITTI tracking.
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
@@ -7,7 +8,8 @@
 #include "common/base/errors.h"
 #include "common/replay/pose_file.h"
 #include "tools/evaluate/command.h"
-#include "tools/evaluate/object_score.h"
+#include "tools/evaluate/kitti_score.h"
+#include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
 namespace {
@@ -15,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ObjectsOptions {
-  std::string truth, sequence, csv, trajectory, class_name = "car";
+  std::string truth, sequence, csv, trajectory, class_name;
   std::vector<std::uint32_t> image_size;
   ScoreOptions score;
   bool json = false, list = false;
@@ -24,7 +26,13 @@ struct ObjectsOptions {
 struct Evaluated {
   ObjectScore score;
   std::uint64_t estimates = 0, poses = 0;
+  std::string of;  ///< for people: which truth, which class
 };
+
+fs::path trajectoryOf(const ObjectsOptions& options) {
+  const fs::path beside = fs::path(options.csv).parent_path() / "trajectory.tum";
+  return options.trajectory.empty() ? beside : fs::path(options.trajectory);
+}
 
 replay::KittiCalibration readCalibration(const ObjectsOptions& options) {
   const fs::path root = options.truth;
@@ -35,18 +43,35 @@ replay::KittiCalibration readCalibration(const ObjectsOptions& options) {
   return calibration;
 }
 
-Evaluated evaluate(const ObjectsOptions& options) {
-  const fs::path csv = options.csv;
-  const fs::path beside = csv.parent_path() / "trajectory.tum";
-  const fs::path tum = options.trajectory.empty() ? beside : fs::path(options.trajectory);
+Evaluated evaluateKitti(const ObjectsOptions& options) {
+  const std::string class_name = options.class_name.empty() ? "car" : options.class_name;
   const auto labels =
       replay::readKittiLabels(fs::path(options.truth) / "label_02" / (options.sequence + ".txt"));
   const auto calibration = readCalibration(options);
-  auto rows = readObjectRows(csv);
-  const auto poses = posesByFrame(replay::PoseFile::read(tum).poses(), rows);
-  std::erase_if(rows, [&](const EstimateRow& row) { return row.class_name != options.class_name; });
+  auto rows = readObjectRows(options.csv);
+  const auto poses = posesByFrame(replay::PoseFile::read(trajectoryOf(options)).poses(), rows);
+  std::erase_if(rows, [&](const EstimateRow& row) { return row.class_name != class_name; });
   const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
-  return {scoreObjects(rows, truth, poses, calibration, options.score), rows.size(), poses.size()};
+  return {scoreObjects(rows, truth, poses, calibration, options.score), rows.size(), poses.size(),
+          "sequence " + options.sequence + ", class " + class_name};
+}
+
+Evaluated evaluateSimulated(ObjectsOptions options) {
+  const SimulatedTruth truth = readSimulatedTruth(options.truth);
+  const SimulatedRun run =
+      pairWithTruth(truth, readObjectRows(options.csv),
+                    replay::PoseFile::read(trajectoryOf(options)).poses(), options.class_name);
+  options.score.frame_interval_s = truth.frameInterval();
+  Evaluated result{
+      scoreFrames(run.frames, options.score), run.estimates, run.poses,
+      "simulated, " + (options.class_name.empty() ? "all classes" : "class " + options.class_name)};
+  result.score.outside = run.outside;
+  return result;
+}
+
+Evaluated evaluate(const ObjectsOptions& options) {
+  if (!options.sequence.empty()) return evaluateKitti(options);
+  return evaluateSimulated(options);
 }
 
 nlohmann::ordered_json toJson(const Evaluated& result) {
@@ -94,8 +119,8 @@ void printMishaps(const ObjectScore& score) {
 void print(const Evaluated& result, const ObjectsOptions& options) {
   const ObjectScore& s = result.score;
   const auto json = toJson(result);
-  std::printf("sequence %s, class %s%s: precision / recall\n", options.sequence.c_str(),
-              options.class_name.c_str(), options.score.strict ? ", strict" : "");
+  std::printf("%s%s: precision / recall\n", result.of.c_str(),
+              options.score.strict ? ", strict" : "");
   std::printf("          < 30 deg       < 45 deg       any\n");
   for (std::size_t d = 0; d < 3; ++d) {
     std::printf("< %.1f m", kDistances_m[d]);
@@ -124,13 +149,15 @@ void print(const Evaluated& result, const ObjectsOptions& options) {
 void addEvaluateObjects(CLI::App& evaluate_app) {
   auto options = std::make_shared<ObjectsOptions>();
   CLI::App* app = evaluate_app.add_subcommand(
-      "objects", "Precision and recall of objects_inst.csv or objects_final.csv on KITTI tracking");
+      "objects", "Precision and recall of objects_inst.csv or objects_final.csv");
   app->add_option("csv", options->csv, "objects_inst.csv or objects_final.csv")->required();
-  app->add_option("--truth", options->truth, "Root of KITTI tracking (label_02, calib)")
+  app->add_option("--truth", options->truth,
+                  "A simulated folder, or the root of KITTI tracking (label_02, calib)")
       ->required();
-  app->add_option("--sequence", options->sequence, "Sequence, for example 0000")->required();
+  app->add_option("--sequence", options->sequence, "Of KITTI tracking, for example 0000");
   app->add_option("--trajectory", options->trajectory, "Default: trajectory.tum beside the CSV");
-  app->add_option("--class", options->class_name, "Class of the estimates")->capture_default_str();
+  app->add_option("--class", options->class_name,
+                  "Only this class; without it car on KITTI, all of them where simulated");
   app->add_option("--image-size", options->image_size, "Width and height in pixels")->expected(2);
   app->add_flag("--strict", options->score.strict, "Estimates on ignored labels are false alarms");
   app->add_flag("--list", options->list, "List every false alarm and miss (1.5 m, any angle)");

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "common/base/ids.h"
-#include "tools/evaluate/object_score.h"
+#include "tools/evaluate/kitti_score.h"
 
 namespace perdure::tools {
 namespace {

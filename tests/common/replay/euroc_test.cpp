@@ -71,6 +71,49 @@ TEST(Euroc, SamplesAndFramesComeByTimeWithTheSampleFirst) {
   EXPECT_TRUE(dataset->reasons().all().empty());
 }
 
+TEST(Euroc, ASimulatedVehiclesSpeedComesWithItsSigma) {
+  const auto root = tinyEuroc("speed");
+  writeText(root / "mav0/speed0/sensor.yaml", "sensor_type: speed\nrate_hz: 50\nsigma: 0.03\n");
+  writeText(root / "mav0/speed0/data.csv",
+            "#timestamp [ns],speed [m s^-1]\n1000000000,8.5\n1020000000,8.6\n1010000000,1\nx,2\n");
+  const auto dataset = open(root);
+  EXPECT_TRUE(dataset->calibration().has_speed);
+  std::vector<SpeedSample> speed;
+  while (auto message = dataset->next()) {
+    if (auto* sample = std::get_if<SpeedSample>(&*message)) speed.push_back(*sample);
+  }
+  ASSERT_EQ(speed.size(), 2U);
+  EXPECT_EQ(speed[1].speed, 8.6);
+  EXPECT_EQ(speed[1].sigma, 0.03);
+  EXPECT_EQ(toNanoseconds(speed[1].time), 1'020'000'000);
+  EXPECT_EQ(dataset->reasons().of("speed_malformed"), 2U);
+  fs::remove(root / "mav0/speed0/sensor.yaml");
+  EXPECT_THAT(errorOf(root), HasSubstr("speed0/sensor.yaml"));
+}
+
+TEST(Euroc, ImagesMayBeJpegByTheNamesInTheTable) {
+  const auto root = tinyEuroc("jpeg");
+  const auto table = root / "mav0/cam0/data.csv";
+  writeText(table, "#timestamp [ns],filename\n1000000000,1000000000.jpg\n");
+  writeImage(root / "mav0/cam0/data/1000000000.jpg", 32, 24, 3);
+  const auto dataset = open(root);
+  std::optional<Frame> frame;
+  while (auto message = dataset->next()) {
+    if (auto* one = std::get_if<Frame>(&*message)) frame = *one;
+  }
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->encoding, ImageEncoding::kBgr8);
+}
+
+TEST(Euroc, WhoWantsNoPixelsNeedsNoImages) {
+  const auto root = tinyEuroc("no_images");
+  fs::remove_all(root / "mav0/cam0/data");
+  const auto dataset = Dataset::open({.path = root, .decode = false});
+  std::size_t frames = 0;
+  while (auto message = dataset->next()) frames += std::holds_alternative<Frame>(*message);
+  EXPECT_EQ(frames, 5U);
+}
+
 TEST(Euroc, ASecondCameraSharesIndexAndTimeWithTheFirst) {
   const auto root = tinyEuroc("stereo", true);
   // cam1 runs 2 ms late, and its third frame has no partner.

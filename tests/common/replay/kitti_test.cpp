@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "common/camera/camera_model.h"
@@ -96,6 +97,22 @@ TEST(KittiRaw, TheFirstOxtsRecordAnchorsTheDriveOnEarth) {
   ASSERT_TRUE(dataset->calibration().anchor);
   EXPECT_EQ(dataset->calibration().anchor->latitude_deg, 49.01);
   EXPECT_EQ(dataset->calibration().anchor->yaw, -1.22);
+}
+
+TEST(KittiRaw, OxtsGivesTheTrueWayEastNorthAndUp) {
+  const auto drive = tinyKittiRaw("way");
+  const std::string record = readText(drive / "oxts/data/0000000002.txt");
+  writeText(drive / "oxts/data/0000000002.txt", "49.0101 8.4202 113.8 0 0 1.5" + record.substr(33));
+  const auto dataset = Dataset::open({.path = drive});
+  ASSERT_TRUE(dataset->truth());
+  const auto& poses = dataset->truth()->poses();
+  ASSERT_EQ(poses.size(), 4U);
+  EXPECT_TRUE(poses[0].T_WB.p.isZero());
+  // A degree of a great circle of 6378137 m is 111319.5 m; one of longitude is cos 49.01 of it.
+  EXPECT_NEAR(poses[2].T_WB.p.x(), 2e-4 * 111319.5 * std::cos(49.01 * 3.14159265 / 180), 1e-3);
+  EXPECT_NEAR(poses[2].T_WB.p.y(), 1e-4 * 111319.5, 1e-3);
+  EXPECT_NEAR(poses[2].T_WB.p.z(), 1.0, 1e-9);
+  EXPECT_NEAR((poses[2].T_WB.q * Eigen::Vector3d::UnitX()).x(), std::cos(1.5), 1e-9);
 }
 
 TEST(KittiRaw, CalibrationBesideOrAboveTheDriveIsFoundAndItsAbsenceNamed) {

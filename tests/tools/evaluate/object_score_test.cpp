@@ -1,8 +1,8 @@
-#include "tools/evaluate/object_score.h"
-
 #include <gtest/gtest.h>
 
 #include <numbers>
+
+#include "tools/evaluate/kitti_score.h"
 
 namespace perdure::tools {
 namespace {
@@ -28,13 +28,11 @@ EstimateRow rowAt(double x, double z, std::uint64_t id = 1, std::uint64_t frame 
   return row;
 }
 
-replay::KittiLabel labelAt(double x, double z, std::int64_t track = 7) {
-  replay::KittiLabel label;
+TruthLabel labelAt(double x, double z, std::int64_t track = 7) {
+  TruthLabel label;
   label.track = track;
-  label.type = "Car";
   label.centre = Eigen::Vector3d(x, 1.0, z);
-  label.length = 4.0, label.width = 1.5, label.height = 1.6;
-  label.rotation_y = 0.0;
+  label.heading = 0.0;
   label.box = toCamera(rowAt(x, z), RigidTransform(), camera())->box;
   return label;
 }
@@ -63,11 +61,11 @@ TEST(ObjectScore, DistanceDecidesTheCell) {
 TEST(ObjectScore, AngleIsModuloAFullTurnAndAnyMeansAny) {
   auto label = labelAt(0, 20);
   for (const double turn : {0.0, 2 * kPi - 0.4}) {
-    label.rotation_y = turn;  // the estimate's rotation_y is 0
+    label.heading = turn;  // the estimate's is 0
     const auto s = score({rowAt(0, 20)}, {{.counted = {label}, .ignored = {}, .dont_care = {}}});
     EXPECT_EQ(s.cells[2][0].matched, 1U) << turn;
   }
-  label.rotation_y = kPi;
+  label.heading = kPi;
   const auto s = score({rowAt(0, 20)}, {{.counted = {label}, .ignored = {}, .dont_care = {}}});
   EXPECT_EQ(s.cells[2][1].matched, 0U);
   EXPECT_EQ(s.cells[2][1].false_alarms, 1U);
@@ -98,15 +96,13 @@ TEST(ObjectScore, AnEstimateOnAnIgnoredLabelIsNeutralUnlessStrict) {
 }
 
 TEST(ObjectScore, HalfTheBoxInADontCareRegionIsNeutral) {
-  replay::KittiLabel region;
-  region.type = "DontCare";
   const Box box = labelAt(0, 20).box;
-  region.box = Box{box.x1, box.y1, box.x1 + 0.6 * box.width(), box.y2};
+  Box region{box.x1, box.y1, box.x1 + 0.6 * box.width(), box.y2};
   EXPECT_EQ(score({rowAt(0, 20)}, {{.counted = {}, .ignored = {}, .dont_care = {region}}})
                 .cells[2][2]
                 .false_alarms,
             0U);
-  region.box.x2 = box.x1 + 0.4 * box.width();
+  region.x2 = box.x1 + 0.4 * box.width();
   EXPECT_EQ(score({rowAt(0, 20)}, {{.counted = {}, .ignored = {}, .dont_care = {region}}})
                 .cells[2][2]
                 .false_alarms,
@@ -162,10 +158,10 @@ TEST(ObjectScore, YawInWBecomesRotationAboutTheCamerasVertical) {
   EstimateRow row;
   row.centre_W = Eigen::Vector3d(20, 0, 0);
   row.length = 4, row.width = 2, row.height = 1.5;
-  EXPECT_NEAR(toCamera(row, T_RW, camera())->rotation_y, -kPi / 2, 1e-12);
+  EXPECT_NEAR(toCamera(row, T_RW, camera())->heading, -kPi / 2, 1e-12);
   row.yaw = -kPi / 2;
   const auto seen = toCamera(row, T_RW, camera());
-  EXPECT_NEAR(seen->rotation_y, 0.0, 1e-12);
+  EXPECT_NEAR(seen->heading, 0.0, 1e-12);
   EXPECT_NEAR(seen->box.width(), 700 * 4.0 / 19.0, 1e-9) << "the near face, 1 m before the centre";
   EXPECT_NEAR(seen->box.height(), 700 * 1.5 / 19.0, 1e-9);
 }

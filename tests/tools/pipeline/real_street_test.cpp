@@ -5,7 +5,7 @@
 
 #include "common/replay/text_file.h"
 #include "tests/common/replay/tiny_datasets.h"
-#include "tools/evaluate/object_score.h"
+#include "tools/evaluate/kitti_score.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {

@@ -1,0 +1,21 @@
+// Objects against KITTI tracking's labels: estimates are taken into rectified camera 0.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "tools/evaluate/object_rows.h"
+#include "tools/evaluate/object_score.h"
+
+namespace perdure::tools {
+
+/// Maps a row from W into the camera; nothing where the centre is behind or outside the image.
+std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
+                                 const replay::KittiCalibration& calibration);
+
+ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
+                         const std::map<std::uint64_t, TruthFrame>& truth,
+                         const PosesByFrame& poses, const replay::KittiCalibration& calibration,
+                         const ScoreOptions& options);
+
+}  // namespace perdure::tools
