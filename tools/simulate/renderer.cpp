@@ -12,11 +12,10 @@ namespace {
 constexpr int kTile = 32;
 constexpr float kNear = 0.02F, kSunOffset = 2e-3F;
 
-std::array<int, kPacket> validOf(unsigned count) {
-  std::array<int, kPacket> valid;
-  for (unsigned i = 0; i < kPacket; ++i) valid[i] = i < count ? -1 : 0;
-  return valid;
-}
+/// -1 for the lanes in use; aligned as Embree wants it.
+struct alignas(32) Lanes {
+  std::array<int, kPacket> valid{};
+};
 
 template <class Rays>
 void setRay(Rays& rays, unsigned i, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
@@ -101,13 +100,14 @@ void Renderer::aim(Packet& packet, int column, int row, float dx, float dy) cons
 
 void Renderer::follow(Packet& packet) const {
   RTCRayHit8 rays;
-  const auto valid = validOf(packet.count);
+  Lanes lanes;
   for (unsigned i = 0; i < packet.count; ++i) {
+    lanes.valid[i] = -1;
     setRay(rays.ray, i, packet.origins[i], packet.directions[i], kNear);
     rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
-  world_.intersect(valid.data(), rays);
+  world_.intersect(lanes.valid.data(), rays);
   for (unsigned i = 0; i < packet.count; ++i) {
     readHit(world_, rays, i, packet.origins[i], packet.directions[i], packet.hits[i]);
   }
@@ -115,7 +115,7 @@ void Renderer::follow(Packet& packet) const {
 
 void Renderer::findSun(Packet& packet) const {
   RTCRay8 rays;
-  std::array<int, kPacket> valid{};
+  Lanes lanes;
   bool any = false;
   for (unsigned i = 0; i < packet.count; ++i) {
     const Hit& hit = packet.hits[i];
@@ -123,12 +123,13 @@ void Renderer::findSun(Packet& packet) const {
     if (hit.instance == kNothing || hit.normal.dot(lighting_.sun()) <= 0.0F) continue;
     const float offset = kSunOffset + 2e-4F * hit.distance;
     setRay(rays, i, hit.position + offset * hit.normal, lighting_.sun(), offset);
-    valid[i] = -1;
+    lanes.valid[i] = -1;
     any = true;
   }
   if (!any) return;
-  world_.occluded(valid.data(), rays);
-  for (unsigned i = 0; i < packet.count; ++i) packet.in_sun[i] = valid[i] && rays.tfar[i] >= 0.0F;
+  world_.occluded(lanes.valid.data(), rays);
+  for (unsigned i = 0; i < packet.count; ++i)
+    packet.in_sun[i] = lanes.valid[i] && rays.tfar[i] >= 0.0F;
 }
 
 void Renderer::forTiles(const Picture& picture, const std::function<void(int, int)>& task) {
