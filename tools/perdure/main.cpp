@@ -9,6 +9,7 @@
 #include "tools/evaluate/command.h"
 #include "tools/map/command.h"
 #include "tools/pipeline/command.h"
+#include "tools/simulate/command.h"
 
 namespace {
 
@@ -38,6 +39,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   perdure::tools::addPipelineCommand(app);
   perdure::tools::addEvaluateCommand(app);
+  perdure::tools::addSimulateCommand(app);
   perdure::tools::addMapCommand(app);
   perdure::tools::addDemoCommand(app);
   perdure::tools::addBusCommands(app);
