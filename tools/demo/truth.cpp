@@ -11,6 +11,7 @@
 #include "common/replay/kitti_labels.h"
 #include "common/replay/pose_file.h"
 #include "tools/evaluate/kitti_score.h"
+#include "tools/evaluate/object_report.h"
 
 namespace perdure::tools {
 namespace {
@@ -116,14 +117,11 @@ Json scoreAgainst(const TruthFiles& truth, const fs::path& out) {
   std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
   const auto tracks = staticTracks(labels, calibration.T_RI, poses);
   const auto score = scoreObjects(rows, sortTruth(labels, tracks), poses, calibration, {});
-  const Cell& cell = score.cells[1][2];
-  return {{"recall", cell.recall()},
-          {"precision", cell.precision()},
-          {"duplicates", score.duplicates},
-          {"position_error_m", score.position_error_m},
-          {"of", "cars in objects_final.csv, under 1 m, any orientation; duplicates and position "
-                 "error under 1.5 m"},
-          {"parked_cars", parkedCars(labels, tracks, poses, calibration.T_RI, rows)}};
+  Json report = toReport(score);
+  report["of"] = "cars in objects_final.csv, under 1 m, any orientation; duplicates are objects of "
+                 "the map for each true one that was found";
+  report["parked_cars"] = parkedCars(labels, tracks, poses, calibration.T_RI, rows);
+  return report;
 }
 
 }  // namespace perdure::tools

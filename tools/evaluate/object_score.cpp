@@ -63,7 +63,7 @@ double bestOverlap(const Box& box, const std::vector<TruthLabel>& labels) {
 struct Track {
   std::uint64_t counted = 0, matched = 0, unmatched_since = 0;
   std::uint64_t last_id = 0;
-  std::set<std::uint64_t> ids;
+  std::set<std::uint64_t> ids, ids_near;
 };
 
 void followIdentities(const std::vector<Match>& matches, const std::vector<Estimate>& estimates,
@@ -83,6 +83,7 @@ void followIdentities(const std::vector<Match>& matches, const std::vector<Estim
     track.unmatched_since = 0;
     track.last_id = *id_of[t];
     track.ids.insert(*id_of[t]);
+    track.ids_near.insert(*id_of[t]);
     ++track.matched;
   }
 }
@@ -94,6 +95,7 @@ void summarise(const std::map<std::int64_t, Track>& tracks, const ScoreOptions& 
   for (const auto& [id, track] : tracks) {
     if (track.matched > 0) ++score.objects_found;
     score.ids_matched += track.ids.size();
+    if (track.matched > 0) score.ids_near += track.ids_near.size();
     score.minutes += static_cast<double>(track.counted) * options.frame_interval_s / 60.0;
     recalls += static_cast<double>(track.matched) / static_cast<double>(track.counted);
   }
@@ -106,7 +108,10 @@ void summarise(const std::map<std::int64_t, Track>& tracks, const ScoreOptions& 
 void countCell(const std::vector<Match>& matches, std::size_t truths,
                const std::vector<bool>& neutral, bool strict, Cell& cell) {
   std::vector<bool> used(neutral.size());
-  for (const Match& match : matches) used[match.estimate] = true;
+  for (const Match& match : matches) {
+    used[match.estimate] = true;
+    cell.distance_m += match.distance;
+  }
   cell.matched += matches.size();
   cell.truth += truths;
   for (std::size_t e = 0; e < neutral.size(); ++e) {
@@ -114,8 +119,20 @@ void countCell(const std::vector<Match>& matches, std::size_t truths,
   }
 }
 
+/// The counted truth nearest to the estimate, where it is near.
+const TruthLabel* nearestCounted(const Estimate& estimate, const TruthFrame& truth) {
+  const TruthLabel* nearest = nullptr;
+  double best = kNear_m;
+  for (const auto& label : truth.counted) {
+    const double distance = (label.centre - estimate.centre).norm();
+    if (distance < best) best = distance, nearest = &label;
+  }
+  return nearest;
+}
+
 void countUnmatched(const std::vector<Match>& matches, const std::vector<Estimate>& estimates,
-                    const std::vector<bool>& neutral, const TruthFrame& truth, ObjectScore& score) {
+                    const std::vector<bool>& neutral, const TruthFrame& truth,
+                    std::map<std::int64_t, Track>& tracks, ObjectScore& score) {
   std::vector<bool> used(estimates.size());
   for (const Match& match : matches) {
     used[match.estimate] = true;
@@ -123,11 +140,12 @@ void countUnmatched(const std::vector<Match>& matches, const std::vector<Estimat
   }
   for (std::size_t e = 0; e < estimates.size(); ++e) {
     if (used[e]) continue;
-    if (neutral[e]) ++score.neutral;
-    const bool near = std::any_of(truth.counted.begin(), truth.counted.end(), [&](const auto& t) {
-      return (t.centre - estimates[e].centre).norm() < kNear_m;
-    });
-    if (near && !neutral[e]) ++score.duplicates;
+    if (neutral[e]) {
+      ++score.neutral;
+    } else if (const TruthLabel* label = nearestCounted(estimates[e], truth)) {
+      ++score.duplicates;
+      tracks[label->track].ids_near.insert(estimates[e].id);
+    }
   }
 }
 
@@ -168,6 +186,15 @@ double Cell::recall() const {
   return truth == 0 ? 1.0 : static_cast<double>(matched) / static_cast<double>(truth);
 }
 
+double Cell::positionError() const {
+  return matched == 0 ? 0.0 : distance_m / static_cast<double>(matched);
+}
+
+double ObjectScore::idsPerFound() const {
+  return objects_found == 0 ? 1.0
+                            : static_cast<double>(ids_near) / static_cast<double>(objects_found);
+}
+
 double Cell::precision() const {
   const std::uint64_t claimed = matched + false_alarms;
   return claimed == 0 ? 1.0 : static_cast<double>(matched) / static_cast<double>(claimed);
@@ -205,7 +232,7 @@ ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
       }
     }
     followIdentities(matches, estimates, truth, tracks, score);
-    countUnmatched(matches, estimates, neutral, truth, score);
+    countUnmatched(matches, estimates, neutral, truth, tracks, score);
     noteMishaps(frame, matches, estimates, neutral, truth, score.mishaps);
   }
   summarise(tracks, options, score);

@@ -18,8 +18,10 @@ inline constexpr std::array<double, 3> kAngles_deg{30.0, 45.0, 180.0};  ///< the
 
 struct Cell {
   std::uint64_t matched = 0, truth = 0, false_alarms = 0;
-  double recall() const;     ///< 1 where there is no truth
-  double precision() const;  ///< 1 where there are no estimates
+  double distance_m = 0.0;       ///< summed over the matched
+  double recall() const;         ///< 1 where there is no truth
+  double precision() const;      ///< 1 where there are no estimates
+  double positionError() const;  ///< metres, mean of the matched
 };
 
 /// A false alarm (with the estimate's id) or a miss (with the truth's track), at 1.5 m, any angle.
@@ -39,12 +41,16 @@ struct ObjectScore {
   std::uint64_t duplicates = 0;     ///< unmatched estimates nearest to, and near, a counted truth
   std::uint64_t interruptions = 0;  ///< counted frames without match between frames with one
   std::uint64_t ids_matched = 0;    ///< distinct ids, summed over true objects
+  std::uint64_t ids_near = 0;       ///< the same with the duplicates' ids
   double minutes = 0.0;             ///< of counted truth, summed over objects
   double position_error_m = 0.0;    ///< mean of the matched
   double mean_object_recall = 0.0;
   std::uint64_t objects = 0, objects_found = 0;  ///< true objects; those matched at least once
   std::uint64_t neutral = 0, outside = 0;        ///< estimates that were set aside (1.5 m, any)
   std::vector<Mishap> mishaps;
+
+  /// Objects of the map for each true object that was found: 1 is perfect.
+  double idsPerFound() const;
 };
 
 struct ScoreOptions {

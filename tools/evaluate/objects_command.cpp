@@ -97,6 +97,7 @@ nlohmann::ordered_json toJson(const Evaluated& result) {
           {"mean_object_recall", s.mean_object_recall},
           {"position_error_m", s.position_error_m},
           {"id_switches", s.id_switches},
+          {"ids_per_found_object", s.idsPerFound()},
           {"ids_per_object", static_cast<double>(s.ids_matched) / objects},
           {"duplicates_per_object", static_cast<double>(s.duplicates) / objects},
           {"flicker_per_minute",
@@ -138,9 +139,9 @@ void print(const Evaluated& result, const ObjectsOptions& options) {
       static_cast<unsigned long long>(s.objects_found), static_cast<unsigned long long>(s.objects),
       s.mean_object_recall, s.position_error_m);
   std::printf(
-      "identities: %llu switches, %.2f ids an object, %.2f duplicates an object, "
+      "identities: %llu switches, %.2f ids a found object, %.2f duplicates an object, "
       "%.2f interruptions a minute\n",
-      static_cast<unsigned long long>(s.id_switches), json["ids_per_object"].get<double>(),
+      static_cast<unsigned long long>(s.id_switches), s.idsPerFound(),
       json["duplicates_per_object"].get<double>(), json["flicker_per_minute"].get<double>());
 }
 

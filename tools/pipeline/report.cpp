@@ -4,6 +4,8 @@
 
 #include "common/base/ids.h"
 #include "tools/evaluate/kitti_score.h"
+#include "tools/evaluate/object_report.h"
+#include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
 namespace {
@@ -62,12 +64,7 @@ Json objectScore(const PipelineOptions& options, const fs::path& labels_file) {
   const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
   std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
   const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
-  const ObjectScore score = scoreObjects(rows, truth, poses, calibration, {});
-  const Cell& at_one_metre = score.cells[1][2];
-  return {{"recall", at_one_metre.recall()},
-          {"precision", at_one_metre.precision()},
-          {"duplicates", score.duplicates},
-          {"position_error_m", score.position_error_m}};
+  return toReport(scoreObjects(rows, truth, poses, calibration, {}));
 }
 
 }  // namespace
@@ -87,7 +84,9 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
   const fs::path labels = fs::path(options.data) / "label_02" / (options.sequence + ".txt");
   const bool has_truth =
       pipeline.dataset().kind() == replay::DatasetKind::kKittiTracking && fs::exists(labels);
-  if (has_truth && pipeline.outputs().odometryFrames() > 0) {
+  if (pipeline.outputs().odometryFrames() == 0) return report;
+  if (isSimulated(options.data)) report["objects"] = reportSimulated(options.data, options.out);
+  if (has_truth) {
     report["objects"] = objectScore(options, labels);
     copyTruth(options.data, fs::path(options.out) / "truth", options.sequence);
   }

@@ -130,6 +130,15 @@ TEST(ObjectScore, AnotherIdForTheSameTruthIsASwitchAndAGapAnInterruption) {
   EXPECT_NEAR(s.minutes, 0.4 / 60, 1e-12);
 }
 
+TEST(ObjectScore, ObjectsOfTheMapAreCountedForEachTrueOneThatWasFound) {
+  const TruthFrame truth{{labelAt(0, 20, 1), labelAt(8, 20, 2), labelAt(-8, 20, 3)}, {}, {}};
+  const auto s = score({rowAt(0, 20, 1), rowAt(0.9, 20, 2), rowAt(8.3, 20, 3)}, {truth});
+  EXPECT_EQ(s.duplicates, 1U);
+  EXPECT_NEAR(s.idsPerFound(), 3.0 / 2.0, 1e-12) << "two for the first, one for the second";
+  EXPECT_NEAR(s.cells[1][2].positionError(), 0.15, 1e-12);
+  EXPECT_EQ(score({}, {truth}).idsPerFound(), 1.0);
+}
+
 TEST(ObjectScore, FalseAlarmsAndMissesAreListedWithWhatIsNearest) {
   const TruthFrame truth{{labelAt(0, 20, 7)}, {}, {}};
   const auto s = score({rowAt(0, 23, 9)}, {truth});
