@@ -9,8 +9,9 @@
 
 namespace perdure::tools {
 
-/// Paving, brick, bark, leaves, wood, screens and the grounds bring their own colours; plaster,
-/// fabric, metal, car paint, skin and markings are nearly white, to be tinted by the material.
+/// Paving, brick, bark, leaves, wood (boards), timber, books, screens and the grounds bring their
+/// own colours; plaster, fabric, metal, car paint, skin and markings are nearly white, to be tinted
+/// by the material.
 enum class TextureKind {
   kAsphalt,
   kPaving,
@@ -29,7 +30,8 @@ enum class TextureKind {
   kMarkings,
   kTiles,
   kEarth,
-  kBooks
+  kBooks,
+  kTimber
 };
 
 class Texture {

@@ -13,7 +13,7 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kWheel = 0.335F;
 
 struct Bicycle {
-  int frame, rubber, metal, saddle;
+  int frame, rubber, metal, spokes, saddle;
 };
 
 /// Spokes are thin strips in the wheel's plane, seen from both sides.
@@ -29,7 +29,7 @@ void addWheel(MeshBuilder& b, const Bicycle& m, float x) {
     const Vec3 along(std::cos(a), 0.0F, std::sin(a)), side(-std::sin(a), 0.0F, std::cos(a));
     const Vec3 from = hub + 0.015F * along, to = hub + (kWheel - 0.045F) * along;
     b.quad(from - 0.0025F * side, to - 0.0025F * side, to + 0.0025F * side, from + 0.0025F * side,
-           m.metal);
+           m.spokes);
   }
 }
 
@@ -92,6 +92,9 @@ Mesh makeBicycle(const Order& order) {
   m.frame = b.material(plain(paintColour(dice), 0.5F));
   m.rubber = b.material(rubber());
   m.metal = b.material(chrome());
+  Material strips = chrome();
+  strips.two_sided = true;
+  m.spokes = b.material(strips);
   m.saddle = b.material(plain(Vec3(0.05F, 0.03F, 0.02F) * dice.uniform(0.3F, 3.0F), 0.2F));
   addWheel(b, m, -0.52F);
   addWheel(b, m, 0.55F);

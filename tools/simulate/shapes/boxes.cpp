@@ -140,7 +140,7 @@ Mesh makeShelf(const Order& order) {
   Dice dice(order.look_seed ^ 0x5E1FULL);
   MeshBuilder b;
   const Vec3 s = order.size.cast<float>(), half = s / 2.0F;
-  const auto wood = sharedTexture(TextureKind::kWood, order.look_seed, dice, 256);
+  const auto wood = sharedTexture(TextureKind::kTimber, order.look_seed, dice, 256);
   const int boards = b.material(textured(woodColour(dice), wood, 0.1F), 1.1F);
   // Books stand along the longer side and are seen from both.
   const bool turned = s.x() > s.y();

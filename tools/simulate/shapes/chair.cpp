@@ -99,7 +99,7 @@ Mesh makeChair(const Order& order) {
       chosenShape(order, "chair", {"wooden", "kitchen", "office", "armchair"});
   MeshBuilder b;
   ChairMaterials m{};
-  const auto wood = sharedTexture(TextureKind::kWood, order.look_seed, dice, 128);
+  const auto wood = sharedTexture(TextureKind::kTimber, order.look_seed, dice, 128);
   const auto cloth = sharedTexture(TextureKind::kFabric, order.look_seed, dice, 128);
   const bool wooden = shape == "wooden" || shape == "armchair";
   m.frame =

@@ -155,7 +155,7 @@ Look lookOf(MeshBuilder& b, const Order& order, Dice& dice) {
   l.ledge = b.material(textured(Vec3::Constant(dice.uniform(0.35F, 0.85F)), plaster), 1.1F);
   l.frame = b.material(
       plain(dice.chance(0.7F) ? Vec3(0.75F, 0.74F, 0.72F) : Vec3(0.08F, 0.06F, 0.05F), 0.2F));
-  const auto wood = sharedTexture(TextureKind::kWood, order.look_seed, dice, 256);
+  const auto wood = sharedTexture(TextureKind::kTimber, order.look_seed, dice, 256);
   l.door = b.material(textured(0.9F * woodColour(dice), wood, 0.1F), 1.0F);
   l.roof = b.material(plain({0.12F, 0.11F, 0.11F}));
   for (int& pane : l.panes) {

@@ -144,4 +144,15 @@ Pattern woodPattern(Dice& dice) {
   };
 }
 
+Pattern timberPattern(Dice& dice) {
+  const std::uint32_t seed = noiseSeed(dice);
+  const Colour base = dice.uniform(0.7F, 1.1F) * Colour(0.52F, 0.33F, 0.19F);
+  return [=](float u, float v) {
+    const float grain = octaves(u, v, 3, 20, 5, seed);
+    const float ring = 0.5F + 0.5F * std::sin(60.0F * grain);
+    const float pores = valueNoise(u, v, 12, 160, seed + 7U);
+    return Colour(base * (0.62F + 0.3F * grain + 0.18F * ring + 0.16F * pores));
+  };
+}
+
 }  // namespace perdure::tools::shapes

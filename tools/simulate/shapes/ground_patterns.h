@@ -1,4 +1,4 @@
-// The pictures of what one walks and drives on.
+// The pictures of what one walks and drives on, and of wood.
 #pragma once
 
 #include "tools/simulate/shapes/dice.h"
@@ -13,5 +13,6 @@ Pattern earthPattern(Dice& dice);
 Pattern tilesPattern(Dice& dice);
 Pattern markingsPattern(Dice& dice);
 Pattern woodPattern(Dice& dice);
+Pattern timberPattern(Dice& dice);
 
 }  // namespace perdure::tools::shapes

@@ -47,11 +47,13 @@ void MeshBuilder::begin(float crease_deg) {
 }
 
 void MeshBuilder::closed() {
+  if (part_start_ == faces_.size()) return;
+  const Vec3 origin = faces_[part_start_].corners[0];
   double volume = 0.0;
   for (std::size_t i = part_start_; i < faces_.size(); ++i) {
     const auto& c = faces_[i].corners;
     volume +=
-        c[0].cross(c[1]).cast<double>().dot((c[2] - faces_[part_start_].corners[0]).cast<double>());
+        (c[0] - origin).cross(c[1] - origin).cast<double>().dot((c[2] - origin).cast<double>());
   }
   if (volume >= 0.0) return;
   for (std::size_t i = part_start_; i < faces_.size(); ++i) {

@@ -29,6 +29,8 @@ Pattern patternOf(TextureKind kind, std::uint64_t seed) {
       return markingsPattern(dice);
     case TextureKind::kWood:
       return woodPattern(dice);
+    case TextureKind::kTimber:
+      return timberPattern(dice);
     case TextureKind::kBrick:
       return brickPattern(dice);
     case TextureKind::kPlaster:

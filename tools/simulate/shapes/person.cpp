@@ -80,8 +80,9 @@ void addArm(MeshBuilder& b, const Clothes& c, float side, float swing, float spr
   const Vec3 elbow = shoulder + 0.3F * down(swing, spread);
   const Vec3 wrist =
       elbow + 0.25F * down(swing + 0.25F + 0.5F * std::max(swing, 0.0F), 0.6F * spread);
-  b.pipe({shoulder, shoulder + 0.14F * down(swing, spread), elbow}, {0.06F, 0.05F, 0.042F}, 8,
-         c.shirt);
+  const Vec3 top = shoulder + Vec3(0.0F, -0.03F * side, 0.045F);
+  b.pipe({top, shoulder, shoulder + 0.14F * down(swing, spread), elbow},
+         {0.02F, 0.06F, 0.05F, 0.042F}, 8, c.shirt);
   b.pipe({elbow + 0.02F * Vec3::UnitZ(), wrist}, {0.041F, 0.029F}, 8,
          c.short_sleeves ? c.skin : c.shirt);
   b.ellipsoid(wrist + 0.055F * (wrist - elbow).normalized(), {0.032F, 0.026F, 0.068F}, 6, 5,
@@ -102,8 +103,10 @@ Clothes dress(MeshBuilder& b, const Order& order, Dice& dice) {
   Clothes c{};
   c.skin = b.material(textured(skinColour(dice), skin_texture, 0.05F), 0.4F);
   c.hair = b.material(plain(dice.pick(kHairs), 0.15F));
-  c.shirt = b.material(textured(clothColour(dice), cloth()), 0.5F);
-  c.trousers = b.material(textured(clothColour(dice), cloth()), 0.5F);
+  c.shirt = b.material(
+      dice.chance(0.3F) ? plain(clothColour(dice)) : textured(clothColour(dice), cloth()), 0.7F);
+  c.trousers = b.material(
+      dice.chance(0.7F) ? plain(clothColour(dice)) : textured(clothColour(dice), cloth()), 0.4F);
   c.shoes = b.material(plain(clothColour(dice) * 0.6F, 0.15F));
   c.short_sleeves = dice.chance(0.4F);
   c.short_legs = dice.chance(0.2F);

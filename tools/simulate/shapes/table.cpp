@@ -69,7 +69,7 @@ Mesh makeTable(const Order& order) {
   Dice dice(order.look_seed ^ 0x7AB1EULL);
   const std::string shape = chosenShape(order, "dining table", {"rectangular", "round", "trestle"});
   MeshBuilder b;
-  const auto wood = sharedTexture(TextureKind::kWood, order.look_seed, dice, 256);
+  const auto wood = sharedTexture(TextureKind::kTimber, order.look_seed, dice, 256);
   const Vec3 tint = woodColour(dice);
   const int top = dice.chance(0.75F) ? b.material(textured(tint, wood, 0.25F), 1.1F)
                                      : b.material(plain({0.75F, 0.74F, 0.72F}, 0.3F));

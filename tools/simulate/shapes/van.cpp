@@ -13,7 +13,7 @@ BodyProfile panelVan() {
            {0.34F, 0.975F}, {0.45F, 1.0F},  {0.97F, 0.99F}, {1.0F, 0.97F}};
   p.belt = {{0.0F, 0.36F}, {0.06F, 0.44F}, {0.18F, 0.5F}, {1.0F, 0.53F}};
   p.windscreen = {0.172F, 0.29F};
-  p.rear_glass = {2.0F, 2.0F};
+  p.rear_glass = {};
   p.side_glass = {{0.2F, 0.35F}};
   p.seams = {0.19F, 0.365F, 0.6F};
   p.front_axle = 0.17F;

@@ -39,13 +39,14 @@ class Body {
     for (const Span& s : {p_.windscreen, p_.rear_glass}) xs.insert(xs.end(), {s.from, s.to});
     for (float x : p_.seams) xs.insert(xs.end(), {x - kSeam / 2.0F, x + kSeam / 2.0F});
     for (float axle : {p_.front_axle, p_.rear_axle}) {
-      for (float c : {1.0F, 0.92F, 0.7F, 0.38F}) {
+      for (float c : {1.0F, 0.85F, 0.45F}) {
         const float reach = c * archRadius() / size_.x();
         xs.insert(xs.end(), {axle - reach, axle + reach});
       }
       const float outside = 1.004F * archRadius() / size_.x();
       xs.insert(xs.end(), {axle, axle - outside, axle + outside});
     }
+    std::erase_if(xs, [](float x) { return x < 0.0F || x > 1.0F; });
     std::sort(xs.begin(), xs.end());
     // Stations nearer than a millimetre are one.
     xs.erase(std::unique(xs.begin(), xs.end(), [](float a, float c) { return c - a < 2e-4F; }),
@@ -85,7 +86,7 @@ class Body {
     const float zb = undersideAt(x, arch);
     const float belt = std::min(lineAt(p_.belt, x) * h, zt - 0.035F * h);
     const float lip = zb + (arch ? 0.015F : 0.05F) * h;
-    const float middle = std::max(lip + 0.02F * h, 0.5F * (p_.sill * h + belt));
+    const float middle = std::max(lip + 0.02F * h, p_.sill * h + 0.62F * (belt - p_.sill * h));
     const float cabin = std::clamp((zt - belt) / (0.3F * h) - 0.12F, 0.0F, 1.0F);
     const float roof = p_.roof_width * w;
     const auto blend = [&](const Vec2& low, const Vec2& high) {

@@ -7,7 +7,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr int kSides = 14;
+constexpr int kSides = 13;
 constexpr float kPi = std::numbers::pi_v<float>;
 
 void addSpokes(MeshBuilder& b, const Vec3& hub, float reach, float half_width, int count,
@@ -17,8 +17,8 @@ void addSpokes(MeshBuilder& b, const Vec3& hub, float reach, float half_width, i
     const float a = 2.0F * kPi * static_cast<float>(i) / static_cast<float>(count) + 0.3F;
     const Vec3 along(std::cos(a), 0.0F, std::sin(a)), side(-std::sin(a), 0.0F, std::cos(a));
     const Vec3 inner = hub + 0.1F * reach * along, outer = hub + reach * along;
-    b.quad(inner + half_width * side, inner - half_width * side, outer - 0.8F * half_width * side,
-           outer + 0.8F * half_width * side, material);
+    b.quad(outer + 0.8F * half_width * side, outer - 0.8F * half_width * side,
+           inner - half_width * side, inner + half_width * side, material);
   }
 }
 
