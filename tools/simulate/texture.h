@@ -31,7 +31,9 @@ enum class TextureKind {
   kTiles,
   kEarth,
   kBooks,
-  kTimber
+  kTimber,
+  kPainting,
+  kSign
 };
 
 class Texture {

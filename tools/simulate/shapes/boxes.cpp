@@ -29,7 +29,7 @@ void addPictures(MeshBuilder& b, const Order& order, const Vec3& s, float depth,
   for (int i = 0; i < 2 * count; ++i) {
     if (dice.chance(0.3F)) continue;
     const int picture = b.material(textured(
-        Vec3::Constant(0.9F), sharedTexture(TextureKind::kScreen, order.look_seed, dice, 128)));
+        Vec3::Constant(0.9F), sharedTexture(TextureKind::kPainting, order.look_seed, dice, 128)));
     const float u = length * ((static_cast<float>(i % count) + dice.uniform(0.3F, 0.7F)) /
                                   static_cast<float>(count) -
                               0.5F);
@@ -142,6 +142,7 @@ Mesh makeShelf(const Order& order) {
   const Vec3 s = order.size.cast<float>(), half = s / 2.0F;
   const auto wood = sharedTexture(TextureKind::kTimber, order.look_seed, dice, 256);
   const int boards = b.material(textured(woodColour(dice), wood, 0.1F), 1.1F);
+  const int paper = b.material(plain({0.6F, 0.57F, 0.5F}));
   // Books stand along the longer side and are seen from both.
   const bool turned = s.x() > s.y();
   const float length = turned ? s.x() : s.y(), depth = turned ? s.y() : s.x();
@@ -167,8 +168,9 @@ Mesh makeShelf(const Order& order) {
               repeats);
     b.picture({-deep, to, low}, {-deep, from, low}, {-deep, from, high}, {-deep, to, high}, books,
               repeats);
-    b.picture({deep, from, high}, {deep, to, high}, {-deep, to, high}, {-deep, from, high}, books,
-              {repeats.x(), 0.3F});
+    b.quad({-deep, from, low}, {deep, from, low}, {deep, from, high}, {-deep, from, high}, boards);
+    b.quad({deep, to, low}, {-deep, to, low}, {-deep, to, high}, {deep, to, high}, boards);
+    b.quad({deep, from, high}, {deep, to, high}, {-deep, to, high}, {-deep, from, high}, paper);
   }
   b.placing.setIdentity();
   return b.finish(order.size);

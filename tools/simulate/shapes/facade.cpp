@@ -14,8 +14,9 @@ constexpr float kOverhang = 0.16F;  // metres from the wall to the cornice's and
 struct Look {
   int wall, base, frame, ledge, door, roof;
   std::array<int, 3> panes;
+  int sign, shutter;
   float storey, bay, window_width, window_height, sill, recess;
-  bool ledges, bars, bands;
+  bool ledges, bars, bands, shutters, shop;
 };
 
 /// One side of the house: u runs to the right along the wall seen from outside, z up, out to the
@@ -33,7 +34,14 @@ class Side {
         h_(height),
         dice_(dice) {}
 
-  void add() {
+  void addBlind() {
+    b_.begin();
+    panel(0.0F, w_, 0.0F, h_, 0.0F, l_.wall);
+    ledge(-kOverhang, w_ + kOverhang, h_ - 0.3F, 0.3F, kOverhang);
+  }
+
+  void add(bool front) {
+    front_ = front;
     const int bays = std::max(1, static_cast<int>(std::lround(w_ / l_.bay)));
     const int storeys = std::max(1, static_cast<int>(std::lround(h_ / l_.storey)));
     const float bay = w_ / static_cast<float>(bays), storey = h_ / static_cast<float>(storeys);
@@ -45,6 +53,7 @@ class Side {
       }
       if (s > 0 && l_.bands) ledge(0.0F, w_, storey * static_cast<float>(s), 0.12F, 0.06F);
     }
+    if (shop()) shopFront(storey);
     ledge(-kOverhang, w_ + kOverhang, h_ - 0.3F, 0.3F, kOverhang);
     ledge(0.0F, w_, 0.0F, std::min(0.5F, 0.2F * h_), 0.05F, l_.base);
   }
@@ -71,12 +80,29 @@ class Side {
     block(u0, u1, z, z + tall, 0.0F, out, material < 0 ? l_.ledge : material);
   }
 
+  bool shop() const { return front_ && l_.shop && w_ > 5.0F; }
+
+  /// The board with the name.
+  void shopFront(float storey) {
+    const float z = std::min(2.75F, storey - 0.55F), from = 0.06F * w_, to = 0.94F * w_;
+    block(from, to, z, z + 0.5F, 0.0F, 0.08F, l_.frame);
+    b_.begin();
+    b_.picture(at(from + 0.1F, z + 0.04F, 0.085F), at(to - 0.1F, z + 0.04F, 0.085F),
+               at(to - 0.1F, z + 0.46F, 0.085F), at(from + 0.1F, z + 0.46F, 0.085F), l_.sign);
+  }
+
   /// A piece of wall with one opening.
   void cell(float u, float z, float bay, float storey, bool door, bool ground) {
-    const float half = 0.5F * (door ? 1.15F : std::min(l_.window_width, 0.75F * bay));
+    const bool display = ground && shop() && !door;
+    const float half = 0.5F * (door      ? 1.15F
+                               : display ? 0.86F * bay
+                                         : std::min(l_.window_width, 0.75F * bay));
     const float u0 = u + 0.5F * bay - half, u1 = u + 0.5F * bay + half;
-    const float z0 = z + (door ? 0.02F : l_.sill);
-    const float z1 = std::min(z + (door ? 2.3F : l_.sill + l_.window_height), z + storey - 0.25F);
+    const float z0 = z + (door ? 0.02F : display ? 0.55F : l_.sill);
+    const float z1 = std::min(z + (door      ? 2.3F
+                                   : display ? 2.6F
+                                             : l_.sill + l_.window_height),
+                              z + storey - (display ? 0.6F : 0.25F));
     const int wall = ground ? l_.base : l_.wall;
     b_.begin();
     if (z1 - z0 < 0.4F || bay < 0.9F) return panel(u, u + bay, z, z + storey, 0.0F, l_.wall);
@@ -87,6 +113,11 @@ class Side {
     reveal(u0, u1, z0, z1);
     if (door) return doorIn(u0, u1, z0, z1);
     windowIn(u0, u1, z0, z1);
+    if (!l_.shutters || display || ground) return;
+    const float wide = std::min(0.5F * (u1 - u0), u0 - u - 0.05F);
+    if (wide < 0.2F) return;
+    block(u0 - wide, u0 - 0.02F, z0, z1, 0.0F, 0.04F, l_.shutter);
+    block(u1 + 0.02F, u1 + wide, z0, z1, 0.0F, 0.04F, l_.shutter);
   }
 
   void reveal(float u0, float u1, float z0, float z1) {
@@ -136,6 +167,7 @@ class Side {
   Vec3 o_, r_, out_;
   float w_, h_;
   Dice& dice_;
+  bool front_ = false;
 };
 
 int wallMaterial(MeshBuilder& b, const Order& order, Dice& dice) {
@@ -162,6 +194,12 @@ Look lookOf(MeshBuilder& b, const Order& order, Dice& dice) {
     pane = b.material(textured(
         Vec3::Ones(), sharedTexture(TextureKind::kWindows, order.look_seed, dice, 128), 0.8F));
   }
+  l.sign =
+      b.material(textured(paintColour(dice).cwiseMax(0.15F),
+                          sharedTexture(TextureKind::kSign, order.look_seed, dice, 256), 0.1F));
+  l.shutter = b.material(
+      textured(paintColour(dice), sharedTexture(TextureKind::kMetal, order.look_seed, dice, 128)),
+      0.25F);
   l.storey = dice.uniform(2.9F, 3.7F);
   l.bay = dice.uniform(2.0F, 3.4F);
   l.window_width = dice.uniform(0.95F, 1.5F);
@@ -171,6 +209,8 @@ Look lookOf(MeshBuilder& b, const Order& order, Dice& dice) {
   l.ledges = dice.chance(0.5F);
   l.bars = dice.chance(0.7F);
   l.bands = dice.chance(0.5F);
+  l.shutters = dice.chance(0.3F);
+  l.shop = dice.chance(0.35F);
   return l;
 }
 
@@ -184,10 +224,10 @@ Mesh makeFacade(const Order& order) {
   const Vec3 s = order.size.cast<float>();
   const float x = std::max(0.5F * s.x() - kOverhang, 0.3F * s.x());
   const float y = std::max(0.5F * s.y() - kOverhang, 0.3F * s.y());
-  Side(b, look, {-x, -y, 0.0F}, Vec3::UnitX(), 2.0F * x, s.z(), dice).add();
-  Side(b, look, {x, -y, 0.0F}, Vec3::UnitY(), 2.0F * y, s.z(), dice).add();
-  Side(b, look, {x, y, 0.0F}, -Vec3::UnitX(), 2.0F * x, s.z(), dice).add();
-  Side(b, look, {-x, y, 0.0F}, -Vec3::UnitY(), 2.0F * y, s.z(), dice).add();
+  Side(b, look, {-x, -y, 0.0F}, Vec3::UnitX(), 2.0F * x, s.z(), dice).add(true);
+  Side(b, look, {x, -y, 0.0F}, Vec3::UnitY(), 2.0F * y, s.z(), dice).add(false);
+  Side(b, look, {x, y, 0.0F}, -Vec3::UnitX(), 2.0F * x, s.z(), dice).addBlind();
+  Side(b, look, {-x, y, 0.0F}, -Vec3::UnitY(), 2.0F * y, s.z(), dice).add(false);
   b.begin();
   b.quad({-x, -y, s.z()}, {x, -y, s.z()}, {x, y, s.z()}, {-x, y, s.z()}, look.roof);
   return b.finish(order.size);

@@ -31,6 +31,10 @@ Pattern patternOf(TextureKind kind, std::uint64_t seed) {
       return woodPattern(dice);
     case TextureKind::kTimber:
       return timberPattern(dice);
+    case TextureKind::kPainting:
+      return paintingPattern(dice);
+    case TextureKind::kSign:
+      return signPattern(dice);
     case TextureKind::kBrick:
       return brickPattern(dice);
     case TextureKind::kPlaster:

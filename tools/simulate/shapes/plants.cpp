@@ -28,17 +28,31 @@ std::array<int, 2> leafMaterials(MeshBuilder& b, const Order& order, Dice& dice)
   return leaves;
 }
 
-/// Leaves that stick out of a cluster: small sheets near its surface, turned at random.
+/// A lumpy ball: the dark inside of a cluster, through which one does not see.
+void addLump(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int material, Dice& dice) {
+  constexpr int kSides = 7;
+  std::vector<Ring> rings;
+  for (float latitude : {-1.2F, -0.5F, 0.2F, 0.9F, 1.4F}) {
+    Ring ring = circle(Vec3::UnitZ() * std::sin(latitude), Vec3::UnitZ(), std::cos(latitude),
+                       kSides, dice.uniform(0.0F, 1.0F));
+    for (Vec3& p : ring) p = centre + dice.uniform(0.75F, 1.1F) * p.cwiseProduct(radii);
+    rings.push_back(std::move(ring));
+  }
+  b.loft(
+      rings, [material](std::size_t, std::size_t) { return material; }, material, material, 80.0F);
+}
+
+/// Leaves that stick out of a cluster: small sheets about its surface, turned at random.
 void addSheets(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int count, float size,
                const std::array<int, 2>& leaves, Dice& dice) {
   for (int i = 0; i < count; ++i) {
     const Vec3 out = direction(dice);
-    const Vec3 at = centre + dice.uniform(0.85F, 1.12F) * radii.cwiseProduct(out);
-    const Vec3 normal = (out + 0.8F * direction(dice)).normalized();
-    const Vec3 u = normal.cross(direction(dice)).normalized() * size * dice.uniform(0.6F, 1.3F);
+    const Vec3 at = centre + dice.uniform(0.8F, 1.2F) * radii.cwiseProduct(out);
+    const Vec3 normal = (out + 0.9F * direction(dice)).normalized();
+    const Vec3 u = normal.cross(direction(dice)).normalized() * size * dice.uniform(0.5F, 1.3F);
     const Vec3 v = normal.cross(u) * dice.uniform(0.5F, 0.9F);
     b.begin(5.0F);
-    b.quad(at - u, at - v, at + u, at + v, dice.pick(leaves));
+    b.triangle(at - u - 0.6F * v, at + u - 0.6F * v, at + 1.1F * v, dice.pick(leaves));
   }
 }
 
@@ -49,13 +63,13 @@ struct Cluster {
 std::vector<Cluster> crownOf(const Vec3& s, float crown_low, int count, Dice& dice) {
   const Vec3 middle(0.0F, 0.0F, 0.5F * (s.z() + crown_low));
   const Vec3 half(0.5F * s.x(), 0.5F * s.y(), 0.5F * (s.z() - crown_low));
-  std::vector<Cluster> clusters{{middle, 0.62F * half}};
+  std::vector<Cluster> clusters{{middle, 0.6F * half}};
   for (int i = 0; i < count; ++i) {
     const float z = 1.7F * (static_cast<float>(i) + 0.5F) / static_cast<float>(count) - 0.85F;
     const float a = 2.4F * static_cast<float>(i) + dice.uniform(-0.4F, 0.4F);
-    const float r = 0.62F * std::sqrt(std::max(0.05F, 1.0F - z * z));
+    const float r = 0.68F * std::sqrt(std::max(0.05F, 1.0F - z * z));
     const Vec3 at(r * std::cos(a), r * std::sin(a), 0.72F * z);
-    clusters.push_back({middle + half.cwiseProduct(at), half * dice.uniform(0.3F, 0.42F)});
+    clusters.push_back({middle + half.cwiseProduct(at), half * dice.uniform(0.24F, 0.36F)});
   }
   return clusters;
 }
@@ -83,12 +97,12 @@ Mesh makeTree(const Order& order) {
       textured(Vec3::Ones(), sharedTexture(TextureKind::kBark, order.look_seed, dice, 256)), 0.7F);
   const Vec3 s = order.size.cast<float>();
   const float crown_low = dice.uniform(0.24F, 0.38F) * s.z();
-  const auto crown = crownOf(s, crown_low, 7 + dice.below(4), dice);
+  const auto crown = crownOf(s, crown_low, 10 + dice.below(4), dice);
   addTrunk(b, s, crown_low, crown, bark, dice);
-  const float sheet = 0.045F * (s.x() + s.y()) / 2.0F + 0.04F;
+  const float sheet = 0.05F * (s.x() + s.y()) / 2.0F + 0.05F;
   for (const Cluster& c : crown) {
-    b.ellipsoid(c.centre, 0.94F * c.radii, 8, 5, dice.pick(leaves));
-    addSheets(b, c.centre, c.radii, 48, sheet, leaves, dice);
+    addLump(b, c.centre, 0.95F * c.radii, dice.pick(leaves), dice);
+    addSheets(b, c.centre, c.radii, 64, sheet, leaves, dice);
   }
   return b.finish(order.size);
 }
@@ -100,24 +114,21 @@ Mesh makeHedge(const Order& order) {
   const Vec3 s = order.size.cast<float>(), half = s / 2.0F;
   b.box(-0.9F * half + Vec3(0.0F, 0.0F, -0.1F * half.z()), 0.9F * half, leaves[0]);
   const float area = 2.0F * (s.x() + s.y()) * s.z() + s.x() * s.y();
-  const int count = std::clamp(static_cast<int>(area * 22.0F), 60, 700);
+  const int count = std::clamp(static_cast<int>(area * 45.0F), 100, 1000);
   const float sheet = std::clamp(0.75F * std::sqrt(area / static_cast<float>(count)), 0.05F, 0.3F);
   for (int i = 0; i < count; ++i) {
-    const Vec3 out = direction(dice);
-    const Vec3 face = out.cwiseQuotient(half).cwiseAbs();
     Vec3 at(dice.uniform(-1.0F, 1.0F), dice.uniform(-1.0F, 1.0F), dice.uniform(-1.0F, 1.0F));
-    const float pick = dice.uniform(0.0F, area);
-    const Eigen::Index axis = pick < s.x() * s.y()                          ? 2
-                              : pick < s.x() * s.y() + 2.0F * s.x() * s.z() ? 1
-                                                                            : 0;
-    at[axis] =
-        axis == 2 || face[axis] >= 0.0F ? (axis == 2 || dice.chance(0.5F) ? 1.0F : -1.0F) : 1.0F;
+    const float where = dice.uniform(0.0F, area);
+    const Eigen::Index axis = where < s.x() * s.y()                    ? 2
+                              : where < s.x() * (s.y() + 2.0F * s.z()) ? 1
+                                                                       : 0;
+    at[axis] = axis == 2 || dice.chance(0.5F) ? 1.0F : -1.0F;
     const Vec3 normal = (Vec3::Unit(axis) * at[axis] + 0.9F * direction(dice)).normalized();
     const Vec3 u = normal.cross(direction(dice)).normalized() * sheet * dice.uniform(0.5F, 1.1F);
     const Vec3 v = normal.cross(u) * dice.uniform(0.5F, 0.9F);
     const Vec3 centre = 0.92F * half.cwiseProduct(at);
     b.begin(5.0F);
-    b.quad(centre - u, centre - v, centre + u, centre + v, dice.pick(leaves));
+    b.triangle(centre - u, centre + u, centre + 1.2F * v, dice.pick(leaves));
   }
   return b.finish(order.size);
 }

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "tools/simulate/shapes/dice.h"
 #include "tools/simulate/shapes/looks.h"
 #include "tools/simulate/shapes/mesh_builder.h"
@@ -46,6 +48,24 @@ void addBollard(MeshBuilder& b, const Vec3& s, int metal, Dice& dice) {
   }
 }
 
+/// A post whose lantern is no wider than its foot.
+void addPost(MeshBuilder& b, const Vec3& s, int metal, int light, Dice& dice) {
+  const float r = 0.5F * std::min(s.x(), s.y());
+  const auto up = [](float z) { return Vec3(0.0F, 0.0F, z); };
+  b.pipe({up(0.0F), up(0.5F), up(0.9F), up(1.0F)}, {r, r, 0.92F * r, 0.6F * r}, 12, metal);
+  b.box({-0.35F * r, -1.0F * r, 0.35F}, {0.35F * r, -0.9F * r, 0.75F}, metal);
+  const float head = dice.uniform(0.35F, 0.55F);
+  b.tube(up(0.95F), up(s.z() - head), 0.56F * r, 0.42F * r, 10, metal);
+  b.tube(up(s.z() - head), up(s.z() - 0.12F), 0.5F * r, 0.9F * r, 10, light);
+  b.tube(up(s.z() - 0.12F), up(s.z()), r, 0.25F * r, 10, metal);
+  const int notice = b.material(plain(paintColour(dice), 0.2F));
+  const float z = dice.uniform(1.3F, 2.0F);
+  if (dice.chance(0.5F))
+    b.tube(up(z), up(z + dice.uniform(0.2F, 0.4F)), 0.6F * r, 0.6F * r, 10, notice);
+  for (float ring : {1.1F, 2.6F})
+    b.tube(up(ring), up(ring + 0.05F), 0.64F * r, 0.64F * r, 10, metal);
+}
+
 }  // namespace
 
 Mesh makePole(const Order& order) {
@@ -59,6 +79,8 @@ Mesh makePole(const Order& order) {
     addLamp(b, s, metal, b.material(plain({0.9F, 0.88F, 0.8F}, 0.3F)));
   } else if (s.z() > 1.5F && s.y() > 0.25F) {
     addSign(b, s, metal, dice);
+  } else if (s.z() > 3.0F) {
+    addPost(b, s, metal, b.material(plain({0.9F, 0.88F, 0.8F}, 0.3F)), dice);
   } else {
     addBollard(b, s, metal, dice);
   }

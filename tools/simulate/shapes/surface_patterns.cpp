@@ -189,4 +189,39 @@ Pattern booksPattern(Dice& dice) {
   return patchwork(grey(0.02F), std::move(patches));
 }
 
+/// Strokes like letters, on a board about ten times as wide as high.
+Pattern signPattern(Dice& dice) {
+  std::vector<Patch> patches;
+  const bool light = dice.chance(0.5F);
+  const Colour ink = light ? grey(0.05F) : grey(0.95F);
+  const float gap = dice.uniform(0.008F, 0.015F);
+  for (float x = dice.uniform(0.08F, 0.3F); x < dice.uniform(0.7F, 0.95F);) {
+    const float wide = dice.uniform(0.02F, 0.04F), stroke = 0.25F * wide;
+    patches.push_back({x, 0.2F, x + stroke, 0.8F, ink});
+    if (dice.chance(0.6F)) patches.push_back({x + wide - stroke, 0.2F, x + wide, 0.8F, ink});
+    for (float y : {0.2F, 0.45F, 0.7F}) {
+      if (dice.chance(0.55F)) patches.push_back({x, y, x + wide, y + 0.1F, ink});
+    }
+    x += wide + (dice.chance(0.15F) ? 4.0F : 1.0F) * gap;
+  }
+  return patchwork(grey(light ? 0.9F : 0.5F), std::move(patches));
+}
+
+Pattern paintingPattern(Dice& dice) {
+  const std::uint32_t seed = noiseSeed(dice);
+  const auto tint = [&] {
+    return Colour(dice.uniform(0.05F, 0.8F), dice.uniform(0.05F, 0.7F), dice.uniform(0.05F, 0.7F));
+  };
+  const Colour sky = tint(), hills = tint(), field = tint(), light = tint();
+  const float horizon = dice.uniform(0.3F, 0.6F), rough = dice.uniform(0.1F, 0.4F);
+  return [=](float u, float v) {
+    const float ridge = horizon + rough * (octaves(u, 0.5F, 3, 1, 4, seed) - 0.5F);
+    const float near = 0.55F * horizon + rough * (octaves(u, 0.3F, 5, 1, 4, seed + 9U) - 0.5F);
+    Colour c = mix(sky, light, octaves(u, v, 4, 6, 4, seed + 3U) * 1.4F - 0.3F);
+    if (v < ridge) c = hills * (0.6F + 0.6F * octaves(u, v, 14, 8, 3, seed + 5U));
+    if (v < near) c = field * (0.5F + 0.9F * octaves(u, v, 30, 12, 3, seed + 7U));
+    return c;
+  };
+}
+
 }  // namespace perdure::tools::shapes

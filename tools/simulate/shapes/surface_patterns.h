@@ -17,5 +17,7 @@ Pattern carPaintPattern(Dice& dice);
 Pattern screenPattern(Dice& dice);
 Pattern skinPattern(Dice& dice);
 Pattern booksPattern(Dice& dice);
+Pattern signPattern(Dice& dice);
+Pattern paintingPattern(Dice& dice);
 
 }  // namespace perdure::tools::shapes
