@@ -63,6 +63,13 @@ std::optional<TimePoint> Dataset::frameTime(std::uint64_t index) const {
   return std::nullopt;
 }
 
+std::optional<Frame> Dataset::frameAt(std::uint64_t index) {
+  for (const auto& frame : recording_.frames) {
+    if (frame.index == index && frame.camera == 0) return decodeFrame(frame);
+  }
+  return std::nullopt;
+}
+
 std::optional<Message> Dataset::next() {
   while (true) {
     const bool has_imu = next_imu_ < recording_.imu.size();

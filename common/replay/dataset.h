@@ -63,6 +63,9 @@ class Dataset {
   std::size_t frameCount() const { return recording_.frame_count; }
   /// Capture time of frame `index` of cam0; nothing where the dataset has no such frame.
   std::optional<TimePoint> frameTime(std::uint64_t index) const;
+  /// Frame `index` of cam0 with its pixels, out of turn; nothing where there is none, or where its
+  /// image is missing or wrong (counted as by next()).
+  std::optional<Frame> frameAt(std::uint64_t index);
   const std::optional<PoseFile>& truth() const { return recording_.truth; }
 
   /// The next message, or nothing at the end. Frames that cannot be decoded are counted

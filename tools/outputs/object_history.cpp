@@ -8,7 +8,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kMovingAbove = 0.5;
-constexpr double kMostlySeen = 0.6;  // FINAL: with less of it in sight an object counts as hidden
+constexpr double kMostlySeen = 0.6;    // FINAL: with less of it in sight an object counts as hidden
 constexpr double kBelievedFrom = 0.1;  // FINAL: fainter guesses are not a first detection
 
 bool isHidden(Visibility v) { return v == Visibility::kOccluded; }

@@ -40,9 +40,9 @@ class ObjectHistory {
   /// Confirmed, static objects that are claimed to be there and not hidden, by frame and id.
   std::vector<ObjectRow> inst() const;
   /// The surviving id after merges, the last estimate, from the first detection on that made it
-  /// more than a faint guess (r of .1), in the frames in which it projects into the image and is not
-  /// hidden: neither known to be so at the time, nor with under .6 of it in sight beside the last
-  /// estimates of nearer ones. Objects that were judged moving or gone at last give none.
+  /// more than a faint guess (r of .1), in the frames in which it projects into the image and is
+  /// not hidden: neither known to be so at the time, nor with under .6 of it in sight beside the
+  /// last estimates of nearer ones. Objects that were judged moving or gone at last give none.
   std::vector<ObjectRow> finalRows() const;
   /// The last belief of each confirmed object that is not gone and was not merged away, by id.
   std::vector<ObjectBelief> lastBeliefs() const;

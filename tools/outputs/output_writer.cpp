@@ -4,8 +4,11 @@
 
 #include <chrono>
 #include <cmath>
+#include <numbers>
 
 #include "common/base/errors.h"
+#include "common/math/so3.h"
+#include "tools/outputs/evolution_picture.h"
 #include "tools/outputs/geodesy.h"
 #include "tools/outputs/map_picture.h"
 
@@ -118,6 +121,19 @@ void OutputWriter::onOdometry(const Odometry& odometry) {
   poses_[odometry.stamp.sequence] = {odometry.stamp.time, odometry.T_WB};
 }
 
+void OutputWriter::onObjects(const Objects& objects) {
+  history_.add(objects);
+  log_.add(objects);
+}
+
+void OutputWriter::onLandmarks(const Landmarks& message) {
+  constexpr double kVagueVariance = 1.0;  // m²
+  for (const Landmark& one : message.landmarks) {
+    if (!one.p_W.allFinite() || !(one.covariance.trace() < kVagueVariance)) continue;
+    landmarks_[{message.instance, one.id}] = one.p_W.cast<float>();
+  }
+}
+
 void OutputWriter::onEvent(const Event& event) {
   history_.add(event);
   events_ << toJson(event).dump() << "\n";
@@ -134,9 +150,25 @@ void OutputWriter::finish() {
   writeTrajectory();
   writeObjects();
   writeGeoJson();
-  std::vector<Eigen::Vector3d> path;
-  for (const auto& [frame, pose] : poses_) path.push_back(pose.T_WB.p);
-  drawMap(path, history_.lastBeliefs(), folder_ / "map.png");
+  writePictures();
+}
+
+void OutputWriter::writePictures() const {
+  MapContent content;
+  for (const auto& [frame, pose] : poses_) content.path.push_back(pose.T_WB.p);
+  for (const ObjectBelief& belief : history_.lastBeliefs()) {
+    content.objects.push_back(glanceAt(belief));
+    if (belief.memory == Memory::kLongTerm)
+      content.objects.back().visibility = Visibility::kOutOfView;
+  }
+  for (const auto& [id, p_W] : landmarks_) content.landmarks.push_back(p_W);
+  content.truth = truth_;
+  if (!poses_.empty()) content.end = poses_.rbegin()->second.time;
+  if (const auto T_WB = poseAtAnchor()) {
+    content.yaw_of_north = yawOf(T_WB->R()) + 0.5 * std::numbers::pi - anchor_->yaw;
+  }
+  writeMap(content, folder_ / "map.png");
+  writeEvolution(log_, truth_ ? &*truth_ : nullptr, folder_ / "evolution.png");
 }
 
 void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const {
@@ -167,26 +199,31 @@ void OutputWriter::writeObjects() const {
   writeJson("objects.json", {{"objects", objects}});
 }
 
-void OutputWriter::writeGeoJson() const {
-  // W meets the Earth at the pose nearest to the anchor's time; further away it would be a guess.
+/// W meets the Earth at the pose nearest to the anchor's time; further away it would be a guess.
+std::optional<RigidTransform> OutputWriter::poseAtAnchor() const {
+  if (!anchor_) return std::nullopt;
   constexpr Duration kNear = std::chrono::seconds(1);
-  const GeoAnchor anchor = anchor_.value_or(kDefaultAnchor);
-  RigidTransform T_WB;
-  auto nearest = Duration::max();
+  std::optional<RigidTransform> T_WB;
+  auto nearest = kNear + Duration(1);
   for (const auto& [frame, pose] : poses_) {
-    const auto apart = std::chrono::abs(pose.time - anchor.time);
-    if (!anchor_ || apart >= nearest) continue;
+    const auto apart = std::chrono::abs(pose.time - anchor_->time);
+    if (apart >= nearest) continue;
     nearest = apart;
     T_WB = pose.T_WB;
   }
-  const GeoReference reference(anchor, T_WB);
+  return T_WB;
+}
+
+void OutputWriter::writeGeoJson() const {
+  const auto T_WB = poseAtAnchor();
+  const GeoReference reference(anchor_.value_or(kDefaultAnchor), T_WB.value_or(RigidTransform{}));
   Json features = Json::array();
   for (const ObjectBelief& belief : history_.lastBeliefs()) {
     features.push_back(featureOf(belief, reference));
   }
-  writeJson("map.geojson", {{"type", "FeatureCollection"},
-                            {"georeferenced", anchor_.has_value() && nearest <= kNear},
-                            {"features", features}});
+  writeJson(
+      "map.geojson",
+      {{"type", "FeatureCollection"}, {"georeferenced", T_WB.has_value()}, {"features", features}});
 }
 
 }  // namespace perdure::tools

@@ -10,10 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "common/replay/pose_file.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
+#include "tools/outputs/drive_log.h"
 #include "tools/outputs/object_history.h"
+#include "tools/outputs/picture_truth.h"
 
 namespace perdure::tools {
 
@@ -25,8 +28,13 @@ class OutputWriter {
 
   void onCalibration(const Calibration& calibration);
   void onOdometry(const Odometry& odometry);
-  void onObjects(const Objects& objects) { history_.add(objects); }
+  void onObjects(const Objects& objects);
   void onEvent(const Event& event);
+  void onDetections(const Detections& detections) { log_.add(detections); }
+  /// Points whose standard deviation is above a metre are not drawn.
+  void onLandmarks(const Landmarks& landmarks);
+  /// For the pictures; before finish().
+  void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
 
   /// Writes everything but events.jsonl, which is written as events come.
   void finish();
@@ -34,23 +42,27 @@ class OutputWriter {
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
 
   const ObjectHistory& history() const { return history_; }
+  const DriveLog& log() const { return log_; }
+  /// By frame, those of usable odometry.
+  const std::map<std::uint64_t, replay::StampedPose>& poses() const { return poses_; }
   std::size_t odometryFrames() const { return poses_.size(); }
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
-  struct Pose {
-    TimePoint time;
-    RigidTransform T_WB;
-  };
   void writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const;
   void writeTrajectory() const;
   void writeObjects() const;
   void writeGeoJson() const;
+  void writePictures() const;
+  std::optional<RigidTransform> poseAtAnchor() const;
 
   std::filesystem::path folder_;
   std::string sequence_;
   ObjectHistory history_;
-  std::map<std::uint64_t, Pose> poses_;
+  DriveLog log_;
+  std::map<std::uint64_t, replay::StampedPose> poses_;
+  std::map<std::pair<InstanceId, std::uint64_t>, Eigen::Vector3f> landmarks_;
+  std::optional<PictureTruth> truth_;
   std::optional<GeoAnchor> anchor_;
   std::ofstream events_;
 };

@@ -1,0 +1,63 @@
+// What was said at each frame, in short: enough to draw the frame again after the drive.
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/types/detections.h"
+#include "common/types/objects.h"
+
+namespace perdure::tools {
+
+/// The most probable class of an object at a frame.
+struct ObjectGlance {
+  ObjectId id = 0;
+  std::string class_name;
+  double existence = 0.0, moving = 0.0;
+  bool confirmed = false;
+  Visibility visibility = Visibility::kVisible;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  ///< centre
+  Eigen::Matrix3d p_covariance = Eigen::Matrix3d::Zero();
+  double yaw = 0.0;
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length, width, height
+
+  bool inSight() const {
+    return visibility == Visibility::kVisible || visibility == Visibility::kPartial;
+  }
+  bool hidden() const { return visibility == Visibility::kOccluded; }
+};
+ObjectGlance glanceAt(const ObjectBelief& object);
+
+struct DetectionGlance {
+  Box box;
+  double probability = 0.0;  ///< of the best class against clutter and the other classes
+};
+
+struct FrameGlance {
+  FrameStamp stamp;
+  bool has_objects = false;  ///< an `objects` message came for it
+  RigidTransform T_WB;       ///< where has_objects
+  std::vector<ObjectGlance> objects;
+  std::vector<DetectionGlance> detections;
+};
+
+/// The corners of an object's box in W: bit 0 of the index is front or rear, bit 1 left or right,
+/// bit 2 top or bottom.
+std::array<Eigen::Vector3d, 8> cornersOf(const ObjectGlance& object);
+
+/// Collects by frame; a later message about the same frame replaces the earlier one.
+class DriveLog {
+ public:
+  void add(const Objects& objects);
+  void add(const Detections& detections);
+
+  const std::map<std::uint64_t, FrameGlance>& frames() const { return frames_; }
+
+ private:
+  FrameGlance& frameOf(const FrameStamp& stamp);
+  std::map<std::uint64_t, FrameGlance> frames_;
+};
+
+}  // namespace perdure::tools

@@ -1,0 +1,14 @@
+// What stands beside the map: what its signs and colours mean, where north is, how long a metre is.
+#pragma once
+
+#include "tools/outputs/map_picture.h"
+
+namespace perdure::tools {
+
+/// Map, axes and legend together.
+cv::Size pictureSize(const MapContent& content, const MapView& view);
+/// A bar of view.bar_m metres, view.bar_m × view.scale pixels long, with its length beside it.
+void drawScaleBar(cv::Mat& picture, const MapView& view);
+void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& view);
+
+}  // namespace perdure::tools

@@ -1,0 +1,41 @@
+// What really stood where, as the pictures draw it: in W, in the order of time.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/time.h"
+
+namespace perdure::tools {
+
+struct TruthTrack {
+  struct Key {
+    TimePoint time;
+    Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
+    double yaw = 0.0;
+  };
+  std::uint64_t id = 0;
+  std::string class_name;
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length, width, height
+  bool moves = false;
+  std::vector<Key> keys;  ///< at least one, by time
+  TimePoint present_from = TimePoint::min(), present_until = TimePoint::max();
+
+  /// Standing: the last key up to then, or the first. Moving: on the straight way between keys,
+  /// nothing outside them. Nothing while it is not present.
+  std::optional<Key> at(TimePoint time) const;
+};
+
+struct PictureTruth {
+  std::vector<Eigen::Vector3d> path;  ///< of the body; may be empty
+  std::vector<TruthTrack> objects;
+};
+
+/// The track of `truth` that is nearest to `p_W` at a time, nearer than `within` metres.
+const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,
+                               TimePoint time, double within);
+
+}  // namespace perdure::tools

@@ -1,0 +1,36 @@
+// An MP4 film of pictures, by FFmpeg's libraries: H.264 (4:2:0, which browsers play), or MPEG-4
+// part 2 where no H.264 encoder is there. OpenCV's VideoWriter would do the same, but takes x264
+// only at its middling preset: five times the processor time.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace perdure::tools {
+
+class VideoFile {
+ public:
+  /// Even sides, rate > 0. Reasons: video_no_codec, video_not_written (the file cannot be made).
+  static Result<VideoFile> open(const std::filesystem::path& file, const cv::Size& size,
+                                double rate_hz);
+  VideoFile(VideoFile&&) noexcept;
+  VideoFile& operator=(VideoFile&&) noexcept;
+  ~VideoFile();  ///< ends the film
+
+  /// CV_8UC3 (blue, green, red) of the film's size. Reason video_not_written: the disk is full.
+  Result<void> write(const cv::Mat& picture);
+  std::size_t frames() const;
+  const std::string& codec() const;  ///< "H.264", "MPEG-4"
+
+ private:
+  struct Film;
+  explicit VideoFile(std::unique_ptr<Film> film);
+  std::unique_ptr<Film> film_;
+};
+
+}  // namespace perdure::tools
