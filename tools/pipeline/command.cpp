@@ -33,6 +33,7 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--config", options.configs, "service=FILE in place of config/service.yaml")
       ->take_all();
   app.add_option("--set", options.assignments, "service.key=value")->take_all();
+  app.add_flag("--pictures", options.pictures, "Also overlay.mp4: the frames with the objects");
   app.add_flag("--quiet", options.quiet, "No progress");
 }
 
@@ -47,6 +48,14 @@ void showProgress(const Pipeline& pipeline, const PipelineCounts& counts) {
                pipeline.outputs().history().confirmedNow(), terminal ? "\033[K" : "\n");
 }
 
+void drawOverlay(const Pipeline& pipeline, bool quiet) {
+  const bool terminal = !quiet && isatty(STDERR_FILENO) != 0;
+  const std::string sentence = pipeline.drawOverlay([&](std::size_t done, std::size_t all) {
+    if (terminal) std::fprintf(stderr, "\roverlay: frame %zu of %zu\033[K", done, all);
+  });
+  std::fprintf(stderr, "%s%s\n", terminal ? "\r\033[K" : "", sentence.c_str());
+}
+
 void run(const PipelineOptions& options) {
   Pipeline pipeline(options);
   pipeline.run([&](const PipelineCounts& counts) {
@@ -55,6 +64,7 @@ void run(const PipelineOptions& options) {
   if (!options.quiet && isatty(STDERR_FILENO) != 0) std::fputc('\n', stderr);
   pipeline.finish();
   pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
+  if (options.pictures) drawOverlay(pipeline, options.quiet);
   for (const auto& [service, reasons] : pipeline.reasons()) {
     for (const auto& [code, count] : reasons.all()) {
       std::fprintf(stderr, "%s: %s %llu times\n", service.c_str(), code.c_str(),

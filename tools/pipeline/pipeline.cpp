@@ -7,6 +7,8 @@
 #include "common/base/errors.h"
 #include "common/replay/class_aliases.h"
 #include "services/semantic_filter/priors.h"
+#include "tools/outputs/overlay_video.h"
+#include "tools/outputs/truth_sources.h"
 
 namespace perdure::tools {
 namespace {
@@ -33,7 +35,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   if (options.odometry != "vio" && options.odometry != "truth") {
     pose_file_ = replay::PoseFile::read(options.odometry);
   }
-  openData(options);
+  openData();
   openOdometry(options);
   openDetections(options);
   const auto priors = semantic_filter::loadClassPriors(configs_.semantic_filter.class_priors);
@@ -58,7 +60,8 @@ Pipeline::Pipeline(const PipelineOptions& options)
 
 Pipeline::~Pipeline() = default;
 
-void Pipeline::openData(const PipelineOptions& options) {
+replay::DatasetOptions Pipeline::dataOptions() const {
+  const PipelineOptions& options = options_;
   replay::DatasetOptions data;
   data.path = options.data;
   data.sequence = options.sequence;
@@ -69,8 +72,10 @@ void Pipeline::openData(const PipelineOptions& options) {
   data.source = kCapture;
   data.second_encoding = ImageEncoding::kMono8;
   data.decode = options.odometry == "vio" || options.detections == "model";
-  dataset_ = replay::Dataset::open(data);
+  return data;
 }
+
+void Pipeline::openData() { dataset_ = replay::Dataset::open(dataOptions()); }
 
 void Pipeline::openOdometry(const PipelineOptions& options) {
   if (options.odometry == "truth") {
@@ -95,6 +100,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   sinks.odometry = [this](const Odometry& odometry) { new_odometry_.push_back(odometry); };
   sinks.landmarks = [this](const Landmarks& landmarks) {
     landmarks_[landmarks.stamp.sequence] = landmarks;
+    outputs_->onLandmarks(landmarks);
   };
   vio_ = std::make_unique<vio::Node>(configs_.vio, kVio, std::move(sinks));
   vio_->setWorld({1, 0});
@@ -214,6 +220,7 @@ void Pipeline::detect(const Frame& frame) {
 }
 
 void Pipeline::offer(Detections detections) {
+  outputs_->onDetections(detections);
   ++counts_.inferred;
   counts_.detections += detections.detections.size();
   waiting_[detections.stamp.sequence] = std::move(detections);
@@ -251,8 +258,17 @@ void Pipeline::deliverDetections(std::uint64_t frame) {
 }
 
 void Pipeline::finish() {
+  if (auto truth = pictureTruth(*dataset_, dataOptions(), outputs_->poses()))
+    outputs_->setTruth(*std::move(truth));
   outputs_->finish();
   outputs_->writeJson("timing.json", timer_.toJson());
+}
+
+std::string Pipeline::drawOverlay(
+    const std::function<void(std::size_t, std::size_t)>& progress) const {
+  auto data = dataOptions();
+  data.decode = true;
+  return writeOverlay(outputs_->log(), data, outputs_->folder() / "overlay.mp4", progress);
 }
 
 std::map<std::string, ReasonCounts> Pipeline::reasons() const {

@@ -37,6 +37,8 @@ class Pipeline {
   void run(const std::function<void(const PipelineCounts&)>& progress);
   /// Writes every file but report.json.
   void finish();
+  /// Writes overlay.mp4; returns what became of it, as a sentence. After finish().
+  std::string drawOverlay(const std::function<void(std::size_t, std::size_t)>& progress) const;
 
   const PipelineCounts& counts() const { return counts_; }
   const replay::Dataset& dataset() const { return *dataset_; }
@@ -51,7 +53,8 @@ class Pipeline {
  private:
   void openOdometry(const PipelineOptions& options);
   void openDetections(const PipelineOptions& options);
-  void openData(const PipelineOptions& options);
+  void openData();
+  replay::DatasetOptions dataOptions() const;
   void handle(const replay::Message& message);
   void handleFrame(const Frame& frame);
   void detect(const Frame& frame);
