@@ -47,7 +47,8 @@ struct Recording {
   std::vector<FrameFile> frames;  ///< by time, cameras in order
   std::vector<ImuSample> imu;     ///< by time
   std::vector<SpeedSample> speed;
-  std::optional<PoseFile> truth;  ///< of the body
+  /// Of the body, in a world whose z is up. Of a KITTI drive: by OXTS, east, north and up.
+  std::optional<PoseFile> truth;
   ReasonCounts reasons;           ///< what was left out while reading
 };
 

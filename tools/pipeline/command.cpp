@@ -12,7 +12,8 @@ namespace perdure::tools {
 namespace {
 
 void addOptions(CLI::App& app, PipelineOptions& options) {
-  app.add_option("--data", options.data, "Dataset folder: EuRoC, KITTI raw or KITTI tracking")
+  app.add_option("--data", options.data,
+                 "Dataset folder: EuRoC (simulated too), KITTI raw or tracking")
       ->required();
   app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000");
   app.add_option("--odometry", options.odometry, "vio, truth, or a pose file (TUM or KITTI lines)")
@@ -30,9 +31,14 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--out", options.out, "Folder for the results")->required();
   app.add_option("--seconds", options.seconds, "Stop after so many seconds of data")
       ->check(CLI::NonNegativeNumber);
+  app.add_option("--seed", options.seed, "Of --detections simulated")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--config", options.configs, "service=FILE in place of config/service.yaml")
       ->take_all();
-  app.add_option("--set", options.assignments, "service.key=value")->take_all();
+  app.add_option("--set", options.assignments,
+                 "service.key=value; services are vio, semantic_filter, inference and detector, "
+                 "the simulated one")
+      ->take_all();
   app.add_flag("--pictures", options.pictures, "Also overlay.mp4: the frames with the objects");
   app.add_flag("--quiet", options.quiet, "No progress");
 }

@@ -7,6 +7,7 @@
 #include "common/base/errors.h"
 #include "common/replay/class_aliases.h"
 #include "services/semantic_filter/priors.h"
+#include "tools/evaluate/simulated_truth.h"
 #include "tools/outputs/overlay_video.h"
 #include "tools/outputs/truth_sources.h"
 
@@ -56,6 +57,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   outputs_->onCalibration(dataset_->calibration());
   filter_->onCalibration(dataset_->calibration());
   if (inference_) filter_->onModel(inference_->model());
+  if (simulated_) filter_->onModel(simulated_->info());
 }
 
 Pipeline::~Pipeline() = default;
@@ -78,6 +80,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
 void Pipeline::openData() { dataset_ = replay::Dataset::open(dataOptions()); }
 
 void Pipeline::openOdometry(const PipelineOptions& options) {
+  PoseAccuracy accuracy;
   if (options.odometry == "truth") {
     if (!dataset_->truth()) {
       throw StartupError(
@@ -85,9 +88,10 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
           options.data + " holds no true poses; give --odometry a pose file, or vio");
     }
     pose_file_ = dataset_->truth();
+    accuracy = isSimulated(options.data) ? ofExactTruth() : ofMeasuredTruth();
   }
   if (pose_file_) {
-    poses_ = std::make_unique<PoseOdometry>(*pose_file_, kVio);
+    poses_ = std::make_unique<PoseOdometry>(*pose_file_, kVio, accuracy);
     return;
   }
   uses_vio_ = true;
@@ -110,10 +114,9 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
 void Pipeline::openDetections(const PipelineOptions& options) {
   if (options.detections == "none") return;
   if (options.detections == "simulated") {
-    throw StartupError(ExitCode::kUnavailable,
-                       "--detections simulated needs a simulated folder (objects_truth.json, "
-                       "visibility_truth.csv), which this version does not make yet; give a CSV, "
-                       "model or none");
+    simulated_ = std::make_unique<SimulatedDetections>(configs_.detector, options.data, *dataset_,
+                                                       kInference);
+    return;
   }
   if (options.detections != "model") {
     const auto aliases = replay::ClassAliases::load(configFolder() / "class_aliases.yaml");
@@ -154,6 +157,7 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
     if (first_camera) progress(counts_);
   }
   if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
+  if (simulated_) offerDue(TimePoint::max());
   deliver();
   timer_.timeTowardsNext("semantic_filter", [&] { filter_->flush(); });
 }
@@ -202,6 +206,10 @@ void Pipeline::detect(const Frame& frame) {
       reasons_.add(detections.error());
     return;
   }
+  if (simulated_) {
+    simulated_->look(frame);
+    return offerDue(frame.stamp.time);
+  }
   if (!detection_file_) return;
   const auto found = detection_file_->at(frame.stamp.sequence);
   const ModelInfo model = detection_file_->modelAt(frame.stamp.sequence);
@@ -217,6 +225,10 @@ void Pipeline::detect(const Frame& frame) {
   detections.model_hash = model.hash;
   detections.detections = *found;
   offer(std::move(detections));
+}
+
+void Pipeline::offerDue(TimePoint now) {
+  for (Detections& detections : simulated_->due(now)) offer(std::move(detections));
 }
 
 void Pipeline::offer(Detections detections) {

@@ -59,6 +59,7 @@ class Pipeline {
   void handleFrame(const Frame& frame);
   void detect(const Frame& frame);
   void offer(Detections detections);
+  void offerDue(TimePoint now);
   void deliver();
   void deliverDetections(std::uint64_t frame);
 
@@ -71,6 +72,7 @@ class Pipeline {
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;
   std::unique_ptr<inference::Node> inference_;
+  std::unique_ptr<SimulatedDetections> simulated_;
   std::unique_ptr<vio::Node> vio_;
   std::unique_ptr<semantic_filter::Node> filter_;
   bool uses_vio_ = false;

@@ -12,16 +12,19 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Service {
-  std::string name;
+  std::string name, file;
   config::Fields fields;
 };
 
 std::vector<Service> describeAll(ServiceConfigs& configs) {
-  std::vector<Service> services;
-  vio::describe(configs.vio, services.emplace_back(Service{"vio", {}}).fields);
-  semantic_filter::describe(configs.semantic_filter,
-                            services.emplace_back(Service{"semantic_filter", {}}).fields);
-  inference::describe(configs.inference, services.emplace_back(Service{"inference", {}}).fields);
+  std::vector<Service> services{{"vio", "vio.yaml", {}},
+                                {"semantic_filter", "semantic_filter.yaml", {}},
+                                {"inference", "inference.yaml", {}},
+                                {"detector", "simulated_detector.yaml", {}}};
+  vio::describe(configs.vio, services[0].fields);
+  semantic_filter::describe(configs.semantic_filter, services[1].fields);
+  inference::describe(configs.inference, services[2].fields);
+  describe(configs.detector, services[3].fields);
   return services;
 }
 
@@ -43,7 +46,7 @@ void readFiles(std::vector<Service>& services, const PipelineOptions& options,
                std::vector<config::Problem>& problems) {
   std::vector<std::pair<Service*, std::string>> files;
   for (auto& service : services) {
-    const fs::path file = configFolder() / (service.name + ".yaml");
+    const fs::path file = configFolder() / service.file;
     if (fs::exists(file)) files.emplace_back(&service, file.string());
   }
   for (const auto& entry : options.configs) {
@@ -93,6 +96,7 @@ ServiceConfigs readServiceConfigs(const PipelineOptions& options) {
     const auto found = config::assign(service.fields, assignment.substr(service.name.size() + 1));
     problems.insert(problems.end(), found.begin(), found.end());
   }
+  if (options.seed) configs.detector.seed = *options.seed;
   config::refuse(problems);
   auto& priors = configs.semantic_filter.class_priors;
   if (!fs::exists(priors)) priors = (configFolder() / fs::path(priors).filename()).string();

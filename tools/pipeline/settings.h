@@ -10,6 +10,7 @@
 #include "services/inference/config.h"
 #include "services/semantic_filter/config.h"
 #include "services/vio/config.h"
+#include "tools/pipeline/simulated_source.h"
 
 namespace perdure::tools {
 
@@ -21,6 +22,7 @@ struct PipelineOptions {
   std::vector<std::uint32_t> image_size;
   double box_origin = 0.0;
   std::optional<double> seconds;
+  std::optional<std::int64_t> seed;      ///< of --detections simulated
   std::vector<std::string> configs;      ///< service=FILE
   std::vector<std::string> assignments;  ///< service.key=value
   bool quiet = false;
@@ -32,11 +34,13 @@ struct ServiceConfigs {
   vio::Config vio;
   semantic_filter::Config semantic_filter;
   inference::Config inference;
+  DetectorConfig detector;   ///< of --detections simulated; service `detector`
   std::uint64_t digest = 0;  ///< of all values
 };
 
 /// Throws StartupError: kConfiguration with all that is wrong, kUsage for an unknown service.
-/// Files: config/SERVICE.yaml of the configuration folder where there is one, or --config.
+/// Files: config/SERVICE.yaml of the configuration folder where there is one, or --config; the
+/// simulated detector's is simulated_detector.yaml.
 ServiceConfigs readServiceConfigs(const PipelineOptions& options);
 
 /// The folder `config`: $PERDURE_CONFIG_DIR, else the one of the working directory, of the source

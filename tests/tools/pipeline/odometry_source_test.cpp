@@ -40,5 +40,25 @@ TEST(PoseOdometry, UpIsTheMeanOfTheBodysZAxisSoFar) {
   EXPECT_NEAR(source.at(stampOf(2))->up_W.z(), 1.0, 1e-9);
 }
 
+TEST(PoseOdometry, TruthHasAnErrorThatStaysInTheWorldAndAWorldWhoseZIsUp) {
+  std::vector<replay::StampedPose> poses(2);
+  poses[0].T_WB.q = expQuaternion({0.2, 0, 0});
+  poses[1].T_WB.q = expQuaternion({0.2, 0, 0}) * expQuaternion({0, 0, 0.3});
+  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2, ofExactTruth());
+  const auto first = source.at(stampOf(0));
+  EXPECT_FALSE(first->has_increment) << "nothing was before it";
+  const auto second = source.at(stampOf(1));
+  EXPECT_EQ(second->up_W, Eigen::Vector3d(Eigen::Vector3d::UnitZ()));
+  ASSERT_TRUE(second->has_increment);
+  EXPECT_EQ(second->increment_from, 0U);
+  EXPECT_TRUE(second->increment_covariance.isZero());
+  // An error of the body's attitude is the same turn of the world before and after.
+  const Eigen::Vector3d error(1e-4, 2e-4, 3e-4);
+  const Eigen::Vector3d then = second->transition.topLeftCorner<3, 3>() * error;
+  EXPECT_TRUE((second->T_WB.q * then).isApprox(first->T_WB.q * error, 1e-12));
+  EXPECT_LT(second->covariance.diagonal().maxCoeff(), 1e-5);
+  EXPECT_GT(second->covariance.diagonal().minCoeff(), 0.0);
+}
+
 }  // namespace
 }  // namespace perdure::tools

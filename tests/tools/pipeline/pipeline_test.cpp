@@ -32,8 +32,8 @@ RigidTransform poseOf(int frame) {
   return RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * frame, 0, 0));
 }
 
-/// The box of the car in a frame, cut at the image's border as detectors do; nothing where less than
-/// a fifth of it is in the image.
+/// The box of the car in a frame, cut at the image's border as detectors do; nothing where less
+/// than a fifth of it is in the image.
 std::optional<Box> boxOf(const CameraModel& camera, int frame) {
   const RigidTransform T_CW = (poseOf(frame) * camera.T_BC()).inverse();
   Box box{1e9, 1e9, -1e9, -1e9};
@@ -215,7 +215,8 @@ TEST(Pipeline, WhatCannotStartSaysTheMend) {
   EXPECT_THAT(errorOf(options), HasSubstr("no inertial samples"));
   options = streetOptions(street, "out");
   options.assignments = {"planner.speed=3"};
-  EXPECT_THAT(errorOf(options), HasSubstr("services are vio, semantic_filter, inference"));
+  EXPECT_THAT(errorOf(options),
+              HasSubstr("services are vio, semantic_filter, inference, detector"));
   options.assignments = {"semantic_filter.no_such_key=3"};
   EXPECT_THAT(errorOf(options), HasSubstr("no_such_key"));
   options = streetOptions(street, "out");
