@@ -134,9 +134,10 @@ TEST_F(Demo, SaysWhatIsMissing) {
   const auto demo = start({});
   EXPECT_THAT(demo->wait(60s), ::testing::AnyOf(69, 78)) << demo->log();
   EXPECT_THAT(demo->log(), HasSubstr("inference does not start"));
-  Child without({(programs() / "perdure").string(), "demo"}, folder_.file("without"));
+  Child without({(programs() / "perdure").string(), "demo", "--data", drive_.string()},
+                folder_.file("without"));
   EXPECT_EQ(without.wait(10s), 64);
-  EXPECT_THAT(without.log(), HasSubstr("--data DIR"));
+  EXPECT_THAT(without.log(), HasSubstr("--model FILE.onnx"));
 }
 
 /// Confirmed objects of `before` that `after` still has, and how far they moved (the middle one).

@@ -1,7 +1,9 @@
 #include "tools/demo/command.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -11,21 +13,44 @@
 #include "common/base/errors.h"
 #include "common/service/signals.h"
 #include "tools/demo/demo.h"
+#include "tools/demo/embedded_drive.h"
 
 namespace perdure::tools {
 namespace {
 
 namespace fs = std::filesystem;
 
-void require(const DemoOptions& options) {
-  if (options.data.empty()) {
-    throw StartupError(ExitCode::kUsage,
-                       "there is no simulated drive yet: give --data DIR, a drive in EuRoC, KITTI "
-                       "raw or KITTI tracking layout, and --model FILE.onnx");
+/// A line that rewrites itself on a terminal; elsewhere one each tenth of the way.
+void showRendering(const SimulateProgress& progress) {
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  const std::size_t tenth = std::max<std::size_t>(1, progress.frames / 10);
+  const bool last = progress.frame == progress.frames;
+  if (!terminal && progress.frame % tenth != 0 && !last) return;
+  std::cerr << fmt::format("{}demo: renders the drive, frame {} of {}{}",
+                           terminal ? "\r\033[K" : "", progress.frame, progress.frames,
+                           terminal && !last ? "" : "\n")
+            << std::flush;
+}
+
+/// Fills in what was not given: drive and network of the demo's own.
+void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
+  if (options.programs.empty()) {
+    options.programs = fs::read_symlink("/proc/self/exe").parent_path().string();
   }
-  if (options.model.empty()) {
-    throw StartupError(ExitCode::kUsage, "give --model FILE.onnx, the network that looks at images");
+  if (!options.data.empty()) {
+    if (!options.model.empty()) return;
+    throw StartupError(
+        ExitCode::kUsage,
+        "give --model FILE.onnx, the network that looks at the images of --data; the "
+        "one in models/ knows rendered drives only");
   }
+  if (options.model.empty()) options.model = embeddedModel(options.root);
+  const fs::path cache =
+      options.cache.empty() ? fs::path(options.root) / "out" : fs::path(options.cache);
+  options.data = embeddedDrive(cache, [&](const SimulateProgress& progress) {
+                   showRendering(progress);
+                   if (interrupted) throw CLI::RuntimeError(130);
+                 }).string();
 }
 
 void summarise(const fs::path& out) {
@@ -42,21 +67,19 @@ void summarise(const fs::path& out) {
                              s.value("dropped", 0), s.value("restarts", 0));
   }
   if (report.contains("objects")) {
-    std::cout << fmt::format("cars: recall {:.3f}, precision {:.3f} under 1 m\n",
-                             report["objects"]["recall"].get<double>(),
-                             report["objects"]["precision"].get<double>());
+    std::cout << fmt::format(
+        "objects: recall {:.3f}, precision {:.3f} under 1 m, {:.2f} on the map for each found\n",
+        report["objects"]["recall"].get<double>(), report["objects"]["precision"].get<double>(),
+        report["objects"]["duplicates"].get<double>());
   }
   std::cout << "outputs: " << out.string() << std::endl;
 }
 
 void runDemo(DemoOptions options) {
-  require(options);
-  if (options.programs.empty()) {
-    options.programs = fs::read_symlink("/proc/self/exe").parent_path().string();
-  }
   const service::BlockedSignals blocked;
   std::atomic<bool> interrupted = false;
   const service::SignalThread signals(blocked, [&] { interrupted = true; });
+  complete(options, interrupted);
   Demo(options, interrupted).run();
   summarise(fs::absolute(options.out));
   if (interrupted) throw CLI::RuntimeError(130);
@@ -69,20 +92,23 @@ void addDemoCommand(CLI::App& app) {
   options->out = "out/demo";
   CLI::App* demo = app.add_subcommand(
       "demo", "The five services under supervision over a drive; deploy/demo builds and calls it");
-  demo->add_option("--data", options->data, "folder of the drive")->type_name("DIR");
+  demo->add_option("--data", options->data, "folder of the drive; default: one that is rendered")
+      ->type_name("DIR");
   demo->add_option("--sequence", options->sequence, "of KITTI tracking, for example 0000");
-  demo->add_option("--model", options->model, "the network")->type_name("FILE.onnx");
+  demo->add_option("--model", options->model, "the network; default: the one in models/")
+      ->type_name("FILE.onnx");
   demo->add_option("--seconds", options->seconds, "of the drive; default: all of it")
       ->check(CLI::PositiveNumber);
   demo->add_option("--rate", options->rate,
                    "seconds of the drive in one second, or max: as fast as the services answer")
       ->capture_default_str();
   demo->add_option("--out", options->out, "folder for what comes out")->capture_default_str();
-  demo->add_flag("--headless", options->headless,
-                 "open no window (this version has none to open)");
+  demo->add_flag("--headless", options->headless, "open no window (this version has none to open)");
   demo->add_option("--truth", options->truth, "root of KITTI tracking with label_02 and calib");
   demo->add_option("--truth-sequence", options->truth_sequence, "in --truth, for example 0000");
   demo->add_option("--root", options->root, "folder that has config/")->capture_default_str();
+  demo->add_option("--cache", options->cache,
+                   "folder where rendered drives are kept; default: ROOT/out");
   demo->add_option("--programs", options->programs,
                    "folder of the services; default: that of this program");
   demo->callback([options] { runDemo(*options); });

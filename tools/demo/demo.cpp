@@ -16,7 +16,10 @@
 
 #include "common/base/errors.h"
 #include "common/base/ids.h"
-#include "common/replay/dataset.h"
+#include "tools/evaluate/object_report.h"
+#include "tools/evaluate/simulated_truth.h"
+#include "tools/outputs/overlay_video.h"
+#include "tools/outputs/truth_sources.h"
 
 namespace perdure::tools {
 namespace {
@@ -90,7 +93,8 @@ std::string socketFolder() {
   std::string name = (fs::temp_directory_path() / "perdure-demo-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) {
     throw StartupError(ExitCode::kUnavailable, "no folder can be made in " +
-                       fs::temp_directory_path().string() + "; set TMPDIR to one that can be written");
+                                                   fs::temp_directory_path().string() +
+                                                   "; set TMPDIR to one that can be written");
   }
   return name;
 }
@@ -124,10 +128,10 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   std::ofstream(config) << supervisorConfig(services_, folders_, socket_, options_.root);
   supervisor_ = std::make_unique<Supervisor>(config.string(), socket_,
                                              (folders_.run / "supervisord.out").string());
-  std::cerr << fmt::format("demo: {} frames, services on DDS domain {}; listen with: "
-                           "PERDURE_DOMAIN={} {}/perdure topics\n",
-                           frames_, domain_->options().domain, domain_->options().domain,
-                           options_.programs);
+  std::cerr << fmt::format(
+      "demo: {} frames, services on DDS domain {}; listen with: "
+      "PERDURE_DOMAIN={} {}/perdure topics\n",
+      frames_, domain_->options().domain, domain_->options().domain, options_.programs);
 }
 
 Demo::~Demo() {
@@ -136,12 +140,16 @@ Demo::~Demo() {
   if (!socket_.empty()) fs::remove_all(fs::path(socket_).parent_path(), ignored);
 }
 
-void Demo::openData() {
+replay::DatasetOptions Demo::dataOptions() const {
   replay::DatasetOptions data;
   data.path = options_.data;
   data.sequence = options_.sequence;
   data.decode = false;
-  frames_ = replay::Dataset::open(data)->frameCount();
+  return data;
+}
+
+void Demo::openData() {
+  frames_ = replay::Dataset::open(dataOptions())->frameCount();
   if (!fs::exists(options_.model)) {
     throw StartupError(ExitCode::kUnavailable,
                        options_.model + " does not exist; give --model a network, FILE.onnx");
@@ -156,8 +164,8 @@ void Demo::checkConfigurations() {
     const std::string folder = shellQuoted(fs::absolute(options_.root).string());
     const Answer answer = answerOf("cd " + folder + " && " + command + "--print-config 2>&1");
     if (answer.status != 0) {
-      const auto code = answer.status == 127 ? ExitCode::kUnavailable
-                                             : static_cast<ExitCode>(answer.status);
+      const auto code =
+          answer.status == 127 ? ExitCode::kUnavailable : static_cast<ExitCode>(answer.status);
       throw StartupError(code, service.name + " cannot start: " + answer.text);
     }
     configurations_ += answer.text;
@@ -202,8 +210,8 @@ void Demo::checkServices() {
   const auto states = supervisor_->states();
   if (!states) {
     if (supervisor_->alive()) return;  // busy; asked again soon
-    throw StartupError(ExitCode::kFailure, "supervisord has ended; see " +
-                       (folders_.run / "supervisord.log").string());
+    throw StartupError(ExitCode::kFailure,
+                       "supervisord has ended; see " + (folders_.run / "supervisord.log").string());
   }
   const bool all_well = std::all_of(states->begin(), states->end(), [](const auto& one) {
     return one.second.state != "BACKOFF" && one.second.state != "FATAL";
@@ -217,16 +225,15 @@ void Demo::checkServices() {
     const std::string words = lastWords(service.log);
     throw StartupError(status == 0 ? ExitCode::kFailure : static_cast<ExitCode>(status),
                        fmt::format("{} does not start: {} (its log: {})", service.name,
-                                   words.empty() ? found->second.spawn_error : words,
-                                   service.log));
+                                   words.empty() ? found->second.spawn_error : words, service.log));
   }
 }
 
 void Demo::showProgress(bool last) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const std::string line = reporter_->progressLine(frames_);
-  std::cerr << (terminal ? "\r\033[K" : "") << "demo: " << line
-            << (terminal && !last ? "" : "\n") << std::flush;
+  std::cerr << (terminal ? "\r\033[K" : "") << "demo: " << line << (terminal && !last ? "" : "\n")
+            << std::flush;
 }
 
 void Demo::endInOrder() {
@@ -243,7 +250,27 @@ void Demo::endOne(const std::string& service) {
   }
 }
 
+/// Truth that cannot be read is told where it is scored.
+void Demo::setTruthOfPictures() {
+  const auto data = dataOptions();
+  auto truth = truth_ ? pictureTruthOfLabels(truth_->labels, truth_->calibration, outputs_->poses())
+                      : pictureTruth(*replay::Dataset::open(data), data, outputs_->poses());
+  if (truth) outputs_->setTruth(*std::move(truth));
+}
+
+void Demo::drawOverlay() const {
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  auto data = dataOptions();
+  data.decode = true;
+  const std::string sentence = writeOverlay(
+      outputs_->log(), data, folders_.out / "overlay.mp4", [&](std::size_t done, std::size_t all) {
+        if (terminal) std::cerr << fmt::format("\r\033[Kdemo: overlay, frame {} of {}", done, all);
+      });
+  std::cerr << (terminal ? "\r\033[K" : "") << "demo: " << sentence << std::endl;
+}
+
 void Demo::write() {
+  setTruthOfPictures();
   outputs_->finish();
   outputs_->writeJson("timing.json", reporter_->timing());
   nlohmann::ordered_json report = {{"program", "perdure demo"},
@@ -261,8 +288,11 @@ void Demo::write() {
   }
   if (truth_ && reporter_->odometryFrames() > 0) {
     report["objects"] = scoreAgainst(*truth_, folders_.out);
+  } else if (isSimulated(options_.data) && reporter_->odometryFrames() > 0) {
+    report["objects"] = reportSimulated(options_.data, folders_.out);
   }
   outputs_->writeJson("report.json", report);
+  drawOverlay();
 }
 
 }  // namespace perdure::tools

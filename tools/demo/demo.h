@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "common/replay/dataset.h"
 #include "tools/demo/plan.h"
 #include "tools/demo/reporter.h"
 #include "tools/demo/supervisor.h"
@@ -33,6 +34,9 @@ class Demo {
   void endInOrder();
   void endOne(const std::string& service);
   void write();
+  void setTruthOfPictures();
+  void drawOverlay() const;
+  replay::DatasetOptions dataOptions() const;
 
   const DemoOptions options_;
   const std::atomic<bool>& interrupted_;

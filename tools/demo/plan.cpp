@@ -16,9 +16,9 @@ namespace fs = std::filesystem;
 constexpr char kMark[] = "supervisord.conf";
 
 [[noreturn]] void cannotUse(const fs::path& folder, const std::string& why) {
-  throw StartupError(ExitCode::kUnavailable,
-                     fmt::format("{} cannot be used: {}; give --out another folder",
-                                 folder.string(), why));
+  throw StartupError(
+      ExitCode::kUnavailable,
+      fmt::format("{} cannot be used: {}; give --out another folder", folder.string(), why));
 }
 
 /// "--set" arguments that make capture's pace of --rate.
@@ -28,7 +28,8 @@ std::vector<std::string> paceOf(const std::string& rate) {
   const auto [end, error] = std::from_chars(rate.data(), rate.data() + rate.size(), value);
   if (error != std::errc() || end != rate.data() + rate.size() || !(value > 0.0)) {
     throw StartupError(ExitCode::kUsage, fmt::format("--rate {}: give max, or how many seconds of "
-                                                     "the drive pass in one second", rate));
+                                                     "the drive pass in one second",
+                                                     rate));
   }
   return {"pace.mode=clock", "pace.rate=" + rate};
 }
@@ -49,8 +50,7 @@ std::vector<std::string> settingsOf(const std::string& service, const DemoOption
   if (service != "capture") return {};
   std::vector<std::string> settings = {
       "dataset.path=" + fs::absolute(options.data).string(),
-      "run.state=" + (folders.state / "capture.json").string(),
-      "run.on_end=stay",
+      "run.state=" + (folders.state / "capture.json").string(), "run.on_end=stay",
       "start.readers=[vio, inference, semantic_filter, map_store, demo]"};
   if (!options.sequence.empty()) {
     settings.push_back(fmt::format("dataset.sequence=\"{}\"", options.sequence));
@@ -104,7 +104,8 @@ std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFold
     if (!fs::exists(program)) {
       throw StartupError(ExitCode::kUnavailable,
                          fmt::format("{} is missing; build it: cmake --preset release && cmake "
-                                     "--build --preset release", program.string()));
+                                     "--build --preset release",
+                                     program.string()));
     }
     ServicePlan plan{name, {program.string()}, (folders.run / (name + ".log")).string()};
     const fs::path config = root / "config" / (name + ".yaml");

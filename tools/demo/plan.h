@@ -9,12 +9,15 @@
 namespace perdure::tools {
 
 struct DemoOptions {
-  std::string data, sequence, model, out, rate = "1";
-  std::string root = ".";    ///< where config/ is
-  std::string programs;      ///< folder of the services; empty: that of this program
-  std::string truth;         ///< root of KITTI tracking; empty: looked for beside the data
+  std::string data;   ///< empty: the drive that the demo renders for itself
+  std::string model;  ///< empty: the one in ROOT/models, for that drive only
+  std::string sequence, out, rate = "1";
+  std::string cache;       ///< where rendered drives are kept; empty: ROOT/out
+  std::string root = ".";  ///< where config/ is
+  std::string programs;    ///< folder of the services; empty: that of this program
+  std::string truth;       ///< root of KITTI tracking; empty: looked for beside the data
   std::string truth_sequence;
-  double seconds = 0.0;      ///< of the drive; 0: all of it
+  double seconds = 0.0;  ///< of the drive; 0: all of it
   bool headless = false;
 };
 

@@ -47,14 +47,16 @@ Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, Out
     : outputs_(outputs),
       calibration_reader_(participant, bus::topics::kCalibration),
       odometry_reader_(participant, bus::topics::kOdometry),
+      landmarks_reader_(participant, bus::topics::kLandmarks),
       detections_reader_(participant, bus::topics::kDetections),
       objects_reader_(participant, bus::topics::kObjects),
       events_reader_(participant, bus::topics::kEvents),
       health_reader_(participant, bus::topics::kHealth) {
   loop.on(calibration_reader_, [this](const Calibration& c) { outputs_.onCalibration(c); });
   loop.on(odometry_reader_, [this](const Odometry& o) { onOdometry(o); });
+  loop.on(landmarks_reader_, [this](const Landmarks& l) { outputs_.onLandmarks(l); });
   loop.on(detections_reader_, [this](const Detections& d) {
-    detections_.insert(d.stamp.sequence);
+    if (detections_.insert(d.stamp.sequence).second) outputs_.onDetections(d);
     last_message_ns_ = monotonicNs();
   });
   loop.on(objects_reader_, [this](const Objects& o) { onObjects(o); });
@@ -120,12 +122,9 @@ std::string Reporter::progressLine(std::size_t frames_in_all) const {
 Json Reporter::report() const {
   Json services = Json::object();
   for (const auto& [name, counts] : services_) {
-    services[name] = {{"frames_in", counts.framesIn()},
-                      {"frames_out", counts.framesOut()},
-                      {"dropped", counts.dropped()},
-                      {"restarts", 0},
-                      {"cpu_s", rounded(counts.cpuSeconds())},
-                      {"reasons", counts.reasons()}};
+    services[name] = {{"frames_in", counts.framesIn()},        {"frames_out", counts.framesOut()},
+                      {"dropped", counts.dropped()},           {"restarts", 0},
+                      {"cpu_s", rounded(counts.cpuSeconds())}, {"reasons", counts.reasons()}};
   }
   return {{"services", services},
           {"messages",

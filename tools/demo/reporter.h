@@ -61,6 +61,7 @@ class Reporter {
   OutputWriter& outputs_;
   bus::Reader<Calibration> calibration_reader_;
   bus::Reader<Odometry> odometry_reader_;
+  bus::Reader<Landmarks> landmarks_reader_;
   bus::Reader<Detections> detections_reader_;
   bus::Reader<Objects> objects_reader_;
   bus::Reader<Event> events_reader_;

@@ -61,8 +61,7 @@ class Socket {
   Socket& operator=(const Socket&) = delete;
   bool isOpen() const { return open_; }
   bool send(const std::string& text) const {
-    return ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) ==
-           static_cast<ssize_t>(text.size());
+    return ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   }
   std::string receiveAll() const {
     std::string text;
@@ -132,7 +131,8 @@ Supervisor::Supervisor(const std::string& config_file, const std::string& socket
     waitForEnd();
     throw StartupError(ExitCode::kUnavailable,
                        "supervisord does not answer; install it with deploy/install --runtime, "
-                       "and see " + log);
+                       "and see " +
+                           log);
   }
 }
 
@@ -160,9 +160,10 @@ Result<std::string> Supervisor::call(const std::string& method,
   if (!connection.isOpen()) return fail("no_supervisor", socket_);
   const std::string body = "<?xml version=\"1.0\"?><methodCall><methodName>supervisor." + method +
                            "</methodName><params>" + parameters + "</params></methodCall>";
-  const std::string head = "POST /RPC2 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
-                           "Content-Type: text/xml\r\nContent-Length: " +
-                           std::to_string(body.size()) + "\r\n\r\n";
+  const std::string head =
+      "POST /RPC2 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+      "Content-Type: text/xml\r\nContent-Length: " +
+      std::to_string(body.size()) + "\r\n\r\n";
   if (!connection.send(head + body)) return fail("no_supervisor", socket_);
   const std::string answer = connection.receiveAll();
   if (answer.find("</methodResponse>") == std::string::npos) return fail("no_answer", answer);

@@ -118,8 +118,9 @@ Json scoreAgainst(const TruthFiles& truth, const fs::path& out) {
   const auto tracks = staticTracks(labels, calibration.T_RI, poses);
   const auto score = scoreObjects(rows, sortTruth(labels, tracks), poses, calibration, {});
   Json report = toReport(score);
-  report["of"] = "cars in objects_final.csv, under 1 m, any orientation; duplicates are objects of "
-                 "the map for each true one that was found";
+  report["of"] =
+      "cars in objects_final.csv, under 1 m, any orientation; duplicates are objects of "
+      "the map for each true one that was found";
   report["parked_cars"] = parkedCars(labels, tracks, poses, calibration.T_RI, rows);
   return report;
 }
