@@ -26,6 +26,41 @@ const std::vector<Entry>& entries() {
         "size, "
         "though chairs stand close together and hide each other."},
        makeRoom},
+      {{"toy",
+        "A toy car near by and a car far away that fill the same pixels part within a few views, "
+        "while cars farther away, smaller in the image than the toy, remain cars."},
+       makeToy},
+      {{"occlusion",
+        "A chair that goes behind a monitor and comes back is known all the while, and is the same "
+        "chair when it comes back."},
+       makeOcclusion},
+      {{"vanish",
+        "What was taken away behind one's back is given up once its place is seen to be empty; "
+        "what "
+        "was moved is found at its new place."},
+       makeVanish},
+      {{"row", "Cars parked 0.8 m apart stay ten cars: neither merged nor doubled."}, makeRow},
+      {{"roll",
+        "A camera that leans by up to 60 degrees leaves objects upright and where they are: the "
+        "vertical comes from gravity, not from the image."},
+       makeRoll},
+      {{"still",
+        "Without parallax the filter stays undecided between near and small and far and large: "
+        "standing still is no evidence."},
+       makeStill},
+      {{"straight",
+        "A minute of even driving, in which one camera and an IMU hardly observe their scale, "
+        "drifts "
+        "no more than wheels or a second camera allow."},
+       makeStraight},
+      {{"traffic",
+        "Cars that move are kept apart from parked ones and leave nothing behind; one that drives "
+        "off has moved, one that arrives becomes part of the map."},
+       makeTraffic},
+      {{"town",
+        "The cost of a frame depends on what is in view, not on the 500 vehicles of a map of four "
+        "kilometres of streets."},
+       makeTown},
       {{"random",
         "Single views for training, one a second: each looks at a thing of a class drawn evenly, "
         "from any side and as large in the image as may be; the body rests in between."},

@@ -9,6 +9,15 @@ namespace perdure::sim {
 
 Scene makeStreet(std::uint64_t seed, const SceneOptions& options);
 Scene makeRoom(std::uint64_t seed, const SceneOptions& options);
+Scene makeToy(std::uint64_t seed, const SceneOptions& options);
+Scene makeOcclusion(std::uint64_t seed, const SceneOptions& options);
+Scene makeVanish(std::uint64_t seed, const SceneOptions& options);
+Scene makeRow(std::uint64_t seed, const SceneOptions& options);
+Scene makeRoll(std::uint64_t seed, const SceneOptions& options);
+Scene makeStill(std::uint64_t seed, const SceneOptions& options);
+Scene makeStraight(std::uint64_t seed, const SceneOptions& options);
+Scene makeTraffic(std::uint64_t seed, const SceneOptions& options);
+Scene makeTown(std::uint64_t seed, const SceneOptions& options);
 Scene makeRandom(std::uint64_t seed, const SceneOptions& options);
 
 }  // namespace perdure::sim

@@ -1,0 +1,52 @@
+// Ten cars parked one behind the other, 0.8 m apart.
+#include <limits>
+
+#include "common/sim/path.h"
+#include "common/sim/scenes/rigs.h"
+#include "common/sim/scenes/scenes.h"
+#include "common/sim/scenes/streets.h"
+
+namespace perdure::sim {
+namespace {
+
+constexpr double kDefaultSeconds = 24.0, kCameraHeight = 1.6, kGap = 0.8, kFirst = 24.0;
+constexpr int kCars = 10;
+
+void parkRow(SceneBuilder& builder) {
+  Dice& dice = builder.dice();
+  const double side = dice.chance(0.5) ? 1.0 : -1.0;
+  double along = kFirst;
+  for (int i = 0; i < kCars; ++i) {
+    SceneObject car = builder.draw("car");
+    const double length = car.size.x();
+    const double across = 0.5 * kRoadWidth - 0.18 - 0.5 * car.size.y();
+    builder.mustPut(std::move(car),
+                    {{along + 0.5 * length, side * across}, side > 0 ? M_PI : 0.0, 0.0});
+    along += length + kGap;
+  }
+}
+
+}  // namespace
+
+Scene makeRow(std::uint64_t seed, const SceneOptions& options) {
+  SceneBuilder builder("row", seed, options);
+  Dice& dice = builder.dice();
+  const double seconds = builder.seconds(kDefaultSeconds);
+  const GroundPath way({{{0, -kLane}}, {{150, -kLane}}}, false);
+  const SpeedLimits limits{4.5, 2.0, 1.2, 1.2};
+  // It stands again behind the row, however long one looks.
+  const Drive driven = drive(way, limits, 0.0, 95.0, 1.2, seconds + 2.0);
+  Suspension suspension;
+  suspension.height = kCameraHeight - kCameraAboveBody;
+  suspension.seed = dice.seed();
+  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
+  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
+  drawDaylight(builder);
+  parkRow(builder);
+  Furnishing furnishing;
+  furnishing.free_share = 1.0;  // nobody else parks
+  Streets(builder, {{{-20.0, 0.0}, {130.0, 0.0}, kRoadWidth}}, furnishing).furnish();
+  return builder.take();
+}
+
+}  // namespace perdure::sim

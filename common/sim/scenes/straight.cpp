@@ -1,0 +1,41 @@
+// A long street, driven evenly from a start at rest.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/sim/path.h"
+#include "common/sim/scenes/rigs.h"
+#include "common/sim/scenes/scenes.h"
+#include "common/sim/scenes/streets.h"
+
+namespace perdure::sim {
+namespace {
+
+constexpr double kDefaultSeconds = 60.0, kSpeed = 8.5, kRest = 1.2, kCameraHeight = 1.6;
+
+}  // namespace
+
+Scene makeStraight(std::uint64_t seed, const SceneOptions& options) {
+  SceneBuilder builder("straight", seed, options);
+  Dice& dice = builder.dice();
+  const double seconds = builder.seconds(kDefaultSeconds);
+  const double end = kSpeed * std::max(seconds, kDefaultSeconds) + 70.0;
+  const GroundPath way({{{0, -kLane}}, {{end, -kLane}}}, false);
+  const SpeedLimits limits{kSpeed, 2.0, 1.4, 1.4};
+  const Drive driven =
+      drive(way, limits, 0.0, std::numeric_limits<double>::infinity(), kRest, seconds + 2.0);
+  Suspension suspension;
+  suspension.height = kCameraHeight - kCameraAboveBody;
+  suspension.seed = dice.seed();
+  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
+  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
+  drawDaylight(builder);
+  std::vector<Road> roads{{{-25.0, 0.0}, {end, 0.0}, kRoadWidth}};
+  for (double x = dice.uniform(60.0, 90.0); x < end - 50.0; x += dice.uniform(90.0, 140.0)) {
+    roads.push_back({{x, -35.0}, {x, 35.0}, kRoadWidth});
+  }
+  Streets(builder, roads, Furnishing{}).furnish();
+  return builder.take();
+}
+
+}  // namespace perdure::sim

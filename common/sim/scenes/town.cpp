@@ -1,0 +1,114 @@
+// A grid of streets, four kilometres in all, and a drive through nearly all of them.
+#include <algorithm>
+#include <limits>
+
+#include "common/sim/path.h"
+#include "common/sim/scenes/rigs.h"
+#include "common/sim/scenes/scenes.h"
+#include "common/sim/scenes/streets.h"
+
+namespace perdure::sim {
+namespace {
+
+constexpr double kDefaultSeconds = 520.0, kCameraHeight = 1.6;
+constexpr int kColumns = 6, kRows = 5;
+constexpr double kBlockLength = 82.0, kBlockWidth = 66.0, kBeyond = 14.0;
+constexpr std::size_t kVehicles = 500;
+
+std::vector<Road> roadsOfTown() {
+  std::vector<Road> roads;
+  const double length = kBlockLength * (kColumns - 1), width = kBlockWidth * (kRows - 1);
+  for (int row = 0; row < kRows; ++row) {
+    const double y = kBlockWidth * row;
+    roads.push_back({{-kBeyond, y}, {length + kBeyond, y}, kRoadWidth});
+  }
+  for (int column = 0; column < kColumns; ++column) {
+    const double x = kBlockLength * column;
+    roads.push_back({{x, -kBeyond}, {x, width + kBeyond}, kRoadWidth});
+  }
+  return roads;
+}
+
+/// Crossings where the way turns: along the rows to and fro, then along the columns.
+std::vector<Eigen::Vector2d> turns() {
+  std::vector<Eigen::Vector2i> crossings;
+  const int right = kColumns - 1, top = kRows - 1;
+  for (int row = 0; row < kRows; ++row) {
+    const bool forth = row % 2 == 0;
+    crossings.emplace_back(forth ? 0 : right, row);
+    crossings.emplace_back(forth ? right : 0, row);
+  }
+  // An odd number of rows ends at the top right corner.
+  for (int i = 0; i < kColumns; ++i) {
+    const int column = right - i;
+    crossings.emplace_back(column, i % 2 == 0 ? top : 0);
+    crossings.emplace_back(column, i % 2 == 0 ? 0 : top);
+  }
+  std::vector<Eigen::Vector2d> points;
+  for (const auto& crossing : crossings) {
+    const Eigen::Vector2d point(kBlockLength * crossing.x(), kBlockWidth * crossing.y());
+    if (points.empty() || (point - points.back()).norm() > 1.0) points.push_back(point);
+  }
+  return points;
+}
+
+/// On the right-hand lane; right turns are tighter than left ones.
+GroundPath wayThrough(const std::vector<Eigen::Vector2d>& points) {
+  const auto rightOf = [](const Eigen::Vector2d& way) {
+    return Eigen::Vector2d(way.y(), -way.x());
+  };
+  std::vector<Corner> corners;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector2d in = (points[i] - points[i > 0 ? i - 1 : 0]).normalized();
+    const Eigen::Vector2d out =
+        (points[std::min(i + 1, points.size() - 1)] - points[i]).normalized();
+    const bool end = i == 0 || i + 1 == points.size();
+    const bool ahead = !end && in.dot(out) > 0.9;
+    if (ahead) continue;
+    const bool left = in.x() * out.y() - in.y() * out.x() > 0;
+    const Eigen::Vector2d offset = end ? rightOf(i == 0 ? out : in) : rightOf(in) + rightOf(out);
+    corners.push_back({points[i] + kLane * offset, left ? 14.0 : 8.0});
+  }
+  return GroundPath(corners, false);
+}
+
+/// Takes away vehicles anywhere until as many are left as the town is to have.
+void thinOut(SceneBuilder& builder) {
+  auto& objects = builder.scene().objects;
+  const auto isVehicle = [](const SceneObject& o) {
+    return o.class_name == "car" || o.class_name == "van";
+  };
+  auto count = static_cast<std::size_t>(std::count_if(objects.begin(), objects.end(), isVehicle));
+  while (count > kVehicles) {
+    const std::size_t i = builder.dice().below(objects.size());
+    if (!isVehicle(objects[i])) continue;
+    objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(i));
+    --count;
+  }
+}
+
+}  // namespace
+
+Scene makeTown(std::uint64_t seed, const SceneOptions& options) {
+  SceneBuilder builder("town", seed, options);
+  Dice& dice = builder.dice();
+  const double seconds = builder.seconds(kDefaultSeconds);
+  const GroundPath way = wayThrough(turns());
+  const SpeedLimits limits{10.5, 2.4, 1.7, 1.9};
+  const Drive driven = drive(way, limits, 8.0, way.length() - 8.0, 1.2, seconds + 2.0);
+  Suspension suspension;
+  suspension.height = kCameraHeight - kCameraAboveBody;
+  suspension.seed = dice.seed();
+  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
+  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
+  drawDaylight(builder);
+  Furnishing furnishing;
+  furnishing.free_share = 0.42;
+  furnishing.tree_every = 30.0;
+  furnishing.person_every = furnishing.bicycle_every = 90.0;
+  Streets(builder, roadsOfTown(), furnishing).furnish();
+  thinOut(builder);
+  return builder.take();
+}
+
+}  // namespace perdure::sim
