@@ -33,7 +33,7 @@ class Body {
 
  private:
   std::vector<float> stationsOf() const {
-    std::vector<float> xs{0.0F, 0.012F, 0.035F, 0.07F, 0.12F, 0.95F, 0.975F, 0.992F, 1.0F};
+    std::vector<float> xs{0.0F, 0.012F, 0.035F, 0.95F, 0.975F, 0.99F, 1.0F};
     for (const Vec2& v : p_.top) xs.push_back(v.x());
     for (const Span& s : p_.side_glass) xs.insert(xs.end(), {s.from, s.to});
     for (const Span& s : {p_.windscreen, p_.rear_glass}) xs.insert(xs.end(), {s.from, s.to});
@@ -43,13 +43,13 @@ class Body {
         const float reach = c * archRadius() / size_.x();
         xs.insert(xs.end(), {axle - reach, axle + reach});
       }
-      const float outside = 1.004F * archRadius() / size_.x();
+      const float outside = 1.02F * archRadius() / size_.x();
       xs.insert(xs.end(), {axle, axle - outside, axle + outside});
     }
     std::erase_if(xs, [](float x) { return x < 0.0F || x > 1.0F; });
     std::sort(xs.begin(), xs.end());
-    // Stations nearer than a millimetre are one.
-    xs.erase(std::unique(xs.begin(), xs.end(), [](float a, float c) { return c - a < 2e-4F; }),
+    // Stations nearer than a few millimetres are one; seams are wider.
+    xs.erase(std::unique(xs.begin(), xs.end(), [](float a, float c) { return c - a < 1.2e-3F; }),
              xs.end());
     return xs;
   }

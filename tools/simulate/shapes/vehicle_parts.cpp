@@ -39,7 +39,7 @@ void addRails(MeshBuilder& b, const BodyProfile& p, const Vec3& size, int materi
       return Vec3((0.5F - x) * size.x(), side * y, (lineAt(p.top, x) - 0.02F + lift) * size.z());
     };
     const float r = 0.01F * size.z();
-    b.pipe({at(0.46F, 0.0F), at(0.5F, 0.035F), at(0.82F, 0.035F), at(0.87F, 0.0F)}, {r, r, r, r}, 5,
+    b.pipe({at(0.46F, 0.0F), at(0.5F, 0.035F), at(0.82F, 0.035F), at(0.87F, 0.0F)}, {r, r, r, r}, 4,
            material);
   }
 }

@@ -7,7 +7,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr int kSides = 13;
+constexpr int kSides = 12;
 constexpr float kPi = std::numbers::pi_v<float>;
 
 void addSpokes(MeshBuilder& b, const Vec3& hub, float reach, float half_width, int count,
@@ -48,7 +48,7 @@ void addWheel(MeshBuilder& b, const Vec3& centre, float radius, float width,
     addSpokes(b, hub, 0.98F * (rim - 0.02F) * radius, half, look.spokes, look.rim);
   }
   b.tube(centre + Vec3(0.0F, 0.28F * width, 0.0F), hub + Vec3(0.0F, 0.03F * width, 0.0F),
-         0.2F * radius, 0.16F * radius, 8, look.rim);
+         0.2F * radius, 0.16F * radius, 6, look.rim);
 }
 
 }  // namespace perdure::tools::shapes
