@@ -17,12 +17,14 @@ constexpr int kWidth = 1500, kRow = 190, kTop = 66, kBottom = 56;
 constexpr int kLeft = 84, kBetween = 90, kRight = 24;
 const Colour kHiddenShade(150, 150, 235), kOutShade(190, 190, 190);
 
+struct Seen {
+  TimePoint time;
+  Eigen::Vector3d p_W;
+};
 struct Candidate {
   Evolution evolution;
-  std::size_t seen = 0;
+  std::vector<Seen> seen;  ///< while in sight
   bool confirmed = false;
-  ObjectGlance last_seen;
-  TimePoint last_time;
 };
 
 Phase phaseOf(const ObjectGlance& object) {
@@ -37,11 +39,7 @@ std::map<ObjectId, Candidate> candidatesOf(const DriveLog& log) {
       one.evolution.id = object.id;
       one.evolution.class_name = object.class_name;
       one.confirmed = one.confirmed || object.confirmed;
-      if (object.inSight()) {
-        ++one.seen;
-        one.last_seen = object;
-        one.last_time = frame.stamp.time;
-      }
+      if (object.inSight()) one.seen.push_back({frame.stamp.time, object.p_W});
     }
   }
   std::erase_if(all, [](const auto& entry) { return !entry.second.confirmed; });
@@ -52,7 +50,7 @@ std::vector<const Candidate*> chosen(const std::map<ObjectId, Candidate>& all, s
   std::vector<const Candidate*> by_length, firsts, rest;
   for (const auto& [id, one] : all) by_length.push_back(&one);
   std::stable_sort(by_length.begin(), by_length.end(),
-                   [](const auto* a, const auto* b) { return a->seen > b->seen; });
+                   [](const auto* a, const auto* b) { return a->seen.size() > b->seen.size(); });
   std::set<std::string> classes;
   for (const Candidate* one : by_length) {
     (classes.insert(one->evolution.class_name).second ? firsts : rest).push_back(one);
@@ -60,6 +58,19 @@ std::vector<const Candidate*> chosen(const std::map<ObjectId, Candidate>& all, s
   firsts.insert(firsts.end(), rest.begin(), rest.end());
   if (firsts.size() > most) firsts.resize(most);
   return firsts;
+}
+
+/// Nothing where the track was not there in half of the frames in which the object was in sight.
+std::optional<double> medianDistance(const Candidate& one, const TruthTrack& track) {
+  std::vector<double> distances;
+  for (const Seen& seen : one.seen) {
+    const auto key = track.at(seen.time);
+    if (key) distances.push_back((key->centre_W - seen.p_W).norm());
+  }
+  if (distances.empty() || 2 * distances.size() < one.seen.size()) return std::nullopt;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
 }
 
 /// The nearest pairs first, each object and each track in one pair at most.
@@ -72,11 +83,10 @@ std::map<ObjectId, const TruthTrack*> pairs(const std::map<ObjectId, Candidate>&
   };
   std::vector<Pair> near;
   for (const auto& [id, one] : all) {
-    if (truth == nullptr || one.seen == 0) continue;
+    if (truth == nullptr) break;
     for (const TruthTrack& track : truth->objects) {
-      const auto key = track.at(one.last_time);
-      const double distance = key ? (key->centre_W - one.last_seen.p_W).norm() : kSameThing;
-      if (distance < kSameThing) near.push_back({distance, id, &track});
+      const auto distance = medianDistance(one, track);
+      if (distance && *distance < kSameThing) near.push_back({*distance, id, &track});
     }
   }
   std::stable_sort(near.begin(), near.end(),

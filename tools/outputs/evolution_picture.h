@@ -27,8 +27,8 @@ struct Evolution {
 };
 
 /// Of the objects that were confirmed: the longest seen of each class, then the longest seen of the
-/// rest, at most `most`. Truth is the track nearest to an object (within 3 m, the nearest pairs
-/// first, one each) when it was seen last.
+/// rest, at most `most`. Truth is the track that was nearest to an object by the median over the
+/// frames in which it was in sight: within 3 m, the nearest pairs first, one each.
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 

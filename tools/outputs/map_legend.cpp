@@ -127,7 +127,7 @@ void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& v
     legend.box(fmt::format("{}: {}", name, count), {classColour(name), 2}, 0.5);
   }
   legend.skip(0.4);
-  if (content.truth) legend.box("truth", {kTruthColour, 1}, 0.0);
+  if (content.truth) legend.box("truth", {kTruthColour, 2}, 0.0);
   const Colour grey(110, 110, 110);
   legend.box("in sight at the end", {grey, 2}, 0.5);
   legend.box("out of view", {grey, 2}, 0.0);

@@ -203,13 +203,14 @@ MapView viewOf(const MapContent& content) {
 cv::Mat drawMap(const MapContent& content, const MapView& view) {
   cv::Mat picture(pictureSize(content, view), CV_8UC3, kPaper);
   drawGrid(picture, view);
-  cv::Mat map = picture(cv::Rect({}, cv::Size(view.area.br())));  // lines end at the map's border
+  cv::Mat map = picture.clone();  // what is drawn beyond the map's border is not taken over
   drawLandmarks(map, view, content.landmarks);
   drawWay(map, view, content.path, {kInk, thick(view, 2)});
   drawEnds(map, view, content.path);
   for (const ObjectGlance& object : content.objects) drawObject(map, view, object);
   if (content.truth) drawTruth(map, view, *content.truth, content.end);
   drawIds(map, view, content.objects);
+  map(view.area).copyTo(picture(view.area));
   drawScaleBar(picture, view);
   drawMapLegend(picture, content, view);
   return picture;

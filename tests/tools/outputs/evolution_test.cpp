@@ -62,6 +62,16 @@ TEST(Evolution, TheErrorIsTheDistanceFromTheNearestTruthAndElseThereIsNone) {
   EXPECT_FALSE(evolutions[2].points[0].error) << "30 m away is another thing";
 }
 
+TEST(Evolution, WhatOnlyPassesATruthIsNotTakenForIt) {
+  DriveLog log;
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    log.add(messageOf(frameOf(i, {objectAt(1, {static_cast<double>(i), 0, 0})})));
+  }
+  PictureTruth truth;
+  truth.objects = {standing(7, {39, 0, 0})};
+  EXPECT_FALSE(chooseEvolutions(log, &truth, 1)[0].points[39].error);
+}
+
 TEST(Evolution, HiddenPhasesAreShadedAndOthersAreNot) {
   const auto evolutions = chooseEvolutions(drive(), nullptr, 2);
   EXPECT_EQ(evolutions[1].points[9].phase, Phase::kInSight);

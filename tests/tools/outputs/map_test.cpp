@@ -120,6 +120,19 @@ TEST(MapPicture, AStrayObjectFarFromTheWayDoesNotShrinkTheMap) {
   EXPECT_FALSE(drawMap(content, view).empty());
 }
 
+TEST(MapPicture, NothingIsDrawnBeyondTheMapsBorder) {
+  MapContent content = street();
+  const MapView view = viewOf(content);
+  const cv::Mat before = drawMap(content, view);
+  for (const double y : {-400.0, 400.0}) content.path.emplace_back(30, y, 0);
+  const cv::Mat after = drawMap(content, view);
+  EXPECT_EQ(cv::norm(before.rowRange(0, view.area.y), after.rowRange(0, view.area.y)), 0.0);
+  EXPECT_EQ(cv::norm(before.rowRange(view.area.br().y, before.rows),
+                     after.rowRange(view.area.br().y, before.rows)),
+            0.0);
+  EXPECT_GT(cv::norm(before(view.area), after(view.area)), 100.0);
+}
+
 TEST(MapPicture, TheEllipseIsTwoSigmaInEachDirection) {
   MapContent content = street();
   content.objects[2].p_covariance.diagonal() << 9.0, 1.0, 1.0;
