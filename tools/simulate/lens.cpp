@@ -30,19 +30,18 @@ Lens::Lens(const CameraCalibration& calibration)
     for (int column = 0; column <= width_; ++column) {
       const auto n = model_.unproject({column, row});
       const bool valid = n && n->norm() <= max_radius_;
-      rays_.push_back(
-          valid ? Eigen::Vector3f(static_cast<float>(n->x()), static_cast<float>(n->y()), 1.0F)
-                : Eigen::Vector3f::Zero());
+      Eigen::Vector3f ray = Eigen::Vector3f::Zero();
+      if (valid) ray = Eigen::Vector3d(n->x(), n->y(), 1.0).normalized().cast<float>();
+      rays_.push_back(ray);
     }
   }
 }
 
 Eigen::Vector3f Lens::direction(int column, int row, float dx, float dy) const {
-  const Eigen::Vector3f& centre = ray(column, row);
-  Eigen::Vector3f d = centre;
-  const Eigen::Vector3f &right = ray(column + 1, row), &below = ray(column, row + 1);
-  if (right.z() > 0.0F && below.z() > 0.0F) d += dx * (right - centre) + dy * (below - centre);
-  return d.normalized();
+  const Eigen::Vector3f& centre = direction(column, row);
+  const Eigen::Vector3f &right = direction(column + 1, row), &below = direction(column, row + 1);
+  if (right.z() <= 0.0F || below.z() <= 0.0F) return centre;
+  return (centre + dx * (right - centre) + dy * (below - centre)).normalized();
 }
 
 Eigen::Vector2d Lens::projectBeyond(const Eigen::Vector3d& point_C) const {

@@ -16,9 +16,13 @@ class Lens {
   int height() const { return height_; }
   const CameraModel& model() const { return model_; }
   /// Whether the distortion can be inverted there.
-  bool sees(int column, int row) const { return ray(column, row).z() > 0.0F; }
-  /// Unit direction in C through a pixel's centre plus an offset within the pixel.
-  Eigen::Vector3f direction(int column, int row, float dx = 0.0F, float dy = 0.0F) const;
+  bool sees(int column, int row) const { return rays_[indexOf(column, row)].z() > 0.0F; }
+  /// Unit direction in C through a pixel's centre.
+  const Eigen::Vector3f& direction(int column, int row) const {
+    return rays_[indexOf(column, row)];
+  }
+  /// The same at an offset within the pixel.
+  Eigen::Vector3f direction(int column, int row, float dx, float dy) const;
   /// Angle between neighbouring pixels in the image's centre, radians.
   float pixelAngle() const { return pixel_angle_; }
   /// Pixel of any point with z > 0; beyond the distortion's range, the outermost valid pixel in
@@ -26,9 +30,9 @@ class Lens {
   Eigen::Vector2d projectBeyond(const Eigen::Vector3d& point_C) const;
 
  private:
-  const Eigen::Vector3f& ray(int column, int row) const {
-    return rays_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ + 1) +
-                 static_cast<std::size_t>(column)];
+  std::size_t indexOf(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ + 1) +
+           static_cast<std::size_t>(column);
   }
 
   CameraModel model_;

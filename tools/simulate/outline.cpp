@@ -8,10 +8,12 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kNear = 0.05;    ///< triangles are cut here, metres before the camera
-constexpr double kCells = 160.0;  ///< along the longer side of an outline's raster, at most
+constexpr double kNear = 0.05;  ///< triangles are cut here, metres before the camera
+/// Cells along the longer side of an outline's raster: four a pixel, within these limits.
+constexpr double kMinCells = 24.0, kMaxCells = 112.0;
 
 using Polygon = std::vector<Eigen::Vector3d>;
+using Triangle = std::array<const Eigen::Vector2d*, 3>;
 
 /// The part of a triangle beyond the near plane: nothing, three or four corners.
 void cutNear(const std::array<Eigen::Vector3d, 3>& triangle, Polygon& out) {
@@ -36,18 +38,19 @@ class Raster {
         rows_(sizeOf(box.height())),
         cells_(static_cast<std::size_t>(columns_ * rows_)) {}
 
-  void draw(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
-    const Eigen::Vector2d origin(x_, y_);
-    const std::array<Eigen::Vector2d, 3> p = {(a - origin) / cell_, (b - origin) / cell_,
-                                              (c - origin) / cell_};
-    const double low = std::min({p[0].y(), p[1].y(), p[2].y()});
-    const double high = std::max({p[0].y(), p[1].y(), p[2].y()});
+  /// In units of cells.
+  Eigen::Vector2d cellOf(const Eigen::Vector2d& pixel) const {
+    return (pixel - Eigen::Vector2d(x_, y_)) / cell_;
+  }
+  void draw(const Triangle& p) {
+    const double low = std::min({p[0]->y(), p[1]->y(), p[2]->y()});
+    const double high = std::max({p[0]->y(), p[1]->y(), p[2]->y()});
     const int first = std::max(0, static_cast<int>(std::ceil(low - 0.5)));
     const int last = std::min(rows_ - 1, static_cast<int>(std::floor(high - 0.5)));
     for (int row = first; row <= last; ++row) drawRow(p, row);
   }
   double area() const {
-    const auto filled = std::count(cells_.begin(), cells_.end(), true);
+    const auto filled = std::count(cells_.begin(), cells_.end(), 1);
     return static_cast<double>(filled) * cell_ * cell_;
   }
 
@@ -56,11 +59,11 @@ class Raster {
     return std::max(1, static_cast<int>(std::ceil(length / cell_)));
   }
 
-  void drawRow(const std::array<Eigen::Vector2d, 3>& p, int row) {
+  void drawRow(const Triangle& p, int row) {
     const double y = row + 0.5;
     double left = 1e9, right = -1e9;
     for (std::size_t i = 0; i < 3; ++i) {
-      const Eigen::Vector2d &a = p[i], &b = p[(i + 1) % 3];
+      const Eigen::Vector2d &a = *p[i], &b = *p[(i + 1) % 3];
       if ((a.y() <= y) == (b.y() <= y)) continue;
       const double x = a.x() + (b.x() - a.x()) * ((y - a.y()) / (b.y() - a.y()));
       left = std::min(left, x), right = std::max(right, x);
@@ -68,13 +71,13 @@ class Raster {
     const int first = std::max(0, static_cast<int>(std::ceil(std::max(left, -1.0) - 0.5)));
     const int last = static_cast<int>(std::floor(std::min<double>(right, columns_) - 0.5));
     for (int column = first; column <= std::min(last, columns_ - 1); ++column) {
-      cells_[static_cast<std::size_t>(row * columns_ + column)] = true;
+      cells_[static_cast<std::size_t>(row * columns_ + column)] = 1;
     }
   }
 
   double x_, y_, cell_;
   int columns_, rows_;
-  std::vector<bool> cells_;
+  std::vector<char> cells_;
 };
 
 Box enlargedPlane(const Lens& lens) {
@@ -89,36 +92,38 @@ void include(Box& box, const Eigen::Vector2d& pixel) {
 
 /// The projected triangles of a surface, cut at the near plane.
 struct Projected {
-  std::vector<std::array<Eigen::Vector2d, 3>> triangles;
-  Box box{1e9, 1e9, -1e9, -1e9};
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< of pixels
 };
 
 Projected projectSurface(const Surface& surface, const RigidTransform& T_CO, const Lens& lens) {
   Projected result;
   std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> pixels;
+  points.reserve(surface.positions.size());
+  result.pixels.reserve(surface.positions.size());
   const Eigen::Matrix3d R = T_CO.R();
+  bool whole = true;
   for (const auto& position : surface.positions) {
     points.emplace_back(R * position.cast<double>() + T_CO.p);
     const bool before = points.back().z() >= kNear;
-    pixels.push_back(before ? lens.projectBeyond(points.back()) : Eigen::Vector2d::Zero());
+    result.pixels.push_back(before ? lens.projectBeyond(points.back()) : Eigen::Vector2d::Zero());
+    whole = whole && before;
+  }
+  if (whole) {
+    result.triangles = surface.triangles;
+    return result;
   }
   Polygon polygon;
+  std::vector<Eigen::Vector2d> pixels;
   for (const auto& [i, j, k] : surface.triangles) {
-    if (points[i].z() >= kNear && points[j].z() >= kNear && points[k].z() >= kNear) {
-      result.triangles.push_back({pixels[i], pixels[j], pixels[k]});
-    } else {
-      cutNear({points[i], points[j], points[k]}, polygon);
-      for (std::size_t n = 2; n < polygon.size(); ++n) {
-        result.triangles.push_back({lens.projectBeyond(polygon[0]),
-                                    lens.projectBeyond(polygon[n - 1]),
-                                    lens.projectBeyond(polygon[n])});
-      }
+    cutNear({points[i], points[j], points[k]}, polygon);
+    const auto first = static_cast<std::uint32_t>(pixels.size());
+    for (const auto& point : polygon) pixels.push_back(lens.projectBeyond(point));
+    for (std::uint32_t n = 2; n < polygon.size(); ++n) {
+      result.triangles.push_back({first, first + n - 1, first + n});
     }
   }
-  for (const auto& triangle : result.triangles) {
-    for (const auto& pixel : triangle) include(result.box, pixel);
-  }
+  result.pixels.swap(pixels);
   return result;
 }
 
@@ -145,17 +150,22 @@ bool isOutside(const Eigen::Vector3d& centre_C, double radius, double widest) {
 }  // namespace
 
 Outline outlineOf(const Surface& surface, const RigidTransform& T_CO, const Lens& lens) {
-  const Projected projected = projectSurface(surface, T_CO, lens);
-  const Box plane = enlargedPlane(lens);
+  Projected projected = projectSurface(surface, T_CO, lens);
   Outline outline;
   if (projected.triangles.empty()) return outline;
-  outline.box = {std::max(projected.box.x1, plane.x1), std::max(projected.box.y1, plane.y1),
-                 std::min(projected.box.x2, plane.x2), std::min(projected.box.y2, plane.y2)};
-  if (outline.box.width() <= 0.0 || outline.box.height() <= 0.0) return Outline{};
-  const double longer = std::max(outline.box.width(), outline.box.height());
-  Raster raster(outline.box, longer / kCells);
-  for (const auto& [a, b, c] : projected.triangles) raster.draw(a, b, c);
+  Box box{1e9, 1e9, -1e9, -1e9};
+  for (const auto& pixel : projected.pixels) include(box, pixel);
+  const Box plane = enlargedPlane(lens);
+  box = {std::max(box.x1, plane.x1), std::max(box.y1, plane.y1), std::min(box.x2, plane.x2),
+         std::min(box.y2, plane.y2)};
+  if (box.width() <= 0.0 || box.height() <= 0.0) return outline;
+  const double longer = std::max(box.width(), box.height());
+  Raster raster(box, longer / std::clamp(4.0 * longer, kMinCells, kMaxCells));
+  for (auto& pixel : projected.pixels) pixel = raster.cellOf(pixel);
+  const auto* p = projected.pixels.data();
+  for (const auto& [i, j, k] : projected.triangles) raster.draw({p + i, p + j, p + k});
   outline.area = raster.area();
+  outline.box = box;
   return outline;
 }
 

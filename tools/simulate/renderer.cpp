@@ -94,7 +94,9 @@ void Renderer::begin(const Lens& lens, const Shot& shot, Picture& picture, int s
 void Renderer::aim(Packet& packet, int column, int row, float dx, float dy) const {
   const Eye& eye = eyes_[eyes_.size() > 1 ? static_cast<std::size_t>(row) : 0];
   packet.origins[packet.count] = eye.p;
-  packet.directions[packet.count] = eye.R * lens_->direction(column, row, dx, dy);
+  const bool centre = dx == 0.0F && dy == 0.0F;
+  packet.directions[packet.count] =
+      eye.R * (centre ? lens_->direction(column, row) : lens_->direction(column, row, dx, dy));
   ++packet.count;
 }
 
@@ -186,8 +188,9 @@ void Renderer::drawBlock(Packet& packet, const Place* places, Picture& picture) 
     const std::size_t at = picture.index(places[i].column, places[i].row);
     const Hit& hit = packet.hits[i];
     picture.instance[at] = hit.instance;
-    picture.radiance[at] = lighting_.shade(packet.origins[i], packet.directions[i], hit,
-                                           packet.in_sun[i], lens_->pixelAngle());
+    picture.radiance[at] << lighting_.shade(packet.origins[i], packet.directions[i], hit,
+                                            packet.in_sun[i], lens_->pixelAngle()),
+        0.0F;
     Detail& detail = details_[at];
     if (hit.instance == kNothing) {
       detail = {};

@@ -28,7 +28,7 @@ Shot shotAt(const sim::Scene& scene, std::size_t camera, double time_s);
 
 struct Picture {
   int width = 0, height = 0;
-  std::vector<Eigen::Vector3f> radiance;  ///< linear RGB
+  std::vector<Eigen::Vector4f> radiance;  ///< linear RGB, and nothing: four for speed
   std::vector<std::uint32_t> instance;    ///< at the pixel's centre; see World::instances, kNothing
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
@@ -90,7 +90,7 @@ class Renderer {
   Eigen::Vector3f eye_velocity_W_, turn_rate_C_;
   float exposure_s_ = 0.0F;
   std::vector<Detail> details_;
-  std::vector<Eigen::Vector3f> blurred_;
+  std::vector<Eigen::Vector4f> blurred_;
 };
 
 }  // namespace perdure::tools

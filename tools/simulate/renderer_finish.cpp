@@ -14,14 +14,14 @@ constexpr std::array<std::array<float, 2>, 4> kOffsets = {
     {{-0.375F, -0.125F}, {0.125F, -0.375F}, {0.375F, 0.125F}, {-0.125F, 0.375F}}};
 
 /// Between pixels; held at the border.
-Eigen::Vector3f between(const Picture& picture, float x, float y) {
+Eigen::Vector4f between(const Picture& picture, float x, float y) {
   x = std::clamp(x, 0.0F, static_cast<float>(picture.width - 1));
   y = std::clamp(y, 0.0F, static_cast<float>(picture.height - 1));
   const int left = std::min(static_cast<int>(x), picture.width - 2);
   const int top = std::min(static_cast<int>(y), picture.height - 2);
   const float u = x - static_cast<float>(left), v = y - static_cast<float>(top);
-  const Eigen::Vector3f* upper = &picture.radiance[picture.index(left, top)];
-  const Eigen::Vector3f* lower = upper + picture.width;
+  const Eigen::Vector4f* upper = &picture.radiance[picture.index(left, top)];
+  const Eigen::Vector4f* lower = upper + picture.width;
   return (1.0F - v) * ((1.0F - u) * upper[0] + u * upper[1]) +
          v * ((1.0F - u) * lower[0] + u * lower[1]);
 }
@@ -73,19 +73,19 @@ void Renderer::smoothPixels(const Place* places, unsigned count, Picture& pictur
   constexpr float kShare = 1.0F / (kOffsets.size() + 1);
   for (unsigned i = 0; i < packet.count; ++i) {
     const Place& place = places[i / kOffsets.size()];
-    Eigen::Vector3f& sum = picture.radiance[picture.index(place.column, place.row)];
+    Eigen::Vector4f& sum = picture.radiance[picture.index(place.column, place.row)];
     if (i % kOffsets.size() == 0) sum *= kShare;
     // A bright spot of the sun in one of the rays would stand out as a single white pixel.
-    sum += kShare * lighting_
-                        .shade(packet.origins[i], packet.directions[i], packet.hits[i],
-                               packet.in_sun[i], lens_->pixelAngle())
-                        .cwiseMin(8.0F);
+    sum.head<3>() += kShare * lighting_
+                                  .shade(packet.origins[i], packet.directions[i], packet.hits[i],
+                                         packet.in_sun[i], lens_->pixelAngle())
+                                  .cwiseMin(8.0F);
   }
 }
 
 /// How far what a pixel shows moves in the image during the exposure, in pixels.
 Eigen::Vector2f Renderer::smear(const Picture& picture, int column, int row) const {
-  const Eigen::Vector3f d = lens_->direction(column, row);
+  const Eigen::Vector3f& d = lens_->direction(column, row);
   const std::size_t at = picture.index(column, row);
   Eigen::Vector3f rate = d.cross(turn_rate_C_);
   if (picture.instance[at] != kNothing) {
@@ -110,8 +110,8 @@ void Renderer::blurRow(int row, const Picture& picture) {
     const Eigen::Vector2f whole = smear(picture, column, row);
     const float length = whole.norm();
     if (length < kMinSmear) continue;
-    const int taps = std::min(2 + static_cast<int>(length), kMaxTaps);
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    const int taps = std::min(2 + static_cast<int>(0.7F * length), kMaxTaps);
+    Eigen::Vector4f sum = Eigen::Vector4f::Zero();
     for (int i = 0; i < taps; ++i) {
       const float share = (static_cast<float>(i) + 0.5F) / static_cast<float>(taps) - 0.5F;
       sum += between(picture, static_cast<float>(column) + share * whole.x(),

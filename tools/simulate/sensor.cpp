@@ -34,7 +34,7 @@ double metered(const Picture& picture) {
   std::size_t count = 0;
   for (int row = kMeterStep / 2; row < picture.height; row += kMeterStep) {
     for (int column = kMeterStep / 2; column < picture.width; column += kMeterStep) {
-      const float light = kLuminance.dot(picture.radiance[picture.index(column, row)]);
+      const float light = kLuminance.dot(picture.radiance[picture.index(column, row)].head<3>());
       sum += std::log(std::clamp(static_cast<double>(light), 0.01, 3.0));
       ++count;
     }
@@ -98,7 +98,7 @@ void Sensor::developRow(const Picture& picture, int row, std::uint64_t noise_see
   const std::size_t channels = channelsOf(options_.encoding);
   for (int column = 0; column < picture.width; ++column) {
     const std::size_t at = picture.index(column, row);
-    const Eigen::Vector3f light = picture.radiance[at] * (scale_ * fading_[at]);
+    const Eigen::Vector3f light = picture.radiance[at].head<3>() * (scale_ * fading_[at]);
     std::uint8_t* out = &image[at * channels];
     const std::uint64_t bits = noise_seed + 4 * at;
     if (channels == 1) {

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "tools/simulate/counter_noise.h"
 
 namespace perdure::tools {
 namespace {
 
-constexpr int kWidth = 1024, kHeight = 256;
+constexpr int kSize = 768;  ///< of the sky's map
 constexpr float kCeilingHeight = 3.2F, kTile = 0.6F;
 
 float lattice(std::uint64_t seed, int x, int y) {
@@ -54,15 +53,14 @@ Sky::Sky(const sim::Scene& scene)
 void Sky::paintOutdoors(std::uint64_t seed) {
   const Eigen::Vector3f zenith = Eigen::Vector3f(0.32F, 0.52F, 0.95F) * (1.1F * strength_);
   const Eigen::Vector3f cloud = Eigen::Vector3f(1.0F, 0.99F, 0.97F) * (2.2F * strength_);
-  map_.reserve(static_cast<std::size_t>(kWidth * kHeight));
-  for (int row = 0; row < kHeight; ++row) {
-    const float elevation =
-        (static_cast<float>(row) + 0.5F) / kHeight * 0.5F * std::numbers::pi_v<float>;
-    for (int column = 0; column < kWidth; ++column) {
-      const float azimuth =
-          (static_cast<float>(column) + 0.5F) / kWidth * 2.0F * std::numbers::pi_v<float>;
-      const Eigen::Vector3f d(std::cos(elevation) * std::cos(azimuth),
-                              std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+  map_.reserve(static_cast<std::size_t>(kSize * kSize));
+  for (int row = 0; row < kSize; ++row) {
+    for (int column = 0; column < kSize; ++column) {
+      const float x = (static_cast<float>(column) + 0.5F) * 2.0F / kSize - 1.0F;
+      const float y = (static_cast<float>(row) + 0.5F) * 2.0F / kSize - 1.0F;
+      const float r2 = std::min(x * x + y * y, 1.0F);
+      const Eigen::Vector3f d =
+          Eigen::Vector3f(2.0F * x, 2.0F * y, 1.0F - r2).normalized();  // the corners: the horizon
       const Eigen::Vector3f clear = horizon_ + (zenith - horizon_) * std::sqrt(d.z());
       const float share = 0.85F * cloudsAt(seed, d);
       const float glow = std::pow(std::max(0.0F, d.dot(sun_W_)), 60.0F);
@@ -77,19 +75,17 @@ Eigen::Vector3f Sky::radiance(const Eigen::Vector3f& origin_W, const Eigen::Vect
 }
 
 Eigen::Vector3f Sky::outdoors(const Eigen::Vector3f& d) const {
-  constexpr float kTurn = 1.0F / (2.0F * std::numbers::pi_v<float>);
-  const float elevation = std::asin(std::clamp(d.z(), 0.0F, 1.0F)) * 4.0F * kTurn;
-  const float azimuth = std::atan2(d.y(), d.x()) * kTurn;
-  const float x = (azimuth - std::floor(azimuth)) * kWidth - 0.5F;
-  const float y = std::clamp(elevation * kHeight - 0.5F, 0.0F, kHeight - 1.0F);
-  const float left = std::floor(x), low = std::floor(y);
-  const int column = (static_cast<int>(left) + kWidth) % kWidth, row = static_cast<int>(low);
-  const auto texel = [&](int r, int c) -> const Eigen::Vector3f& {
-    return map_[static_cast<std::size_t>(std::min(r, kHeight - 1) * kWidth + c % kWidth)];
+  // Below the horizon: the horizon in that direction.
+  const float scale = 1.0F / (d.z() > 0.0F ? 1.0F + d.z() : d.head<2>().norm() + 1e-6F);
+  const auto place = [&](float t) {
+    return std::clamp((t * scale + 1.0F) * (0.5F * kSize) - 0.5F, 0.0F, kSize - 1.001F);
   };
-  const float u = x - left, v = y - low;
-  return (1.0F - v) * ((1.0F - u) * texel(row, column) + u * texel(row, column + 1)) +
-         v * ((1.0F - u) * texel(row + 1, column) + u * texel(row + 1, column + 1));
+  const float x = place(d.x()), y = place(d.y());
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const float u = x - static_cast<float>(column), v = y - static_cast<float>(row);
+  const Eigen::Vector3f* low = &map_[static_cast<std::size_t>(row * kSize + column)];
+  const Eigen::Vector3f* high = low + kSize;
+  return (1.0F - v) * ((1.0F - u) * low[0] + u * low[1]) + v * ((1.0F - u) * high[0] + u * high[1]);
 }
 
 Eigen::Vector3f Sky::ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3f& d) const {

@@ -26,7 +26,8 @@ class Sky {
   bool indoors_;
   float strength_;
   Eigen::Vector3f sun_W_, horizon_;
-  std::vector<Eigen::Vector3f> map_;  ///< kHeight × kWidth; by azimuth and elevation above 0
+  /// kSize × kSize: direction d at (d.x, d.y) / (1 + d.z), from -1 to 1 across the square.
+  std::vector<Eigen::Vector3f> map_;
 };
 
 }  // namespace perdure::tools

@@ -219,7 +219,7 @@ TEST(Renderer, ExposesRowsInTurnWithARollingShutter) {
 Picture evenPicture(float light) {
   Picture picture;
   picture.width = 160, picture.height = 120;
-  picture.radiance.assign(160 * 120, Eigen::Vector3f::Constant(light));
+  picture.radiance.assign(160 * 120, Eigen::Vector4f::Constant(light));
   return picture;
 }
 
