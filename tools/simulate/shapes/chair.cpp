@@ -1,6 +1,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tools/simulate/shapes/cushion.h"
 #include "tools/simulate/shapes/dice.h"
 #include "tools/simulate/shapes/looks.h"
 #include "tools/simulate/shapes/mesh_builder.h"
@@ -79,15 +80,17 @@ void addOffice(MeshBuilder& b, const ChairMaterials& m, Dice& dice) {
 }
 
 void addArmchair(MeshBuilder& b, const ChairMaterials& m, Dice& dice) {
-  const float arm = dice.uniform(0.58F, 0.66F);
-  b.box({-0.25F, -0.24F, 0.2F}, {0.28F, 0.24F, 0.36F}, m.seat);
-  b.box({-0.22F, -0.21F, 0.36F}, {0.3F, 0.21F, 0.46F}, m.seat);
-  b.box({-0.34F, -0.3F, 0.15F}, {-0.2F, 0.3F, 0.9F}, m.seat);
+  const float arm = dice.uniform(0.56F, 0.66F), foot = dice.uniform(0.1F, 0.2F);
+  const float wide = dice.uniform(0.08F, 0.12F);
+  addCushion(b, {-0.28F, -0.26F, foot}, {0.27F, 0.26F, 0.34F}, 0.02F, m.seat);
+  addCushion(b, {-0.22F, -0.3F + wide, 0.32F}, {0.3F, 0.3F - wide, 0.46F}, 0.035F, m.seat);
+  addCushion(b, {-0.34F, -0.29F, foot}, {-0.2F, 0.29F, 0.9F}, 0.045F, m.seat);
   for (float side : {1.0F, -1.0F}) {
-    const float y0 = side > 0.0F ? 0.21F : -0.31F;
-    b.box({-0.3F, y0, 0.15F}, {0.28F, y0 + 0.1F, arm}, m.seat);
-    for (float x : {0.22F, -0.28F})
-      b.tube({x, side * 0.25F, 0.0F}, {x, side * 0.25F, 0.16F}, 0.015F, 0.022F, 6, m.frame);
+    const float y0 = side > 0.0F ? 0.31F - wide : -0.31F;
+    addCushion(b, {-0.3F, y0, foot}, {0.28F, y0 + wide, arm}, 0.03F, m.seat);
+    for (float x : {0.22F, -0.28F}) {
+      b.tube({x, side * 0.25F, 0.0F}, {x, side * 0.25F, foot + 0.01F}, 0.015F, 0.022F, 6, m.frame);
+    }
   }
 }
 

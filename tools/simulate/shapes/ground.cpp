@@ -14,7 +14,7 @@ using namespace shapes;
 // Layers lie a few millimetres apart, so that each is hit alone; the road itself is z = 0.
 constexpr float kGrassZ = -0.01F, kPavementZ = -0.005F, kRoadZ = 0.0F, kPatchZ = 0.002F,
                 kSpotZ = 0.004F, kMarkingZ = 0.006F;
-constexpr float kPavement = 3.0F;  // width beside the road, metres
+constexpr float kPavement = 3.4F;  // width beside the road, metres
 constexpr float kPi = std::numbers::pi_v<float>;
 
 Eigen::AlignedBox2f extentOf(const sim::Scene& scene, float margin) {

@@ -69,7 +69,7 @@ Pattern pavingPattern(Dice& dice) {
 
 Pattern grassPattern(Dice& dice) {
   const std::uint32_t seed = noiseSeed(dice);
-  const Colour fresh(dice.uniform(0.09F, 0.14F), dice.uniform(0.2F, 0.28F), 0.05F);
+  const Colour fresh(dice.uniform(0.09F, 0.13F), dice.uniform(0.15F, 0.2F), 0.045F);
   const Colour dry(0.3F, 0.27F, 0.12F), earth(0.14F, 0.1F, 0.06F);
   return [=](float u, float v) {
     const float blades = valueNoise(u, v, 230, 90, seed) * valueNoise(u, v, 90, 230, seed + 3U);

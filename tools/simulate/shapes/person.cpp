@@ -62,13 +62,15 @@ void addLeg(MeshBuilder& b, const Clothes& c, float side, float angle, float ben
   const Vec3 knee = hip + 0.43F * down(angle);
   const Vec3 calf = knee + 0.13F * down(angle - bend) - Vec3(0.012F, 0.0F, 0.0F);
   const Vec3 ankle = knee + 0.42F * down(angle - bend);
-  b.pipe({hip, hip + 0.2F * down(angle), knee}, {0.092F, 0.082F, 0.058F}, 9, c.trousers);
+  const Vec3 top = hip + Vec3(0.0F, -0.035F * side, 0.05F);
+  b.pipe({top, hip - Vec3(0.0F, 0.008F * side, 0.0F), hip + 0.2F * down(angle), knee},
+         {0.05F, 0.085F, 0.08F, 0.057F}, 9, c.trousers);
   b.pipe({knee - 0.03F * down(angle), calf, ankle}, {0.055F, 0.056F, 0.036F}, 8,
          c.short_legs ? c.skin : c.trousers);
   const float heel = std::clamp(angle - bend, -0.9F, 0.35F);
   b.placing =
       Eigen::Affine3f(Eigen::Translation3f(ankle)) * Eigen::AngleAxisf(-heel, Vec3::UnitY());
-  b.ellipsoid({0.065F, 0.0F, -0.045F}, {0.14F, 0.047F, 0.05F}, 8, 5, c.shoes);
+  b.ellipsoid({0.055F, 0.0F, -0.04F}, {0.128F, 0.046F, 0.052F}, 8, 5, c.shoes);
   b.placing.setIdentity();
 }
 
