@@ -100,6 +100,18 @@ int linesOf(const MapContent& content) {
 
 }  // namespace
 
+double fillOf(Visibility visibility) {
+  switch (visibility) {
+    case Visibility::kVisible:
+    case Visibility::kPartial:
+      return 0.65;
+    case Visibility::kOccluded:
+      return 0.0;
+    default:
+      return 0.2;
+  }
+}
+
 cv::Size pictureSize(const MapContent& content, const MapView& view) {
   const int legend = static_cast<int>(view.text * (linesOf(content) * kLine + 20));
   const int map = view.area.br().y + static_cast<int>(34 * view.text);
@@ -124,17 +136,17 @@ void drawScaleBar(cv::Mat& picture, const MapView& view) {
 void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& view) {
   Legend legend(picture, view);
   for (const auto& [name, count] : countsOf(content)) {
-    legend.box(fmt::format("{}: {}", name, count), {classColour(name), 2}, 0.5);
+    legend.box(fmt::format("{}: {}", name, count), {classColour(name), 2}, 0.65);
   }
   legend.skip(0.4);
-  if (content.truth) legend.box("truth", {kTruthColour, 2}, 0.0);
+  if (content.truth) legend.box("truth", {kTruthColour, 1}, 0.0);
   const Colour grey(110, 110, 110);
-  legend.box("in sight at the end", {grey, 2}, 0.5);
-  legend.box("out of view", {grey, 2}, 0.0);
+  legend.box("in sight at the end", {grey, 2}, fillOf(Visibility::kVisible));
+  legend.box("out of view", {grey, 2}, fillOf(Visibility::kOutOfView));
   legend.box("hidden", {grey, 1, true, 4.0, 4.0}, 0.0);
   legend.ellipse("2 sigma of the centre", grey);
   legend.line("the way (disc: start)", {kInk, 2});
-  if (!content.landmarks.empty()) legend.dots("sparse points", mixed(kInk, kPaper, 0.4));
+  if (!content.landmarks.empty()) legend.dots("sparse points", kDots);
   drawCompass(picture, legend, content.yaw_of_north);
 }
 

@@ -1,10 +1,14 @@
 // What stands beside the map: what its signs and colours mean, where north is, how long a metre is.
 #pragma once
 
+#include "tools/outputs/drawing.h"
 #include "tools/outputs/map_picture.h"
 
 namespace perdure::tools {
 
+inline const Colour kDots(170, 165, 160);
+/// How much of its colour an object's outline is filled with, by what is seen of it at the end.
+double fillOf(Visibility visibility);
 /// Map, axes and legend together.
 cv::Size pictureSize(const MapContent& content, const MapView& view);
 /// A bar of view.bar_m metres, view.bar_m × view.scale pixels long, with its length beside it.

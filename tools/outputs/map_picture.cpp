@@ -17,9 +17,9 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kLongSide = 1500.0, kLongestSide = 4000.0;  // pixels
-constexpr double kLeastScale = 4.0, kMostScale = 60.0;       // pixels a metre
-constexpr double kNearTheWay = 60.0;                         // metres
+constexpr double kLongSide = 1500.0, kLongestSide = 4000.0;    // pixels
+constexpr double kLeastScale = 4.0, kMostScale = 60.0;         // pixels a metre
+constexpr double kNearTheWay = 60.0, kTruthNearTheWay = 30.0;  // metres
 constexpr double kLeastExtent = 6.0;
 
 Eigen::Vector2d flat(const Eigen::Vector3d& p) { return p.head<2>(); }
@@ -62,7 +62,7 @@ void drawEllipse(cv::Mat& picture, const MapView& view, const ObjectGlance& obje
 void drawObject(cv::Mat& picture, const MapView& view, const ObjectGlance& object) {
   const Colour colour = classColour(object.class_name);
   const Polyline outline = footprint(view, object.p_W, object.yaw, object.size);
-  if (object.inSight()) drawFilled(picture, outline, colour, 0.5);
+  if (!object.hidden()) drawFilled(picture, outline, colour, fillOf(object.visibility));
   drawEllipse(picture, view, object);
   drawClosed(picture, outline,
              {colour, thick(view, object.hidden() ? 1 : 2), object.hidden(), 5.0 * view.text,
@@ -87,11 +87,11 @@ void drawIds(cv::Mat& picture, const MapView& view, const std::vector<ObjectGlan
 }
 
 void drawLandmarks(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vector3f>& all) {
-  const Colour colour = mixed(kInk, kPaper, 0.62);
+  const Colour colour = kDots;
   for (const Eigen::Vector3f& p : all) {
     const cv::Point at(view.at(p.head<2>().cast<double>()));
     if (!view.area.contains(at)) continue;
-    cv::rectangle(picture, cv::Rect(at, cv::Size(thick(view, 1), thick(view, 1))), colour,
+    cv::rectangle(picture, cv::Rect(at, cv::Size(thick(view, 2), thick(view, 2))), colour,
                   cv::FILLED);
   }
 }
@@ -124,7 +124,7 @@ void drawEnds(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Ve
 
 void drawTruth(cv::Mat& picture, const MapView& view, const PictureTruth& truth, TimePoint end) {
   drawWay(picture, view, truth.path, {mixed(kTruthColour, kPaper, 0.45), thick(view, 1)});
-  const Stroke stroke{kTruthColour, thick(view, 2)};
+  const Stroke stroke{kTruthColour, thick(view, 1)};
   for (const TruthTrack& track : truth.objects) {
     if (track.moves) {
       std::vector<Eigen::Vector3d> way;
@@ -135,6 +135,7 @@ void drawTruth(cv::Mat& picture, const MapView& view, const PictureTruth& truth,
     const auto key = track.at(end);
     if (!key) continue;
     drawClosed(picture, footprint(view, key->centre_W, key->yaw, track.size), stroke);
+    if (track.size.head<2>().minCoeff() * view.scale < 12.0 * view.text) continue;
     const cv::Point2d at = view.at(flat(key->centre_W));
     const cv::Point2d arm(3.0 * view.text, 0), leg(0, 3.0 * view.text);
     drawLine(picture, {at - arm, at + arm}, stroke);
@@ -171,13 +172,14 @@ void drawGrid(cv::Mat& picture, const MapView& view) {
 MapView viewOf(const MapContent& content) {
   Eigen::AlignedBox2d bounds;
   for (const auto& p : content.path) bounds.extend(flat(p));
-  const auto include = [&](const Eigen::Vector3d& p) {
-    if (distanceToWay(content.path, p) < kNearTheWay) bounds.extend(flat(p));
+  const auto include = [&](const Eigen::Vector3d& p, double near) {
+    if (distanceToWay(content.path, p) < near) bounds.extend(flat(p));
   };
-  for (const auto& object : content.objects) include(object.p_W);
+  for (const auto& object : content.objects) include(object.p_W, kNearTheWay);
   if (bounds.isEmpty()) bounds.extend(Eigen::Vector2d::Zero());
   if (content.truth) {
-    for (const auto& track : content.truth->objects) include(track.keys.back().centre_W);
+    for (const auto& track : content.truth->objects)
+      include(track.keys.back().centre_W, kTruthNearTheWay);
   }
   const double room = std::max(3.0, 0.04 * bounds.sizes().maxCoeff());
   const Eigen::Vector2d half =

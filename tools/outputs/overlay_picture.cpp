@@ -13,7 +13,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kHeader = 30;
-constexpr double kDimmed = 0.8;             // the image, so that lines stand out
+constexpr double kDimmed = 0.88;            // the image, so that lines stand out
 constexpr double kLeastProbability = 0.15;  // fainter boxes are not drawn
 constexpr int kSamples = 16;                // of an edge: lenses bend it
 const Colour kWhite(255, 255, 255), kGrey(165, 165, 165), kNight(38, 34, 30);

@@ -194,7 +194,7 @@ TEST(OverlayVideo, HasAsManyFramesAsWereGivenInTheirOrderAndSize) {
   int frames = 0;
   for (; video.read(image); ++frames) {
     EXPECT_EQ(image.size(), size);
-    EXPECT_NEAR(image.at<cv::Vec3b>(300, 100)[1], 0.8 * 10 * frames, 6.0) << frames;
+    EXPECT_NEAR(image.at<cv::Vec3b>(300, 100)[1], 0.88 * 10 * frames, 6.0) << frames;
   }
   EXPECT_EQ(frames, kFrames);
 }

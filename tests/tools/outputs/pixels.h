@@ -29,11 +29,14 @@ inline bool hasColour(const cv::Mat& picture, const cv::Point2d& at, const Colou
 
 /// Share of the points between a and b, ends included, that have the colour.
 inline double coverage(const cv::Mat& picture, const cv::Point2d& a, const cv::Point2d& b,
-                       const Colour& colour) {
+                       const Colour& colour, double tolerance = 60.0) {
   constexpr int kPoints = 200;
   int hits = 0;
   for (int i = 0; i <= kPoints; ++i) {
-    hits += hasColour(picture, a + (b - a) * (static_cast<double>(i) / kPoints), colour, 1) ? 1 : 0;
+    hits +=
+        hasColour(picture, a + (b - a) * (static_cast<double>(i) / kPoints), colour, 1, tolerance)
+            ? 1
+            : 0;
   }
   return hits / (kPoints + 1.0);
 }
