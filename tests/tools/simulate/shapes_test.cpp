@@ -10,6 +10,8 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <optional>
+#include <random>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -242,6 +244,55 @@ TEST(Shapes, HaveClosedPartsWithTheOutsideOutside) {
                                  "couch", "tree", "post", "floor"}) {
     EXPECT_GT(closed_of[name], 0) << name;
   }
+}
+
+struct Ray {
+  Vector3f from, way;
+};
+
+/// Distance along the ray (Möller and Trumbore, 1997), if it meets the triangle.
+std::optional<float> meets(const Mesh& mesh, std::size_t triangle, const Ray& ray) {
+  const auto& t = mesh.triangles[triangle];
+  const Vector3f a = mesh.positions[t[0]], u = mesh.positions[t[1]] - a,
+                 v = mesh.positions[t[2]] - a, p = ray.way.cross(v), s = ray.from - a;
+  const float det = u.dot(p);
+  if (std::abs(det) < 1e-12F) return {};
+  const float b = s.dot(p) / det, c = ray.way.dot(s.cross(u)) / det;
+  if (b < 0.0F || c < 0.0F || b + c > 1.0F) return {};
+  return v.dot(s.cross(u)) / det;
+}
+
+/// Does the ray see the back of a face that has only one side?
+bool seesAnInside(const Mesh& mesh, const Ray& ray, float tolerance) {
+  float nearest = 1e9F, nearest_front = 1e9F;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto distance = meets(mesh, i, ray);
+    if (!distance) continue;
+    nearest = std::min(nearest, *distance);
+    const bool front = acrossOf(mesh, i).dot(ray.way) < 0.0F;
+    if (front || mesh.materials[mesh.material_of[i]].two_sided) {
+      nearest_front = std::min(nearest_front, *distance);
+    }
+  }
+  return nearest_front > nearest + tolerance;
+}
+
+TEST(Shapes, ShowNobodyTheirInside) {
+  std::mt19937_64 engine(5);
+  const auto unit = [&] { return static_cast<float>(engine() >> 40U) * 0x1.0p-24F; };
+  forAll([&](const Sample& s) {
+    const Vector3f half = (s.size / 2.0).cast<float>();
+    int seen = 0;
+    for (int i = 0; i < 120; ++i) {
+      const float angle = 6.2831853F * unit(), height = 0.6F * unit();
+      const Vector3f out(std::cos(angle), std::sin(angle), height);
+      const Vector3f target =
+          half.cwiseProduct(Vector3f(2 * unit() - 1, 2 * unit() - 1, 2 * unit() - 1));
+      const Vector3f from = target + 4.0F * half.norm() * out;
+      if (seesAnInside(s.mesh, {from, (target - from).normalized()}, 0.002F * half.norm())) ++seen;
+    }
+    EXPECT_EQ(seen, 0) << s.name;
+  });
 }
 
 TEST(Shapes, StayWithinTheRenderersBudget) {
