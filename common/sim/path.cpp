@@ -118,7 +118,10 @@ GroundPath::GroundPath(const std::vector<Corner>& corners, bool closed, double s
   Points points = resampled(outlineOf(corners, closed), step_);
   if (closed) points.pop_back();  // it is the first one again
   points = smoothed(std::move(points), static_cast<int>(0.5 * smoothing_m / kStep), closed);
-  if (!closed) points = resampled(points, step_ = kStep);
+  // Smoothing shortens the curves: equal distances again.
+  if (closed) points.push_back(points.front());
+  points = resampled(points, step_ = kStep);
+  if (closed) points.pop_back();
   points_ = withHeadings(points, closed, step_);
 }
 

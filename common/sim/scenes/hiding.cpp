@@ -37,13 +37,13 @@ RigidTransform standing(const SceneObject& object, const Eigen::Vector2d& point,
 constexpr double kOcclusionSeconds = 32.0, kOcclusionHeight = 1.45, kWalkX = -3.2;
 
 Trajectory walkPast(double seconds) {
-  const std::vector<Key> across{{1.2, 1.3},   {4.0, 0.9},   {6.5, 1.4},  {9.5, 0.0},  {13.5, 0.0},
-                                {16.5, -1.3}, {20.0, -1.0}, {23.0, 0.0}, {26.0, 0.0}, {29.5, 1.3}};
+  const std::vector<Key> across{{1.2, 1.7},   {4.0, 1.4},   {6.5, 1.8},  {9.8, 0.0},  {13.5, 0.0},
+                                {16.8, -1.8}, {20.0, -1.5}, {23.3, 0.0}, {26.0, 0.0}, {29.4, 1.8}};
   std::vector<Look> looks;
   for (double t = 0.0; t < seconds + 2.0; t += kInterval) {
     const double y = smoothly(across, t);
     const double since = std::max(0.0, t - 1.2), begun = std::min(1.0, since / 2.0);
-    const double yaw = std::atan2(-y, 2.6) + 0.06 * begun * std::sin(0.9 * since);
+    const double yaw = std::atan2(-y, 3.0) + 0.06 * begun * std::sin(0.9 * since);
     looks.push_back({{kWalkX + 0.05 * begun * std::sin(1.1 * since), y},
                      yaw,
                      0.18 + 0.04 * begun * std::sin(1.7 * since),
@@ -54,7 +54,7 @@ Trajectory walkPast(double seconds) {
 
 void putHiddenChair(SceneBuilder& builder) {
   SceneObject table = builder.draw("dining table");
-  table.size = {0.9, 1.4, 0.74};
+  table.size = {0.9, 1.0, 0.74};
   SceneObject monitor = builder.draw("monitor");
   monitor.size = {0.2, 0.68, 0.5};
   SceneObject chair = builder.draw("chair");
@@ -62,7 +62,7 @@ void putHiddenChair(SceneBuilder& builder) {
   // All in a line before the camera's middle place; the screen faces the camera.
   builder.mustPut(table, {{kWalkX + 1.95, 0.0}, M_PI, 0.0});
   builder.mustPut(std::move(monitor), {{kWalkX + 1.9, 0.0}, M_PI, table.size.z()});
-  builder.mustPut(std::move(chair), {{kWalkX + 3.4, 0.0}, builder.dice().uniform(2.7, 3.5), 0.0});
+  builder.mustPut(std::move(chair), {{kWalkX + 4.2, 0.0}, builder.dice().uniform(2.7, 3.5), 0.0});
 }
 
 // ---- vanish: the camera looks, turns away, and looks again.

@@ -103,7 +103,7 @@ Scene makeTown(std::uint64_t seed, const SceneOptions& options) {
   builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
   drawDaylight(builder);
   Furnishing furnishing;
-  furnishing.free_share = 0.42;
+  furnishing.free_share = 0.33;
   furnishing.tree_every = 30.0;
   furnishing.person_every = furnishing.bicycle_every = 90.0;
   Streets(builder, roadsOfTown(), furnishing).furnish();
