@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -95,7 +96,7 @@ void drawCompass(cv::Mat& picture, Legend& legend, const std::optional<double>& 
 }
 
 int linesOf(const MapContent& content) {
-  return 14 + static_cast<int>(countsOf(content).size()) + (content.truth ? 1 : 0);
+  return 15 + static_cast<int>(countsOf(content).size()) + (content.truth ? 1 : 0);
 }
 
 }  // namespace
@@ -138,6 +139,11 @@ void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& v
   for (const auto& [name, count] : countsOf(content)) {
     legend.box(fmt::format("{}: {}", name, count), {classColour(name), 2}, 0.65);
   }
+  const auto beyond = std::count_if(
+      content.objects.begin(), content.objects.end(), [&](const ObjectGlance& object) {
+        return !view.area.contains(cv::Point(view.at(object.p_W.head<2>())));
+      });
+  if (beyond > 0) legend.entry(fmt::format("{} beyond the border", beyond));
   legend.skip(0.4);
   if (content.truth) legend.box("truth", {kTruthColour, 1}, 0.0);
   const Colour grey(110, 110, 110);

@@ -17,9 +17,9 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kLongSide = 1500.0, kLongestSide = 4000.0;    // pixels
-constexpr double kLeastScale = 4.0, kMostScale = 60.0;         // pixels a metre
-constexpr double kNearTheWay = 60.0, kTruthNearTheWay = 30.0;  // metres
+constexpr double kLongSide = 1500.0, kLongestSide = 4000.0;  // pixels
+constexpr double kLeastScale = 4.0, kMostScale = 60.0;       // pixels a metre
+constexpr double kNearTheWay = 60.0;                         // metres
 constexpr double kLeastExtent = 6.0;
 
 Eigen::Vector2d flat(const Eigen::Vector3d& p) { return p.head<2>(); }
@@ -28,6 +28,19 @@ double distanceToWay(const std::vector<Eigen::Vector3d>& path, const Eigen::Vect
   double least = path.empty() ? 0.0 : 1e9;
   for (const auto& q : path) least = std::min(least, (flat(q) - flat(p)).norm());
   return least;
+}
+
+/// Three times the distance within which four fifths of the objects are: one stray estimate does
+/// not make the rest small.
+double usualDistance(const MapContent& content) {
+  std::vector<double> distances;
+  for (const auto& object : content.objects) {
+    distances.push_back(distanceToWay(content.path, object.p_W));
+  }
+  if (distances.empty()) return kNearTheWay;
+  const auto at = distances.begin() + static_cast<std::ptrdiff_t>(0.8 * (distances.size() - 1.0));
+  std::nth_element(distances.begin(), at, distances.end());
+  return std::clamp(3.0 * *at, kLeastExtent, kNearTheWay);
 }
 
 Polyline footprint(const MapView& view, const Eigen::Vector3d& centre, double yaw,
@@ -172,14 +185,15 @@ void drawGrid(cv::Mat& picture, const MapView& view) {
 MapView viewOf(const MapContent& content) {
   Eigen::AlignedBox2d bounds;
   for (const auto& p : content.path) bounds.extend(flat(p));
-  const auto include = [&](const Eigen::Vector3d& p, double near) {
-    if (distanceToWay(content.path, p) < near) bounds.extend(flat(p));
+  const double near = usualDistance(content);
+  const auto include = [&](const Eigen::Vector3d& p, double limit) {
+    if (distanceToWay(content.path, p) < limit) bounds.extend(flat(p));
   };
-  for (const auto& object : content.objects) include(object.p_W, kNearTheWay);
+  for (const auto& object : content.objects) include(object.p_W, near);
   if (bounds.isEmpty()) bounds.extend(Eigen::Vector2d::Zero());
   if (content.truth) {
     for (const auto& track : content.truth->objects)
-      include(track.keys.back().centre_W, kTruthNearTheWay);
+      include(track.keys.back().centre_W, 0.5 * near);
   }
   const double room = std::max(3.0, 0.04 * bounds.sizes().maxCoeff());
   const Eigen::Vector2d half =

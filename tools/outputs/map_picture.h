@@ -36,7 +36,7 @@ struct MapView {
   }
 };
 
-/// A view of the way and of what is within 60 m of it: rooms, streets and long drives.
+/// A view of the way and of what is near it (60 m, less in rooms; truth: half of that).
 MapView viewOf(const MapContent& content);
 cv::Mat drawMap(const MapContent& content, const MapView& view);
 /// False: there is neither a way nor an object, or the file cannot be written.

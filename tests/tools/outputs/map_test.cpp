@@ -120,6 +120,11 @@ TEST(MapPicture, AStrayObjectFarFromTheWayDoesNotShrinkTheMap) {
   const MapView view = viewOf(content);
   EXPECT_DOUBLE_EQ(view.scale, scale);
   EXPECT_FALSE(drawMap(content, view).empty());
+  MapContent room = street(4.0);
+  for (auto& object : room.objects) object.p_W = {1.0, 1.5, 0.0};
+  const double room_scale = viewOf(room).scale;
+  room.objects.push_back(objectAt(9, {0, 25, 0}));
+  EXPECT_DOUBLE_EQ(viewOf(room).scale, room_scale) << "25 m are far in a room";
 }
 
 TEST(MapPicture, NothingIsDrawnBeyondTheMapsBorder) {
