@@ -225,9 +225,12 @@ void OverlayPicture::drawImage(const cv::Mat& from, cv::Mat& to) const {
 void OverlayPicture::drawObjects(cv::Mat& image, const FrameGlance& frame) const {
   const RigidTransform T_CW = (frame.T_WB * camera_.T_BC()).inverse();
   const auto objects = fartherFirst(frame);
-  std::vector<cv::Rect> boxes, taken;
-  for (const auto& object : objects) {
-    boxes.push_back(drawBox(image, object, T_CW, camera_, scale_));
+  std::vector<cv::Rect> boxes(objects.size()), taken;
+  for (const bool hidden : {false, true}) {  // over what hides them, or they would not be seen
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      if (objects[i].hidden() != hidden) continue;
+      boxes[i] = drawBox(image, objects[i], T_CW, camera_, scale_);
+    }
   }
   for (std::size_t i = objects.size(); i-- > 0;) {  // the nearest labels choose first
     if (!boxes[i].empty()) drawLabel(image, objects[i], boxes[i], taken);

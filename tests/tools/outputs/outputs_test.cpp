@@ -219,6 +219,7 @@ TEST(OutputWriter, LeavesEveryFileWellFormed) {
   EXPECT_EQ(map["type"], "FeatureCollection");
   EXPECT_FALSE(map["georeferenced"]);
   EXPECT_GT(std::filesystem::file_size(folder / "map.png"), 1000u);
+  EXPECT_GT(std::filesystem::file_size(folder / "evolution.png"), 1000u);
 }
 
 TEST(OutputWriter, TheMapIsGeoreferencedAtThePoseNearestToTheAnchor) {

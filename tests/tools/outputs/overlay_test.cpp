@@ -48,6 +48,18 @@ TEST(Overlay, AnObjectInSightHasUnbrokenLinesAndAHiddenOneHasGaps) {
   EXPECT_LT(hidden, 0.95);
 }
 
+TEST(Overlay, AHiddenObjectIsSeenOverTheOneThatHidesIt) {
+  ObjectGlance near = objectAt(1, {8.0, 0.0, 0.0}, Visibility::kVisible, "van");
+  ObjectGlance behind = objectAt(2, {12.65, 0.0, 0.0}, Visibility::kOccluded);
+  near.size = {0.5, 1.0, 1.0};
+  behind.size = {0.5, 1.6, 1.6};  // as large in the image: the lines coincide
+  const auto corners = cornersOf(behind);
+  const cv::Mat image = drawn(frameOf(0, {behind, near}));
+  EXPECT_GT(coverage(image, pixelOf(aheadCamera(), corners[0]), pixelOf(aheadCamera(), corners[2]),
+                     onImage("car")),
+            0.4);
+}
+
 TEST(Overlay, WhatIsOutOfViewBehindOrUnconfirmedLeavesTheImageAlone) {
   ObjectGlance guess = objectAt(1, kAhead);
   guess.confirmed = false;
@@ -209,6 +221,23 @@ TEST(OverlayVideo, RefusesFramesOfAnotherSizeAndSaysWhereNoFileOpens) {
     EXPECT_EQ(writer.add(frameWithPixels(0, 0), frameOf(0, {})).error().code, "video_not_written");
   }
   EXPECT_EQ(writer.frames(), 0u);
+}
+
+TEST(OverlayVideo, IsDrawnFromTheFolderWithTheFramesThatHaveImages) {
+  DriveLog log;
+  for (std::uint64_t i = 0; i < 5; ++i) log.add(messageOf(frameOf(i, {})));
+  const auto root = replay::tinyKittiTracking("overlay_images");  // three images
+  const auto file = root / "overlay.mp4";
+  std::size_t calls = 0, all = 0;
+  const std::string sentence =
+      writeOverlay(log, {.path = root, .sequence = "0000"}, file, [&](std::size_t, std::size_t n) {
+        ++calls;
+        all = n;
+      });
+  EXPECT_EQ(sentence.rfind("overlay.mp4: 3 frames", 0), 0u) << sentence;
+  EXPECT_EQ(calls, 5u);
+  EXPECT_EQ(all, 5u);
+  EXPECT_NEAR(cv::VideoCapture(file.string()).get(cv::CAP_PROP_FRAME_COUNT), 3.0, 0.1);
 }
 
 TEST(OverlayVideo, ADriveWithoutImagesIsSaidInASentence) {
