@@ -25,7 +25,7 @@ CameraCalibration makeCamera(const std::string& name, const SceneOptions& option
   Eigen::Matrix3d R_BC;
   R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   camera.T_BC = RigidTransform(Eigen::Matrix3d(expSo3({0, pitch_down, 0}) * R_BC),
-                               Eigen::Vector3d(0.06, left, kCameraAboveBody));
+                               Eigen::Vector3d(kCameraBeforeBody, left, kCameraAboveBody));
   camera.readout_s = options.rolling_shutter ? kReadout : 0.0;
   camera.rate_hz = options.rate_hz;
   return camera;

@@ -14,5 +14,7 @@ Rig makeRig(Carrier carrier, const SceneOptions& options, Dice& dice, double pit
 
 /// Height of the camera above the body's origin.
 inline constexpr double kCameraAboveBody = 0.05;
+/// And before it; with two cameras each is half of the baseline to its side.
+inline constexpr double kCameraBeforeBody = 0.06;
 
 }  // namespace perdure::sim

@@ -11,12 +11,14 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kToySeconds = 24.0, kStillSeconds = 20.0, kCameraHeight = 1.35;
-constexpr double kScale = 14.0;       ///< the toy is a 4.2 m car, made 0.3 m long
-constexpr double kToyDistance = 2.1;  ///< from where the camera starts
+constexpr double kScale = 14.0;        ///< the toy is a 4.2 m car, made 0.3 m long
+constexpr double kToyDistance = 1.35;  ///< from where the camera starts
 constexpr double kInterval = 0.05;
 
+/// Seen from where the camera starts, at the body's place.
 Eigen::Vector2d polar(double distance, double bearing) {
-  return distance * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+  return distance * Eigen::Vector2d(std::cos(bearing), std::sin(bearing)) +
+         Eigen::Vector2d(kCameraBeforeBody, 0.0);
 }
 
 SceneObject carOf(SceneBuilder& builder, double length) {
@@ -28,11 +30,11 @@ SceneObject carOf(SceneBuilder& builder, double length) {
 
 void putCars(SceneBuilder& builder) {
   Dice& dice = builder.dice();
-  const double yaw = dice.uniform(0.5, 1.0), far_bearing = 0.16, near_bearing = -0.24;
+  const double yaw = dice.uniform(0.5, 1.0), far_bearing = 0.2, near_bearing = -0.3;
   const SceneObject car = carOf(builder, 4.2);
   builder.mustPut(car, {polar(kScale * kToyDistance, far_bearing), far_bearing + yaw, 0.0});
-  builder.mustPut(carOf(builder, 4.2), {polar(46.0, -0.09), dice.uniform(-1.0, 1.0), 0.0});
-  builder.mustPut(carOf(builder, 4.2), {polar(62.0, 0.04), dice.uniform(-1.0, 1.0), 0.0});
+  builder.mustPut(carOf(builder, 4.2), {polar(29.0, -0.13), dice.uniform(-1.0, 1.0), 0.0});
+  builder.mustPut(carOf(builder, 4.2), {polar(40.0, 0.02), dice.uniform(-1.0, 1.0), 0.0});
   // The same picture: all that separates camera and car, fourteen times smaller.
   SceneObject toy = builder.draw("toy");
   toy.shape = "hatchback";
@@ -40,7 +42,7 @@ void putCars(SceneBuilder& builder) {
   const double centre = kCameraHeight - (kCameraHeight - 0.5 * car.size.z()) / kScale;
   const double top = centre - 0.5 * toy.size.z();
   const Eigen::Vector2d point = polar(kToyDistance, near_bearing);
-  builder.mustPut(PropKind::kCrate, {0.4, 0.4, top}, {point, near_bearing, 0.0});
+  builder.mustPut(PropKind::kCrate, {0.31, 0.31, top}, {point, near_bearing, 0.0});
   builder.mustPut(std::move(toy), {point, near_bearing + yaw, top});
 }
 
@@ -50,9 +52,10 @@ Trajectory sideways(double seconds) {
   for (double t = 0.0; t < seconds + 2.0; t += kInterval) {
     const double since = std::max(0.0, t - 1.2), begun = std::min(1.0, since / 2.0);
     const double grown = begun * begun * (3.0 - 2.0 * begun);
-    const double phase = 2.0 * M_PI * since / 8.0;
-    looks.push_back({{0.25 * grown * std::sin(0.5 * phase), 0.7 * grown * std::sin(phase)},
-                     -0.05 + 0.08 * grown * std::sin(0.7 * phase),
+    const double phase = 2.0 * M_PI * since / 5.0;
+    const double y = grown * (0.18 + 0.3 * std::sin(phase));
+    looks.push_back({{0.2 * grown * std::sin(0.5 * phase), y},
+                     -0.05 - 0.25 * y + 0.03 * grown * std::sin(0.7 * phase),
                      0.02 + 0.04 * grown * std::sin(1.3 * phase),
                      0.04 * grown * std::sin(0.9 * phase)});
   }
@@ -68,7 +71,7 @@ Scene makePlace(SceneBuilder& builder, Trajectory body, double seconds) {
   furnishing.free_share = 1.0;  // no other cars
   furnishing.person_every = furnishing.bicycle_every = 1e9;
   furnishing.hedge_share = 0.0;
-  Streets(builder, {{{-15.0, 0.0}, {85.0, 0.0}, 16.0}}, furnishing).furnish();
+  Streets(builder, {{{-15.0, 0.0}, {70.0, 0.0}, 16.0}}, furnishing).furnish();
   return builder.take();
 }
 
@@ -83,8 +86,11 @@ Scene makeToy(std::uint64_t seed, const SceneOptions& options) {
 Scene makeStill(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("still", seed, options);
   const Eigen::Vector3d place(0.0, 0.0, kCameraHeight - kCameraAboveBody);
-  return makePlace(builder, Trajectory(RigidTransform(Eigen::Quaterniond::Identity(), place)),
-                   builder.seconds(kStillSeconds));
+  return makePlace(
+      builder,
+      Trajectory(RigidTransform(
+          Eigen::Quaterniond(Eigen::AngleAxisd(-0.05, Eigen::Vector3d::UnitZ())), place)),
+      builder.seconds(kStillSeconds));
 }
 
 }  // namespace perdure::sim

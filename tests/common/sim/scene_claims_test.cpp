@@ -142,6 +142,7 @@ TEST(Toy, FillsThePixelsOfACarAndIsLargerInTheImageThanTwoOthers) {
         const auto far = spanOf(scene, *cars[i], 0.5);
         ASSERT_TRUE(far);
         EXPECT_LT(far->height, 0.8 * toy->height);
+        EXPECT_GT(far->height, 12.0);
       }
       for (const SceneObject* object : {toys[0], cars[0], cars[1], cars[2]}) {
         EXPECT_GT(shareSeen(scene, *object, 0.5), 0.3) << name << " " << object->id;
