@@ -53,7 +53,8 @@ std::vector<const Candidate*> chosen(const std::map<ObjectId, Candidate>& all, s
                    [](const auto* a, const auto* b) { return a->seen.size() > b->seen.size(); });
   std::set<std::string> classes;
   for (const Candidate* one : by_length) {
-    (classes.insert(one->evolution.class_name).second ? firsts : rest).push_back(one);
+    const std::string& name = one->evolution.class_name;
+    (name != kOtherClass && classes.insert(name).second ? firsts : rest).push_back(one);
   }
   firsts.insert(firsts.end(), rest.begin(), rest.end());
   if (firsts.size() > most) firsts.resize(most);

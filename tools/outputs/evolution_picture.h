@@ -26,9 +26,9 @@ struct Evolution {
   std::vector<EvolutionPoint> points;
 };
 
-/// Of the objects that were confirmed: the longest seen of each class, then the longest seen of the
-/// rest, at most `most`. Truth is the track that was nearest to an object by the median over the
-/// frames in which it was in sight: within 3 m, the nearest pairs first, one each.
+/// Of the objects that were confirmed: the longest seen of each class but *other*, then the longest
+/// seen of the rest, at most `most`. Truth is the track that was nearest to an object by the median
+/// over the frames in which it was in sight: within 3 m, the nearest pairs first, one each.
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 

@@ -47,6 +47,13 @@ TEST(Evolution, TakesTheLongestSeenOfEachClassFirstAndNoGuesses) {
   };
   EXPECT_THAT(ids(2), ElementsAre(1, 3));
   EXPECT_THAT(ids(9), ElementsAre(1, 3, 2));
+  DriveLog log;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    std::vector<ObjectGlance> objects = {objectAt(1, {9, 0, 0}, Visibility::kVisible, kOtherClass)};
+    if (i > 0) objects.push_back(objectAt(2, {5, 0, 0}));
+    log.add(messageOf(frameOf(i, objects)));
+  }
+  EXPECT_EQ(chooseEvolutions(log, nullptr, 1)[0].id, 2u) << "what it is counts for more";
 }
 
 TEST(Evolution, TheErrorIsTheDistanceFromTheNearestTruthAndElseThereIsNone) {
