@@ -6,6 +6,7 @@
 #include "common/base/errors.h"
 #include "tools/bus_tools/command.h"
 #include "tools/demo/command.h"
+#include "tools/detect/command.h"
 #include "tools/evaluate/command.h"
 #include "tools/map/command.h"
 #include "tools/pipeline/command.h"
@@ -39,6 +40,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   perdure::tools::addPipelineCommand(app);
   perdure::tools::addEvaluateCommand(app);
+  perdure::tools::addDetectCommand(app);
   perdure::tools::addSimulateCommand(app);
   perdure::tools::addMapCommand(app);
   perdure::tools::addDemoCommand(app);

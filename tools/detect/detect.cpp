@@ -1,0 +1,88 @@
+#include "tools/detect/detect.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <ostream>
+#include <vector>
+
+#include "common/base/errors.h"
+#include "common/replay/dataset.h"
+#include "services/inference/node.h"
+
+namespace perdure::tools {
+namespace {
+
+double cpuMs() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+void writeDetectionHeader(std::ostream& out, const ModelInfo& model) {
+  out << "frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth";
+  for (const std::string& name : model.classes) out << ",logit:" << name;
+  out << '\n';
+}
+
+void writeDetection(std::ostream& out, const ModelInfo& model, std::uint64_t frame,
+                    const Detection& detection) {
+  const auto& a = detection.activations;
+  const auto best = std::max_element(a.begin() + 1, a.end());
+  const double highest = *std::max_element(a.begin(), a.end());
+  double sum = 0.0;
+  for (const float value : a) sum += std::exp(value - highest);
+  const auto k = static_cast<std::size_t>(best - a.begin()) - 1;
+  const Box& b = detection.box;
+  out << frame << ',' << model.classes.at(k) << ',' << b.x1 << ',' << b.y1 << ',' << b.x2 << ','
+      << b.y2 << ',' << std::exp(*best - highest) / sum << ',';
+  if (detection.azimuth) out << *detection.azimuth << ',' << detection.azimuth_sigma;
+  if (!detection.azimuth) out << ',';
+  for (std::size_t i = 1; i < a.size(); ++i) out << ',' << a[i];
+  out << '\n';
+}
+
+DetectSummary detect(const DetectOptions& options,
+                     const std::function<void(std::uint64_t, std::uint64_t)>& report) {
+  replay::DatasetOptions data;
+  data.path = options.data;
+  const auto dataset = replay::Dataset::open(data);
+  inference::Node node(options.inference, 1);
+  std::ofstream out(options.out);
+  if (!out) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options.out.string() + " cannot be written; give --out a file elsewhere");
+  }
+  out.precision(7);
+  writeDetectionHeader(out, node.model());
+  DetectSummary summary;
+  std::vector<double> times;
+  const std::string camera = dataset->calibration().cameras.front().name;
+  while (const auto message = dataset->next()) {
+    const Frame* frame = std::get_if<Frame>(&*message);
+    if (frame == nullptr || frame->camera != camera) continue;
+    const double before = cpuMs();
+    const auto answer = node.infer(*frame);
+    times.push_back(cpuMs() - before);
+    ++summary.frames;
+    if (answer) {
+      summary.boxes += answer->detections.size();
+      for (const auto& d : answer->detections) {
+        writeDetection(out, node.model(), frame->stamp.sequence, d);
+      }
+    } else {
+      ++summary.failed;
+    }
+    if (report) report(summary.frames, dataset->frameCount());
+  }
+  summary.cpu_ms_median = medianOf(std::move(times));
+  return summary;
+}
+
+}  // namespace perdure::tools
