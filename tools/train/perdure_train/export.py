@@ -1,0 +1,76 @@
+"""The network as an ONNX file that OpenCV 4.6 loads: batch norm folded, names given."""
+
+import copy
+
+import onnx
+import torch
+from onnx import helper, numpy_helper
+from torch import nn
+from torch.nn.utils import fusion
+
+from .network import TENSORS
+from .settings import HEIGHT, WIDTH
+
+
+def _fold(module):
+    """Batch norm into the convolution before it, everywhere below `module`."""
+    for name, child in module.named_children():
+        if isinstance(child, nn.Sequential) and len(child) >= 2 and isinstance(child[1], nn.BatchNorm2d):
+            fused = fusion.fuse_conv_bn_eval(child[0], child[1])
+            setattr(module, name, nn.Sequential(fused, *list(child)[2:]))
+        else:
+            _fold(child)
+
+
+def folded(network):
+    network = copy.deepcopy(network).float().eval()
+    _fold(network)
+    return network
+
+
+class _Flat(nn.Module):
+    def __init__(self, network):
+        super().__init__()
+        self.network = network
+
+    def forward(self, images):
+        return tuple(t for level in self.network(images) for t in level)
+
+
+def _without_identities(model):
+    """torch 1.13 gives a tensor that is used twice a second name by Identity; OpenCV 4.6 knows no
+    Identity of a constant. The first name does for both."""
+    renamed = {n.output[0]: n.input[0] for n in model.graph.node if n.op_type == "Identity"}
+    nodes = [n for n in model.graph.node if n.op_type != "Identity"]
+    for node in nodes:
+        for i, name in enumerate(node.input):
+            while name in renamed:
+                name = renamed[name]
+            node.input[i] = name
+    del model.graph.node[:]
+    model.graph.node.extend(nodes)
+    return model
+
+
+def write_onnx(network, path, background_shift=0.0):
+    """`background_shift` is added to the background's logit: calibration that needs no key."""
+    network = folded(network)
+    with torch.no_grad():
+        network.logits.bias[0] += background_shift
+    names = [name for level in TENSORS for name in level]
+    torch.onnx.export(
+        _Flat(network),
+        torch.zeros(1, 3, HEIGHT, WIDTH),
+        str(path),
+        opset_version=11,
+        input_names=["images"],
+        output_names=names,
+        do_constant_folding=True,
+    )
+    model = _without_identities(onnx.load(str(path)))
+    model.doc_string = ""
+    for node in model.graph.node:
+        node.doc_string = ""
+    onnx.checker.check_model(model)
+    onnx.save(model, str(path))
+    return names

@@ -1,0 +1,58 @@
+"""What the heads' numbers mean: cells, boxes and azimuths, for training and for tests."""
+
+import math
+
+import torch
+from torch.nn import functional
+
+from .settings import BINS, STRIDES, grid
+
+HALF_BIN = math.pi / BINS
+
+
+def cells():
+    """Centres (A, 2) in pixels of the input and strides (A,) of all cells, stride 8 first."""
+    centres, strides = [], []
+    for stride in STRIDES:
+        rows, columns = grid(stride)
+        y, x = torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
+        centre = (torch.stack((x, y), -1).reshape(-1, 2).float() + 0.5) * stride
+        centres.append(centre)
+        strides.append(torch.full((len(centre),), float(stride)))
+    return torch.cat(centres), torch.cat(strides)
+
+
+def flat(outputs):
+    """One (N, A, channels) each of logits, box and azimuth, float32."""
+    parts = []
+    for part in range(3):
+        maps = [level[part].float().flatten(2) for level in outputs]
+        parts.append(torch.cat(maps, 2).transpose(1, 2))
+    return parts
+
+
+def boxes_of(raw, centres, strides):
+    """Corners (…, A, 4) in pixels of the input."""
+    distance = functional.softplus(raw) * strides[:, None]
+    return torch.cat((centres - distance[..., :2], centres + distance[..., 2:]), -1)
+
+
+def azimuth_of(raw):
+    """The angle of the likeliest bin, corrected by its residual."""
+    bins, residuals = raw.split(BINS, -1)
+    best = bins.argmax(-1, keepdim=True)
+    angle = best.float() * 2 * HALF_BIN + residuals.gather(-1, best) * HALF_BIN
+    return wrapped(angle.squeeze(-1))
+
+
+def wrapped(angle):
+    return torch.remainder(angle + math.pi, 2 * math.pi) - math.pi
+
+
+def iou(a, b):
+    """IoU of boxes of broadcastable shapes (…, 4)."""
+    low, high = torch.maximum(a[..., :2], b[..., :2]), torch.minimum(a[..., 2:], b[..., 2:])
+    common = (high - low).clamp_min(0).prod(-1)
+    area_a = (a[..., 2:] - a[..., :2]).prod(-1)
+    area_b = (b[..., 2:] - b[..., :2]).prod(-1)
+    return common / (area_a + area_b - common).clamp_min(1e-6)

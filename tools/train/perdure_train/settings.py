@@ -1,0 +1,13 @@
+"""What the network looks for, and the shape of its input and heads."""
+
+CLASSES = ["car", "van", "person", "bicycle", "chair", "dining table", "monitor", "couch"]
+# Where a yaw shows in the picture; of the others no azimuth is reported.
+AZIMUTH_CLASSES = ["car", "van", "bicycle", "chair", "monitor", "couch"]
+WIDTH, HEIGHT = 320, 240
+STRIDES = [8, 16, 32]
+BINS = 12  # of azimuth, 30 degrees each
+
+
+def grid(stride):
+    """Rows and columns of cells: the last row may reach beyond the image (240 / 32 is 7.5)."""
+    return -(-HEIGHT // stride), -(-WIDTH // stride)

@@ -1,0 +1,114 @@
+"""A folder of `perdure simulate` as pictures with boxes, classes and azimuths."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from .settings import CLASSES, HEIGHT, WIDTH
+
+MIN_SIDE = 10.0  # of the longer side in pixels of the input; smaller ones are ignored
+HIDDEN = 0.05  # share of the outline within the image in sight below which there is nothing to see
+IGNORED = 0.25  # share below which an object is neither to be found nor wrong to be found
+
+
+def table(file):
+    """Rows of numbers of a CSV; its header, and what is no number, are left out."""
+    with open(file, newline="") as stream:
+        return [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
+
+
+def rotation(w, x, y, z):
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])
+
+
+class Poses:
+    """Of the camera in the world, by time."""
+
+    def __init__(self, mav0):
+        rows = np.array(
+            [[float(x) for x in row[:8]]
+             for row in table(mav0 / "state_groundtruth_estimate0" / "data.csv")]
+        )
+        self.times, self.rows = rows[:, 0], rows[:, 1:]
+        text = (mav0 / "cam0" / "sensor.yaml").read_text()
+        numbers = text[text.index("data:") + 5 :]
+        numbers = numbers[numbers.index("[") + 1 : numbers.index("]")]
+        self.T_BC = np.array([float(x) for x in numbers.split(",")]).reshape(4, 4)
+
+    def at(self, time_ns):
+        """R_WC and p_WC at the state nearest to the time."""
+        row = self.rows[np.abs(self.times - time_ns).argmin()]
+        R_WB = rotation(*row[3:7])
+        return R_WB @ self.T_BC[:3, :3], R_WB @ self.T_BC[:3, 3] + row[:3]
+
+
+def azimuth(R_WC, p_WC, centre, yaw):
+    """alpha as KITTI has it, in the gravity-levelled camera: rotation_y less the bearing."""
+    forward = np.array([R_WC[0, 2], R_WC[1, 2]])
+    forward /= max(np.linalg.norm(forward), 1e-9)
+    right = np.array([forward[1], -forward[0]])
+    front = np.array([math.cos(yaw), math.sin(yaw)])
+    ray = np.asarray(centre[:2]) - p_WC[:2]
+    rotation_y = math.atan2(-front @ forward, front @ right)
+    return math.remainder(rotation_y - math.atan2(ray @ right, ray @ forward), 2 * math.pi)
+
+
+def key_at(thing, time_ns):
+    """Centre and yaw; on a straight way between dense keys where the object moves."""
+    keys = thing["keys"]
+    after = next((i for i, key in enumerate(keys) if key["time_ns"] > time_ns), len(keys))
+    before = keys[max(after - 1, 0)]
+    if not thing["moves"] or after in (0, len(keys)):
+        return np.array(before["centre"]), before["yaw"]
+    share = (time_ns - before["time_ns"]) / (keys[after]["time_ns"] - before["time_ns"])
+    centre = np.array(before["centre"]) * (1 - share) + np.array(keys[after]["centre"]) * share
+    return centre, before["yaw"]
+
+
+def judged(row, scale):
+    """Box in pixels of the input, cut by the image, and whether it is ignored; or nothing."""
+    full = np.array([float(x) for x in row[3:7]]) * scale
+    box = np.clip(full, 0, [WIDTH, HEIGHT, WIDTH, HEIGHT])
+    sides, whole = box[2:] - box[:2], full[2:] - full[:2]
+    if sides.min() < 1:
+        return None
+    seen = float(row[2])
+    inside = min(1.0, seen * whole.prod() / sides.prod())
+    if inside < HIDDEN or seen < 0.01:
+        return None
+    return box, bool(inside < IGNORED or sides.max() < MIN_SIDE or sides.min() < 3)
+
+
+def read_folder(folder):
+    """Images (N, 240, 320, 3) and the truth of each frame, ready for data.Chunk."""
+    mav0 = Path(folder) / "mav0"
+    things = {t["id"]: t for t in json.loads((Path(folder) / "objects_truth.json").read_text())["objects"]}
+    poses = Poses(mav0)
+    rows = {}
+    for row in table(Path(folder) / "visibility_truth.csv")[1:]:
+        rows.setdefault(int(row[0]), []).append(row)
+    images, frames = [], []
+    for i, (stamp, name) in enumerate(table(mav0 / "cam0" / "data.csv")):
+        with Image.open(mav0 / "cam0" / "data" / name.strip()) as picture:
+            scale = np.array([WIDTH / picture.width, HEIGHT / picture.height] * 2)
+            images.append(np.array(picture.convert("RGB").resize((WIDTH, HEIGHT), Image.BOX)))
+        R_WC, p_WC = poses.at(float(stamp))
+        frame = {"boxes": [], "classes": [], "azimuths": [], "ignored": []}
+        for row in rows.get(i, []):
+            thing, judgement = things[int(row[1])], judged(row, scale)
+            if judgement is None or thing["looks_like"] not in CLASSES:
+                continue
+            frame["boxes"].append([round(float(x), 2) for x in judgement[0]])
+            frame["ignored"].append(judgement[1])
+            frame["classes"].append(CLASSES.index(thing["looks_like"]))
+            frame["azimuths"].append(round(azimuth(R_WC, p_WC, *key_at(thing, float(stamp))), 4))
+        frames.append(frame)
+    return np.stack(images), frames
