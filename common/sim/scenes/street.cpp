@@ -56,13 +56,13 @@ Drive twoLaps(const GroundPath& loop, double from, double until_s) {
 Scene makeStreet(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("street", seed, options);
   Dice& dice = builder.dice();
-  const Block block{dice.uniform(64.0, 67.0), dice.uniform(42.0, 45.0)};
+  const Block block{dice.uniform(62.0, 66.0), dice.uniform(42.0, 44.5)};
   const GroundPath loop = loopOf(block, 16.0);
   const double seconds = builder.seconds(kDefaultSeconds);
   Suspension suspension;
   suspension.height = kCameraHeight - kCameraAboveBody;
   suspension.seed = dice.seed();
-  const double from = dice.uniform(6.0, 14.0);
+  const double from = dice.uniform(27.0, 33.0);  // on the first straight
   builder.setBody(vehicleMotion(loop, twoLaps(loop, from, std::max(seconds, kDefaultSeconds) + 2.0),
                                 suspension),
                   seconds, 1.15, 2.2);

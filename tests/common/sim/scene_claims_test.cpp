@@ -53,9 +53,8 @@ std::optional<Span> spanOf(const Scene& scene, const SceneObject& object, double
   return Span{high.x() - low.x(), high.y() - low.y()};
 }
 
-/// Share of a grid of points of the thing's box that nothing else's box hides.
-double shareSeen(const Scene& scene, const SceneObject& object, double t) {
-  const Eigen::Vector3d eye = cameraPose(scene, t).p;
+/// All but the thing itself, as boxes; one sees under a table.
+std::vector<Solid> othersThan(const Scene& scene, const SceneObject& object, double t) {
   std::vector<Solid> others;
   for (const Prop& prop : scene.props) {
     for (const Solid& solid : solidsOf(prop)) others.push_back(solid);
@@ -63,18 +62,28 @@ double shareSeen(const Scene& scene, const SceneObject& object, double t) {
   for (const SceneObject& other : scene.objects) {
     if (other.id == object.id || !other.presentAt(t)) continue;
     Solid solid = solidOf(other, t);
-    // One sees under a table.
     if (other.class_name == "dining table") solid.low = solid.high - 0.03;
     others.push_back(solid);
   }
+  return others;
+}
+
+bool sees(const std::vector<Solid>& others, const Eigen::Vector3d& eye,
+          const Eigen::Vector3d& target) {
+  return std::none_of(others.begin(), others.end(),
+                      [&](const Solid& solid) { return blocks(solid, eye, target); });
+}
+
+/// Share of a grid of points of the thing's box that nothing else's box hides.
+double shareSeen(const Scene& scene, const SceneObject& object, double t) {
+  const Eigen::Vector3d eye = cameraPose(scene, t).p;
+  const std::vector<Solid> others = othersThan(scene, object, t);
+  const RigidTransform T_WO = object.motion.poseAt(t);
   int seen = 0, all = 0;
   for (double x = -0.45; x < 0.5; x += 0.3) {
     for (double y = -0.45; y < 0.5; y += 0.15) {
       for (double z = -0.45; z < 0.5; z += 0.15) {
-        const Eigen::Vector3d target =
-            object.motion.poseAt(t) * Eigen::Vector3d(x, y, z).cwiseProduct(object.size);
-        seen += std::none_of(others.begin(), others.end(),
-                             [&](const Solid& solid) { return blocks(solid, eye, target); });
+        seen += sees(others, eye, T_WO * Eigen::Vector3d(x, y, z).cwiseProduct(object.size));
         ++all;
       }
     }
@@ -291,24 +300,26 @@ TEST(Random, ShowsAllClassesAtAllSizesUpright) {
   options.width = 320, options.height = 240;
   options.look_set = "train";
   std::map<std::string, std::array<int, 3>> sizes;
-  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const Scene scene = makeScene("random", seed, options);
     for (double t = 0.0; t < scene.seconds; t += 1.0) {
       // What is seen is seen in passing, not in the leap to the next view.
       EXPECT_LT(scene.body.at(t).velocity_W.norm(), 7.5);
       for (const SceneObject& object : scene.objects) {
         const auto span = spanOf(scene, object, t);
-        if (!span || shareSeen(scene, object, t) < 0.3) continue;
+        if (!span) continue;
         const double side = std::max(span->width, span->height);
-        if (side >= 10) ++sizes[object.class_name][side < 30 ? 0 : side < 80 ? 1 : 2];
+        const Eigen::Vector3d eye = cameraPose(scene, t).p, centre = object.motion.poseAt(t).p;
+        if (side < 10 || !sees(othersThan(scene, object, t), eye, centre)) continue;
+        ++sizes[object.class_name][side < 30 ? 0 : side < 80 ? 1 : 2];
       }
     }
   }
   ASSERT_EQ(sizes.size(), 8u);
   for (const auto& [name, counts] : sizes) {
-    EXPECT_GT(counts[0], name == "couch" || name == "dining table" ? 0 : 25) << name;
-    EXPECT_GT(counts[1], 60) << name;
-    EXPECT_GT(counts[2], 25) << name;
+    EXPECT_GT(counts[0], name == "couch" || name == "dining table" ? 0 : 15) << name;
+    EXPECT_GT(counts[1], 50) << name;
+    EXPECT_GT(counts[2], 20) << name;
   }
 }
 
