@@ -5,7 +5,7 @@ import math
 import torch
 from torch import nn
 
-from .settings import BINS, CLASSES, STRIDES
+from .settings import BINS, CLASSES, STRIDES, grid
 
 
 class _ReLU(torch.autograd.Function):
@@ -53,9 +53,8 @@ class Block(nn.Module):
         return self.relu(x + self.second(self.first(x)))
 
 
-def upsampled(small, like):
-    big = nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
-    return big[:, :, : like.shape[2]] if big.shape[2] != like.shape[2] else big
+def upsampled(small):
+    return nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
 
 
 class Network(nn.Module):
@@ -98,8 +97,8 @@ class Network(nn.Module):
         c16 = self.stride16(c8)
         c32 = self.stride32(c16)
         p32 = torch.relu(self.lateral[2](c32))
-        p16 = self.smooth[1](self.lateral[1](c16) + upsampled(p32, c16))
-        p8 = self.smooth[0](self.lateral[0](c8) + upsampled(p16, c8))
+        p16 = self.smooth[1](self.lateral[1](c16) + upsampled(p32)[:, :, : grid(16)[0]])
+        p8 = self.smooth[0](self.lateral[0](c8) + upsampled(p16))
         outputs = []
         for feature in (p8, p16, p32):
             shape = self.box_trunk(feature)
