@@ -108,8 +108,8 @@ Eigen::Vector3f Lighting::gloss(const Eigen::Vector3f& ray, const Hit& hit, bool
   const float open = smoothStep(0.0F, 0.35F, mirrored.z());
   Eigen::Vector3f seen = bounce_colour_ * (0.5F * (1.0F - open)) + around * open;
   if (in_sun) {
-    const float spot = std::max(0.0F, mirrored.dot(sun_W_));
-    seen += sun_colour_ * (12.0F * std::pow(spot, 250.0F));
+    const float spot = mirrored.dot(sun_W_);
+    if (spot > 0.96F) seen += sun_colour_ * (12.0F * std::pow(spot, 250.0F));
   }
   return share * seen;
 }

@@ -30,7 +30,7 @@ void setRay(Rays& rays, unsigned i, const Eigen::Vector3f& origin, const Eigen::
 
 void readHit(const World& world, const RTCRayHit8& rays, unsigned i, const Eigen::Vector3f& origin,
              const Eigen::Vector3f& direction, Hit& hit) {
-  hit.instance = rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID ? kNothing : rays.hit.instID[0][i];
+  hit.instance = World::instanceOf(rays, i);
   if (hit.instance == kNothing) return;
   const Instance& instance = world.instances()[hit.instance];
   const SurfacePoint point =
@@ -44,8 +44,8 @@ void readHit(const World& world, const RTCRayHit8& rays, unsigned i, const Eigen
   hit.normal = (instance.R * point.normal).normalized();
   if (hit.normal.dot(direction) > 0.0F) {
     // Seen from behind, or the shading normal of a rounded edge turned away: the latter keeps it.
-    const Eigen::Vector3f flat =
-        instance.R * Eigen::Vector3f(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
+    Eigen::Vector3f flat(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
+    if (World::movesAlone(rays, i)) flat = instance.R * flat;
     if (flat.dot(hit.normal) * flat.dot(direction) > 0.0F) hit.normal = -hit.normal;
   }
 }

@@ -61,6 +61,12 @@ class Renderer {
   struct Place {
     int column = 0, row = 0;
   };
+  /// Rays that add to pixels.
+  struct Samples {
+    Packet packet;
+    std::array<Place, kPacket> places;
+    std::array<float, kPacket> shares{};
+  };
   /// What is known of a pixel beside its radiance.
   struct Detail {
     std::uint32_t key = 0;  ///< instance, material and whether the sun shines
@@ -74,9 +80,10 @@ class Renderer {
   void findSun(Packet& packet) const;
   void drawTile(int left, int top, Picture& picture);
   void drawBlock(Packet& packet, const Place* places, Picture& picture);
-  bool isEdge(const Picture& picture, int column, int row) const;
+  /// Towards which neighbours a pixel is to be smoothed, as bits.
+  unsigned edgesOf(const Picture& picture, int column, int row) const;
   void smoothTile(int left, int top, Picture& picture);
-  void smoothPixels(const Place* places, unsigned count, Picture& picture);
+  void addSamples(Samples& samples, Picture& picture) const;
   Eigen::Vector2f smear(const Picture& picture, int column, int row) const;
   void blurRow(int row, const Picture& picture);
   void forTiles(const Picture& picture, const std::function<void(int, int)>& task);

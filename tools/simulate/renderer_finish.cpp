@@ -1,5 +1,6 @@
 // The second half of Renderer: smooth edges and motion blur.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "tools/simulate/renderer.h"
@@ -10,8 +11,37 @@ namespace {
 constexpr int kTile = 32;
 constexpr float kMinSmear = 0.6F;  ///< pixels; less is not to be seen
 constexpr int kMaxTaps = 12;
-constexpr std::array<std::array<float, 2>, 4> kOffsets = {
-    {{-0.375F, -0.125F}, {0.125F, -0.375F}, {0.375F, 0.125F}, {-0.125F, 0.375F}}};
+constexpr unsigned kLeft = 1, kRight = 2, kAbove = 4, kBelow = 8;
+
+struct Ray {
+  float dx, dy, share;
+};
+/// More rays of a pixel, and what is left of the one through its centre.
+struct Pattern {
+  float centre_share;
+  unsigned count;
+  std::array<Ray, 4> rays;
+};
+
+/// An edge towards one neighbour lies in that half of the pixel: two rays there. Foliage, where all
+/// neighbours differ, has no edge to be drawn smoothly: two rays. Otherwise four.
+const Pattern& patternOf(unsigned edges) {
+  static constexpr std::array<Pattern, 4> kTowards = {
+      {{0.58F, 2, {{{-0.18F, 0.22F, 0.2F}, {-0.4F, -0.22F, 0.22F}}}},
+       {0.58F, 2, {{{0.18F, -0.22F, 0.2F}, {0.4F, 0.22F, 0.22F}}}},
+       {0.58F, 2, {{{-0.22F, -0.18F, 0.2F}, {0.22F, -0.4F, 0.22F}}}},
+       {0.58F, 2, {{{0.22F, 0.18F, 0.2F}, {-0.22F, 0.4F, 0.22F}}}}}};
+  static constexpr Pattern kAround = {0.2F,
+                                      4,
+                                      {{{-0.375F, -0.125F, 0.2F},
+                                        {0.125F, -0.375F, 0.2F},
+                                        {0.375F, 0.125F, 0.2F},
+                                        {-0.125F, 0.375F, 0.2F}}}};
+  static constexpr Pattern kFoliage = {0.34F, 2, {{{-0.3F, -0.2F, 0.33F}, {0.3F, 0.2F, 0.33F}}}};
+  const int count = std::popcount(edges);
+  if (count == 1) return kTowards[static_cast<std::size_t>(std::countr_zero(edges))];
+  return count >= 3 ? kFoliage : kAround;
+}
 
 /// Between pixels; held at the border.
 Eigen::Vector4f between(const Picture& picture, float x, float y) {
@@ -28,59 +58,60 @@ Eigen::Vector4f between(const Picture& picture, float x, float y) {
 
 }  // namespace
 
-bool Renderer::isEdge(const Picture& picture, int column, int row) const {
+unsigned Renderer::edgesOf(const Picture& picture, int column, int row) const {
   const Detail& here = details_[picture.index(column, row)];
   const auto differs = [&](const Detail& there) {
-    return there.key != here.key || (here.key != 0 && there.normal.dot(here.normal) < 0.85F);
+    return there.key != here.key || (here.key != 0 && there.normal.dot(here.normal) < 0.6F);
   };
   const auto bends = [&](const Detail& before, const Detail& after) {
     const float bend = before.inverse_distance + after.inverse_distance - 2 * here.inverse_distance;
-    return std::abs(bend) > 0.03F * here.inverse_distance;
+    return std::abs(bend) > 0.06F * here.inverse_distance;
   };
   const int left = std::max(column - 1, 0), right = std::min(column + 1, picture.width - 1);
   const int above = std::max(row - 1, 0), below = std::min(row + 1, picture.height - 1);
   const Detail &l = details_[picture.index(left, row)], &r = details_[picture.index(right, row)];
   const Detail &a = details_[picture.index(column, above)],
                &b = details_[picture.index(column, below)];
-  if (differs(l) || differs(r) || differs(a) || differs(b)) return true;
-  return here.key != 0 && left < column && column < right && above < row && row < below &&
-         (bends(l, r) || bends(a, b));
+  const unsigned edges = (differs(l) ? kLeft : 0U) | (differs(r) ? kRight : 0U) |
+                         (differs(a) ? kAbove : 0U) | (differs(b) ? kBelow : 0U);
+  if (edges != 0 || here.key == 0) return edges;
+  if (left < column && column < right && bends(l, r)) return kLeft | kRight;
+  return above < row && row < below && bends(a, b) ? kAbove | kBelow : 0U;
 }
 
 void Renderer::smoothTile(int left, int top, Picture& picture) {
-  std::array<Place, kPacket / kOffsets.size()> places;
-  unsigned count = 0;
+  Samples samples;
   for (int row = top; row < std::min(top + kTile, picture.height); ++row) {
     for (int column = left; column < std::min(left + kTile, picture.width); ++column) {
-      if (!lens_->sees(column, row) || !isEdge(picture, column, row)) continue;
-      places[count++] = {column, row};
-      if (count == places.size()) {
-        smoothPixels(places.data(), count, picture);
-        count = 0;
+      if (!lens_->sees(column, row)) continue;
+      const unsigned edges = edgesOf(picture, column, row);
+      if (edges == 0) continue;
+      const Pattern& pattern = patternOf(edges);
+      picture.radiance[picture.index(column, row)] *= pattern.centre_share;
+      for (unsigned i = 0; i < pattern.count; ++i) {
+        const auto& [dx, dy, share] = pattern.rays[i];
+        samples.places[samples.packet.count] = {column, row};
+        samples.shares[samples.packet.count] = share;
+        aim(samples.packet, column, row, dx, dy);
+        if (samples.packet.count == kPacket) addSamples(samples, picture);
       }
     }
   }
-  if (count > 0) smoothPixels(places.data(), count, picture);
+  addSamples(samples, picture);
 }
 
-void Renderer::smoothPixels(const Place* places, unsigned count, Picture& picture) {
-  Packet packet;
-  for (unsigned i = 0; i < count; ++i) {
-    for (const auto& [dx, dy] : kOffsets) aim(packet, places[i].column, places[i].row, dx, dy);
-  }
+void Renderer::addSamples(Samples& samples, Picture& picture) const {
+  Packet& packet = samples.packet;
+  if (packet.count == 0) return;
   follow(packet);
   findSun(packet);
-  constexpr float kShare = 1.0F / (kOffsets.size() + 1);
   for (unsigned i = 0; i < packet.count; ++i) {
-    const Place& place = places[i / kOffsets.size()];
-    Eigen::Vector4f& sum = picture.radiance[picture.index(place.column, place.row)];
-    if (i % kOffsets.size() == 0) sum *= kShare;
-    // A bright spot of the sun in one of the rays would stand out as a single white pixel.
-    sum.head<3>() += kShare * lighting_
-                                  .shade(packet.origins[i], packet.directions[i], packet.hits[i],
-                                         packet.in_sun[i], lens_->pixelAngle())
-                                  .cwiseMin(8.0F);
+    const Place& place = samples.places[i];
+    picture.radiance[picture.index(place.column, place.row)].head<3>() +=
+        samples.shares[i] * lighting_.shade(packet.origins[i], packet.directions[i], packet.hits[i],
+                                            packet.in_sun[i], lens_->pixelAngle());
   }
+  packet.count = 0;
 }
 
 /// How far what a pixel shows moves in the image during the exposure, in pixels.

@@ -82,7 +82,7 @@ class Run {
       : options_(options),
         scene_(scene),
         workers_(options.threads),
-        world_(scene_),
+        world_(scene_, options.threads),
         renderer_(world_, workers_) {
     const auto& cameras = scene_.rig.true_calibration.cameras;
     for (std::size_t i = 0; i < cameras.size(); ++i) {

@@ -98,7 +98,11 @@ Eigen::Vector3f Sky::ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3
   const float edge = std::min(std::min(x - std::floor(x), std::ceil(x) - x),
                               std::min(y - std::floor(y), std::ceil(y) - y));
   const float tone = 0.92F + 0.08F * lattice(0x7117, column, row);
-  return plain * (edge < 0.03F ? 0.45F : tone);
+  // Far away a pixel is wider than a line: it sees a mixture.
+  const float blur = 0.0025F * (at - origin).norm() / (d.z() * kTile) + 1e-3F;
+  const float line =
+      std::clamp((0.03F + 0.5F * blur - edge) / blur, 0.0F, 1.0F) * std::min(1.0F, 0.06F / blur);
+  return plain * (tone + (0.45F - tone) * line);
 }
 
 }  // namespace perdure::tools

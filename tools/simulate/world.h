@@ -1,5 +1,6 @@
-// A scene as Embree holds it: the scenery is one instance, each object another, so that what moves
-// or goes away only changes a transform. Embree 3.13 (Wald et al., SIGGRAPH 2014).
+// A scene as Embree holds it: all that stays where it is in one tree of triangles, and each object
+// that moves, comes or goes an instance beside it, of which only the transform changes. Embree 3.13
+// (Wald et al., SIGGRAPH 2014).
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -31,7 +32,7 @@ struct Instance {
 class World {
  public:
   /// Throws std::runtime_error where Embree cannot start.
-  explicit World(const sim::Scene& scene);
+  explicit World(const sim::Scene& scene, int threads = 2);
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
@@ -42,22 +43,34 @@ class World {
   /// [0] is the scenery, [i + 1] scene().objects[i].
   const std::vector<Instance>& instances() const { return instances_; }
 
-  /// The nearest hits; the instance is hit.instID[0][lane].
+  /// The nearest hits; see instanceOf.
   void intersect(const int* valid, RTCRayHit8& rays) const;
   /// Sets tfar to -infinity where something is between tnear and tfar.
   void occluded(const int* valid, RTCRay8& rays) const;
 
+  /// Index of the instance that lane `i` hit, or kNothing.
+  static std::uint32_t instanceOf(const RTCRayHit8& rays, unsigned i) {
+    if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return kNothing;
+    return movesAlone(rays, i) ? rays.hit.instID[0][i] : rays.hit.geomID[i];
+  }
+  /// Whether the hit's Ng is in the instance's own frame rather than in W.
+  static bool movesAlone(const RTCRayHit8& rays, unsigned i) {
+    return rays.hit.instID[0][i] != RTC_INVALID_GEOMETRY_ID && rays.hit.instID[0][i] != 0;
+  }
+
  private:
-  RTCScene sceneOf(const Surface& surface);
-  void addInstance(std::shared_ptr<const Surface> surface, RTCScene inner);
+  void makeSurfaces(int threads);
+  RTCGeometry trianglesOf(const Surface& surface, const Instance& place);
+  void attachFixed();
+  void attachMoving(std::size_t index);
   void place(std::size_t index);
+  bool moves(std::size_t index) const { return index > 0 && geometries_[index] != nullptr; }
 
   sim::Scene scene_;
   std::vector<Instance> instances_;
-  std::vector<RTCGeometry> geometries_;
-  std::vector<RTCScene> inner_;
+  std::vector<RTCGeometry> geometries_;  ///< of what moves alone, null for the rest
   RTCDevice device_ = nullptr;
-  RTCScene top_ = nullptr;
+  RTCScene fixed_ = nullptr, top_ = nullptr;  ///< top_: fixed_ and what moves
   std::optional<double> time_s_;
 };
 
