@@ -1,0 +1,221 @@
+#include "tests/scenario/scenario.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "common/base/ids.h"
+#include "common/math/so3.h"
+#include "common/types/objects.h"
+#include "tools/pipeline/pipeline.h"
+#include "tools/pipeline/report.h"
+#include "tools/simulate/simulate.h"
+
+namespace perdure::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string textOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+fs::path folderIn(const char* variable) {
+  const char* value = std::getenv(variable);
+  if (value == nullptr) throw std::runtime_error(std::string(variable) + " is not set; use ctest");
+  return value;
+}
+
+/// Of all that a scene depends on.
+std::string sourcesDigest() {
+  const fs::path root = folderIn("PERDURE_SOURCE");
+  std::vector<fs::path> files;
+  for (const char* folder : {"common/sim", "common/math", "common/camera", "tools/simulate"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+      const auto extension = entry.path().extension();
+      if (extension == ".cpp" || extension == ".h") files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::string all;
+  for (const auto& file : files) all += toHex(digest(textOf(file)));
+  return toHex(digest(all));
+}
+
+/// Scenes of other sources than these are removed.
+fs::path cacheFolder() {
+  const fs::path all = folderIn("PERDURE_BIN").parent_path() / "tests" / "scenes";
+  const fs::path own = all / sourcesDigest();
+  std::error_code ignored;
+  if (fs::create_directories(own, ignored)) {
+    for (const auto& entry : fs::directory_iterator(all)) {
+      if (entry.path() != own) fs::remove_all(entry.path(), ignored);
+    }
+  }
+  return own;
+}
+
+fs::path sceneFolder(const Setting& setting) {
+  tools::SimulateOptions options;
+  options.scene = setting.scene;
+  options.seed = setting.seed;
+  options.images = false;
+  options.world.rate_hz = setting.rate_hz;
+  if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
+  options.out = cacheFolder() / (setting.scene + "-" + std::to_string(setting.seed) + "-" +
+                                 std::to_string(static_cast<int>(setting.seconds)) + "-" +
+                                 std::to_string(static_cast<int>(setting.rate_hz)));
+  tools::simulate(options, {});
+  return options.out;
+}
+
+void runPipeline(const Setting& setting, const fs::path& folder, const fs::path& out) {
+  tools::PipelineOptions options;
+  options.data = folder.string();
+  options.odometry = "truth";
+  options.detections = "simulated";
+  options.seed = setting.detections_seed;
+  options.out = out.string();
+  tools::Pipeline pipeline(options);
+  pipeline.run([](const tools::PipelineCounts&) {});
+  pipeline.finish();
+}
+
+tools::ObjectScore scoreOf(const Outcome& run, const std::vector<tools::EstimateRow>& rows,
+                           const std::vector<replay::StampedPose>& trajectory) {
+  return tools::scoreFrames(tools::pairWithTruth(run.truth, rows, trajectory, "").frames,
+                            {.frame_interval_s = run.truth.frameInterval()});
+}
+
+std::vector<MapObject> readObjects(const fs::path& file) {
+  std::vector<MapObject> objects;
+  const auto root = nlohmann::json::parse(textOf(file));
+  for (const auto& json : root["objects"]) {
+    MapObject object;
+    object.id = json["id"];
+    object.class_name = json["class"];
+    object.existence = json["existence"];
+    object.moving = json["moving"];
+    const auto& belief = json["classes"][object.class_name];
+    for (int i = 0; i < 3; ++i) {
+      object.centre[i] = belief["mean"][i];
+      for (int j = 0; j < 3; ++j) object.covariance(i, j) = belief["covariance"][i][j];
+    }
+    objects.push_back(object);
+  }
+  return objects;
+}
+
+}  // namespace
+
+std::vector<MapObject> Outcome::believed(const std::string& class_name) const {
+  std::vector<MapObject> result;
+  for (const auto& object : objects) {
+    const bool right =
+        class_name.empty() ? object.class_name != kOtherClass : object.class_name == class_name;
+    if (object.existence > 0.5 && right) result.push_back(object);
+  }
+  return result;
+}
+
+std::size_t Outcome::countNear(const Eigen::Vector3d& centre, double within,
+                               const std::string& class_name) const {
+  std::size_t count = 0;
+  for (const auto& object : believed(class_name)) {
+    if ((object.centre - centre).norm() < within) ++count;
+  }
+  return count;
+}
+
+std::set<std::uint64_t> Outcome::idsNear(const std::vector<tools::EstimateRow>& rows,
+                                         const Eigen::Vector3d& centre, double within,
+                                         const std::string& class_name) {
+  std::set<std::uint64_t> ids;
+  for (const auto& row : rows) {
+    const bool near = (row.centre_W - centre).norm() < within;
+    if (near && row.class_name == class_name) ids.insert(row.id);
+  }
+  return ids;
+}
+
+std::size_t Outcome::countEvents(const std::string& event) const {
+  return static_cast<std::size_t>(
+      std::count_if(events.begin(), events.end(),
+                    [&](const nlohmann::json& one) { return one["event"] == event; }));
+}
+
+std::size_t Outcome::countEvents(const std::string& event,
+                                 const std::set<std::uint64_t>& objects_asked) const {
+  return static_cast<std::size_t>(
+      std::count_if(events.begin(), events.end(), [&](const nlohmann::json& one) {
+        return one["event"] == event &&
+               objects_asked.contains(one["object_id"].get<std::uint64_t>());
+      }));
+}
+
+std::vector<sim::TruthObject> Outcome::standing(const std::string& class_name) const {
+  std::vector<sim::TruthObject> result;
+  for (const auto& object : truth.truth.objects) {
+    const bool stands = !object.moves && object.keys.size() == 1 &&
+                        object.presentAt(truth.frames.front()) &&
+                        object.presentAt(truth.frames.back());
+    if (stands && object.class_name == class_name) result.push_back(object);
+  }
+  return result;
+}
+
+Outcome runScene(const Setting& setting) {
+  const fs::path folder = sceneFolder(setting);
+  const fs::path out = folder.string() + ".out" + std::to_string(setting.detections_seed);
+  runPipeline(setting, folder, out);
+  Outcome run{tools::readSimulatedTruth(folder), {}, {}, {}, {}, {}, {}};
+  run.inst_rows = tools::readObjectRows(out / "objects_inst.csv");
+  run.final_rows = tools::readObjectRows(out / "objects_final.csv");
+  const auto trajectory = replay::PoseFile::read(out / "trajectory.tum").poses();
+  run.inst = scoreOf(run, run.inst_rows, trajectory);
+  run.final = scoreOf(run, run.final_rows, trajectory);
+  run.objects = readObjects(out / "objects.json");
+  std::ifstream events(out / "events.jsonl");
+  for (std::string line; std::getline(events, line);) {
+    run.events.push_back(nlohmann::json::parse(line));
+  }
+  return run;
+}
+
+std::vector<Bar> commonBars(const Outcome& run, const Expected& not_yet) {
+  const tools::Cell& cell = run.final.cells[1][2];
+  return {atLeast(0.80, "recall under 1 m", cell.recall(), not_yet.recall),
+          atLeast(0.80, "precision under 1 m", cell.precision(), not_yet.precision),
+          atMost(1.05, "objects of the map for each one found", run.final.idsPerFound(),
+                 not_yet.duplicates)};
+}
+
+void hold(const std::vector<Bar>& bars) {
+  for (const Bar& bar : bars) {
+    const bool meets =
+        bar.sense == Sense::kAtLeast ? bar.measured >= bar.limit : bar.measured <= bar.limit;
+    std::printf("%-58s %8.3f  bar %s %.3f  %s\n", bar.what.c_str(), bar.measured,
+                bar.sense == Sense::kAtLeast ? ">=" : "<=", bar.limit,
+                meets                 ? "passes"
+                : bar.not_yet.empty() ? "FAILS"
+                                      : bar.not_yet.c_str());
+    if (bar.not_yet.empty()) {
+      EXPECT_TRUE(meets) << bar.what << " is " << bar.measured;
+    } else {
+      EXPECT_FALSE(meets) << bar.what << " is " << bar.measured
+                          << " and passes now: take the reason out of the table (" << bar.not_yet
+                          << ")";
+    }
+  }
+}
+
+}  // namespace perdure::test

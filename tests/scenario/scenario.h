@@ -1,0 +1,85 @@
+// Scenes with exact truth, run through the pipeline with true poses and simulated detections, so
+// that what is measured is the filter; and tables of the bars that it is held to.
+//
+// A bar that the filter does not pass yet is an expected failure: it says why, and the test fails
+// when it begins to pass, so that the table stays true.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tools/evaluate/object_score.h"
+#include "tools/evaluate/simulated_truth.h"
+
+namespace perdure::test {
+
+struct Setting {
+  std::string scene;
+  std::uint64_t seed = 1;  ///< of the scene
+  double seconds = 0.0;    ///< 0: the scene's own length
+  double rate_hz = 10.0;   ///< of the frames
+  std::int64_t detections_seed = 1;
+};
+
+/// An object of the map at the end, as objects.json has it.
+struct MapObject {
+  std::uint64_t id = 0;
+  std::string class_name;
+  double existence = 0.0, moving = 0.0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< of the centre
+};
+
+/// What a run left behind, with its scores.
+struct Outcome {
+  tools::SimulatedTruth truth;
+  tools::ObjectScore final, inst;
+  std::vector<MapObject> objects;
+  std::vector<nlohmann::json> events;
+  std::vector<tools::EstimateRow> inst_rows, final_rows;
+
+  /// At the end, believed to be there (existence over one half) and of that class; "": of any that
+  /// is named, hence not `other`.
+  std::vector<MapObject> believed(const std::string& class_name = "") const;
+  /// Those of them that are nearer than so many metres to a place.
+  std::size_t countNear(const Eigen::Vector3d& centre, double within,
+                        const std::string& class_name = "") const;
+  /// Distinct ids of the class in rows nearer than so many metres to a place.
+  static std::set<std::uint64_t> idsNear(const std::vector<tools::EstimateRow>& rows,
+                                         const Eigen::Vector3d& centre, double within,
+                                         const std::string& class_name);
+  std::size_t countEvents(const std::string& event) const;
+  std::size_t countEvents(const std::string& event, const std::set<std::uint64_t>& objects) const;
+  /// True objects of a class that stand all the time.
+  std::vector<sim::TruthObject> standing(const std::string& class_name) const;
+};
+
+/// Generates the scene (once: it is kept in the build folder while the simulator's sources stay as
+/// they are) and runs the pipeline over it.
+Outcome runScene(const Setting& setting);
+
+enum class Sense { kAtLeast, kAtMost };
+struct Bar {
+  std::string what;
+  double measured = 0.0;
+  Sense sense = Sense::kAtLeast;
+  double limit = 0.0;
+  std::string not_yet = {};  ///< why the filter does not pass it, with the figure; empty: it does
+};
+inline Bar atLeast(double limit, std::string what, double measured, std::string not_yet = "") {
+  return {std::move(what), measured, Sense::kAtLeast, limit, std::move(not_yet)};
+}
+inline Bar atMost(double limit, std::string what, double measured, std::string not_yet = "") {
+  return {std::move(what), measured, Sense::kAtMost, limit, std::move(not_yet)};
+}
+/// The bars that every scene with enough parallax is held to, FINAL at 1 m.
+struct Expected {
+  std::string recall = {}, precision = {}, duplicates = {};  ///< why not yet; empty: it passes
+};
+std::vector<Bar> commonBars(const Outcome& run, const Expected& not_yet = {});
+/// Prints the table, and fails for each bar that is not as it says.
+void hold(const std::vector<Bar>& bars);
+
+}  // namespace perdure::test

@@ -1,0 +1,161 @@
+// What the filter does in each scene, against the bars that it is to pass. Each table says what is
+// asked, what was measured, and, where a bar is not passed yet, why.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/types/objects.h"
+#include "tests/scenario/scenario.h"
+
+namespace perdure::test {
+namespace {
+
+using Bars = std::vector<Bar>;
+
+Bars operator+(Bars bars, const Bars& more) {
+  bars.insert(bars.end(), more.begin(), more.end());
+  return bars;
+}
+
+// What holds the filter back, by experiment: without hypotheses of motion (prior and birth of them
+// near zero) FINAL recall under 1 m is .95, .67, .87, .70 in occlusion, roll, traffic, street.
+constexpr char kMoving[] =
+    "standing things are taken for moving, then lost: the innovation of a wrong first depth is "
+    "explained by motion instead of correcting it";
+
+std::string because(const char* figure, const std::string& why) {
+  return std::string(figure) + ": " + why;
+}
+
+double number(std::size_t count) { return static_cast<double>(count); }
+
+Eigen::Vector3d placeAtEnd(const Outcome& run, const sim::TruthObject& object) {
+  return object.at(run.truth.frames.back()).centre_W;
+}
+
+TEST(Scene, Toy) {
+  const Outcome run = runScene({.scene = "toy"});
+  double cars = 0.0;
+  for (const auto& car : run.standing("car")) {
+    const Eigen::Vector3d place = car.keys[0].centre_W;
+    cars += run.countNear(place, 0.1 * place.norm(), "car") > 0 ? 1.0 : 0.0;
+  }
+  const auto toys = run.standing("toy");
+  ASSERT_EQ(toys.size(), 1U);
+  const Eigen::Vector3d toy = toys[0].keys[0].centre_W;
+  const double called_car = number(Outcome::idsNear(run.inst_rows, toy, 1.0, "car").size());
+  hold({atLeast(3, "true cars that are cars on the map, place to 10 %", cars,
+                "1: at 29 m and more the sideways metre places nothing to the metre that "
+                "`confirm` asks for, so they stay unconfirmed"),
+        atMost(0, "cars that were ever claimed within 1 m of the toy", called_car),
+        atLeast(1, "things of no known class within 0.3 m of the toy",
+                number(run.countNear(toy, 0.3, kOtherClass)),
+                "0: the toy is no car, but nothing is confirmed in its place either")});
+}
+
+TEST(Scene, Occlusion) {
+  const Outcome run = runScene({.scene = "occlusion"});
+  sim::TruthObject hidden;
+  for (const auto& chair : run.standing("chair")) {
+    const bool in_line = std::abs(chair.keys[0].centre_W.y()) < 0.2 &&
+                         std::abs(chair.keys[0].centre_W.x() - 1.0) < 0.2;
+    if (in_line) hidden = chair;
+  }
+  ASSERT_EQ(hidden.class_name, "chair");
+  const Eigen::Vector3d place = hidden.keys[0].centre_W;
+  const auto ids = Outcome::idsNear(run.inst_rows, place, 0.4, "chair");
+  hold(commonBars(run, {.recall = because("0.65", kMoving),
+                        .duplicates = because("1.13", "an id is lost with each of those")}) +
+       Bars{atMost(1, "ids of the hidden chair", number(ids.size()), because("2", kMoving)),
+            atLeast(1, "times it was known to be hidden", number(run.countEvents("occluded", ids))),
+            atMost(0, "times it was given up", number(run.countEvents("gone", ids))),
+            atLeast(1, "chairs at its place at the end",
+                    number(run.countNear(place, 0.4, "chair")))});
+}
+
+TEST(Scene, Vanish) {
+  const Outcome run = runScene({.scene = "vanish"});
+  const TimePoint start = run.truth.frames.front(), end = run.truth.frames.back();
+  const sim::TruthObject *taken = nullptr, *moved = nullptr;
+  for (const auto& object : run.truth.truth.objects) {
+    if (object.presentAt(start) && !object.presentAt(end)) taken = &object;
+    if (object.keys.size() > 1) moved = &object;
+  }
+  ASSERT_NE(taken, nullptr);
+  ASSERT_NE(moved, nullptr);
+  hold(commonBars(run) +
+       Bars{atMost(0, "chairs where the one was that was taken away",
+                   number(run.countNear(taken->keys[0].centre_W, 0.5, "chair"))),
+            atMost(0, "chairs where the other was before it was moved",
+                   number(run.countNear(moved->keys[0].centre_W, 0.5, "chair"))),
+            atLeast(1, "chairs where it is now",
+                    number(run.countNear(placeAtEnd(run, *moved), 0.5, "chair")))});
+}
+
+TEST(Scene, Row) {
+  const Outcome run = runScene({.scene = "row"});
+  const auto cars = run.standing("car");
+  double found = 0.0, doubled = 0.0;
+  for (const auto& car : cars) {
+    const std::size_t here = run.countNear(car.keys[0].centre_W, 1.2, "car");
+    found += here > 0 ? 1.0 : 0.0;
+    doubled += here > 1 ? 1.0 : 0.0;
+  }
+  hold(commonBars(run) +
+       Bars{atLeast(number(cars.size()), "cars of the row that are on the map at the end", found,
+                    because("9 of 10", kMoving)),
+            atMost(0, "cars that are on the map twice", doubled)});
+}
+
+TEST(Scene, Roll) {
+  const Outcome run = runScene({.scene = "roll"});
+  hold(commonBars(run, {.recall = because("0.55", kMoving)}) +
+       Bars{atMost(0.5, "mean position error of what is found under 1 m",
+                   run.final.cells[1][2].positionError())});
+}
+
+TEST(Scene, Traffic) {
+  const Outcome run = runScene({.scene = "traffic"});
+  double left_over = 0.0;
+  for (const auto& object : run.believed()) {
+    double nearest = 1e9;
+    for (const auto& one : run.truth.truth.objects) {
+      nearest = std::min(nearest, (placeAtEnd(run, one) - object.centre).norm());
+    }
+    left_over += object.moving < 0.5 && nearest > 3.0 ? 1.0 : 0.0;
+  }
+  hold(commonBars(run, {.recall = because("0.78", kMoving)}) +
+       Bars{atMost(0, "standing things on the map where nothing is", left_over,
+                   "2: what a moving car leaves behind where it was first believed to stand")});
+}
+
+TEST(Scene, StreetTwice) {
+  const Outcome run = runScene({.scene = "street"});
+  hold(commonBars(run, {.recall = because("0.55", kMoving)}) +
+       Bars{atMost(0, "switches of id", number(run.final.id_switches))});
+}
+
+TEST(Scene, Still) {
+  const Outcome run = runScene({.scene = "still"});
+  double surely_wrong = 0.0;
+  for (const auto& object : run.believed()) {
+    double best = 1e9;  // squared deviations to the truth that fits best
+    for (const auto& one : run.truth.truth.objects) {
+      const Eigen::Vector3d error = object.centre - one.keys[0].centre_W;
+      best = std::min(best, error.dot(object.covariance.ldlt().solve(error)));
+    }
+    surely_wrong += best > 14.2 ? 1.0 : 0.0;  // the 99.73 % quantile of χ², three degrees
+  }
+  hold({atMost(0, "things believed where nothing is, by 3 sigma", surely_wrong,
+               "1: the toy, with the image of a car at 19 m, is believed to be that car"),
+        atMost(0, "true things that were given up for want of parallax",
+               number(run.countEvents("gone")))});
+}
+
+TEST(Scene, Room) {
+  const Outcome run = runScene({.scene = "room"});
+  hold(commonBars(run, {.duplicates = "1.11: chairs close together change their ids"}));
+}
+
+}  // namespace
+}  // namespace perdure::test
