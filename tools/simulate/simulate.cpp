@@ -1,5 +1,7 @@
 #include "tools/simulate/simulate.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <fstream>
 #include <memory>
@@ -13,6 +15,7 @@
 #include "tools/simulate/journal.h"
 #include "tools/simulate/outline.h"
 #include "tools/simulate/renderer.h"
+#include "tools/simulate/scene_digest.h"
 #include "tools/simulate/sensor.h"
 
 namespace perdure::tools {
@@ -30,6 +33,7 @@ nlohmann::json descriptionOf(const SimulateOptions& options, const sim::Scene& s
           {"proves", scene.proves},
           {"seconds", scene.seconds},
           {"program", std::string("perdure ") + PERDURE_VERSION},
+          {"digest", fmt::format("{:016x}", digestOf(scene))},
           {"epoch_ns", toNanoseconds(kSceneEpoch)},
           {"options",
            {{"width", w.width},
