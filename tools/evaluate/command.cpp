@@ -7,6 +7,7 @@ void addEvaluateCommand(CLI::App& app) {
   evaluate->require_subcommand(1);
   addEvaluateObjects(*evaluate);
   addEvaluateTrajectory(*evaluate);
+  addEvaluateConsistency(*evaluate);
 }
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// `perdure evaluate {objects,trajectory}`: the metrics of the design, section 7.
+// `perdure evaluate {objects,trajectory,consistency}`: the metrics of the design, section 7.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,5 +8,6 @@ namespace perdure::tools {
 void addEvaluateCommand(CLI::App& app);
 void addEvaluateObjects(CLI::App& evaluate);
 void addEvaluateTrajectory(CLI::App& evaluate);
+void addEvaluateConsistency(CLI::App& evaluate);
 
 }  // namespace perdure::tools

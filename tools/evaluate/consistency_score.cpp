@@ -1,0 +1,141 @@
+#include "tools/evaluate/consistency_score.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+
+#include "common/base/errors.h"
+#include "common/math/chi2.h"
+#include "common/math/so3.h"
+
+namespace perdure::tools {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+MapBelief beliefOf(const nlohmann::json& json) {
+  MapBelief belief;
+  belief.id = json.at("id");
+  belief.class_name = json.at("class");
+  belief.existence = json.at("existence");
+  belief.moving = json.at("moving");
+  belief.last_seen = fromNanoseconds(json.at("last_seen_ns"));
+  const auto& gaussian = json.at("classes").at(belief.class_name);
+  for (std::size_t i = 0; i < 7; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    belief.mean[row] = gaussian.at("mean").at(i);
+    for (std::size_t j = 0; j < 7; ++j) {
+      belief.covariance(row, static_cast<Eigen::Index>(j)) = gaussian.at("covariance").at(i).at(j);
+    }
+  }
+  return belief;
+}
+
+/// The nearest true object of the class that stands and is there when it was last seen.
+std::optional<std::size_t> partnerOf(const MapBelief& belief, const sim::Truth& truth,
+                                     const RigidTransform& T_WT, double within) {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < truth.objects.size(); ++i) {
+    const auto& object = truth.objects[i];
+    if (object.moves || object.class_name != belief.class_name) continue;
+    if (!object.presentAt(belief.last_seen)) continue;
+    const Eigen::Vector3d place = T_WT * object.at(belief.last_seen).centre_W;
+    const double distance = (place - belief.mean.head<3>()).norm();
+    if (distance < within) within = distance, best = i;
+  }
+  return best;
+}
+
+void compare(const MapBelief& belief, const sim::TruthObject& object, const RigidTransform& T_WT,
+             ConsistencyScore& score) {
+  const sim::TruthKey key = object.at(belief.last_seen);
+  Vector7d truth;
+  truth << T_WT * key.centre_W, wrapAngle(key.yaw + yawOf(T_WT.R())),
+      Eigen::Vector3d(object.size.array().log());
+  const Vector7d error = belief.mean - truth;
+  const auto part = [&](Eigen::Index from) {
+    const Eigen::Vector3d e = error.segment<3>(from);
+    return e.dot(belief.covariance.block<3, 3>(from, from).ldlt().solve(e));
+  };
+  const double turn = wrapAngle(error[3]), half = 0.5 * wrapAngle(2.0 * turn);
+  score.position.nees.push_back(part(0));
+  score.yaw.nees.push_back(turn * turn / belief.covariance(3, 3));
+  score.half_yaw.nees.push_back(half * half / belief.covariance(3, 3));
+  score.size.nees.push_back(part(4));
+}
+
+}  // namespace
+
+std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
+  std::vector<MapBelief> beliefs;
+  try {
+    std::ifstream stream(file);
+    const auto root = nlohmann::json::parse(stream);
+    for (const auto& object : root.at("objects")) beliefs.push_back(beliefOf(object));
+  } catch (const nlohmann::json::exception& error) {
+    throw StartupError(ExitCode::kUnavailable, file.string() + " is missing or no objects.json (" +
+                                                   error.what() +
+                                                   "); `perdure pipeline` writes it");
+  }
+  return beliefs;
+}
+
+double Anees::mean() const {
+  double sum = 0.0;
+  for (const double value : nees) sum += value;
+  return nees.empty() ? 0.0 : sum / (static_cast<double>(nees.size()) * dof);
+}
+
+double Anees::median() const {
+  if (nees.empty()) return 0.0;
+  std::vector<double> sorted = nees;
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+double Anees::within3Sigma() const {
+  constexpr double kShare = 0.9973;
+  const double limit = chi2Quantile(kShare, dof);
+  const auto inside =
+      std::count_if(nees.begin(), nees.end(), [&](double value) { return value <= limit; });
+  return nees.empty() ? 1.0 : static_cast<double>(inside) / static_cast<double>(nees.size());
+}
+
+std::pair<double, double> Anees::band() const {
+  const int n = dof * static_cast<int>(nees.size());
+  if (n == 0) return {0.0, 0.0};
+  return {chi2Quantile(0.025, n) / n, chi2Quantile(0.975, n) / n};
+}
+
+ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
+                                  const RigidTransform& T_WT, double within) {
+  std::map<std::size_t, std::pair<double, const MapBelief*>> nearest;  // by true object
+  ConsistencyScore score;
+  std::uint64_t asked = 0;
+  for (const auto& belief : beliefs) {
+    if (belief.class_name == kOtherClass || belief.existence <= 0.5) continue;
+    ++asked;
+    const auto partner =
+        belief.moving > 0.5 ? std::nullopt : partnerOf(belief, truth, T_WT, within);
+    if (!partner) continue;
+    const Eigen::Vector3d place = T_WT * truth.objects[*partner].at(belief.last_seen).centre_W;
+    const double distance = (place - belief.mean.head<3>()).norm();
+    const auto found = nearest.find(*partner);
+    if (found == nearest.end() || distance < found->second.first) {
+      nearest[*partner] = {distance, &belief};
+    }
+  }
+  for (const auto& [object, pair] : nearest) {
+    compare(*pair.second, truth.objects[object], T_WT, score);
+  }
+  score.objects = nearest.size();
+  score.left_out = asked - score.objects;
+  return score;
+}
+
+}  // namespace perdure::tools

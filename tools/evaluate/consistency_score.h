@@ -1,0 +1,55 @@
+// Whether the map's covariances are honest: normalised squared errors of its objects against exact
+// truth, and their means (ANEES) with the χ² band (Bar-Shalom et al., "Estimation with
+// Applications to Tracking and Navigation", 5.4).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/math/rigid_transform.h"
+#include "common/types/objects.h"
+#include "tools/evaluate/simulated_truth.h"
+
+namespace perdure::tools {
+
+/// An object of objects.json, by the Gaussian of its most probable class.
+struct MapBelief {
+  std::uint64_t id = 0;
+  std::string class_name;
+  double existence = 0.0, moving = 0.0;
+  Vector7d mean = Vector7d::Zero();
+  Matrix7d covariance = Matrix7d::Identity();
+  TimePoint last_seen;
+};
+/// Throws StartupError(kUnavailable) where the file is missing or is none.
+std::vector<MapBelief> readBeliefs(const std::filesystem::path& file);
+
+/// Squared errors over their covariance: of dof degrees each, chi-square where it is honest.
+struct Anees {
+  std::string what;
+  int dof = 1;
+  std::vector<double> nees;
+
+  double mean() const;          ///< per degree of freedom: 1 where it is honest; 0 of none
+  double median() const;        ///< of nees, not per degree
+  double within3Sigma() const;  ///< share
+  std::pair<double, double> band() const;  ///< of mean() at 95 %, independent objects
+};
+
+struct ConsistencyScore {
+  Anees position{"position", 3, {}}, yaw{"yaw", 1, {}},
+      half_yaw{"yaw but for its half turns", 1, {}}, size{"size", 3, {}};
+  std::uint64_t objects = 0, left_out = 0;  ///< compared; of no true object or moving
+};
+
+/// Each believed, standing object (existence over one half, named) with the true one of its class
+/// that is nearest, nearer than `within` metres and not nearer to another belief. T_WT takes the
+/// truth's world into the map's.
+ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
+                                  const RigidTransform& T_WT, double within);
+
+}  // namespace perdure::tools
