@@ -86,7 +86,7 @@ void Renderer::begin(const Lens& lens, const Shot& shot, Picture& picture, int s
                      (T_WC.p + t * velocity_W).cast<float>()});
   }
   R_CW_ = T_WC.R().transpose().cast<float>();
-  eye_velocity_W_ = velocity_W.cast<float>();
+  eye_velocity_C_ = R_CW_ * velocity_W.cast<float>();
   turn_rate_C_ = R_CW_ * turn_W.cast<float>();
   exposure_s_ = static_cast<float>(shot.exposure_s);
 }

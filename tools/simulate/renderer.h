@@ -94,7 +94,7 @@ class Renderer {
   const Lens* lens_ = nullptr;
   std::vector<Eye> eyes_;  ///< of each row, or one for all
   Eigen::Matrix3f R_CW_;
-  Eigen::Vector3f eye_velocity_W_, turn_rate_C_;
+  Eigen::Vector3f eye_velocity_C_, turn_rate_C_;
   float exposure_s_ = 0.0F;
   std::vector<Detail> details_;
   std::vector<Eigen::Vector4f> blurred_;

@@ -9,8 +9,9 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kTile = 32;
-constexpr float kMinSmear = 0.6F;  ///< pixels; less is not to be seen
-constexpr int kMaxTaps = 12;
+constexpr float kMinSmear = 0.6F;   ///< pixels; less is not to be seen
+constexpr float kLongSmear = 3.0F;  ///< pixels; a tap each pixel need not be between pixels
+constexpr int kMaxTaps = 16;
 constexpr unsigned kLeft = 1, kRight = 2, kAbove = 4, kBelow = 8;
 
 struct Ray {
@@ -23,24 +24,47 @@ struct Pattern {
   std::array<Ray, 4> rays;
 };
 
-/// An edge towards one neighbour lies in that half of the pixel: two rays there. Foliage, where all
-/// neighbours differ, has no edge to be drawn smoothly: two rays. Otherwise four.
+/// An edge towards one neighbour, or two at a corner, lies in that half of the pixel: two rays
+/// there. Foliage, where three neighbours differ, has no edge to be drawn smoothly: two rays. Thin
+/// things, between two neighbours: four.
+Pattern makePattern(unsigned edges) {
+  constexpr float kNear = 0.2F, kFar = 0.22F, kCentre = 1.0F - kNear - kFar;
+  const float x = static_cast<float>((edges >> 1 & 1U)) - static_cast<float>(edges & 1U);
+  const float y = static_cast<float>((edges >> 3 & 1U)) - static_cast<float>(edges >> 2 & 1U);
+  if (std::popcount(edges) >= 3) {
+    return {0.34F, 2, {{{-0.3F, -0.2F, 0.33F}, {0.3F, 0.2F, 0.33F}}}};
+  }
+  if (x != 0.0F && y != 0.0F) {
+    return {kCentre, 2, {{{0.13F * x, 0.35F * y, kNear}, {0.37F * x, 0.17F * y, kFar}}}};
+  }
+  if (x != 0.0F || y != 0.0F) {
+    return {kCentre,
+            2,
+            {{{0.18F * x - 0.22F * y, 0.18F * y + 0.22F * x, kNear},
+              {0.4F * x + 0.22F * y, 0.4F * y - 0.22F * x, kFar}}}};
+  }
+  constexpr float kEven = 0.2F;
+  return {kEven,
+          4,
+          {{{-0.375F, -0.125F, kEven},
+            {0.125F, -0.375F, kEven},
+            {0.375F, 0.125F, kEven},
+            {-0.125F, 0.375F, kEven}}}};
+}
+
 const Pattern& patternOf(unsigned edges) {
-  static constexpr std::array<Pattern, 4> kTowards = {
-      {{0.58F, 2, {{{-0.18F, 0.22F, 0.2F}, {-0.4F, -0.22F, 0.22F}}}},
-       {0.58F, 2, {{{0.18F, -0.22F, 0.2F}, {0.4F, 0.22F, 0.22F}}}},
-       {0.58F, 2, {{{-0.22F, -0.18F, 0.2F}, {0.22F, -0.4F, 0.22F}}}},
-       {0.58F, 2, {{{0.22F, 0.18F, 0.2F}, {-0.22F, 0.4F, 0.22F}}}}}};
-  static constexpr Pattern kAround = {0.2F,
-                                      4,
-                                      {{{-0.375F, -0.125F, 0.2F},
-                                        {0.125F, -0.375F, 0.2F},
-                                        {0.375F, 0.125F, 0.2F},
-                                        {-0.125F, 0.375F, 0.2F}}}};
-  static constexpr Pattern kFoliage = {0.34F, 2, {{{-0.3F, -0.2F, 0.33F}, {0.3F, 0.2F, 0.33F}}}};
-  const int count = std::popcount(edges);
-  if (count == 1) return kTowards[static_cast<std::size_t>(std::countr_zero(edges))];
-  return count >= 3 ? kFoliage : kAround;
+  static const std::array<Pattern, 16> patterns = [] {
+    std::array<Pattern, 16> all{};
+    for (unsigned i = 0; i < all.size(); ++i) all[i] = makePattern(i);
+    return all;
+  }();
+  return patterns[edges];
+}
+
+const Eigen::Vector4f& nearest(const Picture& picture, float x, float y) {
+  const int column = std::clamp(static_cast<int>(x + 0.5F), 0, picture.width - 1);
+  const int row = std::clamp(static_cast<int>(y + 0.5F), 0, picture.height - 1);
+  return picture.radiance[picture.index(column, row)];
 }
 
 /// Between pixels; held at the border.
@@ -121,13 +145,13 @@ Eigen::Vector2f Renderer::smear(const Picture& picture, int column, int row) con
   Eigen::Vector3f rate = d.cross(turn_rate_C_);
   if (picture.instance[at] != kNothing) {
     const Instance& instance = world_.instances()[picture.instance[at]];
-    Eigen::Vector3f velocity = instance.velocity - eye_velocity_W_;
     const float inverse = details_[at].inverse_distance;
-    if (!instance.turn_rate.isZero()) {
+    rate -= inverse * eye_velocity_C_;
+    if (instance.moves) {
       const Eigen::Vector3f where = eyes_.front().p + R_CW_.transpose() * d / inverse;
-      velocity += instance.turn_rate.cross(where - instance.p);
+      rate +=
+          inverse * (R_CW_ * (instance.velocity + instance.turn_rate.cross(where - instance.p)));
     }
-    rate += inverse * (R_CW_ * velocity);
   }
   const float scale = exposure_s_ / (d.z() * lens_->pixelAngle());
   return scale * (rate.head<2>() - rate.z() / d.z() * d.head<2>());
@@ -141,12 +165,13 @@ void Renderer::blurRow(int row, const Picture& picture) {
     const Eigen::Vector2f whole = smear(picture, column, row);
     const float length = whole.norm();
     if (length < kMinSmear) continue;
-    const int taps = std::min(2 + static_cast<int>(0.7F * length), kMaxTaps);
+    const int taps = std::clamp(static_cast<int>(length + 0.5F), 2, kMaxTaps);
     Eigen::Vector4f sum = Eigen::Vector4f::Zero();
     for (int i = 0; i < taps; ++i) {
       const float share = (static_cast<float>(i) + 0.5F) / static_cast<float>(taps) - 0.5F;
-      sum += between(picture, static_cast<float>(column) + share * whole.x(),
-                     static_cast<float>(row) + share * whole.y());
+      const float x = static_cast<float>(column) + share * whole.x();
+      const float y = static_cast<float>(row) + share * whole.y();
+      sum += length > kLongSmear ? nearest(picture, x, y) : between(picture, x, y);
     }
     blurred_[at] = sum / static_cast<float>(taps);
   }

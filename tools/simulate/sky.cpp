@@ -64,8 +64,9 @@ void Sky::paintOutdoors(std::uint64_t seed) {
       const Eigen::Vector3f clear = horizon_ + (zenith - horizon_) * std::sqrt(d.z());
       const float share = 0.85F * cloudsAt(seed, d);
       const float glow = std::pow(std::max(0.0F, d.dot(sun_W_)), 60.0F);
-      map_.emplace_back(clear + (cloud - clear) * share +
-                        Eigen::Vector3f(1.0F, 0.9F, 0.7F) * (2.0F * glow * strength_));
+      const Eigen::Vector3f light = clear + (cloud - clear) * share +
+                                    Eigen::Vector3f(1.0F, 0.9F, 0.7F) * (2.0F * glow * strength_);
+      map_.emplace_back(light.x(), light.y(), light.z(), 0.0F);
     }
   }
 }
@@ -83,9 +84,11 @@ Eigen::Vector3f Sky::outdoors(const Eigen::Vector3f& d) const {
   const float x = place(d.x()), y = place(d.y());
   const int column = static_cast<int>(x), row = static_cast<int>(y);
   const float u = x - static_cast<float>(column), v = y - static_cast<float>(row);
-  const Eigen::Vector3f* low = &map_[static_cast<std::size_t>(row * kSize + column)];
-  const Eigen::Vector3f* high = low + kSize;
-  return (1.0F - v) * ((1.0F - u) * low[0] + u * low[1]) + v * ((1.0F - u) * high[0] + u * high[1]);
+  const Eigen::Vector4f* low = &map_[static_cast<std::size_t>(row * kSize + column)];
+  const Eigen::Vector4f* high = low + kSize;
+  const Eigen::Vector4f light = (1.0F - v) * ((1.0F - u) * low[0] + u * low[1]) +
+                                v * ((1.0F - u) * high[0] + u * high[1]);
+  return light.head<3>();
 }
 
 Eigen::Vector3f Sky::ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3f& d) const {

@@ -27,7 +27,7 @@ class Sky {
   float strength_;
   Eigen::Vector3f sun_W_, horizon_;
   /// kSize × kSize: direction d at (d.x, d.y) / (1 + d.z), from -1 to 1 across the square.
-  std::vector<Eigen::Vector3f> map_;
+  std::vector<Eigen::Vector4f> map_;
 };
 
 }  // namespace perdure::tools

@@ -35,30 +35,31 @@ void Surface::add(const Mesh& mesh, const RigidTransform& T_SM) {
   const auto first_material = static_cast<std::uint32_t>(materials.size());
   const Eigen::Matrix3f R = T_SM.R().cast<float>();
   const Eigen::Vector3f p = T_SM.p.cast<float>();
-  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    positions.emplace_back(R * mesh.positions[i] + p);
-    normals.emplace_back(R * mesh.normals[i]);
-  }
-  uvs.insert(uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
+  for (const auto& position : mesh.positions) positions.emplace_back(R * position + p);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& t = mesh.triangles[i];
     triangles.push_back({first + t[0], first + t[1], first + t[2]});
-    material_of.push_back(first_material + mesh.material_of[i]);
-    repeats_per_metre.push_back(repeatsPerMetre(mesh, t));
+    Facet facet;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      facet.normals[corner] = R * mesh.normals[t[corner]];
+      facet.uvs[corner] = mesh.uvs[t[corner]];
+    }
+    facet.repeats_per_metre = repeatsPerMetre(mesh, t);
+    facet.material = first_material + mesh.material_of[i];
+    facets.push_back(facet);
   }
   materials.insert(materials.end(), mesh.materials.begin(), mesh.materials.end());
 }
 
 SurfacePoint pointOn(const Surface& surface, std::uint32_t triangle, float u, float v) {
-  const auto& t = surface.triangles[triangle];
+  const Facet& facet = surface.facets[triangle];
   const float w = 1.0F - u - v;
-  const auto& n = surface.normals;
   SurfacePoint point;
-  point.normal = w * n[t[0]] + u * n[t[1]] + v * n[t[2]];
-  point.uv = w * surface.uvs[t[0]] + u * surface.uvs[t[1]] + v * surface.uvs[t[2]];
-  point.repeats_per_metre = surface.repeats_per_metre[triangle];
-  point.material_index = surface.material_of[triangle];
-  point.material = &surface.materials[point.material_index];
+  point.normal = w * facet.normals[0] + u * facet.normals[1] + v * facet.normals[2];
+  point.uv = w * facet.uvs[0] + u * facet.uvs[1] + v * facet.uvs[2];
+  point.repeats_per_metre = facet.repeats_per_metre;
+  point.material_index = facet.material;
+  point.material = &surface.materials[facet.material];
   return point;
 }
 

@@ -11,13 +11,19 @@
 
 namespace perdure::tools {
 
+/// What shading reads of a triangle, in one piece: rays meet triangles in no order.
+struct Facet {
+  std::array<Eigen::Vector3f, 3> normals;
+  std::array<Eigen::Vector2f, 3> uvs;
+  float repeats_per_metre = 0.0F;  ///< of the texture
+  std::uint32_t material = 0;
+};
+
 /// One or more meshes in one frame.
 struct Surface {
-  std::vector<Eigen::Vector3f> positions, normals;
-  std::vector<Eigen::Vector2f> uvs;
+  std::vector<Eigen::Vector3f> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::uint32_t> material_of;
-  std::vector<float> repeats_per_metre;  ///< of the texture, by triangle
+  std::vector<Facet> facets;  ///< of each triangle
   std::vector<Material> materials;
 
   /// Adds `mesh`, placed by T_SM. Throws std::invalid_argument where its lists do not fit together.

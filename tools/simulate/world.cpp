@@ -164,6 +164,7 @@ bool World::setTime(double t_s) {
     instance.p = motion.T_WB.p.cast<float>();
     instance.velocity = motion.velocity_W.cast<float>();
     instance.turn_rate = (motion.T_WB.q * motion.angular_velocity_B).cast<float>();
+    instance.moves = !instance.velocity.isZero() || !instance.turn_rate.isZero();
     instance.present = present;
     place(i + 1);
     changed = true;

@@ -26,6 +26,7 @@ struct Instance {
   Eigen::Vector3f p = Eigen::Vector3f::Zero();
   Eigen::Vector3f velocity = Eigen::Vector3f::Zero();   ///< W, m/s
   Eigen::Vector3f turn_rate = Eigen::Vector3f::Zero();  ///< W, rad/s
+  bool moves = false;                                   ///< just now
   bool present = true;
 };
 

@@ -108,7 +108,7 @@ TEST(Surface, RefusesMeshesWhoseListsDoNotFit) {
   mesh.materials.resize(1);
   Surface surface;
   surface.add(mesh);
-  EXPECT_NEAR(surface.repeats_per_metre[0], 2.0, 1e-6);
+  EXPECT_NEAR(surface.facets[0].repeats_per_metre, 2.0, 1e-6);
   mesh.triangles = {{0, 1, 3}};
   EXPECT_THROW(surface.add(mesh), std::invalid_argument);
 }
