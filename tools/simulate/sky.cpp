@@ -86,8 +86,8 @@ Eigen::Vector3f Sky::outdoors(const Eigen::Vector3f& d) const {
   const float u = x - static_cast<float>(column), v = y - static_cast<float>(row);
   const Eigen::Vector4f* low = &map_[static_cast<std::size_t>(row * kSize + column)];
   const Eigen::Vector4f* high = low + kSize;
-  const Eigen::Vector4f light = (1.0F - v) * ((1.0F - u) * low[0] + u * low[1]) +
-                                v * ((1.0F - u) * high[0] + u * high[1]);
+  const Eigen::Vector4f light =
+      (1.0F - v) * ((1.0F - u) * low[0] + u * low[1]) + v * ((1.0F - u) * high[0] + u * high[1]);
   return light.head<3>();
 }
 
