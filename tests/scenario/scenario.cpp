@@ -68,12 +68,14 @@ fs::path sceneFolder(const Setting& setting) {
   tools::SimulateOptions options;
   options.scene = setting.scene;
   options.seed = setting.seed;
-  options.images = false;
+  options.images = setting.images;
+  options.format = tools::ImageFormat::kJpeg;
   options.world.rate_hz = setting.rate_hz;
   if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
   options.out = cacheFolder() / (setting.scene + "-" + std::to_string(setting.seed) + "-" +
                                  std::to_string(static_cast<int>(setting.seconds)) + "-" +
-                                 std::to_string(static_cast<int>(setting.rate_hz)));
+                                 std::to_string(static_cast<int>(setting.rate_hz)) +
+                                 (setting.images ? "-images" : ""));
   tools::simulate(options, {});
   return options.out;
 }
@@ -81,7 +83,7 @@ fs::path sceneFolder(const Setting& setting) {
 void runPipeline(const Setting& setting, const fs::path& folder, const fs::path& out) {
   tools::PipelineOptions options;
   options.data = folder.string();
-  options.odometry = "truth";
+  options.odometry = setting.images ? "vio" : "truth";
   options.detections = "simulated";
   options.seed = setting.detections_seed;
   options.out = out.string();
@@ -105,6 +107,7 @@ std::vector<MapObject> readObjects(const fs::path& file) {
     object.class_name = json["class"];
     object.existence = json["existence"];
     object.moving = json["moving"];
+    object.working = json["memory"] == "working";
     const auto& belief = json["classes"][object.class_name];
     for (int i = 0; i < 3; ++i) {
       object.centre[i] = belief["mean"][i];
@@ -177,12 +180,19 @@ Outcome runScene(const Setting& setting) {
   const fs::path folder = sceneFolder(setting);
   const fs::path out = folder.string() + ".out" + std::to_string(setting.detections_seed);
   runPipeline(setting, folder, out);
-  Outcome run{tools::readSimulatedTruth(folder), {}, {}, {}, {}, {}, {}};
+  Outcome run{tools::readSimulatedTruth(folder), {}, {}, {}, {}, {}, {}, {}};
   run.inst_rows = tools::readObjectRows(out / "objects_inst.csv");
   run.final_rows = tools::readObjectRows(out / "objects_final.csv");
   const auto trajectory = replay::PoseFile::read(out / "trajectory.tum").poses();
   run.inst = scoreOf(run, run.inst_rows, trajectory);
   run.final = scoreOf(run, run.final_rows, trajectory);
+  std::vector<tools::PosePair> pairs;
+  for (const auto& pose : trajectory) {
+    if (const auto there = run.truth.body.at(0, pose.time)) {
+      pairs.push_back({pose.time, pose.T_WB, *there});
+    }
+  }
+  run.trajectory = tools::scoreTrajectory(pairs, tools::Alignment::kYaw);
   run.objects = readObjects(out / "objects.json");
   std::ifstream events(out / "events.jsonl");
   for (std::string line; std::getline(events, line);) {

@@ -1,7 +1,8 @@
 // Scenes with exact truth, run through the pipeline with true poses and simulated detections, so
-// that what is measured is the filter; and tables of the bars that it is held to.
+// that what is measured is the filter (or with vio over rendered images); and tables of the bars
+// that it is held to.
 //
-// A bar that the filter does not pass yet is an expected failure: it says why, and the test fails
+// A bar that is not passed yet is an expected failure: it says why, and the test fails
 // when it begins to pass, so that the table stays true.
 #pragma once
 
@@ -12,6 +13,7 @@
 
 #include "tools/evaluate/object_score.h"
 #include "tools/evaluate/simulated_truth.h"
+#include "tools/evaluate/trajectory_score.h"
 
 namespace perdure::test {
 
@@ -21,6 +23,7 @@ struct Setting {
   double seconds = 0.0;    ///< 0: the scene's own length
   double rate_hz = 10.0;   ///< of the frames
   std::int64_t detections_seed = 1;
+  bool images = false;  ///< rendered, and vio over them in place of true poses
 };
 
 /// An object of the map at the end, as objects.json has it.
@@ -28,6 +31,7 @@ struct MapObject {
   std::uint64_t id = 0;
   std::string class_name;
   double existence = 0.0, moving = 0.0;
+  bool working = true;  ///< in the working set, not in long-term memory
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< of the centre
 };
@@ -36,6 +40,7 @@ struct MapObject {
 struct Outcome {
   tools::SimulatedTruth truth;
   tools::ObjectScore final, inst;
+  tools::TrajectoryScore trajectory;
   std::vector<MapObject> objects;
   std::vector<nlohmann::json> events;
   std::vector<tools::EstimateRow> inst_rows, final_rows;

@@ -131,7 +131,7 @@ TEST(Scene, Traffic) {
 
 TEST(Scene, StreetTwice) {
   const Outcome run = runScene({.scene = "street"});
-  hold(commonBars(run, {.recall = because("0.55", kMoving)}) +
+  hold(commonBars(run, {.recall = because("0.64", kMoving)}) +
        Bars{atMost(0, "switches of id", number(run.final.id_switches))});
 }
 
@@ -155,6 +155,25 @@ TEST(Scene, Still) {
 TEST(Scene, Room) {
   const Outcome run = runScene({.scene = "room"});
   hold(commonBars(run, {.duplicates = "1.11: chairs close together change their ids"}));
+}
+
+TEST(LongScene, Town) {
+  const Outcome run = runScene({.scene = "town", .seconds = 120.0, .rate_hz = 5.0});
+  const Eigen::Vector3d here = run.truth.body.poses().back().T_WB.p;
+  double kept = 0.0;
+  for (const auto& object : run.objects) {
+    kept += object.working && (object.centre - here).norm() > 150.0 ? 1.0 : 0.0;
+  }
+  hold(commonBars(run, {.recall = because("0.62", kMoving)}) +
+       Bars{atMost(0, "things in the working set more than 150 m away", kept,
+                   "84: the working set is everything, nothing is archived yet")});
+}
+
+TEST(LongScene, Straight) {
+  const Outcome run = runScene({.scene = "straight", .rate_hz = 20.0, .images = true});
+  hold({atMost(1.0, "drift of vio with one camera and wheels, % of the way",
+               run.trajectory.segments.t_err_percent),
+        atMost(0.5, "ATE aligned in position and yaw, metres", run.trajectory.ate_rmse_m)});
 }
 
 }  // namespace
