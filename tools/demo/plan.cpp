@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
 namespace {
@@ -45,7 +46,14 @@ std::string programName(const std::string& service) {
 std::vector<std::string> settingsOf(const std::string& service, const DemoOptions& options,
                                     const DemoFolders& folders) {
   if (service == "map_store") return {"store.path=" + (folders.state / "map.sqlite").string()};
-  if (service == "vio") return {"state.directory=" + folders.state.string()};
+  if (service == "vio") {
+    std::vector<std::string> settings = {"state.directory=" + folders.state.string()};
+    // A simulated folder with wheels is a car's, which slides neither sideways nor up.
+    const bool car = isSimulated(options.data) &&
+                     fs::exists(fs::path(options.data) / "mav0" / "speed0" / "data.csv");
+    if (car) settings.push_back("speed.planar=true");
+    return settings;
+  }
   if (service == "inference") return {"model.path=" + fs::absolute(options.model).string()};
   if (service != "capture") return {};
   std::vector<std::string> settings = {

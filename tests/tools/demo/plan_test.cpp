@@ -61,6 +61,16 @@ TEST_F(DemoPlan, GivesEachServiceWhatItNeeds) {
   EXPECT_THAT(commandOf("map_store"), Contains(HasSubstr("out/run/state/map.sqlite")));
 }
 
+TEST_F(DemoPlan, TellsVioThatASimulatedCarDoesNotSlide) {
+  EXPECT_THAT(commandOf("vio"), Not(Contains("speed.planar=true")));
+  fs::create_directories(folder_ / "drive" / "mav0" / "speed0");
+  options_.data = (folder_ / "drive").string();
+  std::ofstream(folder_ / "drive" / "mav0" / "speed0" / "data.csv") << "";
+  EXPECT_THAT(commandOf("vio"), Not(Contains("speed.planar=true"))) << "not known to be simulated";
+  std::ofstream(folder_ / "drive" / "objects_truth.json") << "{}";
+  EXPECT_THAT(commandOf("vio"), Contains("speed.planar=true"));
+}
+
 TEST_F(DemoPlan, NamesTheProgramThatIsMissing) {
   fs::remove(folder_ / "perdure-vio");
   try {
