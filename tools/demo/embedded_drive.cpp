@@ -6,6 +6,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/ids.h"
+#include "tools/simulate/scene_digest.h"
 
 namespace perdure::tools {
 namespace {
@@ -29,7 +30,8 @@ fs::path embeddedDriveFolder(const fs::path& cache) {
   const std::string all = o.scene + " " + std::to_string(o.seed) + " " +
                           std::to_string(*o.world.seconds) + " " + std::to_string(o.world.width) +
                           "x" + std::to_string(o.world.height) + " " +
-                          std::to_string(o.world.rate_hz) + " jpeg " + PERDURE_VERSION;
+                          std::to_string(o.world.rate_hz) + " jpeg " + PERDURE_VERSION + " " +
+                          toHex(digestOf(sim::makeScene(o.scene, o.seed, o.world)));
   return cache / ("street-" + toHex(digest(all)));
 }
 

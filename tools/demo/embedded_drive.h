@@ -14,7 +14,8 @@ namespace perdure::tools {
 /// Sixty seconds of `street` with its first seed, JPEG.
 SimulateOptions embeddedScene();
 
-/// FOLDER/street-DIGEST: the digest is of everything that the frames depend on but the code.
+/// FOLDER/street-DIGEST: the digest is of the scene, the options and the version: of
+/// all that the frames depend on but the renderer's code.
 std::filesystem::path embeddedDriveFolder(const std::filesystem::path& cache);
 
 /// Renders the drive there, or carries on where an earlier run was cut; takes it as it is where it
