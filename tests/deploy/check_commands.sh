@@ -11,8 +11,9 @@ expect() { # STATUS WORDS COMMAND …
     exit 1
   fi
 }
-expect 64 "--data DIR" deploy/demo
-expect 64 "--data DIR" deploy/demo --headless
+expect 64 "--model FILE.onnx" deploy/demo --data a-drive
+expect 64 "--model FILE.onnx" deploy/demo --headless --data=a-drive
+expect 0 "--data DIR" deploy/demo --help
 expect 64 "unknown option '--everything'" deploy/install --everything
 expect 0 "--runtime" deploy/install --help
 for script in deploy/demo deploy/install tests/run .ci/run; do bash -n "$script"; done

