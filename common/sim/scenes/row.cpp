@@ -9,7 +9,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 24.0, kCameraHeight = 1.6, kGap = 0.8, kFirst = 24.0;
+constexpr double kDefaultSeconds = 24.0, kGap = 0.8, kFirst = 24.0;
 constexpr int kCars = 10;
 
 void parkRow(SceneBuilder& builder) {
@@ -30,18 +30,12 @@ void parkRow(SceneBuilder& builder) {
 
 Scene makeRow(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("row", seed, options);
-  Dice& dice = builder.dice();
   const double seconds = builder.seconds(kDefaultSeconds);
   const GroundPath way({{{0, -kLane}}, {{150, -kLane}}}, false);
   const SpeedLimits limits{4.5, 2.0, 1.2, 1.2};
   // It stands again behind the row, however long one looks.
   const Drive driven = drive(way, limits, 0.0, 95.0, 1.2, seconds + 2.0);
-  Suspension suspension;
-  suspension.height = kCameraHeight - kCameraAboveBody;
-  suspension.seed = dice.seed();
-  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
-  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
-  drawDaylight(builder);
+  putOnWheels(builder, way, driven, seconds, options);
   parkRow(builder);
   Furnishing furnishing;
   furnishing.free_share = 1.0;  // nobody else parks

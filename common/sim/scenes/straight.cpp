@@ -11,7 +11,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 60.0, kSpeed = 8.5, kRest = 1.2, kCameraHeight = 1.6;
+constexpr double kDefaultSeconds = 60.0, kSpeed = 8.5, kRest = 1.2;
 
 }  // namespace
 
@@ -24,12 +24,7 @@ Scene makeStraight(std::uint64_t seed, const SceneOptions& options) {
   const SpeedLimits limits{kSpeed, 2.0, 1.4, 1.4};
   const Drive driven =
       drive(way, limits, 0.0, std::numeric_limits<double>::infinity(), kRest, seconds + 2.0);
-  Suspension suspension;
-  suspension.height = kCameraHeight - kCameraAboveBody;
-  suspension.seed = dice.seed();
-  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
-  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
-  drawDaylight(builder);
+  putOnWheels(builder, way, driven, seconds, options);
   std::vector<Road> roads{{{-25.0, 0.0}, {end, 0.0}, kRoadWidth}};
   for (double x = dice.uniform(60.0, 90.0); x < end - 50.0; x += dice.uniform(90.0, 140.0)) {
     roads.push_back({{x, -35.0}, {x, 35.0}, kRoadWidth});

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/math/so3.h"
+#include "common/sim/scenes/rigs.h"
 
 namespace perdure::sim {
 namespace {
@@ -179,6 +180,17 @@ void drawDaylight(SceneBuilder& builder) {
                            std::cos(height) * std::sin(azimuth), std::sin(height)};
   builder.scene().sun_strength = dice.uniform(0.7, 1.1);
   builder.scene().sky_strength = dice.uniform(0.4, 0.6);
+}
+
+void putOnWheels(SceneBuilder& builder, const GroundPath& way, const Drive& driven, double seconds,
+                 const SceneOptions& options) {
+  constexpr double kHeightOfCamera = 1.6;
+  Suspension suspension;
+  suspension.height = kHeightOfCamera - kCameraAboveBody;
+  suspension.seed = builder.dice().seed();
+  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
+  builder.scene().rig = makeRig(Carrier::kVehicle, options, builder.dice(), 0.02);
+  drawDaylight(builder);
 }
 
 }  // namespace perdure::sim

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "common/sim/path.h"
 #include "common/sim/scenes/builder.h"
 
 namespace perdure::sim {
@@ -48,5 +49,8 @@ class Streets {
 
 /// A light of the day: sun and sky.
 void drawDaylight(SceneBuilder& builder);
+/// The body as a car that drives so for `seconds`, with a car's sensors, by day.
+void putOnWheels(SceneBuilder& builder, const GroundPath& way, const Drive& driven, double seconds,
+                 const SceneOptions& options);
 
 }  // namespace perdure::sim

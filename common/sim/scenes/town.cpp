@@ -10,7 +10,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 520.0, kCameraHeight = 1.6;
+constexpr double kDefaultSeconds = 520.0;
 constexpr int kColumns = 6, kRows = 5;
 constexpr double kBlockLength = 82.0, kBlockWidth = 66.0, kBeyond = 14.0;
 constexpr std::size_t kVehicles = 500;
@@ -91,17 +91,11 @@ void thinOut(SceneBuilder& builder) {
 
 Scene makeTown(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("town", seed, options);
-  Dice& dice = builder.dice();
   const double seconds = builder.seconds(kDefaultSeconds);
   const GroundPath way = wayThrough(turns());
   const SpeedLimits limits{10.5, 2.4, 1.7, 1.9};
   const Drive driven = drive(way, limits, 8.0, way.length() - 8.0, 1.2, seconds + 2.0);
-  Suspension suspension;
-  suspension.height = kCameraHeight - kCameraAboveBody;
-  suspension.seed = dice.seed();
-  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
-  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
-  drawDaylight(builder);
+  putOnWheels(builder, way, driven, seconds, options);
   Furnishing furnishing;
   furnishing.free_share = 0.33;
   furnishing.tree_every = 30.0;

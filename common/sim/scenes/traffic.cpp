@@ -13,7 +13,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 40.0, kCameraHeight = 1.6, kForever = 1e9;
+constexpr double kDefaultSeconds = 40.0, kForever = 1e9;
 constexpr double kParked =
     0.5 * kRoadWidth - 0.18 - 0.9;  ///< middle of a parked car, from the road's
 constexpr double kFarEnd = 420.0, kNearEnd = -60.0, kCrossing = 150.0;
@@ -120,19 +120,13 @@ void addTraffic(SceneBuilder& builder, double seconds) {
 
 Scene makeTraffic(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("traffic", seed, options);
-  Dice& dice = builder.dice();
   const double seconds = builder.seconds(kDefaultSeconds);
   const double planned = std::max(seconds, kDefaultSeconds);
   const GroundPath way({{{0, -kLane}}, {{kFarEnd, -kLane}}}, false);
   const SpeedLimits limits{6.8, 2.0, 1.4, 1.4};
   // However long one looks, it stands again before the street ends.
   const Drive driven = drive(way, limits, 0.0, 330.0, 1.2, planned + 2.0);
-  Suspension suspension;
-  suspension.height = kCameraHeight - kCameraAboveBody;
-  suspension.seed = dice.seed();
-  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
-  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
-  drawDaylight(builder);
+  putOnWheels(builder, way, driven, seconds, options);
   addTraffic(builder, planned);
   Furnishing furnishing;
   furnishing.ends = false;
