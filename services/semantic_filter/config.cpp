@@ -10,16 +10,33 @@ using config::positive;
 
 void describeBox(BoxParameters& p, Fields& fields) {
   fields.number("box.sigma_px", p.sigma_px, positive(), {"floor of a side's deviation", "px"});
+  fields.number("box.sigma_network_px", p.sigma_network_px, atLeast(0),
+                {"the same in the network's input, where its size is known", "px"});
   fields.number("box.sigma_relative", p.sigma_relative, positive(),
                 {"a side's deviation relative to the box, where the model does not say"});
   fields.number("box.border_px", p.border_px, atLeast(0),
                 {"a side this near to the image border is cut by it", "px"});
-  fields.number("box.gate", p.gate, between(0.5, 0.999999),
+  fields.number("box.gate", p.gate, between(0.5, 1.0 - 1e-12),
                 {"probability inside the gate of the normalised innovation"});
-  fields.number("box.min_height_px", p.min_height_px, positive(),
-                {"height at which detection is half as likely", "px"});
+  fields.number("box.tail", p.tail, atLeast(1),
+                {"degrees of freedom of the innovation's t distribution: outliers count less"});
+  fields.number("box.min_size_px", p.min_size_px, positive(),
+                {"root of a box's area at which detection is half as likely", "px"});
   fields.number("box.min_network_px", p.min_network_px, positive(),
                 {"the same in the network's input, where its size is known", "px"});
+  fields.number("box.bias_share", p.bias_share, between(0, 0.99),
+                {"share of a side's variance that stays with the object while the view stays"});
+  fields.number("box.bias_angle", p.bias_angle, positive(),
+                {"change of aspect after which it has fallen to 1/e", "rad"});
+  fields.number("box.bias_log_distance", p.bias_log_distance, positive(),
+                {"the same for the logarithm of the distance"});
+  fields.number("box.bias_image_angle", p.bias_image_angle, positive(),
+                {"the same for the place in the image", "rad"});
+  fields.number(
+      "box.noise_view", p.noise_view, positive(),
+      {"change of aspect or log distance after which a side's noise is another (half of it "
+       "in the image)",
+       "rad"});
   fields.integer("box.iterations", p.iterations, between(1, 20), {"of the iterated EKF"});
 }
 
@@ -66,6 +83,16 @@ void describeMotion(Parameters& p, Fields& fields) {
                 {"mean time for which a thing stays where it is", "s"});
   fields.number("motion.min_speed", m.min_speed, positive(),
                 {"slower objects count as static", "m/s"});
+  fields.number("motion.slow_share", p.motion.slow_share, atLeast(0),
+                {"of the deviation of a class's speed: what is slower creeps"});
+  fields.number("motion.creeping", p.motion.creeping, between(1e-6, 1),
+                {"how likely it is that a moving one creeps, against a Gaussian"});
+  fields.number("motion.lost_sigma_m", m.lost_sigma_m, positive(),
+                {"a moving hypothesis less well placed than this is given up", "m"});
+  fields.number("motion.misplaced_odds", m.misplaced_odds, atLeast(0),
+                {"of having misplaced a thing against its having driven off"});
+  fields.number("motion.misplaced_sigma", m.misplaced_sigma, positive(),
+                {"relative, of distance and size"});
   fields.number("motion.start_probability", m.start_probability, between(1e-9, 0.5),
                 {"of a moving hypothesis that is added to a static object"});
   fields.number("motion.start_nis", m.start_nis, positive(),
@@ -91,6 +118,12 @@ void describeTend(Parameters& p, Fields& fields) {
   fields.number("visibility.minimum", v.minimum, between(0, 1),
                 {"visible fraction below which a frame says nothing"});
   fields.number("visibility.full", v.full, between(0, 1), {"fraction that is called visible"});
+  fields.number("visibility.screened", v.screened, between(0, 0.99),
+                {"that something not on the map hides an object from a view not yet tried"});
+  fields.number("visibility.screen_angle", v.screen_angle, positive(),
+                {"change of aspect after which what is known of that has fallen to 1/e", "rad"});
+  fields.number("visibility.screen_log_distance", v.screen_log_distance, positive(),
+                {"the same for the logarithm of the distance"});
   fields.number("visibility.solid", v.solid, between(0, 1),
                 {"existence from which an object hides others"});
   auto& t = p.tend;
@@ -106,6 +139,8 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"the same for one that was never confirmed"});
   fields.number("tend.class_dominates", t.class_dominates, between(0.5, 1),
                 {"a class above this ends the others"});
+  fields.number("tend.size_gate", t.size_gate, positive(),
+                {"deviations of a class's size beyond which a thing is not of the class"});
   fields.number("tend.hypothesis_floor", t.hypothesis_floor, between(0, 0.5),
                 {"weight below which a hypothesis is pruned"});
   fields.number("tend.scale_resolved", t.scale_resolved, atLeast(0),

@@ -14,13 +14,16 @@
 namespace perdure::semantic_filter {
 namespace {
 
-using Vector7 = Eigen::Matrix<double, 7, 1>;
+constexpr int kFree = kVelocity;  // dimensions of the fit: geometry and bias
+using VectorFit = Eigen::Matrix<double, kFree, 1>;
+using MatrixFit = Eigen::Matrix<double, kFree, kFree>;
 
-/// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range.
+/// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range,
+/// four of bias.
 class BirthCost {
  public:
   using Scalar = double;
-  enum { NUM_RESIDUALS = 12, NUM_PARAMETERS = 7 };
+  enum { NUM_RESIDUALS = 16, NUM_PARAMETERS = kFree };
   using Residuals = Eigen::Matrix<double, NUM_RESIDUALS, 1>;
   using Jacobian = Eigen::Matrix<double, NUM_RESIDUALS, NUM_PARAMETERS>;
 
@@ -34,6 +37,7 @@ class BirthCost {
         range_(range),
         log_size_(prior.log_size),
         start_(start) {
+    bias_sigma_ = std::max(viewWalkOf(frame).bias_sigma, 1e-6);
     position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
     const Eigen::Matrix3d L = prior.log_size_covariance.llt().matrixL();
     size_whitening_ = L.inverse();
@@ -41,8 +45,8 @@ class BirthCost {
 
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     State x = State::Zero();
-    x.head<7>() = Eigen::Map<const Vector7>(parameters);
-    const auto box = projectCuboid(x, view_);
+    x.head<kFree>() = Eigen::Map<const VectorFit>(parameters);
+    const auto box = projectObserved(x, view_);
     if (!box) return false;
     Eigen::Map<Residuals> r(residuals);
     Jacobian J = Jacobian::Zero();
@@ -59,6 +63,8 @@ class BirthCost {
       r[11] = (ray.norm() - range_->distance_m) / range_->sigma_m;
       J.block<1, 3>(11, 0) = ray.normalized().transpose() / range_->sigma_m;
     }
+    r.segment<4>(12) = x.segment<4>(kBias) / bias_sigma_;
+    J.block<4, 4>(12, kBias).diagonal().setConstant(1.0 / bias_sigma_);
     if (jacobian) std::copy(J.data(), J.data() + J.size(), jacobian);
     return r.allFinite();
   }
@@ -70,7 +76,7 @@ class BirthCost {
       if (!box.exact[i] || (!z_.measured[i] && inside <= 0.0)) continue;
       const double weight = 1.0 / std::sqrt(z_.variance[i]);
       r[i] = weight * (box.sides[i] - z_.sides[i]);
-      J.row(i) = weight * box.H.row(i).head<7>();
+      J.row(i) = weight * box.H.row(i).head<kFree>();
     }
   }
 
@@ -79,7 +85,7 @@ class BirthCost {
   double yaw_, yaw_sigma_;
   std::optional<RangeHint> range_;
   Eigen::Vector3d log_size_, start_;
-  double position_weight_ = 1.0;
+  double position_weight_ = 1.0, bias_sigma_ = 1.0;
   Eigen::Matrix3d size_whitening_;
 };
 
@@ -263,23 +269,23 @@ std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, 
   const double start_depth = range ? range->distance_m / ray->norm() : *depth;
   const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
   const BirthCost cost(evidence, prior, yaw, yaw_sigma, range, frame, start);
-  Vector7 x;
-  x << start, yaw, prior.log_size;
+  VectorFit x = VectorFit::Zero();
+  x.head<7>() << start, yaw, prior.log_size;
   ceres::TinySolver<BirthCost> solver;
   solver.options.max_num_iterations = 15;
   solver.Solve(cost, &x);
   BirthCost::Residuals r;
   BirthCost::Jacobian J;
   if (!x.allFinite() || !cost(x.data(), r.data(), J.data())) return std::nullopt;
-  const Eigen::LDLT<Matrix7d> hessian(J.transpose() * J);
+  const Eigen::LDLT<MatrixFit> hessian(J.transpose() * J);
   if (hessian.info() != Eigen::Success || !hessian.isPositive()) return std::nullopt;
   Fit fit;
   fit.cost = 0.5 * r.squaredNorm();
   fit.hypothesis.class_name = prior.name;
-  fit.hypothesis.x.head<7>() = x;
+  fit.hypothesis.x.head<kFree>() = x;
   fit.hypothesis.x[kYaw] = wrapAngle(x[kYaw]);
   fit.hypothesis.P.setZero();
-  fit.hypothesis.P.topLeftCorner<7, 7>() = hessian.solve(Matrix7d::Identity());
+  fit.hypothesis.P.topLeftCorner<kFree, kFree>() = hessian.solve(MatrixFit::Identity());
   addPoseError(fit.hypothesis, frame);
   if (!fit.hypothesis.P.allFinite()) return std::nullopt;
   return fit;
@@ -307,6 +313,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.hits = 1;
   normalise(object);
   object.hit_view = {frame.view.T_WC(), 1.0};
+  object.last_view = frame.view.T_WC();
   return object;
 }
 

@@ -14,6 +14,14 @@ double logBelowZero(double mean, double variance) {
   return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
 }
 
+/// log of the multivariate t density with scale matrix S, by its squared Mahalanobis distance.
+double logStudent(double nis, const Eigen::MatrixXd& S, double tail) {
+  const auto n = static_cast<double>(S.rows());
+  const double log_det = 2.0 * S.llt().matrixLLT().diagonal().array().log().sum();
+  return std::lgamma(0.5 * (tail + n)) - std::lgamma(0.5 * tail) -
+         0.5 * (n * std::log(tail * M_PI) + log_det) - 0.5 * (tail + n) * std::log1p(nis / tail);
+}
+
 /// χ² quantiles of one gate for 1..4 degrees of freedom, computed once per gate value.
 double gateThreshold(double gate, int dof) {
   thread_local double cached_gate = -1.0;
@@ -32,18 +40,27 @@ int BoxMeasurement::count() const {
 }
 
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
-                       double relative_sigma) {
+                       const BoxNoise& noise) {
   BoxMeasurement z;
   z.sides << std::clamp(box.x1, 0.0, width), std::clamp(box.y1, 0.0, height),
       std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
-  const double relative = relative_sigma > 0.0 ? relative_sigma : parameters.sigma_relative;
-  const double sx = parameters.sigma_px + relative * z.width();
-  const double sy = parameters.sigma_px + relative * z.height();
-  z.variance << sx * sx, sy * sy, sx * sx, sy * sy;
+  const double relative = noise.relative > 0.0 ? noise.relative : parameters.sigma_relative;
+  const double floor = std::max(parameters.sigma_px, parameters.sigma_network_px * noise.pixel);
+  const double white = relative * std::sqrt(1.0 - parameters.bias_share);
+  const double wx = floor + white * z.width();
+  const double wy = floor + white * z.height();
+  z.variance << wx * wx, wy * wy, wx * wx, wy * wy;
+  const double sx = floor + relative * z.width();
+  const double sy = floor + relative * z.height();
   const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
   z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,
                 z.sides[3] < height - my};
   return z;
+}
+
+double biasSigma(const BoxParameters& parameters, double relative_sigma) {
+  const double relative = relative_sigma > 0.0 ? relative_sigma : parameters.sigma_relative;
+  return relative * std::sqrt(parameters.bias_share);
 }
 
 double logClutter(const BoxMeasurement& z, double width, double height,
@@ -79,7 +96,7 @@ std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox&
 
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,
-                                 const std::array<bool, 4>& hidden, double gate) {
+                                 const std::array<bool, 4>& hidden, double gate, double tail) {
   const auto use = comparableSides(z, predicted, hidden);
   const int n = static_cast<int>(std::count(use.begin(), use.end(), true));
   if (n == 0) return std::nullopt;
@@ -107,7 +124,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
   score.nis = llt.matrixL().solve(nu).squaredNorm();
   score.dof = n;
   if (score.nis > gateThreshold(gate, n)) return std::nullopt;
-  score.log_density += logGaussian(nu, S);
+  score.log_density += logStudent(score.nis, S, tail);
   return score;
 }
 

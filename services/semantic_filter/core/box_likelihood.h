@@ -25,10 +25,18 @@ struct BoxMeasurement {
   double height() const { return sides[3] - sides[1]; }
 };
 
+/// What a network says of the errors of its boxes; 0 where it does not.
+struct BoxNoise {
+  double relative = 0.0;  ///< deviation of a side, in widths or heights of a large box
+  double pixel = 0.0;     ///< a pixel of the network's input, in pixels of the image
+};
+
 /// The box of a detection, its sides cut at the border of a width × height image marked censored.
-/// `relative_sigma` > 0 (a network's own figure) replaces the default.
+/// The variance is that of the noise: the share that is the object's b is in its state.
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
-                       double relative_sigma = 0.0);
+                       const BoxNoise& noise = {});
+/// Standard deviation of b, in widths or heights of the box.
+double biasSigma(const BoxParameters& parameters, double relative_sigma = 0.0);
 
 /// log of the clutter measure of the box: expected false boxes times the density (measured sides)
 /// or probability (censored ones) of one of them being this one.
@@ -45,11 +53,11 @@ struct BoxScore {
   int dof = 0;
 };
 
-/// log N(z; h(x), S) with censoring. `hidden` are sides that a nearer object hides. Nothing where
-/// no side can be compared, or outside the gate.
+/// log t(z; h(x), S) with `tail` degrees of freedom and with censoring. `hidden` are sides that a
+/// nearer object hides. Nothing where no side can be compared, or outside the gate.
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,
-                                 const std::array<bool, 4>& hidden, double gate);
+                                 const std::array<bool, 4>& hidden, double gate, double tail);
 
 /// Sides that can be compared: measured, not hidden, and exact in the projection.
 std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,

@@ -117,6 +117,24 @@ std::optional<ProjectedBox> projectCuboid(const State& x, const View& view) {
   return box;
 }
 
+std::optional<ProjectedBox> projectObserved(const State& x, const View& view) {
+  auto box = projectCuboid(x, view);
+  if (!box) return box;
+  const ProjectedBox plain = *box;
+  const double limit[2] = {2.0 * view.camera->width(), 2.0 * view.camera->height()};
+  for (int i = 0; i < 4; ++i) {
+    const int low = i % 2, high = low + 2;
+    const double extent = plain.sides[high] - plain.sides[low];
+    const double b = x[kBias + i];
+    box->sides[i] += b * std::min(extent, limit[low]);
+    box->H(i, kBias + i) = std::min(extent, limit[low]);
+    if (extent >= limit[low]) continue;
+    box->H.row(i) += b * (plain.H.row(high) - plain.H.row(low));
+    box->H_pose.row(i) += b * (plain.H_pose.row(high) - plain.H_pose.row(low));
+  }
+  return box;
+}
+
 double yawFromAzimuth(double azimuth, const Eigen::Vector3d& centre_W, const View& view) {
   const RigidTransform T_WC = view.T_WC();
   const Eigen::Vector3d down = -view.up_W;

@@ -21,7 +21,8 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
   if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return std::nullopt;
   if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
   Evidence e;
-  e.z = measure(b, width, height, box, model.box_sigma);
+  const double pixel = model.input_width > 0.0 ? width / model.input_width : 0.0;
+  e.z = measure(b, width, height, box, {model.box_sigma, pixel});
   if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
   e.log_clutter = logClutter(e.z, width, height, clutter);
   const double zero = detection.activations[0];

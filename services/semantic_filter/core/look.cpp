@@ -7,6 +7,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
+constexpr double kNever = 1e9;              // a change of view that never counts
 
 bool mayMatch(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
   for (int axis = 0; axis < 2; ++axis) {
@@ -24,8 +25,8 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, const Sight& s
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const Evidence& e = boxes[i];
     if (!mayMatch(e.z, *h.box, h.covariance)) continue;
-    const auto score =
-        scoreBox(e.z, *h.box, h.covariance, sight.hidden, frame.parameters->box.gate);
+    const auto score = scoreBox(e.z, *h.box, h.covariance, sight.hidden, frame.parameters->box.gate,
+                                frame.parameters->box.tail);
     if (!score) continue;
     const double log_l = logRatio(e, *frame.model, class_name) + score->log_density - e.log_clutter;
     h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
@@ -35,13 +36,25 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, const Sight& s
 
 }  // namespace
 
-double detectionProbability(const ClassPrior& prior, double height_px, const FrameContext& frame) {
+ViewWalk viewWalkOf(const FrameContext& frame) {
   const BoxParameters& box = frame.parameters->box;
-  double half = box.min_height_px;
+  const VisibilityParameters& visibility = frame.parameters->visibility;
+  ViewWalk walk;
+  walk.T_WC = frame.view.T_WC();
+  walk.bias_sigma = biasSigma(box, frame.model ? frame.model->box_sigma : 0.0);
+  walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
+  walk.screened = visibility.screened;
+  walk.screen = {visibility.screen_angle, visibility.screen_log_distance, kNever};
+  return walk;
+}
+
+double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {
+  const BoxParameters& box = frame.parameters->box;
+  double half = box.min_size_px;
   if (frame.model && frame.model->input_width > 0.0) {
     half = box.min_network_px * frame.view.camera->width() / frame.model->input_width;
   }
-  return prior.detection_probability / (1.0 + std::exp(-(height_px - half) / (0.2 * half)));
+  return prior.detection_probability / (1.0 + std::exp(-(size_px - half) / (0.2 * half)));
 }
 
 ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
@@ -53,14 +66,14 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
     HypothesisLook h;
     h.likelihood.assign(boxes.size(), 0.0);
     h.nis.assign(boxes.size(), 0.0);
-    h.box = projectCuboid(hypothesis.x, frame.view);
+    h.box = projectObserved(hypothesis.x, frame.view);
     h.hit_looks = sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view, looks);
-    h.miss_looks = sharedLooks(hypothesis.x.head<3>(), object.miss_view, frame.view, looks);
     if (h.box) {
       h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
-      const double height = h.box->sides[3] - h.box->sides[1];
-      h.detection = sight.fraction *
-                    detectionProbability(frame.priors->of(hypothesis.class_name), height, frame);
+      const double size =
+          std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
+      h.detection = sight.fraction * (1.0 - object.screened) *
+                    detectionProbability(frame.priors->of(hypothesis.class_name), size, frame);
       scoreBoxes(h, hypothesis.class_name, sight, boxes, frame);
     }
     result.hypotheses.push_back(std::move(h));
@@ -82,14 +95,9 @@ double associationWeight(const Object& object, const ObjectLook& look, std::size
 double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
                    const LooksParameters& parameters) {
   if (last.looks <= 0.0) return 0.0;
-  const Eigen::Vector3d ray_now = position - view.T_WC().p;
-  const Eigen::Vector3d ray_then = position - last.T_WC.p;
-  const double now = std::max(ray_now.norm(), 1e-3), then = std::max(ray_then.norm(), 1e-3);
-  const Eigen::Vector3d image_now = view.T_WC().q.conjugate() * ray_now / now;
-  const Eigen::Vector3d image_then = last.T_WC.q.conjugate() * ray_then / then;
-  const double change = (ray_now / now - ray_then / then).norm() / parameters.angle +
-                        (image_now - image_then).norm() / parameters.image_angle +
-                        std::abs(std::log(now / then)) / parameters.log_distance;
+  const double change =
+      viewChange(position, last.T_WC, view.T_WC(),
+                 {parameters.angle, parameters.log_distance, parameters.image_angle});
   return last.looks * std::exp(-change);
 }
 

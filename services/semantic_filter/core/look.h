@@ -16,10 +16,10 @@ namespace perdure::semantic_filter {
 struct HypothesisLook {
   std::optional<ProjectedBox> box;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
-  double detection = 0.0;                    ///< v P_D: probability that the network reports it
-  std::vector<double> likelihood;            ///< L(z) for each box, 0 outside the gate
-  std::vector<double> nis;                   ///< per degree of freedom, where likelihood > 0
-  double hit_looks = 0.0, miss_looks = 0.0;  ///< earlier looks that share this view, if it is true
+  double detection = 0.0;          ///< v P_D: probability that the network reports it
+  std::vector<double> likelihood;  ///< L(z) for each box, 0 outside the gate
+  std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
+  double hit_looks = 0.0;          ///< earlier looks that share this view, if it is true
 };
 
 struct ObjectLook {
@@ -36,8 +36,11 @@ struct FrameContext {
   const Parameters* parameters = nullptr;
 };
 
-/// P_D of a class for an instance of this height in pixels, fully visible.
-double detectionProbability(const ClassPrior& prior, double height_px, const FrameContext& frame);
+/// What changes at an object with the view of this frame.
+ViewWalk viewWalkOf(const FrameContext& frame);
+
+/// P_D of a class for an instance of this size in pixels (√ of its box's area), fully visible.
+double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
 ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
                 const FrameContext& frame);

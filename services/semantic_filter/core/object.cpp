@@ -47,17 +47,19 @@ double classProbability(const Object& object, const std::string& class_name) {
   return sum;
 }
 
+double fasterThan(const Hypothesis& h, double limit) {
+  const Eigen::Vector2d v = h.x.segment<2>(kVelocity);
+  const Eigen::Matrix2d P = h.P.block<2, 2>(kVelocity, kVelocity);
+  const double speed = v.norm();
+  const double variance = speed > 1e-3 ? v.dot(P * v) / (speed * speed) : P.trace();
+  const double scale = std::sqrt(2.0 * std::max(variance, 0.0)) + 1e-6;
+  return 0.5 * (std::erfc((limit - speed) / scale) + std::erfc((limit + speed) / scale));
+}
+
 double movingProbability(const Object& object, double min_speed) {
   double sum = 0.0;
   for (const auto& h : object.hypotheses) {
-    if (!h.moving) continue;
-    const Eigen::Vector2d v = h.x.segment<2>(kVelocity);
-    const double speed = v.norm();
-    const Eigen::Vector2d along =
-        speed > 0.0 ? Eigen::Vector2d(v / speed) : Eigen::Vector2d::UnitX();
-    const double variance = along.dot(h.P.block<2, 2>(kVelocity, kVelocity) * along);
-    const double sigma = std::sqrt(std::max(variance, 0.0)) + 1e-6;
-    sum += h.weight * 0.5 * std::erfc((min_speed - speed) / (std::sqrt(2.0) * sigma));
+    if (h.moving) sum += h.weight * fasterThan(h, min_speed);
   }
   return std::min(sum, 1.0);
 }

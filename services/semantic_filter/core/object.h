@@ -13,13 +13,15 @@
 
 namespace perdure::semantic_filter {
 
-/// x = [p_WO, yaw about gravity, log l, log w, log h, v_W]; v and its covariance are zero while
-/// the hypothesis is a static one.
-inline constexpr int kStateDim = 10;
+/// x = [p_WO, yaw about gravity, log l, log w, log h, b, v_W]. b is the detector's own error at
+/// this object: how far it puts each side of the box (x1, y1, x2, y2) from the cuboid's image, in
+/// widths and heights of the box; it stays while the view stays (DESIGN 5, item 7). v and its
+/// covariance are zero while the hypothesis is a static one.
+inline constexpr int kStateDim = 14;
 using State = Eigen::Matrix<double, kStateDim, 1>;
 using StateCovariance = Eigen::Matrix<double, kStateDim, kStateDim>;
 using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< P_xg with the pose error [θ, p]
-inline constexpr int kYaw = 3, kSize = 4, kVelocity = 7;
+inline constexpr int kYaw = 3, kSize = 4, kBias = 7, kVelocity = 11;
 
 struct Hypothesis {
   std::string class_name;
@@ -29,6 +31,8 @@ struct Hypothesis {
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
+  double pace =
+      1.0;  ///< of a moving one: the prior of its speed against the Gaussian it began with
 };
 
 /// From where the object was last looked at, for the correlation of looks (DESIGN 5, item 7).
@@ -45,9 +49,11 @@ struct Object {
   TimePoint first_seen, last_seen, as_of;
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
   std::uint32_t hits = 0, visible_misses = 0;
-  double running_nis = 1.0;       ///< per degree of freedom, of the boxes it claimed
-  ViewPoint hit_view, miss_view;  ///< of the last look that showed it, and that did not
-  double support = 1.0;           ///< share of late visible looks that showed it
+  double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
+  ViewPoint hit_view;        ///< of the last look that showed it
+  double screened = 0.0;     ///< probability that something not on the map hides it, if it exists
+  std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
+  double support = 1.0;                     ///< share of late visible looks that showed it
   Visibility visibility = Visibility::kVisible;
   double visible_fraction = 1.0;
   ObjectId blocked_by = 0;
@@ -58,6 +64,8 @@ struct Object {
 
 /// π of a class: the sum of its hypotheses' weights.
 double classProbability(const Object& object, const std::string& class_name);
+/// Probability that a moving hypothesis is faster than `speed`, m/s.
+double fasterThan(const Hypothesis& h, double speed);
 /// Probability that the object moves faster than `min_speed`, given that it exists.
 double movingProbability(const Object& object, double min_speed);
 /// All numbers are finite and some weight is left.

@@ -6,13 +6,22 @@
 namespace perdure::semantic_filter {
 
 struct BoxParameters {
-  double sigma_px = 1.0;         ///< floor of a side's standard deviation
-  double sigma_relative = 0.04;  ///< of the box's width (x sides) or height (y sides)
-  double border_px = 6.0;        ///< a side this near to the image border is cut by it
-  double gate = 0.9997;          ///< probability mass inside the gate of the innovation
-  double min_height_px = 12.0;   ///< detection probability has fallen to one half here
-  double min_network_px = 9.0;   ///< the same in the pixels of the network's input, where known
-  std::int64_t iterations = 3;   ///< of the iterated EKF
+  double sigma_px = 0.8;          ///< floor of a side's standard deviation
+  double sigma_network_px = 0.8;  ///< the same in pixels of the network's input, where known
+  double sigma_relative = 0.045;  ///< of the box's width (x sides) or height (y sides)
+  double border_px = 6.0;         ///< a side this near to the image border is cut by it
+  double gate = 0.9997;           ///< probability mass inside the gate of the innovation
+  double tail = 5.0;              ///< degrees of freedom of the innovation's t distribution
+  double min_size_px = 14.0;      ///< √ of the area where detection is half as likely
+  double min_network_px = 10.0;   ///< the same in the pixels of the network's input, where known
+  double noise_view = 0.001;      ///< change of view, rad or of log distance, that renews the noise
+  std::int64_t iterations = 3;    ///< of the iterated EKF
+  /// The error of a side is noise and, for this share of its variance, the object's b, which stays
+  /// while the view stays; b falls to 1/e after a change of
+  double bias_share = 0.3;
+  double bias_angle = 0.3;         ///< aspect, rad
+  double bias_log_distance = 0.3;  ///< logarithm of the distance
+  double bias_image_angle = 0.3;   ///< place in the image, rad
 };
 
 struct ClutterParameters {
@@ -41,17 +50,22 @@ struct MotionParameters {
   double acceleration = 1.0;        ///< m/s²/√Hz, of moving hypotheses
   double survival_s = 3600.0;       ///< mean time a thing stays where it is
   double min_speed = 0.7;           ///< m/s: slower ones count as static
+  double slow_share = 0.25;         ///< of a class's deviation of speed: slower is creeping
+  double creeping = 0.05;           ///< how likely that is against the Gaussian
+  double lost_sigma_m = 10.0;       ///< a moving hypothesis less well placed than this is given up
   double start_probability = 0.02;  ///< of a moving hypothesis that is added to a static object
+  double misplaced_odds = 5.0;      ///< of having misplaced a thing against its having driven off
+  double misplaced_sigma = 0.1;     ///< relative, of distance and size
   double start_nis = 3.0;           ///< running innovation above which it is added
 };
 
 struct PoseParameters {
-  double walk_position = 0.02;    ///< m/√m, where odometry has no covariance
-  double walk_rotation = 0.0008;  ///< rad/√m
+  double walk_position = 0.015;   ///< m/√m, where odometry has no covariance
+  double walk_rotation = 0.0004;  ///< rad/√m
 };
 
 struct LooksParameters {
-  double correlation = 0.7;   ///< of the errors of two looks from the same place
+  double correlation = 0.5;   ///< of the errors of two looks from the same place
   double angle = 0.1;         ///< rad, change of aspect after which it has fallen to 1/e
   double log_distance = 0.1;  ///< the same for the logarithm of the distance
   double image_angle = 0.03;  ///< rad, the same for the place in the image
@@ -61,18 +75,24 @@ struct VisibilityParameters {
   std::int64_t cell_px = 8;
   double minimum = 0.25;  ///< v below this is 0: no evidence
   double full = 0.7;      ///< v from here on is called visible
+  /// That something not on the map hides an object from a view in which it was not yet seen; what
+  /// is known of that falls to 1/e after a change of
+  double screened = 0.2;
+  double screen_angle = 0.15;        ///< aspect, rad
+  double screen_log_distance = 0.3;  ///< logarithm of the distance
   double solid = 0.4;  ///< existence (times its late hit rate) from which an object can hide others
 };
 
 struct TendParameters {
   double confirm = 0.95;
-  std::int64_t confirm_hits = 2;
+  std::int64_t confirm_hits = 3;
   double confirm_sigma_m =
-      2.2;                ///< of its place beside the body; one that is not known is no claim
+      1.5;                ///< of its place beside the body; one that is not known is no claim
   double certain = 0.99;  ///< existence is kept below it, so that misses can still be heard
   double gone = 0.02;     ///< existence below which an object is forgotten
   double gone_tentative = 0.05;
   double class_dominates = 0.995;
+  double size_gate = 4.5;  ///< deviations of the class's size beyond which nothing is of the class
   double hypothesis_floor = 0.002;
   double scale_resolved = 0.06;   ///< relative deviation of the distance; before it "other" stays
   double hypothesis_merge = 1.0;  ///< squared Mahalanobis distance

@@ -30,6 +30,26 @@ void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m) {
   h.P(kYaw, kYaw) += 25.0 * m.yaw_walk * m.yaw_walk * dt;
 }
 
+/// b forgets with the change of the view: an Ornstein-Uhlenbeck process along the way.
+void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const ViewWalk& walk) {
+  const double keep = last ? std::exp(-viewChange(h.x.head<3>(), *last, walk.T_WC, walk.bias)) : 0;
+  h.x.segment<4>(kBias) *= keep;
+  h.P.middleRows<4>(kBias) *= keep;
+  h.P.middleCols<4>(kBias) *= keep;
+  h.C.middleRows<4>(kBias) *= keep;
+  h.P.diagonal().segment<4>(kBias).array() +=
+      (1.0 - keep * keep) * walk.bias_sigma * walk.bias_sigma;
+}
+
+/// What may hide it from elsewhere is not known until it is seen from there.
+void predictScreen(Object& object, const ViewWalk& walk) {
+  const Eigen::Vector3d place = object.best().x.head<3>();
+  const double keep = object.last_view
+                          ? std::exp(-viewChange(place, *object.last_view, walk.T_WC, walk.screen))
+                          : 0.0;
+  object.screened = walk.screened + keep * (object.screened - walk.screened);
+}
+
 /// The transition since the object was brought up to date. vio's updates make the product of
 /// transitions small, so that its inverse may lose its sense: then nothing is left of C.
 Matrix6d transitionSince(const Object& object, const PoseError& pose_error) {
@@ -59,7 +79,35 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
   if (correlation * correlation > kExplained) h.C *= std::sqrt(kExplained) / correlation;
 }
 
+/// What drove off unseen could be anywhere: it would claim any box. The object lives on as far as
+/// it may have stayed.
+void giveUpLostOnes(Object& object, double lost_sigma_m) {
+  double kept = 0.0;
+  for (const auto& h : object.hypotheses) {
+    const double sigma = std::sqrt(h.P.topLeftCorner<2, 2>().trace());
+    if (!h.moving || sigma < lost_sigma_m) kept += h.weight;
+  }
+  if (kept >= 1.0 - 1e-9) return;
+  object.existence *= kept;
+  if (kept <= 1e-9) return;  // nothing is left of it; it will be buried
+  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+    return h.moving && std::sqrt(h.P.topLeftCorner<2, 2>().trace()) >= lost_sigma_m;
+  });
+  normalise(object);
+}
+
 }  // namespace
+
+double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
+                  const ViewScales& scales) {
+  const Eigen::Vector3d ray_a = position - a.p, ray_b = position - b.p;
+  const double far_a = std::max(ray_a.norm(), 1e-3), far_b = std::max(ray_b.norm(), 1e-3);
+  const Eigen::Vector3d image_a = a.q.conjugate() * ray_a / far_a;
+  const Eigen::Vector3d image_b = b.q.conjugate() * ray_b / far_b;
+  return (ray_a / far_a - ray_b / far_b).norm() / scales.angle +
+         (image_a - image_b).norm() / scales.image_angle +
+         std::abs(std::log(far_a / far_b)) / scales.log_distance;
+}
 
 State stateAt(const Hypothesis& h, double dt) {
   State x = h.x;
@@ -68,16 +116,20 @@ State stateAt(const Hypothesis& h, double dt) {
 }
 
 void predict(Object& object, TimePoint now, const PoseError& pose_error,
-             const MotionParameters& parameters) {
+             const MotionParameters& parameters, const ViewWalk& walk) {
   const double dt = toSeconds(now - object.as_of);
   const Matrix6d transition = transitionSince(object, pose_error);
   for (auto& h : object.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
+    predictBias(h, object.last_view, walk);
     h.C = (h.C * transition.transpose()).eval();
     keepConsistent(h, pose_error.covariance);
   }
+  giveUpLostOnes(object, parameters.lost_sigma_m);
   if (dt > 0.0) object.existence *= std::exp(-dt / parameters.survival_s);
   object.as_of = now;
+  predictScreen(object, walk);
+  object.last_view = walk.T_WC;
   object.pose_product = pose_error.product;
 }
 

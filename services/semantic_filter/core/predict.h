@@ -17,8 +17,23 @@ struct PoseError {
 
 /// x at a later time: static ones stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
+/// How much the view of a point changed from camera pose a to b, in lengths after which what two
+/// looks have in common has fallen to 1/e.
+struct ViewScales {
+  double angle, log_distance, image_angle;
+};
+double viewChange(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
+                  const RigidTransform& T_WC_b, const ViewScales& scales);
+/// What changes at an object as the view of it changes, and goes back to where it began.
+struct ViewWalk {
+  RigidTransform T_WC;      ///< the new view
+  double bias_sigma = 0.0;  ///< of b, stationary: in widths and heights of the box
+  ViewScales bias{1, 1, 1};
+  double screened = 0.0;  ///< Object::screened, stationary
+  ViewScales screen{1, 1, 1};
+};
 /// Brings the object up to `now`: noise on every hypothesis, P_xg, survival of its existence.
 void predict(Object& object, TimePoint now, const PoseError& pose_error,
-             const MotionParameters& parameters);
+             const MotionParameters& parameters, const ViewWalk& walk);
 
 }  // namespace perdure::semantic_filter

@@ -69,9 +69,10 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
                                                         const FrameInput& input,
                                                         const FrameContext& frame) const {
   std::vector<Seen> seen;
+  const ViewWalk walk = viewWalkOf(frame);
   for (std::size_t j = 0; j < sights.size(); ++j) {
     if (sights[j].fraction <= 0.0) continue;
-    predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion);
+    predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
     seen.push_back({j, look(belief.objects[j], sights[j], *input.boxes, frame)});
   }
   return seen;
@@ -103,11 +104,13 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
 bool SemanticFilter::matches(const Object& object, const Sight& sight, const Evidence& box,
                              const FrameInput& input) const {
   const State x = stateAt(object.best(), toSeconds(input.stamp.time - object.as_of));
-  const auto predicted = projectCuboid(x, input.view);
+  const auto predicted = projectObserved(x, input.view);
   if (!predicted) return false;
   const auto covariance =
       predictedCovariance(object.best(), *predicted, input.pose_error.covariance);
-  return scoreBox(box.z, *predicted, covariance, sight.hidden, parameters_.box.gate).has_value();
+  return scoreBox(box.z, *predicted, covariance, sight.hidden, parameters_.box.gate,
+                  parameters_.box.tail)
+      .has_value();
 }
 
 void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
@@ -137,6 +140,7 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
 
 bool SemanticFilter::leavesView(const Belief& belief, const std::vector<Sight>& sights,
                                 const Evidence& box, const FrameInput& input) const {
+  if (box.z.count() == 4) return false;  // what leaves is cut by the border
   for (std::size_t j = 0; j < sights.size(); ++j) {
     const Object& o = belief.objects[j];
     if (sights[j].visibility != Visibility::kOutOfView || !o.confirmed) continue;
@@ -171,6 +175,7 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
     object->id = ids.idFor(input.stamp.sequence, z);
     object->existence *= 1.0 - claimed[static_cast<Eigen::Index>(z)];
     tendHypotheses(*object, priors_, parameters_);
+    if (object->hypotheses.empty()) continue;
     born.push_back(std::move(*object));
     accepted.push_back(z);
   }
@@ -192,6 +197,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   }
   births(belief, sights, claimed, input, frame, ids);
   StepReport report;
+  std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
   report.merges = mergeObjects(belief.objects, frame);
   confirmAndBury(belief.objects, frame);

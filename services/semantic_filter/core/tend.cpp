@@ -1,5 +1,6 @@
 #include "services/semantic_filter/core/tend.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -35,18 +36,49 @@ double distance2(const Hypothesis& a, const Hypothesis& b) {
   return result;
 }
 
+/// The hypothesis given that v = 0: what it took for motion was the error of its place.
+void stop(Hypothesis& h) {
+  const Eigen::Matrix3d S = h.P.bottomRightCorner<3, 3>();
+  const Eigen::Matrix<double, kStateDim, 3> K =
+      S.ldlt().solve(h.P.rightCols<3>().transpose()).transpose();
+  h.x -= K * Eigen::Vector3d(h.x.tail<3>());
+  h.x[kYaw] = wrapAngle(h.x[kYaw]);
+  h.P = (h.P - K * S * K.transpose()).eval();
+  h.C = (h.C - K * h.C.bottomRows<3>()).eval();
+  h.moving = false;
+  h.x.tail<3>().setZero();
+  h.P.bottomRows<3>().setZero();
+  h.P.rightCols<3>().setZero();
+  h.C.bottomRows<3>().setZero();
+  makeSymmetric(h.P);
+}
+
 void settleSlowOnes(Object& object, double min_speed) {
   for (auto& h : object.hypotheses) {
     if (!h.moving) continue;
     const Eigen::Matrix2d P = h.P.block<2, 2>(kVelocity, kVelocity);
     const double sigma = std::sqrt(std::max(P.trace(), 0.0));
     if (h.x.segment<2>(kVelocity).norm() + sigma > min_speed) continue;
-    h.moving = false;
-    h.x.tail<3>().setZero();
-    h.P.bottomRows<3>().setZero();
-    h.P.rightCols<3>().setZero();
-    h.C.bottomRows<3>().setZero();
+    stop(h);
   }
+}
+
+/// What moves seldom creeps: the Gaussian prior of a moving one's velocity has a hole around zero.
+/// Without it a parked car of unusual size is one of usual size that creeps.
+void weighPace(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
+  for (auto& h : object.hypotheses) {
+    if (!h.moving) continue;
+    const double slow = motion.slow_share * priors.of(h.class_name).speed_sigma;
+    const double pace = motion.creeping + (1.0 - motion.creeping) * fasterThan(h, slow);
+    h.weight *= pace / h.pace;
+    h.pace = pace;
+  }
+}
+
+/// Two beliefs about one place of very different certainty are two explanations.
+bool wider(const Hypothesis& a, const Hypothesis& b) {
+  const double va = a.P.topLeftCorner<3, 3>().trace(), vb = b.P.topLeftCorner<3, 3>().trace();
+  return std::max(va, vb) > 4.0 * std::min(va, vb);
 }
 
 void mergeNearOnes(Object& object, double threshold) {
@@ -54,6 +86,7 @@ void mergeNearOnes(Object& object, double threshold) {
   for (std::size_t i = 0; i < hs.size(); ++i) {
     for (std::size_t j = hs.size() - 1; j > i; --j) {
       if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
+      if (wider(hs[i], hs[j])) continue;
       if (distance2(hs[i], hs[j]) > threshold) continue;
       mergeInto(hs[i], hs[j]);
       hs.erase(hs.begin() + static_cast<std::ptrdiff_t>(j));
@@ -66,6 +99,20 @@ bool scaleIsOpen(const Object& object, const TendParameters& tend) {
   const double distance = (object.best().x.head<3>() - object.hit_view.T_WC.p).norm();
   const double variance = object.best().P.topLeftCorner<3, 3>().trace();
   return std::sqrt(variance) > tend.scale_resolved * distance;
+}
+
+/// A car half as high as cars are is none: what has drifted there has lost its way. Whatever is
+/// left of the object is as likely as it was; where nothing is, the object goes.
+void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
+  double lost = 0.0;
+  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+    const ClassPrior prior = priors.of(h.class_name);
+    const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
+    if (d.dot(prior.log_size_covariance.llt().solve(d)) < size_gate * size_gate) return false;
+    lost += h.weight;
+    return true;
+  });
+  object.existence *= 1.0 - std::min(lost, 1.0);
 }
 
 void pruneLightOnes(Object& object, const TendParameters& tend) {
@@ -93,6 +140,16 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
   twin.weight *= motion.start_probability;
   twin.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;  // (3 m/s)²: just driving off
   twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
+  // Or it stands where we are wrong about it: the same thing along the ray, near and far.
+  Hypothesis wide = object.best();
+  wide.weight *= motion.start_probability * motion.misplaced_odds;
+  const Eigen::Vector3d ray = wide.x.head<3>() - object.hit_view.T_WC.p;
+  const double relative = motion.misplaced_sigma;
+  Eigen::Matrix<double, kStateDim, 1> g = Eigen::Matrix<double, kStateDim, 1>::Zero();
+  g.head<3>() = ray;
+  g.segment<3>(kSize).setOnes();
+  wide.P += relative * relative * g * g.transpose();
+  object.hypotheses.push_back(wide);
   object.hypotheses.push_back(twin);
   object.running_nis = 1.0;
 }
@@ -149,8 +206,12 @@ bool older(const Object& a, const Object& b) {
 }  // namespace
 
 void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters) {
+  weighPace(object, priors, parameters.motion);
   settleSlowOnes(object, parameters.motion.min_speed);
   mergeNearOnes(object, parameters.tend.hypothesis_merge);
+  normalise(object);
+  pruneMisshapen(object, priors, parameters.tend.size_gate);
+  if (object.hypotheses.empty()) return;
   normalise(object);
   pruneLightOnes(object, parameters.tend);
   addMovingTwin(object, priors, parameters.motion);
@@ -211,7 +272,10 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   fused.x.head<7>() += P * pull;
   fused.x[kYaw] = wrapAngle(fused.x[kYaw]);
   const Eigen::Matrix<double, 7, 6> B = P * (J_a * B_a + J_new * B_b);
-  if (!a.moving) fused.P.setZero();
+  const Eigen::Matrix4d bias = a.P.block<4, 4>(kBias, kBias);
+  fused.P.setZero();
+  fused.P.block<4, 4>(kBias, kBias) = bias;
+  fused.C.middleRows<4>(kBias).setZero();
   fused.P.topLeftCorner<7, 7>() = P + B * P_pose * B.transpose();
   fused.C.topRows<7>() = B * P_pose;
   makeSymmetric(fused.P);

@@ -50,15 +50,21 @@ struct Gain {
   Eigen::MatrixXd K, S;
 };
 
-Gain gainOf(const Hypothesis& h, const Innovation& y, double worth, const Matrix6d& P_pose) {
+Gain gainOf(const Hypothesis& h, const Innovation& y, const Matrix6d& P_pose) {
   const Eigen::MatrixXd PHt = h.P * y.H.transpose() + h.C * y.H_pose.transpose();
   Gain gain;
   gain.S =
       y.H * PHt + y.H_pose * (h.C.transpose() * y.H.transpose() + P_pose * y.H_pose.transpose());
-  gain.S.diagonal() += y.variance / worth;
+  gain.S.diagonal() += y.variance;
   makeSymmetric(gain.S);
   gain.K = gain.S.ldlt().solve(PHt.transpose()).transpose();
   return gain;
+}
+
+/// How much the noise of an outlier is widened: the weight of a t distribution, inverted.
+double doubtOf(const Innovation& y, const Eigen::MatrixXd& S, double tail) {
+  const double nis = y.residual.dot(S.ldlt().solve(y.residual));
+  return std::max(1.0, (tail + nis) / (tail + static_cast<double>(y.residual.size())));
 }
 
 /// Moment match of "no box" and each box by their shares (the second half of PDA).
@@ -100,12 +106,12 @@ Shares sharesOf(const HypothesisLook& h, const Eigen::VectorXd& eta) {
 }
 
 void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
-                 const std::vector<Evidence>& boxes, double worth, const FrameContext& frame) {
+                 const std::vector<Evidence>& boxes, double repeated, const FrameContext& frame) {
   std::vector<std::pair<double, Hypothesis>> parts;
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (shares.box[z] < kNegligible) continue;
     parts.emplace_back(shares.box[z],
-                       updateWithBox(h, boxes[z].z, look.sight.hidden, worth, frame));
+                       updateWithBox(h, boxes[z].z, look.sight.hidden, repeated, frame));
   }
   if (parts.empty()) return;
   const double weight = h.weight;
@@ -178,12 +184,21 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
   }
 }
 
-/// What a look is worth beside earlier ones, τ of a hit and of a miss. How much the view has
-/// changed depends on how far the object is: that is asked of the hypothesis that explains the look
-/// best. A look that shows what the last one did not is news: hits and misses are counted apart.
+/// By how much the noise of a look counts more because the last look had almost the same: that of
+/// a stationary process of first order, whose correlation fades with the view.
+double repetition(const Object& object, const FrameContext& frame) {
+  if (object.hit_view.looks <= 0.0) return 1.0;
+  const double scale = frame.parameters->box.noise_view;
+  const double change = viewChange(object.best().x.head<3>(), object.hit_view.T_WC,
+                                   frame.view.T_WC(), {scale, scale, 0.5 * scale});
+  const double correlation = std::exp(-change);
+  return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
+}
+
+/// What a look is worth beside earlier ones. How much the view has changed depends on how far the
+/// object is: that is asked of the hypothesis that explains the look best.
 struct Worth {
-  double hit = 1.0, miss = 1.0;
-  double hit_looks = 0.0, miss_looks = 0.0;
+  double worth = 1.0, looks = 0.0;
 };
 
 Worth worthOf(const Object& object, const ObjectLook& look, const std::vector<Shares>& shares,
@@ -193,29 +208,54 @@ Worth worthOf(const Object& object, const ObjectLook& look, const std::vector<Sh
   for (std::size_t i = 1; i < shares.size(); ++i) {
     if (posterior(i) > posterior(best)) best = i;
   }
-  const HypothesisLook& h = look.hypotheses[best];
-  return {worthOfLook(h.hit_looks, correlation), worthOfLook(h.miss_looks, correlation),
-          h.hit_looks, h.miss_looks};
+  const double looks = look.hypotheses[best].hit_looks;
+  return {worthOfLook(looks, correlation), looks};
 }
 
-void rememberView(Object& object, double seen, const Worth& worth, const FrameContext& frame) {
-  (seen >= 0.5 ? object.hit_view : object.miss_view) = {
-      frame.view.T_WC(), 1.0 + (seen >= 0.5 ? worth.hit_looks : worth.miss_looks)};
+/// π ∝ π A. Within a class the hypotheses differ by geometry alone, whose shared errors are in the
+/// state: A counts in full there. Between classes, and for existence, looks share what the network
+/// mistakes: A counts by the look's worth. Returns the mean of A over the prior, by that exponent.
+/// A frame that does not show the object says that it is screened, too: P(frame | screened) is 1.
+double weigh(Object& object, const std::vector<Shares>& shares, double worth) {
+  std::map<std::string, std::pair<double, double>> classes;  // weight, Σ w A
+  double mean_A = 0.0, tempered_A = 0.0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    auto& [weight, sum] = classes[object.hypotheses[i].class_name];
+    weight += object.hypotheses[i].weight;
+    sum += object.hypotheses[i].weight * shares[i].A;
+  }
+  for (const auto& [name, c] : classes) {
+    mean_A += c.second;
+    tempered_A += c.first * std::pow(c.second / c.first, worth);
+  }
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    const auto& [weight, sum] = classes[object.hypotheses[i].class_name];
+    object.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, worth - 1.0);
+  }
+  object.screened = std::min(1.0, object.screened / mean_A);
+  return tempered_A;
 }
 
 }  // namespace
 
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
-                         const std::array<bool, 4>& hidden, double worth,
+                         const std::array<bool, 4>& hidden, double repeated,
                          const FrameContext& frame) {
   Hypothesis posterior = prior;
   State x = prior.x;
+  double doubt = 1.0;
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
-    const auto box = projectCuboid(x, frame.view);
+    const auto box = projectObserved(x, frame.view);
     if (!box) break;
     Innovation y = innovation(z, *box, hidden);
     if (y.residual.size() == 0) break;
-    const Gain gain = gainOf(prior, y, worth, frame.pose_error.covariance);
+    y.variance *= repeated;
+    Gain gain = gainOf(prior, y, frame.pose_error.covariance);
+    if (i == 0) doubt = doubtOf(y, gain.S, frame.parameters->box.tail);
+    if (doubt > 1.0) {
+      y.variance *= doubt;
+      gain = gainOf(prior, y, frame.pose_error.covariance);
+    }
     State back = prior.x - x;
     back[kYaw] = wrapAngle(back[kYaw]);
     State next = prior.x + gain.K * (y.residual - y.H * back);
@@ -267,20 +307,17 @@ void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
   std::vector<Shares> shares;
   for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, eta));
   const double seen = probabilitySeen(object, shares);
-  const Worth of = worthOf(object, look, shares, frame.parameters->looks.correlation);
-  const double worth = seen * of.hit + (1.0 - seen) * of.miss;
+  const Worth hit = worthOf(object, look, shares, frame.parameters->looks.correlation);
   count(object, seen, shares, look);
-  double mean_A = 0.0;
+  const double repeated = repetition(object, frame);
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    Hypothesis& h = object.hypotheses[i];
-    h.weight *= std::pow(shares[i].A, worth);
-    mean_A += h.weight;
-    updateState(h, shares[i], look, boxes, of.hit, frame);
+    updateState(object.hypotheses[i], shares[i], look, boxes, repeated, frame);
   }
+  const double mean_A = weigh(object, shares, seen * hit.worth + 1.0 - seen);
   const double r = object.existence;
   object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
-  updateAzimuths(object, shares, of.hit, boxes, frame);
-  rememberView(object, seen, of, frame);
+  updateAzimuths(object, shares, hit.worth, boxes, frame);
+  if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
   if (sound(object)) normalise(object);
 }
 

@@ -17,9 +17,10 @@ namespace perdure::semantic_filter {
 void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
             const std::vector<Evidence>& boxes, const FrameContext& frame);
 
-/// One hypothesis against one box: the iterated consider-EKF with R / worth.
+/// One hypothesis against one box: the iterated consider-EKF. The box's variance counts `repeated`
+/// times, and more where the box is an outlier.
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
-                         const std::array<bool, 4>& hidden, double worth,
+                         const std::array<bool, 4>& hidden, double repeated,
                          const FrameContext& frame);
 
 /// A network's azimuth as a weak measurement of yaw modulo 180°, with `weight` in (0, 1]; head or

@@ -8,6 +8,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kWidth = 1242, kHeight = 375;
+constexpr double kTail = 5.0;
 
 ProjectedBox predictedBox(double x1, double y1, double x2, double y2) {
   ProjectedBox p;
@@ -28,24 +29,55 @@ TEST(BoxLikelihood, ABoxThatLeavesTheImageIsCutThere) {
   EXPECT_EQ(z.count(), 2);
 }
 
-TEST(BoxLikelihood, DensityOfAllSidesIsTheGaussian) {
+TEST(BoxLikelihood, WithAThinTailTheDensityOfAllSidesIsTheGaussian) {
   const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
   const auto score =
-      scoreBox(z, predictedBox(102, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+      scoreBox(z, predictedBox(102, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999, 1e6);
   ASSERT_TRUE(score);
   double expected = 0.0;
   for (int i = 0; i < 4; ++i) expected -= 0.5 * std::log(2.0 * M_PI * z.variance[i]);
   expected -= 0.5 * 4.0 / z.variance[0];
-  EXPECT_NEAR(score->log_density, expected, 1e-9);
+  EXPECT_NEAR(score->log_density, expected, 1e-4);
   EXPECT_NEAR(score->nis, 4.0 / z.variance[0], 1e-9);
+}
+
+TEST(BoxLikelihood, AnOutlierCostsLessThanAGaussianWouldTake) {
+  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
+  const double sigma = std::sqrt(z.variance[0]);
+  const auto at = [&](double deviations, double tail) {
+    return scoreBox(z, predictedBox(100 + deviations * sigma, 100, 200, 180),
+                    Eigen::Matrix4d::Zero(), {}, 0.999999, tail)
+        ->log_density;
+  };
+  EXPECT_NEAR(at(4, 1e6) - at(0, 1e6), -8.0, 1e-3);
+  EXPECT_GT(at(4, kTail) - at(0, kTail), -7.0);
+  EXPECT_LT(at(4, kTail), at(2, kTail));
+}
+
+TEST(BoxLikelihood, ANetworkPlacesSidesToAPixelOfItsOwnInput) {
+  BoxParameters parameters;
+  parameters.sigma_px = 0.5;
+  parameters.sigma_network_px = 1.0;
+  const auto fine = measure({100, 100, 120, 120}, kWidth, kHeight, parameters, {0.05, 0.0});
+  const auto coarse = measure({100, 100, 120, 120}, kWidth, kHeight, parameters, {0.05, 3.0});
+  EXPECT_NEAR(std::sqrt(coarse.variance[0]) - std::sqrt(fine.variance[0]), 2.5, 1e-9);
+}
+
+TEST(BoxLikelihood, NoiseAndWhatStaysAreTheWholeError) {
+  BoxParameters parameters;
+  parameters.sigma_px = 1e-6;
+  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {0.1, 0.0});
+  const double stays = biasSigma(parameters, 0.1);
+  EXPECT_NEAR(std::hypot(std::sqrt(z.variance[0]) / 100.0, stays), 0.1, 1e-6);
+  EXPECT_NEAR(stays * stays, 0.01 * parameters.bias_share, 1e-9);
 }
 
 TEST(BoxLikelihood, ACensoredSideCountsAsTheProbabilityThatItLiesBeyond) {
   const auto z = measure({0.0, 100, 200, 180}, kWidth, kHeight, {});
   const auto far =
-      scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+      scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999, kTail);
   const auto edge =
-      scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999);
+      scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999, kTail);
   ASSERT_TRUE(far && edge);
   EXPECT_EQ(far->dof, 3);
   EXPECT_NEAR(far->log_density - edge->log_density, std::log(2.0), 1e-9);
@@ -55,13 +87,14 @@ TEST(BoxLikelihood, AHiddenSideMayLieBeyondTheBlocker) {
   const auto z = measure({300, 100, 400, 180}, kWidth, kHeight, {});
   const std::array<bool, 4> left_hidden{true, false, false, false};
   const auto p = predictedBox(250, 100, 400, 180);
-  EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, 0.9999));
-  EXPECT_TRUE(scoreBox(z, p, Eigen::Matrix4d::Zero(), left_hidden, 0.9999));
+  EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, 0.9999, kTail));
+  EXPECT_TRUE(scoreBox(z, p, Eigen::Matrix4d::Zero(), left_hidden, 0.9999, kTail));
 }
 
 TEST(BoxLikelihood, OutsideTheGateThereIsNoScore) {
   const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
-  EXPECT_FALSE(scoreBox(z, predictedBox(200, 100, 300, 180), Eigen::Matrix4d::Zero(), {}, 0.999));
+  EXPECT_FALSE(
+      scoreBox(z, predictedBox(200, 100, 300, 180), Eigen::Matrix4d::Zero(), {}, 0.999, kTail));
 }
 
 TEST(BoxLikelihood, ClutterOfMeasuredSidesIntegratesToItsExpectedNumber) {

@@ -49,11 +49,34 @@ TEST_F(Cuboid, JacobianByThePoseMatchesDifferences) {
             1e-4 * (1.0 + numeric.cwiseAbs().maxCoeff()));
 }
 
+TEST_F(Cuboid, TheDetectorsErrorMovesEachSideByItsShareOfTheBox) {
+  x.segment<4>(kBias) << 0.1, -0.05, 0.02, 0.03;
+  const auto plain = projectCuboid(x, view), seen = projectObserved(x, view);
+  ASSERT_TRUE(plain && seen);
+  const double width = plain->sides[2] - plain->sides[0];
+  const double height = plain->sides[3] - plain->sides[1];
+  EXPECT_NEAR(seen->sides[0] - plain->sides[0], 0.1 * width, 1e-9);
+  EXPECT_NEAR(seen->sides[3] - plain->sides[3], 0.03 * height, 1e-9);
+  const auto by_object = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    return projectObserved(State(v), view)->sides;
+  };
+  const auto by_pose = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    View moved = view;
+    moved.T_WB = boxPlus(view.T_WB, v);
+    return projectObserved(x, moved)->sides;
+  };
+  const Eigen::MatrixXd H = numericJacobian(by_object, x);
+  const Eigen::MatrixXd H_pose = numericJacobian(by_pose, Eigen::VectorXd::Zero(6));
+  EXPECT_LT((seen->H - H).cwiseAbs().maxCoeff(), 1e-4 * (1.0 + H.cwiseAbs().maxCoeff()));
+  EXPECT_LT((seen->H_pose - H_pose).cwiseAbs().maxCoeff(),
+            1e-4 * (1.0 + H_pose.cwiseAbs().maxCoeff()));
+}
+
 TEST_F(Cuboid, LinearCovarianceOfTheBoxMatchesMonteCarlo) {
   Hypothesis h;
   h.x = x;
   h.P.setZero();
-  h.P.diagonal() << 0.04, 0.04, 0.01, 0.0009, 0.0016, 0.0016, 0.0016, 0, 0, 0;
+  h.P.diagonal().head<7>() << 0.04, 0.04, 0.01, 0.0009, 0.0016, 0.0016, 0.0016;
   Matrix6d P_pose = Matrix6d::Zero();
   P_pose.diagonal() << 1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3;
   const auto box = projectCuboid(x, view);
@@ -66,7 +89,7 @@ TEST_F(Cuboid, LinearCovarianceOfTheBoxMatchesMonteCarlo) {
   for (int n = 0; n < kSamples; ++n) {
     State y = x;
     Eigen::Matrix<double, 6, 1> g;
-    for (int i = 0; i < 10; ++i) y[i] += std::sqrt(h.P(i, i)) * normal(random);
+    for (int i = 0; i < kBias; ++i) y[i] += std::sqrt(h.P(i, i)) * normal(random);
     for (int i = 0; i < 6; ++i) g[i] = std::sqrt(P_pose(i, i)) * normal(random);
     View moved = view;
     moved.T_WB = boxPlus(view.T_WB, g);

@@ -47,6 +47,21 @@ class Tending : public ::testing::Test {
   FrameContext frame;
 };
 
+TEST_F(Tending, WhatStandsStillWasWronglyPlacedNotMoving) {
+  // Seen from far, the place along the ray and the speed along it are one error.
+  Object o = makeObject(1, "car", makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+  Hypothesis& h = o.hypotheses[0];
+  h.moving = true;
+  h.x[kVelocity] = 0.2;
+  h.P.bottomRightCorner<3, 3>().diagonal() << 0.04, 0.01, 0.01;
+  h.P(0, kVelocity) = h.P(kVelocity, 0) = 0.03;
+  tendHypotheses(o, priors, parameters);
+  ASSERT_FALSE(o.best().moving);
+  EXPECT_NEAR(o.best().x[0], 20.0 - 0.03 / 0.04 * 0.2, 1e-9);
+  EXPECT_NEAR(o.best().P(0, 0), 0.04 - 0.03 * 0.03 / 0.04, 1e-9);
+  EXPECT_EQ(o.best().x.tail<3>(), Eigen::Vector3d::Zero());
+}
+
 TEST_F(Tending, OverlapIsSharedOverJointVolume) {
   const State a = makeState(0, 0, 0, 0, 4, 2, 1.5);
   EXPECT_NEAR(overlap(a, a, Eigen::Vector3d::UnitZ()), 1.0, 1e-12);

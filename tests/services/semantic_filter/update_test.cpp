@@ -35,7 +35,7 @@ class Update : public ::testing::Test {
     h.weight = weight;
     h.x = makeState(15.0, 2.0, 0.75, 0.5, 4.2, 1.75, 1.5);
     h.P.setZero();
-    h.P.diagonal() << 0.3, 0.3, 0.02, 0.03, 0.01, 0.01, 0.01, 0, 0, 0;
+    h.P.diagonal().head<7>() << 0.3, 0.3, 0.02, 0.03, 0.01, 0.01, 0.01;
     return h;
   }
   Evidence evidenceOf(const State& x, float shift = 0.0F) const {
@@ -64,12 +64,14 @@ class Update : public ::testing::Test {
 bool sameBits(const Object& a, const Object& b) {
   if (a.hypotheses.size() != b.hypotheses.size()) return false;
   if (std::memcmp(&a.existence, &b.existence, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.screened, &b.screened, sizeof(double)) != 0) return false;
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
     if (std::memcmp(&x.weight, &y.weight, sizeof(double)) != 0) return false;
-    if (std::memcmp(x.x.data(), y.x.data(), sizeof(double) * 10) != 0) return false;
-    if (std::memcmp(x.P.data(), y.P.data(), sizeof(double) * 100) != 0) return false;
-    if (std::memcmp(x.C.data(), y.C.data(), sizeof(double) * 60) != 0) return false;
+    if (std::memcmp(x.x.data(), y.x.data(), sizeof(double) * kStateDim) != 0) return false;
+    if (std::memcmp(x.P.data(), y.P.data(), sizeof(double) * kStateDim * kStateDim) != 0)
+      return false;
+    if (std::memcmp(x.C.data(), y.C.data(), sizeof(double) * kStateDim * 6) != 0) return false;
   }
   return true;
 }
@@ -91,12 +93,14 @@ TEST_F(Update, TwoClassesFollowEquationFourByHand) {
   for (int k = 0; k < 2; ++k) {
     const auto& h = l.hypotheses[k];
     const auto box = projectCuboid(object.hypotheses[k].x, frame.view);
-    const double height = box->sides[3] - box->sides[1];
-    const double P_D = 0.9 / (1.0 + std::exp(-(height - parameters.box.min_height_px) /
-                                             (0.2 * parameters.box.min_height_px)));
+    const double size =
+        std::sqrt((box->sides[2] - box->sides[0]) * (box->sides[3] - box->sides[1]));
+    const double P_D =
+        0.9 /
+        (1.0 + std::exp(-(size - parameters.box.min_size_px) / (0.2 * parameters.box.min_size_px)));
     const auto score = scoreBox(boxes[0].z, *box,
                                 predictedCovariance(object.hypotheses[k], *box, Matrix6d::Zero()),
-                                {}, parameters.box.gate);
+                                {}, parameters.box.gate, parameters.box.tail);
     ASSERT_TRUE(score);
     const double g = k == 0 ? 1.5 : 0.5;
     const double L = std::exp(g + score->log_density - boxes[0].log_clutter);
@@ -118,6 +122,45 @@ TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
   update(object, l, Eigen::VectorXd(0), {}, frame);
   EXPECT_NEAR(object.existence, 0.6 * mean / (0.4 + 0.6 * mean), 1e-12);
   EXPECT_EQ(object.best().x, before);
+}
+
+TEST_F(Update, MissesFromOnePlaceSayAtMostThatItIsScreened) {
+  object.existence = 0.99;
+  object.screened = 0.25;
+  for (int k = 0; k < 100; ++k) update(object, lookAt({}, 1.0), Eigen::VectorXd(0), {}, frame);
+  EXPECT_GT(object.screened, 0.99);
+  const double odds = object.existence / (1.0 - object.existence);
+  EXPECT_NEAR(odds, 0.25 * 99.0, 0.3);  // all that is left is what was screened to begin with
+}
+
+TEST_F(Update, ASightOfItSaysThatItIsNotScreened) {
+  object.screened = 0.25;
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_LT(object.screened, 0.01);
+}
+
+TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
+  Hypothesis astray = object.hypotheses[0];  // of the same class, where the box is not
+  astray.moving = true;
+  astray.x[1] += 0.8;
+  object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
+  object.hypotheses[0].weight = object.hypotheses[1].weight = 0.35;
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const ObjectLook l = lookAt(boxes, 1.0);
+  double A[3];
+  for (int i = 0; i < 3; ++i) {
+    A[i] = 1.0 - l.hypotheses[i].detection * (1.0 - l.hypotheses[i].likelihood[0]);
+  }
+  object.hit_view = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
+  const ObjectLook repeated = lookAt(boxes, 1.0);
+  update(object, repeated, Eigen::VectorXd::Ones(1), boxes, frame);
+  double still = 0.0, moving = 0.0;
+  for (const auto& h : object.hypotheses) {
+    if (h.class_name == "car") (h.moving ? moving : still) = h.weight;
+  }
+  EXPECT_NEAR(moving / still, A[1] / A[0], 1e-9 + 1e-6 * A[1] / A[0]);
+  EXPECT_NEAR(classProbability(object, "car"), 0.7, 0.05);
 }
 
 TEST_F(Update, AConstantAddedToAllActivationsChangesNothing) {
@@ -173,17 +216,27 @@ TEST_F(Update, ManyLooksFromOnePlaceAddLittle) {
 }
 
 TEST_F(Update, ManyLooksUnderOnePoseErrorDoNotBeatIt) {
-  parameters.looks.correlation = 0.0;
   frame.pose_error.covariance.diagonal() << 1e-8, 1e-8, 1e-8, 0.04, 0.04, 0.04;
   for (auto& h : object.hypotheses) {  // as at birth: the position carries the pose's error
     h.C.topRightCorner<3, 3>() = 0.04 * Eigen::Matrix3d::Identity();
     h.P.diagonal().head<3>().array() += 0.04;
   }
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
-  for (int k = 0; k < 100; ++k) {
-    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
-  }
-  EXPECT_GT(object.best().P(1, 1), 0.039);
+  const Evidence box = evidenceOf(object.hypotheses[0].x);
+  Hypothesis h = object.hypotheses[0];
+  const double before = h.P(1, 1);
+  for (int k = 0; k < 100; ++k) h = updateWithBox(h, box.z, {}, 1.0, frame);
+  EXPECT_LT(h.P(1, 1), 0.5 * before);  // the looks did count
+  EXPECT_GT(h.P(1, 1), 0.039);
+}
+
+TEST_F(Update, AnOutlierMovesTheStateLessThanItsNoiseWouldLetIt) {
+  const Hypothesis h = object.hypotheses[0];
+  const auto moved = [&](double metres) {
+    State far = h.x;
+    far[1] += metres;
+    return (updateWithBox(h, evidenceOf(far).z, {}, 1.0, frame).x - h.x).head<3>().norm();
+  };
+  EXPECT_LT(moved(4.0), 3.6 * moved(1.0));
 }
 
 TEST_F(Update, EkfShrinksTheErrorOfPositionFromASeriesOfViews) {

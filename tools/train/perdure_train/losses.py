@@ -14,7 +14,7 @@ from .settings import AZIMUTH_CLASSES, BINS, CLASSES
 
 TOP = 10
 WITH_AZIMUTH = torch.tensor([name in AZIMUTH_CLASSES for name in CLASSES])
-WEIGHTS = {"class": 1.0, "box": 3.0, "side": 0.5, "bin": 0.6, "residual": 1.0}
+WEIGHTS = {"class": 1.0, "box": 3.0, "side": 0.5, "bin": 1.0, "residual": 1.0}
 
 
 def inside(centres, boxes):

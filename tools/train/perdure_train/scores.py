@@ -178,17 +178,22 @@ def calibration_error(p, labels, bins=15):
     return float(error)
 
 
+CLEAR = 0.8  # probability of the best class; what is half hidden has other errors
+LARGE = 40.0  # pixels of the input; of smaller ones the pixel is the larger error
+
+
 def side_errors(frames):
-    """Errors of sides relative to the box's size, of best matches that reach no border."""
+    """Errors of sides relative to the box's size, where that is large, of clear best matches."""
     errors = []
     for detections, truth in frames:
         if not len(detections["boxes"]) or not len(truth["boxes"]):
             continue
         got = match(detections["boxes"], detections["p"].max(1), truth["boxes"], ~truth["ignored"])
-        for i in np.flatnonzero(got >= 0):
+        clear = detections["p"].max(1) > CLEAR
+        for i in np.flatnonzero((got >= 0) & clear):
             box = truth["boxes"][got[i]]
             sides = np.array([box[2] - box[0], box[3] - box[1]])
             error = (detections["boxes"][i] - box) / np.tile(sides, 2)
             free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
-            errors.extend(error[free])
+            errors.extend(error[free & np.tile(sides > LARGE, 2)])
     return np.array(errors)
