@@ -160,9 +160,9 @@ TEST(LongScene, Town) {
   for (const auto& object : run.objects) {
     kept += object.working && (object.centre - here).norm() > 150.0 ? 1.0 : 0.0;
   }
-  hold(commonBars(run, {.recall = because("0.62", kMoving)}) +
+  hold(commonBars(run, {.recall = because("0.60", kMoving)}) +
        Bars{atMost(0, "things in the working set more than 150 m away", kept,
-                   "84: the working set is everything, nothing is archived yet")});
+                   "89: the working set is everything, nothing is archived yet")});
 }
 
 TEST(LongScene, Straight) {

@@ -225,12 +225,15 @@ double weigh(Object& object, const std::vector<Shares>& shares, double worth) {
     sum += object.hypotheses[i].weight * shares[i].A;
   }
   for (const auto& [name, c] : classes) {
+    if (c.first <= 0.0) continue;
     mean_A += c.second;
     tempered_A += c.first * std::pow(c.second / c.first, worth);
   }
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const auto& [weight, sum] = classes[object.hypotheses[i].class_name];
-    object.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, worth - 1.0);
+    if (weight > 0.0) {
+      object.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, worth - 1.0);
+    }
   }
   object.screened = std::min(1.0, object.screened / mean_A);
   return tempered_A;
