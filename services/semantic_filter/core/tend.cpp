@@ -199,6 +199,25 @@ bool sameInImage(const State& a, const State& b, const View& view) {
   return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
 }
 
+bool bothSeen(const Object& a, const Object& b) {
+  return a.visible_fraction > 0.0 && b.visible_fraction > 0.0;
+}
+
+/// Whether b is hidden by a, which is seen: two solid things cannot share their space, so that a
+/// copy behind its original is no thing of its own.
+bool hides(const Object& a, const Object& b) {
+  return a.visible_fraction > 0.0 && b.visibility == Visibility::kOccluded && b.blocked_by == a.id;
+}
+
+/// A hidden one waits at the time when it was last seen; what is merged is of one time.
+void bringUpToDate(Object& a, Object& b, const FrameContext& frame) {
+  const TimePoint now = std::max(a.as_of, b.as_of);
+  for (Object* o : {&a, &b}) {
+    if (o->visible_fraction > 0.0) continue;
+    predict(*o, now, frame.pose_error, frame.parameters->motion, viewWalkOf(frame));
+  }
+}
+
 bool older(const Object& a, const Object& b) {
   return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
 }
@@ -285,9 +304,9 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (objects[i].visible_fraction <= 0.0) continue;
     for (std::size_t j = i + 1; j < objects.size();) {
-      if (objects[j].visible_fraction <= 0.0) {
+      if (!bothSeen(objects[i], objects[j]) && !hides(objects[i], objects[j]) &&
+          !hides(objects[j], objects[i])) {
         ++j;
         continue;
       }
@@ -301,6 +320,7 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
         ++j;
         continue;
       }
+      bringUpToDate(objects[i], objects[j], frame);
       if (older(objects[j], objects[i])) std::swap(objects[i], objects[j]);
       absorb(objects[i], objects[j], frame);
       merges.push_back({objects[i].id, objects[j].id});

@@ -19,8 +19,9 @@ void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters&
 /// Shared volume over joint volume of two upright cuboids.
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 
-/// Merges visible objects of the same best class that occupy the same space; the older survives.
-/// Hidden ones wait: a frame that does not see them does not change them.
+/// Merges objects of the same best class that occupy the same space; the older survives. Both are
+/// seen, or one hides the other; the rest waits: a frame that does not see them does not change
+/// them.
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame);
 
 /// The state of two beliefs about one object whose errors are independent but for the size prior

@@ -70,6 +70,21 @@ TEST_F(Tending, OverlapIsSharedOverJointVolume) {
   EXPECT_EQ(overlap(a, makeState(0, 0, 2, 0, 4, 2, 1.5), Eigen::Vector3d::UnitZ()), 0.0);
 }
 
+TEST_F(Tending, ACopyThatIsHiddenByItsOriginalIsNoThingOfItsOwn) {
+  std::vector<Object> objects = {
+      makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
+      makeObject(5, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
+  objects[1].visible_fraction = 0.0;
+  objects[1].visibility = Visibility::kOccluded;
+  objects[1].blocked_by = 7;  // something else: it waits
+  EXPECT_TRUE(mergeObjects(objects, frame).empty());
+  objects[1].blocked_by = 2;
+  const auto merges = mergeObjects(objects, frame);
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].survivor, 2u);
+  EXPECT_EQ(merges[0].absorbed, 5u);
+}
+
 TEST_F(Tending, OfTwoOfOneClassInOnePlaceTheOlderStays) {
   std::vector<Object> objects = {
       makeObject(5, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
