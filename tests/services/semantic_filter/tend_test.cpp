@@ -70,6 +70,19 @@ TEST_F(Tending, OverlapIsSharedOverJointVolume) {
   EXPECT_EQ(overlap(a, makeState(0, 0, 2, 0, 4, 2, 1.5), Eigen::Vector3d::UnitZ()), 0.0);
 }
 
+TEST_F(Tending, WhatNoLongerHasTheSizeOfItsClassIsDropped) {
+  Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
+  Hypothesis half = o.hypotheses[0];
+  half.x = makeState(5, 0, 0.4, 0, 2, 0.9, 0.75);
+  o.hypotheses[0].weight = 0.4;
+  half.weight = 0.6;
+  o.hypotheses.push_back(half);
+  tendHypotheses(o, priors, parameters);
+  ASSERT_EQ(o.hypotheses.size(), 1u);
+  EXPECT_NEAR(o.best().x[0], 10.0, 1e-9);
+  EXPECT_NEAR(o.existence, 0.9 * 0.4, 1e-9);
+}
+
 TEST_F(Tending, ACopyThatIsHiddenByItsOriginalIsNoThingOfItsOwn) {
   std::vector<Object> objects = {
       makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
