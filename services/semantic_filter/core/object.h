@@ -31,8 +31,7 @@ struct Hypothesis {
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
-  double pace =
-      1.0;  ///< of a moving one: the prior of its speed against the Gaussian it began with
+  double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
 };
 
 /// From where the object was last looked at, for the correlation of looks (DESIGN 5, item 7).
