@@ -1,6 +1,7 @@
 #include "common/replay/detection_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/base/errors.h"
@@ -14,6 +15,8 @@ namespace {
 struct Columns {
   std::size_t frame = 0, x1 = 0, y1 = 0, x2 = 0, y2 = 0, score = 0, count = 0;
   std::optional<std::size_t> class_name, azimuth;
+  std::optional<std::size_t> sigma_azimuth;
+  std::optional<std::array<std::size_t, 4>> sigmas;
   std::vector<std::pair<std::size_t, std::string>> logits;
 };
 
@@ -43,6 +46,10 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
   columns.x2 = need("x2"), columns.y2 = need("y2");
   columns.score = need("score");
   columns.class_name = need("class");
+  if (at.contains("sigma_azimuth")) columns.sigma_azimuth = at["sigma_azimuth"];
+  if (at.contains("sigma_x1")) {
+    columns.sigmas = {need("sigma_x1"), need("sigma_y1"), need("sigma_x2"), need("sigma_y2")};
+  }
   wrong.throwIfAny();
   return columns;
 }
@@ -77,6 +84,18 @@ std::string fillEvidence(const std::vector<std::string_view>& fields, const Colu
     if (!azimuth || std::abs(*azimuth) > 7.0) return "azimuth is in radians, or empty";
     row.detection.azimuth = *azimuth;
     row.detection.azimuth_sigma = options.azimuth_sigma;
+    if (columns.sigma_azimuth && !fields[*columns.sigma_azimuth].empty()) {
+      const auto sigma = parseNumber(fields[*columns.sigma_azimuth]);
+      if (!sigma || *sigma <= 0.0) return "sigma_azimuth is above 0, in radians, or empty";
+      row.detection.azimuth_sigma = *sigma;
+    }
+  }
+  for (std::size_t i = 0; columns.sigmas && i < 4; ++i) {
+    const auto field = fields[(*columns.sigmas)[i]];
+    if (field.empty()) continue;
+    const auto sigma = parseNumber(field);
+    if (!sigma || *sigma < 0.0) return "sigma_x1 to sigma_y2 are 0 or more pixels, or empty";
+    row.detection.side_sigma[i] = *sigma;
   }
   if (columns.logits.empty()) return {};
   row.detection.activations = {0.0F};

@@ -1,6 +1,7 @@
 // What inference says: evidence for classes in boxes (eq. 6, 7), not decisions.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -29,7 +30,10 @@ struct Detection {
   std::vector<float> activations;
   std::optional<double> azimuth;  ///< alpha (KITTI), radians; yaw minus bearing of the centre
   double azimuth_sigma = 0.35;    ///< radians, > 0 where azimuth is given
-  bool primed = false;            ///< found only because a prediction asked for it
+  /// Standard deviation of x1, y1, x2, y2 in pixels, where the network says it of each box; 0 where
+  /// it does not: then ModelInfo::box_sigma holds.
+  std::array<double, 4> side_sigma{};
+  bool primed = false;  ///< found only because a prediction asked for it
 };
 
 struct Detections {
@@ -45,7 +49,8 @@ struct ModelInfo {
   InstanceId instance = 0;
   std::uint64_t hash = 0;  ///< of weights and model.json
   std::string name;
-  std::vector<std::string> classes;  ///< lower-case; K names, activations[k + 1] belongs to classes[k]
+  std::vector<std::string>
+      classes;  ///< lower-case; K names, activations[k + 1] belongs to classes[k]
   std::uint32_t input_width = 0, input_height = 0;
   double box_sigma = 0.0;  ///< standard deviation of a box's side relative to its size; 0 = unknown
 };

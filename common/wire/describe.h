@@ -167,6 +167,9 @@ void describe(A& a, D& d, W& w) {
   a.number("azimuth_sigma", d.azimuth_sigma, w.azimuth_sigma, kNotNegative);
   a.ensure("azimuth_sigma", "out_of_range", [&] { return !d.azimuth || d.azimuth_sigma > 0; });
   a.value("primed", d.primed, w.primed);
+  for (std::size_t i = 0; i < d.side_sigma.size(); ++i) {
+    a.number("side_sigma", d.side_sigma[i], w.side_sigma[i], kNotNegative);
+  }
 }
 
 template <class A, Is<Detections> D, class W>

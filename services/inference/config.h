@@ -18,7 +18,7 @@ struct ModelConfig {
 struct DetectionConfig {
   std::string camera = "cam0";
   double score_threshold = 0.05;
-  double merge_iou = 0.6;
+  double merge_iou = 0.5;
   std::int64_t limit = 100;
   std::vector<std::string> classes;  ///< empty = all of the network's
 };

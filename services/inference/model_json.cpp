@@ -160,6 +160,7 @@ void readLevel(const Json& json, const std::string& where, Reader& parent,
     level.box = reader.text("box", true);
     level.logits = reader.text("logits", true);
     if (model.azimuth.bins > 0) level.azimuth = reader.text("azimuth", true);
+    if (model.spread_scale > 0) level.spread = reader.text("spread", true);
   } else {
     level.box = reader.text("box", true);
     level.objectness = reader.text("objectness", true);
@@ -235,6 +236,8 @@ void readAzimuth(const Json& json, Reader& parent, ModelDescription& model) {
 void readHeads(Reader& reader, ModelDescription& model) {
   if (model.family == Family::kPerdure) {
     if (const Json* azimuth = reader.find("azimuth")) readAzimuth(*azimuth, reader, model);
+    reader.number("reach", model.reach, 0, 10);
+    reader.number("spread_scale", model.spread_scale, 0, 100);
   } else if (const Json* activation = reader.need("activation")) {
     readActivation(*activation, reader, model);
   }

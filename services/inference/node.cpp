@@ -115,6 +115,7 @@ Result<Detections> Node::infer(const Frame& frame) {
   for (Candidate& candidate : *candidates) {
     Detection detection;
     detection.box = fit.toImage(candidate.box);
+    detection.side_sigma = fit.toImage(candidate.side_sigma);
     detection.activations = std::move(candidate.activations);
     detection.azimuth = candidate.azimuth;
     detection.azimuth_sigma = candidate.azimuth_sigma;

@@ -46,8 +46,11 @@ fs::path embeddedDrive(const fs::path& cache,
 std::string embeddedModel(const fs::path& root) {
   std::vector<fs::path> found;
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(root / "models", ignored)) {
-    if (entry.path().extension() == ".onnx") found.push_back(entry.path());
+  for (const fs::path& folder : {root / "models" / "demo", root / "models"}) {
+    if (!found.empty()) break;
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+      if (entry.path().extension() == ".onnx") found.push_back(entry.path());
+    }
   }
   if (found.size() == 1) return found.front().string();
   throw StartupError(ExitCode::kUsage,

@@ -23,8 +23,8 @@ std::filesystem::path embeddedDriveFolder(const std::filesystem::path& cache);
 std::filesystem::path embeddedDrive(const std::filesystem::path& cache,
                                     const std::function<void(const SimulateProgress&)>& report);
 
-/// The one network (.onnx) in ROOT/models. Throws StartupError(kUsage) with the mend where there is
-/// none, or more than one.
+/// The one network (.onnx) in ROOT/models/demo, or else in ROOT/models. Throws StartupError(kUsage)
+/// with the mend where there is none, or more than one.
 std::string embeddedModel(const std::filesystem::path& root);
 
 }  // namespace perdure::tools

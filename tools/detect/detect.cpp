@@ -26,7 +26,7 @@ double medianOf(std::vector<double> values) {
 }  // namespace
 
 void writeDetectionHeader(std::ostream& out, const ModelInfo& model) {
-  out << "frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth";
+  out << "frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,sigma_x1,sigma_y1,sigma_x2,sigma_y2";
   for (const std::string& name : model.classes) out << ",logit:" << name;
   out << '\n';
 }
@@ -44,6 +44,10 @@ void writeDetection(std::ostream& out, const ModelInfo& model, std::uint64_t fra
       << b.y2 << ',' << std::exp(*best - highest) / sum << ',';
   if (detection.azimuth) out << *detection.azimuth << ',' << detection.azimuth_sigma;
   if (!detection.azimuth) out << ',';
+  for (const double sigma : detection.side_sigma) {
+    out << ',';
+    if (sigma > 0.0) out << sigma;
+  }
   for (std::size_t i = 1; i < a.size(); ++i) out << ',' << a[i];
   out << '\n';
 }

@@ -141,6 +141,7 @@ std::vector<std::vector<int>> expectedShapes(const ModelDescription& model) {
       shapes.push_back({1, 4, rows, columns});
       shapes.push_back({1, 1 + classes, rows, columns});
       if (model.azimuth.bins > 0) shapes.push_back({1, 2 * model.azimuth.bins, rows, columns});
+      if (model.spread_scale > 0) shapes.push_back({1, 4, rows, columns});
     } else if (model.family == Family::kYoloFastest) {
       shapes.push_back({1, rows, columns, static_cast<int>(level.anchors.size()) * (5 + classes)});
     } else {

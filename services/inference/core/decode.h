@@ -1,6 +1,7 @@
 // Raw head tensors to boxes with evidence, one rule for each family of networks (eq. 6, 7).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -26,6 +27,7 @@ struct Candidate {
   std::vector<float> activations;
   std::optional<double> azimuth = {};  ///< alpha (KITTI), radians
   double azimuth_sigma = 0.35;         ///< radians
+  std::array<double, 4> side_sigma{};  ///< pixels of the input; 0 = unknown
 };
 
 struct DecodeOptions {

@@ -53,9 +53,9 @@ std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOpti
 
 double softPlus(double x) { return -logSigmoid(-x); }
 
-Box boxOf(const Cell& raw, double x, double y, double stride) {
-  return {x - stride * softPlus(raw[0]), y - stride * softPlus(raw[1]),
-          x + stride * softPlus(raw[2]), y + stride * softPlus(raw[3])};
+Box boxOf(const Cell& raw, double x, double y, double stride, double reach) {
+  const auto distance = [&](std::size_t side) { return stride * (softPlus(raw[side]) - reach); };
+  return {x - distance(0), y - distance(1), x + distance(2), y + distance(3)};
 }
 
 void readAzimuth(const Azimuth& azimuth, const Cell& raw, Candidate& candidate) {
@@ -91,7 +91,13 @@ void decodePerdure(const ModelDescription& model, const DecodeOptions& options, 
     if (!best) continue;
     const double x = (static_cast<int>(i) % columns + 0.5) * level.stride;
     const double y = (static_cast<int>(i) / columns + 0.5) * level.stride;
-    candidate.box = boxOf({tensors[0].values.data() + i, cells}, x, y, level.stride);
+    candidate.box = boxOf({tensors[0].values.data() + i, cells}, x, y, level.stride, model.reach);
+    if (model.spread_scale > 0) {
+      const Cell raw{tensors.back().values.data() + i, cells};
+      for (std::size_t side = 0; side < 4; ++side) {
+        candidate.side_sigma[side] = model.spread_scale * level.stride * softPlus(raw[side]);
+      }
+    }
     if (reportsAzimuth(model, *best)) {
       readAzimuth(model.azimuth, {tensors[2].values.data() + i, cells}, candidate);
     }

@@ -35,8 +35,8 @@ struct Level {
   std::string tensor;
   std::vector<std::pair<double, double>> anchors;
   /// Perdure: `box` (1,4,H,W) and logits (1,1+K,H,W), background first; azimuth (1,2·bins,H,W)
-  /// where the model has one.
-  std::string logits, azimuth;
+  /// and spread (1,4,H,W) where the model has them.
+  std::string logits, azimuth, spread;
 };
 
 /// From the network's score to a log-likelihood ratio against clutter (core/evidence.h).
@@ -62,6 +62,8 @@ struct ModelDescription {
   double class_exponent = 1.0;
   std::vector<Level> levels;
   Azimuth azimuth;
+  double reach = 0.0;         ///< perdure: cells that a cell's centre may lie outside its box
+  double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: the network has none
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0 unknown
   Calibration calibration;
 };
@@ -75,6 +77,7 @@ inline std::vector<std::string> tensorNames(const ModelDescription& model) {
     } else if (model.family == Family::kPerdure) {
       names.insert(names.end(), {level.box, level.logits});
       if (model.azimuth.bins > 0) names.push_back(level.azimuth);
+      if (model.spread_scale > 0) names.push_back(level.spread);
     } else {
       names.insert(names.end(), {level.box, level.objectness, level.classes});
     }

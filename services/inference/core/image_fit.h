@@ -1,6 +1,7 @@
 // An image brought to the network's input, and the way back for boxes.
 #pragma once
 
+#include <array>
 #include <opencv2/core/mat.hpp>
 
 #include "common/base/result.h"
@@ -18,6 +19,9 @@ struct ImageFit {
   Box toImage(const Box& b) const {
     return {(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y, (b.x2 - offset_x) / scale_x,
             (b.y2 - offset_y) / scale_y};
+  }
+  std::array<double, 4> toImage(const std::array<double, 4>& sides) const {
+    return {sides[0] / scale_x, sides[1] / scale_y, sides[2] / scale_x, sides[3] / scale_y};
   }
 };
 

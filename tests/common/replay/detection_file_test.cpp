@@ -71,6 +71,17 @@ TEST(DetectionFile, LogitColumnsAreTakenAsTheyAre) {
   EXPECT_THAT(file.at(0)->front().activations, ElementsAre(0.0F, 1.25F, -2.0F));
 }
 
+TEST(DetectionFile, DeviationsOfSidesAndAzimuthAreRead) {
+  const auto file = readCsv(
+      "frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,sigma_x1,sigma_y1,sigma_x2,sigma_y2\n"
+      "0,car,1,2,3,4,0.5,1.0,0.1,1,2,3,4\n0,car,5,2,7,4,0.5,1.0,,,,,\n");
+  ASSERT_EQ(file.at(0)->size(), 2U);
+  EXPECT_THAT(file.at(0)->front().side_sigma, ElementsAre(1.0, 2.0, 3.0, 4.0));
+  EXPECT_EQ(file.at(0)->front().azimuth_sigma, 0.1);
+  EXPECT_THAT(file.at(0)->back().side_sigma, ElementsAre(0.0, 0.0, 0.0, 0.0));
+  EXPECT_EQ(file.at(0)->back().azimuth_sigma, DetectionFileOptions{}.azimuth_sigma);
+}
+
 TEST(DetectionFile, ClassesAreKnownFromTheFrameInWhichTheyFirstAppear) {
   const std::string first = "0,car,1,2,3,4,0.5,\n", second = "7,van,1,2,3,4,0.5,\n";
   const auto whole = readCsv(kHeader + first + second);
@@ -108,6 +119,11 @@ TEST(DetectionFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(errorOf("frame,frame,class,x1,y1,x2,y2,score\n"), HasSubstr("frame is there twice"));
   EXPECT_THAT(errorOf("frame,class,x1,y1,x2,y2,score,logit:car\n0,car,1,2,3,4,.5,?\n"),
               HasSubstr(":2: logit:car"));
+  EXPECT_THAT(errorOf("frame,class,x1,y1,x2,y2,score,sigma_x1\n"),
+              HasSubstr("sigma_y1 is missing"));
+  EXPECT_THAT(errorOf("frame,class,x1,y1,x2,y2,score,sigma_x1,sigma_y1,sigma_x2,sigma_y2\n"
+                      "0,car,1,2,3,4,.5,1,1,-1,1\n"),
+              HasSubstr("sigma_x1 to sigma_y2 are 0 or more"));
   EXPECT_THAT(errorOf(""), HasSubstr("is empty"));
 }
 

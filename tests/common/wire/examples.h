@@ -122,8 +122,10 @@ class Examples {
     m = {stamp(), bits(), world(), word(), several([&] { return landmark(); })};
   }
   Detection detection() {
-    Detection d{
-        box(), several([&] { return static_cast<float>(uniform()); }), {}, uniform(0.1, 1), coin()};
+    Detection d{box(), several([&] { return static_cast<float>(uniform()); }),
+                {},    uniform(0.1, 1),
+                {},    coin()};
+    for (double& sigma : d.side_sigma) sigma = uniform(0, 9);
     if (coin()) d.azimuth = uniform(-3, 3);
     return d;
   }

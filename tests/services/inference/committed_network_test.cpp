@@ -37,6 +37,16 @@ TEST(CommittedNetwork, KnowsTheClassesOfTheSimulatorAndHowSharpItsBoxesAre) {
   EXPECT_GT(node.model().box_sigma, 0.0);
 }
 
+TEST(CommittedNetwork, OfTheDemoIsTheSameForLargerImages) {
+  Config demo = committed();
+  demo.model.path = (models() / "demo" / "perdure_480x360.onnx").string();
+  const Node node(demo, 1), small(committed(), 2);
+  EXPECT_EQ(node.model().input_width, 480u);
+  EXPECT_EQ(node.model().input_height, 360u);
+  EXPECT_EQ(node.model().classes, small.model().classes);
+  EXPECT_EQ(node.model().box_sigma, small.model().box_sigma);
+}
+
 TEST(CommittedNetwork, IsSureOfNothingOnAFlatPictureOfAnySize) {
   Node node(committed(), 1);
   for (const auto& [width, height] : {std::pair{640u, 480u}, {320u, 240u}, {1242u, 375u}}) {

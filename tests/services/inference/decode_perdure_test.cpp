@@ -57,6 +57,38 @@ TEST(DecodePerdure, SidesAreSoftPlusDistancesFromTheCentreOfTheCell) {
   EXPECT_NEAR(b.y2, 48 + 32 * softPlus(2.0), 1e-5);
 }
 
+TEST(DecodePerdure, ACellMayLieOutsideTheObjectThatItFinds) {
+  ModelDescription model = tinyDescription();
+  model.reach = 0.5;
+  testing::TinyOnnx tiny;
+  tiny.box = {-5.0F, 1.0F, 2.0F, 2.0F};
+  const Box& b = decoded(tiny, {0.05, {0, 1}}, model)[3].box;
+  EXPECT_NEAR(b.x1, 48 - 32 * (softPlus(-5.0) - 0.5), 1e-5);
+  EXPECT_GT(b.x1, 48) << "to the right of the cell's centre";
+}
+
+TEST(DecodePerdure, SpreadIsTheDeviationOfEachSide) {
+  ModelDescription model = tinyDescription();
+  model.spread_scale = 1.5;
+  const testing::TinyOnnx tiny;
+  const std::vector<float> spread{0.0F, 1.0F, -1.0F, 2.0F};
+  std::vector<std::vector<float>> values;
+  for (const auto* head : {&tiny.box, &tiny.logits, &tiny.azimuth, &spread}) {
+    values.emplace_back();
+    for (const float v : *head) values.back().insert(values.back().end(), 4, v);
+  }
+  std::vector<Tensor> tensors;
+  const auto shapes = expectedShapes(model);
+  ASSERT_EQ(shapes.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) tensors.push_back({shapes[i], values[i]});
+  const auto out = decode(model, {0.05, {0, 1}}, tensors);
+  ASSERT_TRUE(out);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR((*out)[0].side_sigma[i], 1.5 * 32 * softPlus(spread[i]), 1e-4);
+  }
+  EXPECT_EQ(decoded(tiny, {0.05, {0, 1}})[0].side_sigma[0], 0.0) << "unknown without a spread";
+}
+
 TEST(DecodePerdure, ActivationsAreLogitsAgainstTheBackgroundsCalibrated) {
   const auto out = decoded({}, {0.05, {0, 1}});
   const double sum = 1 + std::exp(1.0) + std::exp(-2.0);

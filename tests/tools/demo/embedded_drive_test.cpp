@@ -39,6 +39,9 @@ TEST_F(EmbeddedModel, IsTheOneNetworkInModels) {
   std::ofstream(root_ / "models" / "street.json") << "{}";
   std::ofstream(root_ / "models" / "street.onnx") << "";
   EXPECT_EQ(embeddedModel(root_), (root_ / "models" / "street.onnx").string());
+  fs::create_directories(root_ / "models" / "demo");
+  std::ofstream(root_ / "models" / "demo" / "street.onnx") << "";
+  EXPECT_EQ(embeddedModel(root_), (root_ / "models" / "demo" / "street.onnx").string());
 }
 
 TEST_F(EmbeddedModel, IsAskedForWhereThereIsNoneOrMoreThanOne) {

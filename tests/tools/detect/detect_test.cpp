@@ -57,7 +57,7 @@ TEST(Detect, ScoreIsTheSoftMaxOfTheActivationsAndAzimuthMayBeMissing) {
   writeDetectionHeader(out, model);
   writeDetection(out, model, 7, d);
   const double p = std::exp(2.0) / (1 + std::exp(-1.0) + std::exp(2.0));
-  EXPECT_THAT(out.str(), HasSubstr("sigma_azimuth,logit:chair,logit:couch\n7,couch,1,2,3,4,0.8"));
+  EXPECT_THAT(out.str(), HasSubstr("sigma_y2,logit:chair,logit:couch\n7,couch,1,2,3,4,0.8"));
   EXPECT_NEAR(std::stod(out.str().substr(out.str().find("3,4,") + 4)), p, 1e-5);
   EXPECT_THAT(out.str(), HasSubstr(",,,-1,2\n"));
 }

@@ -19,7 +19,7 @@ except ImportError as missing:
 
 from perdure_train import augment, data, export, heads, losses, release, scores, simulated
 from perdure_train.network import Network, parameters_of
-from perdure_train.settings import CLASSES, STRIDES, grid
+from perdure_train.settings import CLASSES, REACH, STRIDES, grid
 
 torch.set_num_threads(1)
 
@@ -151,12 +151,30 @@ class Learning(unittest.TestCase):
         _, truth = self.batch()
         a = len(self.centres)
         boxes = torch.cat((self.centres - 30, self.centres + 30), 1)[None]
-        quality, owner = losses.assign(torch.full((1, a, len(CLASSES) + 1), 0.1), boxes, self.centres, truth)
+        quality, owner = losses.assign(torch.full((1, a, len(CLASSES) + 1), 0.1), boxes, self.centres, self.strides, truth)
         chosen = quality[0] > 0
         self.assertTrue(0 < int(chosen.sum()) <= losses.TOP)
-        inside = losses.inside(self.centres, truth["boxes"])[0, 0]
+        inside = losses.inside(self.centres, truth["boxes"], REACH * self.strides)[0, 0]
         self.assertTrue(bool(inside[chosen].all()))
         self.assertTrue(bool((owner[0][chosen] == 0).all()))
+
+    def test_an_object_smaller_than_a_cell_has_a_cell_wherever_it_is(self):
+        for x in np.arange(100, 108, 0.7):
+            box = torch.tensor([[[x, 60.5, x + 3, 62.5]]], dtype=torch.float32)
+            self.assertTrue(bool(losses.inside(self.centres, box, REACH * self.strides).any()))
+
+    def test_boxes_whose_sides_have_passed_each_other_have_no_area(self):
+        box = torch.tensor([[10.0, 10, 4, 4]])
+        self.assertEqual(float(heads.area(box)), 0.0)
+        self.assertEqual(float(heads.iou(box, torch.tensor([[0.0, 0, 20, 20]]))), 0.0)
+
+    def test_spread_is_cheapest_at_the_mean_error(self):
+        target = torch.tensor([[10.0, 10, 50, 60]])
+        raw = torch.linspace(-3, 3, 200)
+        costs = [float(losses.spread_loss(torch.full((1, 4), float(r)), target + 8, target,
+                                          torch.tensor([8.0]), torch.ones(1))) for r in raw]
+        best = heads.spread_of(raw[int(np.argmin(costs))])
+        self.assertAlmostEqual(float(best), 1.0, delta=0.05)
 
     def test_exact_boxes_cost_nothing_and_shifted_ones_do(self):
         box = torch.tensor([[10.0, 10, 50, 60]])
@@ -212,6 +230,12 @@ class Scores(unittest.TestCase):
         self.assertEqual(scores.class_average_precision(frames, 0, scores.SIZES["medium"]), (1.0, 1))
         self.assertEqual(scores.recall(frames, 0, 24), (1, 1))
 
+    def test_ratios_of_sides_are_errors_over_what_is_said_of_them(self):
+        truth = truth_of([[100, 100, 140, 140]], [0])
+        detections, _ = self.frame([[102, 100, 140, 144]], [self.likely(0, 0.9)], truth)
+        detections["sigmas"] = np.array([[4.0, 1.0, 1.0, 2.0]])
+        np.testing.assert_allclose(scores.side_ratios([(detections, truth)]), [0.5, 0, 0, 2])
+
     def test_calibration_error_is_the_gap_between_confidence_and_success(self):
         p = np.array([self.likely(0, 0.8)] * 10)
         labels = np.array([1] * 5 + [0] * 5)
@@ -238,9 +262,12 @@ class Export(unittest.TestCase):
             export.write_onnx(network, path)
             self.assertLessEqual(path.stat().st_size, 2_000_000)
             model = onnx.load(str(path))
+            export.write_onnx(network, path, size=(480, 360))
+            wide = onnx.load(str(path))
         self.assertNotIn("Identity", {node.op_type for node in model.graph.node})
-        wanted = [level[part] for level in release.description()["levels"] for part in ("logits", "box", "azimuth")]
+        wanted = [level[part] for level in release.description()["levels"] for part in ("logits", "box", "azimuth", "spread")]
         self.assertEqual([output.name for output in model.graph.output], wanted)
+        self.assertEqual([d.dim_value for d in wide.graph.input[0].type.tensor_type.shape.dim], [1, 3, 360, 480])
 
     def test_folding_the_batch_norm_changes_no_answer(self):
         torch.manual_seed(0)

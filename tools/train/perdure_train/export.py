@@ -52,15 +52,16 @@ def _without_identities(model):
     return model
 
 
-def write_onnx(network, path, background_shift=0.0):
-    """`background_shift` is added to the background's logit: calibration that needs no key."""
+def write_onnx(network, path, background_shift=0.0, size=(WIDTH, HEIGHT)):
+    """For images of `size`, width first; the weights are the same for all. `background_shift` is
+    added to the background's logit: calibration that needs no key."""
     network = folded(network)
     with torch.no_grad():
         network.logits.bias[0] += background_shift
     names = [name for level in TENSORS for name in level]
     torch.onnx.export(
         _Flat(network),
-        torch.zeros(1, 3, HEIGHT, WIDTH),
+        torch.zeros(1, 3, size[1], size[0]),
         str(path),
         opset_version=11,
         input_names=["images"],

@@ -5,7 +5,7 @@ import math
 import torch
 from torch.nn import functional
 
-from .settings import BINS, STRIDES, grid
+from .settings import BINS, REACH, STRIDES, grid
 
 HALF_BIN = math.pi / BINS
 
@@ -23,18 +23,23 @@ def cells():
 
 
 def flat(outputs):
-    """One (N, A, channels) each of logits, box and azimuth, float32."""
+    """One (N, A, channels) each of logits, box, azimuth and spread, float32."""
     parts = []
-    for part in range(3):
+    for part in range(len(outputs[0])):
         maps = [level[part].float().flatten(2) for level in outputs]
         parts.append(torch.cat(maps, 2).transpose(1, 2))
     return parts
 
 
 def boxes_of(raw, centres, strides):
-    """Corners (…, A, 4) in pixels of the input."""
-    distance = functional.softplus(raw) * strides[:, None]
+    """Corners (…, A, 4) in pixels of the input; low may pass high by a stride at the most."""
+    distance = (functional.softplus(raw) - REACH) * strides[:, None]
     return torch.cat((centres - distance[..., :2], centres + distance[..., 2:]), -1)
+
+
+def spread_of(raw):
+    """Scale of the Laplace distribution of each side's error, in strides."""
+    return functional.softplus(raw) + 0.01
 
 
 def azimuth_of(raw):
@@ -53,6 +58,9 @@ def iou(a, b):
     """IoU of boxes of broadcastable shapes (…, 4)."""
     low, high = torch.maximum(a[..., :2], b[..., :2]), torch.minimum(a[..., 2:], b[..., 2:])
     common = (high - low).clamp_min(0).prod(-1)
-    area_a = (a[..., 2:] - a[..., :2]).prod(-1)
-    area_b = (b[..., 2:] - b[..., :2]).prod(-1)
-    return common / (area_a + area_b - common).clamp_min(1e-6)
+    return common / (area(a) + area(b) - common).clamp_min(1e-6)
+
+
+def area(boxes):
+    """Of a box whose sides have passed each other: 0."""
+    return (boxes[..., 2:] - boxes[..., :2]).clamp_min(0).prod(-1)

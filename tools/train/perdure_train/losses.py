@@ -9,29 +9,32 @@ cross-entropy are a proper score, so that probabilities come out nearly calibrat
 import torch
 from torch.nn import functional
 
-from .heads import HALF_BIN, boxes_of, iou, wrapped
-from .settings import AZIMUTH_CLASSES, BINS, CLASSES
+from .heads import HALF_BIN, area, boxes_of, iou, spread_of, wrapped
+from .settings import AZIMUTH_CLASSES, BINS, CLASSES, REACH
 
 TOP = 10
 WITH_AZIMUTH = torch.tensor([name in AZIMUTH_CLASSES for name in CLASSES])
-WEIGHTS = {"class": 1.0, "box": 3.0, "side": 0.5, "bin": 1.0, "residual": 1.0}
+WEIGHTS = {"class": 1.0, "box": 5.0, "side": 1.0, "bin": 1.0, "residual": 1.0, "spread": 0.3}
 
 
-def inside(centres, boxes):
-    """(N, G, A): whether a cell's centre is in a box."""
+def inside(centres, boxes, margin):
+    """(N, G, A): whether a cell's centre is in a box that is `margin` (A,) larger on each side."""
     x, y = centres[:, 0], centres[:, 1]
     b = boxes[..., None]
-    return (x > b[..., 0, :]) & (x < b[..., 2, :]) & (y > b[..., 1, :]) & (y < b[..., 3, :])
+    return (
+        (x > b[..., 0, :] - margin) & (x < b[..., 2, :] + margin)
+        & (y > b[..., 1, :] - margin) & (y < b[..., 3, :] + margin)
+    )
 
 
 @torch.no_grad()
-def assign(probabilities, boxes, centres, truth):
+def assign(probabilities, boxes, centres, strides, truth):
     """Quality (N, A) in [0, 1] and object index (N, A); quality 0 is background."""
     wanted = truth["mask"] & ~truth["ignored"]
     overlap = iou(truth["boxes"][:, :, None], boxes[:, None])  # N, G, A
     classes = (truth["classes"] + 1)[:, :, None].expand(-1, -1, boxes.shape[1])
     score = probabilities.transpose(1, 2).gather(1, classes)
-    candidate = inside(centres, truth["boxes"]) & wanted[:, :, None]
+    candidate = inside(centres, truth["boxes"], REACH * strides) & wanted[:, :, None]
     fit = (score.sqrt() * overlap.pow(6) + 1e-12) * candidate
     best = fit.topk(TOP, dim=2)
     chosen = torch.zeros_like(fit).scatter_(2, best.indices, 1.0) * (fit > 0)
@@ -54,13 +57,21 @@ def box_loss(boxes, target, strides, weight):
     high = torch.maximum(boxes[:, 2:], target[:, 2:])
     hull = (high - low).prod(-1).clamp_min(1e-6)
     overlap = iou(boxes, target)
-    areas = (boxes[:, 2:] - boxes[:, :2]).prod(-1) + (target[:, 2:] - target[:, :2]).prod(-1)
-    union = areas / (1 + overlap)
+    union = (area(boxes) + area(target)) / (1 + overlap)
     giou = overlap - (hull - union) / hull
     side = functional.smooth_l1_loss(
         boxes / strides[:, None], target / strides[:, None], reduction="none", beta=0.5
     ).mean(-1)
     return ((1 - giou) * weight).sum(), (side * weight).sum()
+
+
+def spread_loss(raw, boxes, target, strides, weight):
+    """Negative log-likelihood of the sides' errors under a Laplace distribution. What the boxes are
+    does not depend on it: only how sure the network says it is (the idea of Kendall and Gal, "What
+    uncertainties do we need in Bayesian deep learning", NIPS 2017)."""
+    error = (boxes.detach() - target).abs() / strides[:, None]
+    scale = spread_of(raw)
+    return ((error / scale + scale.log()).mean(-1) * weight).sum()
 
 
 def azimuth_loss(raw, angle, weight):
@@ -84,11 +95,12 @@ def azimuth_loss(raw, angle, weight):
 
 def losses(parts, truth, centres, strides):
     """The terms by name, each per unit of assigned quality."""
-    logits, raw_boxes, raw_azimuth = parts
+    logits, raw_boxes, raw_azimuth, raw_spread = parts
     boxes = boxes_of(raw_boxes, centres, strides)
-    quality, owner = assign(logits.detach().softmax(-1), boxes.detach(), centres, truth)
+    quality, owner = assign(logits.detach().softmax(-1), boxes.detach(), centres, strides, truth)
     classes = truth["classes"].gather(1, owner)
-    hidden = inside(centres, truth["boxes"]) & (truth["mask"] & truth["ignored"])[:, :, None]
+    hidden = inside(centres, truth["boxes"], REACH * strides)
+    hidden = hidden & (truth["mask"] & truth["ignored"])[:, :, None]
     ignored = hidden.any(1) & (quality == 0)
     total = quality.sum().clamp_min(1.0)
     terms = {"class": class_loss(logits, quality, classes, ignored)}
@@ -96,6 +108,9 @@ def losses(parts, truth, centres, strides):
     n, a = (quality > 0).nonzero(as_tuple=True)
     g, weight = owner[n, a], quality[n, a]
     terms["box"], terms["side"] = box_loss(boxes[n, a], truth["boxes"][n, g], strides[a], weight)
+    terms["spread"] = spread_loss(
+        raw_spread[n, a], boxes[n, a], truth["boxes"][n, g], strides[a], weight
+    )
     turned = WITH_AZIMUTH[classes[n, a]].float() * weight
     terms["bin"], terms["residual"] = azimuth_loss(
         raw_azimuth[n, a], truth["azimuths"][n, g], turned

@@ -5,7 +5,7 @@ import math
 import torch
 from torch import nn
 
-from .settings import BINS, CLASSES, STRIDES, grid
+from .settings import BINS, CLASSES, STRIDES
 
 
 class _ReLU(torch.autograd.Function):
@@ -53,25 +53,28 @@ class Block(nn.Module):
         return self.relu(x + self.second(self.first(x)))
 
 
-def upsampled(small):
-    return nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
+def upsampled(small, rows):
+    """Twice as large; without the row too many where the input's height is no multiple."""
+    large = nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
+    return large if large.shape[2] == rows else large[:, :, :rows]
 
 
 class Network(nn.Module):
-    """Images (N, 3, 240, 320), RGB in [0, 1] less 0.5, to one (logits, box, azimuth) a stride.
+    """Images (N, 3, 240, 320), RGB in [0, 1] less 0.5, to one (logits, box, azimuth, spread) a
+    stride.
 
     logits: K + 1, background first. box: softplus of the distances to the left, top, right and
-    bottom from the cell's centre, in strides. azimuth: BINS logits, then BINS residuals in units
-    of half a bin.
+    bottom from the cell's centre, less REACH, in strides. azimuth: BINS logits, then BINS residuals in units
+    of half a bin. spread: softplus of how far each side may be from where it is, in strides.
     """
 
     def __init__(self, widths=(16, 32, 64, 80, 64), neck=48):
         super().__init__()
         stem, w4, w8, w16, w32 = widths
         self.stride4 = nn.Sequential(conv(3, stem, 2), conv(stem, w4, 2), Block(w4))
-        self.stride8 = nn.Sequential(conv(w4, w8, 2), Block(w8))
+        self.stride8 = nn.Sequential(conv(w4, w8, 2), Block(w8), Block(w8))
         self.stride16 = nn.Sequential(conv(w8, w16, 2), Block(w16))
-        self.stride32 = nn.Sequential(conv(w16, w32, 2), Block(w32))
+        self.stride32 = conv(w16, w32, 2)
         self.lateral = nn.ModuleList([conv(w, neck, size=1, relu=False) for w in (w8, w16, w32)])
         self.smooth = nn.ModuleList([conv(neck, neck) for _ in range(2)])
         self.class_trunk = conv(neck, neck)
@@ -79,16 +82,18 @@ class Network(nn.Module):
         self.logits = nn.Conv2d(neck, len(CLASSES) + 1, 1)
         self.box = nn.Conv2d(neck, 4, 1)
         self.azimuth = nn.Conv2d(neck, 2 * BINS, 1)
+        self.spread = nn.Conv2d(neck, 4, 1)
         self._initialise()
 
     def _initialise(self):
         for m in self.modules():
             if isinstance(m, nn.Conv2d):
                 nn.init.kaiming_normal_(m.weight, mode="fan_out", nonlinearity="relu")
-        for head in (self.logits, self.box, self.azimuth):
+        for head in (self.logits, self.box, self.azimuth, self.spread):
             nn.init.normal_(head.weight, std=0.01)
             nn.init.zeros_(head.bias)
         nn.init.constant_(self.box.bias, 1.0)
+        nn.init.constant_(self.spread.bias, -1.0)
         with torch.no_grad():  # one cell in a hundred holds something
             self.logits.bias[0] = math.log(99.0 * len(CLASSES))
 
@@ -97,12 +102,13 @@ class Network(nn.Module):
         c16 = self.stride16(c8)
         c32 = self.stride32(c16)
         p32 = torch.relu(self.lateral[2](c32))
-        p16 = self.smooth[1](self.lateral[1](c16) + upsampled(p32)[:, :, : grid(16)[0]])
-        p8 = self.smooth[0](self.lateral[0](c8) + upsampled(p16))
+        p16 = self.smooth[1](self.lateral[1](c16) + upsampled(p32, int(c16.shape[2])))
+        p8 = self.smooth[0](self.lateral[0](c8) + upsampled(p16, int(c8.shape[2])))
         outputs = []
         for feature in (p8, p16, p32):
             shape = self.box_trunk(feature)
-            outputs.append((self.logits(self.class_trunk(feature)), self.box(shape), self.azimuth(shape)))
+            logits = self.logits(self.class_trunk(feature))
+            outputs.append((logits, self.box(shape), self.azimuth(shape), self.spread(shape)))
         return outputs
 
 
@@ -110,4 +116,4 @@ def parameters_of(network):
     return sum(p.numel() for p in network.parameters())
 
 
-TENSORS = [[f"{part}{stride}" for part in ("logits", "box", "azimuth")] for stride in STRIDES]
+TENSORS = [[f"{part}{stride}" for part in ("logits", "box", "azimuth", "spread")] for stride in STRIDES]

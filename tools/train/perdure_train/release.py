@@ -9,27 +9,35 @@ import torch
 from . import measure, scores
 from .export import write_onnx
 from .network import Network, TENSORS
-from .settings import AZIMUTH_CLASSES, BINS, CLASSES, HEIGHT, STRIDES, WIDTH
+from .settings import AZIMUTH_CLASSES, BINS, CLASSES, HEIGHT, REACH, STRIDES, WIDTH
 
-NAME = "perdure_320x240"
+NAME = f"perdure_{WIDTH}x{HEIGHT}"
+DEMO_SIZE = (480, 360)  # the same weights for the demo, whose people are small
 SCENES = 12  # of the calibration set
 THRESHOLD = 0.05
 
 
-def description(temperature=1.0, clutter_rate=0.5, box_sigma=0.0, azimuth_sigma=0.35):
+def name_of(width, height):
+    return f"perdure_{width}x{height}"
+
+
+def description(temperature=1.0, clutter_rate=0.5, box_sigma=0.0, azimuth_sigma=0.35,
+                spread_scale=1.0, size=(WIDTH, HEIGHT)):
     levels = [
-        {"stride": stride, "box": box, "logits": logits, "azimuth": azimuth}
-        for stride, (logits, box, azimuth) in zip(STRIDES, TENSORS)
+        {"stride": stride, "box": box, "logits": logits, "azimuth": azimuth, "spread": spread}
+        for stride, (logits, box, azimuth, spread) in zip(STRIDES, TENSORS)
     ]
     return {
         "comment": "Perdure's own network, trained by tools/train on simulated pictures only: see "
                    "models/README.md. Written by tools/train/train.",
-        "name": NAME,
+        "name": name_of(*size),
         "family": "perdure",
-        "input": {"width": WIDTH, "height": HEIGHT, "fit": "letterbox_top_left", "pad": 114,
+        "input": {"width": size[0], "height": size[1], "fit": "letterbox_top_left", "pad": 114,
                   "colour": "rgb", "scale": 1 / 255, "mean": [127.5, 127.5, 127.5]},
         "classes": CLASSES,
         "azimuth": {"bins": BINS, "sigma": azimuth_sigma, "classes": AZIMUTH_CLASSES},
+        "reach": REACH,
+        "spread_scale": spread_scale,
         "levels": levels,
         "box_sigma": box_sigma,
         "calibration": {"temperature": temperature, "clutter_rate": clutter_rate},
@@ -105,6 +113,11 @@ def release(options, program):
         "clutter_rate": round(clutter_rate, 3),
         "box_sigma": round(robust_sigma(scores.side_errors(frames), 0.01, 1.0), 3),
         "azimuth_sigma": round(azimuth_sigma_of(frames), 3),
+        "spread_scale": round(robust_sigma(scores.side_ratios(frames), 0.1, 10.0), 3),
     }
     write_description(says, **values)
+    demo = options.out / "demo"
+    demo.mkdir(exist_ok=True)
+    write_onnx(network, demo / f"{name_of(*DEMO_SIZE)}.onnx", -shift, DEMO_SIZE)
+    write_description(demo / "model.json", size=DEMO_SIZE, **values)
     print(f"step {state['step']}: {model} {model.stat().st_size} bytes, {values}")

@@ -26,22 +26,25 @@ def read_detections(file, clutter_rate):
     """
     frames = {}
     prior = math.log(clutter_rate / (1 - clutter_rate))
+    sides = ("x1", "y1", "x2", "y2")
     with open(file, newline="") as stream:
         for row in csv.DictReader(stream):
             known = row["azimuth"] != ""
             frames.setdefault(int(row["frame"]), []).append((
-                [float(row[side]) for side in ("x1", "y1", "x2", "y2")],
+                [float(row[side]) for side in sides],
                 [float(row["logit:" + name]) - prior for name in CLASSES],
                 [float(row["azimuth"]), float(row["sigma_azimuth"])] if known else [math.nan] * 2,
+                [float(row["sigma_" + side] or math.nan) for side in sides],
             ))
     return {
         frame: {"boxes": np.array([r[0] for r in rows]), "odds": np.array([r[1] for r in rows]),
-                "azimuths": np.array([r[2] for r in rows])}
+                "azimuths": np.array([r[2] for r in rows]), "sigmas": np.array([r[3] for r in rows])}
         for frame, rows in frames.items()
     }
 
 
-EMPTY = {"boxes": np.zeros((0, 4)), "odds": np.zeros((0, len(CLASSES))), "azimuths": np.zeros((0, 2))}
+EMPTY = {"boxes": np.zeros((0, 4)), "odds": np.zeros((0, len(CLASSES))), "azimuths": np.zeros((0, 2)),
+         "sigmas": np.zeros((0, 4))}
 
 
 def probabilities(odds, temperature=1.0, shift=0.0):
@@ -197,3 +200,19 @@ def side_errors(frames):
             free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
             errors.extend(error[free & np.tile(sides > LARGE, 2)])
     return np.array(errors)
+
+
+def side_ratios(frames):
+    """Errors of sides over what the network says of them, of all matched boxes; those at the
+    border of the image are left out."""
+    ratios = []
+    for detections, truth in frames:
+        if not len(detections["boxes"]) or not len(truth["boxes"]):
+            continue
+        got = match(detections["boxes"], detections["p"].max(1), truth["boxes"], ~truth["ignored"])
+        for i in np.flatnonzero(got >= 0):
+            box = truth["boxes"][got[i]]
+            ratio = (detections["boxes"][i] - box) / detections["sigmas"][i]
+            free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
+            ratios.extend(ratio[free & np.isfinite(ratio)])
+    return np.array(ratios)

@@ -6,6 +6,9 @@ AZIMUTH_CLASSES = ["car", "van", "bicycle", "chair", "monitor", "couch"]
 WIDTH, HEIGHT = 320, 240
 STRIDES = [8, 16, 32]
 BINS = 12  # of azimuth, 30 degrees each
+# By how many strides a cell may lie outside the object that it finds: what is smaller than a cell
+# often holds no cell's centre at all.
+REACH = 0.5
 
 
 def grid(stride):
