@@ -14,6 +14,8 @@ void describeBox(BoxParameters& p, Fields& fields) {
                 {"the same in the network's input, where its size is known", "px"});
   fields.number("box.sigma_relative", p.sigma_relative, positive(),
                 {"a side's deviation relative to the box, where the model does not say"});
+  fields.number("box.sigma_doubt", p.sigma_doubt, atLeast(0),
+                {"added to it in proportion to the probability that the box is clutter"});
   fields.number("box.border_px", p.border_px, atLeast(0),
                 {"a side this near to the image border is cut by it", "px"});
   fields.number("box.gate", p.gate, between(0.5, 1.0 - 1e-12),

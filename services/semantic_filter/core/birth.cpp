@@ -37,7 +37,7 @@ class BirthCost {
         range_(range),
         log_size_(prior.log_size),
         start_(start) {
-    bias_sigma_ = std::max(viewWalkOf(frame).bias_sigma, 1e-6);
+    bias_sigma_ = biasSigma(viewWalkOf(frame).lasting, z_.width(), z_.height()).cwiseMax(1e-6);
     position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
     const Eigen::Matrix3d L = prior.log_size_covariance.llt().matrixL();
     size_whitening_ = L.inverse();
@@ -63,8 +63,8 @@ class BirthCost {
       r[11] = (ray.norm() - range_->distance_m) / range_->sigma_m;
       J.block<1, 3>(11, 0) = ray.normalized().transpose() / range_->sigma_m;
     }
-    r.segment<4>(12) = x.segment<4>(kBias) / bias_sigma_;
-    J.block<4, 4>(12, kBias).diagonal().setConstant(1.0 / bias_sigma_);
+    r.segment<4>(12) = x.segment<4>(kBias).cwiseQuotient(bias_sigma_);
+    J.block<4, 4>(12, kBias).diagonal() = bias_sigma_.cwiseInverse();
     if (jacobian) std::copy(J.data(), J.data() + J.size(), jacobian);
     return r.allFinite();
   }
@@ -85,7 +85,8 @@ class BirthCost {
   double yaw_, yaw_sigma_;
   std::optional<RangeHint> range_;
   Eigen::Vector3d log_size_, start_;
-  double position_weight_ = 1.0, bias_sigma_ = 1.0;
+  double position_weight_ = 1.0;
+  Eigen::Vector4d bias_sigma_;
   Eigen::Matrix3d size_whitening_;
 };
 

@@ -39,28 +39,39 @@ int BoxMeasurement::count() const {
   return static_cast<int>(std::count(measured.begin(), measured.end(), true));
 }
 
+SideError sideError(const BoxParameters& parameters, const BoxNoise& noise) {
+  return {std::max(parameters.sigma_px, parameters.sigma_network_px * noise.pixel),
+          noise.relative > 0.0 ? noise.relative : parameters.sigma_relative};
+}
+
+SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise) {
+  return sideError(parameters, noise) * std::sqrt(parameters.bias_share);
+}
+
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
                        const BoxNoise& noise) {
   BoxMeasurement z;
   z.sides << std::clamp(box.x1, 0.0, width), std::clamp(box.y1, 0.0, height),
       std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
-  const double relative = noise.relative > 0.0 ? noise.relative : parameters.sigma_relative;
-  const double floor = std::max(parameters.sigma_px, parameters.sigma_network_px * noise.pixel);
-  const double white = relative * std::sqrt(1.0 - parameters.bias_share);
-  const double wx = floor + white * z.width();
-  const double wy = floor + white * z.height();
-  z.variance << wx * wx, wy * wy, wx * wx, wy * wy;
-  const double sx = floor + relative * z.width();
-  const double sy = floor + relative * z.height();
+  const SideError lasting = lastingError(parameters, noise);
+  SideError error = sideError(parameters, noise);
+  error.relative += parameters.sigma_doubt * noise.doubt;
+  const double sx = error.at(z.width()), sy = error.at(z.height());
+  for (int i = 0; i < 4; ++i) {
+    const bool is_x = i % 2 == 0;
+    const double whole = noise.sides[i] > 0.0 ? noise.sides[i] : is_x ? sx : sy;
+    const double stays = lasting.at(is_x ? z.width() : z.height());
+    z.variance[i] = whole * whole - std::min(stays * stays, parameters.bias_share * whole * whole);
+  }
   const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
   z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,
                 z.sides[3] < height - my};
   return z;
 }
 
-double biasSigma(const BoxParameters& parameters, double relative_sigma) {
-  const double relative = relative_sigma > 0.0 ? relative_sigma : parameters.sigma_relative;
-  return relative * std::sqrt(parameters.bias_share);
+Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double height_px) {
+  const double x = lasting.at(width_px) / width_px, y = lasting.at(height_px) / height_px;
+  return {x, y, x, y};
 }
 
 double logClutter(const BoxMeasurement& z, double width, double height,

@@ -27,16 +27,31 @@ struct BoxMeasurement {
 
 /// What a network says of the errors of its boxes; 0 where it does not.
 struct BoxNoise {
-  double relative = 0.0;  ///< deviation of a side, in widths or heights of a large box
-  double pixel = 0.0;     ///< a pixel of the network's input, in pixels of the image
+  double relative = 0.0;          ///< deviation of a side, in widths or heights of a large box
+  double pixel = 0.0;             ///< a pixel of the network's input, in pixels of the image
+  std::array<double, 4> sides{};  ///< of this box's sides, in pixels of the image
+  double doubt = 0.0;  ///< probability of clutter: what a network doubts it also places worse
 };
+
+/// Standard deviation of a side of a box.
+struct SideError {
+  double pixels = 0.0;    ///< of the image
+  double relative = 0.0;  ///< of the box's width (x sides) or height (y sides)
+
+  double at(double size_px) const { return pixels + relative * size_px; }
+  SideError operator*(double factor) const { return {pixels * factor, relative * factor}; }
+};
+/// Of noise and b together.
+SideError sideError(const BoxParameters& parameters, const BoxNoise& noise);
+/// The part of it that stays with the object while the view stays: b.
+SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise);
 
 /// The box of a detection, its sides cut at the border of a width × height image marked censored.
 /// The variance is that of the noise: the share that is the object's b is in its state.
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
                        const BoxNoise& noise = {});
-/// Standard deviation of b, in widths or heights of the box.
-double biasSigma(const BoxParameters& parameters, double relative_sigma = 0.0);
+/// Standard deviation of b, in widths and heights, of a box of this size in pixels.
+Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double height_px);
 
 /// log of the clutter measure of the box: expected false boxes times the density (measured sides)
 /// or probability (censored ones) of one of them being this one.

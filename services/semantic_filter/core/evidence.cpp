@@ -14,6 +14,10 @@ Model makeModel(const ModelInfo& info) {
   return model;
 }
 
+BoxNoise boxNoise(const Model& model, double image_width) {
+  return {model.box_sigma, model.input_width > 0.0 ? image_width / model.input_width : 0.0};
+}
+
 std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
                                      double height, const BoxParameters& box,
                                      const ClutterParameters& clutter) {
@@ -21,18 +25,21 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
   if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return std::nullopt;
   if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
   Evidence e;
-  const double pixel = model.input_width > 0.0 ? width / model.input_width : 0.0;
-  e.z = measure(b, width, height, box, {model.box_sigma, pixel});
-  if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
-  e.log_clutter = logClutter(e.z, width, height, clutter);
   const double zero = detection.activations[0];
-  double best = -clutter.max_log_ratio;
+  double best = -clutter.max_log_ratio, odds = 0.0;
   for (std::size_t k = 0; k < model.classes.size(); ++k) {
     const double ratio = detection.activations[k + 1] - zero;
     if (std::isnan(ratio)) return std::nullopt;
     e.log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
     best = std::max(best, e.log_ratio.back());
+    odds += std::exp(e.log_ratio.back());
   }
+  BoxNoise noise = boxNoise(model, width);
+  noise.sides = detection.side_sigma;
+  noise.doubt = 1.0 / (1.0 + odds);
+  e.z = measure(b, width, height, box, noise);
+  if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
+  e.log_clutter = logClutter(e.z, width, height, clutter);
   // A thing of no known class looks to the network like clutter, or like one of its classes.
   e.log_ratio_other =
       std::log(1.0 - clutter.other_lookalike + clutter.other_lookalike * std::exp(best));

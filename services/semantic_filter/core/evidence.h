@@ -21,6 +21,7 @@ struct Model {
   double box_sigma = 0.0;
 };
 Model makeModel(const ModelInfo& info);
+BoxNoise boxNoise(const Model& model, double image_width);
 
 struct Evidence {
   BoxMeasurement z;

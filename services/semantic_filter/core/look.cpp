@@ -41,7 +41,9 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   const VisibilityParameters& visibility = frame.parameters->visibility;
   ViewWalk walk;
   walk.T_WC = frame.view.T_WC();
-  walk.bias_sigma = biasSigma(box, frame.model ? frame.model->box_sigma : 0.0);
+  walk.focal = frame.view.camera->fx();
+  walk.lasting = lastingError(
+      box, frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{});
   walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
   walk.screened = visibility.screened;
   walk.screen = {visibility.screen_angle, visibility.screen_log_distance, kNever};

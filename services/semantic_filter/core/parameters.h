@@ -9,6 +9,7 @@ struct BoxParameters {
   double sigma_px = 0.8;          ///< floor of a side's standard deviation
   double sigma_network_px = 0.8;  ///< the same in pixels of the network's input, where known
   double sigma_relative = 0.045;  ///< of the box's width (x sides) or height (y sides)
+  double sigma_doubt = 0.05;      ///< added to it in proportion to the probability of clutter
   double border_px = 6.0;         ///< a side this near to the image border is cut by it
   double gate = 0.9997;           ///< probability mass inside the gate of the innovation
   double tail = 5.0;              ///< degrees of freedom of the innovation's t distribution
@@ -51,7 +52,7 @@ struct MotionParameters {
   double survival_s = 3600.0;       ///< mean time a thing stays where it is
   double min_speed = 0.7;           ///< m/s: slower ones count as static
   double slow_share = 0.25;         ///< of a class's deviation of speed: slower is creeping
-  double creeping = 0.05;           ///< how likely that is against the Gaussian
+  double creeping = 0.03;           ///< how likely that is against the Gaussian
   double lost_sigma_m = 10.0;       ///< a moving hypothesis less well placed than this is given up
   double start_probability = 0.02;  ///< of a moving hypothesis that is added to a static object
   double misplaced_odds = 5.0;      ///< of having misplaced a thing against its having driven off

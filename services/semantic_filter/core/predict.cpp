@@ -30,15 +30,29 @@ void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m) {
   h.P(kYaw, kYaw) += 25.0 * m.yaw_walk * m.yaw_walk * dt;
 }
 
-/// b forgets with the change of the view: an Ornstein-Uhlenbeck process along the way.
+/// Stationary deviation of b from this view, by the mean extent of the cuboid over all aspects.
+Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const ViewWalk& walk) {
+  const double scale = walk.focal / std::max((x.head<3>() - T_WC.p).norm(), 1.0);
+  const Eigen::Vector3d size = x.segment<3>(kSize).array().exp();
+  const double width = std::max(scale * (size.x() + size.y()) * 2.0 / M_PI, 1.0);
+  return biasSigma(walk.lasting, width, std::max(scale * size.z(), 1.0));
+}
+
+/// b forgets with the change of the view: an Ornstein-Uhlenbeck process along the way. Its pixels
+/// become a lesser share of the box as the object comes nearer.
 void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const ViewWalk& walk) {
-  const double keep = last ? std::exp(-viewChange(h.x.head<3>(), *last, walk.T_WC, walk.bias)) : 0;
-  h.x.segment<4>(kBias) *= keep;
-  h.P.middleRows<4>(kBias) *= keep;
-  h.P.middleCols<4>(kBias) *= keep;
-  h.C.middleRows<4>(kBias) *= keep;
-  h.P.diagonal().segment<4>(kBias).array() +=
-      (1.0 - keep * keep) * walk.bias_sigma * walk.bias_sigma;
+  const Eigen::Vector4d sigma = stationaryBias(h.x, walk.T_WC, walk);
+  Eigen::Vector4d keep = Eigen::Vector4d::Zero();
+  double correlation = 0.0;
+  if (last) {
+    correlation = std::exp(-viewChange(h.x.head<3>(), *last, walk.T_WC, walk.bias));
+    keep = correlation * sigma.cwiseQuotient(stationaryBias(h.x, *last, walk).cwiseMax(1e-12));
+  }
+  h.x.segment<4>(kBias) = keep.asDiagonal() * h.x.segment<4>(kBias);
+  h.P.middleRows<4>(kBias) = (keep.asDiagonal() * h.P.middleRows<4>(kBias)).eval();
+  h.P.middleCols<4>(kBias) = (h.P.middleCols<4>(kBias) * keep.asDiagonal()).eval();
+  h.C.middleRows<4>(kBias) = (keep.asDiagonal() * h.C.middleRows<4>(kBias)).eval();
+  h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
 /// What may hide it from elsewhere is not known until it is seen from there.

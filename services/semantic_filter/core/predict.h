@@ -2,6 +2,7 @@
 // of the pose error are applied when an object can next be seen; hidden beliefs stay untouched.
 #pragma once
 
+#include "services/semantic_filter/core/box_likelihood.h"
 #include "services/semantic_filter/core/object.h"
 #include "services/semantic_filter/core/parameters.h"
 
@@ -26,8 +27,9 @@ double viewChange(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
                   const RigidTransform& T_WC_b, const ViewScales& scales);
 /// What changes at an object as the view of it changes, and goes back to where it began.
 struct ViewWalk {
-  RigidTransform T_WC;      ///< the new view
-  double bias_sigma = 0.0;  ///< of b, stationary: in widths and heights of the box
+  RigidTransform T_WC;  ///< the new view
+  double focal = 1.0;   ///< pixels
+  SideError lasting;    ///< of b, stationary
   ViewScales bias{1, 1, 1};
   double screened = 0.0;  ///< Object::screened, stationary
   ViewScales screen{1, 1, 1};

@@ -60,16 +60,42 @@ TEST(BoxLikelihood, ANetworkPlacesSidesToAPixelOfItsOwnInput) {
   parameters.sigma_network_px = 1.0;
   const auto fine = measure({100, 100, 120, 120}, kWidth, kHeight, parameters, {0.05, 0.0});
   const auto coarse = measure({100, 100, 120, 120}, kWidth, kHeight, parameters, {0.05, 3.0});
-  EXPECT_NEAR(std::sqrt(coarse.variance[0]) - std::sqrt(fine.variance[0]), 2.5, 1e-9);
+  const double noise = std::sqrt(1.0 - parameters.bias_share);
+  EXPECT_NEAR(std::sqrt(coarse.variance[0]) - std::sqrt(fine.variance[0]), 2.5 * noise, 1e-9);
 }
 
 TEST(BoxLikelihood, NoiseAndWhatStaysAreTheWholeError) {
   BoxParameters parameters;
-  parameters.sigma_px = 1e-6;
-  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {0.1, 0.0});
-  const double stays = biasSigma(parameters, 0.1);
-  EXPECT_NEAR(std::hypot(std::sqrt(z.variance[0]) / 100.0, stays), 0.1, 1e-6);
-  EXPECT_NEAR(stays * stays, 0.01 * parameters.bias_share, 1e-9);
+  parameters.sigma_px = 2.0;
+  const BoxNoise noise{.relative = 0.1};
+  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, parameters, noise);
+  const Eigen::Vector4d stays = biasSigma(lastingError(parameters, noise), 100.0, 80.0);
+  EXPECT_NEAR(std::hypot(std::sqrt(z.variance[0]), stays[0] * 100.0), 12.0, 1e-6);
+  EXPECT_NEAR(std::hypot(std::sqrt(z.variance[3]), stays[3] * 80.0), 10.0, 1e-6);
+  EXPECT_NEAR(std::pow(stays[0] * 100.0, 2), 144.0 * parameters.bias_share, 1e-6);
+}
+
+TEST(BoxLikelihood, WhatTheNetworkDoubtsItPlacesWorse) {
+  BoxParameters parameters;
+  parameters.sigma_doubt = 0.2;
+  const auto at = [&](double doubt) {
+    return measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {.doubt = doubt}).variance[0];
+  };
+  EXPECT_GT(at(0.5), at(0.0));
+  EXPECT_GT(at(1.0), 1.5 * at(0.5));
+}
+
+TEST(BoxLikelihood, ASideOfWhichTheNetworkSaysHowSureItIsHasThatDeviation) {
+  const BoxParameters parameters;
+  BoxNoise noise{.relative = 0.05};
+  noise.sides = {40.0, 0.0, 2.0, 0.0};
+  const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, parameters, noise);
+  const double stays =
+      100.0 * biasSigma(lastingError(parameters, {.relative = 0.05}), 100.0, 80.0)[0];
+  EXPECT_NEAR(z.variance[0], 1600.0 - stays * stays, 1e-6);
+  EXPECT_NEAR(z.variance[2], 4.0 * (1.0 - parameters.bias_share), 1e-6)
+      << "it may be surer than boxes are on the whole, but noise is left";
+  EXPECT_GT(z.variance[1], 0.0);
 }
 
 TEST(BoxLikelihood, ACensoredSideCountsAsTheProbabilityThatItLiesBeyond) {

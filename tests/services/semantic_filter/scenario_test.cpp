@@ -74,6 +74,7 @@ TEST(Scenario, PositionsAreAsUncertainAsTheirCovarianceSays) {
   // are independent: the mean of the squared normalised error must lie in the 95 % band of χ².
   Config config;
   config.filter.looks.correlation = 0.0;
+  config.filter.box.bias_share = 0.0;
   std::mt19937 random(21);
   std::normal_distribution<double> normal;
   constexpr int kRuns = 50;
