@@ -167,9 +167,10 @@ void describe(A& a, D& d, W& w) {
   a.number("azimuth_sigma", d.azimuth_sigma, w.azimuth_sigma, kNotNegative);
   a.ensure("azimuth_sigma", "out_of_range", [&] { return !d.azimuth || d.azimuth_sigma > 0; });
   a.value("primed", d.primed, w.primed);
-  for (std::size_t i = 0; i < d.side_sigma.size(); ++i) {
-    a.number("side_sigma", d.side_sigma[i], w.side_sigma[i], kNotNegative);
-  }
+  a.number("sigma_x1", d.side_sigma[0], w.side_sigma[0], kNotNegative);
+  a.number("sigma_y1", d.side_sigma[1], w.side_sigma[1], kNotNegative);
+  a.number("sigma_x2", d.side_sigma[2], w.side_sigma[2], kNotNegative);
+  a.number("sigma_y2", d.side_sigma[3], w.side_sigma[3], kNotNegative);
 }
 
 template <class A, Is<Detections> D, class W>

@@ -47,7 +47,8 @@ SideError sideError(const BoxParameters& parameters, const BoxNoise& noise);
 SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise);
 
 /// The box of a detection, its sides cut at the border of a width × height image marked censored.
-/// The variance is that of the noise: the share that is the object's b is in its state.
+/// The variance is that of the noise: the share that is the object's b is in its state. Where the
+/// network says how sure a side is, that is the whole of noise and b.
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
                        const BoxNoise& noise = {});
 /// Standard deviation of b, in widths and heights, of a box of this size in pixels.

@@ -21,6 +21,7 @@ struct Model {
   double box_sigma = 0.0;
 };
 Model makeModel(const ModelInfo& info);
+/// What the model says of all its boxes, in images of this width in pixels.
 BoxNoise boxNoise(const Model& model, double image_width);
 
 struct Evidence {

@@ -91,7 +91,8 @@ TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
   EXPECT_EQ(json["anchor"].size(), members<GeoAnchor>());
   Detections detections;
   detections.detections = {examples.detection()};
-  EXPECT_EQ(toJson(detections)["detections"][0].size(), members<Detection>() + 3);  // 4 corners
+  EXPECT_EQ(toJson(detections)["detections"][0].size(),
+            members<Detection>() + 6);  // 4 corners, 4 deviations
   Landmarks landmarks;
   landmarks.landmarks = {examples.landmark()};
   EXPECT_EQ(toJson(landmarks)["landmarks"][0].size(), members<Landmark>());

@@ -25,7 +25,7 @@ inline CameraCalibration makeCamera() {
 
 inline State makeState(double x, double y, double z, double yaw, double l, double w, double h) {
   State s = State::Zero();
-  s << x, y, z, yaw, std::log(l), std::log(w), std::log(h), 0, 0, 0;
+  s.head<kBias>() << x, y, z, yaw, std::log(l), std::log(w), std::log(h);
   return s;
 }
 

@@ -64,8 +64,8 @@ class Network(nn.Module):
     stride.
 
     logits: K + 1, background first. box: softplus of the distances to the left, top, right and
-    bottom from the cell's centre, less REACH, in strides. azimuth: BINS logits, then BINS residuals in units
-    of half a bin. spread: softplus of how far each side may be from where it is, in strides.
+    bottom from the cell's centre, less REACH, in strides. azimuth: BINS logits, then BINS residuals
+    in units of half a bin. spread: softplus of how far each side may be from where it is, in strides.
     """
 
     def __init__(self, widths=(16, 32, 64, 80, 64), neck=48):

@@ -1,0 +1,84 @@
+#include "services/semantic_filter/core/predict.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+/// A camera that looks along z from `metres` down its axis.
+RigidTransform viewFrom(double metres) {
+  RigidTransform T_WC;
+  T_WC.p = Eigen::Vector3d(0, 0, metres);
+  return T_WC;
+}
+
+/// A car 40 m ahead whose box is too large by two deviations, seen from 0 m.
+Object biasedCar(const ViewWalk& walk) {
+  Hypothesis h;
+  h.class_name = "car";
+  h.weight = 1.0;
+  h.x.head<3>() << 0, 0, 40;
+  h.x.segment<3>(kSize) << std::log(4.0), std::log(1.7), std::log(1.5);
+  h.P.setZero();
+  h.x.segment<4>(kBias).setConstant(0.1);
+  Object object;
+  object.existence = 0.9;
+  object.hypotheses = {h};
+  object.last_view = walk.T_WC;
+  return object;
+}
+
+ViewWalk walkWith(SideError lasting) {
+  ViewWalk walk;
+  walk.T_WC = viewFrom(0.0);
+  walk.focal = 500.0;
+  walk.lasting = lasting;
+  walk.bias = {1e9, 1e9, 1e9};  // nothing is forgotten: what is left is the change of size
+  return walk;
+}
+
+Hypothesis afterDriving(SideError lasting, double metres) {
+  ViewWalk walk = walkWith(lasting);
+  Object object = biasedCar(walk);
+  walk.T_WC = viewFrom(metres);
+  predict(object, {}, {}, {}, walk);
+  return object.best();
+}
+
+TEST(PredictBias, PixelsBecomeALesserShareOfTheBoxAsTheObjectComesNearer) {
+  const Hypothesis near = afterDriving({.pixels = 2.0, .relative = 0.0}, 20.0);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(near.x[kBias + i], 0.05, 1e-6) << "twice as large";
+}
+
+TEST(PredictBias, AShareOfTheBoxStaysOne) {
+  const Hypothesis near = afterDriving({.pixels = 0.0, .relative = 0.05}, 20.0);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(near.x[kBias + i], 0.1, 1e-6);
+}
+
+TEST(PredictBias, WhatTheViewForgetsComesBackAsDeviation) {
+  ViewWalk walk = walkWith({.pixels = 2.0, .relative = 0.03});
+  Object object = biasedCar(walk);
+  walk.bias = {0.3, 0.01, 0.3};
+  walk.T_WC = viewFrom(20.0);  // log 2 of distance at .01 a length: all is forgotten
+  predict(object, {}, {}, {}, walk);
+  const Hypothesis& h = object.best();
+  const Eigen::Vector4d sigma =
+      biasSigma(walk.lasting, 500.0 / 20.0 * 5.7 * 2.0 / M_PI, 500.0 / 20.0 * 1.5);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(h.x[kBias + i], 0.0, 1e-9);
+    EXPECT_NEAR(std::sqrt(h.P(kBias + i, kBias + i)), sigma[i], 1e-9);
+  }
+}
+
+TEST(PredictBias, ADetectorWithoutLastingErrorHasNone) {
+  const Hypothesis h = afterDriving({}, 20.0);
+  EXPECT_TRUE(h.x.allFinite());
+  EXPECT_EQ((h.P.block<4, 4>(kBias, kBias).norm()), 0.0);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
