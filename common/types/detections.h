@@ -53,6 +53,10 @@ struct ModelInfo {
       classes;  ///< lower-case; K names, activations[k + 1] belongs to classes[k]
   std::uint32_t input_width = 0, input_height = 0;
   double box_sigma = 0.0;  ///< standard deviation of a box's side relative to its size; 0 = unknown
+  /// Four a class, or none: how far the sides (x1, y1, x2, y2) of its boxes lie inside the image of
+  /// the object's cuboid on average, in widths and heights of that image. A car's outline is rounder
+  /// than its cuboid's.
+  std::vector<double> side_insets;
 };
 
 }  // namespace perdure

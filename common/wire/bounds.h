@@ -19,6 +19,7 @@ inline constexpr Limits kSpeed{-1e5, 1e5};          ///< m/s
 inline constexpr Limits kMatrixEntry{-1e12, 1e12};  ///< covariances, transitions
 inline constexpr Limits kLogit{-1e6, 1e6};
 inline constexpr Limits kNotNegative{0.0, 1e18};
+inline constexpr Limits kInset{-0.45, 0.45};  // of a box, per side
 inline constexpr Limits kPositive{1e-12, 1e12};
 inline constexpr Limits kLatitudeDeg{-90.0, 90.0};
 inline constexpr Limits kLongitudeDeg{-360.0, 360.0};

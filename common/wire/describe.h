@@ -193,6 +193,10 @@ void describe(A& a, D& d, W& w) {
   a.ensure("input_width", "out_of_range", [&] { return d.input_width <= kImageSide; });
   a.ensure("input_height", "out_of_range", [&] { return d.input_height <= kImageSide; });
   a.number("box_sigma", d.box_sigma, w.box_sigma, kNotNegative);
+  a.numbers("side_insets", d.side_insets, w.side_insets, kInset, 4 * kClasses);
+  a.ensure("side_insets", "size_mismatch", [&] {
+    return d.side_insets.empty() || d.side_insets.size() == 4 * d.classes.size();
+  });
 }
 
 // --- objects ---

@@ -13,6 +13,8 @@
 namespace perdure::inference {
 namespace {
 
+constexpr double kMostInset = 0.45;
+
 using Json = nlohmann::json;
 
 /// Reads one JSON object and remembers all that is wrong with it, unknown keys included.
@@ -243,6 +245,25 @@ void readHeads(Reader& reader, ModelDescription& model) {
   }
 }
 
+void readInsets(const Json& json, Reader& reader, ModelDescription& model) {
+  if (!json.is_object()) return reader.complain("side_insets", "is not an object by class");
+  for (const auto& [name, sides] : json.items()) {
+    const auto& known = model.classes;
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      reader.complain("side_insets", "\"" + name + "\" is not one of the model's classes");
+      continue;
+    }
+    const auto inset = [](const Json& x) {
+      return x.is_number() && std::abs(x.get<double>()) <= kMostInset;
+    };
+    if (!sides.is_array() || sides.size() != 4 || !std::all_of(sides.begin(), sides.end(), inset)) {
+      reader.complain("side_insets", "\"" + name + "\" has not four numbers in [-0.45, 0.45]");
+      continue;
+    }
+    model.side_insets[name] = sides.get<std::array<double, 4>>();
+  }
+}
+
 void readAll(Reader& reader, const std::string& file, ModelDescription& model) {
   model.name = reader.text("name", false);
   reader.choice<Family>("family", model.family,
@@ -260,6 +281,7 @@ void readAll(Reader& reader, const std::string& file, ModelDescription& model) {
     if (model.levels.empty()) reader.complain("levels", "is empty");
   }
   reader.number("box_sigma", model.box_sigma, 0, 1);
+  if (const Json* insets = reader.find("side_insets")) readInsets(*insets, reader, model);
   if (const Json* calibration = reader.find("calibration")) {
     Reader inner(*calibration, "calibration.", reader.problems());
     inner.number("temperature", model.calibration.temperature, 0.01, 100);

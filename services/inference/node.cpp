@@ -53,6 +53,13 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   info_.input_height = static_cast<std::uint32_t>(description_.input.height);
   info_.box_sigma = description_.box_sigma;
   chooseClasses();
+  if (!description_.side_insets.empty()) {
+    for (const std::string& name : info_.classes) {
+      const auto it = description_.side_insets.find(name);
+      const auto sides = it == description_.side_insets.end() ? std::array<double, 4>{} : it->second;
+      info_.side_insets.insert(info_.side_insets.end(), sides.begin(), sides.end());
+    }
+  }
   std::string identity = toHex(file.hash);
   for (const std::string& name : info_.classes) identity += "\n" + name;
   info_.hash = digest(identity);

@@ -113,6 +113,20 @@ void describeMotion(Parameters& p, Fields& fields) {
                 {"the same for the place in the image", "rad"});
 }
 
+void describeSmooth(SmoothParameters& p, Fields& fields) {
+  fields.integer("smooth.keyframes", p.keyframes, between(0, 100),
+                 {"looks that are remembered of an object; 0: nothing is estimated from them"});
+  fields.integer("smooth.least", p.least, between(3, 100), {"fewer are not estimated from"});
+  fields.number("smooth.new_view", p.new_view, positive(),
+                {"change of view (b's correlation falls to 1/e at 1) that is remembered"});
+  fields.number("smooth.place", p.place, positive(),
+                {"relative to the distance: a place less well known is not taken"});
+  fields.number("smooth.contradicted", p.contradicted, between(0, 1),
+                {"share of the looks that may contradict the rest"});
+  fields.number("smooth.least_weight", p.least_weight, between(0, 1),
+                {"of a hypothesis that is worth the estimate"});
+}
+
 void describeTend(Parameters& p, Fields& fields) {
   auto& v = p.visibility;
   fields.integer("visibility.cell_px", v.cell_px, between(1, 256),
@@ -151,6 +165,8 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"squared Mahalanobis distance at which two hypotheses are one"});
   fields.number("tend.merge_overlap", t.merge_overlap, between(0, 1),
                 {"shared over joint volume at which two objects are one"});
+  fields.number("tend.merge_inside", p.tend.merge_inside, positive(),
+                {"share of a thing of no known class that lies in a known one and makes it that"});
   fields.integer("tend.max_objects", t.max_objects, between(1, 1000000),
                  {"in the working set; the least likely go"});
 }
@@ -172,6 +188,7 @@ void describe(Config& c, Fields& fields) {
   describeBirth(c.filter.birth, fields);
   describeMotion(c.filter, fields);
   describeTend(c.filter, fields);
+  describeSmooth(c.filter.smooth, fields);
 }
 
 }  // namespace perdure::semantic_filter

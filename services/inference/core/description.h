@@ -1,6 +1,8 @@
 // What a network expects and what its raw outputs mean: the contents of model.json.
 #pragma once
 
+#include <array>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,6 +67,7 @@ struct ModelDescription {
   double reach = 0.0;         ///< perdure: cells that a cell's centre may lie outside its box
   double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: the network has none
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0 unknown
+  std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
   Calibration calibration;
 };
 

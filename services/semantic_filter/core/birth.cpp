@@ -36,7 +36,8 @@ class BirthCost {
         yaw_sigma_(yaw_sigma),
         range_(range),
         log_size_(prior.log_size),
-        start_(start) {
+        start_(start),
+        offset_(frame.offsetOf(prior.name)) {
     bias_sigma_ = biasSigma(viewWalkOf(frame).lasting, z_.width(), z_.height()).cwiseMax(1e-6);
     position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
     const Eigen::Matrix3d L = prior.log_size_covariance.llt().matrixL();
@@ -46,7 +47,7 @@ class BirthCost {
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     State x = State::Zero();
     x.head<kFree>() = Eigen::Map<const VectorFit>(parameters);
-    const auto box = projectObserved(x, view_);
+    const auto box = projectObserved(x, view_, offset_);
     if (!box) return false;
     Eigen::Map<Residuals> r(residuals);
     Jacobian J = Jacobian::Zero();
@@ -85,6 +86,7 @@ class BirthCost {
   double yaw_, yaw_sigma_;
   std::optional<RangeHint> range_;
   Eigen::Vector3d log_size_, start_;
+  Eigen::Vector4d offset_;
   double position_weight_ = 1.0;
   Eigen::Vector4d bias_sigma_;
   Eigen::Matrix3d size_whitening_;

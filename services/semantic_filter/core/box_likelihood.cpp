@@ -61,7 +61,8 @@ BoxMeasurement measure(const Box& box, double width, double height, const BoxPar
     const bool is_x = i % 2 == 0;
     const double whole = noise.sides[i] > 0.0 ? noise.sides[i] : is_x ? sx : sy;
     const double stays = lasting.at(is_x ? z.width() : z.height());
-    z.variance[i] = whole * whole - std::min(stays * stays, parameters.bias_share * whole * whole);
+    z.lasting[i] = std::min(stays * stays, parameters.bias_share * whole * whole);
+    z.variance[i] = whole * whole - z.lasting[i];
   }
   const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
   z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,

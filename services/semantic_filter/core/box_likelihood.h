@@ -18,6 +18,7 @@ namespace perdure::semantic_filter {
 struct BoxMeasurement {
   Eigen::Vector4d sides = Eigen::Vector4d::Zero();     ///< x1, y1, x2, y2, pixels
   Eigen::Vector4d variance = Eigen::Vector4d::Ones();  ///< px², of each side
+  Eigen::Vector4d lasting = Eigen::Vector4d::Zero();   ///< px², of the object's b at each side
   std::array<bool, 4> measured{true, true, true, true};
 
   int count() const;

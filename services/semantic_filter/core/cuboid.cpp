@@ -117,7 +117,8 @@ std::optional<ProjectedBox> projectCuboid(const State& x, const View& view) {
   return box;
 }
 
-std::optional<ProjectedBox> projectObserved(const State& x, const View& view) {
+std::optional<ProjectedBox> projectObserved(const State& x, const View& view,
+                                            const Eigen::Vector4d& offset) {
   auto box = projectCuboid(x, view);
   if (!box) return box;
   const ProjectedBox plain = *box;
@@ -125,7 +126,7 @@ std::optional<ProjectedBox> projectObserved(const State& x, const View& view) {
   for (int i = 0; i < 4; ++i) {
     const int low = i % 2, high = low + 2;
     const double extent = plain.sides[high] - plain.sides[low];
-    const double b = x[kBias + i];
+    const double b = x[kBias + i] + offset[i];
     box->sides[i] += b * std::min(extent, limit[low]);
     box->H(i, kBias + i) = std::min(extent, limit[low]);
     if (extent >= limit[low]) continue;

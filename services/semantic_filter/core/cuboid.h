@@ -37,8 +37,10 @@ std::array<Eigen::Vector3d, 8> corners(const State& x, const Eigen::Vector3d& up
 /// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
 std::optional<ProjectedBox> projectCuboid(const State& x, const View& view);
 
-/// What a detector reports of it: the cuboid's box with the hypothesis's b added to its sides.
-std::optional<ProjectedBox> projectObserved(const State& x, const View& view);
+/// What a detector reports of it: the cuboid's box with the hypothesis's b and the detector's mean
+/// `offset` (in widths and heights, like b) added to its sides.
+std::optional<ProjectedBox> projectObserved(const State& x, const View& view,
+                                            const Eigen::Vector4d& offset);
 
 /// Yaw in W from KITTI's alpha seen at `centre_W`: alpha = rotation_y - atan2(x, z) of the centre,
 /// in the gravity-levelled camera frame (DESIGN 5, item 8).

@@ -11,6 +11,17 @@ Model makeModel(const ModelInfo& info) {
   for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
   model.input_width = info.input_width;
   model.box_sigma = info.box_sigma;
+  if (info.side_insets.size() == 4 * info.classes.size() && !info.classes.empty()) {
+    auto insets = std::make_shared<Insets>();
+    for (std::size_t k = 0; k < info.classes.size(); ++k) {
+      const Eigen::Vector4d inset(&info.side_insets[4 * k]);
+      // Left and top move to larger coordinates, right and bottom to smaller ones.
+      const Eigen::Vector4d offset(inset[0], inset[1], -inset[2], -inset[3]);
+      insets->by_class[info.classes[k]] = offset;
+      insets->mean += offset / static_cast<double>(info.classes.size());
+    }
+    model.insets = std::move(insets);
+  }
   return model;
 }
 

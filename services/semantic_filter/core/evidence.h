@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,12 +14,24 @@
 
 namespace perdure::semantic_filter {
 
+/// Where a model's boxes lie in the cuboids' images, by class. Of a class it does not name: the mean.
+struct Insets {
+  std::map<std::string, Eigen::Vector4d> by_class;
+  Eigen::Vector4d mean = Eigen::Vector4d::Zero();
+
+  const Eigen::Vector4d& of(const std::string& class_name) const {
+    const auto it = by_class.find(class_name);
+    return it == by_class.end() ? mean : it->second;
+  }
+};
+
 /// What the filter keeps of a ModelInfo.
 struct Model {
   std::vector<std::string> classes;
   std::map<std::string, std::size_t> index;  ///< name to position in `classes`
   double input_width = 0.0;                  ///< of the network, 0 = unknown
   double box_sigma = 0.0;
+  std::shared_ptr<const Insets> insets = std::make_shared<const Insets>();
 };
 Model makeModel(const ModelInfo& info);
 /// What the model says of all its boxes, in images of this width in pixels.

@@ -68,7 +68,7 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
     HypothesisLook h;
     h.likelihood.assign(boxes.size(), 0.0);
     h.nis.assign(boxes.size(), 0.0);
-    h.box = projectObserved(hypothesis.x, frame.view);
+    h.box = projectObserved(hypothesis.x, frame.view, frame.offsetOf(hypothesis.class_name));
     h.hit_looks = sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view, looks);
     if (h.box) {
       h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);

@@ -12,6 +12,8 @@
 
 namespace perdure::semantic_filter {
 
+struct KeyView;
+
 /// One hypothesis in one frame.
 struct HypothesisLook {
   std::optional<ProjectedBox> box;
@@ -34,6 +36,12 @@ struct FrameContext {
   const Model* model = nullptr;
   const ClassPriors* priors = nullptr;
   const Parameters* parameters = nullptr;
+  std::shared_ptr<const KeyView> key_view = {};  ///< of this frame, for what is remembered
+
+  /// Where the network's boxes lie in the cuboid's image, on average, as projectObserved takes it.
+  Eigen::Vector4d offsetOf(const std::string& class_name) const {
+    return model ? model->insets->of(class_name) : Eigen::Vector4d::Zero();
+  }
 };
 
 /// What changes at an object with the view of this frame.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,6 +41,8 @@ struct ViewPoint {
   double looks = 0.0;  ///< number of looks that share this view, discounted
 };
 
+struct Keyframe;
+
 struct Object {
   ObjectId id = 0;
   double existence = 0.0;
@@ -57,6 +60,9 @@ struct Object {
   double visible_fraction = 1.0;
   ObjectId blocked_by = 0;
   bool recalled = false;
+  /// Looks that are remembered, in order of time.
+  std::vector<std::shared_ptr<const Keyframe>> keyframes;
+  std::uint32_t fresh_keyframes = 0;  ///< that came since the state was last smoothed
 
   const Hypothesis& best() const { return hypotheses.front(); }
 };

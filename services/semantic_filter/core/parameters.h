@@ -98,7 +98,18 @@ struct TendParameters {
   double scale_resolved = 0.06;   ///< relative deviation of the distance; before it "other" stays
   double hypothesis_merge = 1.0;  ///< squared Mahalanobis distance
   double merge_overlap = 0.25;
+  double merge_inside = 0.3;  ///< share of a thing of no known class that lies in a known one
   std::int64_t max_objects = 2000;
+};
+
+/// Of the estimate from all remembered looks at once; `keyframes` 0 switches it off.
+struct SmoothParameters {
+  std::int64_t keyframes = 24;   ///< remembered at most, of one object
+  std::int64_t least = 5;        ///< with fewer the filter's own state stays
+  double new_view = 0.12;        ///< change of view, in lengths of b's correlation, that is new
+  double place = 0.2;            ///< relative to the distance: a place less well known is not taken
+  double contradicted = 0.3;     ///< share of looks that may contradict the rest
+  double least_weight = 0.02;    ///< of a hypothesis that is worth it
 };
 
 struct Parameters {
@@ -110,6 +121,7 @@ struct Parameters {
   LooksParameters looks;
   VisibilityParameters visibility;
   TendParameters tend;
+  SmoothParameters smooth;
 };
 
 }  // namespace perdure::semantic_filter

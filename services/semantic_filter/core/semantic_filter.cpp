@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "services/semantic_filter/core/association.h"
+#include "services/semantic_filter/core/smoother.h"
 #include "services/semantic_filter/core/update.h"
 
 namespace perdure::semantic_filter {
@@ -44,7 +45,13 @@ void IdBook::forgetBefore(std::uint64_t frame_sequence) {
 }
 
 FrameContext SemanticFilter::contextOf(const FrameInput& input) const {
-  return {input.view, input.pose_error, &input.model, &priors_, &parameters_};
+  return {input.view,
+          input.pose_error,
+          &input.model,
+          &priors_,
+          &parameters_,
+          std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
+                                          input.model.insets)};
 }
 
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
@@ -96,7 +103,9 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
   const Association association = associate(psi, fresh);
   for (Eigen::Index j = 0; j < n; ++j) {
     const Seen& s = seen[static_cast<std::size_t>(j)];
-    update(belief.objects[s.object], s.look, association.eta.row(j), boxes, frame);
+    Object& object = belief.objects[s.object];
+    const auto own = update(object, s.look, association.eta.row(j), boxes, frame);
+    if (own && sound(object)) rememberAndSmooth(object, boxes[*own], s.look.sight.hidden, frame);
   }
   return association.claimed;
 }
@@ -104,7 +113,8 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
 bool SemanticFilter::matches(const Object& object, const Sight& sight, const Evidence& box,
                              const FrameInput& input) const {
   const State x = stateAt(object.best(), toSeconds(input.stamp.time - object.as_of));
-  const auto predicted = projectObserved(x, input.view);
+  const auto predicted =
+      projectObserved(x, input.view, input.model.insets->of(object.best().class_name));
   if (!predicted) return false;
   const auto covariance =
       predictedCovariance(object.best(), *predicted, input.pose_error.covariance);

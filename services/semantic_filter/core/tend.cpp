@@ -8,6 +8,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/keyframe.h"
 #include "services/semantic_filter/core/polygon.h"
 
 namespace perdure::semantic_filter {
@@ -189,6 +190,9 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.last_seen = std::max(a.last_seen, b.last_seen);
   a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
   a.support = std::max(a.support, b.support);
+  const auto& box = frame.parameters->box;
+  joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
+                frame.parameters->smooth);
 }
 
 /// Two things that the image shows side by side are two, however near their estimated depths are.
@@ -237,7 +241,13 @@ void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters&
   normalise(object);
 }
 
-double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+namespace {
+
+struct Shared {
+  double of_joint = 0.0, of_lesser = 0.0;  ///< volume in common over that of both, of the lesser
+};
+
+Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W) {
   const Eigen::Vector3d size_a = a.segment<3>(kSize).array().exp();
   const Eigen::Vector3d size_b = b.segment<3>(kSize).array().exp();
   const Eigen::Vector3d offset =
@@ -257,7 +267,24 @@ double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
   const double top = std::min(0.5 * size_a.z(), offset.z() + 0.5 * size_b.z());
   const double bottom = std::max(-0.5 * size_a.z(), offset.z() - 0.5 * size_b.z());
   const double shared = polygonArea(footprint) * std::max(top - bottom, 0.0);
-  return shared / (size_a.prod() + size_b.prod() - shared);
+  return {shared / (size_a.prod() + size_b.prod() - shared),
+          shared / std::min(size_a.prod(), size_b.prod())};
+}
+
+/// Two beliefs about one thing: they overlap in space and in the image; or one is of no known class
+/// and lies in the other, since two solid things cannot share their space.
+bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
+  const State &x = a.best().x, &y = b.best().x;
+  const TendParameters& tend = frame.parameters->tend;
+  const Shared shared = sharedVolume(x, y, frame.view.up_W);
+  if (isOther(a) != isOther(b) && shared.of_lesser > tend.merge_inside) return true;
+  return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.view);
+}
+
+}  // namespace
+
+double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+  return sharedVolume(a, b, up_W).of_joint;
 }
 
 Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
@@ -315,8 +342,7 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
       const double reach = a.segment<3>(kSize).array().exp().matrix().norm() +
                            b.segment<3>(kSize).array().exp().matrix().norm();
       if ((a - b).head<3>().norm() > 0.5 * reach || !sameKind(objects[i], objects[j]) ||
-          overlap(a, b, frame.view.up_W) < frame.parameters->tend.merge_overlap ||
-          !sameInImage(a, b, frame.view)) {
+          !sameSpace(objects[i], objects[j], frame)) {
         ++j;
         continue;
       }
@@ -344,7 +370,10 @@ void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
   for (auto& o : objects) {
     if (o.visible_fraction <= 0.0) continue;
     const double sigma = placeSigma(o.best(), frame.pose_error.covariance);
-    if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) o.confirmed = false;
+    if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m || isOther(o)) {
+      o.confirmed = false;
+      continue;
+    }
     if (o.existence >= parameters.confirm && o.hits >= parameters.confirm_hits &&
         sigma < parameters.confirm_sigma_m) {
       o.confirmed = true;

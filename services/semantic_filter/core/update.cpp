@@ -167,6 +167,21 @@ double probabilitySeen(const Object& object, const std::vector<Shares>& shares) 
   return total > 0.0 ? seen / total : 0.0;
 }
 
+/// The box that is the object's beyond reasonable doubt.
+std::optional<std::size_t> surelyOwn(const Object& object, const std::vector<Shares>& shares) {
+  constexpr double kSurely = 0.8;
+  double total = 0.0;
+  std::vector<double> box(shares.empty() ? 0 : shares.front().box.size(), 0.0);
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    const double weight = object.hypotheses[i].weight * shares[i].A;
+    total += weight;
+    for (std::size_t z = 0; z < box.size(); ++z) box[z] += weight * shares[i].box[z];
+  }
+  const auto best = std::max_element(box.begin(), box.end());
+  if (best == box.end() || *best < kSurely * total || total <= 0.0) return std::nullopt;
+  return static_cast<std::size_t>(best - box.begin());
+}
+
 void count(Object& object, double seen, const std::vector<Shares>& shares, const ObjectLook& look) {
   const double visible = std::min(1.0, look.sight.fraction);
   object.support += 0.25 * visible * (seen - object.support);
@@ -248,7 +263,7 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
   State x = prior.x;
   double doubt = 1.0;
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
-    const auto box = projectObserved(x, frame.view);
+    const auto box = projectObserved(x, frame.view, frame.offsetOf(prior.class_name));
     if (!box) break;
     Innovation y = innovation(z, *box, hidden);
     if (y.residual.size() == 0) break;
@@ -304,13 +319,15 @@ double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double wei
   return likelihood;
 }
 
-void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
-            const std::vector<Evidence>& boxes, const FrameContext& frame) {
-  if (look.sight.fraction <= 0.0) return;
+std::optional<std::size_t> update(Object& object, const ObjectLook& look,
+                                  const Eigen::VectorXd& eta, const std::vector<Evidence>& boxes,
+                                  const FrameContext& frame) {
+  if (look.sight.fraction <= 0.0) return std::nullopt;
   std::vector<Shares> shares;
   for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, eta));
   const double seen = probabilitySeen(object, shares);
   const Worth hit = worthOf(object, look, shares, frame.parameters->looks.correlation);
+  const auto own = surelyOwn(object, shares);
   count(object, seen, shares, look);
   const double repeated = repetition(object, frame);
   for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -322,6 +339,7 @@ void update(Object& object, const ObjectLook& look, const Eigen::VectorXd& eta,
   updateAzimuths(object, shares, hit.worth, boxes, frame);
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
   if (sound(object)) normalise(object);
+  return own;
 }
 
 }  // namespace perdure::semantic_filter

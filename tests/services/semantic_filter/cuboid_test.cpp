@@ -51,19 +51,19 @@ TEST_F(Cuboid, JacobianByThePoseMatchesDifferences) {
 
 TEST_F(Cuboid, TheDetectorsErrorMovesEachSideByItsShareOfTheBox) {
   x.segment<4>(kBias) << 0.1, -0.05, 0.02, 0.03;
-  const auto plain = projectCuboid(x, view), seen = projectObserved(x, view);
+  const auto plain = projectCuboid(x, view), seen = projectObserved(x, view, Eigen::Vector4d::Zero());
   ASSERT_TRUE(plain && seen);
   const double width = plain->sides[2] - plain->sides[0];
   const double height = plain->sides[3] - plain->sides[1];
   EXPECT_NEAR(seen->sides[0] - plain->sides[0], 0.1 * width, 1e-9);
   EXPECT_NEAR(seen->sides[3] - plain->sides[3], 0.03 * height, 1e-9);
   const auto by_object = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
-    return projectObserved(State(v), view)->sides;
+    return projectObserved(State(v), view, Eigen::Vector4d::Zero())->sides;
   };
   const auto by_pose = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     View moved = view;
     moved.T_WB = boxPlus(view.T_WB, v);
-    return projectObserved(x, moved)->sides;
+    return projectObserved(x, moved, Eigen::Vector4d::Zero())->sides;
   };
   const Eigen::MatrixXd H = numericJacobian(by_object, x);
   const Eigen::MatrixXd H_pose = numericJacobian(by_pose, Eigen::VectorXd::Zero(6));

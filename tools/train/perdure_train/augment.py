@@ -62,9 +62,10 @@ def blurred(image, rng):
     return (np.roll(image, 1, axis) + 2 * image + np.roll(image, -1, axis)) / 4
 
 
-def augmented(image, truth, rng):
-    """uint8 (240, 320, 3) and its truth, changed at random. A pure function of `rng`'s state."""
-    if rng.random() < 0.75:
+def augmented(image, truth, rng, crops=0.75):
+    """uint8 (240, 320, 3) and its truth, changed at random: a share `crops` of the pictures is cut
+    and scaled. A pure function of `rng`'s state."""
+    if rng.random() < crops:
         image, truth = crop(image, truth, rng)
     if rng.random() < 0.5:
         image, truth = mirrored(image, truth)

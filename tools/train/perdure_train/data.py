@@ -34,12 +34,14 @@ def chunk_folders(folder):
 
 
 class Pictures(Dataset):
-    """The pictures of all chunks; with `augment`, each look is another one."""
+    """The pictures of all chunks; with `augment`, each look is another one. Those that show the
+    class `favour` (an index) count twice. `crops` is the share that is cut and scaled."""
 
-    def __init__(self, folders, augment, seed=0):
+    def __init__(self, folders, augment, seed=0, favour=None, crops=0.75):
         self.chunks = [Chunk(folder) for folder in folders]
         self.index = [(c, i) for c, chunk in enumerate(self.chunks) for i in range(len(chunk.truth))]
-        self.augment, self.seed = augment, seed
+        self.index += [(c, i) for c, i in self.index if favour in self.chunks[c].truth[i]["classes"]]
+        self.augment, self.seed, self.crops = augment, seed, crops
 
     def __len__(self):
         return len(self.index)
@@ -50,7 +52,9 @@ class Pictures(Dataset):
         chunk, i = self.index[picture]
         image, truth = np.array(self.chunks[chunk].images[i]), self.chunks[chunk].truth[i]
         if self.augment:
-            image, truth = augmented(image, truth, np.random.default_rng((self.seed, look)))
+            image, truth = augmented(
+                image, truth, np.random.default_rng((self.seed, look)), self.crops
+            )
         return image, truth
 
 

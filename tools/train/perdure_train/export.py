@@ -8,14 +8,29 @@ from onnx import helper, numpy_helper
 from torch import nn
 from torch.nn.utils import fusion
 
-from .network import TENSORS
+from .network import TENSORS, Trunk
 from .settings import HEIGHT, WIDTH
+
+
+class _Affine(nn.Module):
+    """A batch norm that cannot go into its convolution, which others share."""
+
+    def __init__(self, norm):
+        super().__init__()
+        scale = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+        self.scale = nn.Parameter(scale.view(1, -1, 1, 1))
+        self.shift = nn.Parameter((norm.bias - norm.running_mean * scale).view(1, -1, 1, 1))
+
+    def forward(self, x):
+        return x * self.scale + self.shift
 
 
 def _fold(module):
     """Batch norm into the convolution before it, everywhere below `module`."""
     for name, child in module.named_children():
-        if isinstance(child, nn.Sequential) and len(child) >= 2 and isinstance(child[1], nn.BatchNorm2d):
+        if isinstance(child, Trunk):
+            child.norms = nn.ModuleList([_Affine(norm) for norm in child.norms])
+        elif isinstance(child, nn.Sequential) and len(child) >= 2 and isinstance(child[1], nn.BatchNorm2d):
             fused = fusion.fuse_conv_bn_eval(child[0], child[1])
             setattr(module, name, nn.Sequential(fused, *list(child)[2:]))
         else:

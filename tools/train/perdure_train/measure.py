@@ -20,6 +20,7 @@ def _arrays(frame):
         "classes": np.array(frame["classes"], int),
         "azimuths": np.array(frame["azimuths"], float),
         "ignored": np.array(frame["ignored"], bool),
+        "hulls": np.array(frame["hulls"], float).reshape(-1, 4),
     }
 
 

@@ -53,6 +53,20 @@ class Block(nn.Module):
         return self.relu(x + self.second(self.first(x)))
 
 
+class Trunk(nn.Module):
+    """A convolution that the strides share. Its batch norm they do not: activations differ from
+    stride to stride, and with statistics of all of them together boxes came out a tenth too high."""
+
+    def __init__(self, width):
+        super().__init__()
+        self.convolution = nn.Conv2d(width, width, 3, padding=1, bias=False)
+        self.norms = nn.ModuleList([nn.BatchNorm2d(width, momentum=0.03) for _ in STRIDES])
+        self.relu = ReLU()
+
+    def forward(self, x, level):
+        return self.relu(self.norms[level](self.convolution(x)))
+
+
 def upsampled(small, rows):
     """Twice as large; without the row too many where the input's height is no multiple."""
     large = nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
@@ -77,8 +91,8 @@ class Network(nn.Module):
         self.stride32 = conv(w16, w32, 2)
         self.lateral = nn.ModuleList([conv(w, neck, size=1, relu=False) for w in (w8, w16, w32)])
         self.smooth = nn.ModuleList([conv(neck, neck) for _ in range(2)])
-        self.class_trunk = conv(neck, neck)
-        self.box_trunk = conv(neck, neck)
+        self.class_trunk = Trunk(neck)
+        self.box_trunk = Trunk(neck)
         self.logits = nn.Conv2d(neck, len(CLASSES) + 1, 1)
         self.box = nn.Conv2d(neck, 4, 1)
         self.azimuth = nn.Conv2d(neck, 2 * BINS, 1)
@@ -105,9 +119,9 @@ class Network(nn.Module):
         p16 = self.smooth[1](self.lateral[1](c16) + upsampled(p32, int(c16.shape[2])))
         p8 = self.smooth[0](self.lateral[0](c8) + upsampled(p16, int(c8.shape[2])))
         outputs = []
-        for feature in (p8, p16, p32):
-            shape = self.box_trunk(feature)
-            logits = self.logits(self.class_trunk(feature))
+        for level, feature in enumerate((p8, p16, p32)):
+            shape = self.box_trunk(feature, level)
+            logits = self.logits(self.class_trunk(feature, level))
             outputs.append((logits, self.box(shape), self.azimuth(shape), self.spread(shape)))
         return outputs
 

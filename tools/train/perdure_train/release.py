@@ -7,9 +7,11 @@ import numpy as np
 import torch
 
 from . import measure, scores
+from .data import Pictures, chunk_folders
 from .export import write_onnx
 from .network import Network, TENSORS
 from .settings import AZIMUTH_CLASSES, BINS, CLASSES, HEIGHT, REACH, STRIDES, WIDTH
+from .training import settle_statistics
 
 NAME = f"perdure_{WIDTH}x{HEIGHT}"
 DEMO_SIZE = (480, 360)  # the same weights for the demo, whose people are small
@@ -22,7 +24,7 @@ def name_of(width, height):
 
 
 def description(temperature=1.0, clutter_rate=0.5, box_sigma=0.0, azimuth_sigma=0.35,
-                spread_scale=1.0, size=(WIDTH, HEIGHT)):
+                spread_scale=1.0, side_insets=None, size=(WIDTH, HEIGHT)):
     levels = [
         {"stride": stride, "box": box, "logits": logits, "azimuth": azimuth, "spread": spread}
         for stride, (logits, box, azimuth, spread) in zip(STRIDES, TENSORS)
@@ -40,6 +42,7 @@ def description(temperature=1.0, clutter_rate=0.5, box_sigma=0.0, azimuth_sigma=
         "spread_scale": spread_scale,
         "levels": levels,
         "box_sigma": box_sigma,
+        "side_insets": side_insets or {},
         "calibration": {"temperature": temperature, "clutter_rate": clutter_rate},
     }
 
@@ -88,6 +91,8 @@ def release(options, program):
     state = torch.load(options.cache / options.name / "checkpoint.pt", map_location="cpu")
     network = Network()
     network.load_state_dict(state["slow"])
+    pictures = Pictures(chunk_folders(options.cache / "train"), augment=False)
+    settle_statistics(network, pictures)
     options.out.mkdir(parents=True, exist_ok=True)
     model, says = options.out / f"{NAME}.onnx", options.out / "model.json"
     write_onnx(network, model)
@@ -114,6 +119,10 @@ def release(options, program):
         "box_sigma": round(robust_sigma(scores.side_errors(frames), 0.01, 1.0), 3),
         "azimuth_sigma": round(azimuth_sigma_of(frames), 3),
         "spread_scale": round(robust_sigma(scores.side_ratios(frames), 0.1, 10.0), 3),
+        "side_insets": {
+            name: [round(float(x), 3) for x in scores.side_insets(frames, k)]
+            for k, name in enumerate(CLASSES)
+        },
     }
     write_description(says, **values)
     demo = options.out / "demo"

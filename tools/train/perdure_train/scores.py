@@ -183,6 +183,7 @@ def calibration_error(p, labels, bins=15):
 
 CLEAR = 0.8  # probability of the best class; what is half hidden has other errors
 LARGE = 40.0  # pixels of the input; of smaller ones the pixel is the larger error
+FULL = 12.0  # pixels: a median over many does not mind them
 
 
 def side_errors(frames):
@@ -200,6 +201,24 @@ def side_errors(frames):
             free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
             errors.extend(error[free & np.tile(sides > LARGE, 2)])
     return np.array(errors)
+
+
+def side_insets(frames, cls):
+    """How far the sides lie inside the image of the cuboid, in its widths and heights: medians
+    (x1, y1, x2, y2) over the clear matches of one class; zeros where those are few."""
+    insets = []
+    for detections, truth in frames:
+        if not len(detections["boxes"]) or not len(truth["boxes"]):
+            continue
+        got = match(detections["boxes"], detections["p"].max(1), truth["boxes"], ~truth["ignored"])
+        clear = detections["p"].max(1) > CLEAR
+        for i in np.flatnonzero((got >= 0) & clear):
+            hull = truth["hulls"][got[i]]
+            sides = np.array([hull[2] - hull[0], hull[3] - hull[1]] * 2)
+            if truth["classes"][got[i]] != cls or not sides.min() > FULL:
+                continue
+            insets.append((detections["boxes"][i] - hull) / sides * [1, 1, -1, -1])
+    return np.median(insets, 0) if len(insets) >= 20 else np.zeros(4)
 
 
 def side_ratios(frames):

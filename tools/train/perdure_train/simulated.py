@@ -29,6 +29,40 @@ def rotation(w, x, y, z):
     ])
 
 
+def listed(text, key):
+    """The numbers of `key: [..]` in a sensor.yaml."""
+    numbers = text[text.index(key) :]
+    return [float(x) for x in numbers[numbers.index("[") + 1 : numbers.index("]")].split(",")]
+
+
+class Lens:
+    """Pinhole with radial and tangential distortion, as EuRoC's sensor.yaml gives it."""
+
+    def __init__(self, text):
+        self.fx, self.fy, self.cx, self.cy = listed(text, "intrinsics:")
+        self.k1, self.k2, self.p1, self.p2 = listed(text, "distortion_coefficients:")
+
+    def hull(self, points_C):
+        """Box (x1, y1, x2, y2) around the images of points in front of the camera, or nothing."""
+        if points_C[:, 2].min() < 0.5:
+            return None
+        x, y = points_C[:, 0] / points_C[:, 2], points_C[:, 1] / points_C[:, 2]
+        r = x * x + y * y
+        if r.max() > 2.0:  # beyond what the polynomial describes
+            return None
+        radial = 1 + self.k1 * r + self.k2 * r * r
+        u = self.fx * (x * radial + 2 * self.p1 * x * y + self.p2 * (r + 2 * x * x)) + self.cx
+        v = self.fy * (y * radial + self.p1 * (r + 2 * y * y) + 2 * self.p2 * x * y) + self.cy
+        return np.array([u.min(), v.min(), u.max(), v.max()])
+
+
+def corners(thing, centre, yaw):
+    """The eight corners of the cuboid in the world."""
+    unit = np.array([[a, b, c] for a in (-0.5, 0.5) for b in (-0.5, 0.5) for c in (-0.5, 0.5)])
+    c, s = math.cos(yaw), math.sin(yaw)
+    return (unit * thing["size"]) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + centre
+
+
 class Poses:
     """Of the camera in the world, by time."""
 
@@ -39,9 +73,8 @@ class Poses:
         )
         self.times, self.rows = rows[:, 0], rows[:, 1:]
         text = (mav0 / "cam0" / "sensor.yaml").read_text()
-        numbers = text[text.index("data:") + 5 :]
-        numbers = numbers[numbers.index("[") + 1 : numbers.index("]")]
-        self.T_BC = np.array([float(x) for x in numbers.split(",")]).reshape(4, 4)
+        self.T_BC = np.array(listed(text, "data:")).reshape(4, 4)
+        self.lens = Lens(text)
 
     def at(self, time_ns):
         """R_WC and p_WC at the state nearest to the time."""
@@ -87,6 +120,17 @@ def judged(row, scale):
     return box, bool(inside < IGNORED or sides.max() < MIN_SIDE or sides.min() < 3)
 
 
+def hull_of(thing, seen, R_WC, p_WC, time_ns, lens, scale):
+    """Box of the cuboid's image in pixels of the input, where all of the object is in sight and in
+    the image; else four times NaN."""
+    hull = lens.hull((corners(thing, *key_at(thing, time_ns)) - p_WC) @ R_WC)
+    if hull is None or seen < 0.95:
+        return [math.nan] * 4
+    hull = hull * scale
+    inside = hull[0] > 0 and hull[1] > 0 and hull[2] < WIDTH and hull[3] < HEIGHT
+    return [round(float(x), 2) for x in hull] if inside else [math.nan] * 4
+
+
 def read_folder(folder):
     """Images (N, 240, 320, 3) and the truth of each frame, ready for data.Chunk."""
     mav0 = Path(folder) / "mav0"
@@ -101,7 +145,7 @@ def read_folder(folder):
             scale = np.array([WIDTH / picture.width, HEIGHT / picture.height] * 2)
             images.append(np.array(picture.convert("RGB").resize((WIDTH, HEIGHT), Image.BOX)))
         R_WC, p_WC = poses.at(float(stamp))
-        frame = {"boxes": [], "classes": [], "azimuths": [], "ignored": []}
+        frame = {"boxes": [], "classes": [], "azimuths": [], "ignored": [], "hulls": []}
         for row in rows.get(i, []):
             thing, judgement = things[int(row[1])], judged(row, scale)
             if judgement is None or thing["looks_like"] not in CLASSES:
@@ -109,6 +153,8 @@ def read_folder(folder):
             frame["boxes"].append([round(float(x), 2) for x in judgement[0]])
             frame["ignored"].append(judgement[1])
             frame["classes"].append(CLASSES.index(thing["looks_like"]))
+            frame["hulls"].append(hull_of(thing, float(row[2]), R_WC, p_WC, float(stamp),
+                                          poses.lens, scale))
             frame["azimuths"].append(round(azimuth(R_WC, p_WC, *key_at(thing, float(stamp))), 4))
         frames.append(frame)
     return np.stack(images), frames

@@ -4,6 +4,7 @@ import copy
 import math
 import time
 
+import numpy as np
 import torch
 from torch.utils.data import DataLoader
 
@@ -12,6 +13,7 @@ from .heads import cells, flat
 from .losses import losses
 from .network import Network
 from .progress import Progress
+from .settings import CLASSES
 
 
 def optimiser_of(network, rate, decay):
@@ -33,6 +35,27 @@ def average(slow, fast, step):
             a.copy_(b)
 
 
+@torch.no_grad()
+def settle_statistics(network, pictures, batches=100, batch=32, seed=1):
+    """The statistics of batch norm anew, in float32, as the mean over plain pictures of all scenes
+    (Wu and Johnson, "Rethinking 'Batch' in BatchNorm", 2021): those that training leaves are of
+    augmented pictures and in bf16."""
+    norms = [m for m in network.modules() if isinstance(m, torch.nn.BatchNorm2d)]
+    momenta = [m.momentum for m in norms]
+    for m in norms:
+        m.reset_running_stats()
+        m.momentum = None  # the mean of all
+    network.train()
+    rng = np.random.default_rng(seed)
+    for _ in range(batches):
+        chosen = rng.choice(len(pictures), batch, replace=False)
+        images, _ = batch_of([pictures[(0, int(i))] for i in chosen])
+        network(as_input(images).contiguous(memory_format=torch.channels_last))
+    network.eval()
+    for m, momentum in zip(norms, momenta):
+        m.momentum = momentum
+
+
 class Trainer:
     def __init__(self, options, folders):
         self.options = options
@@ -42,7 +65,8 @@ class Trainer:
         self.slow = copy.deepcopy(self.network).eval()
         self.optimiser = optimiser_of(self.network, options.rate, options.decay)
         self.step, self.share = 0, 0.0
-        self.pictures = Pictures(folders, augment=True, seed=options.seed)
+        favour = CLASSES.index(options.favour) if options.favour else None
+        self.pictures = Pictures(folders, True, options.seed, favour, options.crops)
         self.centres, self.strides = cells()
         self.checkpoint = options.cache / options.name / "checkpoint.pt"
 

@@ -1,0 +1,246 @@
+#include "services/semantic_filter/core/batch_model.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/so3.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kNoInformation = 1e8;  // px², of a side that does not count
+constexpr double kLargestTransition = 10.0;
+constexpr double kYawSpread = 0.8;  // rad, around the start: which way a cuboid lies
+constexpr double kAzimuthCorrelation = 0.5;
+constexpr double kAzimuthTail = 3.0;
+constexpr double kAcross = 0.2;   // share of a class's speed across its length
+constexpr double kUpwards = 0.2;  // m/s
+
+Matrix6d transitionBetween(const PoseError& earlier, const PoseError& later) {
+  if (earlier.product == later.product) return Matrix6d::Identity();
+  const Matrix6d transition = later.product * earlier.product.inverse();
+  const bool sane =
+      transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargestTransition;
+  return sane ? transition : Matrix6d::Identity();
+}
+
+template <class Block>
+Eigen::MatrixXd assemble(std::size_t looks, const Block& of) {
+  const auto n = static_cast<Eigen::Index>(4 * looks);
+  Eigen::MatrixXd R(n, n);
+  for (std::size_t i = 0; i < looks; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
+      const Eigen::Matrix4d block = of(i, j);
+      R.block<4, 4>(row, column) = block;
+      R.block<4, 4>(column, row) = block.transpose();
+    }
+  }
+  return R;
+}
+
+}  // namespace
+
+Looks::Looks(const Keyframes& keyframes) : keyframes_(&keyframes) {
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    const PoseError& later = keyframes[i]->from->error;
+    for (std::size_t j = 0; j <= i; ++j) {
+      const PoseError& earlier = keyframes[j]->from->error;
+      exact_ = exact_ && earlier.covariance.isZero(0.0);
+      pairs_.push_back(transitionBetween(earlier, later) * earlier.covariance);
+    }
+  }
+}
+
+BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name, double yaw,
+        const FrameContext& frame)
+    : looks_(looks),
+      frame_(frame),
+      prior_(frame.priors->of(class_name)),
+      yaw_(yaw),
+      dim_(moving ? kMostFree : kGeometry) {
+  size_information_ = prior_.log_size_covariance.inverse();
+  const auto& box = frame.parameters->box;
+  scales_ = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
+  if (!moving) return;
+  const double s2 = std::max(prior_.speed_sigma * prior_.speed_sigma, 0.01);
+  const Eigen::Vector3d along(std::cos(yaw), std::sin(yaw), 0.0);
+  Eigen::Matrix3d P = s2 * along * along.transpose();
+  P.diagonal().head<2>().array() += kAcross * kAcross * s2;
+  P(2, 2) = kUpwards * kUpwards;
+  speed_information_ = P.inverse();
+}
+
+State BatchModel::at(const State& x, const FreeVector& step) const {
+  State y = x;
+  y.head<kGeometry>() += step.head(kGeometry);
+  y[kYaw] = wrapAngle(y[kYaw]);
+  if (moving()) y.tail<3>() += step.tail(3);
+  return y;
+}
+
+std::optional<Stack> BatchModel::linearise(const State& x) const {
+  const auto n = static_cast<Eigen::Index>(looks_.size());
+  Stack s;
+  s.residual = Eigen::VectorXd::Zero(4 * n);
+  s.J = Eigen::MatrixXd::Zero(4 * n, dim_);
+  s.J_pose.assign(looks_.size(), Eigen::Matrix<double, 4, 6>::Zero());
+  s.counts.assign(looks_.size(), {});
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    const Keyframe& k = *looks_.keyframes()[i];
+    State then = x;
+    then.head<3>() -= age(i) * x.tail<3>();
+    const auto box = projectObserved(then, k.from->view, k.from->insets->of(prior_.name));
+    if (!box) return std::nullopt;
+    const auto use = comparableSides(k.z, *box, k.hidden);
+    const auto row = static_cast<Eigen::Index>(4 * i);
+    for (int a = 0; a < 4; ++a) {
+      const double inside = a < 2 ? box->sides[a] - k.z.sides[a] : k.z.sides[a] - box->sides[a];
+      if (!use[a] && !(box->exact[a] && inside > 0.0)) continue;
+      s.counts[i][a] = true;
+      s.residual[row + a] = k.z.sides[a] - box->sides[a];
+      s.J.row(row + a).head<kGeometry>() = box->H.row(a).head<kGeometry>();
+      if (moving()) s.J.row(row + a).tail<3>() = -age(i) * box->H.row(a).head<3>();
+      s.J_pose[i].row(a) = box->H_pose.row(a);
+    }
+  }
+  if (!s.residual.allFinite() || !s.J.allFinite()) return std::nullopt;
+  return s;
+}
+
+Eigen::MatrixXd BatchModel::covariance(const State& x, const Stack& s,
+                                       const Eigen::VectorXd& doubts) const {
+  // A doubtful box says nothing of the pose: its doubt does not widen the error that all share.
+  return assemble(looks_.size(), [&](std::size_t i, std::size_t j) -> Eigen::Matrix4d {
+    const double doubt =
+        std::sqrt(doubts[static_cast<Eigen::Index>(i)] * doubts[static_cast<Eigen::Index>(j)]);
+    const Eigen::Matrix4d own = doubt * ownShare(x, s, i, j);
+    return looks_.exactPoses() ? own : Eigen::Matrix4d(own + poseShare(s, i, j));
+  });
+}
+
+Eigen::VectorXd BatchModel::withoutPose(const Stack& s,
+                                        const Eigen::LLT<Eigen::MatrixXd>& R) const {
+  if (looks_.exactPoses()) return s.residual;
+  const Eigen::MatrixXd pose =
+      assemble(looks_.size(), [&](std::size_t i, std::size_t j) { return poseShare(s, i, j); });
+  return s.residual - pose * R.solve(s.residual);
+}
+
+std::pair<double, double> BatchModel::deviation(const State& x, const Stack& s,
+                                    const Eigen::VectorXd& residual, std::size_t i) const {
+  const Eigen::Vector4d r = residual.segment<4>(static_cast<Eigen::Index>(4 * i));
+  const Eigen::Matrix4d R = ownShare(x, s, i, i);
+  const auto count = std::count(s.counts[i].begin(), s.counts[i].end(), true);
+  return {r.dot(R.ldlt().solve(r)), static_cast<double>(count)};
+}
+
+Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw, const Eigen::VectorXd& rw) const {
+  Quadratic q{Jw.transpose() * Jw, Jw.transpose() * rw};
+  q.G.block<3, 3>(kSize, kSize) += size_information_;
+  q.g.segment<3>(kSize) += size_information_ * (prior_.log_size - x.segment<3>(kSize));
+  const double yaw_information = 1.0 / (kYawSpread * kYawSpread);
+  q.G(kYaw, kYaw) += yaw_information;
+  q.g[kYaw] += yaw_information * wrapAngle(yaw_ - x[kYaw]);
+  if (moving()) {
+    q.G.bottomRightCorner<3, 3>() += speed_information_;
+    q.g.tail<3>() -= speed_information_ * x.tail<3>();
+  }
+  addAzimuths(x, q);
+  return q;
+}
+
+double BatchModel::priorCost(const State& x) const {
+  const Eigen::Vector3d d = prior_.log_size - x.segment<3>(kSize);
+  const double yaw = wrapAngle(yaw_ - x[kYaw]) / kYawSpread;
+  double cost = d.dot(size_information_ * d) + yaw * yaw;
+  if (moving()) cost += x.tail<3>().dot(speed_information_ * x.tail<3>());
+  return cost;
+}
+
+double BatchModel::logSpeedPrior() const {
+  return moving() ? std::log(speed_information_.determinant()) - 3.0 * std::log(2.0 * M_PI) : 0.0;
+}
+
+Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
+                        const Eigen::VectorXd& doubts) const {
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(4, s.residual.size());
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    const Keyframe& k = *looks_.keyframes()[i];
+    const double rho =
+        std::exp(-viewChange(x.head<3>(), k.from->T_WC, frame_.view.T_WC(), scales_));
+    for (int a = 0; a < 4; ++a) {
+      if (!s.counts[i][a]) continue;
+      const auto row = static_cast<Eigen::Index>(4 * i) + a;
+      c(a, row) =
+          rho * sigma[a] * std::sqrt(k.z.lasting[a] * doubts[static_cast<Eigen::Index>(i)]);
+    }
+  }
+  return c;
+}
+
+Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(6, s.residual.size());
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    const PoseError& then = looks_.keyframes()[i]->from->error;
+    c.middleCols<4>(static_cast<Eigen::Index>(4 * i)) =
+        transitionBetween(then, frame_.pose_error) * then.covariance * s.J_pose[i].transpose();
+  }
+  return c;
+}
+
+/// Seconds from the look to the newest one, which the position is of.
+double BatchModel::age(std::size_t i) const {
+  return moving() ? toSeconds(looks_.keyframes().back()->from->time - looks_.keyframes()[i]->from->time) : 0.0;
+}
+
+/// Covariance of the sides of look i (the later one) and j: by the errors of their poses.
+Eigen::Matrix4d BatchModel::poseShare(const Stack& s, std::size_t i, std::size_t j) const {
+  return s.J_pose[i] * looks_.poses(i, j) * s.J_pose[j].transpose();
+}
+
+/// The same by what the network and the thing itself do.
+Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t i, std::size_t j) const {
+  const Keyframe& a = *looks_.keyframes()[i];
+  const Keyframe& b = *looks_.keyframes()[j];
+  Eigen::Matrix4d block = Eigen::Matrix4d::Zero();
+  if (moving()) {
+    // White acceleration since then: the later look is the nearer to the newest one.
+    const double near = age(i), far = age(j);
+    const double q = std::pow(frame_.parameters->motion.acceleration, 2);
+    const double variance = q * near * near * (3.0 * far - near) / 6.0;
+    block += variance * s.J.block<4, 3>(static_cast<Eigen::Index>(4 * i), 0) *
+             s.J.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0).transpose();
+  }
+  const double rho =
+      i == j ? 1.0 : std::exp(-viewChange(x.head<3>(), a.from->T_WC, b.from->T_WC, scales_));
+  for (int side = 0; side < 4; ++side) {
+    if (s.counts[i][side] && s.counts[j][side]) {
+      block(side, side) += rho * std::sqrt(a.z.lasting[side] * b.z.lasting[side]);
+    }
+    if (i == j) block(side, side) += s.counts[i][side] ? a.z.variance[side] : kNoInformation;
+  }
+  return block;
+}
+
+void BatchModel::addAzimuths(const State& x, Quadratic& q) const {
+  if (!prior_.has_yaw) return;
+  const auto looks = static_cast<double>(
+      std::count_if(looks_.keyframes().begin(), looks_.keyframes().end(),
+                    [](const auto& k) { return k->azimuth.has_value(); }));
+  for (const auto& k : looks_.keyframes()) {
+    if (!k->azimuth) continue;
+    const double sigma = std::max(k->azimuth_sigma, prior_.azimuth_sigma);
+    double residual =
+        wrapAngle(yawFromAzimuth(*k->azimuth, x.head<3>(), k->from->view) - x[kYaw]);
+    if (std::abs(residual) > M_PI / 2) residual = wrapAngle(residual + M_PI);
+    const double nis = residual * residual / (sigma * sigma);
+    const double information = (kAzimuthTail + 1.0) / (kAzimuthTail + nis) /
+                               (sigma * sigma * (1.0 + (looks - 1.0) * kAzimuthCorrelation));
+    q.G(kYaw, kYaw) += information;
+    q.g[kYaw] += information * residual;
+  }
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,100 @@
+// All remembered looks at an object as one measurement of a cuboid: its residuals, Jacobians and full
+// covariance, and the priors. What Smoothed maximises; see smoother.h for the model.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "services/semantic_filter/core/keyframe.h"
+
+namespace perdure::semantic_filter {
+
+using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
+
+/// The looks at one object, and the covariances between the pose errors of all pairs of them.
+class Looks {
+ public:
+  /// `keyframes` are in order of time and outlive this.
+  explicit Looks(const Keyframes& keyframes);
+
+  const Keyframes& keyframes() const { return *keyframes_; }
+  std::size_t size() const { return keyframes_->size(); }
+  /// True where all poses are exact.
+  bool exactPoses() const { return exact_; }
+  /// Of look i with the earlier or same look j.
+  const Matrix6d& poses(std::size_t i, std::size_t j) const { return pairs_[i * (i + 1) / 2 + j]; }
+
+ private:
+  const Keyframes* keyframes_;
+  std::vector<Matrix6d> pairs_;
+  bool exact_ = true;
+};
+
+/// Dimensions that a batch estimates: the cuboid, and the velocity of what moves.
+inline constexpr int kGeometry = 7, kMostFree = 10;
+using FreeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFree, 1>;
+using FreeMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree, kMostFree>;
+
+/// Linearised at one state: four rows for each look.
+struct Stack {
+  Eigen::VectorXd residual;  ///< z - h(x), pixels; 0 where a side does not count
+  Eigen::MatrixXd J;         ///< by geometry (and velocity)
+  std::vector<Eigen::Matrix<double, 4, 6>> J_pose;
+  std::vector<std::array<bool, 4>> counts;
+};
+
+struct Quadratic {
+  FreeMatrix G;  ///< information
+  FreeVector g;  ///< its gradient: the maximum is at x + G⁻¹ g
+};
+
+/// `doubts` (one for each look, >= 1) widen whole looks; x has b = 0.
+class BatchModel {
+ public:
+  /// Of a class, at rest or moving, with this yaw at the start.
+  BatchModel(const Looks& looks, bool moving, const std::string& class_name, double yaw,
+             const FrameContext& frame);
+
+  int dim() const { return dim_; }
+  bool moving() const { return dim_ == kMostFree; }
+  State at(const State& x, const FreeVector& step) const;
+  /// Nothing where a look does not see the cuboid at all.
+  std::optional<Stack> linearise(const State& x) const;
+  /// Of all rows given the cuboid: noise, b, pose errors, acceleration.
+  Eigen::MatrixXd covariance(const State& x, const Stack& s, const Eigen::VectorXd& doubts) const;
+  /// What is left of the residuals when the pose errors have been estimated from them: a common
+  /// pose error is no contradiction. R is the covariance.
+  Eigen::VectorXd withoutPose(const Stack& s, const Eigen::LLT<Eigen::MatrixXd>& R) const;
+  /// Squared deviation of one look with these residuals, and how many sides count.
+  std::pair<double, double> deviation(const State& x, const Stack& s,
+                                      const Eigen::VectorXd& residual, std::size_t look) const;
+  /// Looks (whitened Jacobian and residual) and priors at x.
+  Quadratic quadratic(const State& x, const Eigen::MatrixXd& Jw, const Eigen::VectorXd& rw) const;
+  /// Twice the negative logarithm of the priors, but for a constant and the azimuths.
+  double priorCost(const State& x) const;
+  /// log |Λ / 2π| of the velocity's prior, which only what moves has.
+  double logSpeedPrior() const;
+  /// Covariance of the present b, in units of a box whose b has deviations `sigma`, with all rows.
+  Eigen::MatrixXd biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
+                          const Eigen::VectorXd& doubts) const;
+  /// Covariance of the present pose error with all rows.
+  Eigen::MatrixXd poseNow(const Stack& s) const;
+
+ private:
+  double age(std::size_t look) const;
+  Eigen::Matrix4d poseShare(const Stack& s, std::size_t i, std::size_t j) const;
+  Eigen::Matrix4d ownShare(const State& x, const Stack& s, std::size_t i, std::size_t j) const;
+  void addAzimuths(const State& x, Quadratic& q) const;
+
+  const Looks& looks_;
+  const FrameContext& frame_;
+  ClassPrior prior_;
+  double yaw_;
+  int dim_;
+  Eigen::Matrix3d size_information_, speed_information_ = Eigen::Matrix3d::Zero();
+  ViewScales scales_{1, 1, 1};
+};
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,270 @@
+#include "services/semantic_filter/core/smoother.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/tend.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr int kRounds = 12;
+constexpr double kContradicted = 25.0;  // of about four degrees of freedom
+
+/// Weights of a t distribution for whole looks; returns the share that contradicts x.
+double doubtLooks(const BatchModel& model, const State& x, const Stack& s,
+                  const Eigen::LLT<Eigen::MatrixXd>& R, double tail, Eigen::VectorXd& doubts) {
+  const Eigen::VectorXd residual = model.withoutPose(s, R);
+  double contradicted = 0.0;
+  for (Eigen::Index i = 0; i < doubts.size(); ++i) {
+    const auto [nis, count] = model.deviation(x, s, residual, static_cast<std::size_t>(i));
+    doubts[i] = std::max(1.0, (tail + nis) / (tail + count));
+    contradicted += nis > kContradicted ? 1.0 : 0.0;
+  }
+  return contradicted / static_cast<double>(doubts.size());
+}
+
+struct Fit {
+  State x;
+  Stack stack;
+  Eigen::VectorXd doubts;
+  double contradicted = 0.0;
+  Eigen::LLT<Eigen::MatrixXd> R;
+};
+
+/// One step of Levenberg and Marquardt's. False where none lowers the cost.
+bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) {
+  const Eigen::MatrixXd Jw = fit.R.matrixL().solve(fit.stack.J);
+  const Eigen::VectorXd rw = fit.R.matrixL().solve(fit.stack.residual);
+  const Quadratic q = model.quadratic(fit.x, Jw, rw);
+  const double cost = rw.squaredNorm() + model.priorCost(fit.x);
+  for (int attempt = 0; attempt < 6; ++attempt) {
+    FreeMatrix damped = q.G;
+    damped.diagonal() *= 1.0 + damping;
+    const FreeVector step = damped.ldlt().solve(q.g);
+    const State next = model.at(fit.x, step);
+    auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
+    if (stack) {
+      const Eigen::VectorXd w = fit.R.matrixL().solve(stack->residual);
+      if (w.squaredNorm() + model.priorCost(next) <= cost * (1.0 + 1e-3) + 1e-6) {
+        moved = step.head<3>().norm();
+        fit.x = next;
+        fit.stack = std::move(*stack);
+        damping = std::max(0.1 * damping, 1e-6);
+        return true;
+      }
+    }
+    damping *= 10.0;
+  }
+  return false;
+}
+
+std::optional<Fit> fitLooks(const BatchModel& model, const State& start, std::size_t looks,
+                            double tail) {
+  Fit fit;
+  fit.x = start;
+  fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks));
+  auto stack = model.linearise(fit.x);
+  if (!stack) return std::nullopt;
+  fit.stack = std::move(*stack);
+  double damping = 1e-4;
+  for (int round = 0; round < kRounds; ++round) {
+    fit.R.compute(model.covariance(fit.x, fit.stack, fit.doubts));
+    if (fit.R.info() != Eigen::Success) return std::nullopt;
+    double moved = 0.0;
+    const bool better = descend(model, fit, damping, moved);
+    fit.contradicted = doubtLooks(model, fit.x, fit.stack, fit.R, tail, fit.doubts);
+    if (round > 0 && (!better || moved < 0.005)) break;
+  }
+  fit.R.compute(model.covariance(fit.x, fit.stack, fit.doubts));
+  if (fit.R.info() != Eigen::Success) return std::nullopt;
+  return fit;
+}
+
+/// The filter's state, with b and C, from the fit.
+std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const Hypothesis& start,
+                                  const FrameContext& frame) {
+  const Eigen::MatrixXd Jw = fit.R.matrixL().solve(fit.stack.J);
+  const Eigen::VectorXd rw = fit.R.matrixL().solve(fit.stack.residual);
+  const Eigen::LDLT<FreeMatrix> information(model.quadratic(fit.x, Jw, rw).G);
+  if (information.info() != Eigen::Success || !information.isPositive()) return std::nullopt;
+  const FreeMatrix P = information.solve(FreeMatrix::Identity(model.dim(), model.dim()));
+  const double distance = (fit.x.head<3>() - frame.view.T_WC().p).norm();
+  if (!P.allFinite()) return std::nullopt;
+  const auto now = projectCuboid(fit.x, frame.view);
+  if (!now) return std::nullopt;
+  const Eigen::Vector4d sigma = biasSigma(
+      viewWalkOf(frame).lasting, std::max(now->sides[2] - now->sides[0], 1.0),
+      std::max(now->sides[3] - now->sides[1], 1.0));
+  const Eigen::MatrixXd Bw =
+      fit.R.matrixL().solve(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
+  const Eigen::MatrixXd Ew =
+      fit.R.matrixL().solve(model.poseNow(fit.stack).transpose());
+  const Eigen::MatrixXd BJ = Bw.transpose() * Jw;
+  const Eigen::MatrixXd C = -P * (Jw.transpose() * Ew);
+
+  // State order: geometry, b, velocity.
+  const int g = kGeometry;
+  Hypothesis h = start;
+  h.moving = model.moving();
+  h.x = fit.x;
+  h.x.segment<4>(kBias) = Bw.transpose() * rw;
+  h.P.setZero();
+  h.P.topLeftCorner(g, g) = P.topLeftCorner(g, g);
+  h.P.block<4, 4>(kBias, kBias) = -Bw.transpose() * Bw + BJ * P * BJ.transpose();
+  h.P.block<4, 4>(kBias, kBias).diagonal() += sigma.cwiseAbs2();
+  const Eigen::MatrixXd cross = -BJ * P;
+  h.P.block(kBias, 0, 4, g) = cross.leftCols(g);
+  h.P.block(0, kBias, g, 4) = cross.leftCols(g).transpose();
+  h.C.setZero();
+  h.C.topRows(g) = C.topRows(g);
+  h.C.middleRows<4>(kBias) = -Bw.transpose() * Ew - BJ * C;
+  if (model.moving()) {
+    h.P.bottomRightCorner<3, 3>() = P.bottomRightCorner<3, 3>();
+    h.P.block(kVelocity, 0, 3, g) = P.bottomLeftCorner(3, g);
+    h.P.block(0, kVelocity, g, 3) = P.topRightCorner(g, 3);
+    h.P.block<3, 4>(kVelocity, kBias) = cross.rightCols<3>().transpose();
+    h.P.block<4, 3>(kBias, kVelocity) = cross.rightCols<3>();
+    h.C.bottomRows<3>() = C.bottomRows(3);
+  }
+  makeSymmetric(h.P);
+  const int n = model.moving() ? kStateDim : kVelocity;
+  if (!h.x.allFinite() || !isCovariance(h.P.topLeftCorner(n, n))) return std::nullopt;
+  if (placeSigma(h, frame.pose_error.covariance) > frame.parameters->smooth.place * distance) {
+    return std::nullopt;
+  }
+  return h;
+}
+
+}  // namespace
+
+std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& looks,
+                                       const FrameContext& frame) {
+  const BatchModel model(looks, start.moving, start.class_name, start.x[kYaw], frame);
+  State x = start.x;
+  x.segment<4>(kBias).setZero();
+  const auto fit = fitLooks(model, x, looks.size(), frame.parameters->box.tail);
+  if (!fit) return std::nullopt;
+  const auto h = stateOf(model, *fit, start, frame);
+  if (!h) return std::nullopt;
+  Smoothed result(looks, frame);
+  result.hypothesis_ = *h;
+  result.doubts_ = fit->doubts;
+  result.contradicted_ = fit->contradicted;
+  result.start_yaw_ = start.x[kYaw];
+  return result;
+}
+
+double Smoothed::logEvidence(const Eigen::VectorXd& doubts) const {
+  constexpr double kImpossible = -1e6;
+  const BatchModel model(*looks_, hypothesis_.moving, hypothesis_.class_name, start_yaw_, *frame_);
+  State x = hypothesis_.x;
+  x.segment<4>(kBias).setZero();
+  const auto s = model.linearise(x);
+  if (!s) return kImpossible;
+  const Eigen::LLT<Eigen::MatrixXd> R(model.covariance(x, *s, doubts));
+  if (R.info() != Eigen::Success) return kImpossible;
+  const Eigen::MatrixXd Jw = R.matrixL().solve(s->J);
+  const Eigen::VectorXd rw = R.matrixL().solve(s->residual);
+  const Quadratic q = model.quadratic(x, Jw, rw);
+  const Eigen::LLT<Eigen::MatrixXd> G(q.G);
+  if (G.info() != Eigen::Success) return kImpossible;
+  const auto logDet = [](const Eigen::LLT<Eigen::MatrixXd>& llt) {
+    return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  };
+  const double cost = rw.squaredNorm() + model.priorCost(x) - q.g.dot(G.solve(q.g));
+  const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
+  return 0.5 * (free + model.logSpeedPrior() - cost - logDet(R) - logDet(G));
+}
+
+namespace {
+
+/// The thing at rest where the looks say, when the filter has come to believe that it moves.
+Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
+  Hypothesis h = moving;
+  const double age =
+      toSeconds(keyframes.back()->from->time - keyframes[keyframes.size() / 2]->from->time);
+  h.x.head<3>() -= age * h.x.tail<3>();
+  h.x.tail<3>().setZero();
+  h.moving = false;
+  h.head = moving.head;
+  h.weight = 0.0;
+  return h;
+}
+
+/// Of one class: whether it moves, by what all looks say.
+void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smoothed& still,
+                 const Smoothed& moving, const FrameContext& frame) {
+  constexpr double kSurest = 15.0;  // nats
+  const ClassPrior prior = frame.priors->of(name);
+  const auto& motion = frame.parameters->motion;
+  const Eigen::VectorXd doubts = still.doubts().cwiseMin(moving.doubts());
+  const double pace =
+      motion.creeping + (1.0 - motion.creeping) * fasterThan(moving.hypothesis(),
+                                                             motion.slow_share * prior.speed_sigma);
+  const double log_odds = std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) +
+                                         std::log((1.0 - prior.moving) / prior.moving / pace),
+                                     -kSurest, kSurest);
+  const double rests = 1.0 / (1.0 + std::exp(-log_odds));
+  double weight[2] = {0.0, 0.0};
+  for (const auto& h : hs) {
+    if (h.class_name == name) weight[h.moving] += h.weight;
+  }
+  const double all = weight[0] + weight[1];
+  for (auto& h : hs) {
+    if (h.class_name != name || weight[h.moving] <= 0.0) continue;
+    h.weight *= all * (h.moving ? 1.0 - rests : rests) / weight[h.moving];
+    if (h.moving) h.pace = pace;
+  }
+}
+
+void smoothClass(Object& object, const std::string& name, const Looks& looks,
+                 const FrameContext& frame) {
+  const auto& p = frame.parameters->smooth;
+  std::optional<Smoothed> best[2];  // at rest, moving
+  double weight[2] = {0.0, 0.0};
+  for (auto& h : object.hypotheses) {
+    if (h.class_name != name || h.weight < p.least_weight) continue;
+    auto smoothed = Smoothed::make(h, looks, frame);
+    if (!smoothed || smoothed->contradicted() > p.contradicted) continue;
+    const double old = h.weight;
+    h = smoothed->hypothesis();
+    if (old > weight[h.moving]) weight[h.moving] = old, best[h.moving] = std::move(smoothed);
+  }
+  if (!best[1]) return;
+  if (!best[0]) {
+    auto smoothed = Smoothed::make(atRest(best[1]->hypothesis(), object.keyframes), looks, frame);
+    if (!smoothed || smoothed->contradicted() > p.contradicted) return;
+    object.hypotheses.push_back(smoothed->hypothesis());
+    object.hypotheses.back().weight = 1e-3 * weight[1];
+    best[0] = std::move(smoothed);
+  }
+  weighMotion(object.hypotheses, name, *best[0], *best[1], frame);
+}
+
+}  // namespace
+
+void rememberAndSmooth(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
+                       const FrameContext& frame) {
+  const auto& p = *frame.parameters;
+  if (p.smooth.keyframes == 0 || !frame.key_view) return;
+  const ViewScales scales{p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle};
+  Keyframe keyframe{frame.key_view, box.z, hidden, box.azimuth, box.azimuth_sigma};
+  if (!remember(object, std::move(keyframe), scales, p.smooth)) return;
+  if (object.keyframes.size() < static_cast<std::size_t>(p.smooth.least)) return;
+  // One look more among many changes little: wait for an eighth of them.
+  if (++object.fresh_keyframes * 8 < object.keyframes.size()) return;
+  object.fresh_keyframes = 0;
+  const Looks looks(object.keyframes);
+  std::set<std::string> names;
+  for (const auto& h : object.hypotheses) names.insert(h.class_name);
+  for (const auto& name : names) smoothClass(object, name, looks, frame);
+  normalise(object);
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,214 @@
+#include "services/semantic_filter/core/smoother.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/semantic_filter/core/tend.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makePrior;
+using testing::makePriors;
+using testing::makeState;
+
+/// A car (or what drives as one) that is passed; boxes drawn from the model that is estimated with.
+class Passing {
+ public:
+  explicit Passing(unsigned seed, double speed = 0.0, double pose_sigma = 0.0)
+      : camera_(makeCamera()), random_(seed), priors_(makePriors()) {
+    for (auto& c : priors_.classes) c.moving = 0.2, c.speed_sigma = 8.0;
+    parameters_.smooth.new_view = 0.01;
+    truth_ = makeState(32.0, 5.0, 0.8, 0.15, 4.3, 1.8, 1.45);
+    truth_[kVelocity] = speed;
+    shift_ = Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_)) * pose_sigma;
+    error_.covariance.bottomRightCorner<3, 3>().diagonal().setConstant(pose_sigma * pose_sigma);
+    error_.covariance.topLeftCorner<3, 3>().diagonal().setConstant(1e-8);
+    for (int k = 0; k < 18; ++k) look(k);
+  }
+
+  FrameContext frame() const {
+    const auto& last = *keyframes_.back()->from;
+    return {last.view, last.error, nullptr, &priors_, &parameters_, keyframes_.back()->from};
+  }
+  const Keyframes& keyframes() const { return keyframes_; }
+  Keyframes& keyframes() { return keyframes_; }
+  const State& truth() const { return truth_; }  ///< at the last look
+  Parameters& parameters() { return parameters_; }
+
+  /// What a filter might hold after a bad first box.
+  Hypothesis start(bool moving) const {
+    Hypothesis h;
+    h.class_name = "car";
+    h.moving = moving;
+    h.weight = 1.0;
+    h.x = truth_;
+    h.x.tail<3>().setZero();
+    h.x.head<3>() += Eigen::Vector3d(4.0, 0.6, 0.1);
+    h.x.segment<3>(kSize).array() += 0.12;
+    return h;
+  }
+
+ private:
+  void look(int k) {
+    const double t = 0.2 * k;
+    RigidTransform believed;
+    believed.p = Eigen::Vector3d(1.4 * k, 0.0, 1.2);
+    RigidTransform true_pose = believed;
+    true_pose.p += shift_;
+    State x = truth_;
+    x.head<3>() += t * truth_.tail<3>();
+    const View seen{&camera_, true_pose, Eigen::Vector3d::UnitZ()};
+    const auto box = projectCuboid(x, seen);
+    if (!box) return;
+    const double width = box->sides[2] - box->sides[0], height = box->sides[3] - box->sides[1];
+    Keyframe keyframe;
+    const Box b{box->sides[0], box->sides[1], box->sides[2], box->sides[3]};
+    keyframe.z = measure(b, camera_.width(), camera_.height(), parameters_.box, {});
+    for (int i = 0; i < 4; ++i) {  // b: one draw for all, in shares of the box
+      const double size = i % 2 == 0 ? width : height;
+      if (k == 0) bias_[i] = normal_(random_);
+      keyframe.z.sides[i] += std::sqrt(keyframe.z.variance[i]) * normal_(random_) +
+                             0.5 * std::sqrt(keyframe.z.lasting[i]) * bias_[i];
+      EXPECT_GT(size, 0.0);
+    }
+    keyframe.from = std::make_shared<const KeyView>(View{&camera_, believed, seen.up_W}, error_,
+                                                    fromNanoseconds(std::int64_t{200'000'000} * k),
+                                                    std::make_shared<const Insets>());
+    keyframes_.push_back(std::make_shared<const Keyframe>(keyframe));
+    if (k == 17) truth_.head<3>() += t * truth_.tail<3>();
+  }
+
+  CameraModel camera_;
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_;
+  ClassPriors priors_;
+  Parameters parameters_;
+  State truth_;
+  Eigen::Vector3d shift_;
+  PoseError error_;
+  Eigen::Vector4d bias_ = Eigen::Vector4d::Zero();
+  Keyframes keyframes_;
+};
+
+Eigen::Vector3d placeError(const Smoothed& s, const Passing& scene) {
+  return (s.hypothesis().x - scene.truth()).head<3>();
+}
+
+TEST(Smoother, FindsThePlaceFromMetresAway) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Passing scene(seed);
+    const FrameContext frame = scene.frame();
+    const Looks looks(scene.keyframes());
+    const auto s = Smoothed::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(s) << seed;
+    EXPECT_LT(placeError(*s, scene).norm(), 0.7) << seed;
+    EXPECT_LT(s->contradicted(), 0.1) << seed;
+  }
+}
+
+TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {
+  double nees = 0.0;
+  constexpr int kRuns = 60;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    const Passing scene(seed, 0.0, 0.3);
+    const FrameContext frame = scene.frame();
+    const Looks looks(scene.keyframes());
+    const auto s = Smoothed::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(s) << seed;
+    const Eigen::Vector3d e = placeError(*s, scene);
+    nees += e.dot(s->hypothesis().P.topLeftCorner<3, 3>().ldlt().solve(e)) / kRuns;
+  }
+  // Three degrees of freedom; the truth's size is not drawn from the prior, and b not from its
+  // process, so that the band is wide.
+  EXPECT_GT(nees, 1.0);
+  EXPECT_LT(nees, 5.0);
+}
+
+TEST(Smoother, CorrelatesThePlaceWithThePresentPoseError) {
+  const Passing scene(3, 0.0, 0.3);
+  const FrameContext frame = scene.frame();
+  const Looks looks(scene.keyframes());
+  const auto s = Smoothed::make(scene.start(false), looks, frame);
+  ASSERT_TRUE(s);
+  // All poses share one error: beside the body the place is known far better than in W.
+  EXPECT_LT(placeSigma(s->hypothesis(), frame.pose_error.covariance),
+            0.75 * std::sqrt(s->hypothesis().P.topLeftCorner<3, 3>().trace()));
+}
+
+TEST(Smoother, OneBoxOfAnotherThingCountsLittle) {
+  Passing scene(5);
+  Keyframe wrong = *scene.keyframes()[9];
+  wrong.z.sides += Eigen::Vector4d(60, 5, 70, 8);
+  scene.keyframes()[9] = std::make_shared<const Keyframe>(wrong);
+  const FrameContext frame = scene.frame();
+  const Looks looks(scene.keyframes());
+  const auto s = Smoothed::make(scene.start(false), looks, frame);
+  ASSERT_TRUE(s);
+  EXPECT_GT(s->doubts()[9], 5.0);
+  EXPECT_LT(placeError(*s, scene).norm(), 0.8);
+}
+
+TEST(Smoother, TellsWhatMovesFromWhatStands) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    for (const double speed : {0.0, 5.0}) {
+      const Passing scene(seed, speed);
+      const FrameContext frame = scene.frame();
+      const Looks looks(scene.keyframes());
+      const auto still = Smoothed::make(scene.start(false), looks, frame);
+      const auto moving = Smoothed::make(scene.start(true), looks, frame);
+      ASSERT_TRUE(moving) << seed;
+      if (speed > 0.0) {
+        EXPECT_NEAR(moving->hypothesis().x[kVelocity], speed, 1.5) << seed;
+        if (!still) continue;  // nothing that stands fits
+      }
+      ASSERT_TRUE(still) << seed;
+      const Eigen::VectorXd doubts = still->doubts().cwiseMin(moving->doubts());
+      const double odds = still->logEvidence(doubts) - moving->logEvidence(doubts);
+      if (speed > 0.0) {
+        EXPECT_LT(odds, -3.0) << seed;
+      } else {
+        EXPECT_GT(odds, 1.0) << seed;
+      }
+    }
+  }
+}
+
+TEST(Smoother, TakesNoPlaceThatTheLooksDoNotFix) {
+  Passing scene(2);
+  scene.parameters().smooth.place = 1e-4;
+  const FrameContext frame = scene.frame();
+  const Looks looks(scene.keyframes());
+  EXPECT_FALSE(Smoothed::make(scene.start(false), looks, frame));
+}
+
+TEST(Keyframes, NewViewsAreRememberedAndTheMostAlikeForgotten) {
+  const Passing scene(1);
+  SmoothParameters parameters;
+  parameters.keyframes = 6;
+  parameters.new_view = 0.05;
+  const ViewScales scales{0.3, 0.3, 0.3};
+  Object object;
+  Hypothesis h = scene.start(false);
+  h.x = scene.truth();
+  object.hypotheses = {h};
+  for (const auto& k : scene.keyframes()) remember(object, *k, scales, parameters);
+  ASSERT_EQ(object.keyframes.size(), 6U);
+  EXPECT_FALSE(remember(object, *scene.keyframes().back(), scales, parameters));
+  EXPECT_TRUE(std::is_sorted(
+      object.keyframes.begin(), object.keyframes.end(),
+      [](const auto& a, const auto& b) { return a->from->time < b->from->time; }));
+  // They span the whole drive, not its end.
+  EXPECT_LT(toSeconds(object.keyframes.front()->from->time), 1.5);
+  Object other = object;
+  other.keyframes = {scene.keyframes()[1], scene.keyframes()[2]};
+  joinKeyframes(object, other, scales, parameters);
+  EXPECT_LE(object.keyframes.size(), 6U);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
