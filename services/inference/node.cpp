@@ -56,7 +56,8 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   if (!description_.side_insets.empty()) {
     for (const std::string& name : info_.classes) {
       const auto it = description_.side_insets.find(name);
-      const auto sides = it == description_.side_insets.end() ? std::array<double, 4>{} : it->second;
+      const auto sides =
+          it == description_.side_insets.end() ? std::array<double, 4>{} : it->second;
       info_.side_insets.insert(info_.side_insets.end(), sides.begin(), sides.end());
     }
   }

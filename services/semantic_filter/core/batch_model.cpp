@@ -13,6 +13,7 @@ constexpr double kNoInformation = 1e8;  // px², of a side that does not count
 constexpr double kLargestTransition = 10.0;
 constexpr double kYawSpread = 0.8;  // rad, around the start: which way a cuboid lies
 constexpr double kAzimuthCorrelation = 0.5;
+constexpr double kOtherScale = 1.0;  // of the logarithm of all three dimensions
 constexpr double kAzimuthTail = 3.0;
 constexpr double kAcross = 0.2;   // share of a class's speed across its length
 constexpr double kUpwards = 0.2;  // m/s
@@ -20,8 +21,7 @@ constexpr double kUpwards = 0.2;  // m/s
 Matrix6d transitionBetween(const PoseError& earlier, const PoseError& later) {
   if (earlier.product == later.product) return Matrix6d::Identity();
   const Matrix6d transition = later.product * earlier.product.inverse();
-  const bool sane =
-      transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargestTransition;
+  const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargestTransition;
   return sane ? transition : Matrix6d::Identity();
 }
 
@@ -54,12 +54,14 @@ Looks::Looks(const Keyframes& keyframes) : keyframes_(&keyframes) {
 }
 
 BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name, double yaw,
-        const FrameContext& frame)
+                       const FrameContext& frame)
     : looks_(looks),
       frame_(frame),
       prior_(frame.priors->of(class_name)),
       yaw_(yaw),
       dim_(moving ? kMostFree : kGeometry) {
+  // At birth "other" has three scales, which one Gaussian has to cover here.
+  if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
   size_information_ = prior_.log_size_covariance.inverse();
   const auto& box = frame.parameters->box;
   scales_ = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
@@ -129,14 +131,16 @@ Eigen::VectorXd BatchModel::withoutPose(const Stack& s,
 }
 
 std::pair<double, double> BatchModel::deviation(const State& x, const Stack& s,
-                                    const Eigen::VectorXd& residual, std::size_t i) const {
+                                                const Eigen::VectorXd& residual,
+                                                std::size_t i) const {
   const Eigen::Vector4d r = residual.segment<4>(static_cast<Eigen::Index>(4 * i));
   const Eigen::Matrix4d R = ownShare(x, s, i, i);
   const auto count = std::count(s.counts[i].begin(), s.counts[i].end(), true);
   return {r.dot(R.ldlt().solve(r)), static_cast<double>(count)};
 }
 
-Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw, const Eigen::VectorXd& rw) const {
+Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw,
+                                const Eigen::VectorXd& rw) const {
   Quadratic q{Jw.transpose() * Jw, Jw.transpose() * rw};
   q.G.block<3, 3>(kSize, kSize) += size_information_;
   q.g.segment<3>(kSize) += size_information_ * (prior_.log_size - x.segment<3>(kSize));
@@ -164,7 +168,7 @@ double BatchModel::logSpeedPrior() const {
 }
 
 Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
-                        const Eigen::VectorXd& doubts) const {
+                                    const Eigen::VectorXd& doubts) const {
   Eigen::MatrixXd c = Eigen::MatrixXd::Zero(4, s.residual.size());
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
@@ -173,8 +177,7 @@ Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen:
     for (int a = 0; a < 4; ++a) {
       if (!s.counts[i][a]) continue;
       const auto row = static_cast<Eigen::Index>(4 * i) + a;
-      c(a, row) =
-          rho * sigma[a] * std::sqrt(k.z.lasting[a] * doubts[static_cast<Eigen::Index>(i)]);
+      c(a, row) = rho * sigma[a] * std::sqrt(k.z.lasting[a] * doubts[static_cast<Eigen::Index>(i)]);
     }
   }
   return c;
@@ -192,7 +195,9 @@ Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
 
 /// Seconds from the look to the newest one, which the position is of.
 double BatchModel::age(std::size_t i) const {
-  return moving() ? toSeconds(looks_.keyframes().back()->from->time - looks_.keyframes()[i]->from->time) : 0.0;
+  return moving()
+             ? toSeconds(looks_.keyframes().back()->from->time - looks_.keyframes()[i]->from->time)
+             : 0.0;
 }
 
 /// Covariance of the sides of look i (the later one) and j: by the errors of their poses.
@@ -201,7 +206,8 @@ Eigen::Matrix4d BatchModel::poseShare(const Stack& s, std::size_t i, std::size_t
 }
 
 /// The same by what the network and the thing itself do.
-Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t i, std::size_t j) const {
+Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t i,
+                                     std::size_t j) const {
   const Keyframe& a = *looks_.keyframes()[i];
   const Keyframe& b = *looks_.keyframes()[j];
   Eigen::Matrix4d block = Eigen::Matrix4d::Zero();
@@ -226,14 +232,13 @@ Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t
 
 void BatchModel::addAzimuths(const State& x, Quadratic& q) const {
   if (!prior_.has_yaw) return;
-  const auto looks = static_cast<double>(
-      std::count_if(looks_.keyframes().begin(), looks_.keyframes().end(),
-                    [](const auto& k) { return k->azimuth.has_value(); }));
+  const auto looks =
+      static_cast<double>(std::count_if(looks_.keyframes().begin(), looks_.keyframes().end(),
+                                        [](const auto& k) { return k->azimuth.has_value(); }));
   for (const auto& k : looks_.keyframes()) {
     if (!k->azimuth) continue;
     const double sigma = std::max(k->azimuth_sigma, prior_.azimuth_sigma);
-    double residual =
-        wrapAngle(yawFromAzimuth(*k->azimuth, x.head<3>(), k->from->view) - x[kYaw]);
+    double residual = wrapAngle(yawFromAzimuth(*k->azimuth, x.head<3>(), k->from->view) - x[kYaw]);
     if (std::abs(residual) > M_PI / 2) residual = wrapAngle(residual + M_PI);
     const double nis = residual * residual / (sigma * sigma);
     const double information = (kAzimuthTail + 1.0) / (kAzimuthTail + nis) /

@@ -1,5 +1,5 @@
-// All remembered looks at an object as one measurement of a cuboid: its residuals, Jacobians and full
-// covariance, and the priors. What Smoothed maximises; see smoother.h for the model.
+// All remembered looks at an object as one measurement of a cuboid: its residuals, Jacobians and
+// full covariance, and the priors. What Smoothed maximises; see smoother.h for the model.
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -14,7 +14,8 @@
 
 namespace perdure::semantic_filter {
 
-/// Where a model's boxes lie in the cuboids' images, by class. Of a class it does not name: the mean.
+/// Where a model's boxes lie in the cuboids' images, by class. Of a class it does not name: the
+/// mean.
 struct Insets {
   std::map<std::string, Eigen::Vector4d> by_class;
   Eigen::Vector4d mean = Eigen::Vector4d::Zero();

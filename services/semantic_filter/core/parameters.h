@@ -61,8 +61,8 @@ struct MotionParameters {
 };
 
 struct PoseParameters {
-  double walk_position = 0.015;   ///< m/√m, where odometry has no covariance
-  double walk_rotation = 0.0004;  ///< rad/√m
+  double walk_position = 0.005;   ///< m/√m, where odometry has no covariance
+  double walk_rotation = 0.0002;  ///< rad/√m
 };
 
 struct LooksParameters {
@@ -104,12 +104,12 @@ struct TendParameters {
 
 /// Of the estimate from all remembered looks at once; `keyframes` 0 switches it off.
 struct SmoothParameters {
-  std::int64_t keyframes = 24;   ///< remembered at most, of one object
-  std::int64_t least = 5;        ///< with fewer the filter's own state stays
-  double new_view = 0.12;        ///< change of view, in lengths of b's correlation, that is new
-  double place = 0.2;            ///< relative to the distance: a place less well known is not taken
-  double contradicted = 0.3;     ///< share of looks that may contradict the rest
-  double least_weight = 0.02;    ///< of a hypothesis that is worth it
+  std::int64_t keyframes = 24;  ///< remembered at most, of one object
+  std::int64_t least = 5;       ///< with fewer the filter's own state stays
+  double new_view = 0.12;       ///< change of view, in lengths of b's correlation, that is new
+  double place = 0.2;           ///< relative to the distance: a place less well known is not taken
+  double contradicted = 0.2;    ///< share of looks that may contradict the rest
+  double least_weight = 0.02;   ///< of a hypothesis that is worth it
 };
 
 struct Parameters {

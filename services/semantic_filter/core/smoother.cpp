@@ -98,13 +98,13 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
   if (!P.allFinite()) return std::nullopt;
   const auto now = projectCuboid(fit.x, frame.view);
   if (!now) return std::nullopt;
-  const Eigen::Vector4d sigma = biasSigma(
-      viewWalkOf(frame).lasting, std::max(now->sides[2] - now->sides[0], 1.0),
-      std::max(now->sides[3] - now->sides[1], 1.0));
+  const Eigen::Vector4d sigma =
+      biasSigma(viewWalkOf(frame).lasting, std::max(now->sides[2] - now->sides[0], 1.0),
+                std::max(now->sides[3] - now->sides[1], 1.0))
+          .cwiseMax(1e-6);
   const Eigen::MatrixXd Bw =
       fit.R.matrixL().solve(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
-  const Eigen::MatrixXd Ew =
-      fit.R.matrixL().solve(model.poseNow(fit.stack).transpose());
+  const Eigen::MatrixXd Ew = fit.R.matrixL().solve(model.poseNow(fit.stack).transpose());
   const Eigen::MatrixXd BJ = Bw.transpose() * Jw;
   const Eigen::MatrixXd C = -P * (Jw.transpose() * Ew);
 
@@ -205,8 +205,8 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smo
   const auto& motion = frame.parameters->motion;
   const Eigen::VectorXd doubts = still.doubts().cwiseMin(moving.doubts());
   const double pace =
-      motion.creeping + (1.0 - motion.creeping) * fasterThan(moving.hypothesis(),
-                                                             motion.slow_share * prior.speed_sigma);
+      motion.creeping + (1.0 - motion.creeping) *
+                            fasterThan(moving.hypothesis(), motion.slow_share * prior.speed_sigma);
   const double log_odds = std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) +
                                          std::log((1.0 - prior.moving) / prior.moving / pace),
                                      -kSurest, kSurest);

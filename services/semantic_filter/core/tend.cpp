@@ -370,7 +370,7 @@ void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
   for (auto& o : objects) {
     if (o.visible_fraction <= 0.0) continue;
     const double sigma = placeSigma(o.best(), frame.pose_error.covariance);
-    if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m || isOther(o)) {
+    if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) {
       o.confirmed = false;
       continue;
     }

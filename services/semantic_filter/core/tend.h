@@ -33,9 +33,8 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
 /// Standard deviation of the place relative to the body, metres: what the pose error does not
 /// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
-/// Confirms what surely exists at a known place and is of a known class, takes that back where it is
-/// lost, and removes those whose existence has gone. A thing of no known class explains boxes and
-/// hides others, but nobody asked for it: it is no claim.
+/// Confirms what surely exists at a known place, takes that back where it is lost, and removes
+/// those whose existence has gone.
 void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -55,6 +55,19 @@ TEST(Refusals, NameTheReasonAndThePathOfTheField) {
   EXPECT_EQ(refusal(message), "empty camera");
 }
 
+TEST(Refusals, OfInsetsThatAreNotFourAClass) {
+  ModelInfo message = example<ModelInfo>();
+  message.classes = {"car", "person"};
+  message.side_insets = {0.04, 0.05, 0.03, 0.06, 0.1, 0.0, 0.1, -0.01};
+  EXPECT_EQ(refusal(message), "");
+  message.side_insets.pop_back();
+  EXPECT_EQ(refusal(message), "size_mismatch side_insets");
+  message.side_insets.push_back(0.6);
+  EXPECT_EQ(refusal(message), "out_of_range side_insets");
+  message.side_insets.clear();
+  EXPECT_EQ(refusal(message), "");
+}
+
 TEST(Refusals, OfMalformedDetectionsFromOutside) {
   const auto of = [](auto change) { return decodeRefusal(twoDetections(), change); };
   EXPECT_EQ(of([](auto&) {}), "");

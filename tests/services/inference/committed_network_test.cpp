@@ -35,6 +35,7 @@ TEST(CommittedNetwork, KnowsTheClassesOfTheSimulatorAndHowSharpItsBoxesAre) {
   EXPECT_EQ(node.model().input_width, 320u);
   EXPECT_EQ(node.model().input_height, 240u);
   EXPECT_GT(node.model().box_sigma, 0.0);
+  ASSERT_EQ(node.model().side_insets.size(), 4 * node.model().classes.size());
 }
 
 TEST(CommittedNetwork, OfTheDemoIsTheSameForLargerImages) {

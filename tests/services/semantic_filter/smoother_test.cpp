@@ -199,9 +199,9 @@ TEST(Keyframes, NewViewsAreRememberedAndTheMostAlikeForgotten) {
   for (const auto& k : scene.keyframes()) remember(object, *k, scales, parameters);
   ASSERT_EQ(object.keyframes.size(), 6U);
   EXPECT_FALSE(remember(object, *scene.keyframes().back(), scales, parameters));
-  EXPECT_TRUE(std::is_sorted(
-      object.keyframes.begin(), object.keyframes.end(),
-      [](const auto& a, const auto& b) { return a->from->time < b->from->time; }));
+  EXPECT_TRUE(
+      std::is_sorted(object.keyframes.begin(), object.keyframes.end(),
+                     [](const auto& a, const auto& b) { return a->from->time < b->from->time; }));
   // They span the whole drive, not its end.
   EXPECT_LT(toSeconds(object.keyframes.front()->from->time), 1.5);
   Object other = object;

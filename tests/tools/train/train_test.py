@@ -303,11 +303,12 @@ class Folder(unittest.TestCase):
             Image.new("RGB", (640, 480), (9, 8, 7)).save(mav0 / "cam0" / "data" / "1000.png")
             (mav0 / "cam0" / "data.csv").write_text("#timestamp [ns],filename\n1000,1000.png\n")
             (mav0 / "cam0" / "sensor.yaml").write_text(
-                "T_BS:\n  cols: 4\n  rows: 4\n  data: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1]\n")
+                "T_BS:\n  cols: 4\n  rows: 4\n  data: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1]\n"
+                "intrinsics: [200, 200, 320, 240]\ndistortion_coefficients: [0, 0, 0, 0]\n")
             (mav0 / "state_groundtruth_estimate0" / "data.csv").write_text(
                 "#t\n1000,0,0,1,1,0,0,0,0,0,0,0,0,0,0,0,0\n")
             (folder / "objects_truth.json").write_text(json.dumps({"objects": [
-                {"id": 3, "class": "toy", "looks_like": "car", "moves": False,
+                {"id": 3, "class": "toy", "looks_like": "car", "moves": False, "size": [4, 2, 1],
                  "keys": [{"time_ns": 0, "centre": [6, 0, 0], "yaw": 0.0}]}]}))
             (folder / "visibility_truth.csv").write_text(
                 "frame,object_id,visible_fraction,x1,y1,x2,y2\n0,3,1.0,100,60,200,160\n")
@@ -317,6 +318,38 @@ class Folder(unittest.TestCase):
         self.assertEqual(frames[0]["boxes"], [[50.0, 30.0, 100.0, 80.0]])
         self.assertEqual(frames[0]["classes"], [0])
         self.assertAlmostEqual(frames[0]["azimuths"][0], -math.pi / 2, places=3)
+        # From 1 m up: the front face is 4 m away, 2 m wide, from 0.5 to 1.5 m below; the roof's far
+        # edge is 8 m away and is the highest in the image.
+        for found, true in zip(frames[0]["hulls"][0], [135, 126.25, 185, 157.5]):
+            self.assertAlmostEqual(found, true, places=2)
+
+
+class Statistics(unittest.TestCase):
+    def test_each_stride_has_its_own(self):
+        from perdure_train.network import Trunk
+        torch.manual_seed(3)
+        trunk = Trunk(8).train()
+        for _ in range(250):
+            for level, scale in enumerate((1.0, 3.0, 9.0)):
+                trunk(torch.randn(4, 8, 12, 12) * scale, level)
+        trunk.eval()
+        means = [trunk(torch.randn(4, 8, 12, 12) * s, i).mean() for i, s in enumerate((1.0, 3.0, 9.0))]
+        for mean in means[1:]:
+            self.assertLess(abs(float(mean / means[0]) - 1), 0.15)
+
+    def test_the_exported_network_says_what_the_trained_one_says(self):
+        from perdure_train.export import folded
+        from perdure_train.network import Network
+        torch.manual_seed(5)
+        network = Network()
+        for _ in range(3):
+            network(torch.rand(2, 3, 240, 320) - 0.5)
+        network.eval()
+        picture = torch.rand(1, 3, 240, 320) - 0.5
+        with torch.no_grad():
+            for mine, theirs in zip(network(picture), folded(network)(picture)):
+                for a, b in zip(mine, theirs):
+                    self.assertLess(float((a - b).abs().max()), 1e-3)
 
 
 if __name__ == "__main__":
