@@ -30,12 +30,13 @@ double apart(const Eigen::Vector3d& place, const Keyframes& all, std::size_t of,
   return least;
 }
 
+/// The newest stays: what moves is estimated at its time.
 void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales,
           std::size_t limit) {
   while (all.size() > limit) {
     std::size_t least = 0;
     double least_apart = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t i = 0; i + 1 < all.size(); ++i) {
       const double d = apart(place, all, i, scales);
       if (d < least_apart) least = i, least_apart = d;
     }

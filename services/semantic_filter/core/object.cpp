@@ -152,6 +152,7 @@ Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product) {
   object.visible_fraction = belief.visible_fraction;
   object.blocked_by = belief.blocked_by;
   object.recalled = true;
+  object.remembers_all = false;
   normalise(object);
   return object;
 }

@@ -62,6 +62,9 @@ struct Object {
   bool recalled = false;
   /// Looks that are remembered, in order of time.
   std::vector<std::shared_ptr<const Keyframe>> keyframes;
+  /// False for one that came back (restart, recall): what it knew before is in its state alone, and
+  /// an estimate from the looks since then would lose it.
+  bool remembers_all = true;
   std::uint32_t fresh_keyframes = 0;  ///< that came since the state was last smoothed
 
   const Hypothesis& best() const { return hypotheses.front(); }

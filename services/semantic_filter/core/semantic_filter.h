@@ -1,4 +1,4 @@
-// The semantic filter in five verbs: predict, see, associate, update, tend (eq. 4, 8, 9).
+// The semantic filter in six verbs: predict, see, associate, update, smooth, tend (eq. 4, 8, 9).
 //
 // The belief is a plain value and a step is a function of (belief, frame): a late frame is applied
 // by taking the belief before it and stepping again (DESIGN 5, item 14).

@@ -252,7 +252,7 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
 void rememberAndSmooth(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
                        const FrameContext& frame) {
   const auto& p = *frame.parameters;
-  if (p.smooth.keyframes == 0 || !frame.key_view) return;
+  if (p.smooth.keyframes == 0 || !frame.key_view || !object.remembers_all) return;
   const ViewScales scales{p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle};
   Keyframe keyframe{frame.key_view, box.z, hidden, box.azimuth, box.azimuth_sigma};
   if (!remember(object, std::move(keyframe), scales, p.smooth)) return;

@@ -190,6 +190,7 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.last_seen = std::max(a.last_seen, b.last_seen);
   a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
   a.support = std::max(a.support, b.support);
+  a.remembers_all = a.remembers_all && b.remembers_all;
   const auto& box = frame.parameters->box;
   joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
                 frame.parameters->smooth);

@@ -169,6 +169,25 @@ TEST(DecodePerdure, RefusesADescriptionThatDoesNotFitItself) {
   }
 }
 
+TEST(DecodePerdure, InsetsAreFourOfEachOfTheModelsClasses) {
+  testing::TinyOnnx tiny;
+  const std::string plain = tiny.azimuth_json;
+  tiny.azimuth_json = R"("side_insets": {"car": [0.04, 0.05, 0.03, -0.06]},)" + plain;
+  const auto model = parseModelDescription(tiny.json(), "m.json");
+  EXPECT_EQ(model.side_insets.at("car"), (std::array<double, 4>{0.04, 0.05, 0.03, -0.06}));
+  tiny.azimuth_json =
+      R"("side_insets": {"cat": [0, 0, 0, 0], "car": [0, 0, 0], "person": [0, 0, 0, 0.5]},)" +
+      plain;
+  try {
+    parseModelDescription(tiny.json(), "m.json");
+    FAIL() << "it was taken";
+  } catch (const StartupError& e) {
+    for (const char* part : {"\"cat\" is not one", "\"car\" has not four", "\"person\" has not"}) {
+      EXPECT_THAT(e.what(), HasSubstr(part));
+    }
+  }
+}
+
 TEST(DecodePerdure, ANodeGivesTheKnownAnswerOfATinyOnnxFile) {
   const fs::path folder =
       fs::temp_directory_path() / ("perdure_tiny_onnx_" + std::to_string(getpid()));

@@ -186,6 +186,22 @@ TEST(Smoother, TakesNoPlaceThatTheLooksDoNotFix) {
   EXPECT_FALSE(Smoothed::make(scene.start(false), looks, frame));
 }
 
+TEST(Insets, MoveTheBoxInwardsAndAreAMeanForWhatTheyDoNotName) {
+  ModelInfo info = testing::makeModelInfo();
+  info.side_insets = {0.1, 0.0, 0.1, 0.2, 0, 0, 0, 0, 0, 0, 0, 0, 0.02, 0.04, 0.06, 0.08};
+  const Model model = makeModel(info);
+  const CameraModel camera{makeCamera()};
+  const View view{&camera, RigidTransform(), Eigen::Vector3d::UnitZ()};
+  const State x = makeState(20, 1, 0, 0.4, 4, 2, 1.5);
+  const auto whole = projectCuboid(x, view);
+  const auto car = projectObserved(x, view, model.insets->of("car"));
+  ASSERT_TRUE(whole && car);
+  const double w = whole->sides[2] - whole->sides[0], h = whole->sides[3] - whole->sides[1];
+  EXPECT_TRUE(car->sides.isApprox(whole->sides + Eigen::Vector4d(0.1 * w, 0, -0.1 * w, -0.2 * h)));
+  EXPECT_TRUE(model.insets->of(kOtherClass).isApprox(Eigen::Vector4d(0.03, 0.01, -0.04, -0.07)));
+  EXPECT_TRUE(makeModel(testing::makeModelInfo()).insets->of("car").isZero());
+}
+
 TEST(Keyframes, NewViewsAreRememberedAndTheMostAlikeForgotten) {
   const Passing scene(1);
   SmoothParameters parameters;
