@@ -186,20 +186,26 @@ LARGE = 40.0  # pixels of the input; of smaller ones the pixel is the larger err
 FULL = 12.0  # pixels: a median over many does not mind them
 
 
-def side_errors(frames):
-    """Errors of sides relative to the box's size, where that is large, of clear best matches."""
-    errors = []
+def matches(frames, at_least=0.0):
+    """(detections, truth, i, j) of each box i that is object j's best answer, of those whose best
+    class has this probability."""
     for detections, truth in frames:
         if not len(detections["boxes"]) or not len(truth["boxes"]):
             continue
         got = match(detections["boxes"], detections["p"].max(1), truth["boxes"], ~truth["ignored"])
-        clear = detections["p"].max(1) > CLEAR
-        for i in np.flatnonzero((got >= 0) & clear):
-            box = truth["boxes"][got[i]]
-            sides = np.array([box[2] - box[0], box[3] - box[1]])
-            error = (detections["boxes"][i] - box) / np.tile(sides, 2)
-            free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
-            errors.extend(error[free & np.tile(sides > LARGE, 2)])
+        for i in np.flatnonzero((got >= 0) & (detections["p"].max(1) > at_least)):
+            yield detections, truth, i, got[i]
+
+
+def side_errors(frames):
+    """Errors of sides relative to the box's size, where that is large, of clear best matches."""
+    errors = []
+    for detections, truth, i, j in matches(frames, CLEAR):
+        box = truth["boxes"][j]
+        sides = np.array([box[2] - box[0], box[3] - box[1]])
+        error = (detections["boxes"][i] - box) / np.tile(sides, 2)
+        free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
+        errors.extend(error[free & np.tile(sides > LARGE, 2)])
     return np.array(errors)
 
 
@@ -207,17 +213,12 @@ def side_insets(frames, cls):
     """How far the sides lie inside the image of the cuboid, in its widths and heights: medians
     (x1, y1, x2, y2) over the clear matches of one class; zeros where those are few."""
     insets = []
-    for detections, truth in frames:
-        if not len(detections["boxes"]) or not len(truth["boxes"]):
+    for detections, truth, i, j in matches(frames, CLEAR):
+        hull = truth["hulls"][j]
+        sides = np.array([hull[2] - hull[0], hull[3] - hull[1]] * 2)
+        if truth["classes"][j] != cls or not sides.min() > FULL:
             continue
-        got = match(detections["boxes"], detections["p"].max(1), truth["boxes"], ~truth["ignored"])
-        clear = detections["p"].max(1) > CLEAR
-        for i in np.flatnonzero((got >= 0) & clear):
-            hull = truth["hulls"][got[i]]
-            sides = np.array([hull[2] - hull[0], hull[3] - hull[1]] * 2)
-            if truth["classes"][got[i]] != cls or not sides.min() > FULL:
-                continue
-            insets.append((detections["boxes"][i] - hull) / sides * [1, 1, -1, -1])
+        insets.append((detections["boxes"][i] - hull) / sides * [1, 1, -1, -1])
     return np.median(insets, 0) if len(insets) >= 20 else np.zeros(4)
 
 
@@ -225,13 +226,9 @@ def side_ratios(frames):
     """Errors of sides over what the network says of them, of all matched boxes; those at the
     border of the image are left out."""
     ratios = []
-    for detections, truth in frames:
-        if not len(detections["boxes"]) or not len(truth["boxes"]):
-            continue
-        got = match(detections["boxes"], detections["p"].max(1), truth["boxes"], ~truth["ignored"])
-        for i in np.flatnonzero(got >= 0):
-            box = truth["boxes"][got[i]]
-            ratio = (detections["boxes"][i] - box) / detections["sigmas"][i]
-            free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
-            ratios.extend(ratio[free & np.isfinite(ratio)])
+    for detections, truth, i, j in matches(frames):
+        box = truth["boxes"][j]
+        ratio = (detections["boxes"][i] - box) / detections["sigmas"][i]
+        free = np.array([box[0] > 1, box[1] > 1, box[2] < 319, box[3] < 239])
+        ratios.extend(ratio[free & np.isfinite(ratio)])
     return np.array(ratios)
