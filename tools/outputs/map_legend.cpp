@@ -13,7 +13,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr int kWidth = 252, kLine = 25;
+constexpr int kLegendWidth = 252, kLine = 25;
 
 std::map<std::string, int> countsOf(const MapContent& content) {
   std::map<std::string, int> counts;
@@ -116,7 +116,7 @@ double fillOf(Visibility visibility) {
 cv::Size pictureSize(const MapContent& content, const MapView& view) {
   const int legend = static_cast<int>(view.text * (linesOf(content) * kLine + 20));
   const int map = view.area.br().y + static_cast<int>(34 * view.text);
-  return {view.area.br().x + static_cast<int>(kWidth * view.text), std::max(map, legend)};
+  return {view.area.br().x + static_cast<int>(kLegendWidth * view.text), std::max(map, legend)};
 }
 
 void drawScaleBar(cv::Mat& picture, const MapView& view) {

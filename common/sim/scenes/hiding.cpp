@@ -10,7 +10,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kInterval = 0.05;
+constexpr double kHidingInterval = 0.05;
 
 /// A value at a time; in between it goes smoothly from one to the next.
 struct Key {
@@ -40,7 +40,7 @@ Trajectory walkPast(double seconds) {
   const std::vector<Key> across{{1.2, 1.7},   {4.0, 1.4},   {6.5, 1.8},  {9.8, 0.0},  {13.5, 0.0},
                                 {16.8, -1.8}, {20.0, -1.5}, {23.3, 0.0}, {26.0, 0.0}, {29.4, 1.8}};
   std::vector<Look> looks;
-  for (double t = 0.0; t < seconds + 2.0; t += kInterval) {
+  for (double t = 0.0; t < seconds + 2.0; t += kHidingInterval) {
     const double y = smoothly(across, t);
     const double since = std::max(0.0, t - 1.2), begun = std::min(1.0, since / 2.0);
     const double yaw = std::atan2(-y, 3.0) + 0.06 * begun * std::sin(0.9 * since);
@@ -49,7 +49,7 @@ Trajectory walkPast(double seconds) {
                      0.18 + 0.04 * begun * std::sin(1.7 * since),
                      0.03 * begun * std::sin(since)});
   }
-  return handheldMotion(looks, kInterval, kOcclusionHeight - kCameraAboveBody);
+  return handheldMotion(looks, kHidingInterval, kOcclusionHeight - kCameraAboveBody);
 }
 
 void putHiddenChair(SceneBuilder& builder) {
@@ -74,14 +74,14 @@ Trajectory lookTwice(double seconds) {
   const std::vector<Key> across{{1.2, 0.0},  {3.0, 0.8},   {5.5, -0.8}, {8.0, 0.0},  {11.0, 0.5},
                                 {14.0, 0.0}, {19.0, -0.8}, {22.0, 0.8}, {25.0, -0.3}};
   std::vector<Look> looks;
-  for (double t = 0.0; t < seconds + 2.0; t += kInterval) {
+  for (double t = 0.0; t < seconds + 2.0; t += kHidingInterval) {
     const double since = std::max(0.0, t - 1.2), begun = std::min(1.0, since / 2.0);
     looks.push_back({{-2.4 + 0.15 * begun * std::sin(0.8 * since), smoothly(across, t)},
                      smoothly(turn, t) + 0.08 * begun * std::sin(since),
                      0.15 + 0.04 * begun * std::sin(1.7 * since),
                      0.03 * begun * std::sin(since)});
   }
-  return handheldMotion(looks, kInterval, kVanishHeight - kCameraAboveBody);
+  return handheldMotion(looks, kHidingInterval, kVanishHeight - kCameraAboveBody);
 }
 
 void putThingsThatChange(SceneBuilder& builder) {

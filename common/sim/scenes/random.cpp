@@ -10,7 +10,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 40.0;
+constexpr double kRandomSeconds = 40.0;
 
 /// Two streets that cross, with all that stands there, and things where nobody expects them.
 Area makeOutdoors(SceneBuilder& builder) {
@@ -81,7 +81,7 @@ Area makeIndoors(SceneBuilder& builder) {
 Scene makeRandom(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("random", seed, options);
   Dice& dice = builder.dice();
-  builder.scene().seconds = builder.seconds(kDefaultSeconds);
+  builder.scene().seconds = builder.seconds(kRandomSeconds);
   builder.scene().rig = makeRig(Carrier::kHand, options, dice, 0.0);
   const bool outdoors = seed % 2 == 0;
   const Area area = outdoors ? makeOutdoors(builder) : makeIndoors(builder);

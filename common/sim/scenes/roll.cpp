@@ -11,7 +11,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 30.0, kHeight = 1.8;
+constexpr double kRollSeconds = 30.0, kRollHeight = 1.8;
 constexpr double kMostRoll = 60.0 * M_PI / 180.0, kRollPeriod = 9.0, kLevelUntil = 3.0;
 
 Trajectory leaning(const GroundPath& way, const Drive& driven) {
@@ -27,7 +27,7 @@ Trajectory leaning(const GroundPath& way, const Drive& driven) {
                                  expQuaternion({roll, 0, 0});
     controls.emplace_back(
         q, Eigen::Vector3d(p.position.x(), p.position.y() + 0.4 * grown * std::sin(wave + 1.0),
-                           kHeight + 0.15 * grown * std::sin(2.0 * wave)));
+                           kRollHeight + 0.15 * grown * std::sin(2.0 * wave)));
   }
   return Trajectory(driven.start_s, driven.interval_s, std::move(controls));
 }
@@ -37,7 +37,7 @@ Trajectory leaning(const GroundPath& way, const Drive& driven) {
 Scene makeRoll(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("roll", seed, options);
   Dice& dice = builder.dice();
-  const double seconds = builder.seconds(kDefaultSeconds);
+  const double seconds = builder.seconds(kRollSeconds);
   const GroundPath way({{{0, 0}}, {{200, 0}}}, false);
   const SpeedLimits limits{4.5, 2.0, 1.2, 1.2};
   const Drive driven = drive(way, limits, 0.0, 130.0, 1.5, seconds + 2.0);

@@ -9,7 +9,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 24.0, kGap = 0.8, kFirst = 24.0;
+constexpr double kRowSeconds = 24.0, kGap = 0.8, kFirst = 24.0;
 constexpr int kCars = 10;
 
 void parkRow(SceneBuilder& builder) {
@@ -30,7 +30,7 @@ void parkRow(SceneBuilder& builder) {
 
 Scene makeRow(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("row", seed, options);
-  const double seconds = builder.seconds(kDefaultSeconds);
+  const double seconds = builder.seconds(kRowSeconds);
   const GroundPath way({{{0, -kLane}}, {{150, -kLane}}}, false);
   const SpeedLimits limits{4.5, 2.0, 1.2, 1.2};
   // It stands again behind the row, however long one looks.

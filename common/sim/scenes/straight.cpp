@@ -11,19 +11,19 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 60.0, kSpeed = 8.5, kRest = 1.2;
+constexpr double kStraightSeconds = 60.0, kStraightSpeed = 8.5, kStraightRest = 1.2;
 
 }  // namespace
 
 Scene makeStraight(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("straight", seed, options);
   Dice& dice = builder.dice();
-  const double seconds = builder.seconds(kDefaultSeconds);
-  const double end = kSpeed * std::max(seconds, kDefaultSeconds) + 70.0;
+  const double seconds = builder.seconds(kStraightSeconds);
+  const double end = kStraightSpeed * std::max(seconds, kStraightSeconds) + 70.0;
   const GroundPath way({{{0, -kLane}}, {{end, -kLane}}}, false);
-  const SpeedLimits limits{kSpeed, 2.0, 1.4, 1.4};
-  const Drive driven =
-      drive(way, limits, 0.0, std::numeric_limits<double>::infinity(), kRest, seconds + 2.0);
+  const SpeedLimits limits{kStraightSpeed, 2.0, 1.4, 1.4};
+  const Drive driven = drive(way, limits, 0.0, std::numeric_limits<double>::infinity(),
+                             kStraightRest, seconds + 2.0);
   putOnWheels(builder, way, driven, seconds, options);
   std::vector<Road> roads{{{-25.0, 0.0}, {end, 0.0}, kRoadWidth}};
   for (double x = dice.uniform(60.0, 90.0); x < end - 50.0; x += dice.uniform(90.0, 140.0)) {

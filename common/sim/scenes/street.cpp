@@ -10,8 +10,8 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 60.0, kRest = 1.2, kSideStreet = 38.0;
-constexpr double kCameraHeight = 1.6;
+constexpr double kStreetSeconds = 60.0, kStreetRest = 1.2, kSideStreet = 38.0;
+constexpr double kStreetCameraHeight = 1.6;
 
 /// Crossings of the middle lines at (0, 0), (length, 0), (length, width), (0, width).
 struct Block {
@@ -44,8 +44,8 @@ Drive twoLaps(const GroundPath& loop, double from, double until_s) {
   Drive best;
   for (int i = 0; i < 12; ++i) {
     limits.top = 0.5 * (slow + fast);
-    best = drive(loop, limits, from, std::numeric_limits<double>::infinity(), kRest, until_s);
-    const bool enough = best.distanceAt(kDefaultSeconds - 1.0) - from >= 2.0 * loop.length();
+    best = drive(loop, limits, from, std::numeric_limits<double>::infinity(), kStreetRest, until_s);
+    const bool enough = best.distanceAt(kStreetSeconds - 1.0) - from >= 2.0 * loop.length();
     (enough ? fast : slow) = limits.top;
   }
   return best;
@@ -58,14 +58,14 @@ Scene makeStreet(std::uint64_t seed, const SceneOptions& options) {
   Dice& dice = builder.dice();
   const Block block{dice.uniform(62.0, 66.0), dice.uniform(42.0, 44.5)};
   const GroundPath loop = loopOf(block, 16.0);
-  const double seconds = builder.seconds(kDefaultSeconds);
+  const double seconds = builder.seconds(kStreetSeconds);
   Suspension suspension;
-  suspension.height = kCameraHeight - kCameraAboveBody;
+  suspension.height = kStreetCameraHeight - kCameraAboveBody;
   suspension.seed = dice.seed();
   const double from = dice.uniform(27.0, 33.0);  // on the first straight
-  builder.setBody(vehicleMotion(loop, twoLaps(loop, from, std::max(seconds, kDefaultSeconds) + 2.0),
-                                suspension),
-                  seconds, 1.15, 2.2);
+  builder.setBody(
+      vehicleMotion(loop, twoLaps(loop, from, std::max(seconds, kStreetSeconds) + 2.0), suspension),
+      seconds, 1.15, 2.2);
   builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
   drawDaylight(builder);
   Streets streets(builder, roadsOf(block, dice.uniform(0.4, 0.6) * block.length), Furnishing{});

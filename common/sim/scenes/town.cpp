@@ -10,7 +10,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 520.0;
+constexpr double kTownSeconds = 520.0;
 constexpr int kColumns = 6, kRows = 5;
 constexpr double kBlockLength = 82.0, kBlockWidth = 66.0, kBeyond = 14.0;
 constexpr std::size_t kVehicles = 500;
@@ -91,7 +91,7 @@ void thinOut(SceneBuilder& builder) {
 
 Scene makeTown(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("town", seed, options);
-  const double seconds = builder.seconds(kDefaultSeconds);
+  const double seconds = builder.seconds(kTownSeconds);
   const GroundPath way = wayThrough(turns());
   const SpeedLimits limits{10.5, 2.4, 1.7, 1.9};
   const Drive driven = drive(way, limits, 8.0, way.length() - 8.0, 1.2, seconds + 2.0);

@@ -10,10 +10,10 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kToySeconds = 24.0, kStillSeconds = 20.0, kCameraHeight = 1.35;
+constexpr double kToySeconds = 24.0, kStillSeconds = 20.0, kToyCameraHeight = 1.35;
 constexpr double kScale = 14.0;        ///< the toy is a 4.2 m car, made 0.3 m long
 constexpr double kToyDistance = 1.35;  ///< from where the camera starts
-constexpr double kInterval = 0.05;
+constexpr double kToyInterval = 0.05;
 
 /// Seen from where the camera starts, at the body's place.
 Eigen::Vector2d polar(double distance, double bearing) {
@@ -39,7 +39,7 @@ void putCars(SceneBuilder& builder) {
   SceneObject toy = builder.draw("toy");
   toy.shape = "hatchback";
   toy.size = car.size / kScale;
-  const double centre = kCameraHeight - (kCameraHeight - 0.5 * car.size.z()) / kScale;
+  const double centre = kToyCameraHeight - (kToyCameraHeight - 0.5 * car.size.z()) / kScale;
   const double top = centre - 0.5 * toy.size.z();
   const Eigen::Vector2d point = polar(kToyDistance, near_bearing);
   builder.mustPut(PropKind::kCrate, {0.31, 0.31, top}, {point, near_bearing, 0.0});
@@ -49,7 +49,7 @@ void putCars(SceneBuilder& builder) {
 /// To and fro across the view, and a little along it.
 Trajectory sideways(double seconds) {
   std::vector<Look> looks;
-  for (double t = 0.0; t < seconds + 2.0; t += kInterval) {
+  for (double t = 0.0; t < seconds + 2.0; t += kToyInterval) {
     const double since = std::max(0.0, t - 1.2), begun = std::min(1.0, since / 2.0);
     const double grown = begun * begun * (3.0 - 2.0 * begun);
     const double phase = 2.0 * M_PI * since / 5.0;
@@ -59,7 +59,7 @@ Trajectory sideways(double seconds) {
                      0.02 + 0.04 * grown * std::sin(1.3 * phase),
                      0.04 * grown * std::sin(0.9 * phase)});
   }
-  return handheldMotion(looks, kInterval, kCameraHeight - kCameraAboveBody);
+  return handheldMotion(looks, kToyInterval, kToyCameraHeight - kCameraAboveBody);
 }
 
 Scene makePlace(SceneBuilder& builder, Trajectory body, double seconds) {
@@ -85,7 +85,7 @@ Scene makeToy(std::uint64_t seed, const SceneOptions& options) {
 
 Scene makeStill(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("still", seed, options);
-  const Eigen::Vector3d place(0.0, 0.0, kCameraHeight - kCameraAboveBody);
+  const Eigen::Vector3d place(0.0, 0.0, kToyCameraHeight - kCameraAboveBody);
   return makePlace(
       builder,
       Trajectory(RigidTransform(

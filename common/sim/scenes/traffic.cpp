@@ -13,7 +13,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kDefaultSeconds = 40.0, kForever = 1e9;
+constexpr double kTrafficSeconds = 40.0, kForever = 1e9;
 constexpr double kParked =
     0.5 * kRoadWidth - 0.18 - 0.9;  ///< middle of a parked car, from the road's
 constexpr double kFarEnd = 420.0, kNearEnd = -60.0, kCrossing = 150.0;
@@ -120,8 +120,8 @@ void addTraffic(SceneBuilder& builder, double seconds) {
 
 Scene makeTraffic(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("traffic", seed, options);
-  const double seconds = builder.seconds(kDefaultSeconds);
-  const double planned = std::max(seconds, kDefaultSeconds);
+  const double seconds = builder.seconds(kTrafficSeconds);
+  const double planned = std::max(seconds, kTrafficSeconds);
   const GroundPath way({{{0, -kLane}}, {{kFarEnd, -kLane}}}, false);
   const SpeedLimits limits{6.8, 2.0, 1.4, 1.4};
   // However long one looks, it stands again before the street ends.

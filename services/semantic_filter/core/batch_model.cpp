@@ -1,9 +1,9 @@
 #include "services/semantic_filter/core/batch_model.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
@@ -20,7 +20,7 @@ constexpr double kUpwards = 0.2;  // m/s
 
 Matrix6d transitionBetween(const PoseError& earlier, const PoseError& later) {
   if (earlier.product == later.product) return Matrix6d::Identity();
-  const Matrix6d transition = later.product * earlier.product.inverse();
+  const Matrix6d transition = later.product * inverse(earlier.product);
   const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargestTransition;
   return sane ? transition : Matrix6d::Identity();
 }
@@ -62,7 +62,7 @@ BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class
       dim_(moving ? kMostFree : kGeometry) {
   // At birth "other" has three scales, which one Gaussian has to cover here.
   if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
-  size_information_ = prior_.log_size_covariance.inverse();
+  size_information_ = inverseSymmetric(prior_.log_size_covariance);
   const auto& box = frame.parameters->box;
   scales_ = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
   if (!moving) return;
@@ -71,7 +71,7 @@ BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class
   Eigen::Matrix3d P = s2 * along * along.transpose();
   P.diagonal().head<2>().array() += kAcross * kAcross * s2;
   P(2, 2) = kUpwards * kUpwards;
-  speed_information_ = P.inverse();
+  speed_information_ = inverseSymmetric(P);
 }
 
 State BatchModel::at(const State& x, const FreeVector& step) const {
@@ -122,8 +122,7 @@ Eigen::MatrixXd BatchModel::covariance(const State& x, const Stack& s,
   });
 }
 
-Eigen::VectorXd BatchModel::withoutPose(const Stack& s,
-                                        const Eigen::LLT<Eigen::MatrixXd>& R) const {
+Eigen::VectorXd BatchModel::withoutPose(const Stack& s, const Cholesky& R) const {
   if (looks_.exactPoses()) return s.residual;
   const Eigen::MatrixXd pose =
       assemble(looks_.size(), [&](std::size_t i, std::size_t j) { return poseShare(s, i, j); });
@@ -136,7 +135,7 @@ std::pair<double, double> BatchModel::deviation(const State& x, const Stack& s,
   const Eigen::Vector4d r = residual.segment<4>(static_cast<Eigen::Index>(4 * i));
   const Eigen::Matrix4d R = ownShare(x, s, i, i);
   const auto count = std::count(s.counts[i].begin(), s.counts[i].end(), true);
-  return {r.dot(R.ldlt().solve(r)), static_cast<double>(count)};
+  return {squaredMahalanobis(r, R), static_cast<double>(count)};
 }
 
 Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw,

@@ -2,11 +2,11 @@
 // full covariance, and the priors. What Smoothed maximises; see smoother.h for the model.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/math/gaussian.h"
 #include "services/semantic_filter/core/keyframe.h"
 
 namespace perdure::semantic_filter {
@@ -66,7 +66,7 @@ class BatchModel {
   Eigen::MatrixXd covariance(const State& x, const Stack& s, const Eigen::VectorXd& doubts) const;
   /// What is left of the residuals when the pose errors have been estimated from them: a common
   /// pose error is no contradiction. R is the covariance.
-  Eigen::VectorXd withoutPose(const Stack& s, const Eigen::LLT<Eigen::MatrixXd>& R) const;
+  Eigen::VectorXd withoutPose(const Stack& s, const Cholesky& R) const;
   /// Squared deviation of one look with these residuals, and how many sides count.
   std::pair<double, double> deviation(const State& x, const Stack& s,
                                       const Eigen::VectorXd& residual, std::size_t look) const;

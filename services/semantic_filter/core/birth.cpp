@@ -2,8 +2,6 @@
 
 #include <ceres/tiny_solver.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +14,6 @@ namespace {
 
 constexpr int kFree = kVelocity;  // dimensions of the fit: geometry and bias
 using VectorFit = Eigen::Matrix<double, kFree, 1>;
-using MatrixFit = Eigen::Matrix<double, kFree, kFree>;
 
 /// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range,
 /// four of bias.
@@ -40,8 +37,7 @@ class BirthCost {
         offset_(frame.offsetOf(prior.name)) {
     bias_sigma_ = biasSigma(viewWalkOf(frame).lasting, z_.width(), z_.height()).cwiseMax(1e-6);
     position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
-    const Eigen::Matrix3d L = prior.log_size_covariance.llt().matrixL();
-    size_whitening_ = L.inverse();
+    size_whitening_ = Cholesky(prior.log_size_covariance).whiten(Eigen::Matrix3d::Identity());
   }
 
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
@@ -280,15 +276,16 @@ std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, 
   BirthCost::Residuals r;
   BirthCost::Jacobian J;
   if (!x.allFinite() || !cost(x.data(), r.data(), J.data())) return std::nullopt;
-  const Eigen::LDLT<MatrixFit> hessian(J.transpose() * J);
-  if (hessian.info() != Eigen::Success || !hessian.isPositive()) return std::nullopt;
+  const Cholesky hessian(J.transpose() * J);
+  if (!hessian.positive()) return std::nullopt;
   Fit fit;
   fit.cost = 0.5 * r.squaredNorm();
   fit.hypothesis.class_name = prior.name;
   fit.hypothesis.x.head<kFree>() = x;
   fit.hypothesis.x[kYaw] = wrapAngle(x[kYaw]);
   fit.hypothesis.P.setZero();
-  fit.hypothesis.P.topLeftCorner<kFree, kFree>() = hessian.solve(MatrixFit::Identity());
+  fit.hypothesis.P.topLeftCorner<kFree, kFree>() =
+      hessian.solve(Eigen::MatrixXd::Identity(kFree, kFree));
   addPoseError(fit.hypothesis, frame);
   if (!fit.hypothesis.P.allFinite()) return std::nullopt;
   return fit;

@@ -14,10 +14,9 @@ double logBelowZero(double mean, double variance) {
   return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
 }
 
-/// log of the multivariate t density with scale matrix S, by its squared Mahalanobis distance.
-double logStudent(double nis, const Eigen::MatrixXd& S, double tail) {
-  const auto n = static_cast<double>(S.rows());
-  const double log_det = 2.0 * S.llt().matrixLLT().diagonal().array().log().sum();
+/// log of the multivariate t density in n dimensions, by the squared Mahalanobis distance and the
+/// log-determinant of its scale matrix.
+double logStudent(double nis, double log_det, double n, double tail) {
   return std::lgamma(0.5 * (tail + n)) - std::lgamma(0.5 * tail) -
          0.5 * (n * std::log(tail * M_PI) + log_det) - 0.5 * (tail + n) * std::log1p(nis / tail);
 }
@@ -131,12 +130,12 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     }
     ++a;
   }
-  const Eigen::LLT<Eigen::MatrixXd> llt(S);
-  if (llt.info() != Eigen::Success) return std::nullopt;
-  score.nis = llt.matrixL().solve(nu).squaredNorm();
+  const Cholesky chol(S);
+  if (!chol.positive()) return std::nullopt;
+  score.nis = chol.whiten(nu).squaredNorm();
   score.dof = n;
   if (score.nis > gateThreshold(gate, n)) return std::nullopt;
-  score.log_density += logStudent(score.nis, S, tail);
+  score.log_density += logStudent(score.nis, chol.logDeterminant(), n, tail);
   return score;
 }
 

@@ -1,9 +1,8 @@
 #include "services/semantic_filter/core/predict.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "common/math/gaussian.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -69,7 +68,7 @@ void predictScreen(Object& object, const ViewWalk& walk) {
 Matrix6d transitionSince(const Object& object, const PoseError& pose_error) {
   constexpr double kLargest = 10.0;
   if (object.pose_product == pose_error.product) return Matrix6d::Identity();
-  const Matrix6d transition = pose_error.product * object.pose_product.inverse();
+  const Matrix6d transition = pose_error.product * inverse(object.pose_product);
   const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargest;
   return sane ? transition : Matrix6d::Zero();
 }
@@ -81,16 +80,15 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
   constexpr double kExplained = 0.9999;
   if (h.C.isZero(0.0)) return;
   const Eigen::Index n = h.moving ? kStateDim : kVelocity;
-  const Eigen::LLT<Eigen::MatrixXd> P(h.P.topLeftCorner(n, n));
-  const Eigen::LLT<Matrix6d> pose(P_pose);
-  if (P.info() != Eigen::Success || pose.info() != Eigen::Success) {
+  const Cholesky P(h.P.topLeftCorner(n, n));
+  const Cholesky pose(P_pose);
+  if (!P.positive() || !pose.positive()) {
     h.C.setZero();
     return;
   }
-  const Eigen::MatrixXd half = P.matrixL().solve(Eigen::MatrixXd(h.C.topRows(n)));
-  const Eigen::MatrixXd whitened = pose.matrixL().solve(Eigen::MatrixXd(half.transpose()));
-  const double correlation = Eigen::JacobiSVD<Eigen::MatrixXd>(whitened).singularValues()[0];
-  if (correlation * correlation > kExplained) h.C *= std::sqrt(kExplained) / correlation;
+  const Eigen::MatrixXd whitened = pose.whiten(P.whiten(h.C.topRows(n)).transpose());
+  const double explained = eigenvalues(whitened * whitened.transpose()).maxCoeff();
+  if (explained > kExplained) h.C *= std::sqrt(kExplained / explained);
 }
 
 /// What drove off unseen could be anywhere: it would claim any box. The object lives on as far as

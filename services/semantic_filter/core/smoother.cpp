@@ -1,7 +1,5 @@
 #include "services/semantic_filter/core/smoother.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -17,8 +15,8 @@ constexpr int kRounds = 12;
 constexpr double kContradicted = 25.0;  // of about four degrees of freedom
 
 /// Weights of a t distribution for whole looks; returns the share that contradicts x.
-double doubtLooks(const BatchModel& model, const State& x, const Stack& s,
-                  const Eigen::LLT<Eigen::MatrixXd>& R, double tail, Eigen::VectorXd& doubts) {
+double doubtLooks(const BatchModel& model, const State& x, const Stack& s, const Cholesky& R,
+                  double tail, Eigen::VectorXd& doubts) {
   const Eigen::VectorXd residual = model.withoutPose(s, R);
   double contradicted = 0.0;
   for (Eigen::Index i = 0; i < doubts.size(); ++i) {
@@ -34,23 +32,23 @@ struct Fit {
   Stack stack;
   Eigen::VectorXd doubts;
   double contradicted = 0.0;
-  Eigen::LLT<Eigen::MatrixXd> R;
+  Cholesky R;
 };
 
 /// One step of Levenberg and Marquardt's. False where none lowers the cost.
 bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) {
-  const Eigen::MatrixXd Jw = fit.R.matrixL().solve(fit.stack.J);
-  const Eigen::VectorXd rw = fit.R.matrixL().solve(fit.stack.residual);
+  const Eigen::MatrixXd Jw = fit.R.whiten(fit.stack.J);
+  const Eigen::VectorXd rw = fit.R.whiten(fit.stack.residual);
   const Quadratic q = model.quadratic(fit.x, Jw, rw);
   const double cost = rw.squaredNorm() + model.priorCost(fit.x);
   for (int attempt = 0; attempt < 6; ++attempt) {
     FreeMatrix damped = q.G;
     damped.diagonal() *= 1.0 + damping;
-    const FreeVector step = damped.ldlt().solve(q.g);
+    const FreeVector step = solveSymmetric(damped, q.g);
     const State next = model.at(fit.x, step);
     auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
     if (stack) {
-      const Eigen::VectorXd w = fit.R.matrixL().solve(stack->residual);
+      const Eigen::VectorXd w = fit.R.whiten(stack->residual);
       if (w.squaredNorm() + model.priorCost(next) <= cost * (1.0 + 1e-3) + 1e-6) {
         moved = step.head<3>().norm();
         fit.x = next;
@@ -74,26 +72,26 @@ std::optional<Fit> fitLooks(const BatchModel& model, const State& start, std::si
   fit.stack = std::move(*stack);
   double damping = 1e-4;
   for (int round = 0; round < kRounds; ++round) {
-    fit.R.compute(model.covariance(fit.x, fit.stack, fit.doubts));
-    if (fit.R.info() != Eigen::Success) return std::nullopt;
+    fit.R = Cholesky(model.covariance(fit.x, fit.stack, fit.doubts));
+    if (!fit.R.positive()) return std::nullopt;
     double moved = 0.0;
     const bool better = descend(model, fit, damping, moved);
     fit.contradicted = doubtLooks(model, fit.x, fit.stack, fit.R, tail, fit.doubts);
     if (round > 0 && (!better || moved < 0.005)) break;
   }
-  fit.R.compute(model.covariance(fit.x, fit.stack, fit.doubts));
-  if (fit.R.info() != Eigen::Success) return std::nullopt;
+  fit.R = Cholesky(model.covariance(fit.x, fit.stack, fit.doubts));
+  if (!fit.R.positive()) return std::nullopt;
   return fit;
 }
 
 /// The filter's state, with b and C, from the fit.
 std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const Hypothesis& start,
                                   const FrameContext& frame) {
-  const Eigen::MatrixXd Jw = fit.R.matrixL().solve(fit.stack.J);
-  const Eigen::VectorXd rw = fit.R.matrixL().solve(fit.stack.residual);
-  const Eigen::LDLT<FreeMatrix> information(model.quadratic(fit.x, Jw, rw).G);
-  if (information.info() != Eigen::Success || !information.isPositive()) return std::nullopt;
-  const FreeMatrix P = information.solve(FreeMatrix::Identity(model.dim(), model.dim()));
+  const Eigen::MatrixXd Jw = fit.R.whiten(fit.stack.J);
+  const Eigen::VectorXd rw = fit.R.whiten(fit.stack.residual);
+  const Cholesky information(model.quadratic(fit.x, Jw, rw).G);
+  if (!information.positive()) return std::nullopt;
+  const Eigen::MatrixXd P = information.solve(Eigen::MatrixXd::Identity(model.dim(), model.dim()));
   const double distance = (fit.x.head<3>() - frame.view.T_WC().p).norm();
   if (!P.allFinite()) return std::nullopt;
   const auto now = projectCuboid(fit.x, frame.view);
@@ -103,8 +101,8 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
                 std::max(now->sides[3] - now->sides[1], 1.0))
           .cwiseMax(1e-6);
   const Eigen::MatrixXd Bw =
-      fit.R.matrixL().solve(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
-  const Eigen::MatrixXd Ew = fit.R.matrixL().solve(model.poseNow(fit.stack).transpose());
+      fit.R.whiten(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
+  const Eigen::MatrixXd Ew = fit.R.whiten(model.poseNow(fit.stack).transpose());
   const Eigen::MatrixXd BJ = Bw.transpose() * Jw;
   const Eigen::MatrixXd C = -P * (Jw.transpose() * Ew);
 
@@ -167,19 +165,16 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts) const {
   x.segment<4>(kBias).setZero();
   const auto s = model.linearise(x);
   if (!s) return kImpossible;
-  const Eigen::LLT<Eigen::MatrixXd> R(model.covariance(x, *s, doubts));
-  if (R.info() != Eigen::Success) return kImpossible;
-  const Eigen::MatrixXd Jw = R.matrixL().solve(s->J);
-  const Eigen::VectorXd rw = R.matrixL().solve(s->residual);
+  const Cholesky R(model.covariance(x, *s, doubts));
+  if (!R.positive()) return kImpossible;
+  const Eigen::MatrixXd Jw = R.whiten(s->J);
+  const Eigen::VectorXd rw = R.whiten(s->residual);
   const Quadratic q = model.quadratic(x, Jw, rw);
-  const Eigen::LLT<Eigen::MatrixXd> G(q.G);
-  if (G.info() != Eigen::Success) return kImpossible;
-  const auto logDet = [](const Eigen::LLT<Eigen::MatrixXd>& llt) {
-    return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
-  };
-  const double cost = rw.squaredNorm() + model.priorCost(x) - q.g.dot(G.solve(q.g));
+  const Cholesky G(q.G);
+  if (!G.positive()) return kImpossible;
+  const double cost = rw.squaredNorm() + model.priorCost(x) - G.whiten(q.g).squaredNorm();
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
-  return 0.5 * (free + model.logSpeedPrior() - cost - logDet(R) - logDet(G));
+  return 0.5 * (free + model.logSpeedPrior() - cost - R.logDeterminant() - G.logDeterminant());
 }
 
 namespace {

@@ -1,8 +1,5 @@
 #include "services/semantic_filter/core/tend.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -28,11 +25,11 @@ Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
 double distance2(const Hypothesis& a, const Hypothesis& b) {
   const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();
   const Vector7d d = geometryDifference(a, b);
-  double result = d.dot(P.ldlt().solve(d));
+  double result = squaredMahalanobis(d, P);
   if (a.moving) {
     const Eigen::Vector3d dv = (a.x - b.x).tail<3>();
     const Eigen::Matrix3d Pv = a.P.bottomRightCorner<3, 3>();
-    result += dv.dot(Pv.ldlt().solve(dv));
+    result += squaredMahalanobis(dv, Pv);
   }
   return result;
 }
@@ -40,8 +37,7 @@ double distance2(const Hypothesis& a, const Hypothesis& b) {
 /// The hypothesis given that v = 0: what it took for motion was the error of its place.
 void stop(Hypothesis& h) {
   const Eigen::Matrix3d S = h.P.bottomRightCorner<3, 3>();
-  const Eigen::Matrix<double, kStateDim, 3> K =
-      S.ldlt().solve(h.P.rightCols<3>().transpose()).transpose();
+  const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.rightCols<3>());
   h.x -= K * Eigen::Vector3d(h.x.tail<3>());
   h.x[kYaw] = wrapAngle(h.x[kYaw]);
   h.P = (h.P - K * S * K.transpose()).eval();
@@ -109,7 +105,7 @@ void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate)
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
     const ClassPrior prior = priors.of(h.class_name);
     const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
-    if (d.dot(prior.log_size_covariance.llt().solve(d)) < size_gate * size_gate) return false;
+    if (squaredMahalanobis(d, prior.log_size_covariance) < size_gate * size_gate) return false;
     lost += h.weight;
     return true;
   });
@@ -291,25 +287,21 @@ double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
 Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
                 const Matrix6d& P_pose) {
   // Given the pose error g the beliefs are x | g ~ N(x̂ + B g, P - B P_g Bᵀ) with B = C P_g⁻¹.
-  Eigen::Matrix<double, 7, 6> B_a = Eigen::Matrix<double, 7, 6>::Zero(), B_b = B_a;
-  const Eigen::LDLT<Matrix6d> pose(P_pose);
-  if (pose.isPositive() && pose.vectorD().minCoeff() > 1e-18) {
-    B_a = pose.solve(a.C.topRows<7>().transpose()).transpose();
-    B_b = pose.solve(b.C.topRows<7>().transpose()).transpose();
-  }
+  const Eigen::Matrix<double, 7, 6> B_a = regressOn(P_pose, a.C.topRows<7>());
+  const Eigen::Matrix<double, 7, 6> B_b = regressOn(P_pose, b.C.topRows<7>());
   const Matrix7d P_a = a.P.topLeftCorner<7, 7>() - B_a * P_pose * B_a.transpose();
   const Matrix7d P_b = b.P.topLeftCorner<7, 7>() - B_b * P_pose * B_b.transpose();
   if (!isCovariance(P_a) || !isCovariance(P_b)) return a;
-  const Matrix7d J_a = P_a.inverse();
-  const Matrix7d J_b = P_b.inverse();
+  const Matrix7d J_a = inverseSymmetric(P_a);
+  const Matrix7d J_b = inverseSymmetric(P_b);
   Matrix7d J_prior = Matrix7d::Zero();
-  J_prior.block<3, 3>(kSize, kSize) = prior.log_size_covariance.inverse();
+  J_prior.block<3, 3>(kSize, kSize) = inverseSymmetric(prior.log_size_covariance);
   Matrix7d J_new = J_b - J_prior;  // what b knows beyond the prior that a has used already
-  if (Eigen::SelfAdjointEigenSolver<Matrix7d>(J_new).eigenvalues().minCoeff() < 0.0) {
+  if (eigenvalues(J_new).minCoeff() < 0.0) {
     J_new = 0.5 * J_b;  // its own information is not separable: count half of it
     J_prior = 0.5 * J_b;
   }
-  const Matrix7d P = (J_a + J_new).inverse();
+  const Matrix7d P = inverseSymmetric(J_a + J_new);
   Vector7d prior_mean = Vector7d::Zero();  // relative to a
   prior_mean.segment<3>(kSize) = prior.log_size - a.x.segment<3>(kSize);
   const Vector7d d = geometryDifference(b, a);
@@ -358,12 +350,9 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
 }
 
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
-  Eigen::Matrix3d P = h.P.topLeftCorner<3, 3>();
-  const Eigen::LDLT<Matrix6d> pose(P_pose);
-  if (pose.isPositive() && pose.vectorD().minCoeff() > 1e-18) {
-    P -= h.C.topRows<3>() * pose.solve(h.C.topRows<3>().transpose());
-  }
-  return std::sqrt(std::max(P.trace(), 0.0));
+  const Eigen::Matrix<double, 3, 6> C = h.C.topRows<3>();
+  const Eigen::Matrix<double, 3, 6> B = regressOn(P_pose, C);
+  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - B.cwiseProduct(C).sum(), 0.0));
 }
 
 void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {

@@ -1,6 +1,5 @@
 #include "services/semantic_filter/core/update.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -57,13 +56,13 @@ Gain gainOf(const Hypothesis& h, const Innovation& y, const Matrix6d& P_pose) {
       y.H * PHt + y.H_pose * (h.C.transpose() * y.H.transpose() + P_pose * y.H_pose.transpose());
   gain.S.diagonal() += y.variance;
   makeSymmetric(gain.S);
-  gain.K = gain.S.ldlt().solve(PHt.transpose()).transpose();
+  gain.K = solveSymmetric(gain.S, PHt.transpose()).transpose();
   return gain;
 }
 
 /// How much the noise of an outlier is widened: the weight of a t distribution, inverted.
 double doubtOf(const Innovation& y, const Eigen::MatrixXd& S, double tail) {
-  const double nis = y.residual.dot(S.ldlt().solve(y.residual));
+  const double nis = squaredMahalanobis(y.residual, S);
   return std::max(1.0, (tail + nis) / (tail + static_cast<double>(y.residual.size())));
 }
 

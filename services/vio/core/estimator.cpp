@@ -1,9 +1,9 @@
 #include "services/vio/core/estimator.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 
 #include "common/base/check.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/vio/core/imu_propagator.h"
 #include "services/vio/core/triangulation.h"
@@ -221,12 +221,9 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
     const Matrix6d cross = P.block<6, 6>(newest.at, previous->at);
     Matrix6d P_before = previous_pose_covariance_;
     P_before.diagonal().array() += 1e-12;
-    out.transition = P_before.ldlt().solve(cross.transpose()).transpose();
+    out.transition = solveSymmetric(P_before, cross.transpose()).transpose();
     const Matrix6d Q = P_now - out.transition * cross.transpose();
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (Q + Q.transpose()));
-    out.increment_covariance = eigen.eigenvectors() *
-                               eigen.eigenvalues().cwiseMax(1e-12).asDiagonal() *
-                               eigen.eigenvectors().transpose();
+    out.increment_covariance = withLeastEigenvalue(Q, 1e-12);
     out.has_increment = out.transition.allFinite() && out.increment_covariance.allFinite();
     out.increment_from = previous->frame;
   }
@@ -296,10 +293,8 @@ LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& s
   Matrix6d P_pose = P.block<6, 6>(pose, pose);
   P_pose.diagonal().array() += 1e-12;
   const Eigen::Matrix3d given = P.block<3, 3>(point.at, point.at) -
-                                l.cross_pose * P_pose.ldlt().solve(l.cross_pose.transpose());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(0.5 * (given + given.transpose()));
-  l.covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(1e-10).asDiagonal() *
-                 eigen.eigenvectors().transpose();
+                                l.cross_pose * solveSymmetric(P_pose, l.cross_pose.transpose());
+  l.covariance = withLeastEigenvalue(given, 1e-10);
   return l;
 }
 

@@ -1,10 +1,13 @@
 #include "services/vio/core/motion_initialiser.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/vio/core/initialiser.h"
 
@@ -223,7 +226,7 @@ Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d
     Matrix3d A = J.transpose() * J;
     A.diagonal() *= 1.0 + lambda;
     A.diagonal().array() += 1e-12;
-    const Vector3d step = -A.ldlt().solve(J.transpose() * r);
+    const Vector3d step = -solveSymmetric(A, J.transpose() * r);
     const Eigen::VectorXd next = residuals(bias + step);
     if (next.squaredNorm() < r.squaredNorm()) {
       bias += step;
@@ -293,7 +296,7 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   if (!s.x.allFinite() || s.in_front < 0.8 || s.rms_px > 3.0) return fail("start_inconsistent");
 
   // Deviations of v0 and g; the accelerometer's unknown bias adds its share.
-  const Matrix6 covariance = s.information.inverse();
+  const Matrix6 covariance = inverse(s.information);
   const double bias = options_.start.accel_bias_sigma, t = keyframes.back().t;
   const double sigma_g = std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
   const double sigma_v = std::sqrt(covariance.topLeftCorner<3, 3>().trace());

@@ -1,10 +1,10 @@
 #include "services/vio/core/state.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::vio {
@@ -143,11 +143,11 @@ Result<void> State::update(const Eigen::MatrixXd& H, const std::vector<Block>& b
     S.noalias() += H.middleCols(column, b.size) * PHt.middleRows(b.at, b.size);
     column += b.size;
   }
-  const Eigen::LLT<Eigen::MatrixXd> llt(S);
-  if (llt.info() != Eigen::Success) return fail("update_not_positive");
+  const Cholesky chol(S);
+  if (!chol.positive()) return fail("update_not_positive");
   // K S Kᵀ = W Wᵀ with W = P Hᵀ L⁻ᵀ; dx = W L⁻¹ r.
-  const Eigen::MatrixXd Wt = llt.matrixL().solve(PHt.transpose());
-  const Eigen::VectorXd dx = Wt.transpose() * llt.matrixL().solve(r);
+  const Eigen::MatrixXd Wt = chol.whiten(PHt.transpose());
+  const Eigen::VectorXd dx = Wt.transpose() * chol.whiten(r);
   if (!dx.allFinite()) return fail("update_not_finite");
   auto active = P_.topLeftCorner(size_, size_);
   active.selfadjointView<Eigen::Lower>().rankUpdate(Wt.transpose(), -1.0);

@@ -1,11 +1,11 @@
 #include "services/vio/core/visual.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <array>
 
 #include "common/base/check.h"
 #include "common/math/chi2.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::vio {
@@ -107,9 +107,9 @@ void dropPoint(PointSystem& s) {
 }
 
 bool passesGate(const Eigen::VectorXd& r, const Eigen::MatrixXd& S, double probability) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(S);
-  if (llt.info() != Eigen::Success) return false;
-  return llt.matrixL().solve(r).squaredNorm() < gate(static_cast<int>(r.size()), probability);
+  const Cholesky chol(S);
+  return chol.positive() &&
+         chol.whiten(r).squaredNorm() < gate(static_cast<int>(r.size()), probability);
 }
 
 void compress(Eigen::MatrixXd& H, Eigen::VectorXd& r) {

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <numbers>
 
 #include "tools/simulate/shapes/dice.h"
 #include "tools/simulate/shapes/looks.h"
@@ -9,7 +8,6 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kWheel = 0.335F;
 
 struct Bicycle {

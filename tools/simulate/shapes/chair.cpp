@@ -1,5 +1,4 @@
 #include <cmath>
-#include <numbers>
 
 #include "tools/simulate/shapes/cushion.h"
 #include "tools/simulate/shapes/dice.h"
@@ -9,8 +8,6 @@
 
 namespace perdure::tools::shapes {
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 struct ChairMaterials {
   int frame, seat;

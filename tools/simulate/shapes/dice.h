@@ -32,6 +32,8 @@ class Dice {
     return list[static_cast<std::size_t>(below(static_cast<int>(N)))];
   }
   std::uint64_t seed() { return engine_(); }
+  /// For the functions in noise.h.
+  std::uint32_t noiseSeed() { return static_cast<std::uint32_t>(seed()); }
 
  private:
   std::mt19937_64 engine_;

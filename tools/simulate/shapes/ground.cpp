@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "tools/simulate/shapes/dice.h"
 #include "tools/simulate/shapes/looks.h"
@@ -15,7 +14,6 @@ using namespace shapes;
 constexpr float kGrassZ = -0.01F, kPavementZ = -0.005F, kRoadZ = 0.0F, kPatchZ = 0.002F,
                 kSpotZ = 0.004F, kMarkingZ = 0.006F;
 constexpr float kPavement = 3.4F;  // width beside the road, metres
-constexpr float kPi = std::numbers::pi_v<float>;
 
 Eigen::AlignedBox2f extentOf(const sim::Scene& scene, float margin) {
   Eigen::AlignedBox2f box;

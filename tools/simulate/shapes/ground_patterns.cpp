@@ -8,14 +8,6 @@
 namespace perdure::tools::shapes {
 namespace {
 
-std::uint32_t noiseSeed(Dice& dice) { return static_cast<std::uint32_t>(dice.seed()); }
-
-/// Distance to the nearest grid line, in cells, of a coordinate in cells.
-float toLine(float cells) {
-  const float part = cells - std::floor(cells);
-  return std::min(part, 1.0F - part);
-}
-
 /// Thin dark lines along the noise's middle contour, in places only.
 float cracks(float u, float v, std::uint32_t seed) {
   const float ridge = std::abs(octaves(u, v, 3, 3, 4, seed) - 0.5F);
@@ -26,7 +18,7 @@ float cracks(float u, float v, std::uint32_t seed) {
 }  // namespace
 
 Pattern asphaltPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const float tone = dice.uniform(0.13F, 0.2F), warmth = dice.uniform(-0.03F, 0.05F);
   return [=](float u, float v) {
     const float broad = octaves(u, v, 3, 3, 4, seed);
@@ -43,7 +35,7 @@ Pattern asphaltPattern(Dice& dice) {
 }
 
 Pattern pavingPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const int rows = 4 + 2 * dice.below(3), columns = dice.chance(0.5F) ? rows : rows / 2;
   const float tone = dice.uniform(0.3F, 0.45F), red = dice.chance(0.3F) ? 0.14F : 0.03F;
   const bool staggered = dice.chance(0.6F);
@@ -68,7 +60,7 @@ Pattern pavingPattern(Dice& dice) {
 }
 
 Pattern grassPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const Colour fresh(dice.uniform(0.09F, 0.13F), dice.uniform(0.15F, 0.2F), 0.045F);
   const Colour dry(0.3F, 0.27F, 0.12F), earth(0.14F, 0.1F, 0.06F);
   return [=](float u, float v) {
@@ -84,7 +76,7 @@ Pattern grassPattern(Dice& dice) {
 }
 
 Pattern earthPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const Colour light(0.33F, 0.26F, 0.18F), dark(0.13F, 0.1F, 0.07F);
   return [=](float u, float v) {
     const Colour c = mix(dark, light, octaves(u, v, 5, 5, 6, seed));
@@ -94,7 +86,7 @@ Pattern earthPattern(Dice& dice) {
 }
 
 Pattern tilesPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const int count = 4 + 2 * dice.below(2);
   const bool chequered = dice.chance(0.3F);
   const Colour base(dice.uniform(0.4F, 0.62F), dice.uniform(0.38F, 0.58F),
@@ -113,7 +105,7 @@ Pattern tilesPattern(Dice& dice) {
 }
 
 Pattern markingsPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const float wear = dice.uniform(0.6F, 0.75F);
   return [=](float u, float v) {
     const float worn = octaves(u, v, 12, 12, 5, seed);
@@ -123,7 +115,7 @@ Pattern markingsPattern(Dice& dice) {
 }
 
 Pattern woodPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const int planks = 6 + 2 * dice.below(3);
   const float tone = dice.uniform(0.35F, 1.0F);
   const Colour base = tone * Colour(0.5F, 0.31F, 0.17F);
@@ -145,7 +137,7 @@ Pattern woodPattern(Dice& dice) {
 }
 
 Pattern timberPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const Colour base = dice.uniform(0.7F, 1.1F) * Colour(0.52F, 0.33F, 0.19F);
   return [=](float u, float v) {
     const float grain = octaves(u, v, 3, 20, 5, seed);

@@ -1,7 +1,6 @@
 #include "tools/simulate/shapes/mesh_builder.h"
 
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "tools/simulate/shapes/mesh_finish.h"
@@ -9,7 +8,6 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kLeastArea = 1e-9F;  // m²; slivers have no direction
 
 Vec3 across(const Vec3& axis) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -16,6 +17,7 @@ namespace perdure::tools::shapes {
 using Vec2 = Eigen::Vector2f;
 using Vec3 = Eigen::Vector3f;
 using Ring = std::vector<Vec3>;
+inline constexpr float kPi = std::numbers::pi_v<float>;
 
 class MeshBuilder {
  public:

@@ -1,6 +1,7 @@
 // Noise that tiles: value noise on a lattice that wraps after `frequency` cells, and its octaves.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -44,6 +45,12 @@ inline float octaves(float u, float v, int fx, int fy, int count, std::uint32_t 
     weight *= 0.5F;
   }
   return sum / total;
+}
+
+/// Distance to the nearest grid line, in cells, of a coordinate in cells.
+inline float toLine(float cells) {
+  const float part = cells - std::floor(cells);
+  return std::min(part, 1.0F - part);
 }
 
 }  // namespace perdure::tools::shapes

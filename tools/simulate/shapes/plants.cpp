@@ -1,5 +1,4 @@
 #include <cmath>
-#include <numbers>
 
 #include "tools/simulate/shapes/dice.h"
 #include "tools/simulate/shapes/looks.h"
@@ -8,8 +7,6 @@
 
 namespace perdure::tools::shapes {
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 Vec3 direction(Dice& dice) {
   const float z = dice.uniform(-1.0F, 1.0F), a = dice.uniform(0.0F, 2.0F * kPi);

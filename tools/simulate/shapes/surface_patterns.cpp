@@ -9,14 +9,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-std::uint32_t noiseSeed(Dice& dice) { return static_cast<std::uint32_t>(dice.seed()); }
-
 Colour grey(float light) { return Colour::Constant(light); }
-
-float toLine(float cells) {
-  const float part = cells - std::floor(cells);
-  return std::min(part, 1.0F - part);
-}
 
 struct Patch {
   float left, bottom, right, top;
@@ -37,7 +30,7 @@ Pattern patchwork(const Colour& ground, std::vector<Patch> patches) {
 }  // namespace
 
 Pattern brickPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const Colour base(dice.uniform(0.26F, 0.42F), dice.uniform(0.11F, 0.2F),
                     dice.uniform(0.07F, 0.14F));
   const float mortar = dice.uniform(0.25F, 0.5F);
@@ -56,7 +49,7 @@ Pattern brickPattern(Dice& dice) {
 }
 
 Pattern plasterPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const float streaks = dice.uniform(0.1F, 0.35F);
   return [=](float u, float v) {
     float light = 0.72F + 0.22F * octaves(u, v, 5, 5, 4, seed);
@@ -69,7 +62,7 @@ Pattern plasterPattern(Dice& dice) {
 }
 
 Pattern windowsPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const float curtain = dice.uniform(0.05F, 0.4F), blind = dice.uniform(0.0F, 0.7F);
   const Colour cloth(dice.uniform(0.3F, 0.7F), dice.uniform(0.3F, 0.65F), dice.uniform(0.3F, 0.6F));
   return [=](float u, float v) {
@@ -83,7 +76,7 @@ Pattern windowsPattern(Dice& dice) {
 }
 
 Pattern barkPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const Colour base(dice.uniform(0.14F, 0.26F), dice.uniform(0.1F, 0.19F),
                     dice.uniform(0.07F, 0.14F));
   return [=](float u, float v) {
@@ -94,7 +87,7 @@ Pattern barkPattern(Dice& dice) {
 }
 
 Pattern leavesPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const Colour dark(dice.uniform(0.02F, 0.06F), dice.uniform(0.07F, 0.12F), 0.02F);
   const Colour light(dice.uniform(0.14F, 0.3F), dice.uniform(0.28F, 0.42F),
                      dice.uniform(0.05F, 0.1F));
@@ -106,7 +99,7 @@ Pattern leavesPattern(Dice& dice) {
 }
 
 Pattern fabricPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const int style = dice.below(4), stripes = 3 + dice.below(8);
   const float depth = dice.uniform(0.25F, 0.7F);
   return [=](float u, float v) {
@@ -124,7 +117,7 @@ Pattern fabricPattern(Dice& dice) {
 }
 
 Pattern metalPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   return [=](float u, float v) {
     const float brushed = valueNoise(u, v, 6, 200, seed);
     return grey(0.7F + 0.15F * brushed + 0.12F * octaves(u, v, 8, 8, 4, seed + 3U));
@@ -132,7 +125,7 @@ Pattern metalPattern(Dice& dice) {
 }
 
 Pattern carPaintPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const float dirt = dice.uniform(0.0F, 0.3F);
   return [=](float u, float v) {
     const float film = smoothStep(0.4F, 0.8F, octaves(u, v, 5, 5, 5, seed));
@@ -166,7 +159,7 @@ Pattern screenPattern(Dice& dice) {
 }
 
 Pattern skinPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   return [=](float u, float v) {
     const float blush = octaves(u, v, 5, 5, 4, seed);
     return Colour(0.95F, 0.9F - 0.08F * blush, 0.86F - 0.1F * blush);
@@ -208,7 +201,7 @@ Pattern signPattern(Dice& dice) {
 }
 
 Pattern paintingPattern(Dice& dice) {
-  const std::uint32_t seed = noiseSeed(dice);
+  const std::uint32_t seed = dice.noiseSeed();
   const auto tint = [&] {
     return Colour(dice.uniform(0.05F, 0.8F), dice.uniform(0.05F, 0.7F), dice.uniform(0.05F, 0.7F));
   };

@@ -2,13 +2,11 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace perdure::tools::shapes {
 namespace {
 
 constexpr int kSides = 12;
-constexpr float kPi = std::numbers::pi_v<float>;
 
 void addSpokes(MeshBuilder& b, const Vec3& hub, float reach, float half_width, int count,
                int material) {

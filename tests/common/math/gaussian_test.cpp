@@ -1,0 +1,89 @@
+// The decompositions against their definitions, for fixed and dynamic sizes.
+#include "common/math/gaussian.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace perdure {
+namespace {
+
+Eigen::MatrixXd random(int rows, int columns, unsigned seed) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> normal;
+  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(engine); });
+}
+
+Eigen::MatrixXd covariance(int n, unsigned seed) {
+  const Eigen::MatrixXd A = random(n, n + 2, seed);
+  return A * A.transpose();
+}
+
+TEST(Gaussian, SolvesAndInvertsSymmetricMatrices) {
+  const Eigen::Matrix<double, 7, 7> S = covariance(7, 1);
+  const Eigen::MatrixXd B = random(7, 3, 2);
+  EXPECT_LT((S * solveSymmetric(S, B) - B).norm(), 1e-9);
+  EXPECT_LT((S * inverseSymmetric(S) - Eigen::MatrixXd::Identity(7, 7)).norm(), 1e-9);
+  EXPECT_NEAR(squaredMahalanobis(B.col(0), S), B.col(0).dot(S.inverse() * B.col(0)), 1e-9);
+}
+
+TEST(Gaussian, RegressionLeavesNothingInCommon) {
+  // With B = C S⁻¹ the rest, x - B s, has no covariance with s.
+  const Eigen::MatrixXd S = covariance(6, 3), C = random(3, 6, 4);
+  EXPECT_LT((C - regressOn(S, C) * S).norm(), 1e-9);
+}
+
+TEST(Gaussian, RegressionOnASingularMatrixIsZero) {
+  Eigen::MatrixXd S = covariance(6, 3);
+  S.row(2).setZero();
+  S.col(2).setZero();
+  EXPECT_TRUE(regressOn(S, random(3, 6, 4)).isZero(0.0));
+}
+
+TEST(Gaussian, CholeskyWhitensAndKnowsTheDeterminant) {
+  const Eigen::Matrix4d S = covariance(4, 5);
+  const Cholesky chol(S);
+  ASSERT_TRUE(chol.positive());
+  const Eigen::MatrixXd W = chol.whiten(Eigen::Matrix4d::Identity());
+  EXPECT_LT((W.transpose() * W - S.inverse()).norm(), 1e-9);
+  EXPECT_TRUE(W.isLowerTriangular(1e-15));
+  EXPECT_LT((S * chol.solve(Eigen::Vector4d::Ones()) - Eigen::Vector4d::Ones()).norm(), 1e-10);
+  EXPECT_NEAR(chol.logDeterminant(), std::log(S.determinant()), 1e-10);
+}
+
+TEST(Gaussian, WhatIsNotPositiveIsNoCovariance) {
+  Eigen::MatrixXd S = covariance(5, 6);
+  EXPECT_TRUE(isCovariance(S));
+  S(4, 4) = -1.0;
+  EXPECT_FALSE(Cholesky(S).positive());
+  EXPECT_FALSE(isCovariance(S));
+  EXPECT_EQ(logGaussian(Eigen::VectorXd::Zero(5), S), -std::numeric_limits<double>::infinity());
+  S(4, 4) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(isCovariance(S));
+}
+
+TEST(Gaussian, DensityIsThatOfIndependentNormals) {
+  const Eigen::Vector2d r(0.5, -2.0);
+  const Eigen::Matrix2d S = Eigen::Vector2d(4.0, 0.25).asDiagonal();
+  const double expected = -0.5 * (0.25 / 4.0 + 4.0 / 0.25) - std::log(2.0 * M_PI * 2.0 * 0.5);
+  EXPECT_NEAR(logGaussian(r, S), expected, 1e-12);
+}
+
+TEST(Gaussian, LeastEigenvalueIsRaisedAndTheRestKept) {
+  const Eigen::MatrixXd S = Eigen::Vector3d(2.0, -1.0, 1e-9).asDiagonal();
+  const Eigen::MatrixXd T = withLeastEigenvalue(S, 1e-3);
+  EXPECT_LT((eigenvalues(T) - Eigen::Vector3d(1e-3, 1e-3, 2.0)).norm(), 1e-12);
+  EXPECT_LT((T - Eigen::MatrixXd(Eigen::Vector3d(2.0, 1e-3, 1e-3).asDiagonal())).norm(), 1e-12);
+}
+
+TEST(Gaussian, InverseOfASingularMatrixIsNotFinite) {
+  EXPECT_LT((inverse(random(6, 6, 7)) * random(6, 6, 7) - Eigen::MatrixXd::Identity(6, 6)).norm(),
+            1e-9);
+  EXPECT_FALSE(inverse(Eigen::Matrix2d::Zero()).allFinite());
+}
+
+}  // namespace
+}  // namespace perdure
