@@ -103,6 +103,11 @@ void describeMotion(Parameters& p, Fields& fields) {
                 {"random walk of poses that come without covariance", "m/√m"});
   fields.number("pose.walk_rotation", p.pose.walk_rotation, atLeast(0),
                 {"the same of their rotation", "rad/√m"});
+  fields.number(
+      "pose.drift_position", p.pose.drift_position, atLeast(0),
+      {"random walk of odometry, in place of the covariance that it says; 0: that", "m/√m"});
+  fields.number("pose.drift_rotation", p.pose.drift_rotation, atLeast(0),
+                {"the same of its rotation", "rad/√m"});
   fields.number("looks.correlation", p.looks.correlation, between(0, 1),
                 {"of the errors of two looks from the same place"});
   fields.number("looks.angle", p.looks.angle, positive(),

@@ -44,17 +44,26 @@ void Node::onModel(const ModelInfo& model) {
 }
 
 void Node::advancePoseError(const Odometry& odometry) {
-  if (odometry.has_increment) {
+  const PoseParameters& pose = config_.filter.pose;
+  const bool walks = !odometry.has_increment ||
+                     (pose.drift_position > 0.0 && !odometry.increment_covariance.isZero(0.0));
+  if (!walks || !last_T_WB_) {
     pose_error_.covariance = odometry.covariance.topLeftCorner<6, 6>();
     pose_error_.product = (odometry.transition * pose_error_.product).eval();
-  } else if (last_T_WB_) {
-    // Poses from a file: their error is a random walk in W, by distance travelled.
-    const auto& walk = config_.filter.pose;
-    const double metres = (odometry.T_WB.p - last_T_WB_->p).norm();
+  } else {
+    // A random walk in W, by distance travelled. The error of rotation is the body's: it turns
+    // against it.
+    Matrix6d A = Matrix6d::Identity();
+    A.topLeftCorner<3, 3>() = odometry.T_WB.R().transpose() * last_T_WB_->R();
+    const double position = odometry.has_increment ? pose.drift_position : pose.walk_position;
+    const double rotation = odometry.has_increment ? pose.drift_rotation : pose.walk_rotation;
     Eigen::Matrix<double, 6, 1> q;
-    q << Eigen::Vector3d::Constant(walk.walk_rotation * walk.walk_rotation),
-        Eigen::Vector3d::Constant(walk.walk_position * walk.walk_position);
+    q << Eigen::Vector3d::Constant(rotation * rotation),
+        Eigen::Vector3d::Constant(position * position);
+    const double metres = (odometry.T_WB.p - last_T_WB_->p).norm();
+    pose_error_.covariance = (A * pose_error_.covariance * A.transpose()).eval();
     pose_error_.covariance.diagonal() += metres * q;
+    pose_error_.product = (A * pose_error_.product).eval();
   }
   last_T_WB_ = odometry.T_WB;
 }

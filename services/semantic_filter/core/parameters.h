@@ -36,7 +36,7 @@ struct ClutterParameters {
 
 struct BirthParameters {
   double odds = 0.2;             ///< expected new objects in a box against false alarms
-  double min_log_ratio = -2.0;   ///< weaker boxes only support objects that are there
+  double min_log_ratio = 0.5;    ///< weaker boxes only support objects that are there
   double claimed = 0.5;          ///< a box claimed with more than this gives no birth
   std::int64_t max_classes = 4;  ///< kept of the network's list, "other" beside them
   double class_ratio = 0.01;     ///< classes below this share of the best are not kept
@@ -63,6 +63,9 @@ struct MotionParameters {
 struct PoseParameters {
   double walk_position = 0.005;   ///< m/√m, where odometry has no covariance
   double walk_rotation = 0.0002;  ///< rad/√m
+  /// Of odometry that says its own uncertainty, in place of that; 0: what it says is believed.
+  double drift_position = 0.015;   ///< m/√m
+  double drift_rotation = 0.0003;  ///< rad/√m
 };
 
 struct LooksParameters {

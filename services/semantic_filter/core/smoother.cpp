@@ -14,24 +14,24 @@ namespace {
 constexpr int kRounds = 12;
 constexpr double kContradicted = 25.0;  // of about four degrees of freedom
 
-/// Weights of a t distribution for whole looks; returns the share that contradicts x.
-double doubtLooks(const BatchModel& model, const State& x, const Stack& s, const Cholesky& R,
-                  double tail, Eigen::VectorXd& doubts) {
+/// Weights of a t distribution for whole looks; returns which contradict x.
+Eigen::ArrayXi doubtLooks(const BatchModel& model, const State& x, const Stack& s,
+                          const Cholesky& R, double tail, Eigen::VectorXd& doubts) {
   const Eigen::VectorXd residual = model.withoutPose(s, R);
-  double contradicted = 0.0;
+  Eigen::ArrayXi contradicted(doubts.size());
   for (Eigen::Index i = 0; i < doubts.size(); ++i) {
     const auto [nis, count] = model.deviation(x, s, residual, static_cast<std::size_t>(i));
     doubts[i] = std::max(1.0, (tail + nis) / (tail + count));
-    contradicted += nis > kContradicted ? 1.0 : 0.0;
+    contradicted[i] = nis > kContradicted ? 1 : 0;
   }
-  return contradicted / static_cast<double>(doubts.size());
+  return contradicted;
 }
 
 struct Fit {
   State x;
   Stack stack;
   Eigen::VectorXd doubts;
-  double contradicted = 0.0;
+  Eigen::ArrayXi contradicted;
   Cholesky R;
 };
 
@@ -218,8 +218,29 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smo
   }
 }
 
+/// What the fits that were taken say of each look.
+struct Verdicts {
+  int fits = 0;
+  Eigen::ArrayXi against;
+  void add(const Eigen::ArrayXi& contradictions) {
+    against = fits++ == 0 ? contradictions : Eigen::ArrayXi(against + contradictions);
+  }
+};
+
+/// A look that contradicts every fit showed something else.
+void forgetContradicted(Object& object, const Verdicts& verdicts, std::size_t least) {
+  if (verdicts.fits == 0) return;
+  std::vector<std::shared_ptr<const Keyframe>> kept;
+  for (std::size_t i = 0; i < object.keyframes.size(); ++i) {
+    if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) {
+      kept.push_back(object.keyframes[i]);
+    }
+  }
+  if (kept.size() >= least) object.keyframes = std::move(kept);
+}
+
 void smoothClass(Object& object, const std::string& name, const Looks& looks,
-                 const FrameContext& frame) {
+                 const FrameContext& frame, Verdicts& verdicts) {
   const auto& p = frame.parameters->smooth;
   std::optional<Smoothed> best[2];  // at rest, moving
   double weight[2] = {0.0, 0.0};
@@ -229,6 +250,7 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
     if (!smoothed || smoothed->contradicted() > p.contradicted) continue;
     const double old = h.weight;
     h = smoothed->hypothesis();
+    verdicts.add(smoothed->contradictions());
     if (old > weight[h.moving]) weight[h.moving] = old, best[h.moving] = std::move(smoothed);
   }
   if (!best[1]) return;
@@ -258,7 +280,9 @@ void rememberAndSmooth(Object& object, const Evidence& box, const std::array<boo
   const Looks looks(object.keyframes);
   std::set<std::string> names;
   for (const auto& h : object.hypotheses) names.insert(h.class_name);
-  for (const auto& name : names) smoothClass(object, name, looks, frame);
+  Verdicts verdicts;
+  for (const auto& name : names) smoothClass(object, name, looks, frame, verdicts);
+  forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
   normalise(object);
 }
 

@@ -25,7 +25,9 @@ class Smoothed {
   /// By how much each look's noise is widened (t distribution), >= 1.
   const Eigen::VectorXd& doubts() const { return doubts_; }
   /// Share of the looks that contradict it.
-  double contradicted() const { return contradicted_; }
+  double contradicted() const { return contradicted_.cast<double>().mean(); }
+  /// 1 for each look that does.
+  const Eigen::ArrayXi& contradictions() const { return contradicted_; }
   /// log p(looks | this class, and that it moves or not), by Laplace's method. To compare two, both
   /// are asked with the same doubts.
   double logEvidence(const Eigen::VectorXd& doubts) const;
@@ -35,7 +37,7 @@ class Smoothed {
 
   Hypothesis hypothesis_;
   Eigen::VectorXd doubts_;
-  double contradicted_ = 0.0;
+  Eigen::ArrayXi contradicted_;
   const Looks* looks_;
   const FrameContext* frame_;
   double start_yaw_ = 0.0;
