@@ -47,10 +47,10 @@ void Node::advancePoseError(const Odometry& odometry) {
   const PoseParameters& pose = config_.filter.pose;
   const bool walks = !odometry.has_increment ||
                      (pose.drift_position > 0.0 && !odometry.increment_covariance.isZero(0.0));
-  if (!walks || !last_T_WB_) {
+  if (!walks) {
     pose_error_.covariance = odometry.covariance.topLeftCorner<6, 6>();
     pose_error_.product = (odometry.transition * pose_error_.product).eval();
-  } else {
+  } else if (last_T_WB_) {
     // A random walk in W, by distance travelled. The error of rotation is the body's: it turns
     // against it.
     Matrix6d A = Matrix6d::Identity();
