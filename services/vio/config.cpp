@@ -78,14 +78,16 @@ void describeTracker(TrackerOptions& t, Config& c, Fields& f) {
   f.integer("tracker.max_points", t.max_points, between(20, 1000), {"points in the first camera"});
   f.integer("tracker.grid_columns", t.grid_columns, between(1, 50), {"of new corners"});
   f.integer("tracker.grid_rows", t.grid_rows, between(1, 50), {"of new corners"});
-  f.integer("tracker.pyramid_levels", t.pyramid_levels, between(0, 8),
+  f.integer("tracker.pyramid_levels", t.pyramid_levels, between(1, 8),
             {"above the image itself, from image to image"});
   f.integer("tracker.stereo_levels", t.stereo_levels, between(0, 8),
             {"above the image itself, into the second camera"});
-  f.integer("tracker.window", t.window_px, between(5, 51), {"side of a patch", "px"});
+  f.integer("tracker.window", t.window_px, between(5, 51), {"side of a patch of Lucas-Kanade", "px"});
   f.integer("tracker.iterations", t.iterations, between(1, 100), {"of Lucas-Kanade"});
   f.integer("tracker.fast_threshold", t.fast_threshold, between(2, 100), {"of new corners"});
   f.number("tracker.min_distance", t.min_distance_px, atLeast(1), {"between corners", "px"});
+  f.number("tracker.similarity", t.similarity, between(0, 1),
+           {"of a patch with its first sight; a track that has less ends"});
   f.number("tracker.ransac", t.ransac_px, positive(), {"from the epipolar line", "px"});
   f.number("tracker.stereo_epipolar", t.stereo_px, positive(),
            {"from the calibration's epipolar line, second camera", "px"});

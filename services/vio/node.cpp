@@ -417,7 +417,6 @@ void Node::publishLandmarks(const FrameStamp& stamp, const cv::Mat& image) {
   out.instance = instance_;
   out.world = world_;
   out.camera = cameras_->models[0].calibration().name;
-  const DescriptorExtractor descriptors(image);
   for (const LandmarkEstimate& e : cameras_->estimator.landmarks()) {
     if (!e.p_W.allFinite() || !e.covariance.allFinite() || !e.cross_pose.allFinite()) continue;
     Landmark l;
@@ -426,7 +425,7 @@ void Node::publishLandmarks(const FrameStamp& stamp, const cv::Mat& image) {
     l.covariance = e.covariance;
     l.cross_pose = e.cross_pose;
     l.pixel = e.pixel;
-    l.descriptor = descriptors.at(e.pixel).value_or(Descriptor{});
+    l.descriptor = descriptorAt(image, e.pixel).value_or(Descriptor{});
     out.landmarks.push_back(l);
   }
   outputs_.landmarks(out);

@@ -1,5 +1,6 @@
 #include "services/vio/core/descriptor.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -7,7 +8,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kRadius = 15;
+constexpr int kReach = 13, kRadius = kReach + 2;  // of the pattern, and with the box around it
 
 struct Pair {
   int x0, y0, x1, y1;
@@ -22,7 +23,7 @@ std::array<Pair, 256> makePattern() {
       seed = seed * 6364136223846793005ull + 1442695040888963407ull;
       sum += static_cast<int>((seed >> 40) % 9);  // 0 … 8
     }
-    return sum - 16 < -13 ? -13 : (sum - 16 > 13 ? 13 : sum - 16);
+    return std::clamp(sum - 16, -kReach, kReach);
   };
   std::array<Pair, 256> pattern{};
   for (Pair& p : pattern) {
@@ -35,20 +36,21 @@ std::array<Pair, 256> makePattern() {
 
 }  // namespace
 
-DescriptorExtractor::DescriptorExtractor(const cv::Mat& image) { cv::blur(image, smooth_, {5, 5}); }
-
-std::optional<Descriptor> DescriptorExtractor::at(const Eigen::Vector2d& pixel) const {
+std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector2d& pixel) {
   static const std::array<Pair, 256> kPattern = makePattern();
   const int x = static_cast<int>(std::lround(pixel.x()));
   const int y = static_cast<int>(std::lround(pixel.y()));
-  if (x < kRadius || y < kRadius || x >= smooth_.cols - kRadius || y >= smooth_.rows - kRadius) {
+  if (x < kRadius || y < kRadius || x >= image.cols - kRadius || y >= image.rows - kRadius) {
     return std::nullopt;
   }
+  // The box looks out of the patch into the image around it.
+  cv::Mat smooth;
+  cv::blur(image(cv::Rect(x - kReach, y - kReach, 2 * kReach + 1, 2 * kReach + 1)), smooth, {5, 5});
   Descriptor d{};
   for (std::size_t i = 0; i < kPattern.size(); ++i) {
     const Pair& p = kPattern[i];
-    const bool bit =
-        smooth_.at<std::uint8_t>(y + p.y0, x + p.x0) < smooth_.at<std::uint8_t>(y + p.y1, x + p.x1);
+    const bool bit = smooth.at<std::uint8_t>(kReach + p.y0, kReach + p.x0) <
+                     smooth.at<std::uint8_t>(kReach + p.y1, kReach + p.x1);
     d[i / 8] = static_cast<std::uint8_t>(d[i / 8] | (bit << (i % 8)));
   }
   return d;

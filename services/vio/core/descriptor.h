@@ -12,16 +12,8 @@ namespace perdure::vio {
 
 using Descriptor = std::array<std::uint8_t, 32>;
 
-class DescriptorExtractor {
- public:
-  /// CV_8UC1; kept smoothed.
-  explicit DescriptorExtractor(const cv::Mat& image);
-  /// Nothing nearer than 16 pixels to the border.
-  std::optional<Descriptor> at(const Eigen::Vector2d& pixel) const;
-
- private:
-  cv::Mat smooth_;
-};
+/// Of a CV_8UC1 image. Nothing nearer than 16 pixels to the border.
+std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector2d& pixel);
 
 /// Number of bits that differ.
 int hammingDistance(const Descriptor& a, const Descriptor& b);

@@ -31,7 +31,7 @@ struct WindowOptions {
 };
 
 struct VisionOptions {
-  double sigma_px = 1.0;
+  double sigma_px = 0.4;
   double gate_probability = 0.95;
   double min_depth_m = 0.1, max_depth_m = 75.0;
   double max_condition = 10000.0;  ///< of a triangulation's normal matrix

@@ -130,18 +130,37 @@ Eigen::MatrixXd State::project(const Eigen::MatrixXd& H, const std::vector<Block
 
 Result<void> State::update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                            const Eigen::VectorXd& r) {
-  const Eigen::Index m = r.size();
+  return update({Measurement{H, blocks, r}});
+}
+
+Result<void> State::update(const std::vector<Measurement>& measurements) {
+  Eigen::Index m = 0;
+  for (const Measurement& z : measurements) m += z.r.size();
+  Eigen::VectorXd r(m);
   Eigen::MatrixXd PHt = Eigen::MatrixXd::Zero(size_, m);
-  Eigen::Index column = 0;
-  for (const Block& b : blocks) {
-    PHt.noalias() += P_.block(0, b.at, size_, b.size) * H.middleCols(column, b.size).transpose();
-    column += b.size;
+  Eigen::Index row = 0;
+  for (const Measurement& z : measurements) {
+    const Eigen::Index rows = z.r.size();
+    r.segment(row, rows) = z.r;
+    Eigen::Index column = 0;
+    for (const Block& b : z.blocks) {
+      PHt.middleCols(row, rows).noalias() +=
+          P_.block(0, b.at, size_, b.size) * z.H.middleCols(column, b.size).transpose();
+      column += b.size;
+    }
+    row += rows;
   }
-  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(m, m);
-  column = 0;
-  for (const Block& b : blocks) {
-    S.noalias() += H.middleCols(column, b.size) * PHt.middleRows(b.at, b.size);
-    column += b.size;
+  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(m, m);  // the lower triangle counts
+  row = 0;
+  for (const Measurement& z : measurements) {
+    const Eigen::Index rows = z.r.size();
+    Eigen::Index column = 0;
+    for (const Block& b : z.blocks) {
+      S.block(row, 0, rows, row + rows).noalias() +=
+          z.H.middleCols(column, b.size) * PHt.block(b.at, 0, b.size, row + rows);
+      column += b.size;
+    }
+    row += rows;
   }
   const Cholesky chol(S);
   if (!chol.positive()) return fail("update_not_positive");

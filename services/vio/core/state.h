@@ -45,6 +45,13 @@ struct Block {
   int at = 0, size = 0;
 };
 
+/// r = H·error + noise of unit covariance; H's columns are those of `blocks`, one after another.
+struct Measurement {
+  Eigen::MatrixXd H;
+  std::vector<Block> blocks;
+  Eigen::VectorXd r;
+};
+
 inline constexpr int kNavSize = 15;
 inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
 
@@ -85,6 +92,8 @@ class State {
   /// then leaves the state as it was.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
+  /// The same with measurements that each touch few blocks: their zeros cost nothing.
+  Result<void> update(const std::vector<Measurement>& measurements);
   /// H P Hᵀ for such an H.
   Eigen::MatrixXd project(const Eigen::MatrixXd& H, const std::vector<Block>& blocks) const;
   /// The covariance of the error of `blocks`.

@@ -83,33 +83,38 @@ std::vector<bool> Tracker::inliers(const std::vector<Match>& matches,
   return result;
 }
 
-void Tracker::follow(const std::vector<cv::Mat>& now, const std::optional<Eigen::Matrix3d>& R) {
+void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R) {
   if (points_.empty() || previous_.empty()) return;
   std::vector<cv::Point2f> from, to = seeds(R);
   for (const Point& p : points_) from.push_back(p.pixel);
   std::vector<std::uint8_t> status;
   const int w = static_cast<int>(options_.window_px);
-  cv::calcOpticalFlowPyrLK(previous_, now, from, to, status, cv::noArray(), {w, w},
-                           static_cast<int>(options_.pyramid_levels), criteria(options_.iterations),
-                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  for (auto* points : {&from, &to}) {
+    for (cv::Point2f& p : *points) p *= 0.5F;
+  }
+  cv::calcOpticalFlowPyrLK(previous_, now.half, from, to, status, cv::noArray(), {w, w},
+                           static_cast<int>(options_.pyramid_levels) - 1,
+                           criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  for (cv::Point2f& p : to) p *= 2.0F;
   std::vector<Point> kept;
   std::vector<Match> matches;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Eigen::Vector2d pixel = toEigen(to[i]);
-    if (!status[i] || !cameras_[0].inImage(pixel, kBorder)) continue;
-    const auto seen = imagePoint(cameras_[0], pixel);
+    if (!status[i]) continue;
+    Point& p = points_[i];
+    const auto found = p.patch.find(now.levels, to[i]);
+    if (!found || found->similarity < options_.similarity) continue;
+    const auto seen = imagePoint(cameras_[0], toEigen(found->pixel));
     if (!seen) continue;
-    Point p = points_[i];
     matches.push_back({p.normalised, seen->normalised, seen->scale});
-    p.second += to[i] - p.pixel;  // the second camera's seed moves along
-    p.pixel = to[i];
+    p.second += found->pixel - p.pixel;  // the second camera's seed moves along
+    p.pixel = found->pixel;
     p.normalised = seen->normalised;
-    kept.push_back(p);
+    kept.push_back(std::move(p));
   }
   const std::vector<bool> good = inliers(matches, R);
   points_.clear();
   for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (good[i]) points_.push_back(kept[i]);
+    if (good[i]) points_.push_back(std::move(kept[i]));
   }
 }
 
@@ -135,7 +140,7 @@ void Tracker::detect(const cv::Mat& image) {
   std::vector<cv::KeyPoint> corners;
   for (int cell = 0; cell < columns * rows; ++cell) {
     const std::int64_t wanted = per_cell - filled[static_cast<std::size_t>(cell)];
-    if (wanted <= 0) continue;
+    if (2 * wanted <= per_cell) continue;  // half full: seeking costs more than it brings
     // Three pixels more on each side: FAST's circle.
     const cv::Rect inner(static_cast<int>(cell % columns * cell_w),
                          static_cast<int>(cell / columns * cell_h), static_cast<int>(cell_w),
@@ -157,11 +162,12 @@ void Tracker::detect(const cv::Mat& image) {
     }
   }
   if (fresh.empty()) return;
-  cv::cornerSubPix(image, fresh, {3, 3}, {-1, -1}, criteria(10));
   for (const cv::Point2f& p : fresh) {
-    if (!cameras_[0].inImage(toEigen(p), kBorder)) continue;
     const auto seen = imagePoint(cameras_[0], toEigen(p));
-    if (seen) points_.push_back({next_id_++, p, p, false, seen->normalised});
+    auto patch = Patch::cut(image, p);
+    if (seen && patch) {
+      points_.push_back({next_id_++, p, p, false, seen->normalised, std::move(*patch)});
+    }
   }
 }
 
@@ -218,17 +224,21 @@ TrackedFrame Tracker::result() const {
 TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
                             const std::optional<Eigen::Matrix3d>& R_now_before) {
   const bool stereo = cameras_.size() == 2 && !second.empty();
-  const auto levels =
-      stereo ? std::max(options_.pyramid_levels, options_.stereo_levels) : options_.pyramid_levels;
-  std::vector<cv::Mat> now = pyramid(first, levels);
+  Images now;
+  cv::Mat half;
+  cv::pyrDown(first, half);
+  now.half = pyramid(half, options_.pyramid_levels - 1);
+  now.levels.push_back(first);
+  for (std::size_t i = 0; i < now.half.size(); i += 2) now.levels.push_back(now.half[i]);
   follow(now, R_now_before);
   detect(first);
   if (stereo) {
-    followIntoSecond(now, pyramid(second, levels));
+    followIntoSecond(pyramid(first, options_.stereo_levels),
+                     pyramid(second, options_.stereo_levels));
   } else {
     for (Point& p : points_) p.has_second = false;
   }
-  previous_ = std::move(now);
+  previous_ = std::move(now.half);
   std::vector<std::pair<std::uint64_t, cv::Point2f>> seen;
   for (const Point& p : points_) seen.emplace_back(p.id, p.pixel);
   history_.push_back(std::move(seen));

@@ -1,5 +1,6 @@
-// Corners followed from image to image, and into the second camera, by pyramidal Lucas-Kanade
-// seeded with the gyroscope's prediction; new corners (FAST) where the grid is empty.
+// Corners followed from image to image by pyramidal Lucas-Kanade at half size, seeded with the
+// gyroscope's prediction, and then placed by their first sight (patch.h); into the second camera by
+// Lucas-Kanade alone. New corners (FAST) where the grid is empty.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,6 +14,7 @@
 
 #include "common/base/result.h"
 #include "common/camera/camera_model.h"
+#include "services/vio/core/patch.h"
 #include "services/vio/core/ransac.h"
 #include "services/vio/core/tracks.h"
 
@@ -21,14 +23,15 @@ namespace perdure::vio {
 struct TrackerOptions {
   std::int64_t max_points = 150;
   std::int64_t grid_columns = 8, grid_rows = 6;
-  std::int64_t pyramid_levels = 3;  ///< above the image itself
+  std::int64_t pyramid_levels = 3;  ///< above the image itself; 1 at least
   std::int64_t stereo_levels = 4;
-  std::int64_t window_px = 15;
+  std::int64_t window_px = 11;
   std::int64_t iterations = 20;
   std::int64_t fast_threshold = 15;
   double min_distance_px = 12.0;
   double ransac_px = 1.5;
   double stereo_px = 2.0;    ///< from the epipolar line of the calibration
+  double similarity = 0.75;  ///< with the first sight of a point, at least
   std::int64_t memory = 10;  ///< frames over which motion can be asked
 };
 
@@ -54,9 +57,14 @@ class Tracker {
     cv::Point2f pixel, second;  ///< second: in the second camera, when has_second
     bool has_second = false;
     Eigen::Vector2d normalised;
+    Patch patch;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
-  void follow(const std::vector<cv::Mat>& now, const std::optional<Eigen::Matrix3d>& R);
+  struct Images {
+    std::vector<cv::Mat> half;    ///< from half size on, as of cv::buildOpticalFlowPyramid
+    std::vector<cv::Mat> levels;  ///< the image itself first, each half the one before
+  };
+  void follow(const Images& now, const std::optional<Eigen::Matrix3d>& R);
   std::vector<cv::Point2f> seeds(const std::optional<Eigen::Matrix3d>& R) const;
   std::vector<bool> inliers(const std::vector<Match>& matches,
                             const std::optional<Eigen::Matrix3d>& R);

@@ -23,9 +23,8 @@ Result<UpdateCounts> updateMsckf(State& state, const std::vector<Track>& tracks,
     if (s.r.size() < 4) continue;
     separatePoint(s);
     dropPoint(s);
-    Eigen::MatrixXd S = s.H_x * P * s.H_x.transpose();
-    S.diagonal().array() += 1.0;
-    if (!passesGate(s.r, S, options.gate_probability)) {
+    const auto of_views = [&] { return s.H_x * P * s.H_x.transpose(); };
+    if (!passesGateWith(s.r, of_views, options.gate_probability)) {
       ++counts.gated;
       reasons.add("msckf_gated");
       continue;

@@ -12,19 +12,17 @@ namespace {
 constexpr int kFailuresToLeave = 3;
 
 /// The newest clone's views of one point: rows × [extrinsics, clone, point].
-struct PointRows {
-  Eigen::MatrixXd H;
-  Eigen::VectorXd r;
-  Block point;
-};
-
-Result<PointRows> rowsOf(const State& state, const PointState& point, const Observation& seen,
-                         double sigma_px) {
+Result<Measurement> rowsOf(const State& state, const PointState& point, const Observation& seen,
+                           double sigma_px) {
   const Clone& clone = state.clones.back();
   const auto cameras = static_cast<Eigen::Index>(state.T_BC.size());
-  PointRows rows{Eigen::MatrixXd::Zero(2 * cameras, 6 * cameras + 9),
-                 Eigen::VectorXd(2 * cameras),
-                 {point.at, 3}};
+  Measurement rows{
+      Eigen::MatrixXd::Zero(2 * cameras, 6 * cameras + 9), {}, Eigen::VectorXd(2 * cameras)};
+  for (int c = 0; c < static_cast<int>(cameras); ++c) {
+    rows.blocks.push_back({state.extrinsicsAt(c), 6});
+  }
+  rows.blocks.push_back({clone.at, 6});
+  rows.blocks.push_back({point.at, 3});
   Eigen::Index row = 0;
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
     if (!seen.seen[c]) continue;
@@ -46,56 +44,20 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   return rows;
 }
 
-std::vector<Block> commonBlocks(const State& state) {
-  std::vector<Block> blocks;
-  for (int c = 0; c < static_cast<int>(state.T_BC.size()); ++c) {
-    blocks.push_back({state.extrinsicsAt(c), 6});
-  }
-  blocks.push_back({state.clones.back().at, 6});
-  return blocks;
-}
-
-bool gateOf(const State& state, const PointRows& rows, const VisionOptions& options) {
-  std::vector<Block> blocks = commonBlocks(state);
-  blocks.push_back(rows.point);
-  Eigen::MatrixXd S = state.project(rows.H, blocks);
-  S.diagonal().array() += 1.0;
-  return passesGate(rows.r, S, options.gate_probability);
-}
-
-Result<void> updateWith(State& state, const std::vector<PointRows>& used) {
-  std::vector<Block> blocks = commonBlocks(state);
-  const Eigen::Index common = 6 * static_cast<Eigen::Index>(blocks.size());
-  Eigen::Index m = 0;
-  for (const PointRows& p : used) m += p.r.size();
-  const Eigen::Index n = common + 3 * static_cast<Eigen::Index>(used.size());
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(m, n);
-  Eigen::VectorXd r(m);
-  Eigen::Index row = 0, column = common;
-  for (const PointRows& p : used) {
-    H.block(row, 0, p.r.size(), common) = p.H.leftCols(common);
-    H.block(row, column, p.r.size(), 3) = p.H.rightCols<3>();
-    r.segment(row, p.r.size()) = p.r;
-    blocks.push_back(p.point);
-    row += p.r.size();
-    column += 3;
-  }
-  return state.update(H, blocks, r);
-}
-
 }  // namespace
 
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, ReasonCounts& reasons) {
   check(!state.clones.empty(), "the newest pose is cloned");
   UpdateCounts counts;
-  std::vector<PointRows> used;
+  std::vector<Measurement> used;
   std::vector<std::uint64_t> leaving;
   for (PointState& point : state.points) {
     const Track* track = database.find(point.id);
     if (!track || !track->seenAt(state.clones.back().frame)) continue;
     const auto rows = rowsOf(state, point, track->observations.back(), options.sigma_px);
-    if (rows && gateOf(state, *rows, options)) {
+    const auto of_views = [&] { return state.project(rows->H, rows->blocks); };
+    if (rows && passesGateWith(rows->r, of_views, options.gate_probability)) {
       point.failed_gates = 0;
       used.push_back(*rows);
       ++counts.used;
@@ -106,7 +68,7 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
     if (!rows || ++point.failed_gates >= kFailuresToLeave) leaving.push_back(point.id);
   }
   if (!used.empty()) {
-    if (const auto done = updateWith(state, used); !done) return tl::unexpected(done.error());
+    if (const auto done = state.update(used); !done) return tl::unexpected(done.error());
   }
   for (const std::uint64_t id : leaving) state.removePoint(id);
   return counts;
@@ -124,9 +86,8 @@ Result<void> initialisePoint(State& state, const Track& track, const VisionOptio
   const Eigen::MatrixXd H_1 = s.H_x.topRows<3>();
   const Eigen::Vector3d r_1 = s.r.head<3>();
   dropPoint(s);
-  Eigen::MatrixXd S = state.project(s.H_x, blocks);
-  S.diagonal().array() += 1.0;
-  if (!passesGate(s.r, S, options.gate_probability)) return fail("slam_gated");
+  const auto of_views = [&] { return state.project(s.H_x, blocks); };
+  if (!passesGateWith(s.r, of_views, options.gate_probability)) return fail("slam_gated");
 
   // δf = R_f⁻¹ (r₁ − H₁ δx − n₁): mean, covariance and cross-covariance of the new point.
   const Eigen::Matrix3d R_inverse = R_f.inverse();

@@ -112,6 +112,14 @@ bool passesGate(const Eigen::VectorXd& r, const Eigen::MatrixXd& S, double proba
          chol.whiten(r).squaredNorm() < gate(static_cast<int>(r.size()), probability);
 }
 
+bool passesGateWith(const Eigen::VectorXd& r, const std::function<Eigen::MatrixXd()>& P,
+                    double probability) {
+  if (r.squaredNorm() < gate(static_cast<int>(r.size()), probability)) return true;
+  Eigen::MatrixXd S = P();
+  S.diagonal().array() += 1.0;
+  return passesGate(r, S, probability);
+}
+
 void compress(Eigen::MatrixXd& H, Eigen::VectorXd& r) {
   const Eigen::Index n = H.cols();
   if (H.rows() <= n) return;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "services/vio/core/options.h"
@@ -47,6 +48,11 @@ void dropPoint(PointSystem& system);
 
 /// True when rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
 bool passesGate(const Eigen::VectorXd& r, const Eigen::MatrixXd& S, double probability);
+
+/// The same with S = P + I, where P is costly: it is only asked for when rᵀ r, which bounds
+/// rᵀ S⁻¹ r from above, is not below.
+bool passesGateWith(const Eigen::VectorXd& r, const std::function<Eigen::MatrixXd()>& P,
+                    double probability);
 
 /// Keeps no more rows than columns, by QR, without loss.
 void compress(Eigen::MatrixXd& H, Eigen::VectorXd& r);

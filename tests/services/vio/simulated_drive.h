@@ -16,7 +16,7 @@ struct DriveOptions {
   unsigned seed = 1;
   double imu_rate_hz = 200.0, camera_rate_hz = 20.0;
   ImuNoise noise;
-  double pixel_sigma = 1.0;
+  double pixel_sigma = 0.4;
   bool stereo = false;
   double time_offset_s = 0.0;  ///< true t_imu − t_image
   double rest_s = 0.0;         ///< stands still this long at the start
