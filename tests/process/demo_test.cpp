@@ -140,7 +140,8 @@ TEST_F(Demo, SaysWhatIsMissing) {
   EXPECT_THAT(without.log(), HasSubstr("--model FILE.onnx"));
 }
 
-/// Confirmed objects of `before` that `after` still has, and how far they moved (the middle one).
+/// Confirmed objects of `before` that `after` still has, and how far those moved that are said to
+/// stand (the middle one): a cyclist and a van drive ahead.
 struct Kept {
   std::size_t before = 0, after = 0;
   double moved_m = 0.0;
@@ -154,10 +155,11 @@ Kept compare(const Objects& before, const Objects& after) {
     ++kept.before;
     for (const ObjectBelief& now : after.objects) {
       if (now.id != old.id) continue;
+      ++kept.after;
+      if (old.moving > 0.5 || now.moving > 0.5) continue;
       moved.push_back((now.best().mean.head<3>() - old.best().mean.head<3>()).norm());
     }
   }
-  kept.after = moved.size();
   std::sort(moved.begin(), moved.end());
   if (!moved.empty()) kept.moved_m = moved[moved.size() / 2];
   return kept;
