@@ -101,7 +101,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (!status[i]) continue;
     Point& p = points_[i];
-    const auto found = p.patch.find(now.levels, to[i]);
+    const auto found = p.patch->find(now.levels, to[i]);
     if (!found || found->similarity < options_.similarity) continue;
     const auto seen = imagePoint(cameras_[0], toEigen(found->pixel));
     if (!seen) continue;
@@ -166,7 +166,7 @@ void Tracker::detect(const cv::Mat& image) {
     const auto seen = imagePoint(cameras_[0], toEigen(p));
     auto patch = Patch::cut(image, p);
     if (seen && patch) {
-      points_.push_back({next_id_++, p, p, false, seen->normalised, std::move(*patch)});
+      points_.push_back({next_id_++, p, p, false, seen->normalised, std::make_unique<Patch>(*patch)});
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <utility>
@@ -57,7 +58,7 @@ class Tracker {
     cv::Point2f pixel, second;  ///< second: in the second camera, when has_second
     bool has_second = false;
     Eigen::Vector2d normalised;
-    Patch patch;
+    std::unique_ptr<Patch> patch;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
