@@ -32,6 +32,8 @@ void describeImu(Options& o, Config& c, Fields& f) {
   f.number("imu.gap_accel", o.imu.gap_accel, atLeast(0), {"noise across a gap", "m/s²"});
   f.number("imu.longest_gap", c.longest_gap_s, positive(),
            {"a longer gap ends the odometry's frame of reference: epoch goes up", "s"});
+  f.number("imu.longest_blackout", c.longest_blackout_s, positive(),
+           {"so does a longer one in which no frame came: the clock may have jumped", "s"});
   f.number("imu.slack", c.imu_slack_s, between(0, 1),
            {"samples are awaited this long past a frame", "s"});
 }
@@ -82,7 +84,8 @@ void describeTracker(TrackerOptions& t, Config& c, Fields& f) {
             {"above the image itself, from image to image"});
   f.integer("tracker.stereo_levels", t.stereo_levels, between(0, 8),
             {"above the image itself, into the second camera"});
-  f.integer("tracker.window", t.window_px, between(5, 51), {"side of a patch of Lucas-Kanade", "px"});
+  f.integer("tracker.window", t.window_px, between(5, 51),
+            {"side of a patch of Lucas-Kanade", "px"});
   f.integer("tracker.iterations", t.iterations, between(1, 100), {"of Lucas-Kanade"});
   f.integer("tracker.fast_threshold", t.fast_threshold, between(2, 100), {"of new corners"});
   f.number("tracker.min_distance", t.min_distance_px, atLeast(1), {"between corners", "px"});

@@ -119,9 +119,12 @@ void Node::clockJumpedBack() {
 }
 
 void Node::onImu(const ImuSample& sample) {
-  if (!imu_.empty() && sample.time < imu_.last() - std::chrono::seconds(1)) clockJumpedBack();
+  // No transport reorders by so much.
+  if (!imu_.empty() && sample.time < imu_.last() - std::chrono::milliseconds(300)) {
+    clockJumpedBack();
+  }
   const auto added = imu_.add({sample.time, sample.gyro, sample.accel});
-  if (!added) return reasons_.add(added.error());
+  if (!added) reasons_.add(added.error());
   if (!last_imu_time_) {
     // Before the first frame only the last seconds matter.
     imu_.dropBefore(sample.time - std::chrono::seconds(5));
@@ -257,12 +260,19 @@ void Node::noteGaps(TimePoint now) {
   if (gap <= config_.core.imu.gap_from_s) return;
   reasons_.add("imu_gap");
   degraded_frames_ = kDegradedFrames;
-  if (gap > config_.longest_gap_s && started()) lose({"imu_gap_too_long", ""});
+  if (!started()) return;
+  if (gap > config_.longest_gap_s) return lose({"imu_gap_too_long", ""});
+  // Neither images nor samples: either the clock jumped, or the body moved on unseen.
+  if (std::min(gap, seconds(now - from)) > config_.longest_blackout_s) {
+    lose({"clock_jumped_or_blackout", ""});
+  }
 }
 
 TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now) {
   std::optional<Eigen::Matrix3d> R;
-  if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time) {
+  const double gap_from = config_.core.imu.gap_from_s;
+  if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time &&
+      seconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
     R = cameras_->estimator.predictRotation(imu_, now);
   }
   return cameras_->tracker.track(first, second, R);

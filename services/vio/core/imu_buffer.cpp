@@ -6,40 +6,70 @@
 
 namespace perdure::vio {
 namespace {
-bool earlier(const ImuReading& r, TimePoint t) { return r.time < t; }
+
+// Larger than what gravity or a calm turn shows: there, two samples that agree to the last bit are
+// the sensor's limit.
+constexpr double kLargeRate = 3.0, kLargeForce = 12.0;  // rad/s, m/s²
+
+const auto kEarlier = [](const auto& item, TimePoint t) { return item.time < t; };
+
+bool saturated(const Eigen::Vector3d& before, const Eigen::Vector3d& now, double large) {
+  return ((before.array() == now.array()) && (now.array().abs() > large)).any();
+}
+
 }  // namespace
 
 Result<void> ImuBuffer::add(const ImuReading& reading) {
   if (!reading.gyro.allFinite() || !reading.accel.allFinite()) return fail("imu_not_finite");
-  if (!readings_.empty()) {
-    if (reading.time == last()) return fail("imu_duplicate");
-    if (reading.time < last()) return fail("imu_out_of_order");
+  bool gyro_saturated = false, accel_saturated = false;
+  if (!raw_.empty()) {
+    const ImuReading& before = raw_.back();
+    if (reading.time == before.time) return fail("imu_duplicate");
+    if (reading.time < before.time) return fail("imu_out_of_order");
+    gyro_saturated = saturated(before.gyro, reading.gyro, kLargeRate);
+    accel_saturated = saturated(before.accel, reading.accel, kLargeForce);
+    const auto takeBack = [&](Values& values) {
+      if (values.size() > 1 && values.back().time == before.time) values.pop_back();
+    };
+    if (gyro_saturated) takeBack(rates_);
+    if (accel_saturated) takeBack(forces_);
   }
-  readings_.push_back(reading);
+  raw_.push_back(reading);
+  if (!gyro_saturated) rates_.push_back({reading.time, reading.gyro});
+  if (!accel_saturated) forces_.push_back({reading.time, reading.accel});
+  if (gyro_saturated) return fail("imu_gyro_saturated");
+  if (accel_saturated) return fail("imu_accel_saturated");
   return {};
 }
 
-ImuReading ImuBuffer::at(TimePoint time) const {
-  const auto after = std::lower_bound(readings_.begin(), readings_.end(), time, earlier);
-  if (after == readings_.begin() || after == readings_.end()) {
-    ImuReading held = after == readings_.end() ? readings_.back() : *after;
-    held.time = time;
-    return held;
-  }
-  const ImuReading &a = *(after - 1), &b = *after;
+Eigen::Vector3d ImuBuffer::at(const Values& values, TimePoint time) {
+  const auto after = std::lower_bound(values.begin(), values.end(), time, kEarlier);
+  if (after == values.end()) return values.back().value;
+  if (after == values.begin()) return after->value;
+  const Value &a = *(after - 1), &b = *after;
   const double s = toSeconds(time - a.time) / toSeconds(b.time - a.time);
-  return {time, a.gyro + s * (b.gyro - a.gyro), a.accel + s * (b.accel - a.accel)};
+  return a.value + s * (b.value - a.value);
+}
+
+double ImuBuffer::spanAt(const Values& values, TimePoint time) {
+  const auto after = std::lower_bound(values.begin(), values.end(), time, kEarlier);
+  if (after == values.begin()) return toSeconds(after->time - time);
+  return toSeconds((after == values.end() ? time : after->time) - (after - 1)->time);
+}
+
+ImuReading ImuBuffer::reading(TimePoint time) const {
+  return {time, at(rates_, time), at(forces_, time), spanAt(rates_, time), spanAt(forces_, time)};
 }
 
 std::vector<ImuReading> ImuBuffer::between(TimePoint from, TimePoint to) const {
   check(from < to, "an interval has a length");
-  if (readings_.empty()) return {};
-  std::vector<ImuReading> result{at(from)};
-  for (auto it = std::lower_bound(readings_.begin(), readings_.end(), from, earlier);
-       it != readings_.end() && it->time < to; ++it) {
-    if (it->time > from) result.push_back(*it);
+  if (raw_.empty()) return {};
+  std::vector<ImuReading> result{reading(from)};
+  for (auto it = std::lower_bound(raw_.begin(), raw_.end(), from, kEarlier);
+       it != raw_.end() && it->time < to; ++it) {
+    if (it->time > from) result.push_back(reading(it->time));
   }
-  result.push_back(at(to));
+  result.push_back(reading(to));
   return result;
 }
 
@@ -47,9 +77,9 @@ Duration ImuBuffer::longestGap(TimePoint from, TimePoint to) const {
   TimePoint previous = from;
   Duration longest{0};
   // The samples around the interval bound the gap, too: start from the one before it.
-  auto it = std::lower_bound(readings_.begin(), readings_.end(), from, earlier);
-  if (it != readings_.begin() && it != readings_.end()) previous = (it - 1)->time;
-  for (; it != readings_.end(); ++it) {
+  auto it = std::lower_bound(raw_.begin(), raw_.end(), from, kEarlier);
+  if (it != raw_.begin() && it != raw_.end()) previous = (it - 1)->time;
+  for (; it != raw_.end(); ++it) {
     longest = std::max(longest, it->time - previous);
     previous = it->time;
     if (it->time >= to) return longest;
@@ -59,18 +89,30 @@ Duration ImuBuffer::longestGap(TimePoint from, TimePoint to) const {
 
 std::optional<Duration> ImuBuffer::period() const {
   constexpr std::size_t kSamples = 20;
-  if (readings_.size() < 3) return std::nullopt;
+  if (raw_.size() < 3) return std::nullopt;
   std::vector<Duration> steps;
-  const std::size_t begin = readings_.size() > kSamples ? readings_.size() - kSamples : 1;
-  for (std::size_t i = begin; i < readings_.size(); ++i) {
-    steps.push_back(readings_[i].time - readings_[i - 1].time);
+  const std::size_t begin = raw_.size() > kSamples ? raw_.size() - kSamples : 1;
+  for (std::size_t i = begin; i < raw_.size(); ++i) {
+    steps.push_back(raw_[i].time - raw_[i - 1].time);
   }
   std::nth_element(steps.begin(), steps.begin() + static_cast<long>(steps.size() / 2), steps.end());
   return steps[steps.size() / 2];
 }
 
+void ImuBuffer::dropBefore(Values& values, TimePoint time) {
+  while (values.size() > 2 && values[1].time < time) values.pop_front();
+}
+
 void ImuBuffer::dropBefore(TimePoint time) {
-  while (readings_.size() > 2 && readings_[1].time < time) readings_.pop_front();
+  while (raw_.size() > 2 && raw_[1].time < time) raw_.pop_front();
+  dropBefore(rates_, time);
+  dropBefore(forces_, time);
+}
+
+void ImuBuffer::clear() {
+  raw_.clear();
+  rates_.clear();
+  forces_.clear();
 }
 
 }  // namespace perdure::vio

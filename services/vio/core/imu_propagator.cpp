@@ -1,5 +1,7 @@
 #include "services/vio/core/imu_propagator.h"
 
+#include <algorithm>
+
 #include "common/base/check.h"
 #include "common/math/so3.h"
 
@@ -25,18 +27,26 @@ struct Densities {
   double gyro2, accel2;
 };
 
+/// Added to a square density where values are interpolated over `span`, and they differ by
+/// `change` over `dt` of it.
+double interpolationDensity(double span, double dt, double change2, double floor, double gap,
+                            const ImuNoise& noise) {
+  if (span <= noise.interpolation_from_s) return 0.0;
+  const double whole = span / dt;  // the change over all of the span
+  double variance = floor * floor + whole * whole * change2 / 12.0;
+  if (span > noise.gap_from_s) variance += gap * gap;
+  return span * variance;
+}
+
 /// Square noise densities of one step, with the error of interpolation where samples are sparse.
 Densities densities(const ImuReading& a, const ImuReading& b, double dt, const ImuNoise& noise) {
-  Densities d{noise.gyro * noise.gyro, noise.accel * noise.accel};
-  if (dt <= noise.interpolation_from_s) return d;
-  const double gyro = noise.interpolation_gyro, accel = noise.interpolation_accel;
-  d.gyro2 += dt * (gyro * gyro + (b.gyro - a.gyro).squaredNorm() / 12.0);
-  d.accel2 += dt * (accel * accel + (b.accel - a.accel).squaredNorm() / 12.0);
-  if (dt > noise.gap_from_s) {
-    d.gyro2 += dt * noise.gap_gyro * noise.gap_gyro;
-    d.accel2 += dt * noise.gap_accel * noise.gap_accel;
-  }
-  return d;
+  const auto added = [&](double span, const Vector3d& change, double floor, double gap) {
+    return interpolationDensity(std::max(span, dt), dt, change.squaredNorm(), floor, gap, noise);
+  };
+  return {noise.gyro * noise.gyro +
+              added(b.gyro_span_s, b.gyro - a.gyro, noise.interpolation_gyro, noise.gap_gyro),
+          noise.accel * noise.accel +
+              added(b.accel_span_s, b.accel - a.accel, noise.interpolation_accel, noise.gap_accel)};
 }
 
 void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vector3d& bg,

@@ -166,7 +166,8 @@ void Tracker::detect(const cv::Mat& image) {
     const auto seen = imagePoint(cameras_[0], toEigen(p));
     auto patch = Patch::cut(image, p);
     if (seen && patch) {
-      points_.push_back({next_id_++, p, p, false, seen->normalised, std::make_unique<Patch>(*patch)});
+      points_.push_back(
+          {next_id_++, p, p, false, seen->normalised, std::make_unique<Patch>(*patch)});
     }
   }
 }

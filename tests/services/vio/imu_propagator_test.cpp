@@ -156,6 +156,44 @@ TEST(ImuBuffer, RefusesWhatIsDoubledOutOfOrderOrNotFinite) {
       "imu_not_finite");
 }
 
+TEST(ImuBuffer, InterpolatesOverWhatIsSaturated) {
+  ImuBuffer buffer;
+  const auto ms = [](double t) { return fromNanoseconds(static_cast<std::int64_t>(1e6 * t)); };
+  int saturated = 0;
+  for (int i = 0; i <= 100; i += 5) {
+    const double x = 0.1 * i, limit = 19.6;
+    const bool high = i >= 30 && i < 60;
+    const auto added = buffer.add({ms(i), Vector3d(x, 0, 0), Vector3d(high ? limit : x, 0, 9.81)});
+    saturated += !added && added.error().code == "imu_accel_saturated";
+  }
+  EXPECT_EQ(saturated, 5);
+  for (const ImuReading& r : buffer.between(ms(12), ms(87))) {
+    const double x = 1e2 * toSeconds(r.time - ms(0));
+    EXPECT_NEAR(r.gyro.x(), x, 1e-9);
+    EXPECT_NEAR(r.accel.x(), x, 1e-9);
+    const bool over = x > 2.5 + 1e-9 && x < 6.0 + 1e-9;
+    EXPECT_NEAR(r.accel_span_s, over ? 0.035 : 0.005, 1e-9) << x;
+    EXPECT_NEAR(r.gyro_span_s, 0.005, 1e-9);
+  }
+}
+
+TEST(Propagation, AGapIsAsUncertainInPiecesAsInOne) {
+  ImuBuffer buffer;
+  const auto ms = [](int t) { return fromNanoseconds(1'000'000LL * t); };
+  for (const int t : {0, 5, 10, 510, 515}) {
+    ASSERT_TRUE(buffer.add({ms(t), Vector3d::Zero(), Vector3d(0, 0, 9.81)}));
+  }
+  const ImuNoise noise;
+  const auto sigma = [&](int from, int to) {
+    return integrate(buffer.between(ms(from), ms(to)), Vector3d::Zero(), Vector3d::Zero(), noise)
+        .Q(kVelocity, kVelocity);
+  };
+  EXPECT_NEAR(std::sqrt(sigma(10, 510)), 0.5 * noise.gap_accel, 0.01);
+  double pieces = 0.0;
+  for (int t = 10; t < 510; t += 50) pieces += sigma(t, t + 50);
+  EXPECT_NEAR(pieces, sigma(10, 510), 0.01 * pieces);
+}
+
 TEST(ImuBuffer, FindsTheLongestGap) {
   ImuBuffer buffer;
   for (const int t : {0, 10, 20, 70, 80}) {

@@ -158,12 +158,28 @@ TEST(VioNode, EveryFrameIsAnsweredOnceAndInOrder) {
   }
 }
 
+/// How far the motion from `from` to `to`, seconds of the drive, is from the truth's, in metres.
+double motionError(const Recorder& r, const test::SimulatedDrive& drive, double from, double to) {
+  const auto at = [&](double t) {
+    return *std::find_if(r.odometry.begin(), r.odometry.end(), [&](const Odometry& o) {
+      return toSeconds(o.stamp.time - drive.time(t)) > -1e-6;
+    });
+  };
+  const Odometry a = at(from), b = at(to);
+  EXPECT_EQ(a.world, b.world) << "not the same frame of reference";
+  const Nav true_a = drive.truth(from), true_b = drive.truth(to);
+  const Eigen::Vector3d moved = a.T_WB.R().transpose() * (b.T_WB.p - a.T_WB.p);
+  return (moved - true_a.q_WB.conjugate() * (true_b.p_WB - true_a.p_WB)).norm();
+}
+
 TEST(VioNode, BridgesAnInertialGapOfHalfASecondAndSaysSo) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());
   node.onCalibration(calibration());
-  Player(6.0).play(node, 0.0, 6.0, [](ImuSample&, double t) { return t < 3.0 || t > 3.5; });
+  Player player(6.0);
+  player.play(node, 0.0, 6.0, [](ImuSample&, double t) { return t < 3.0 || t > 3.5; });
   node.flush();
+  EXPECT_LT(motionError(r, player.drive(), 2.9, 6.0), 0.3);
   EXPECT_GE(node.reasons().of("imu_gap"), 1u);
   EXPECT_EQ(r.odometry.size(), 121u);
   EXPECT_TRUE(std::any_of(r.odometry.begin(), r.odometry.end(),
@@ -182,6 +198,52 @@ TEST(VioNode, AnInertialGapThatIsTooLongBeginsANewEpoch) {
   EXPECT_EQ(node.reasons().of("imu_gap_too_long"), 1u);
   EXPECT_EQ(r.odometry.back().world.epoch, 1u);
   EXPECT_EQ(r.odometry.front().world.epoch, 0u);
+  expectFinite(r);
+}
+
+TEST(VioNode, TakesNoForceFromASaturatedAccelerometer) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(6.0);
+  player.play(node, 0.0, 6.0, [](ImuSample& s, double t) {
+    if (t > 3.0 && t < 3.3) s.accel = Eigen::Vector3d(19.6, -19.6, 19.6);
+    return true;
+  });
+  node.flush();
+  EXPECT_GT(node.reasons().of("imu_accel_saturated"), 50u);
+  EXPECT_EQ(node.reasons().of("reset"), 0u);
+  EXPECT_LT(motionError(r, player.drive(), 2.9, 6.0), 0.3);
+  expectFinite(r);
+}
+
+TEST(VioNode, CarriesOnThroughTwoBlackSeconds) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(7.0);
+  cv::Mat black(480, 752, CV_8UC1, cv::Scalar(0));
+  player.play(node, 0.0, 7.0, {}, [&](Frame& f, double t) {
+    return t <= 3.0 || t >= 5.0 || vision::setPixels(f, black).has_value();
+  });
+  node.flush();
+  EXPECT_EQ(node.reasons().of("reset"), 0u);
+  EXPECT_EQ(r.odometry.size(), 141u);
+  EXPECT_LT(motionError(r, player.drive(), 2.9, 7.0), 0.5);
+  expectFinite(r);
+}
+
+TEST(VioNode, ASecondWithoutAnythingBeginsANewEpoch) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  const auto seen = [](double t) { return t < 3.0 || t > 4.0; };
+  Player(6.0).play(
+      node, 0.0, 6.0, [&](ImuSample&, double t) { return seen(t); },
+      [&](Frame&, double t) { return seen(t); });
+  node.flush();
+  EXPECT_EQ(node.reasons().of("clock_jumped_or_blackout"), 1u);
+  EXPECT_EQ(r.odometry.back().world.epoch, 1u);
   expectFinite(r);
 }
 
@@ -220,7 +282,7 @@ TEST(VioNode, ASpikeInTheInertialSamplesLeavesTheOutputFinite) {
   Node node(Config{}, 5, r.outputs());
   node.onCalibration(calibration());
   Player(5.0).play(node, 0.0, 5.0, [&](ImuSample& s, double t) {
-    if (std::abs(t - 3.0) < 0.02) s.accel = Eigen::Vector3d::Constant(1e7);
+    if (std::abs(t - 3.0) < 0.02) s.accel = Eigen::Vector3d::Constant(1e7 * (1.0 + t));
     return true;
   });
   node.flush();
