@@ -18,7 +18,8 @@ inline constexpr std::size_t kMaxCameras = 2;
 struct ImagePoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< as seen, distorted
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
-  double scale = 1.0;  ///< pixels per unit of the normalised image, there
+  double scale = 1.0;  ///< pixels per unit of the normalised image, there, on average
+  Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised, there
 };
 
 /// Undistorts; nothing where that is impossible.

@@ -32,7 +32,7 @@ Result<Measurement> rowsOf(const State& state, const PointState& point, const Ob
         !projectPoint(clone.first, state.T_BC[c], point.first, first, &J)) {
       return fail("slam_behind_camera");
     }
-    const double weight = seen.seen[c]->scale / sigma_px;
+    const Eigen::Matrix2d weight = seen.seen[c]->to_pixels / sigma_px;
     rows.H.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = weight * J.extrinsic;
     rows.H.block<2, 6>(row, 6 * cameras) = weight * J.pose;
     rows.H.block<2, 3>(row, 6 * cameras + 6) = weight * J.point;

@@ -77,7 +77,7 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
           !projectPoint(clone.first, state.T_BC[c], p_W_first, first, &J)) {
         return {};
       }
-      const double weight = seen->scale / sigma_px;
+      const Eigen::Matrix2d weight = seen->to_pixels / sigma_px;
       s.r.segment<2>(row) = weight * (seen->normalised - now);
       s.H_x.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = weight * J.extrinsic;
       s.H_x.block<2, 6>(row, column) = weight * J.pose;

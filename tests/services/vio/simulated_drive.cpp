@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "common/math/so3.h"
 
@@ -94,6 +95,10 @@ Nav SimulatedDrive::truth(double t) const {
   nav.v_WB = (position(t + h) - position(t - h)) / (2.0 * h);
   nav.gyro_bias = options_.gyro_bias;
   nav.accel_bias = options_.accel_bias;
+  if (!biases_.empty()) {
+    const auto i = static_cast<std::size_t>(std::max(0.0, std::round(t * options_.imu_rate_hz)));
+    std::tie(nav.gyro_bias, nav.accel_bias) = biases_[std::min(i, biases_.size() - 1)];
+  }
   return nav;
 }
 
@@ -104,11 +109,15 @@ Vector3d SimulatedDrive::noise(double sigma) {
 std::vector<ImuReading> SimulatedDrive::imu(double until) {
   std::vector<ImuReading> result;
   const double dt = 1.0 / options_.imu_rate_hz, root = std::sqrt(options_.imu_rate_hz);
+  Vector3d gyro_bias = options_.gyro_bias, accel_bias = options_.accel_bias;
   for (int i = 0; i * dt <= until; ++i) {
     const double t = i * dt;
-    result.push_back({time(t),
-                      rateTruth(t) + options_.gyro_bias + noise(options_.noise.gyro * root),
-                      forceTruth(t) + options_.accel_bias + noise(options_.noise.accel * root)});
+    result.push_back({time(t), rateTruth(t) + gyro_bias + noise(options_.noise.gyro * root),
+                      forceTruth(t) + accel_bias + noise(options_.noise.accel * root)});
+    if (!options_.walking_biases) continue;
+    biases_.emplace_back(gyro_bias, accel_bias);
+    gyro_bias += noise(options_.noise.gyro_walk / root);
+    accel_bias += noise(options_.noise.accel_walk / root);
   }
   return result;
 }

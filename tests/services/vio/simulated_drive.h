@@ -18,8 +18,9 @@ struct DriveOptions {
   ImuNoise noise;
   double pixel_sigma = 0.4;
   bool stereo = false;
-  double time_offset_s = 0.0;  ///< true t_imu − t_image
-  double rest_s = 0.0;         ///< stands still this long at the start
+  bool walking_biases = false;  ///< by the noise's walks; imu() has to go before truth()
+  double time_offset_s = 0.0;   ///< true t_imu − t_image
+  double rest_s = 0.0;          ///< stands still this long at the start
   int points = 600;
   int points_per_image = 100;
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
@@ -53,6 +54,7 @@ class SimulatedDrive {
   Eigen::Vector3d noise(double sigma);
 
   DriveOptions options_;
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases_;  ///< at each sample
   std::mt19937 random_;
   std::normal_distribution<double> normal_;
   std::vector<CameraModel> cameras_;

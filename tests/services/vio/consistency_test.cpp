@@ -1,0 +1,118 @@
+// Whether the filter's covariance is what its errors are: seeded runs of a minute in which
+// everything that the covariance speaks of is drawn from what the filter is told.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "common/math/chi2.h"
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/vio/core/estimator.h"
+#include "services/vio/core/initialiser.h"
+#include "tests/services/vio/simulated_drive.h"
+
+namespace perdure::vio {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kRuns = 30;
+constexpr std::array<int, 6> kSeconds{10, 20, 30, 40, 50, 60};
+constexpr std::array<const char*, 3> kWhat{"orientation", "position", "velocity"};
+
+/// NEES of orientation, position and velocity at each of kSeconds.
+using Nees = std::array<std::array<double, 3>, kSeconds.size()>;
+
+class Draws {
+ public:
+  explicit Draws(unsigned seed) : random_(seed) {}
+  double one(double sigma) { return sigma * normal_(random_); }
+  Vector3d three(double sigma) { return {one(sigma), one(sigma), one(sigma)}; }
+
+ private:
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_;
+};
+
+/// A minute after a start at rest; W is placed on the truth at the first output, by yaw and
+/// position.
+Nees run(unsigned seed) {
+  const Options options;
+  const CalibrationOptions& calibration = options.calibration;
+  Draws draws(1000 + seed);
+  test::DriveOptions drive_options;
+  drive_options.seed = seed;
+  drive_options.camera_rate_hz = 10.0;
+  drive_options.rest_s = 1.0;
+  drive_options.walking_biases = true;
+  drive_options.gyro_bias = draws.three(0.02);
+  drive_options.accel_bias = draws.three(options.start.accel_bias_sigma);
+  drive_options.time_offset_s = draws.one(calibration.time_offset_s);
+  test::SimulatedDrive drive(drive_options);
+  ImuBuffer imu;
+  for (const ImuReading& r : drive.imu(kSeconds.back() + 1.0)) EXPECT_TRUE(imu.add(r));
+  std::vector<RigidTransform> T_BC = drive.T_BC();
+  for (RigidTransform& T : T_BC) {
+    Eigen::Matrix<double, 6, 1> error;
+    error << draws.three(calibration.extrinsic_rotation),
+        draws.three(calibration.extrinsic_position_m);
+    T = boxPlus(T, error);
+  }
+  Estimator estimator(options, T_BC, 0.0);
+  const auto start = startAtRest(imu, drive.time(0.6), options);
+  EXPECT_TRUE(start);
+  estimator.start(*start);
+  const Nav begin = drive.truth(0.6);
+  const Eigen::Matrix3d turn =
+      rotationAboutZ(yawOf(start->nav.q_WB.toRotationMatrix()) - yawOf(begin.T_WB().R()));
+  Nees result{};
+  std::size_t next = 0;
+  for (std::uint64_t frame = 7; next < kSeconds.size(); ++frame) {
+    const double t = 0.1 * static_cast<double>(frame);
+    FrameInput input{frame, drive.time(t), drive.see(t), {}, {}};
+    if (t < drive_options.rest_s) input.motion_px = 0.0;
+    const auto out = estimator.process(input, imu);
+    EXPECT_TRUE(out) << out.error().code;
+    if (!out) break;
+    if (t < kSeconds[next] - 0.05) continue;
+    const Nav truth = drive.truth(t + drive_options.time_offset_s);
+    const Eigen::Quaterniond q_WB(turn * truth.q_WB.toRotationMatrix());
+    const std::array<Vector3d, 3> errors{logSo3(out->nav.q_WB.conjugate() * q_WB),
+                                         Vector3d(turn * (truth.p_WB - begin.p_WB) - out->nav.p_WB),
+                                         Vector3d(turn * truth.v_WB - out->nav.v_WB)};
+    for (int what = 0; what < 3; ++what) {
+      result[next][static_cast<std::size_t>(what)] = squaredMahalanobis(
+          errors[static_cast<std::size_t>(what)], out->covariance.block<3, 3>(3 * what, 3 * what));
+    }
+    ++next;
+  }
+  return result;
+}
+
+TEST(Consistency, NineTenthsOfTheMeanErrorsLieInTheirBand) {
+  std::array<std::array<double, 3>, kSeconds.size()> sum{};
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    const Nees nees = run(seed);
+    for (std::size_t k = 0; k < kSeconds.size(); ++k) {
+      for (std::size_t what = 0; what < 3; ++what) sum[k][what] += nees[k][what];
+    }
+  }
+  const double low = chi2Quantile(0.025, 3 * kRuns), high = chi2Quantile(0.975, 3 * kRuns);
+  int inside = 0, asked = 0;
+  for (std::size_t k = 0; k < kSeconds.size(); ++k) {
+    for (std::size_t what = 0; what < 3; ++what) {
+      const bool in = sum[k][what] > low && sum[k][what] < high;
+      inside += in;
+      ++asked;
+      std::printf("%2d s %-12s %.2f %s (%.2f … %.2f)\n", kSeconds[k], kWhat[what],
+                  sum[k][what] / (3 * kRuns), in ? "in" : "out", low / (3 * kRuns),
+                  high / (3 * kRuns));
+    }
+  }
+  EXPECT_GE(10 * inside, 9 * asked);
+}
+
+}  // namespace
+}  // namespace perdure::vio
