@@ -165,10 +165,8 @@ TEST(LongScene, Town) {
 TEST(LongScene, Straight) {
   const Outcome run = runScene({.scene = "straight", .rate_hz = 20.0, .images = true});
   hold({atMost(1.0, "drift of vio with one camera and wheels, % of the way",
-               run.trajectory.segments.t_err_percent,
-               "1.17: yaw drifts by 1.7 degrees, far more than the gyro alone would"),
-        atMost(0.5, "ATE aligned in position and yaw, metres", run.trajectory.ate_rmse_m,
-               "1.25: the same, and sideways jumps of up to a metre a second")});
+               run.trajectory.segments.t_err_percent),
+        atMost(0.5, "ATE aligned in position and yaw, metres", run.trajectory.ate_rmse_m)});
 }
 
 }  // namespace

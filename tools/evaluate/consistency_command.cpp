@@ -1,10 +1,13 @@
-// `perdure evaluate consistency`: ANEES of the map's objects against a simulated folder.
+// `perdure evaluate consistency`: ANEES of the map's objects and of odometry against truth.
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
+#include "common/replay/dataset.h"
 #include "tools/evaluate/command.h"
 #include "tools/evaluate/consistency_score.h"
 
@@ -17,6 +20,11 @@ struct ConsistencyOptions {
   std::string out, truth;
   double within_m = 3.0;
   bool json = false;
+};
+
+struct Consistency {
+  std::optional<ConsistencyScore> objects;
+  std::optional<OdometryScore> odometry;
 };
 
 /// The truth's world in the run's, by yaw and position at the first pose that both know.
@@ -34,43 +42,87 @@ RigidTransform alignedAtTheStart(const SimulatedTruth& truth,
                      "folder over which the run went");
 }
 
-nlohmann::ordered_json toJson(const ConsistencyScore& score) {
-  nlohmann::ordered_json json = {{"objects", score.objects}, {"left_out", score.left_out}};
-  for (const Anees* anees : {&score.position, &score.yaw, &score.half_yaw, &score.size}) {
-    const auto [low, high] = anees->band();
-    json["anees"].push_back({{"what", anees->what},
-                             {"dof", anees->dof},
-                             {"mean_per_dof", anees->mean()},
-                             {"band_95", {low, high}},
-                             {"median", anees->median()},
-                             {"within_3_sigma", anees->within3Sigma()}});
+nlohmann::ordered_json toJson(const Anees& anees) {
+  return {{"what", anees.what},          {"dof", anees.dof},
+          {"number", anees.nees.size()}, {"mean_per_dof", anees.mean()},
+          {"median", anees.median()},    {"within_3_sigma", anees.within3Sigma()}};
+}
+
+nlohmann::ordered_json toJson(const Consistency& consistency) {
+  nlohmann::ordered_json json;
+  if (const auto& score = consistency.objects) {
+    json = {{"objects", score->objects}, {"left_out", score->left_out}};
+    for (const Anees* anees : {&score->position, &score->yaw, &score->half_yaw, &score->size}) {
+      json["anees"].push_back(toJson(*anees));
+      const auto [low, high] = anees->band();
+      json["anees"].back()["band_95"] = {low, high};
+    }
+  }
+  if (const auto& score = consistency.odometry) {
+    for (const Anees* anees : {&score->orientation, &score->position, &score->velocity}) {
+      json["odometry"].push_back(toJson(*anees));
+    }
   }
   return json;
 }
 
-void print(const ConsistencyScore& score) {
-  std::printf("%llu objects of the map with a true one, %llu without\n",
-              static_cast<unsigned long long>(score.objects),
-              static_cast<unsigned long long>(score.left_out));
+void print(const Anees& anees, const std::string& band) {
+  std::printf("%-26s %14.2f %16s %10.2f %14.3f\n", anees.what.c_str(), anees.mean(), band.c_str(),
+              anees.median(), anees.within3Sigma());
+}
+
+void print(const Consistency& consistency) {
+  if (consistency.objects) {
+    std::printf("%llu objects of the map with a true one, %llu without\n",
+                static_cast<unsigned long long>(consistency.objects->objects),
+                static_cast<unsigned long long>(consistency.objects->left_out));
+  }
   std::printf("%-26s %14s %16s %10s %14s\n", "", "NEES per dof", "95 % band", "median",
               "within 3 sigma");
-  for (const Anees* anees : {&score.position, &score.yaw, &score.half_yaw, &score.size}) {
-    const auto [low, high] = anees->band();
-    std::printf("%-26s %14.2f %7.2f .. %5.2f %10.2f %14.3f\n", anees->what.c_str(), anees->mean(),
-                low, high, anees->median(), anees->within3Sigma());
+  if (const auto& score = consistency.objects) {
+    for (const Anees* anees : {&score->position, &score->yaw, &score->half_yaw, &score->size}) {
+      const auto [low, high] = anees->band();
+      print(*anees, fmt::format("{:.2f} .. {:.2f}", low, high));
+    }
+  }
+  if (const auto& score = consistency.odometry) {
+    for (const Anees* anees : {&score->orientation, &score->position, &score->velocity}) {
+      print(*anees, "one run: none");
+    }
   }
 }
 
+/// Without a sequence: the folder's own true trajectory, or that of a TUM file.
+replay::PoseFile truePoses(const std::string& truth) {
+  if (!fs::is_directory(truth)) return replay::PoseFile::read(truth);
+  replay::DatasetOptions options;
+  options.path = truth;
+  options.decode = false;
+  if (const auto poses = replay::Dataset::open(options)->truth()) return *poses;
+  throw StartupError(ExitCode::kUnavailable,
+                     truth + " holds no true trajectory; give a TUM file to --truth");
+}
+
 void run(const ConsistencyOptions& options) {
-  const SimulatedTruth truth = readSimulatedTruth(options.truth);
-  const auto trajectory = replay::PoseFile::read(fs::path(options.out) / "trajectory.tum").poses();
-  const ConsistencyScore score =
-      scoreConsistency(readBeliefs(fs::path(options.out) / "objects.json"), truth.truth,
-                       alignedAtTheStart(truth, trajectory), options.within_m);
+  const fs::path out = options.out;
+  Consistency consistency;
+  replay::PoseFile poses(replay::PoseFormat::kTum, {});
+  if (isSimulated(options.truth)) {
+    const SimulatedTruth truth = readSimulatedTruth(options.truth);
+    const auto trajectory = replay::PoseFile::read(out / "trajectory.tum").poses();
+    consistency.objects = scoreConsistency(readBeliefs(out / "objects.json"), truth.truth,
+                                        alignedAtTheStart(truth, trajectory), options.within_m);
+    poses = truth.body;
+  } else {
+    poses = truePoses(options.truth);
+  }
+  if (poses.format() == replay::PoseFormat::kTum) {
+    consistency.odometry = scoreOdometry(readOdometry(out / "odometry.csv"), poses);
+  }
   if (options.json)
-    std::cout << toJson(score).dump(2) << std::endl;
+    std::cout << toJson(consistency).dump(2) << std::endl;
   else
-    print(score);
+    print(consistency);
 }
 
 }  // namespace
@@ -78,9 +130,11 @@ void run(const ConsistencyOptions& options) {
 void addEvaluateConsistency(CLI::App& evaluate_app) {
   auto options = std::make_shared<ConsistencyOptions>();
   CLI::App* app = evaluate_app.add_subcommand(
-      "consistency", "Whether the covariances of a run's objects are honest, by simulated truth");
-  app->add_option("out", options->out, "Folder of a run: objects.json, trajectory.tum")->required();
-  app->add_option("--truth", options->truth, "The simulated folder")->required();
+      "consistency", "Whether the covariances of a run's objects and odometry are honest");
+  app->add_option("out", options->out, "Folder of a run: objects.json, odometry.csv")->required();
+  app->add_option("--truth", options->truth,
+                  "Simulated folder; for odometry alone: EuRoC folder or TUM file")
+      ->required();
   app->add_option("--within", options->within_m, "Metres from a true object that an error may be")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

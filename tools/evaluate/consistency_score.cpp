@@ -1,5 +1,7 @@
 #include "tools/evaluate/consistency_score.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -11,7 +13,9 @@
 
 #include "common/base/errors.h"
 #include "common/math/chi2.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "common/replay/text_file.h"
 
 namespace perdure::tools {
 namespace {
@@ -83,6 +87,68 @@ std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
                                                    "); `perdure pipeline` writes it");
   }
   return beliefs;
+}
+
+std::vector<OdometryRow> readOdometry(const std::filesystem::path& file) {
+  constexpr std::size_t kFields = 4 + 7 + 9 + 45;
+  const auto lines = replay::readLines(file, "`perdure pipeline` writes it");
+  std::vector<OdometryRow> rows;
+  for (const replay::TextLine& line : lines) {
+    if (line.text.starts_with("frame,")) continue;
+    const auto fields = replay::split(line.text, ',');
+    const auto v = fields.size() == kFields
+                       ? replay::parseNumbers({fields.begin() + 2, fields.end()})
+                       : std::nullopt;
+    const auto time = v ? replay::parseInteger(fields[1]) : std::nullopt;
+    if (!time) {
+      throw StartupError(ExitCode::kUnavailable,
+                         fmt::format("{}:{}: no line of odometry.csv; `perdure pipeline` writes it",
+                                     file.string(), line.number));
+    }
+    const auto at = [&](std::size_t i) { return (*v)[i]; };
+    OdometryRow row;
+    row.time = fromNanoseconds(*time);
+    row.epoch = static_cast<std::uint64_t>(at(0));
+    row.T_WB = RigidTransform(Eigen::Quaterniond(at(8), at(5), at(6), at(7)).normalized(),
+                              Eigen::Vector3d(at(2), at(3), at(4)));
+    row.v_WB = {at(9), at(10), at(11)};
+    std::size_t k = 18;
+    for (Eigen::Index i = 0; i < 9; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, ++k) {
+        row.covariance(i, j) = row.covariance(j, i) = at(k);
+      }
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::PoseFile& truth) {
+  constexpr Duration kStep = std::chrono::milliseconds(10);
+  OdometryScore score;
+  std::optional<RigidTransform> T_WT;
+  std::uint64_t epoch = 0;
+  for (const OdometryRow& row : rows) {
+    const auto before = truth.at(0, row.time - kStep), after = truth.at(0, row.time + kStep);
+    const auto now = truth.at(0, row.time);
+    if (!before || !now || !after) continue;
+    if (!T_WT || row.epoch != epoch) {
+      // The turn about z that brings one nearest to the other: of use for a body whose x points up.
+      const Eigen::Matrix3d M = row.T_WB.R() * now->R().transpose();
+      const Eigen::Matrix3d R = rotationAboutZ(std::atan2(M(1, 0) - M(0, 1), M(0, 0) + M(1, 1)));
+      T_WT = RigidTransform(R, Eigen::Vector3d(row.T_WB.p - R * now->p));
+      epoch = row.epoch;
+    }
+    const RigidTransform T_WB = *T_WT * *now;
+    const Eigen::Vector3d v = T_WT->R() * (after->p - before->p) / (2.0 * toSeconds(kStep));
+    const auto nees = [&](const Eigen::Vector3d& error, Eigen::Index at) {
+      return squaredMahalanobis(error, row.covariance.block<3, 3>(at, at));
+    };
+    score.orientation.nees.push_back(nees(logSo3(row.T_WB.q.conjugate() * T_WB.q), 0));
+    score.position.nees.push_back(nees(T_WB.p - row.T_WB.p, 3));
+    score.velocity.nees.push_back(nees(v - row.v_WB, 6));
+  }
+  return score;
 }
 
 double Anees::mean() const {

@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "common/math/rigid_transform.h"
+#include "common/replay/pose_file.h"
 #include "common/types/objects.h"
+#include "common/types/odometry.h"
 #include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
@@ -39,6 +41,26 @@ struct Anees {
   double within3Sigma() const;  ///< share
   std::pair<double, double> band() const;  ///< of mean() at 95 %, independent objects
 };
+
+/// A line of odometry.csv.
+struct OdometryRow {
+  TimePoint time;
+  std::uint64_t epoch = 0;
+  RigidTransform T_WB;
+  Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();
+  Matrix9d covariance = Matrix9d::Zero();  ///< of [θ, p, v]: θ on the right, p and v in W
+};
+/// Throws StartupError(kUnavailable) where the file is missing or a line is none.
+std::vector<OdometryRow> readOdometry(const std::filesystem::path& file);
+
+/// Over the rows of a run. Those of one run are correlated: no band holds for their mean.
+struct OdometryScore {
+  Anees orientation{"orientation of the body", 3, {}}, position{"position of the body", 3, {}},
+      velocity{"velocity of the body", 3, {}};
+};
+/// The truth's W is placed on the run's by yaw and position at the first row of each epoch that
+/// both know, and never again. Rows without a true pose 10 ms to both sides are left out.
+OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::PoseFile& truth);
 
 struct ConsistencyScore {
   Anees position{"position", 3, {}}, yaw{"yaw", 1, {}},

@@ -109,6 +109,15 @@ OutputWriter::OutputWriter(std::filesystem::path folder, std::string sequence)
                                    folder_.string(), error.message()));
   }
   events_ = openForWriting(folder_ / "events.jsonl");
+  odometry_ = openForWriting(folder_ / "odometry.csv");
+  odometry_ << "frame,timestamp_ns,epoch,degraded,x,y,z,qx,qy,qz,qw,vx,vy,vz";
+  for (const char* bias : {"bg", "ba"}) {
+    for (const char axis : {'x', 'y', 'z'}) odometry_ << "," << bias << axis;
+  }
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j <= i; ++j) odometry_ << ",P" << i << j;
+  }
+  odometry_ << "\n";
 }
 
 void OutputWriter::onCalibration(const Calibration& calibration) {
@@ -119,6 +128,19 @@ void OutputWriter::onCalibration(const Calibration& calibration) {
 void OutputWriter::onOdometry(const Odometry& odometry) {
   if (odometry.state == OdometryState::kInitialising) return;
   poses_[odometry.stamp.sequence] = {odometry.stamp.time, odometry.T_WB};
+  const auto& [q, p] = odometry.T_WB;
+  odometry_ << fmt::format("{},{},{},{}", odometry.stamp.sequence,
+                           toNanoseconds(odometry.stamp.time), odometry.world.epoch,
+                           odometry.state == OdometryState::kDegraded ? 1 : 0);
+  const auto put = [this](double value) { odometry_ << fmt::format(",{:.9g}", value); };
+  for (const double value : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) put(value);
+  for (const auto* v : {&odometry.v_WB, &odometry.gyro_bias, &odometry.accel_bias}) {
+    for (const double value : *v) put(value);
+  }
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j <= i; ++j) put(odometry.covariance(i, j));
+  }
+  odometry_ << "\n";
 }
 
 void OutputWriter::onObjects(const Objects& objects) {
@@ -145,6 +167,7 @@ void OutputWriter::writeJson(const std::string& name, const Json& json) const {
 
 void OutputWriter::finish() {
   events_.flush();
+  odometry_.flush();
   writeTable("objects_inst.csv", history_.inst());
   writeTable("objects_final.csv", history_.finalRows());
   writeTrajectory();

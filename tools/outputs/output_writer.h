@@ -36,7 +36,7 @@ class OutputWriter {
   /// For the pictures; before finish().
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
 
-  /// Writes everything but events.jsonl, which is written as events come.
+  /// Writes everything but events.jsonl and odometry.csv, which are written as their messages come.
   void finish();
   /// Any further file: timing.json, report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
@@ -64,7 +64,7 @@ class OutputWriter {
   std::map<std::pair<InstanceId, std::uint64_t>, Eigen::Vector3f> landmarks_;
   std::optional<PictureTruth> truth_;
   std::optional<GeoAnchor> anchor_;
-  std::ofstream events_;
+  std::ofstream events_, odometry_;
 };
 
 /// One line of events.jsonl.

@@ -98,6 +98,59 @@ TEST(Consistency, OnlyTheNearestStandingBeliefOfTheClassIsCompared) {
   EXPECT_EQ(score.left_out, 4U);
 }
 
+/// A body that circles with its x axis upwards, where yaw by that axis means nothing.
+RigidTransform circling(double t) {
+  const Eigen::Matrix3d up = expSo3(Eigen::Vector3d(0, -0.5 * kPi, 0));
+  return {rotationAboutZ(0.3 * t) * up,
+          Eigen::Vector3d(5 * std::cos(0.3 * t), 5 * std::sin(0.3 * t), 1)};
+}
+
+replay::PoseFile circle() {
+  std::vector<replay::StampedPose> poses;
+  for (int i = 0; i < 4000; ++i) {
+    poses.push_back({fromNanoseconds(5'000'000LL * i), circling(0.005 * i)});
+  }
+  return {replay::PoseFormat::kTum, poses};
+}
+
+/// In a world that is turned and moved, with errors of sigma; none in the first row of an epoch.
+std::vector<OdometryRow> odometryOf(double sigma, double turn) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  std::vector<OdometryRow> rows;
+  for (int i = 10; i < 390; ++i) {
+    OdometryRow row;
+    row.time = fromNanoseconds(50'000'000LL * i);
+    row.epoch = i < 200 ? 0 : 1;
+    const bool first = i == 10 || i == 200;
+    const auto error = [&]() -> Eigen::Vector3d {
+      return Eigen::Vector3d(normal(random), normal(random), normal(random)) *
+             (first ? 0.0 : sigma);
+    };
+    const auto epoch = static_cast<double>(row.epoch);
+    const RigidTransform W(rotationAboutZ(turn * epoch), Eigen::Vector3d(epoch, -7, 2));
+    const double t = 0.05 * i, h = 1e-4;
+    row.T_WB = W * circling(t);
+    row.v_WB = W.R() * (circling(t + h).p - circling(t - h).p) / (2.0 * h) + error();
+    row.T_WB = RigidTransform(row.T_WB.R() * expSo3(error()), row.T_WB.p + error());
+    row.covariance = sigma * sigma * Matrix9d::Identity();
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+TEST(Consistency, HonestOdometryHasAneesOneInEachEpochsWorld) {
+  const auto score = scoreOdometry(odometryOf(0.01, 2.0), circle());
+  for (const Anees* anees : {&score.orientation, &score.position, &score.velocity}) {
+    EXPECT_EQ(anees->nees.size(), 380U) << anees->what;
+    EXPECT_GT(anees->mean(), anees->band().first) << anees->what;  // errors of its own each row
+    EXPECT_LT(anees->mean(), anees->band().second) << anees->what;
+  }
+  auto fast = odometryOf(0.01, 2.0);
+  for (OdometryRow& row : fast) row.v_WB *= 1.05;  // 7.5 cm/s
+  EXPECT_NEAR(scoreOdometry(fast, circle()).velocity.mean(), 1.0 + 7.5 * 7.5 / 3.0, 2.0);
+}
+
 TEST(Consistency, AFileThatIsNoneIsRefusedWithTheMend) {
   const auto folder = replay::freshFolder("consistency");
   const auto errorOf = [&] {
@@ -106,6 +159,9 @@ TEST(Consistency, AFileThatIsNoneIsRefusedWithTheMend) {
   EXPECT_THAT(errorOf(), testing::HasSubstr("perdure pipeline"));
   replay::writeText(folder / "objects.json", R"({"objects": [{"id": 1}]})");
   EXPECT_THAT(errorOf(), testing::HasSubstr("class"));
+  replay::writeText(folder / "odometry.csv", "frame,timestamp_ns\n3,4,oops\n");
+  EXPECT_THAT(replay::startupErrorOf([&] { readOdometry(folder / "odometry.csv"); }),
+              testing::HasSubstr("odometry.csv:2"));
 }
 
 }  // namespace

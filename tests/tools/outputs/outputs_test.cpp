@@ -211,6 +211,9 @@ TEST(OutputWriter, LeavesEveryFileWellFormed) {
       textOf(folder / "objects_inst.csv"),
       HasSubstr("0000,0,0,1,car,0.720000,4.0000,2.0000,0.5000,4.0000,1.6000,1.5000,0.10000,1"));
   EXPECT_THAT(textOf(folder / "trajectory.tum"), HasSubstr("1.500000000 0.000000000"));
+  const std::string rows = textOf(folder / "odometry.csv");
+  EXPECT_THAT(rows, HasSubstr("\n0,1500000000,0,0,0,0,0,0,0,0,1,"));
+  EXPECT_EQ(std::count(rows.begin(), rows.end(), ','), 2 * 64) << "a header and a row of 65";
   const auto objects = nlohmann::json::parse(textOf(folder / "objects.json"));
   EXPECT_EQ(objects["objects"][0]["classes"]["car"]["covariance"].size(), 7u);
   EXPECT_EQ(objects["objects"][0]["memory"], "working");
