@@ -10,7 +10,6 @@ namespace {
 
 constexpr int kDegradedFrames = 20;  // after a gap or a resumption
 constexpr int kUnaidedFrames = 5;    // without an image's help
-constexpr std::size_t kSpeeds = 512;
 
 double seconds(Duration d) { return toSeconds(d); }
 
@@ -49,6 +48,8 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       instance_(instance),
       outputs_(std::move(outputs)),
       world_{instance, 0},
+      speeds_(config.core.speed.max_age_s),
+      waiting_(config.pair_tolerance_s),
       motion_initialiser_(config.core) {}
 
 Node::~Node() = default;
@@ -70,8 +71,7 @@ void Node::onCalibration(const Calibration& calibration) {
   if (calibration_ && sameCameras(*calibration_, calibration)) return;
   if (calibration_) {
     if (started()) lose({"calibration_changed", ""});
-    pending_.clear();
-    seconds_.clear();
+    waiting_.clear();
   }
   calibration_ = calibration;
   std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
@@ -111,8 +111,7 @@ void Node::clockJumpedBack() {
   if (!started()) reasons_.add("clock_jumped_back");
   imu_.clear();
   speeds_.clear();
-  pending_.clear();
-  seconds_.clear();
+  waiting_.clear();
   last_image_.reset();
   last_imu_time_.reset();
   if (started()) lose({"clock_jumped_back", ""});
@@ -133,14 +132,8 @@ void Node::onImu(const ImuSample& sample) {
 }
 
 void Node::onSpeed(const SpeedSample& sample) {
-  if (!std::isfinite(sample.speed) || !(sample.sigma > 0) || !std::isfinite(sample.sigma)) {
-    return reasons_.add("speed_not_finite");
-  }
-  if (!speeds_.empty() && sample.time <= speeds_.back().time) {
-    return reasons_.add("speed_out_of_order");
-  }
-  speeds_.push_back({sample.time, sample.speed, sample.sigma});
-  while (speeds_.size() > kSpeeds) speeds_.pop_front();
+  const auto added = speeds_.add({sample.time, sample.speed, sample.sigma});
+  if (!added) return reasons_.add(added.error());
   drain(false);
 }
 
@@ -158,36 +151,13 @@ void Node::onFrame(const Frame& frame) {
     return reasons_.add("frame_size_differs");
   }
   if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
-  if (second) return addSecond(frame);
-  const auto later = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& p) {
-    return p.first.stamp.time >= frame.stamp.time;
-  });
-  if (later != pending_.end()) {
-    if (later->first.stamp.time == frame.stamp.time) return reasons_.add("frame_duplicate");
-    reasons_.add("frame_reordered");
-  }
-  pending_.insert(later, Pending{frame, {}});
-  if (static_cast<std::int64_t>(pending_.size()) > config_.max_pending) {
+  const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
+  if (!added) reasons_.add(added.error());
+  if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {
     reasons_.add("frame_without_imu");
-    publishWaiting(pending_.front().first.stamp);
-    pending_.pop_front();
+    publishWaiting(waiting_.take().first.stamp);
   }
-  for (const Frame& waiting : std::exchange(seconds_, {})) addSecond(waiting);
   drain(false);
-}
-
-void Node::addSecond(const Frame& frame) {
-  for (Pending& p : pending_) {
-    const double apart = std::abs(seconds(frame.stamp.time - p.first.stamp.time));
-    if (apart > config_.pair_tolerance_s) continue;
-    p.second = frame;
-    return drain(false);
-  }
-  seconds_.push_back(frame);
-  if (seconds_.size() > 4) {
-    seconds_.pop_front();
-    reasons_.add("stereo_unpaired");
-  }
 }
 
 TimePoint Node::imuTime(TimePoint image_time) const {
@@ -196,61 +166,30 @@ TimePoint Node::imuTime(TimePoint image_time) const {
   return image_time + durationFromSeconds(offset);
 }
 
-bool Node::waitsForPair(const Pending& p) const {
-  if (cameras_->models.size() < 2 || p.second) return false;
-  // A later frame of either camera, or half a second of samples, says that none will come.
-  if (pending_.size() > 1 && pending_.front().first.stamp.time == p.first.stamp.time) {
-    if (pending_[1].second || pending_.size() > 3) return false;
-  }
-  const Duration tolerance = durationFromSeconds(config_.pair_tolerance_s);
-  for (const Frame& f : seconds_) {
-    if (f.stamp.time > p.first.stamp.time + tolerance) return false;
-  }
-  return imu_.empty() || imu_.last() < p.first.stamp.time + std::chrono::milliseconds(500);
+bool Node::waitsForPair() const {
+  if (cameras_->models.size() < 2 || !waiting_.frontMayBePaired()) return false;
+  // Half a second of samples says that none will come.
+  return imu_.empty() ||
+         imu_.last() < waiting_.front().first.stamp.time + std::chrono::milliseconds(500);
 }
 
-bool Node::ready(const Pending& p) const {
-  TimePoint now = imuTime(p.first.stamp.time);
+bool Node::ready() const {
+  TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
   // The last sample may be held for a quarter of a period: a capture that waits for this frame's
   // answer sends no sample beyond the next frame.
   if (const auto period = imu_.period()) now -= *period / 4;
   if (imu_.last() < now + durationFromSeconds(config_.imu_slack_s)) return false;
-  if (waitsForPair(p)) return false;
+  if (waitsForPair()) return false;
   if (!config_.core.speed.enabled || !calibration_->has_speed) return true;
-  return (!speeds_.empty() && speeds_.back().time >= now) ||
-         imu_.last() >= now + durationFromSeconds(config_.speed_wait_s);
+  return speeds_.reaches(now) || imu_.last() >= now + durationFromSeconds(config_.speed_wait_s);
 }
 
 void Node::drain(bool all) {
-  while (cameras_ && !pending_.empty() && (all || ready(pending_.front()))) {
-    Pending next = std::move(pending_.front());
-    pending_.pop_front();
-    process(next);
-  }
+  while (cameras_ && !waiting_.empty() && (all || ready())) process(waiting_.take());
 }
 
 void Node::flush() { drain(true); }
-
-std::optional<SpeedReading> Node::speedAt(TimePoint image_time) const {
-  if (!config_.core.speed.enabled || speeds_.empty()) return std::nullopt;
-  const TimePoint t = imuTime(image_time);
-  const auto after = std::find_if(speeds_.begin(), speeds_.end(),
-                                  [&](const TimedSpeed& s) { return s.time >= t; });
-  const double max_age = config_.core.speed.max_age_s;
-  if (after != speeds_.end() && after != speeds_.begin()) {
-    const TimedSpeed &a = *(after - 1), &b = *after;
-    const double span = seconds(b.time - a.time);
-    if (span <= 2.0 * max_age) {
-      const double s = seconds(t - a.time) / span;
-      return SpeedReading{a.speed + s * (b.speed - a.speed), std::max(a.sigma, b.sigma)};
-    }
-  }
-  const TimedSpeed& nearest = after == speeds_.end() ? speeds_.back() : *after;
-  const double age = std::abs(seconds(nearest.time - t));
-  if (age > max_age) return std::nullopt;
-  return SpeedReading{nearest.speed, nearest.sigma + 2.0 * age};  // 2 m/s² unknown
-}
 
 void Node::noteGaps(TimePoint now) {
   const TimePoint from =
@@ -278,17 +217,17 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   return cameras_->tracker.track(first, second, R);
 }
 
-void Node::process(Pending& p) {
-  const FrameStamp& stamp = p.first.stamp;
+void Node::process(const FramePair& frames) {
+  const FrameStamp& stamp = frames.first.stamp;
   last_image_ = stamp.time;
-  const auto first = vision::monoOf(p.first);
+  const auto first = vision::monoOf(frames.first);
   if (!first) {
     reasons_.add(first.error());
     return publishWaiting(stamp);
   }
   cv::Mat second;
-  if (p.second) {
-    if (const auto image = vision::monoOf(*p.second)) {
+  if (frames.second) {
+    if (const auto image = vision::monoOf(*frames.second)) {
       second = *image;
     } else {
       reasons_.add(image.error());
@@ -301,7 +240,7 @@ void Node::process(Pending& p) {
   FrameInput input{++frame_, stamp.time, trackImages(*first, second, now), {}, {}};
   input.motion_px =
       cameras_->tracker.motionSince(static_cast<std::size_t>(config_.core.rest.frames));
-  input.speed = speedAt(stamp.time);
+  if (config_.core.speed.enabled) input.speed = speeds_.at(now);
   if (!started()) begin(now, input);
   if (!started()) {
     last_imu_time_ = now;
@@ -360,7 +299,7 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   if (rest_motion && *rest_motion < options.start.rest_disparity_px && slow) {
     start = startAtRest(imu_, now, options);
   } else if (input.speed && !slow) {
-    start = startWithSpeed(imu_, now, *input.speed, {speeds_.begin(), speeds_.end()}, options);
+    start = startWithSpeed(imu_, now, *input.speed, speeds_.samples(), options);
   } else if (!input.speed && rest_motion) {
     start = motion_initialiser_.start(imu_, cameras_->models);
   }

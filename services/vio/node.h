@@ -2,7 +2,6 @@
 // frame's time is covered by inertial samples, pairs stereo frames, starts, resets, resumes.
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -19,7 +18,9 @@
 #include "services/vio/core/estimator.h"
 #include "services/vio/core/initialiser.h"
 #include "services/vio/core/motion_initialiser.h"
+#include "services/vio/core/speed_history.h"
 #include "services/vio/core/tracker.h"
+#include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {
 
@@ -55,22 +56,16 @@ class Node {
   std::string status() const;
 
  private:
-  struct Pending {
-    Frame first;
-    std::optional<Frame> second;
-  };
   struct Cameras;
 
   void clockJumpedBack();
   void drain(bool all);
-  bool ready(const Pending& pending) const;
-  bool waitsForPair(const Pending& pending) const;
-  void addSecond(const Frame& frame);
-  void process(Pending& pending);
+  bool ready() const;
+  bool waitsForPair() const;
+  void process(const FramePair& frames);
   TrackedFrame trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now);
   void begin(TimePoint now, const FrameInput& input);
   bool resume(TimePoint now);
-  std::optional<SpeedReading> speedAt(TimePoint image_time) const;
   void noteGaps(TimePoint now);
   void lose(const Reason& reason);
   void publish(const FrameStamp& stamp, const FrameEstimate& estimate);
@@ -85,9 +80,8 @@ class Node {
   std::optional<Calibration> calibration_;
   std::unique_ptr<Cameras> cameras_;
   ImuBuffer imu_;
-  std::deque<TimedSpeed> speeds_;
-  std::deque<Pending> pending_;
-  std::deque<Frame> seconds_;  ///< of the second camera, unpaired yet
+  SpeedHistory speeds_;
+  WaitingFrames waiting_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;

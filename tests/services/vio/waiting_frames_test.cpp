@@ -1,0 +1,84 @@
+#include "services/vio/waiting_frames.h"
+
+#include <gtest/gtest.h>
+
+#include "services/vio/core/speed_history.h"
+
+namespace perdure::vio {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+Frame at(std::int64_t ms) {
+  Frame frame;
+  frame.stamp.time = fromNanoseconds(ms * kMs);
+  return frame;
+}
+
+std::string codeOf(const Result<void>& result) { return result ? "" : result.error().code; }
+
+TEST(WaitingFrames, AreTakenInOrderWithTheirPartners) {
+  WaitingFrames waiting(0.01);
+  EXPECT_EQ(codeOf(waiting.addSecond(at(104))), "");  // before its partner
+  EXPECT_EQ(codeOf(waiting.addFirst(at(100))), "");
+  EXPECT_EQ(codeOf(waiting.addFirst(at(200))), "");
+  EXPECT_EQ(codeOf(waiting.addFirst(at(150))), "frame_reordered");
+  EXPECT_EQ(codeOf(waiting.addFirst(at(150))), "frame_duplicate");
+  EXPECT_EQ(codeOf(waiting.addSecond(at(191))), "");
+  ASSERT_EQ(waiting.size(), 3u);
+  const FramePair first = waiting.take(), middle = waiting.take(), last = waiting.take();
+  EXPECT_EQ(first.first.stamp.time, at(100).stamp.time);
+  ASSERT_TRUE(first.second);
+  EXPECT_EQ(first.second->stamp.time, at(104).stamp.time);
+  EXPECT_FALSE(middle.second);
+  ASSERT_TRUE(last.second);
+  EXPECT_EQ(last.second->stamp.time, at(191).stamp.time);
+  EXPECT_TRUE(waiting.empty());
+}
+
+TEST(WaitingFrames, ALaterFrameSaysThatNoPartnerWillCome) {
+  WaitingFrames waiting(0.01);
+  EXPECT_TRUE(waiting.addFirst(at(100)));
+  EXPECT_TRUE(waiting.frontMayBePaired());
+  EXPECT_TRUE(waiting.addFirst(at(150)));
+  EXPECT_TRUE(waiting.frontMayBePaired());
+  EXPECT_TRUE(waiting.addSecond(at(150)));
+  EXPECT_FALSE(waiting.frontMayBePaired()) << "the next one has its own";
+  WaitingFrames alone(0.01);
+  EXPECT_TRUE(alone.addFirst(at(100)));
+  EXPECT_TRUE(alone.addSecond(at(115)));
+  EXPECT_FALSE(alone.frontMayBePaired()) << "the second camera is past it";
+}
+
+TEST(WaitingFrames, SecondsWithoutPartnersDoNotPileUp) {
+  WaitingFrames waiting(0.01);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(waiting.addSecond(at(100 * i)));
+  EXPECT_EQ(codeOf(waiting.addSecond(at(400))), "stereo_unpaired");
+  EXPECT_TRUE(waiting.addFirst(at(0)));
+  EXPECT_FALSE(waiting.take().second) << "given up";
+  EXPECT_TRUE(waiting.addFirst(at(400)));
+  EXPECT_TRUE(waiting.take().second);
+}
+
+TEST(SpeedHistory, InterpolatesAndIsLessSureFurtherAway) {
+  const auto ms = [](std::int64_t t) { return fromNanoseconds(t * kMs); };
+  SpeedHistory speeds(0.15);
+  EXPECT_FALSE(speeds.at(ms(0)));
+  EXPECT_EQ(codeOf(speeds.add({ms(100), 4.0, 0.1})), "");
+  EXPECT_EQ(codeOf(speeds.add({ms(200), 6.0, 0.2})), "");
+  EXPECT_EQ(codeOf(speeds.add({ms(200), 6.0, 0.2})), "speed_out_of_order");
+  EXPECT_EQ(codeOf(speeds.add({ms(300), NAN, 0.2})), "speed_not_finite");
+  EXPECT_EQ(codeOf(speeds.add({ms(300), 1.0, 0.0})), "speed_not_finite");
+  ASSERT_TRUE(speeds.at(ms(125)));
+  EXPECT_NEAR(speeds.at(ms(125))->speed, 4.5, 1e-9);
+  EXPECT_NEAR(speeds.at(ms(125))->sigma, 0.2, 1e-9);
+  ASSERT_TRUE(speeds.at(ms(300)));
+  EXPECT_NEAR(speeds.at(ms(300))->speed, 6.0, 1e-9);
+  EXPECT_NEAR(speeds.at(ms(300))->sigma, 0.4, 1e-9);
+  EXPECT_FALSE(speeds.at(ms(360)));
+  EXPECT_TRUE(speeds.reaches(ms(200)));
+  EXPECT_FALSE(speeds.reaches(ms(201)));
+}
+
+}  // namespace
+}  // namespace perdure::vio
