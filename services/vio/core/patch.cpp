@@ -21,8 +21,8 @@ using Values = Eigen::Matrix<float, Patch::kPixels, 1>;
 /// False where the warped patch reaches out of the image.
 bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vector2f& centre,
             Values& out) {
-  const float h = Patch::kHalf;
-  const Eigen::Vector2f reach = h * warp.cwiseAbs().rowwise().sum();
+  constexpr float h = Patch::kHalf, kRounding = 0.01F;
+  const Eigen::Vector2f reach = (h * warp.cwiseAbs().rowwise().sum()).array() + kRounding;
   if (!(centre.x() - reach.x() >= 0) || !(centre.y() - reach.y() >= 0) ||
       !(centre.x() + reach.x() < static_cast<float>(image.cols - 1)) ||
       !(centre.y() + reach.y() < static_cast<float>(image.rows - 1))) {
@@ -113,6 +113,7 @@ std::optional<Patch::Found> Patch::find(const std::vector<cv::Mat>& levels,
     if (moved.norm() * scale >= kSettled) continue;
     if (!sample(image, warp, at, now)) return std::nullopt;
     const float rest = centre(now);
+    if (!(rest > 0)) return std::nullopt;
     warp_ = scale * warp;
     return Found{{at.x() * scale, at.y() * scale}, now.dot(value_) / (rest * norm_)};
   }

@@ -102,7 +102,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     if (!status[i]) continue;
     Point& p = points_[i];
     const auto found = p.patch->find(now.levels, to[i]);
-    if (!found || found->similarity < options_.similarity) continue;
+    if (!found || !(found->similarity >= options_.similarity)) continue;
     const auto seen = imagePoint(cameras_[0], toEigen(found->pixel));
     if (!seen) continue;
     matches.push_back({p.normalised, seen->normalised, seen->scale});
