@@ -33,9 +33,7 @@ RigidTransform alignedAtTheStart(const SimulatedTruth& truth,
   for (const auto& pose : trajectory) {
     const auto there = truth.body.at(0, pose.time);
     if (!there) continue;
-    const double yaw = wrapAngle(yawOf(pose.T_WB.R()) - yawOf(there->R()));
-    const Eigen::Matrix3d R = rotationAboutZ(yaw);
-    return RigidTransform(R, Eigen::Vector3d(pose.T_WB.p - R * there->p));
+    return placedOn(pose.T_WB, *there);
   }
   throw StartupError(ExitCode::kUnavailable,
                      "the trajectory has no time in common with the truth; name the simulated "
@@ -111,7 +109,7 @@ void run(const ConsistencyOptions& options) {
     const SimulatedTruth truth = readSimulatedTruth(options.truth);
     const auto trajectory = replay::PoseFile::read(out / "trajectory.tum").poses();
     consistency.objects = scoreConsistency(readBeliefs(out / "objects.json"), truth.truth,
-                                        alignedAtTheStart(truth, trajectory), options.within_m);
+                                           alignedAtTheStart(truth, trajectory), options.within_m);
     poses = truth.body;
   } else {
     poses = truePoses(options.truth);

@@ -123,6 +123,12 @@ std::vector<OdometryRow> readOdometry(const std::filesystem::path& file) {
   return rows;
 }
 
+RigidTransform placedOn(const RigidTransform& T_WB, const RigidTransform& true_T_WB) {
+  const Eigen::Matrix3d M = T_WB.R() * true_T_WB.R().transpose();
+  const Eigen::Matrix3d R = rotationAboutZ(std::atan2(M(1, 0) - M(0, 1), M(0, 0) + M(1, 1)));
+  return RigidTransform(R, Eigen::Vector3d(T_WB.p - R * true_T_WB.p));
+}
+
 OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::PoseFile& truth) {
   constexpr Duration kStep = std::chrono::milliseconds(10);
   OdometryScore score;
@@ -133,10 +139,7 @@ OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::
     const auto now = truth.at(0, row.time);
     if (!before || !now || !after) continue;
     if (!T_WT || row.epoch != epoch) {
-      // The turn about z that brings one nearest to the other: of use for a body whose x points up.
-      const Eigen::Matrix3d M = row.T_WB.R() * now->R().transpose();
-      const Eigen::Matrix3d R = rotationAboutZ(std::atan2(M(1, 0) - M(0, 1), M(0, 0) + M(1, 1)));
-      T_WT = RigidTransform(R, Eigen::Vector3d(row.T_WB.p - R * now->p));
+      T_WT = placedOn(row.T_WB, *now);
       epoch = row.epoch;
     }
     const RigidTransform T_WB = *T_WT * *now;

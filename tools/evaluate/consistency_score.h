@@ -53,12 +53,16 @@ struct OdometryRow {
 /// Throws StartupError(kUnavailable) where the file is missing or a line is none.
 std::vector<OdometryRow> readOdometry(const std::filesystem::path& file);
 
+/// Takes the truth's world into the run's, by position and by the turn about z that brings the two
+/// attitudes nearest to each other: of use for a body whose x axis points up, too.
+RigidTransform placedOn(const RigidTransform& T_WB, const RigidTransform& true_T_WB);
+
 /// Over the rows of a run. Those of one run are correlated: no band holds for their mean.
 struct OdometryScore {
   Anees orientation{"orientation of the body", 3, {}}, position{"position of the body", 3, {}},
       velocity{"velocity of the body", 3, {}};
 };
-/// The truth's W is placed on the run's by yaw and position at the first row of each epoch that
+/// The truth's W is placed on the run's at the first row of each epoch that
 /// both know, and never again. Rows without a true pose 10 ms to both sides are left out.
 OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::PoseFile& truth);
 

@@ -11,16 +11,7 @@
 namespace perdure::vio {
 namespace {
 
-cv::Mat texture(unsigned seed) {
-  cv::Mat noise(480, 752, CV_8UC1), smooth;
-  std::mt19937 random(seed);
-  for (int y = 0; y < noise.rows; ++y) {
-    for (int x = 0; x < noise.cols; ++x) noise.at<std::uint8_t>(y, x) = random() % 256;
-  }
-  cv::GaussianBlur(noise, smooth, {9, 9}, 2.5);
-  cv::normalize(smooth, smooth, 0, 255, cv::NORM_MINMAX);
-  return smooth;
-}
+using test::texture;
 
 /// pixel ← A (pixel − centre) + centre + shift, with brightness and noise.
 struct View {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <tuple>
 
 #include "common/math/so3.h"
@@ -10,6 +11,17 @@ namespace perdure::vio::test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+cv::Mat texture(unsigned seed) {
+  cv::Mat noise(480, 752, CV_8UC1), smooth;
+  std::mt19937 random(seed);
+  for (int y = 0; y < noise.rows; ++y) {
+    for (int x = 0; x < noise.cols; ++x) noise.at<std::uint8_t>(y, x) = random() % 256;
+  }
+  cv::GaussianBlur(noise, smooth, {9, 9}, 2.5);
+  cv::normalize(smooth, smooth, 0, 255, cv::NORM_MINMAX);
+  return smooth;
+}
 
 CameraCalibration testCamera(int index) {
   CameraCalibration c;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <opencv2/core.hpp>
 #include <random>
 #include <vector>
 
@@ -62,6 +63,9 @@ class SimulatedDrive {
   std::vector<std::uint64_t> ids_;  ///< 0: not tracked at the moment
   std::uint64_t next_id_ = 1;
 };
+
+/// An image of 752 × 480 that has corners everywhere, of a seed.
+cv::Mat texture(unsigned seed);
 
 /// A camera of EuRoC's kind looking along body z; index 1 stands 11 cm beside it.
 CameraCalibration testCamera(int index);

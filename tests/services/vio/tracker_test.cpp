@@ -51,16 +51,7 @@ TEST(TwoPointRansac, RefusesNothingWithoutEnoughMatches) {
   EXPECT_EQ(std::count(good.begin(), good.end(), true), 3);
 }
 
-cv::Mat texture() {
-  cv::Mat noise(480, 752, CV_8UC1), smooth;
-  std::mt19937 random(4);
-  for (int y = 0; y < noise.rows; ++y) {
-    for (int x = 0; x < noise.cols; ++x) noise.at<std::uint8_t>(y, x) = random() % 256;
-  }
-  cv::GaussianBlur(noise, smooth, {9, 9}, 2.5);
-  cv::normalize(smooth, smooth, 0, 255, cv::NORM_MINMAX);
-  return smooth;
-}
+cv::Mat texture() { return test::texture(4); }
 
 cv::Mat shifted(const cv::Mat& image, double dx, double dy) {
   const cv::Mat A = (cv::Mat_<double>(2, 3) << 1, 0, dx, 0, 1, dy);
