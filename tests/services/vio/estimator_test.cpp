@@ -27,41 +27,13 @@ struct RunOptions {
   double start_sigma_scale = 1.0;
 };
 
-Start startAt(const test::SimulatedDrive& drive, double t, unsigned seed, double scale) {
-  std::mt19937 random(seed + 99);
-  std::normal_distribution<double> n;
-  const auto draw = [&](double s) { return Vector3d(s * n(random), s * n(random), s * n(random)); };
-  Start start;
-  start.time = drive.time(t);
-  start.nav = drive.truth(t);
-  const double theta = 0.01 * scale, v = 0.05 * scale, bg = 0.005 * scale, ba = 0.05 * scale;
-  Vector3d tilt = draw(theta);
-  // Yaw is a gauge: it is known at the start.
-  tilt = start.nav.q_WB * tilt;
-  tilt.z() = 0.0;
-  tilt = start.nav.q_WB.conjugate() * tilt;
-  start.nav.q_WB = start.nav.q_WB * expQuaternion(tilt);
-  start.nav.v_WB += draw(v);
-  start.nav.gyro_bias += draw(bg);
-  start.nav.accel_bias += draw(ba);
-  start.covariance.setZero();
-  const Eigen::Matrix3d R = start.nav.q_WB.toRotationMatrix();
-  start.covariance.block<3, 3>(0, 0) =
-      R.transpose() * Vector3d(theta * theta, theta * theta, 1e-10).asDiagonal() * R;
-  start.covariance.diagonal().segment<3>(3).setConstant(1e-10);
-  start.covariance.diagonal().segment<3>(6).setConstant(v * v);
-  start.covariance.diagonal().segment<3>(9).setConstant(bg * bg);
-  start.covariance.diagonal().segment<3>(12).setConstant(ba * ba);
-  return start;
-}
-
 RunResult run(const test::DriveOptions& drive_options, const Options& options,
               const RunOptions& how) {
   test::SimulatedDrive drive(drive_options);
   ImuBuffer imu;
   for (const ImuReading& r : drive.imu(how.seconds + 1.0)) EXPECT_TRUE(imu.add(r));
   Estimator estimator(options, drive.T_BC(), 0.0);
-  estimator.start(startAt(drive, 0.2, drive_options.seed, how.start_sigma_scale));
+  estimator.start(test::startAt(drive, 0.2, drive_options.seed, how.start_sigma_scale));
   RunResult result;
   std::uint64_t frame = 0;
   for (double t = 0.25; t < how.seconds; t += 1.0 / drive_options.camera_rate_hz) {
@@ -103,7 +75,7 @@ TEST(Estimator, FindsTheTimeOffset) {
   ImuBuffer imu;
   for (const ImuReading& r : world.imu(16.0)) ASSERT_TRUE(imu.add(r));
   Estimator estimator(Options{}, world.T_BC(), 0.0);
-  estimator.start(startAt(world, 0.2, 1, 1.0));
+  estimator.start(test::startAt(world, 0.2, 1, 1.0));
   std::uint64_t frame = 0;
   for (double t = 0.25; t < 15.0; t += 0.05) {
     ASSERT_TRUE(estimator.process({++frame, world.time(t), world.see(t), {}, {}}, imu));
@@ -159,7 +131,7 @@ TEST(Estimator, StandsStillAtRestAndThenFollows) {
   ImuBuffer imu;
   for (const ImuReading& r : drive.imu(13.0)) ASSERT_TRUE(imu.add(r));
   Estimator estimator(Options{}, drive.T_BC(), 0.0);
-  estimator.start(startAt(drive, 0.2, 3, 1.0));
+  estimator.start(test::startAt(drive, 0.2, 3, 1.0));
   const Vector3d origin = drive.truth(0.2).p_WB;
   std::uint64_t frame = 0;
   int rests = 0;
@@ -185,7 +157,7 @@ TEST(Estimator, ImageMotionAloneDoesNotMakeARestOfADrive) {
   ImuBuffer imu;
   for (const ImuReading& r : drive.imu(3.0)) ASSERT_TRUE(imu.add(r));
   Estimator estimator(Options{}, drive.T_BC(), 0.0);
-  estimator.start(startAt(drive, 0.2, 3, 1.0));
+  estimator.start(test::startAt(drive, 0.2, 3, 1.0));
   for (std::uint64_t k = 1; k < 40; ++k) {
     const double t = 0.2 + 0.05 * static_cast<double>(k);
     // A lorry ahead fills the image and moves along.
@@ -202,7 +174,7 @@ TEST(Estimator, LandmarksLieWithinTheirCovariance) {
   ImuBuffer imu;
   for (const ImuReading& r : drive.imu(6.0)) ASSERT_TRUE(imu.add(r));
   Estimator estimator(Options{}, drive.T_BC(), 0.0);
-  estimator.start(startAt(drive, 0.2, 5, 1.0));
+  estimator.start(test::startAt(drive, 0.2, 5, 1.0));
   for (std::uint64_t k = 1; k < 100; ++k) {
     const double t = 0.2 + 0.05 * static_cast<double>(k);
     ASSERT_TRUE(estimator.process({k, drive.time(t), drive.see(t), {}, {}}, imu));
@@ -234,7 +206,7 @@ TEST(Estimator, BadNumbersStopItWithAReason) {
   ImuBuffer imu;
   for (const ImuReading& r : drive.imu(3.0)) ASSERT_TRUE(imu.add(r));
   Estimator estimator(Options{}, drive.T_BC(), 0.0);
-  estimator.start(startAt(drive, 0.2, 3, 1.0));
+  estimator.start(test::startAt(drive, 0.2, 3, 1.0));
   ASSERT_TRUE(estimator.process({1, drive.time(0.25), drive.see(0.25), {}, {}}, imu));
   estimator.state().nav.accel_bias.x() = std::nan("");
   const auto out = estimator.process({2, drive.time(0.3), drive.see(0.3), {}, {}}, imu);

@@ -23,6 +23,13 @@ cv::Mat texture(unsigned seed) {
   return smooth;
 }
 
+cv::Mat shifted(const cv::Mat& image, double dx, double dy) {
+  const cv::Mat A = (cv::Mat_<double>(2, 3) << 1, 0, dx, 0, 1, dy);
+  cv::Mat result;
+  cv::warpAffine(image, result, A, image.size(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+  return result;
+}
+
 CameraCalibration testCamera(int index) {
   CameraCalibration c;
   c.name = index == 0 ? "cam0" : "cam1";
@@ -166,6 +173,34 @@ TrackedFrame SimulatedDrive::see(double t) {
   std::sort(frame.points.begin(), frame.points.end(),
             [](const TrackedPoint& a, const TrackedPoint& b) { return a.id < b.id; });
   return frame;
+}
+
+Start startAt(const SimulatedDrive& drive, double t, unsigned seed, double scale) {
+  std::mt19937 random(seed + 99);
+  std::normal_distribution<double> n;
+  const auto draw = [&](double s) { return Vector3d(s * n(random), s * n(random), s * n(random)); };
+  Start start;
+  start.time = drive.time(t);
+  start.nav = drive.truth(t);
+  const double theta = 0.01 * scale, v = 0.05 * scale, bg = 0.005 * scale, ba = 0.05 * scale;
+  Vector3d tilt = draw(theta);
+  // Yaw is a gauge: it is known at the start.
+  tilt = start.nav.q_WB * tilt;
+  tilt.z() = 0.0;
+  tilt = start.nav.q_WB.conjugate() * tilt;
+  start.nav.q_WB = start.nav.q_WB * expQuaternion(tilt);
+  start.nav.v_WB += draw(v);
+  start.nav.gyro_bias += draw(bg);
+  start.nav.accel_bias += draw(ba);
+  start.covariance.setZero();
+  const Eigen::Matrix3d R = start.nav.q_WB.toRotationMatrix();
+  start.covariance.block<3, 3>(0, 0) =
+      R.transpose() * Vector3d(theta * theta, theta * theta, 1e-10).asDiagonal() * R;
+  start.covariance.diagonal().segment<3>(3).setConstant(1e-10);
+  start.covariance.diagonal().segment<3>(6).setConstant(v * v);
+  start.covariance.diagonal().segment<3>(9).setConstant(bg * bg);
+  start.covariance.diagonal().segment<3>(12).setConstant(ba * ba);
+  return start;
 }
 
 }  // namespace perdure::vio::test

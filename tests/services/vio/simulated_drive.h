@@ -67,6 +67,13 @@ class SimulatedDrive {
 /// An image of 752 × 480 that has corners everywhere, of a seed.
 cv::Mat texture(unsigned seed);
 
+/// The image moved by (dx, dy) pixels; its border is reflected.
+cv::Mat shifted(const cv::Mat& image, double dx, double dy);
+
+/// The truth at `t` with errors drawn from the covariance that comes with it; yaw and position are
+/// exact. scale: of all deviations (1: 10 mrad of tilt, 0.05 m/s, 5 mrad/s, 0.05 m/s²).
+Start startAt(const SimulatedDrive& drive, double t, unsigned seed, double scale);
+
 /// A camera of EuRoC's kind looking along body z; index 1 stands 11 cm beside it.
 CameraCalibration testCamera(int index);
 

@@ -51,14 +51,9 @@ TEST(TwoPointRansac, RefusesNothingWithoutEnoughMatches) {
   EXPECT_EQ(std::count(good.begin(), good.end(), true), 3);
 }
 
-cv::Mat texture() { return test::texture(4); }
+using test::shifted;
 
-cv::Mat shifted(const cv::Mat& image, double dx, double dy) {
-  const cv::Mat A = (cv::Mat_<double>(2, 3) << 1, 0, dx, 0, 1, dy);
-  cv::Mat result;
-  cv::warpAffine(image, result, A, image.size(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
-  return result;
-}
+cv::Mat texture() { return test::texture(4); }
 
 TEST(Tracker, FollowsAShiftedImageToATenthOfAPixel) {
   Tracker tracker(TrackerOptions{}, {CameraModel(test::testCamera(0))});
