@@ -48,10 +48,15 @@ Eigen::VectorXd eigenvalues(const MatrixView& S) {
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(S, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
-Cholesky::Cholesky(const MatrixView& S) : L_(S) {
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(L_);
-  positive_ = in_place.info() == Eigen::Success;
+bool choleskyInPlace(Eigen::Ref<Eigen::MatrixXd> S) {
+  return Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(S).info() == Eigen::Success;
 }
+
+void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B) {
+  L.triangularView<Eigen::Lower>().solveInPlace(B);
+}
+
+Cholesky::Cholesky(const MatrixView& S) : L_(S), positive_(choleskyInPlace(L_)) {}
 
 Eigen::MatrixXd Cholesky::whiten(const MatrixView& B) const {
   return L_.triangularView<Eigen::Lower>().solve(B);

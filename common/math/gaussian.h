@@ -35,6 +35,13 @@ Eigen::MatrixXd withLeastEigenvalue(const MatrixView& S, double least);
 /// Of a symmetric S, in increasing order.
 Eigen::VectorXd eigenvalues(const MatrixView& S);
 
+/// Puts L of S = L Lᵀ into S's lower triangle; the upper one is neither read nor written. False
+/// where S is not positive definite: S is then void.
+bool choleskyInPlace(Eigen::Ref<Eigen::MatrixXd> S);
+
+/// B ← L⁻¹ B with L in the lower triangle of an n × n matrix; B is n × m.
+void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B);
+
 /// S = L Lᵀ.
 class Cholesky {
  public:

@@ -117,11 +117,13 @@ void propagateFrame(benchmark::State& loop) {
   const RunningFilter& run = filter(loop);
   State state = run.estimator().state();
   const TimePoint to = run.input().image_time + durationFromSeconds(state.time_offset_s);
+  std::vector<ImuReading> readings = run.imu().between(state.time, to);
   measure(
       loop, [&] { state = run.estimator().state(); },
       [&] {
-        const ImuIncrement x = integrate(run.imu().between(state.time, to), state.nav.gyro_bias,
-                                         state.nav.accel_bias, run.options().imu);
+        run.imu().between(state.time, to, readings);
+        const ImuIncrement x =
+            integrate(readings, state.nav.gyro_bias, state.nav.accel_bias, run.options().imu);
         propagate(state, x, to, run.options().gravity, true);
       });
 }
@@ -140,7 +142,7 @@ void cloneAndForget(benchmark::State& loop) {
 /// Second argument: tracks.
 void msckf(benchmark::State& loop) {
   const RunningFilter& run = filter(loop);
-  const std::vector<Track> tracks = run.tracks(static_cast<std::size_t>(loop.range(1)));
+  const std::vector<const Track*> tracks = run.tracks(static_cast<std::size_t>(loop.range(1)));
   State state = run.cloned();
   ReasonCounts reasons;
   int used = 0;
@@ -164,13 +166,13 @@ void slam(benchmark::State& loop) {
 void wholeFrame(benchmark::State& loop) {
   const RunningFilter& run = filter(loop);
   const std::vector<FrameInput> inputs = run.inputs();
-  Estimator estimator = run.estimator();
+  Estimator estimator = run.warmed();
   std::size_t at = 0, frames = 0, points = 0;
   measure(
       loop,
       [&] {
         if (at < inputs.size()) return;
-        estimator = run.estimator();
+        estimator = run.warmed();
         at = 0;
       },
       [&] {

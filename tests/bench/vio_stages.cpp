@@ -55,10 +55,7 @@ RunningFilter::RunningFilter(bool stereo)
     const double t = kBegin + kFramePeriod * static_cast<double>(k);
     inputs_.push_back({k, drive_.time(t), drive_.see(t), {}, {}});
   }
-  warm_.start(test::startAt(drive_, kBegin, 1, 1.0));
-  for (std::size_t k = 0; k < kWarm; ++k) {
-    check(warm_.process(inputs_[k], imu_).has_value(), "the filter follows the drive");
-  }
+  warm_ = warmed();
   cloned_ = warm_.state();
   const TimePoint to = input().image_time + durationFromSeconds(cloned_.time_offset_s);
   const ImuIncrement x = integrate(imu_.between(cloned_.time, to), cloned_.nav.gyro_bias,
@@ -70,14 +67,22 @@ RunningFilter::RunningFilter(bool stereo)
   }
 }
 
-std::vector<Track> RunningFilter::tracks(std::size_t count) const {
-  State state = cloned_;
-  std::vector<Track> result;
+Estimator RunningFilter::warmed() const {
+  Estimator estimator(options_, drive_.T_BC(), 0.0);
+  estimator.start(test::startAt(drive_, kBegin, 1, 1.0));
+  for (std::size_t k = 0; k < kWarm; ++k) {
+    check(estimator.process(inputs_[k], imu_).has_value(), "the filter follows the drive");
+  }
+  return estimator;
+}
+
+std::vector<const Track*> RunningFilter::tracks(std::size_t count) const {
+  std::vector<const Track*> result;
   for (const auto& [id, track] : database_.tracks()) {
-    if (!state.point(id)) result.push_back(track);
+    if (!cloned_.point(id)) result.push_back(&track);
   }
   std::stable_sort(result.begin(), result.end(),
-                   [](const Track& a, const Track& b) { return a.views() > b.views(); });
+                   [](const Track* a, const Track* b) { return a->views() > b->views(); });
   if (result.size() > count) result.resize(count);
   return result;
 }

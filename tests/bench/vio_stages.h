@@ -40,6 +40,8 @@ class RunningFilter {
 
   /// After 100 frames.
   const Estimator& estimator() const { return warm_; }
+  /// Another one like estimator().
+  Estimator warmed() const;
   /// The frame that comes next for estimator().
   const FrameInput& input() const { return inputs_[kWarm]; }
   /// All of the drive's frames that come after the first 100.
@@ -50,7 +52,7 @@ class RunningFilter {
   /// What the window's frames and input() saw.
   const FeatureDatabase& database() const { return database_; }
   /// The longest tracks of database() that are not in the state, at most `count`.
-  std::vector<Track> tracks(std::size_t count) const;
+  std::vector<const Track*> tracks(std::size_t count) const;
 
  private:
   static constexpr std::size_t kWarm = 100, kFrames = 340;

@@ -1,6 +1,8 @@
 #include "services/vio/core/estimator.h"
 
 #include <algorithm>
+#include <tuple>
+#include <utility>
 
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
@@ -87,11 +89,10 @@ SavedState Estimator::save() const {
   return s;
 }
 
-Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) const {
+Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) {
   if (!state_ || to <= state_->time || imu.empty()) return Eigen::Matrix3d::Identity();
-  const ImuIncrement x = integrate(imu.between(state_->time, to), state_->nav.gyro_bias,
-                                   state_->nav.accel_bias, options_.imu);
-  return x.dq.toRotationMatrix().transpose();
+  imu.between(state_->time, to, readings_);
+  return integrateRotation(readings_, state_->nav.gyro_bias).toRotationMatrix().transpose();
 }
 
 Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& imu) {
@@ -99,8 +100,9 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   if (imu.empty()) return fail("imu_missing");
   Eigen::Vector3d rate;
   if (to > state_->time) {
-    const ImuIncrement x = integrate(imu.between(state_->time, to), state_->nav.gyro_bias,
-                                     state_->nav.accel_bias, options_.imu);
+    imu.between(state_->time, to, readings_);
+    const ImuIncrement x =
+        integrate(readings_, state_->nav.gyro_bias, state_->nav.accel_bias, options_.imu);
     propagate(*state_, x, to, options_.gravity, options_.window.first_estimates);
     rate = x.end_rate;
   } else if (to == state_->time) {
@@ -119,7 +121,8 @@ bool Estimator::restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePo
   if (!previous_frame_ || !state_->clone(*previous_frame_) || state_->time <= from) return false;
   if (input.speed && std::abs(input.speed->speed) > 0.1) return false;
   if (state_->nav.v_WB.norm() > o.max_speed) return false;
-  const RestSample sample = restSample(imu.between(from, state_->time), options_.imu);
+  imu.between(from, state_->time, readings_);
+  const RestSample sample = restSample(readings_, options_.imu);
   if ((sample.rate - state_->nav.gyro_bias).norm() > o.max_rate + 3.0 * sample.rate_sigma) {
     return false;
   }
@@ -133,29 +136,42 @@ bool Estimator::restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePo
   return done.has_value();
 }
 
-std::vector<Track> Estimator::takeOnceUsed(std::uint64_t frame, bool window_full) {
-  std::vector<Track> ended, leaving;
+std::vector<const Track*> Estimator::onceUsed(std::uint64_t frame, bool window_full) const {
+  struct Candidate {
+    bool goes_on;
+    std::size_t views;
+    const Track* track;
+  };
+  std::vector<Candidate> candidates;
+  candidates.reserve(database_.tracks().size());
   const std::uint64_t oldest = state_->clones.front().frame;
-  std::vector<std::uint64_t> erase;
   for (const auto& [id, track] : database_.tracks()) {
-    if (state_->point(id)) continue;
-    const bool enough = asInt(track.views()) >= options_.window.min_observations;
-    if (!track.seenAt(frame)) {
-      if (enough) ended.push_back(track);
-      erase.push_back(id);
-    } else if (window_full && enough && track.observations.front().frame == oldest) {
-      leaving.push_back(track);
-    }
+    const std::size_t views = track.views();
+    if (asInt(views) < options_.window.min_observations || state_->point(id)) continue;
+    const bool goes_on = track.seenAt(frame);
+    if (goes_on && !(window_full && track.observations.front().frame == oldest)) continue;
+    candidates.push_back({goes_on, views, &track});
   }
-  for (const std::uint64_t id : erase) database_.erase(id);
-  const auto longer = [](const Track& a, const Track& b) { return a.views() > b.views(); };
-  std::stable_sort(ended.begin(), ended.end(), longer);
-  std::stable_sort(leaving.begin(), leaving.end(), longer);
-  ended.insert(ended.end(), leaving.begin(), leaving.end());
+  // Those that have ended first, for they have no other chance; then the longest.
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::tuple(a.goes_on, b.views, a.track->id) <
+           std::tuple(b.goes_on, a.views, b.track->id);
+  });
   const auto limit = static_cast<std::size_t>(options_.window.msckf_features);
-  if (ended.size() > limit) ended.resize(limit);
-  for (const Track& track : ended) database_.erase(track.id);
-  return ended;
+  if (candidates.size() > limit) candidates.resize(limit);
+  std::vector<const Track*> result;
+  result.reserve(candidates.size());
+  for (const Candidate& c : candidates) result.push_back(c.track);
+  return result;
+}
+
+void Estimator::forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame) {
+  for (const Track* track : used) database_.erase(track->id);
+  std::vector<std::uint64_t> ended;
+  for (const auto& [id, track] : database_.tracks()) {
+    if (!track.seenAt(frame) && !state_->point(id)) ended.push_back(id);
+  }
+  for (const std::uint64_t id : ended) database_.erase(id);
 }
 
 void Estimator::dropLostPoints(std::uint64_t frame) {
@@ -173,22 +189,25 @@ void Estimator::dropLostPoints(std::uint64_t frame) {
 Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
   if (!window_full) return {};
   const std::uint64_t oldest = state_->clones.front().frame;
-  std::vector<Track> candidates;
+  const auto room = options_.window.slam_features - asInt(state_->points.size());
+  if (room <= 0) return {};
+  std::vector<std::pair<std::size_t, const Track*>> candidates;  // with its views
   for (const auto& [id, track] : database_.tracks()) {
     if (state_->point(id) || !track.seenAt(frame)) continue;
     if (track.observations.front().frame != oldest) continue;
-    candidates.push_back(track);
+    candidates.emplace_back(track.views(), &track);
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Track& a, const Track& b) { return a.views() > b.views(); });
-  for (const Track& track : candidates) {
+  std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+    return std::tuple(b.first, a.second->id) < std::tuple(a.first, b.second->id);
+  });
+  for (const auto& [views, track] : candidates) {
     if (asInt(state_->points.size()) >= options_.window.slam_features) break;
-    const auto added = initialisePoint(*state_, track, options_.vision);
+    const auto added = initialisePoint(*state_, *track, options_.vision);
     if (!added) {
       reasons_.add(added.error());
       if (added.error().code.starts_with("update_")) return added;
     }
-    database_.erase(track.id);
+    database_.erase(track->id);
   }
   return {};
 }
@@ -200,9 +219,10 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   if (!slam) return tl::unexpected(slam.error());
   for (const PointState& point : state_->points) database_.erase(point.id);
   if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;
-  const auto once =
-      updateMsckf(*state_, takeOnceUsed(input.frame, full), options_.vision, reasons_);
+  const std::vector<const Track*> tracks = onceUsed(input.frame, full);
+  const auto once = updateMsckf(*state_, tracks, options_.vision, reasons_);
   if (!once) return tl::unexpected(once.error());
+  forgetUsed(tracks, input.frame);
   out.points_used = slam->used + once->used;
   return {};
 }
@@ -212,7 +232,8 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   // The pose at the image is the newest clone's: unlike nav's it knows the time offset's error.
   const Clone& newest = state_->clones.back();
   out.nav = state_->nav;
-  out.covariance = state_->covarianceOf({{newest.at, 6}, {kVelocity, 3}});
+  out.covariance << P.block<6, 6>(newest.at, newest.at), P.block<6, 3>(newest.at, kVelocity),
+      P.block<3, 6>(kVelocity, newest.at), P.block<3, 3>(kVelocity, kVelocity);
   const Clone* previous = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
   const Matrix6d P_now = P.block<6, 6>(newest.at, newest.at);
   if (previous) {

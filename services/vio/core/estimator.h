@@ -74,7 +74,7 @@ class Estimator {
   Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
 
   /// The rotation R_B1_B0 of the body from the newest frame to an IMU time, by the gyroscope.
-  Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to) const;
+  Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
 
   /// Points seen in the newest image whose position is known.
   std::vector<LandmarkEstimate> landmarks() const;
@@ -88,7 +88,8 @@ class Estimator {
   Result<void> propagateTo(const FrameInput& input, const ImuBuffer& imu);
   bool restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePoint from);
   Result<void> visionUpdate(const FrameInput& input, FrameEstimate& out);
-  std::vector<Track> takeOnceUsed(std::uint64_t frame, bool window_full);
+  std::vector<const Track*> onceUsed(std::uint64_t frame, bool window_full) const;
+  void forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame);
   Result<void> admitPoints(std::uint64_t frame, bool window_full);
   void dropLostPoints(std::uint64_t frame);
   void report(const FrameInput& input, FrameEstimate& out);
@@ -103,6 +104,7 @@ class Estimator {
   std::optional<State> state_;
   FeatureDatabase database_;
   TrackedFrame newest_;
+  std::vector<ImuReading> readings_;  ///< of one interval; kept for its memory
   ReasonCounts reasons_;
   std::optional<std::uint64_t> previous_frame_;
   Matrix6d previous_pose_covariance_ = Matrix6d::Zero();

@@ -62,15 +62,21 @@ ImuReading ImuBuffer::reading(TimePoint time) const {
 }
 
 std::vector<ImuReading> ImuBuffer::between(TimePoint from, TimePoint to) const {
+  std::vector<ImuReading> result;
+  between(from, to, result);
+  return result;
+}
+
+void ImuBuffer::between(TimePoint from, TimePoint to, std::vector<ImuReading>& readings) const {
   check(from < to, "an interval has a length");
-  if (raw_.empty()) return {};
-  std::vector<ImuReading> result{reading(from)};
+  readings.clear();
+  if (raw_.empty()) return;
+  readings.push_back(reading(from));
   for (auto it = std::lower_bound(raw_.begin(), raw_.end(), from, kEarlier);
        it != raw_.end() && it->time < to; ++it) {
-    if (it->time > from) result.push_back(reading(it->time));
+    if (it->time > from) readings.push_back(reading(it->time));
   }
-  result.push_back(reading(to));
-  return result;
+  readings.push_back(reading(to));
 }
 
 Duration ImuBuffer::longestGap(TimePoint from, TimePoint to) const {

@@ -33,6 +33,8 @@ class ImuBuffer {
   /// Readings at from, at all samples between, and at to (from < to). Outside of the samples the
   /// nearest one is held. Empty when there are no samples.
   std::vector<ImuReading> between(TimePoint from, TimePoint to) const;
+  /// The same into `readings`, whose memory is used again.
+  void between(TimePoint from, TimePoint to, std::vector<ImuReading>& readings) const;
   /// The longest time without a sample inside [from, to].
   Duration longestGap(TimePoint from, TimePoint to) const;
   /// The median distance of the newest samples; nothing before there are three.

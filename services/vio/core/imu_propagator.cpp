@@ -110,6 +110,17 @@ ImuIncrement integrate(const std::vector<ImuReading>& readings, const Vector3d& 
   return x;
 }
 
+Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
+                                     const Vector3d& gyro_bias) {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    const ImuReading &a = readings[i - 1], &b = readings[i];
+    const Matrix3d R = turn(a.gyro - gyro_bias, b.gyro - gyro_bias, toSeconds(b.time - a.time)).R;
+    q = Eigen::Quaterniond(Matrix3d(q.toRotationMatrix() * R)).normalized();
+  }
+  return q;
+}
+
 Nav predict(const Nav& nav, const ImuIncrement& x, double gravity) {
   const Vector3d g(0, 0, -gravity);
   Nav to = nav;
@@ -150,7 +161,14 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
   Matrix15d P_nav =
       Phi * P.topLeftCorner<kNavSize, kNavSize>() * Phi.transpose() + G * x.Q * G.transpose();
   P.topLeftCorner<kNavSize, kNavSize>() = 0.5 * (P_nav + P_nav.transpose());
-  P.topRightCorner(kNavSize, rest) = (Phi * P.topRightCorner(kNavSize, rest)).eval();
+  // In pieces that fit on the stack.
+  constexpr int kPiece = 32;
+  for (Eigen::Index at = 0; at < rest; at += kPiece) {
+    auto cross = P.block(0, kNavSize + at, kNavSize, std::min<Eigen::Index>(kPiece, rest - at));
+    const Eigen::Matrix<double, kNavSize, Eigen::Dynamic, Eigen::ColMajor, kNavSize, kPiece> moved =
+        Phi * cross;
+    cross = moved;
+  }
   P.bottomLeftCorner(rest, kNavSize) = P.topRightCorner(kNavSize, rest).transpose();
   state.nav = predicted;
   state.nav_first = predicted;

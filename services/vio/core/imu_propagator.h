@@ -31,6 +31,10 @@ struct ImuIncrement {
 ImuIncrement integrate(const std::vector<ImuReading>& readings, const Eigen::Vector3d& gyro_bias,
                        const Eigen::Vector3d& accel_bias, const ImuNoise& noise);
 
+/// integrate()'s dq alone: R_B0_B1.
+Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
+                                     const Eigen::Vector3d& gyro_bias);
+
 /// The navigation state after the increment; gravity in m/s², along −z of W.
 Nav predict(const Nav& nav, const ImuIncrement& increment, double gravity);
 

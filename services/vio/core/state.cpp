@@ -8,6 +8,22 @@
 #include "common/math/so3.h"
 
 namespace perdure::vio {
+namespace {
+
+/// What an update with m rows of a state of n needs of the workspace.
+Eigen::Index roomOfUpdate(Eigen::Index n, Eigen::Index m) {
+  return 2 * Workspace::need(n, m) + Workspace::need(m, m) + Workspace::need(m, 1) +
+         Workspace::need(n, 1);
+}
+
+}  // namespace
+
+Workspace::Matrix Workspace::take(Eigen::Index rows, Eigen::Index columns) {
+  double* const at = memory_.data() + taken_;
+  taken_ += need(rows, columns);
+  check(taken_ <= memory_.size(), "a workspace is begun with room for all that is taken");
+  return {at, rows, columns};
+}
 
 State::State(const std::vector<RigidTransform>& cameras, double offset, int max_clones,
              int max_points)
@@ -16,6 +32,12 @@ State::State(const std::vector<RigidTransform>& cameras, double offset, int max_
       size_(kNavSize + 6 * static_cast<int>(cameras.size()) + 1) {
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
+  // The largest updates: of all points, and of compressed rows by calibration and clones.
+  const int count = static_cast<int>(cameras.size());
+  workspace_.begin(
+      roomOfUpdate(capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2))));
+  clones.reserve(static_cast<std::size_t>(max_clones + 2));
+  points.reserve(static_cast<std::size_t>(max_points));
 }
 
 const Clone* State::clone(std::uint64_t frame) const {
@@ -25,8 +47,8 @@ const Clone* State::clone(std::uint64_t frame) const {
   return nullptr;
 }
 
-PointState* State::point(std::uint64_t id) {
-  for (PointState& p : points) {
+const PointState* State::point(std::uint64_t id) const {
+  for (const PointState& p : points) {
     if (p.id == id) return &p;
   }
   return nullptr;
@@ -40,9 +62,16 @@ int State::append(int size) {
 }
 
 void State::remove(int at, int size) {
+  // Column by column, so that nothing has to be copied aside: what moves up or left never lands
+  // on what is still to be moved.
   const int tail = size_ - at - size;
-  P_.block(at, 0, tail, size_) = P_.block(at + size, 0, tail, size_).eval();
-  P_.block(0, at, size_ - size, tail) = P_.block(0, at + size, size_ - size, tail).eval();
+  for (int column = 0; column < size_; ++column) {
+    if (column >= at && column < at + size) continue;
+    const double* const from = P_.col(column).data();
+    double* const to = P_.col(column < at ? column : column - size).data();
+    if (to != from) std::copy(from, from + at, to);
+    std::copy(from + at + size, from + at + size + tail, to + at);
+  }
   size_ -= size;
   for (Clone& c : clones) {
     if (c.at > at) c.at -= size;
@@ -59,10 +88,12 @@ void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vec
       first_estimates ? RigidTransform(nav_first.q_WB, nav_first.p_WB) : nav.T_WB();
   Eigen::Matrix<double, 6, 1> J_offset;
   J_offset << rate_B, (first_estimates ? nav_first.v_WB : nav.v_WB);
-  P_.block(at, 0, 6, n) = P_.block(0, 0, 6, n) + J_offset * P_.row(offset).head(n);
+  for (int j = 0; j < n; ++j) {
+    P_.block<6, 1>(at, j) = P_.block<6, 1>(0, j) + J_offset * P_(offset, j);
+  }
   P_.block(0, at, n, 6) = P_.block(at, 0, 6, n).transpose();
-  P_.block(at, at, 6, 6) =
-      P_.block(at, 0, 6, 6) + P_.block(at, offset, 6, 1) * J_offset.transpose();
+  P_.block<6, 6>(at, at) =
+      P_.block<6, 6>(at, 0) + P_.block<6, 1>(at, offset) * J_offset.transpose();
   clones.push_back({frame, image_time, nav.T_WB(), first, at});
 }
 
@@ -93,7 +124,7 @@ void State::removePoint(std::uint64_t id) {
   remove(at, 3);
 }
 
-void State::apply(const Eigen::VectorXd& dx) {
+void State::apply(const VectorView& dx) {
   nav.q_WB = (nav.q_WB * expQuaternion(dx.segment<3>(kTheta))).normalized();
   nav.p_WB += dx.segment<3>(kPosition);
   nav.v_WB += dx.segment<3>(kVelocity);
@@ -108,7 +139,7 @@ void State::apply(const Eigen::VectorXd& dx) {
   for (PointState& p : points) p.p_W += dx.segment<3>(p.at);
 }
 
-Eigen::MatrixXd State::covarianceOf(const std::vector<Block>& blocks) const {
+Eigen::MatrixXd State::covarianceOf(std::span<const Block> blocks) const {
   int n = 0;
   for (const Block& b : blocks) n += b.size;
   Eigen::MatrixXd result(n, n);
@@ -124,33 +155,37 @@ Eigen::MatrixXd State::covarianceOf(const std::vector<Block>& blocks) const {
   return result;
 }
 
-Eigen::MatrixXd State::project(const Eigen::MatrixXd& H, const std::vector<Block>& blocks) const {
+Eigen::MatrixXd State::project(const MatrixView& H, std::span<const Block> blocks) const {
   return H * covarianceOf(blocks) * H.transpose();
 }
 
 Result<void> State::update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                            const Eigen::VectorXd& r) {
-  return update({Measurement{H, blocks, r}});
+  const Measurement one{H, blocks, r};
+  return update(std::span(&one, 1));
 }
 
-Result<void> State::update(const std::vector<Measurement>& measurements) {
+Result<void> State::update(std::span<const Measurement> measurements) {
   Eigen::Index m = 0;
   for (const Measurement& z : measurements) m += z.r.size();
-  Eigen::VectorXd r(m);
-  Eigen::MatrixXd PHt = Eigen::MatrixXd::Zero(size_, m);
+  const Eigen::Index n = size_;
+  workspace_.begin(roomOfUpdate(n, m));
+  auto PHt = workspace_.take(n, m), Wt = workspace_.take(m, n), S = workspace_.take(m, m);
+  auto r = workspace_.take(m, 1), dx = workspace_.take(n, 1);
+  PHt.setZero();
   Eigen::Index row = 0;
   for (const Measurement& z : measurements) {
     const Eigen::Index rows = z.r.size();
-    r.segment(row, rows) = z.r;
+    r.middleRows(row, rows) = z.r;
     Eigen::Index column = 0;
     for (const Block& b : z.blocks) {
       PHt.middleCols(row, rows).noalias() +=
-          P_.block(0, b.at, size_, b.size) * z.H.middleCols(column, b.size).transpose();
+          P_.block(0, b.at, n, b.size) * z.H.middleCols(column, b.size).transpose();
       column += b.size;
     }
     row += rows;
   }
-  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(m, m);  // the lower triangle counts
+  S.setIdentity();  // the lower triangle counts
   row = 0;
   for (const Measurement& z : measurements) {
     const Eigen::Index rows = z.r.size();
@@ -162,16 +197,17 @@ Result<void> State::update(const std::vector<Measurement>& measurements) {
     }
     row += rows;
   }
-  const Cholesky chol(S);
-  if (!chol.positive()) return fail("update_not_positive");
+  if (!choleskyInPlace(S)) return fail("update_not_positive");
   // K S Kᵀ = W Wᵀ with W = P Hᵀ L⁻ᵀ; dx = W L⁻¹ r.
-  const Eigen::MatrixXd Wt = chol.whiten(PHt.transpose());
-  const Eigen::VectorXd dx = Wt.transpose() * chol.whiten(r);
+  Wt = PHt.transpose();
+  whitenInPlace(S, Wt);
+  whitenInPlace(S, r);
+  dx.noalias() = Wt.transpose() * r;
   if (!dx.allFinite()) return fail("update_not_finite");
   auto active = P_.topLeftCorner(size_, size_);
   active.selfadjointView<Eigen::Lower>().rankUpdate(Wt.transpose(), -1.0);
   active.triangularView<Eigen::StrictlyUpper>() = active.transpose();
-  apply(dx);
+  apply(dx.col(0));
   return {};
 }
 

@@ -7,10 +7,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <initializer_list>
+#include <span>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/base/time.h"
+#include "common/math/gaussian.h"
 #include "common/math/rigid_transform.h"
 
 namespace perdure::vio {
@@ -46,10 +49,38 @@ struct Block {
 };
 
 /// r = H·error + noise of unit covariance; H's columns are those of `blocks`, one after another.
+/// A view: the owner of the numbers must outlive it.
 struct Measurement {
-  Eigen::MatrixXd H;
-  std::vector<Block> blocks;
-  Eigen::VectorXd r;
+  MatrixView H;
+  std::span<const Block> blocks;
+  VectorView r;
+};
+
+/// Memory for matrices that are needed for a moment: it grows to the largest need and is kept, so
+/// that a filter that runs allocates nothing. No part of a value: copies begin without any.
+class Workspace {
+ public:
+  using Matrix = Eigen::Map<Eigen::MatrixXd, Eigen::Aligned16>;
+
+  Workspace() = default;
+  Workspace(const Workspace&) {}
+  Workspace& operator=(const Workspace&) { return *this; }
+
+  /// Room for `size` numbers in all; what was taken before is void.
+  void begin(Eigen::Index size) {
+    if (memory_.size() < size) memory_.resize(size);
+    taken_ = 0;
+  }
+  /// How much of begin()'s room a matrix takes.
+  static Eigen::Index need(Eigen::Index rows, Eigen::Index columns) {
+    return (rows * columns + 1) / 2 * 2;
+  }
+  /// Not initialised.
+  Matrix take(Eigen::Index rows, Eigen::Index columns);
+
+ private:
+  Eigen::VectorXd memory_;
+  Eigen::Index taken_ = 0;
 };
 
 inline constexpr int kNavSize = 15;
@@ -74,7 +105,7 @@ class State {
   auto P() const { return P_.topLeftCorner(size_, size_); }
 
   const Clone* clone(std::uint64_t frame) const;
-  PointState* point(std::uint64_t id);
+  const PointState* point(std::uint64_t id) const;
 
   /// Adds a clone of the present pose. rate_B: angular rate, which ties it to the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
@@ -86,18 +117,21 @@ class State {
   void removePoint(std::uint64_t id);
 
   /// x ← x ⊞ dx.
-  void apply(const Eigen::VectorXd& dx);
+  void apply(const VectorView& dx);
   /// EKF update with residual r = H·error + noise of unit covariance; H's columns are those of
   /// `blocks`, one after another. Fails with "update_not_positive" or "update_not_finite", and
   /// then leaves the state as it was.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
   /// The same with measurements that each touch few blocks: their zeros cost nothing.
-  Result<void> update(const std::vector<Measurement>& measurements);
+  Result<void> update(std::span<const Measurement> measurements);
   /// H P Hᵀ for such an H.
-  Eigen::MatrixXd project(const Eigen::MatrixXd& H, const std::vector<Block>& blocks) const;
+  Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;
   /// The covariance of the error of `blocks`.
-  Eigen::MatrixXd covarianceOf(const std::vector<Block>& blocks) const;
+  Eigen::MatrixXd covarianceOf(std::span<const Block> blocks) const;
+  Eigen::MatrixXd covarianceOf(std::initializer_list<Block> blocks) const {
+    return covarianceOf(std::span(blocks.begin(), blocks.size()));
+  }
   /// All numbers finite and all variances positive.
   bool healthy() const;
 
@@ -107,6 +141,7 @@ class State {
 
   int size_;
   Eigen::MatrixXd P_;  ///< capacity; the upper left size_ × size_ counts
+  Workspace workspace_;
 };
 
 }  // namespace perdure::vio

@@ -23,16 +23,36 @@ std::size_t Track::views() const {
 
 void FeatureDatabase::add(std::uint64_t frame, const TrackedFrame& tracked) {
   for (const TrackedPoint& point : tracked.points) {
-    Track& track = tracks_[point.id];
-    track.id = point.id;
-    track.observations.push_back({frame, point.seen});
+    auto it = tracks_.find(point.id);
+    if (it == tracks_.end()) {
+      if (spare_.empty()) {
+        it = tracks_.try_emplace(point.id).first;
+      } else {
+        spare_.back().key() = point.id;
+        it = tracks_.insert(std::move(spare_.back())).position;
+        spare_.pop_back();
+      }
+      it->second.id = point.id;
+      it->second.observations.clear();
+    }
+    it->second.observations.push_back({frame, point.seen});
   }
+}
+
+FeatureDatabase::Tracks::iterator FeatureDatabase::forget(Tracks::iterator track) {
+  const auto next = std::next(track);
+  spare_.push_back(tracks_.extract(track));
+  return next;
+}
+
+void FeatureDatabase::erase(std::uint64_t id) {
+  if (const auto it = tracks_.find(id); it != tracks_.end()) forget(it);
 }
 
 void FeatureDatabase::removeFrame(std::uint64_t frame) {
   for (auto it = tracks_.begin(); it != tracks_.end();) {
     std::erase_if(it->second.observations, [&](const Observation& o) { return o.frame == frame; });
-    it = it->second.observations.empty() ? tracks_.erase(it) : std::next(it);
+    it = it->second.observations.empty() ? forget(it) : std::next(it);
   }
 }
 

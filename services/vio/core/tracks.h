@@ -55,13 +55,17 @@ class FeatureDatabase {
   void add(std::uint64_t frame, const TrackedFrame& tracked);
   /// Forgets what was seen at a frame, and tracks that are then empty.
   void removeFrame(std::uint64_t frame);
-  void erase(std::uint64_t id) { tracks_.erase(id); }
+  void erase(std::uint64_t id);
   void clear() { tracks_.clear(); }
   const std::map<std::uint64_t, Track>& tracks() const { return tracks_; }
   const Track* find(std::uint64_t id) const;
 
  private:
-  std::map<std::uint64_t, Track> tracks_;
+  using Tracks = std::map<std::uint64_t, Track>;
+  Tracks::iterator forget(Tracks::iterator track);  ///< the one after it
+
+  Tracks tracks_;
+  std::vector<Tracks::node_type> spare_;  ///< of forgotten tracks, with the memory they had
 };
 
 }  // namespace perdure::vio

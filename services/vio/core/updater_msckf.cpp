@@ -5,21 +5,22 @@
 
 namespace perdure::vio {
 
-Result<UpdateCounts> updateMsckf(State& state, const std::vector<Track>& tracks,
+Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons) {
   UpdateCounts counts;
   const std::vector<Block> blocks = calibrationAndClones(state);
   const Eigen::MatrixXd P = state.covarianceOf(blocks);
   std::vector<PointSystem> systems;
   Eigen::Index rows = 0;
-  for (const Track& track : tracks) {
-    const auto point = triangulate(raysOf(track, state, options.sigma_px), options);
+  systems.reserve(tracks.size());
+  for (const Track* const track : tracks) {
+    const auto point = triangulate(raysOf(*track, state, options.sigma_px), options);
     if (!point) {
       ++counts.not_triangulated;
       reasons.add(point.error());
       continue;
     }
-    PointSystem s = stackViews(track, state, point->p_W, point->p_W, options.sigma_px);
+    PointSystem s = stackViews(*track, state, point->p_W, point->p_W, options.sigma_px);
     if (s.r.size() < 4) continue;
     separatePoint(s);
     dropPoint(s);

@@ -18,7 +18,7 @@ struct UpdateCounts {
 
 /// Triangulates each track, gates it, and updates the state with all that pass at once. Counts
 /// failures under their reasons. Fails only where the update itself does.
-Result<UpdateCounts> updateMsckf(State& state, const std::vector<Track>& tracks,
+Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons);
 
 }  // namespace perdure::vio

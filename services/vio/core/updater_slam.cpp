@@ -1,6 +1,8 @@
 #include "services/vio/core/updater_slam.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 
 #include "common/base/check.h"
 #include "services/vio/core/triangulation.h"
@@ -12,17 +14,30 @@ namespace {
 constexpr int kFailuresToLeave = 3;
 
 /// The newest clone's views of one point: rows × [extrinsics, clone, point].
-Result<Measurement> rowsOf(const State& state, const PointState& point, const Observation& seen,
-                           double sigma_px) {
+struct PointRows {
+  static constexpr int kRows = 2 * kMaxCameras, kColumns = 6 * kMaxCameras + 9;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
+  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kRows, 1> r;
+  std::array<Block, kMaxCameras + 2> block;
+  std::size_t blocks = 0;
+
+  Measurement measurement() const { return {H, std::span(block.data(), blocks), r}; }
+};
+
+Result<PointRows> rowsOf(const State& state, const PointState& point, const Observation& seen,
+                         double sigma_px) {
   const Clone& clone = state.clones.back();
   const auto cameras = static_cast<Eigen::Index>(state.T_BC.size());
-  Measurement rows{
-      Eigen::MatrixXd::Zero(2 * cameras, 6 * cameras + 9), {}, Eigen::VectorXd(2 * cameras)};
+  const auto views = std::count_if(seen.seen.begin(), seen.seen.begin() + cameras,
+                                   [](const auto& s) { return s.has_value(); });
+  PointRows rows;
+  rows.H.setZero(2 * views, 6 * cameras + 9);
+  rows.r.resize(2 * views);
   for (int c = 0; c < static_cast<int>(cameras); ++c) {
-    rows.blocks.push_back({state.extrinsicsAt(c), 6});
+    rows.block[rows.blocks++] = {state.extrinsicsAt(c), 6};
   }
-  rows.blocks.push_back({clone.at, 6});
-  rows.blocks.push_back({point.at, 3});
+  rows.block[rows.blocks++] = {clone.at, 6};
+  rows.block[rows.blocks++] = {point.at, 3};
   Eigen::Index row = 0;
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
     if (!seen.seen[c]) continue;
@@ -39,8 +54,6 @@ Result<Measurement> rowsOf(const State& state, const PointState& point, const Ob
     rows.r.segment<2>(row) = weight * (seen.seen[c]->normalised - now);
     row += 2;
   }
-  rows.H.conservativeResize(row, Eigen::NoChange);
-  rows.r.conservativeResize(row);
   return rows;
 }
 
@@ -50,13 +63,14 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, ReasonCounts& reasons) {
   check(!state.clones.empty(), "the newest pose is cloned");
   UpdateCounts counts;
-  std::vector<Measurement> used;
+  std::vector<PointRows> used;
+  used.reserve(state.points.size());
   std::vector<std::uint64_t> leaving;
   for (PointState& point : state.points) {
     const Track* track = database.find(point.id);
     if (!track || !track->seenAt(state.clones.back().frame)) continue;
     const auto rows = rowsOf(state, point, track->observations.back(), options.sigma_px);
-    const auto of_views = [&] { return state.project(rows->H, rows->blocks); };
+    const auto of_views = [&] { return state.project(rows->H, rows->measurement().blocks); };
     if (rows && passesGateWith(rows->r, of_views, options.gate_probability)) {
       point.failed_gates = 0;
       used.push_back(*rows);
@@ -68,7 +82,10 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
     if (!rows || ++point.failed_gates >= kFailuresToLeave) leaving.push_back(point.id);
   }
   if (!used.empty()) {
-    if (const auto done = state.update(used); !done) return tl::unexpected(done.error());
+    std::vector<Measurement> measurements;
+    measurements.reserve(used.size());
+    for (const PointRows& rows : used) measurements.push_back(rows.measurement());
+    if (const auto done = state.update(measurements); !done) return tl::unexpected(done.error());
   }
   for (const std::uint64_t id : leaving) state.removePoint(id);
   return counts;

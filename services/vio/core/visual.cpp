@@ -47,6 +47,7 @@ bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
 
 std::vector<Block> calibrationAndClones(const State& state) {
   std::vector<Block> blocks;
+  blocks.reserve(state.T_BC.size() + state.clones.size());
   for (int c = 0; c < static_cast<int>(state.T_BC.size()); ++c) {
     blocks.push_back({state.extrinsicsAt(c), 6});
   }
@@ -93,11 +94,10 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
 
 void separatePoint(PointSystem& s) {
   check(s.r.size() >= 3, "a point has at least three rows");
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(s.H_f);
+  Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(s.H_f);
   s.H_x.applyOnTheLeft(qr.householderQ().adjoint());
   s.r.applyOnTheLeft(qr.householderQ().adjoint());
-  s.H_f.setZero();
-  s.H_f.topRows<3>() = qr.matrixQR().topRows<3>().triangularView<Eigen::Upper>();
+  s.H_f.triangularView<Eigen::StrictlyLower>().setZero();
 }
 
 void dropPoint(PointSystem& s) {
@@ -106,13 +106,13 @@ void dropPoint(PointSystem& s) {
   s.r = s.r.tail(rows).eval();
 }
 
-bool passesGate(const Eigen::VectorXd& r, const Eigen::MatrixXd& S, double probability) {
+bool passesGate(const VectorView& r, const MatrixView& S, double probability) {
   const Cholesky chol(S);
   return chol.positive() &&
          chol.whiten(r).squaredNorm() < gate(static_cast<int>(r.size()), probability);
 }
 
-bool passesGateWith(const Eigen::VectorXd& r, const std::function<Eigen::MatrixXd()>& P,
+bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability) {
   if (r.squaredNorm() < gate(static_cast<int>(r.size()), probability)) return true;
   Eigen::MatrixXd S = P();

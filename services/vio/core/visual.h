@@ -47,11 +47,11 @@ void separatePoint(PointSystem& system);
 void dropPoint(PointSystem& system);
 
 /// True when rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
-bool passesGate(const Eigen::VectorXd& r, const Eigen::MatrixXd& S, double probability);
+bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
 /// The same with S = P + I, where P is costly: it is only asked for when rᵀ r, which bounds
 /// rᵀ S⁻¹ r from above, is not below.
-bool passesGateWith(const Eigen::VectorXd& r, const std::function<Eigen::MatrixXd()>& P,
+bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 
 /// Keeps no more rows than columns, by QR, without loss.
