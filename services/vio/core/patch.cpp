@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace perdure::vio {
@@ -28,17 +29,42 @@ bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vect
       !(centre.y() + reach.y() < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  Eigen::Index i = 0;
-  for (int y = -Patch::kHalf; y <= Patch::kHalf; ++y) {
-    Eigen::Vector2f p = centre + warp * Eigen::Vector2f(-h, static_cast<float>(y));
-    for (int x = 0; x < Patch::kSide; ++x, p += warp.col(0)) {
-      const int u = static_cast<int>(p.x()), v = static_cast<int>(p.y());
-      const float a = p.x() - static_cast<float>(u), b = p.y() - static_cast<float>(v);
-      const std::uint8_t* top = image.ptr<std::uint8_t>(v) + u;
+  // All rows go side by side, a column at a time: so the compiler has loops of a fixed length over
+  // them. Rows beyond the patch repeat its last one.
+  constexpr std::size_t kRows = 16;
+  static_assert(kRows >= Patch::kSide);
+  std::array<float, kRows> px, py, a, b;
+  for (std::size_t r = 0; r < kRows; ++r) {
+    const float y = std::min(static_cast<float>(r), 2 * h) - h;
+    px[r] = centre.x() + (warp(0, 0) * -h + warp(0, 1) * y);
+    py[r] = centre.y() + (warp(1, 0) * -h + warp(1, 1) * y);
+  }
+  std::array<int, kRows> u, v, top_left, top_right, low_left, low_right;
+  std::array<float, kRows> value;
+  for (int x = 0; x < Patch::kSide; ++x) {
+    for (std::size_t r = 0; r < kRows; ++r) {
+      u[r] = static_cast<int>(px[r]);
+      v[r] = static_cast<int>(py[r]);
+      a[r] = px[r] - static_cast<float>(u[r]);
+      b[r] = py[r] - static_cast<float>(v[r]);
+      px[r] += warp(0, 0);
+      py[r] += warp(1, 0);
+    }
+    for (std::size_t r = 0; r < kRows; ++r) {
+      const std::uint8_t* top = image.ptr<std::uint8_t>(v[r]) + u[r];
       const std::uint8_t* low = top + image.step;
-      const float upper = top[0] + a * static_cast<float>(top[1] - top[0]);
-      const float lower = low[0] + a * static_cast<float>(low[1] - low[0]);
-      out[i++] = upper + b * (lower - upper);
+      top_left[r] = top[0], top_right[r] = top[1];
+      low_left[r] = low[0], low_right[r] = low[1];
+    }
+    for (std::size_t r = 0; r < kRows; ++r) {
+      const float upper =
+          static_cast<float>(top_left[r]) + a[r] * static_cast<float>(top_right[r] - top_left[r]);
+      const float lower =
+          static_cast<float>(low_left[r]) + a[r] * static_cast<float>(low_right[r] - low_left[r]);
+      value[r] = upper + b[r] * (lower - upper);
+    }
+    for (int r = 0; r < Patch::kSide; ++r) {
+      out[r * Patch::kSide + x] = value[static_cast<std::size_t>(r)];
     }
   }
   return true;
@@ -102,8 +128,8 @@ std::optional<Patch::Found> Patch::find(const std::vector<cv::Mat>& levels,
     if (!sample(image, warp, at, now)) return std::nullopt;
     const float norm = centre(now);
     if (!(norm > 0)) return std::nullopt;
-    const Eigen::Matrix<float, 6, 1> d =
-        inverse_hessian_ * (steepest_.transpose() * (norm_ / norm * now - value_));
+    const Values difference = norm_ / norm * now - value_;
+    const Eigen::Matrix<float, 6, 1> d = inverse_hessian_ * (steepest_.transpose() * difference);
     Eigen::Matrix2f step;
     step << d[2], d[3], d[4], d[5];
     warp = warp * (Eigen::Matrix2f::Identity() + step / kHalf).inverse();

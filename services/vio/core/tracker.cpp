@@ -5,6 +5,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <tuple>
 
 #include "common/base/check.h"
 
@@ -20,6 +21,11 @@ cv::Point2f toCv(const Eigen::Vector2d& p) {
 
 cv::TermCriteria criteria(std::int64_t iterations) {
   return {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, static_cast<int>(iterations), 0.01};
+}
+
+/// By response; of equal ones the later in reading order is the worse.
+bool worse(const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  return std::tuple(-a.response, a.pt.y, a.pt.x) > std::tuple(-b.response, b.pt.y, b.pt.x);
 }
 
 }  // namespace
@@ -149,11 +155,13 @@ void Tracker::detect(const cv::Mat& image) {
         (inner + cv::Size(6, 6) - cv::Point(3, 3)) & cv::Rect(0, 0, image.cols, image.rows);
     cv::FAST(image(roi), corners, static_cast<int>(options_.fast_threshold), true);
     if (corners.empty()) cv::FAST(image(roi), corners, 7, true);
-    std::stable_sort(corners.begin(), corners.end(),
-                     [](const auto& a, const auto& b) { return a.response > b.response; });
+    // The best first; only a few are asked for.
+    std::make_heap(corners.begin(), corners.end(), worse);
     std::int64_t added = 0;
-    for (const cv::KeyPoint& corner : corners) {
+    for (auto end = corners.end(); end != corners.begin(); --end) {
       if (added >= wanted || static_cast<std::int64_t>(fresh.size()) >= missing) break;
+      std::pop_heap(corners.begin(), end, worse);
+      const cv::KeyPoint& corner = *(end - 1);
       const cv::Point2f p = corner.pt + cv::Point2f(roi.tl());
       if (!cameras_[0].inImage(toEigen(p), 8.0) || taken.at<std::uint8_t>(cv::Point(p))) continue;
       cv::circle(taken, cv::Point(p), radius, 255, cv::FILLED);

@@ -143,5 +143,36 @@ TEST(Descriptor, IsTheSameWhereThePatchIsAndAnotherElsewhere) {
   EXPECT_FALSE(descriptorAt(image, {5, 5}));
 }
 
+TEST(Descriptor, ComparesWhatOpenCvsBoxFilterWouldGive) {
+  const cv::Mat image = texture();
+  cv::Mat smooth;
+  cv::blur(image, smooth, {5, 5});
+  // The pattern, drawn as its definition says.
+  std::uint64_t seed = 20111129;
+  const auto draw = [&seed] {
+    int sum = 0;
+    for (int i = 0; i < 4; ++i) {
+      seed = seed * 6364136223846793005ull + 1442695040888963407ull;
+      sum += static_cast<int>((seed >> 40) % 9);
+    }
+    return std::clamp(sum - 16, -13, 13);
+  };
+  std::vector<std::array<int, 4>> pattern;
+  while (pattern.size() < 256) {
+    const int x0 = draw(), y0 = draw(), x1 = draw(), y1 = draw();
+    if (x0 != x1 || y0 != y1) pattern.push_back({x0, y0, x1, y1});
+  }
+  for (const auto& [x, y] : {std::pair{200, 150}, {15, 15}, {736, 464}, {401, 77}}) {
+    const auto d = descriptorAt(image, Vector2d(x, y));
+    ASSERT_TRUE(d) << x << ' ' << y;
+    for (std::size_t i = 0; i < pattern.size(); ++i) {
+      const auto [x0, y0, x1, y1] = pattern[i];
+      const bool bit =
+          smooth.at<std::uint8_t>(y + y0, x + x0) < smooth.at<std::uint8_t>(y + y1, x + x1);
+      EXPECT_EQ((*d)[i / 8] >> (i % 8) & 1, static_cast<int>(bit)) << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace perdure::vio
