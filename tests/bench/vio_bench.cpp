@@ -212,24 +212,27 @@ void motionStart(benchmark::State& loop) {
   });
 }
 
-#define PERDURE_STAGE(function) \
-  BENCHMARK(function)->Name("vio/" #function)->Unit(benchmark::kMicrosecond)
+benchmark::internal::Benchmark* stage(const char* name, void (*run)(benchmark::State&)) {
+  return benchmark::RegisterBenchmark(name, run)->Unit(benchmark::kMicrosecond);
+}
 
-PERDURE_STAGE(trackImage);
-PERDURE_STAGE(opencvKlt)
-    ->ArgNames({"window", "levels", "iterations"})
-    ->Args({21, 3, 30})
-    ->Args({11, 3, 20});
-PERDURE_STAGE(ransac);
-PERDURE_STAGE(describe)->ArgName("stereo")->Arg(0);
-PERDURE_STAGE(propagateFrame)->ArgName("stereo")->Arg(0)->Arg(1);
-PERDURE_STAGE(cloneAndForget)->ArgName("stereo")->Arg(0)->Arg(1);
-PERDURE_STAGE(msckf)->ArgNames({"stereo", "tracks"})->ArgsProduct({{0, 1}, {10, 30}});
-PERDURE_STAGE(slam)->ArgName("stereo")->Arg(0)->Arg(1);
-PERDURE_STAGE(wholeFrame)->ArgName("stereo")->Arg(0)->Arg(1);
-PERDURE_STAGE(landmarks)->ArgName("stereo")->Arg(0)->Arg(1);
-PERDURE_STAGE(restStart);
-PERDURE_STAGE(motionStart)->ArgName("stereo")->Arg(0)->Arg(1);
+void registerStages() {
+  stage("vio/track", trackImage);
+  stage("vio/opencv_klt", opencvKlt)
+      ->ArgNames({"window", "levels", "iterations"})
+      ->Args({21, 3, 30})
+      ->Args({11, 3, 20});
+  stage("vio/ransac", ransac);
+  stage("vio/descriptors", describe)->ArgName("stereo")->Arg(0);
+  stage("vio/propagate", propagateFrame)->ArgName("stereo")->DenseRange(0, 1);
+  stage("vio/clone", cloneAndForget)->ArgName("stereo")->DenseRange(0, 1);
+  stage("vio/msckf", msckf)->ArgNames({"stereo", "tracks"})->ArgsProduct({{0, 1}, {10, 30}});
+  stage("vio/slam", slam)->ArgName("stereo")->DenseRange(0, 1);
+  stage("vio/estimator", wholeFrame)->ArgName("stereo")->DenseRange(0, 1);
+  stage("vio/landmarks", landmarks)->ArgName("stereo")->DenseRange(0, 1);
+  stage("vio/start_at_rest", restStart);
+  stage("vio/start_in_motion", motionStart)->ArgName("stereo")->DenseRange(0, 1);
+}
 
 }  // namespace
 }  // namespace perdure::vio::bench
@@ -238,6 +241,7 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);  // as vio does
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 64;
+  perdure::vio::bench::registerStages();
   benchmark::RunSpecifiedBenchmarks();
   return 0;
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <memory>
 #include <vector>
 
 #include "services/vio/core/estimator.h"
@@ -18,11 +20,19 @@ using tests::allocationsSince;
 
 constexpr double kBegin = 0.2, kFramePeriod = 0.05;
 
-#define SKIP_WHERE_NOTHING_IS_COUNTED() \
-  if (!tests::allocationsAreCounted()) GTEST_SKIP() << "a sanitizer owns malloc"
+class AllocationTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!tests::allocationsAreCounted()) GTEST_SKIP() << "a sanitizer owns malloc";
+  }
+};
+using Allocations = AllocationTest;
+using Propagation = AllocationTest;
+using Prediction = AllocationTest;
+using StateUpdate = AllocationTest;
+using EstimatorAllocations = AllocationTest;
 
-TEST(Allocations, OfTheStandardLibraryAndOfEigenAreCounted) {
-  SKIP_WHERE_NOTHING_IS_COUNTED();
+TEST_F(Allocations, OfTheStandardLibraryAndOfEigenAreCounted) {
   const tests::Allocations before = allocations();
   const auto number = std::make_unique<int>(1);
   EXPECT_EQ(allocationsSince(before).own, 1u) << *number;
@@ -63,8 +73,7 @@ struct RunningFilter {
   }
 };
 
-TEST(Propagation, AllocatesNothing) {
-  SKIP_WHERE_NOTHING_IS_COUNTED();
+TEST_F(Propagation, AllocatesNothing) {
   for (const bool stereo : {false, true}) {
     test::DriveOptions options;
     options.stereo = stereo;
@@ -91,8 +100,7 @@ TEST(Propagation, AllocatesNothing) {
   }
 }
 
-TEST(Prediction, OfTheRotationAllocatesNothing) {
-  SKIP_WHERE_NOTHING_IS_COUNTED();
+TEST_F(Prediction, OfTheRotationAllocatesNothing) {
   RunningFilter run({}, 5.0);
   while (run.frame < 60) run.step();
   const TimePoint to = run.drive.time(run.now() + kFramePeriod);
@@ -102,9 +110,7 @@ TEST(Prediction, OfTheRotationAllocatesNothing) {
   EXPECT_EQ(allocationsSince(before).own, 0u) << R;
 }
 
-/// One update of the state itself.
-TEST(StateUpdate, AllocatesNothing) {
-  SKIP_WHERE_NOTHING_IS_COUNTED();
+TEST_F(StateUpdate, AllocatesNothing) {
   RunningFilter run({}, 7.0);
   while (run.frame < 100) run.step();
   State& state = run.estimator.state();
@@ -116,8 +122,7 @@ TEST(StateUpdate, AllocatesNothing) {
   EXPECT_EQ(allocationsSince(before).own, 0u);
 }
 
-TEST(Estimator, AllocatesPerFrameNoMoreThanItsBoundAndNoMoreWithTime) {
-  SKIP_WHERE_NOTHING_IS_COUNTED();
+TEST_F(EstimatorAllocations, StayBelowTheirBoundAndDoNotGrowWithTime) {
   for (const bool stereo : {false, true}) {
     test::DriveOptions options;
     options.stereo = stereo;
