@@ -54,7 +54,7 @@ int noteLibrary(dl_phdr_info* info, std::size_t /*size*/, void* next) {
   return 0;
 }
 
-const bool g_noted = [] {
+[[maybe_unused]] const bool g_noted = [] {
   std::size_t next = 0;
   dl_iterate_phdr(noteLibrary, &next);
   return true;
