@@ -46,7 +46,8 @@ void describeWindow(Options& o, Fields& f) {
             {"points used once, per frame"});
   f.integer("window.min_observations", o.window.min_observations, between(3, 30),
             {"of a track that is used once, in both cameras together"});
-  f.boolean("window.first_estimates", o.window.first_estimates, {"first-estimate Jacobians"});
+  f.boolean("window.first_estimates", o.window.first_estimates,
+            {"Jacobians on a path that no update moves"});
 }
 
 void describeVision(Options& o, Fields& f) {
@@ -91,6 +92,8 @@ void describeTracker(TrackerOptions& t, Config& c, Fields& f) {
   f.number("tracker.min_distance", t.min_distance_px, atLeast(1), {"between corners", "px"});
   f.number("tracker.similarity", t.similarity, between(0, 1),
            {"of a patch with its first sight; a track that has less ends"});
+  f.number("tracker.growth", t.growth, between(1.1, 10),
+           {"of a patch since its first sight; grown more it is a new point"});
   f.number("tracker.ransac", t.ransac_px, positive(), {"from the epipolar line", "px"});
   f.number("tracker.stereo_epipolar", t.stereo_px, positive(),
            {"from the calibration's epipolar line, second camera", "px"});

@@ -34,7 +34,7 @@ Estimator::Estimator(const Options& options, const std::vector<RigidTransform>& 
 void Estimator::start(const Start& start) {
   state_.emplace(T_BC_, time_offset_s_, static_cast<int>(options_.window.clones),
                  static_cast<int>(options_.window.slam_features));
-  state_->nav = state_->nav_first = start.nav;
+  state_->nav = state_->nav_linear = start.nav;
   state_->time = start.time;
   auto P = state_->P();
   P.topLeftCorner<15, 15>() = start.covariance;

@@ -23,6 +23,9 @@ Turn turn(const Vector3d& w0, const Vector3d& w1, double dt) {
   return {expSo3(theta), rightJacobianSo3(theta) * d_theta};
 }
 
+/// Time in which the velocity of linearisation follows the estimated one, s.
+constexpr double kFollow = 1.0;
+
 struct Densities {
   double gyro2, accel2;
 };
@@ -150,8 +153,15 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
                bool first_estimates) {
   const Matrix3d R0 = state.nav.q_WB.toRotationMatrix();
   const Nav predicted = predict(state.nav, x, gravity);
-  const Matrix15d Phi =
-      transition(first_estimates ? state.nav_first : state.nav, predicted, x, R0, gravity);
+  Nav from = state.nav, to_linear = predicted;
+  if (first_estimates) {
+    from = state.nav_linear;
+    from.v_WB += std::min(1.0, x.dt / kFollow) * (state.nav.v_WB - from.v_WB);
+    Nav upright = from;
+    upright.q_WB = state.nav.q_WB;
+    to_linear = predict(upright, x, gravity);
+  }
+  const Matrix15d Phi = transition(from, to_linear, x, R0, gravity);
   Matrix15d G = Matrix15d::Identity();
   G.block<3, 3>(kPosition, kPosition) = R0;
   G.block<3, 3>(kVelocity, kVelocity) = R0;
@@ -171,7 +181,7 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
   }
   P.bottomLeftCorner(rest, kNavSize) = P.topRightCorner(kNavSize, rest).transpose();
   state.nav = predicted;
-  state.nav_first = predicted;
+  state.nav_linear = to_linear;
   state.time = to;
 }
 

@@ -27,7 +27,7 @@ struct WindowOptions {
   std::int64_t slam_features = 40;    ///< points kept in the state
   std::int64_t msckf_features = 30;   ///< points used once, per frame
   std::int64_t min_observations = 4;  ///< of a track that is used once
-  bool first_estimates = true;        ///< first-estimate Jacobians
+  bool first_estimates = true;        ///< Jacobians on a path that no update moves
 };
 
 struct VisionOptions {

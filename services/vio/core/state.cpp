@@ -84,17 +84,16 @@ void State::remove(int at, int size) {
 void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                      bool first_estimates) {
   const int n = size_, at = append(6), offset = timeOffsetAt();
-  const RigidTransform first =
-      first_estimates ? RigidTransform(nav_first.q_WB, nav_first.p_WB) : nav.T_WB();
+  const Nav& there = first_estimates ? nav_linear : nav;
   Eigen::Matrix<double, 6, 1> J_offset;
-  J_offset << rate_B, (first_estimates ? nav_first.v_WB : nav.v_WB);
+  J_offset << rate_B, there.v_WB;
   for (int j = 0; j < n; ++j) {
     P_.block<6, 1>(at, j) = P_.block<6, 1>(0, j) + J_offset * P_(offset, j);
   }
   P_.block(0, at, n, 6) = P_.block(at, 0, 6, n).transpose();
   P_.block<6, 6>(at, at) =
       P_.block<6, 6>(at, 0) + P_.block<6, 1>(at, offset) * J_offset.transpose();
-  clones.push_back({frame, image_time, nav.T_WB(), first, at});
+  clones.push_back({frame, image_time, nav.T_WB(), there.T_WB(), at});
 }
 
 void State::removeClone(std::uint64_t frame) {

@@ -28,17 +28,17 @@ struct Nav {
   RigidTransform T_WB() const { return RigidTransform(q_WB, p_WB); }
 };
 
-/// The body's pose at an image. `first` is the estimate at which Jacobians are taken.
+/// The body's pose at an image. `linear`: where Jacobians are taken, on nav_linear's path.
 struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
-  RigidTransform T_WB, first;
+  RigidTransform T_WB, linear;
   int at = 0;  ///< where its error begins
 };
 
 struct PointState {
   std::uint64_t id = 0;
-  Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), first = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), linear = Eigen::Vector3d::Zero();
   int at = 0;
   int failed_gates = 0;
 };
@@ -91,7 +91,8 @@ class State {
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points);
 
-  Nav nav, nav_first;                ///< nav_first: q, p, v as predicted, before their update
+  /// nav_linear: q as predicted, p and v on a path that no update moves: where Jacobians are taken.
+  Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
   std::vector<RigidTransform> T_BC;  ///< one for each camera
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s

@@ -119,8 +119,19 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
   }
   const std::vector<bool> good = inliers(matches, R);
   points_.clear();
+  std::vector<Point> renewed;
   for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (good[i]) points_.push_back(std::move(kept[i]));
+    if (!good[i]) continue;
+    const bool grown = kept[i].patch->growth() > options_.growth;
+    (grown ? renewed : points_).push_back(std::move(kept[i]));
+  }
+  // Behind the others: points are in order of their ids.
+  for (Point& p : renewed) {
+    const auto patch = Patch::cut(now.levels.front(), p.pixel);
+    if (!patch) continue;
+    *p.patch = *patch;
+    p.id = next_id_++;
+    points_.push_back(std::move(p));
   }
 }
 

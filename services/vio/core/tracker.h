@@ -33,6 +33,7 @@ struct TrackerOptions {
   double ransac_px = 1.5;
   double stereo_px = 2.0;    ///< from the epipolar line of the calibration
   double similarity = 0.75;  ///< with the first sight of a point, at least
+  double growth = 1.7;       ///< of a patch since its first sight; grown more it is a new point
   std::int64_t memory = 10;  ///< frames over which motion can be asked
 };
 

@@ -20,7 +20,7 @@ Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& 
       reasons.add(point.error());
       continue;
     }
-    PointSystem s = stackViews(*track, state, point->p_W, point->p_W, options.sigma_px);
+    PointSystem s = stackViews(*track, state, point->p_W, options.sigma_px);
     if (s.r.size() < 4) continue;
     separatePoint(s);
     dropPoint(s);

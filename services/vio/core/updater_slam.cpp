@@ -41,10 +41,10 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   Eigen::Index row = 0;
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
     if (!seen.seen[c]) continue;
-    Eigen::Vector2d now, first;
+    Eigen::Vector2d now, there;
     ProjectionJacobians J;
     if (!projectPoint(clone.T_WB, state.T_BC[c], point.p_W, now) ||
-        !projectPoint(clone.first, state.T_BC[c], point.first, first, &J)) {
+        !projectPoint(clone.linear, state.T_BC[c], point.linear, there, &J)) {
       return fail("slam_behind_camera");
     }
     const Eigen::Matrix2d weight = seen.seen[c]->to_pixels / sigma_px;
@@ -94,7 +94,7 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
 Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options) {
   const auto point = triangulate(raysOf(track, state, options.sigma_px), options);
   if (!point) return tl::unexpected(point.error());
-  PointSystem s = stackViews(track, state, point->p_W, point->p_W, options.sigma_px);
+  PointSystem s = stackViews(track, state, point->p_W, options.sigma_px);
   if (s.r.size() < 4) return fail("slam_few_views");
   const std::vector<Block> blocks = calibrationAndClones(state);
   separatePoint(s);
@@ -117,7 +117,7 @@ Result<void> initialisePoint(State& state, const Track& track, const VisionOptio
   }
   const Eigen::Matrix3d covariance = state.project(J, blocks) + R_inverse * R_inverse.transpose();
   state.addPoint(track.id, point->p_W + R_inverse * r_1, covariance, cross);
-  state.points.back().first = point->p_W;
+  state.points.back().linear = linearisationPoint(state, track, point->p_W);
   compress(s.H_x, s.r);
   return state.update(s.H_x, blocks, s.r);
 }

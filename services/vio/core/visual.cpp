@@ -55,8 +55,15 @@ std::vector<Block> calibrationAndClones(const State& state) {
   return blocks;
 }
 
+Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
+                                   const Eigen::Vector3d& p_W) {
+  const Clone* clone = state.clone(track.observations.back().frame);
+  if (!clone) clone = &state.clones.back();
+  return clone->linear * (clone->T_WB.inverse() * p_W);
+}
+
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
-                       const Eigen::Vector3d& p_W_first, double sigma_px) {
+                       double sigma_px) {
   const Eigen::Index cameras = static_cast<Eigen::Index>(state.T_BC.size());
   const Eigen::Index columns = 6 * (cameras + static_cast<Eigen::Index>(state.clones.size()));
   const Eigen::Index capacity = 2 * static_cast<Eigen::Index>(track.views());
@@ -64,6 +71,7 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
                 Eigen::VectorXd(capacity)};
   Eigen::Index row = 0, k = 0;
   std::size_t o = 0;
+  const Eigen::Vector3d p_linear = linearisationPoint(state, track, p_W);
   for (const Clone& clone : state.clones) {
     const Eigen::Index column = 6 * (cameras + k++);
     while (o < track.observations.size() && track.observations[o].frame < clone.frame) ++o;
@@ -72,10 +80,10 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
     for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
       const auto& seen = track.observations[o].seen[c];
       if (!seen) continue;
-      Eigen::Vector2d now, first;
+      Eigen::Vector2d now, there;
       ProjectionJacobians J;
       if (!projectPoint(clone.T_WB, state.T_BC[c], p_W, now) ||
-          !projectPoint(clone.first, state.T_BC[c], p_W_first, first, &J)) {
+          !projectPoint(clone.linear, state.T_BC[c], p_linear, there, &J)) {
         return {};
       }
       const Eigen::Matrix2d weight = seen->to_pixels / sigma_px;

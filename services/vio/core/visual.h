@@ -33,11 +33,16 @@ struct PointSystem {
 /// Blocks of all extrinsics and of the clones.
 std::vector<Block> calibrationAndClones(const State& state);
 
+/// Where a point of the estimates lies among the poses of linearisation: it moves along with the
+/// track's newest clone.
+Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
+                                   const Eigen::Vector3d& p_W);
+
 /// Stacks all views of `track` whose clones are in the state; H_x has the columns of
-/// calibrationAndClones. The residual is at the estimates, the Jacobians at the first ones.
+/// calibrationAndClones. The residual is at the estimates, the Jacobians at `linear`.
 /// Empty r when a view lies behind its camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
-                       const Eigen::Vector3d& p_W_first, double sigma_px);
+                       double sigma_px);
 
 /// Rotates the system so that H_f is upper triangular: its first three rows carry the point, the
 /// others do not depend on it.

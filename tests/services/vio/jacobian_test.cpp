@@ -28,7 +28,7 @@ Nav someNav() {
 State someState(int clones) {
   test::SimulatedDrive drive({});
   State state(drive.T_BC(), 0.003, clones + 1, 5);
-  state.nav = state.nav_first = someNav();
+  state.nav = state.nav_linear = someNav();
   Eigen::MatrixXd A = Eigen::MatrixXd::Random(state.size(), state.size());
   state.P() = 1e-4 * (A * A.transpose() + Eigen::MatrixXd::Identity(A.rows(), A.cols()));
   return state;
@@ -126,7 +126,7 @@ TEST(StackedViews, TheNullSpaceDoesNotSeeThePoint) {
   State state(drive.T_BC(), 0.0, 12, 5);
   FeatureDatabase database;
   for (std::uint64_t k = 0; k < 8; ++k) {
-    state.nav = state.nav_first = drive.truth(0.05 * static_cast<double>(k));
+    state.nav = state.nav_linear = drive.truth(0.05 * static_cast<double>(k));
     state.addClone(k, drive.time(0.0), Vector3d::Zero(), true);
     database.add(k, drive.see(0.05 * static_cast<double>(k)));
   }
@@ -135,7 +135,7 @@ TEST(StackedViews, TheNullSpaceDoesNotSeeThePoint) {
     if (track.observations.size() < 8) continue;
     const auto point = triangulate(raysOf(track, state, 1.0), VisionOptions{});
     if (!point) continue;
-    PointSystem s = stackViews(track, state, point->p_W, point->p_W, 1.0);
+    PointSystem s = stackViews(track, state, point->p_W, 1.0);
     const PointSystem whole = s;
     separatePoint(s);
     EXPECT_LT(s.H_f.bottomRows(s.H_f.rows() - 3).norm(), 1e-9);
@@ -170,7 +170,7 @@ TEST(Triangulation, FindsThePointWithinItsCovariance) {
   double nees = 0.0;
   int count = 0;
   for (std::uint64_t k = 0; k < 10; ++k) {
-    state.nav = state.nav_first = drive.truth(0.1 * static_cast<double>(k));
+    state.nav = state.nav_linear = drive.truth(0.1 * static_cast<double>(k));
     state.addClone(k, drive.time(0.0), Vector3d::Zero(), true);
   }
   for (int run = 0; run < 200; ++run) {

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <set>
 
 #include "services/vio/core/tracker.h"
 #include "tests/services/vio/simulated_drive.h"
@@ -121,7 +124,7 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
   view.noise = 3;
   constexpr unsigned kImages = 60;
   for (unsigned k = 0; k < kImages; ++k) {  // a wall that comes nearer
-    const double grown = 1.0 + 1.2 * k / (kImages - 1);
+    const double grown = 1.0 + 0.6 * k / (kImages - 1);
     view.A = {grown, 0, 0, grown};
     last = tracker.track(view.of(image, k), {}, {});
     if (k == 0) first = last;
@@ -137,8 +140,30 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
       ++kept;
     }
   }
-  EXPECT_GT(kept, 15);  // of 150, those within a fifth of the image
+  EXPECT_GT(kept, 40);  // of 150, those within two fifths of the image
   EXPECT_LT(std::sqrt(squares / kept), 0.2);
+}
+
+TEST(Tracker, APatchThatHasGrownIsANewPoint) {
+  const cv::Mat image = texture(4);
+  Tracker tracker(TrackerOptions{}, {CameraModel(test::testCamera(0))});
+  const auto idsAt = [&](double grown) {
+    View view;
+    view.A = {grown, 0, 0, grown};
+    std::set<std::uint64_t> ids;
+    for (const TrackedPoint& p : tracker.track(view.of(image, 0), {}, {}).points) ids.insert(p.id);
+    return ids;
+  };
+  const auto first = idsAt(1.0);
+  std::set<std::uint64_t> before, after;
+  for (double grown = 1.05; grown < 1.65; grown += 0.05) before = idsAt(grown);
+  for (double grown = 1.65; grown < 1.85; grown += 0.05) after = idsAt(grown);
+  const auto of_first = [&](const std::set<std::uint64_t>& ids) {
+    return std::count_if(ids.begin(), ids.end(), [&](auto id) { return first.contains(id); });
+  };
+  EXPECT_GT(of_first(before), 20);
+  EXPECT_LT(of_first(after), 3);
+  EXPECT_GT(after.size(), before.size() / 2);  // they are still followed
 }
 
 }  // namespace

@@ -12,6 +12,13 @@ namespace perdure::vio::test {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+namespace {
+
+constexpr double kStreetLength = 620.0, kStreetSpeed = 8.5;  // m, m/s
+constexpr double kFarthest = 80.0;                           // m: points further away are not seen
+
+}  // namespace
+
 cv::Mat texture(unsigned seed) {
   cv::Mat noise(480, 752, CV_8UC1), smooth;
   std::mt19937 random(seed);
@@ -53,15 +60,34 @@ SimulatedDrive::SimulatedDrive(const DriveOptions& options)
     : options_(options), random_(options.seed) {
   cameras_.emplace_back(testCamera(0));
   if (options.stereo) cameras_.emplace_back(testCamera(1));
+  options.place == DrivePlace::kRoom ? buildRoom() : buildStreet();
+  ids_.assign(points_.size(), 0);
+}
+
+/// On walls, floor and ceiling.
+void SimulatedDrive::buildRoom() {
   std::uniform_real_distribution<double> u(-1.0, 1.0);
-  // On the walls, floor and ceiling of a room of 12 × 12 × 6 m.
-  for (int i = 0; i < options.points; ++i) {
+  for (int i = 0; i < options_.points; ++i) {
     Vector3d p(6.0 * u(random_), 6.0 * u(random_), 3.0 * u(random_));
     const int wall = i % 6;
     p[wall % 3] = (wall < 3 ? 1.0 : -1.0) * (wall % 3 == 2 ? 3.0 : 6.0);
     points_.push_back(p);
   }
-  ids_.assign(points_.size(), 0);
+}
+
+/// On both sides and on the ground, 1.5 m below the body.
+void SimulatedDrive::buildStreet() {
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  const int count = static_cast<int>(options_.points * kStreetLength / 150.0);
+  for (int i = 0; i < count; ++i) {
+    const double x = 0.5 * kStreetLength * (1.0 + u(random_));
+    if (i % 4 == 0) {
+      points_.emplace_back(x, 6.0 * u(random_), -1.5);
+    } else {
+      const double side = i % 2 == 0 ? 1.0 : -1.0;
+      points_.emplace_back(x, side * (8.0 + 4.0 * u(random_)), 1.75 + 3.25 * u(random_));
+    }
+  }
 }
 
 std::vector<RigidTransform> SimulatedDrive::T_BC() const {
@@ -75,20 +101,25 @@ double SimulatedDrive::phase(double t) const {
   const double s = t - options_.rest_s;
   if (options_.rest_s <= 0.0) return t;
   if (s <= 0.0) return 0.0;
-  constexpr double kRise = 2.0;
-  if (s >= kRise) return s - 0.5 * kRise;
-  const double x = s / kRise;  // speed 10x³ − 15x⁴ + 6x⁵, integrated
-  return kRise * (2.5 * x * x * x * x - 3.0 * std::pow(x, 5) + std::pow(x, 6));
+  const double rise = options_.place == DrivePlace::kStreet ? 6.0 : 2.0;
+  if (s >= rise) return s - 0.5 * rise;
+  const double x = s / rise;  // speed 10x³ − 15x⁴ + 6x⁵, integrated
+  return rise * (2.5 * x * x * x * x - 3.0 * std::pow(x, 5) + std::pow(x, 6));
 }
 
 Vector3d SimulatedDrive::position(double t) const {
   const double s = phase(t);
+  if (options_.place == DrivePlace::kStreet) return {kStreetSpeed * s, 0.0, 0.0};
   return {2.5 * std::cos(0.5 * s), 2.0 * std::sin(0.5 * s) + 0.3 * std::sin(1.7 * s),
           0.5 * std::sin(0.9 * s)};
 }
 
 Matrix3d SimulatedDrive::rotation(double t) const {
   const double s = phase(t);
+  if (options_.place == DrivePlace::kStreet) {
+    return rotationAboutZ(0.003 * std::sin(0.7 * s)) *
+           expSo3(Vector3d(0.002 * std::sin(1.3 * s), 0.004 * std::sin(2.1 * s), 0));
+  }
   return rotationAboutZ(0.5 * s + 0.2) * expSo3(Vector3d(0, 0.15 * std::sin(1.1 * s), 0)) *
          expSo3(Vector3d(0.2 * std::sin(0.8 * s), 0, 0));
 }
@@ -154,6 +185,7 @@ TrackedFrame SimulatedDrive::see(double t) {
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       const auto pixel = cameras_[c].project((T_WB * cameras_[c].T_BC()).inverse() * points_[i]);
       if (!pixel || !cameras_[c].inImage(*pixel, 5.0)) continue;
+      if ((points_[i] - T_WB.p).norm() > kFarthest) continue;
       const Eigen::Vector2d noisy = *pixel + noise(options_.pixel_sigma).head<2>();
       views[i][c] = imagePoint(cameras_[c], noisy);
     }

@@ -13,7 +13,11 @@
 
 namespace perdure::vio::test {
 
+/// Where it goes: round a room of 12 × 12 × 6 m, or along a street at an even 8.5 m/s.
+enum class DrivePlace { kRoom, kStreet };
+
 struct DriveOptions {
+  DrivePlace place = DrivePlace::kRoom;
   unsigned seed = 1;
   double imu_rate_hz = 200.0, camera_rate_hz = 20.0;
   ImuNoise noise;
@@ -22,7 +26,7 @@ struct DriveOptions {
   bool walking_biases = false;  ///< by the noise's walks; imu() has to go before truth()
   double time_offset_s = 0.0;   ///< true t_imu − t_image
   double rest_s = 0.0;          ///< stands still this long at the start
-  int points = 600;
+  int points = 600;             ///< of a street: for each 150 m
   int points_per_image = 100;
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
 };
@@ -49,6 +53,8 @@ class SimulatedDrive {
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
 
  private:
+  void buildRoom();
+  void buildStreet();
   double phase(double t) const;
   Eigen::Vector3d position(double t) const;
   Eigen::Matrix3d rotation(double t) const;
