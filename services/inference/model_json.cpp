@@ -3,121 +3,33 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
 
 #include "common/base/errors.h"
+#include "services/inference/json_reader.h"
 #include "services/inference/model_file.h"
+#include "services/inference/model_heads.h"
 
 namespace perdure::inference {
 namespace {
 
 constexpr double kMostInset = 0.45;
 
-using Json = nlohmann::json;
-
-/// Reads one JSON object and remembers all that is wrong with it, unknown keys included.
-class Reader {
- public:
-  Reader(const Json& json, std::string where, std::vector<std::string>& problems)
-      : json_(json), where_(std::move(where)), problems_(problems) {
-    if (!json_.is_object()) complain("", "is not an object");
+/// One number, or one for each channel.
+void readScale(JsonReader& reader, Input& input) {
+  const Json* scale = reader.find("scale");
+  if (!scale) return;
+  auto numbers =
+      scale->is_number() ? std::vector<double>(3, scale->get<double>()) : numbersOf(*scale);
+  const auto good = [](double x) { return x >= 1e-6 && x <= 1e6; };
+  if (numbers.size() != 3 || !std::all_of(numbers.begin(), numbers.end(), good)) {
+    return reader.complain("scale", "is not a number in [0.000001, 1000000], nor a list of three");
   }
-
-  void complain(const std::string& key, const std::string& what) {
-    problems_.push_back(where_ + key + ": " + what);
-  }
-
-  const Json* find(const std::string& key) {
-    known_.insert(key);
-    const auto it = json_.find(key);
-    return it == json_.end() ? nullptr : &*it;
-  }
-
-  const Json* need(const std::string& key) {
-    const Json* value = find(key);
-    if (!value) complain(key, "is missing");
-    return value;
-  }
-
-  void number(const std::string& key, double& target, double low, double high) {
-    const Json* value = find(key);
-    if (!value) return;
-    const double number = value->is_number() ? value->get<double>() : NAN;
-    if (!(number >= low && number <= high)) {
-      return complain(key, "is not a number in [" + shorten(low) + ", " + shorten(high) + "]");
-    }
-    target = number;
-  }
-
-  void positiveInteger(const std::string& key, int& target) {
-    const Json* value = need(key);
-    if (!value) return;
-    if (!value->is_number_integer() || value->get<std::int64_t>() < 1 ||
-        value->get<std::int64_t>() > 8192) {
-      return complain(key, "is not an integer from 1 to 8192");
-    }
-    target = value->get<int>();
-  }
-
-  std::string text(const std::string& key, bool required) {
-    const Json* value = required ? need(key) : find(key);
-    if (!value) return {};
-    if (value->is_string() && !value->get<std::string>().empty()) return value->get<std::string>();
-    complain(key, "is not a text");
-    return {};
-  }
-
-  template <class T>
-  void choice(const std::string& key, T& target, const std::map<std::string, T>& values) {
-    const std::string name = text(key, true);
-    const auto it = values.find(name);
-    if (it != values.end()) {
-      target = it->second;
-    } else if (!name.empty()) {
-      std::string known;
-      for (const auto& [word, value] : values) known += (known.empty() ? "" : ", ") + word;
-      complain(key, "\"" + name + "\" is not one of " + known);
-    }
-  }
-
-  void rejectUnknown() {
-    if (!json_.is_object()) return;
-    for (const auto& [key, value] : json_.items()) {
-      if (!known_.contains(key)) complain(key, "is not a known key");
-    }
-  }
-
-  std::string where() const { return where_; }
-  std::vector<std::string>& problems() { return problems_; }
-
- private:
-  static std::string shorten(double value) {
-    std::string text = std::to_string(value);
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.back() == '.') text.pop_back();
-    return text;
-  }
-
-  const Json& json_;
-  std::string where_;
-  std::vector<std::string>& problems_;
-  std::set<std::string> known_;
-};
-
-std::vector<double> numbersOf(const Json& json) {
-  std::vector<double> numbers;
-  if (!json.is_array()) return {};
-  for (const Json& value : json) {
-    if (!value.is_number()) return {};
-    numbers.push_back(value.get<double>());
-  }
-  return numbers;
+  std::copy(numbers.begin(), numbers.end(), input.scale.begin());
 }
 
-void readInput(const Json& json, Reader& parent, Input& input) {
-  Reader reader(json, "input.", parent.problems());
+void readInput(const Json& json, JsonReader& parent, Input& input) {
+  JsonReader reader(json, "input.", parent.problems());
   reader.positiveInteger("width", input.width);
   reader.positiveInteger("height", input.height);
   reader.choice<Fit>("fit", input.fit,
@@ -126,7 +38,7 @@ void readInput(const Json& json, Reader& parent, Input& input) {
                       {"resize", Fit::kResize}});
   reader.choice<bool>("colour", input.rgb, {{"bgr", false}, {"rgb", true}});
   reader.number("pad", input.pad, 0, 255);
-  reader.number("scale", input.scale, 1e-6, 1e6);
+  readScale(reader, input);
   if (const Json* mean = reader.find("mean")) {
     input.mean = numbersOf(*mean);
     if (input.mean.size() != 3) {
@@ -137,52 +49,7 @@ void readInput(const Json& json, Reader& parent, Input& input) {
   reader.rejectUnknown();
 }
 
-void readLevel(const Json& json, const std::string& where, Reader& parent,
-               ModelDescription& model) {
-  Reader reader(json, where, parent.problems());
-  Level level;
-  reader.positiveInteger("stride", level.stride);
-  if (level.stride > 0 && model.family != Family::kPerdure &&
-      (model.input.width % level.stride != 0 || model.input.height % level.stride != 0)) {
-    reader.complain("stride", "does not divide the input's width and height");
-  }
-  if (model.family == Family::kYoloFastest) {
-    level.tensor = reader.text("tensor", true);
-    const Json* anchors = reader.need("anchors");
-    for (std::size_t i = 0; anchors && anchors->is_array() && i < anchors->size(); ++i) {
-      const auto pair = numbersOf((*anchors)[i]);
-      if (pair.size() == 2 && pair[0] > 0 && pair[1] > 0) {
-        level.anchors.emplace_back(pair[0], pair[1]);
-      } else {
-        reader.complain("anchors", "holds something that is not [width, height]");
-      }
-    }
-    if (anchors && level.anchors.empty()) reader.complain("anchors", "is empty");
-  } else if (model.family == Family::kPerdure) {
-    level.box = reader.text("box", true);
-    level.logits = reader.text("logits", true);
-    if (model.azimuth.bins > 0) level.azimuth = reader.text("azimuth", true);
-    if (model.spread_scale > 0) level.spread = reader.text("spread", true);
-  } else {
-    level.box = reader.text("box", true);
-    level.objectness = reader.text("objectness", true);
-    level.classes = reader.text("classes", true);
-  }
-  reader.rejectUnknown();
-  model.levels.push_back(level);
-}
-
-std::vector<std::string> linesOf(const std::filesystem::path& path) {
-  std::ifstream in(path);
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(in, line);) {
-    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
-    if (!line.empty()) lines.push_back(line);
-  }
-  return lines;
-}
-
-void readClasses(Reader& reader, const std::string& file, ModelDescription& model) {
+void readClasses(JsonReader& reader, const std::string& file, ModelDescription& model) {
   const Json* classes = reader.find("classes");
   const std::string beside = reader.text("classes_file", classes == nullptr);
   if (classes) {
@@ -207,45 +74,7 @@ void readClasses(Reader& reader, const std::string& file, ModelDescription& mode
   }
 }
 
-void readActivation(const Json& json, Reader& parent, ModelDescription& model) {
-  Reader reader(json, "activation.", parent.problems());
-  reader.choice<bool>("class", model.class_softmax, {{"sigmoid", false}, {"softmax", true}});
-  reader.number("objectness_exponent", model.objectness_exponent, 0.01, 10);
-  reader.number("class_exponent", model.class_exponent, 0.01, 10);
-  reader.rejectUnknown();
-}
-
-void readAzimuth(const Json& json, Reader& parent, ModelDescription& model) {
-  Reader reader(json, "azimuth.", parent.problems());
-  reader.positiveInteger("bins", model.azimuth.bins);
-  reader.number("sigma", model.azimuth.sigma, 0.001, 3.2);
-  model.azimuth.classes = model.classes;
-  if (const Json* classes = reader.find("classes")) {
-    model.azimuth.classes.clear();
-    for (const Json& name : *classes) {
-      const std::string text = name.is_string() ? name.get<std::string>() : "";
-      const auto& known = model.classes;
-      if (std::find(known.begin(), known.end(), text) == known.end()) {
-        reader.complain("classes", "\"" + text + "\" is not one of the model's classes");
-      }
-      model.azimuth.classes.push_back(text);
-    }
-  }
-  reader.rejectUnknown();
-}
-
-/// Soft-max over background and classes is the family's own; nothing is to be chosen.
-void readHeads(Reader& reader, ModelDescription& model) {
-  if (model.family == Family::kPerdure) {
-    if (const Json* azimuth = reader.find("azimuth")) readAzimuth(*azimuth, reader, model);
-    reader.number("reach", model.reach, 0, 10);
-    reader.number("spread_scale", model.spread_scale, 0, 100);
-  } else if (const Json* activation = reader.need("activation")) {
-    readActivation(*activation, reader, model);
-  }
-}
-
-void readInsets(const Json& json, Reader& reader, ModelDescription& model) {
+void readInsets(const Json& json, JsonReader& reader, ModelDescription& model) {
   if (!json.is_object()) return reader.complain("side_insets", "is not an object by class");
   for (const auto& [name, sides] : json.items()) {
     const auto& known = model.classes;
@@ -264,26 +93,26 @@ void readInsets(const Json& json, Reader& reader, ModelDescription& model) {
   }
 }
 
-void readAll(Reader& reader, const std::string& file, ModelDescription& model) {
+void readAll(JsonReader& reader, const std::string& file, ModelDescription& model) {
   model.name = reader.text("name", false);
   reader.choice<Family>("family", model.family,
                         {{"yolox", Family::kYolox},
                          {"yolo-fastest", Family::kYoloFastest},
                          {"fastestdet", Family::kFastestDet},
-                         {"perdure", Family::kPerdure}});
+                         {"perdure", Family::kPerdure},
+                         {"yolov5", Family::kYolov5},
+                         {"yolov7", Family::kYolov5},
+                         {"yolov8", Family::kYolov8},
+                         {"nanodet", Family::kNanoDet},
+                         {"ssd", Family::kSsd},
+                         {"detr", Family::kDetr}});
   if (const Json* input = reader.need("input")) readInput(*input, reader, model.input);
   readClasses(reader, file, model);
-  readHeads(reader, model);
-  if (const Json* levels = reader.need("levels")) {
-    for (std::size_t i = 0; levels->is_array() && i < levels->size(); ++i) {
-      readLevel((*levels)[i], "levels[" + std::to_string(i) + "].", reader, model);
-    }
-    if (model.levels.empty()) reader.complain("levels", "is empty");
-  }
+  readHeads(reader, file, model);
   reader.number("box_sigma", model.box_sigma, 0, 1);
   if (const Json* insets = reader.find("side_insets")) readInsets(*insets, reader, model);
   if (const Json* calibration = reader.find("calibration")) {
-    Reader inner(*calibration, "calibration.", reader.problems());
+    JsonReader inner(*calibration, "calibration.", reader.problems());
     inner.number("temperature", model.calibration.temperature, 0.01, 100);
     inner.number("clutter_rate", model.calibration.clutter_rate, 1e-6, 1 - 1e-6);
     inner.rejectUnknown();
@@ -299,7 +128,7 @@ ModelDescription parseModelDescription(const std::string& text, const std::strin
   ModelDescription model;
   try {
     const Json json = Json::parse(text);
-    Reader reader(json, "", problems);
+    JsonReader reader(json, "", problems);
     if (problems.empty()) readAll(reader, file, model);
   } catch (const Json::exception& e) {
     problems.emplace_back(e.what());

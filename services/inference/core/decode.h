@@ -4,22 +4,14 @@
 #include <array>
 #include <cstddef>
 #include <optional>
-#include <span>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/types/detections.h"
 #include "services/inference/core/description.h"
+#include "services/inference/core/tensors.h"
 
 namespace perdure::inference {
-
-/// A dense float tensor, last index fastest. It does not own its values.
-struct Tensor {
-  std::vector<int> shape;
-  std::span<const float> values;
-};
 
 struct Candidate {
   Box box;             ///< pixels of the network's input
@@ -34,13 +26,6 @@ struct DecodeOptions {
   double score_threshold = 0.05;    ///< boxes whose best wanted class scores less are left out
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
-
-/// Columns and rows of a level's cells. Those of the family perdure may reach beyond the input's
-/// border: 240 / 32 is 8 rows.
-std::pair<int, int> cellsOf(const ModelDescription& model, const Level& level);
-
-/// What a level's tensors must look like, in the order of tensorNames().
-std::vector<std::vector<int>> expectedShapes(const ModelDescription& model);
 
 /// Reasons: "model_output_shape", "model_output_not_finite".
 Result<std::vector<Candidate>> decode(const ModelDescription& model, const DecodeOptions& options,

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <numeric>
 
 #include "services/inference/core/evidence.h"
+#include "services/inference/core/weigh.h"
 
 namespace perdure::inference {
 namespace {
@@ -18,39 +18,6 @@ struct Cell {
   double operator[](std::size_t channel) const { return data[channel * step]; }
 };
 
-/// Soft-max of the first `count` channels.
-std::vector<double> softMax(const Cell& cell, std::size_t count) {
-  std::vector<double> p(count);
-  for (std::size_t i = 0; i < count; ++i) p[i] = cell[i];
-  const double highest = *std::max_element(p.begin(), p.end());
-  for (double& value : p) value = std::exp(value - highest);
-  const double sum = std::accumulate(p.begin(), p.end(), 0.0);
-  for (double& value : p) value /= sum;
-  return p;
-}
-
-float evidence(const Calibration& calibration, double log_odds) {
-  const double tempered = std::clamp(log_odds, -kMaxLogit, kMaxLogit) / calibration.temperature;
-  return static_cast<float>(tempered + logit(calibration.clutter_rate));
-}
-
-/// Fills score and activations and returns the best wanted class; nothing below the threshold.
-std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOptions& options,
-                                 const Cell& logits, Candidate& candidate) {
-  const auto p = softMax(logits, model.classes.size() + 1);
-  std::optional<std::size_t> best;
-  for (const std::size_t k : options.wanted) {
-    if (!best || p[k + 1] > p[*best + 1]) best = k;
-  }
-  if (!best || p[*best + 1] < options.score_threshold) return std::nullopt;
-  candidate.score = p[*best + 1];
-  candidate.activations.assign(1, 0.0F);
-  for (const std::size_t k : options.wanted) {
-    candidate.activations.push_back(evidence(model.calibration, logits[k + 1] - logits[0]));
-  }
-  return best;
-}
-
 double softPlus(double x) { return -logSigmoid(-x); }
 
 Box boxOf(const Cell& raw, double x, double y, double stride, double reach) {
@@ -60,7 +27,7 @@ Box boxOf(const Cell& raw, double x, double y, double stride, double reach) {
 
 void readAzimuth(const Azimuth& azimuth, const Cell& raw, Candidate& candidate) {
   const auto bins = static_cast<std::size_t>(azimuth.bins);
-  const auto p = softMax(raw, bins);
+  const auto p = softMax(raw.data, raw.step, bins);
   const double half = std::numbers::pi / azimuth.bins;
   std::complex<double> doubled = 0;
   const auto angle = [&](std::size_t i) {
@@ -87,7 +54,7 @@ void decodePerdure(const ModelDescription& model, const DecodeOptions& options, 
   const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   for (std::size_t i = 0; i < cells; ++i) {
     Candidate candidate;
-    const auto best = weigh(model, options, {tensors[1].values.data() + i, cells}, candidate);
+    const auto best = weigh(model, options, {{}, tensors[1].values.data() + i, cells}, candidate);
     if (!best) continue;
     const double x = (static_cast<int>(i) % columns + 0.5) * level.stride;
     const double y = (static_cast<int>(i) / columns + 0.5) * level.stride;

@@ -10,7 +10,17 @@
 namespace perdure::inference {
 
 /// How the network's heads are laid out; one decode rule each (core/decode.cpp).
-enum class Family { kYolox, kYoloFastest, kFastestDet, kPerdure };
+enum class Family {
+  kYolox,
+  kYoloFastest,
+  kFastestDet,
+  kPerdure,
+  kYolov5,  ///< and v7
+  kYolov8,  ///< and v11
+  kNanoDet,
+  kSsd,
+  kDetr,  ///< and its relatives with sigmoids (RT-DETR)
+};
 
 /// How an image is brought to the input size.
 enum class Fit {
@@ -22,10 +32,11 @@ enum class Fit {
 struct Input {
   int width = 0, height = 0;  ///< pixels, multiples of every stride
   Fit fit = Fit::kResize;
-  bool rgb = false;                            ///< colour order that the network was trained with
-  double pad = 0.0;                            ///< value of padding, before mean and scale
-  double scale = 1.0;                          ///< input = (pixel - mean) * scale
-  std::vector<double> mean = {0.0, 0.0, 0.0};  ///< in the network's colour order
+  bool rgb = false;  ///< colour order that the network was trained with
+  double pad = 0.0;  ///< value of padding, before mean and scale
+  /// input = (pixel - mean) * scale, both in the network's colour order
+  std::array<double, 3> scale = {1.0, 1.0, 1.0};
+  std::vector<double> mean = {0.0, 0.0, 0.0};
 };
 
 /// One resolution of the head, by the names of its raw (pre-activation) tensors.
@@ -34,12 +45,39 @@ struct Level {
   /// YOLOX and FastestDet: three tensors (1,4,H,W), (1,1,H,W), (1,K,H,W).
   std::string box, objectness, classes;
   /// YOLO-Fastest: one tensor (1,H,W,A·(5+K)) and A anchors (width, height, pixels of input).
+  /// YOLOv5: (1,A·(5+K),H,W) or (1,A,H,W,5+K), and anchors. YOLOv8: (1,4·bins+K,H,W), or `box`
+  /// and `classes` for its two parts. NanoDet: (1,K+4·bins,H,W), classes first.
   std::string tensor;
   std::vector<std::pair<double, double>> anchors;
   /// Perdure: `box` (1,4,H,W) and logits (1,1+K,H,W), background first; azimuth (1,2·bins,H,W)
   /// and spread (1,4,H,W) where the model has them.
   std::string logits, azimuth, spread;
 };
+
+/// What a network answers for all of its levels at once, by the names of its tensors: either
+/// `predictions`, or `boxes` and `scores`. With it, levels have no tensors of their own.
+struct Outputs {
+  std::string predictions;    ///< YOLOv5 (1,N,5+K), YOLOv8 (1,4+K,N), NanoDet (1,N,K+4·bins)
+  std::string boxes, scores;  ///< (1,N,4) and (1,N,C); YOLOv8 (1,4,N) and (1,K,N)
+  bool any() const { return !predictions.empty() || !boxes.empty(); }
+};
+
+/// What the four numbers of a whole box are.
+struct BoxForm {
+  enum class Kind {
+    kCentre,   ///< centre x, y, width, height
+    kCorners,  ///< x1, y1, x2, y2
+    kOffsets,  ///< of a prior: centre in sizes of the prior, logarithm of the ratio of sizes
+  };
+  Kind kind = Kind::kCentre;
+  bool y_first = false;                          ///< each pair is (y, x)
+  bool shares = false;                           ///< of the input's sides; else pixels of input
+  std::vector<std::array<double, 4>> priors;     ///< centre x, y, width, height, in shares
+  std::array<double, 2> variances = {0.1, 0.2};  ///< factors of the offsets of centre and size
+};
+
+/// Which of the columns of the scores says "nothing is here".
+enum class Background { kNone, kFirst, kLast };
 
 /// From the network's score to a log-likelihood ratio against clutter (core/evidence.h).
 struct Calibration {
@@ -60,9 +98,15 @@ struct ModelDescription {
   Input input;
   std::vector<std::string> classes;  ///< lower-case, unique, in the order of the network
   bool class_softmax = false;        ///< class activation: soft-max, or independent sigmoids
+  bool applied = false;              ///< the network's scores are probabilities already
+  Background background = Background::kNone;
   double objectness_exponent = 1.0;  ///< score = objectness^a · class^b
   double class_exponent = 1.0;
   std::vector<Level> levels;
+  Outputs outputs;
+  BoxForm box_form;  ///< of `outputs` with whole boxes
+  int bins = 0;      ///< YOLOv8, NanoDet: a distance to a side is the mean over 0 … bins − 1
+  double cell_offset = 0.5;  ///< YOLOv8, NanoDet: a cell's point is (g + offset)·s
   Azimuth azimuth;
   double reach = 0.0;         ///< perdure: cells that a cell's centre may lie outside its box
   double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: the network has none
@@ -70,22 +114,5 @@ struct ModelDescription {
   std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
   Calibration calibration;
 };
-
-/// Names of the tensors to ask the network for, in the order that decode() takes them.
-inline std::vector<std::string> tensorNames(const ModelDescription& model) {
-  std::vector<std::string> names;
-  for (const Level& level : model.levels) {
-    if (model.family == Family::kYoloFastest) {
-      names.push_back(level.tensor);
-    } else if (model.family == Family::kPerdure) {
-      names.insert(names.end(), {level.box, level.logits});
-      if (model.azimuth.bins > 0) names.push_back(level.azimuth);
-      if (model.spread_scale > 0) names.push_back(level.spread);
-    } else {
-      names.insert(names.end(), {level.box, level.objectness, level.classes});
-    }
-  }
-  return names;
-}
 
 }  // namespace perdure::inference

@@ -30,7 +30,7 @@ cv::Mat toPlanes(const Input& input, const cv::Mat& bgr) {
     cv::Mat target(input.height, input.width, CV_32F, blob.ptr<float>() + c * plane);
     cv::Mat channel;
     cv::extractChannel(bgr, channel, static_cast<int>(input.rgb ? 2 - c : c));
-    channel.convertTo(target, CV_32F, input.scale, -input.mean[c] * input.scale);
+    channel.convertTo(target, CV_32F, input.scale[c], -input.mean[c] * input.scale[c]);
   }
   return blob;
 }

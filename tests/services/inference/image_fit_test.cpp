@@ -58,15 +58,15 @@ TEST(ImageFit, BlobHasTheNetworksColourOrderScaleMeanAndPadding) {
   in.width = 8;
   in.height = 8;
   in.rgb = true;
-  in.scale = 0.5;
+  in.scale = {0.5, 0.25, 2};
   in.mean = {1, 2, 3};
   in.pad = 114;
   const auto blob = makeBlob(in, frame(8, 4, ImageEncoding::kBgr8, {10, 20, 30}));
   ASSERT_TRUE(blob);
   const float* r = blob->ptr<float>();
   EXPECT_FLOAT_EQ(r[0], (30 - 1) * 0.5F);
-  EXPECT_FLOAT_EQ(r[64], (20 - 2) * 0.5F);
-  EXPECT_FLOAT_EQ(r[128], (10 - 3) * 0.5F);
+  EXPECT_FLOAT_EQ(r[64], (20 - 2) * 0.25F);
+  EXPECT_FLOAT_EQ(r[128], (10 - 3) * 2.0F);
   EXPECT_FLOAT_EQ(r[63], (114 - 1) * 0.5F) << "the last row is padding";
 }
 
