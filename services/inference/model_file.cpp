@@ -46,8 +46,9 @@ fs::path findDescription(const fs::path& model, const std::vector<std::string>& 
   throw StartupError(ExitCode::kUnavailable,
                      "Nothing describes the network " + model.string() + ": looked for " +
                          listOf(candidates) +
-                         "; write one (services/inference/README.md, \"model.json\") or name it "
-                         "with --set model.description=FILE.");
+                         "; let `perdure model import` make one, write it "
+                         "(services/inference/README.md, \"model.json\") or name it with "
+                         "--set model.description=FILE.");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "tools/detect/command.h"
 #include "tools/evaluate/command.h"
 #include "tools/map/command.h"
+#include "tools/model/command.h"
 #include "tools/pipeline/command.h"
 #include "tools/simulate/command.h"
 
@@ -41,6 +42,7 @@ int main(int argc, char** argv) {
   perdure::tools::addPipelineCommand(app);
   perdure::tools::addEvaluateCommand(app);
   perdure::tools::addDetectCommand(app);
+  perdure::tools::addModelCommand(app);
   perdure::tools::addSimulateCommand(app);
   perdure::tools::addMapCommand(app);
   perdure::tools::addDemoCommand(app);

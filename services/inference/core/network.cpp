@@ -18,7 +18,15 @@ class QuietOpenCv {
   cv::utils::logging::LogLevel before_;
 };
 
-std::string firstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
+/// What OpenCV throws, in one line: the operator that it does not take where it names one
+/// ("> Node [Where@ai.onnx]:(onnx_node!Where_2) parse error …"), else its first line.
+std::string gist(const std::string& text) {
+  const std::size_t begin = text.find("Node ["), end = text.find_first_of("@]", begin);
+  if (begin != std::string::npos && end != std::string::npos) {
+    return "OpenCV does not take its operator " + text.substr(begin + 6, end - begin - 6);
+  }
+  return text.substr(0, text.find('\n'));
+}
 
 std::string lastOf(const std::vector<std::string>& names, std::size_t count) {
   std::string text;
@@ -57,7 +65,7 @@ Result<Network> Network::load(const std::string& file, const std::string& darkne
               : cv::dnn::readNetFromDarknet(file.data(), file.size(), darknet_weights.data(),
                                             darknet_weights.size());
   } catch (const std::exception& e) {  // cv::Exception, and what protobuf and std throw
-    return fail("model_unreadable", firstLine(e.what()));
+    return fail("model_unreadable", gist(e.what()));
   }
   if (net.empty()) return fail("model_unreadable", "it has no layers");
   if (!darknet_weights.empty()) {
@@ -83,7 +91,7 @@ Result<std::vector<Tensor>> Network::forward(const cv::Mat& blob) {
     net_.setInput(blob);
     net_.forward(outputs_, names_);
   } catch (const std::exception& e) {
-    return fail("model_failed", firstLine(e.what()));
+    return fail("model_failed", gist(e.what()));
   }
   std::vector<Tensor> tensors;
   for (cv::Mat& output : outputs_) {

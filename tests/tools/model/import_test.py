@@ -1,0 +1,398 @@
+#!/usr/bin/python3
+"""What `perdure model import` says of files that it cannot take, and what it finds in those it can."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from contextlib import redirect_stdout
+from pathlib import Path
+
+try:
+    import numpy as np
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+except ImportError as missing:
+    print(f"skipped: {missing.name} is not installed (deploy/install --build)")
+    sys.exit(77)
+
+sys.path.insert(0, str(Path(__file__).parent))
+import tiny_networks as tiny
+from perdure_model import __main__ as importer
+from perdure_model.faults import Fault
+from perdure_model.graph import Graph, Node
+from perdure_model.numpy_ops import OPS
+from perdure_model.opencv import Repair
+
+NAMES = "--classes=car,person,dog"
+
+
+def own_decoding(folder):
+    """Heads like those of YOLOv5, sizes by another rule."""
+    def decode(net, raw, stride):
+        p = net.node("Sigmoid", [tiny.rows_of_anchors(net, raw, stride)])
+        wide = net.node("Mul", [p, np.array([stride] * 2 + [50] * 2 + [1] * (1 + tiny.K), np.float32)])
+        return net.node("Reshape", [wide, np.array([1, -1, 5 + tiny.K])])
+    net = tiny.Net(20, **tiny.UNIT)
+    rows, parts = tiny.anchored(net, decode)
+    net.save(folder, [(net.node("Concat", parts, axis=1), [1, len(rows), 5 + tiny.K])], rows, [])
+
+
+class Importing(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.folder = Path(self.temporary.name)
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def made(self, make):
+        make(self.folder / make.__name__)
+        return self.folder / make.__name__ / "net.onnx"
+
+    def graph(self, nodes, outputs, constants=None, inputs=None, opset=12, domains=()):
+        """A file of `nodes`; `outputs`: {name: shape}; `inputs`: {name: (type, shape)}."""
+        inputs = inputs or {"images": (TensorProto.FLOAT, [1, 3, 64, 64])}
+        graph = helper.make_graph(
+            nodes, "g", [helper.make_tensor_value_info(n, t, s) for n, (t, s) in inputs.items()],
+            [helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in outputs.items()],
+            [numpy_helper.from_array(np.asarray(v), k) for k, v in (constants or {}).items()])
+        model = helper.make_model(graph,
+                                  opset_imports=[helper.make_opsetid("", opset),
+                                                 *(helper.make_opsetid(d, 1) for d in domains)])
+        path = self.folder / "g.onnx"
+        onnx.save(model, str(path))
+        return path
+
+    def run_import(self, path, *arguments):
+        """(what was printed, model.json)."""
+        out = self.folder / "out.onnx"
+        told = io.StringIO()
+        with redirect_stdout(told):
+            importer.run(importer.parsed([str(path), "--out", str(out), *arguments]))
+        return told.getvalue(), json.loads((self.folder / "out.onnx.model.json").read_text())
+
+    def refused(self, path, *arguments):
+        with self.assertRaises(Fault) as caught:
+            self.run_import(path, *arguments)
+        self.assertFalse((self.folder / "out.onnx").exists())
+        return str(caught.exception), caught.exception.status
+
+
+class Files(Importing):
+    def test_a_missing_file_and_missing_names_are_69(self):
+        message, status = self.refused(self.folder / "none.onnx", NAMES)
+        self.assertIn("none.onnx is missing", message)
+        self.assertEqual(status, 69)
+        message, status = self.refused(self.made(tiny.yolox), "--classes=/nowhere/coco.names")
+        self.assertIn("coco.names is missing; give a file with a name a line", message)
+        self.assertEqual(status, 69)
+
+    def test_what_is_no_onnx_or_is_cut_off_is_said_to_be(self):
+        whole = self.made(tiny.yolov8).read_bytes()
+        for content in (b"", b"hello", whole[:10], whole[:len(whole) // 2], whole[:-7]):
+            path = self.folder / "part.onnx"
+            path.write_bytes(content)
+            message, status = self.refused(path, NAMES)
+            self.assertIn("not a whole ONNX file", message)
+            self.assertEqual(status, 78)
+
+    def test_flipped_bytes_never_end_without_a_sentence(self):
+        whole = bytearray(self.made(tiny.yolov5).read_bytes())
+        random = np.random.default_rng(3)
+        for _ in range(40):
+            broken = bytearray(whole)
+            for at in random.integers(0, len(broken), 5):
+                broken[at] = random.integers(0, 256)
+            path = self.folder / "flipped.onnx"
+            path.write_bytes(bytes(broken))
+            with redirect_stdout(io.StringIO()):
+                self.assertIn(self.status_of(path), (0, 64, 69, 78))
+
+    def status_of(self, path):
+        before, sys.argv = sys.argv, ["perdure_model", str(path), "--out", str(self.folder / "o.onnx"), NAMES]
+        errors, sys.stderr = sys.stderr, io.StringIO()
+        try:
+            importer.main()
+            return 0
+        except SystemExit as end:
+            return end.code
+        finally:
+            sys.argv, sys.stderr = before, errors
+
+
+    def test_a_folder_that_cannot_be_written_is_said(self):
+        blocked = self.folder / "file"
+        blocked.write_text("")
+        with self.assertRaises(Fault) as caught, redirect_stdout(io.StringIO()):
+            importer.run(importer.parsed([str(self.made(tiny.yolox)), NAMES, "--out", str(blocked / "out.onnx")]))
+        self.assertIn("cannot be written", str(caught.exception))
+        self.assertEqual(caught.exception.status, 69)
+
+
+class Inputs(Importing):
+    def convolution(self, shape=(1, 3, 64, 64), kind=TensorProto.FLOAT, more=None):
+        inputs = {"images": (kind, list(shape)), **(more or {})}
+        weight = np.zeros((8, 3, 8, 8), np.float32)
+        return self.graph([helper.make_node("Conv", ["images", "w"], ["out"], strides=[8, 8])], {"out": None},
+                          {"w": weight}, inputs)
+
+    def test_channels_last_bytes_batches_and_open_sizes_have_their_mends(self):
+        cases = [(dict(shape=(1, 64, 64, 3)), "has its channels last; export with [1,3,height,width]"),
+                 (dict(shape=(1, 1, 64, 64)), "has 1 channels"),
+                 (dict(kind=TensorProto.UINT8), "is uint8; export with float32"),
+                 (dict(shape=(8, 3, 64, 64)), "fixed at 8 images at once; export with batch size 1"),
+                 (dict(shape=("n", 3, "h", "w")), "has no fixed size; say --size"),
+                 (dict(more={"second": (TensorProto.FLOAT, [1, 3, 8, 8])}), "has 2 inputs that could be an image")]
+        for how, words in cases:
+            self.assertIn(words, self.refused(self.convolution(**how), NAMES)[0])
+
+    def test_another_size_than_the_fixed_one_is_refused(self):
+        self.assertIn("fixed at 64x64; leave --size out",
+                      self.refused(self.made(tiny.yolox), NAMES, "--size=320x320")[0])
+
+    def test_wrong_options_are_usage(self):
+        path = self.made(tiny.yolox)
+        for wrong in ("--size=64", "--size=axb", "--anchors=1,2,3", "--scale=x", "--variances=1", "--classes=car,,dog"):
+            self.assertEqual(self.refused(path, NAMES, wrong)[1], 64, wrong)
+
+
+class Classes(Importing):
+    def test_their_number_is_that_of_the_network(self):
+        message, _ = self.refused(self.made(tiny.yolox), "--classes=car,person")
+        self.assertIn("(yolox) has 3 classes and 2 names were given", message)
+
+    def test_names_in_the_file_are_taken_where_none_are_given(self):
+        self.assertEqual(self.run_import(self.made(tiny.yolov8))[1]["classes"], ["car", "person", "dog"])
+        self.assertEqual(self.run_import(self.folder / "yolov8/net.onnx", "--classes=A,B,C")[1]["classes"],
+                         ["a", "b", "c"])
+
+    def test_without_any_they_are_asked_for(self):
+        message, status = self.refused(self.made(tiny.yolox))
+        self.assertIn("does not say the names of its 3 classes; give --classes", message)
+        self.assertEqual(status, 64)
+
+    def test_a_file_has_one_a_line_and_repeated_ones_are_told_apart(self):
+        names = self.folder / "names.txt"
+        names.write_text("Car\n\nN/A\nN/A\n")
+        self.assertEqual(self.run_import(self.made(tiny.yolox), f"--classes={names}")[1]["classes"],
+                         ["car", "n/a-1", "n/a-2"])
+
+
+class Families(Importing):
+    def test_a_family_that_it_is_not_is_refused(self):
+        message, _ = self.refused(self.made(tiny.yolox), NAMES, "--family=yolov8")
+        self.assertIn("is not known as yolov8", message)
+        self.assertIn("yolo export model=FILE.pt format=onnx opset=12 nms=False", message)
+
+    def test_wrong_anchors_show_against_the_files_own_decoding(self):
+        path = self.made(tiny.yolov5)
+        wrong = "--anchors=" + "/".join(["1,2,3,4,5,6"] * 3)
+        self.assertIn("decodes otherwise than the file itself", self.refused(path, NAMES, wrong, "--family=yolov5")[0])
+
+    def test_heads_that_decode_in_a_way_of_their_own_are_taken_as_exported(self):
+        told, described = self.run_import(self.made(own_decoding), NAMES)
+        self.assertIn("decode in a way of their own", told)
+        self.assertEqual(described["outputs"], {"predictions": "predictions"})
+        self.assertTrue(described["activation"]["applied"])
+
+    def test_anchors_come_from_the_file(self):
+        _, described = self.run_import(self.made(tiny.yolov7), NAMES)
+        self.assertEqual([level["anchors"] for level in described["levels"]],
+                         [[[float(n) for n in p] for p in l] for l in tiny.ANCHORS.values()])
+
+    def test_anchors_that_are_not_there_are_said_to_be_assumed(self):
+        told, described = self.run_import(self.made(tiny.yolov5_heads), NAMES)
+        self.assertIn("its anchors are not in the file: those of yolov5 for COCO were taken", told)
+        self.assertEqual(described["levels"][0]["anchors"][0], [10, 13])
+
+    def test_offsets_need_their_priors(self):
+        path = self.made(tiny.ssd_offsets)
+        boxes = next(a for a in (path.parent / "arguments").read_text().split() if "--boxes" in a)
+        self.assertIn("say --priors FILE", self.refused(path, NAMES, boxes)[0])
+        (self.folder / "priors.txt").write_text("0 0 1 1\n")
+        for content, words in (("0 0 1\n", "does not hold priors"), ("a b c d\n", "cannot be read as priors")):
+            (self.folder / "wrong.txt").write_text(content)
+            self.assertIn(words, self.refused(path, NAMES, boxes, f"--priors={self.folder / 'wrong.txt'}")[0])
+        self.assertEqual(self.refused(path, NAMES, boxes, "--priors=/nowhere.txt")[1], 69)
+        self.assertIn("1 priors were given for",
+                      self.refused(path, NAMES, boxes, f"--priors={self.folder / 'priors.txt'}")[0])
+
+    def test_outputs_that_could_both_be_the_boxes_are_asked_about(self):
+        self.assertIn("could both be the boxes; say --boxes", self.refused(self.made(tiny.ssd_offsets), NAMES)[0])
+
+    def test_the_projects_own_needs_no_import(self):
+        nodes = [helper.make_node("Conv", ["images", f"w{n}"], [n], strides=[8, 8]) for n in ("logits8", "box8")]
+        weights = {"wlogits8": np.zeros((4, 3, 8, 8), np.float32), "wbox8": np.zeros((4, 3, 8, 8), np.float32)}
+        self.assertIn("project's own family",
+                      self.refused(self.graph(nodes, {"logits8": None, "box8": None}, weights), NAMES)[0])
+
+    def test_names_that_the_graph_uses_already_make_way(self):
+        path = self.made(tiny.detr)
+        model = onnx.load(str(path))
+        scores, boxes = (o.name for o in model.graph.output)
+        names = {scores: "boxes_of_nothing", boxes: "scores", "images": "boxes"}
+        for node in model.graph.node:
+            for field in (node.input, node.output):
+                field[:] = [names.get(n, n) for n in field]
+        for info in [*model.graph.input, *model.graph.output]:
+            info.name = names.get(info.name, info.name)
+        onnx.save(model, str(path))
+        _, described = self.run_import(path, NAMES, "--boxes=scores")
+        self.assertEqual(described["outputs"], {"boxes": "boxes", "scores": "scores"})
+        made = onnx.load(str(self.folder / "out.onnx"))
+        onnx.checker.check_model(made)
+        shapes = {o.name: [d.dim_value for d in o.type.tensor_type.shape.dim] for o in made.graph.output}
+        self.assertEqual(shapes, {"boxes": [1, 12, 4], "scores": [1, 12, tiny.K + 1]})
+
+    def test_what_the_input_is_may_be_said_otherwise(self):
+        _, described = self.run_import(self.made(tiny.yolox), NAMES, "--colour=rgb", "--scale=0.5", "--mean=1,2,3",
+                                       "--fit=resize")
+        self.assertEqual({k: described["input"][k] for k in ("colour", "scale", "mean", "fit")},
+                         {"colour": "rgb", "scale": 0.5, "mean": [1, 2, 3], "fit": "resize"})
+
+
+class Operators(Importing):
+    def whole(self, more, outputs, constants=None, domains=()):
+        """Boxes and scores by products, so that no heads are found, then `more`."""
+        weight = np.random.default_rng(1).normal(size=(7, 64)).astype(np.float32)
+        nodes = [helper.make_node("AveragePool", ["images"], ["p"], kernel_shape=[8, 8], strides=[8, 8]),
+                 helper.make_node("ReduceMean", ["p"], ["m"], axes=[1], keepdims=0),
+                 helper.make_node("Reshape", ["m", "flat"], ["f"]), helper.make_node("MatMul", ["f", "w"], ["rows"])]
+        constants = {"flat": np.array([1, 8, 8]), "w": weight[:, :8].T.copy(), **(constants or {})}
+        return self.graph([*nodes, *more], outputs, constants, domains=domains)
+
+    def test_suppression_inside_is_named_with_the_export_that_works(self):
+        more = [helper.make_node("Split", ["rows"], ["boxes", "scores"], axis=2, split=[4, 3]),
+                helper.make_node("Transpose", ["scores"], ["turned"], perm=[0, 2, 1]),
+                helper.make_node("NonMaxSuppression", ["boxes", "turned"], ["chosen"]),
+                helper.make_node("Cast", ["chosen"], ["out"], to=1)]
+        message, status = self.refused(self.whole(more, {"out": None}), NAMES, "--family=yolov5")
+        self.assertIn("operator NonMaxSuppression", message)
+        self.assertIn("python export.py --weights FILE.pt --include onnx --opset 12", message)
+        self.assertEqual(status, 78)
+
+    def test_top_k_at_the_end_is_named(self):
+        more = [helper.make_node("TopK", ["rows", "k"], ["out", "index"], axis=1)]
+        self.assertIn("chooses its boxes itself (operator TopK)",
+                      self.refused(self.whole(more, {"out": None}, {"k": np.array([3])}), NAMES)[0])
+
+    def test_an_answer_of_chosen_boxes_is_not_taken_for_one_class_with_objectness(self):
+        more = [helper.make_node("Slice", ["rows", "zero", "six", "two"], ["short"]),
+                helper.make_node("TopK", ["short", "k"], ["out", "index"], axis=1)]
+        path = self.whole(more, {"out": None},
+                          {"k": np.array([3]), "zero": np.array([0]), "six": np.array([6]), "two": np.array([2])})
+        self.assertIn("operator TopK", self.refused(path, "--classes=car")[0])
+
+    def test_an_operator_inside_that_opencv_has_not_is_named(self):
+        more = [helper.make_node("Einsum", ["rows", "rows"], ["e"], equation="bij,bij->bij"),
+                helper.make_node("Identity", ["e"], ["out"])]
+        message, _ = self.refused(self.whole(more, {"out": [1, 8, 7]}), NAMES, "--family=detr")
+        self.assertIn("computes with Einsum inside the network", message)
+        self.assertIn("pred_logits", message)
+
+    def test_another_runtimes_operators_are_named(self):
+        more = [helper.make_node("FusedThing", ["rows"], ["out"], domain="com.example")]
+        message, _ = self.refused(self.whole(more, {"out": [1, 8, 7]}, domains=["com.example"]), NAMES, "--family=detr")
+        self.assertIn("com.example.FusedThing belong to another runtime", message)
+
+    def test_outputs_of_no_family_are_listed_with_their_shapes(self):
+        message, _ = self.refused(self.whole([helper.make_node("Relu", ["rows"], ["out"])], {"out": [1, 8, 7]}),
+                                  "--classes=a,b,c,d,e")
+        self.assertIn("(out 1x8x7)", message)
+        for family in ("yolov5", "yolov7", "yolov8", "yolox", "nanodet", "ssd", "detr"):
+            self.assertIn(family, message)
+
+
+@unittest.skipUnless("PERDURE_BIN" in os.environ, "run by ctest")
+class Command(Importing):
+    def perdure(self, *words):
+        done = subprocess.run([os.environ["PERDURE_BIN"] + "/perdure", "model", *map(str, words)], capture_output=True,
+                              text=True)
+        return done.returncode, done.stdout + done.stderr
+
+    def test_it_writes_network_description_and_drawing(self):
+        path = self.made(tiny.yolov8)
+        status, told = self.perdure("import", path, "--image", path.parent / "picture.ppm", "--out",
+                                    self.folder / "out")
+        self.assertEqual(status, 0, told)
+        self.assertIn("OpenCV      answers as the file says", told)
+        self.assertIn("perdure-inference --set model.path=", told)
+        self.assertEqual(sorted(p.name for p in (self.folder / "out").iterdir()),
+                         ["net.perdure.onnx", "net.perdure.onnx.model.json", "net.perdure.png"])
+        drawn = self.folder / "again.png"
+        status, told = self.perdure("look", self.folder / "out/net.perdure.onnx", "--image",
+                                    path.parent / "picture.ppm", "--out", drawn)
+        self.assertEqual(status, 0, told)
+        self.assertTrue(drawn.exists())
+
+    def test_statuses_say_what_kind_of_fault_it_is(self):
+        self.assertEqual(self.perdure("import", self.folder / "none.onnx", NAMES)[0], 69)
+        self.assertEqual(self.perdure("import", self.made(tiny.yolox))[0], 64)
+        self.assertEqual(self.perdure("import")[0], 64)
+        self.assertEqual(self.perdure("import", self.folder / "yolox/net.onnx", "--classes=car")[0], 78)
+        self.assertEqual(self.perdure("import", self.folder / "yolox/net.onnx", NAMES, "--image", "/nowhere.jpg")[0],
+                         69)
+        status, told = self.perdure("--help")
+        self.assertEqual(status, 0)
+        self.assertIn("perdure model import yolov8n.onnx --image street.jpg", told)
+
+    def test_what_opencv_cannot_run_leaves_nothing_behind(self):
+        path = self.made(tiny.yolox)
+        model = onnx.load(str(path))
+        at, relu = next((i, n) for i, n in enumerate(model.graph.node) if n.op_type == "Relu")
+        x, y = relu.input[0], relu.output[0]
+        model.graph.initializer.append(numpy_helper.from_array(np.float32(0), "zero_of_where"))
+        model.graph.node.remove(relu)
+        model.graph.node.insert(at, helper.make_node("Greater", [x, "zero_of_where"], ["mask_of_where"]))
+        model.graph.node.insert(at + 1, helper.make_node("Where", ["mask_of_where", x, "zero_of_where"], [y]))
+        onnx.save(model, str(path))
+        status, told = self.perdure("import", path, NAMES, "--out", self.folder / "out")
+        self.assertEqual(status, 78, told)
+        self.assertIn("OpenCV does not take its operator Where", told)
+        self.assertEqual(list((self.folder / "out").iterdir()), [])
+
+
+class Computing(unittest.TestCase):
+    def test_constants_fold_and_cuts_drop_what_is_not_needed(self):
+        with tempfile.TemporaryDirectory() as name:
+            tiny.yolov8_open_size(Path(name))
+            graph = Graph.load(Path(name) / "net.onnx")
+            graph.fix_input("net.onnx", (64, 64))
+            graph.fold()
+        self.assertNotIn("Shape", {n.kind for n in graph.nodes})
+        self.assertEqual(graph.shape(graph.outputs[0]), [1, 64 + tiny.K, 8 * 8 + 4 * 4 + 2 * 2])
+        before = len(graph.nodes)
+        graph.keep([graph.nodes[0].outputs[0]])
+        self.assertEqual([n.kind for n in graph.nodes], ["Conv"])
+        self.assertGreater(before, 1)
+
+    def test_what_is_no_constant_is_not_taken_for_one(self):
+        """A bound that is computed, and whole numbers: the repair leaves them as they are."""
+        nodes = [Node("ReduceMax", ["images"], ["top"], {"keepdims": 0}), Node("Clip", ["images", "", "top"], ["c"]),
+                 Node("Shape", ["c"], ["s"]), Node("Div", ["s", "two"], ["half"])]
+        inputs = {"images": (TensorProto.FLOAT, [1, 3, 8, 8])}
+        graph = Graph(nodes, {"two": np.array([2])}, inputs, ["half", "c"], 12, {})
+        graph.infer_shapes()
+        self.assertEqual(Repair(graph).run(), {})
+        self.assertEqual([n.kind for n in graph.nodes], ["ReduceMax", "Clip", "Shape", "Div"])
+
+    def test_pooling_and_resizing_have_the_values_of_the_standard(self):
+        x = np.arange(16, dtype=np.float32).reshape(1, 1, 4, 4)
+        np.testing.assert_array_equal(OPS["MaxPool"]([x], {"kernel_shape": [2, 2], "strides": [2, 2]}, 12)[0].ravel(),
+                                      [5, 7, 13, 15])
+        pads = {"kernel_shape": [3, 3], "strides": [2, 2], "pads": [1, 1, 1, 1]}
+        self.assertEqual(OPS["AveragePool"]([x], pads, 12)[0].ravel()[0], np.mean([0, 1, 4, 5]))
+        self.assertAlmostEqual(float(OPS["AveragePool"]([x], {**pads, "count_include_pad": 1}, 12)[0].ravel()[0]),
+                               (0 + 1 + 4 + 5) / 9, places=6)
+        row = np.array([0, 10], np.float32).reshape(1, 1, 1, 2)
+        linear = {"mode": "linear", "coordinate_transformation_mode": "half_pixel"}
+        out = OPS["Resize"]([row, None, np.array([1, 1, 1, 2], np.float32)], linear, 13)[0]
+        np.testing.assert_allclose(out.ravel(), [0, 2.5, 7.5, 10])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,203 @@
+#include "tools/model/command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "common/base/errors.h"
+#include "tools/model/check.h"
+#include "tools/model/importer.h"
+#include "tools/model/look.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kImportHelp = R"(
+Looks at the graph, finds the family, cuts off what follows the raw heads (decoding, sigmoids,
+suppression), repairs what OpenCV 4.6 cannot load or computes wrongly, compares OpenCV's answers
+with what the file says, and looks at a picture. Writes
+
+  NAME.perdure.onnx               the network, for OpenCV 4.6
+  NAME.perdure.onnx.model.json    what its numbers mean (services/inference/README.md)
+  NAME.perdure.png                what it sees
+
+  perdure model import yolov8n.onnx --image street.jpg        names are in the file
+  perdure model import net.onnx --classes car,person          names in the network's order
+  perdure model import net.onnx --classes coco.names --family yolov7 --size 640x640
+  perdure-inference --set model.path=yolov8n.perdure.onnx     then run it
+
+Look at the picture: colours, mean and scale of the input are the usual ones of the family, and
+boxes that are a little off say that they are other ones here.)";
+
+struct Request {
+  fs::path network, out, image;
+  double threshold = 0.25;
+  bool unchecked = false;
+  std::vector<std::string> arguments;
+};
+
+/// A folder that is gone with its owner.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "perdure-model-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw StartupError(ExitCode::kUnavailable, name + " cannot be made; is the disk full?");
+    }
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+void showSights(const fs::path& network, const fs::path& image, double threshold,
+                const fs::path& drawing) {
+  std::optional<Frame> frame;
+  if (!image.empty()) frame = readPicture(image);
+  const Look look = lookAt(network, frame ? &*frame : nullptr, threshold);
+  std::printf("sees        %zu boxes of score %.2f and more in %s\n", look.sights.size(), threshold,
+              frame ? image.c_str() : "a grey ramp, which holds nothing: give --image");
+  for (std::size_t i = 0; i < look.sights.size() && i < 10; ++i) {
+    const Sight& s = look.sights[i];
+    std::printf("            %.2f %-14s %6.0f %6.0f %6.0f %6.0f\n", s.score, s.name.c_str(),
+                s.box.x1, s.box.y1, s.box.x2, s.box.y2);
+  }
+  drawSights(frame ? *frame : greyRamp(look.input_width, look.input_height), look.sights, drawing);
+  std::printf("drawn       %s\n", drawing.c_str());
+}
+
+void compare(const fs::path& network, const fs::path& reference) {
+  if (!fs::exists(reference / "input.f32")) return;  // the import has said why
+  const Answers answers = checkAnswers(network, reference);
+  if (answers.difference > kMostDifference) {
+    throw StartupError(
+        ExitCode::kConfiguration,
+        fmt::format("OpenCV computes {} of {} otherwise than the file says (by {:.2g} of its "
+                    "largest value), so that its boxes would be wrong; export it with another "
+                    "opset (11 to 13), or a plainer network of the family",
+                    answers.tensor, network.string(), answers.difference));
+  }
+  std::printf("OpenCV      answers as the file says (within %.0e)\n", answers.difference);
+}
+
+void import(const Request& request) {
+  const fs::path out = importedPath(request.network, request.out);
+  const TemporaryFolder folder;
+  ImportRequest wanted{request.network, out, request.unchecked ? fs::path() : folder.path(),
+                       request.arguments};
+  std::fflush(stdout);
+  if (const int status = importNetwork(wanted); status != 0) throw CLI::RuntimeError(status);
+  const fs::path description = out.string() + ".model.json";
+  try {
+    compare(out, folder.path());
+    showSights(out, request.image, request.threshold, fs::path(out).replace_extension(".png"));
+  } catch (...) {  // what cannot be used is not left to be used
+    std::error_code ignored;
+    fs::remove(out, ignored);
+    fs::remove(description, ignored);
+    fs::remove(out.string() + ".priors.txt", ignored);
+    throw;
+  }
+  std::printf("written     %s, %s\nuse it      perdure-inference --set model.path=%s\n",
+              out.c_str(), description.c_str(), out.c_str());
+}
+
+/// An option that the Python part takes as it is.
+void passOn(CLI::App& command, Request& request, const std::string& name, const std::string& help,
+            const std::string& type) {
+  command
+      .add_option_function<std::string>(
+          name,
+          [&request, name](const std::string& value) {
+            request.arguments.push_back(name + "=" + value);
+          },
+          help)
+      ->type_name(type);
+}
+
+void addImport(CLI::App& model, const std::shared_ptr<Request>& request) {
+  CLI::App* command = model.add_subcommand("import", "Make a detector's ONNX file ready for use");
+  command->footer(kImportHelp);
+  command->add_option("network", request->network, "the .onnx file")->required()->type_name("FILE");
+  passOn(*command, *request, "--classes", "names in the network's order, or a file with one a line",
+         "NAMES");
+  passOn(*command, *request, "--family",
+         "instead of a guess: yolov5, yolov7, yolov8 (also v11), yolox, nanodet, fastestdet, ssd, "
+         "detr",
+         "NAME");
+  passOn(*command, *request, "--size", "of an input without a fixed size", "WxH");
+  passOn(*command, *request, "--anchors",
+         "yolov5, yolov7: W,H,W,H,… of each level, / between levels", "LIST");
+  passOn(*command, *request, "--priors", "ssd: a line x y width height for each box, in shares",
+         "FILE");
+  passOn(*command, *request, "--variances", "ssd: of centre and size (0.1,0.2)", "V,V");
+  passOn(*command, *request, "--boxes", "ssd, detr: the output that has the boxes", "OUTPUT");
+  command->add_flag_callback(
+      "--y-first", [request] { request->arguments.emplace_back("--y-first"); },
+      "ssd: boxes are y1 x1 y2 x2, as TensorFlow has them");
+  passOn(*command, *request, "--bins", "nanodet: values of a distance (8)", "N");
+  passOn(*command, *request, "--cell-offset", "nanodet: 0, or 0.5 for the older ones", "SHARE");
+  passOn(*command, *request, "--colour", "rgb or bgr", "ORDER");
+  passOn(*command, *request, "--fit", "letterbox_centre, letterbox_top_left or resize", "HOW");
+  passOn(*command, *request, "--scale", "input = (pixel - mean)·scale: one number or three",
+         "LIST");
+  passOn(*command, *request, "--mean", "three numbers, in the order of the colours", "LIST");
+  passOn(*command, *request, "--pad", "the grey around a letterboxed picture", "VALUE");
+  command->add_option("--image", request->image, "a picture to look at")->type_name("FILE");
+  command->add_option("--out", request->out, "another folder than the network's")->type_name("DIR");
+  command->add_option("--threshold", request->threshold, "least score of what is drawn")
+      ->check(CLI::Range(0.001, 0.999))
+      ->capture_default_str();
+  command->add_flag("--no-check", request->unchecked,
+                    "do not compare OpenCV's answers with the file's (seconds, for large networks "
+                    "minutes)");
+  command->callback([request] { import(*request); });
+}
+
+void addLook(CLI::App& model, const std::shared_ptr<Request>& request) {
+  CLI::App* command =
+      model.add_subcommand("look", "Draw what a network with a model.json sees in a picture");
+  command->add_option("network", request->network, "the .onnx or .cfg file")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--image", request->image, "the picture")->required()->type_name("FILE");
+  command->add_option("--out", request->out, "the drawing, a .png")->required()->type_name("FILE");
+  command->add_option("--threshold", request->threshold, "least score of what is drawn")
+      ->check(CLI::Range(0.001, 0.999))
+      ->capture_default_str();
+  command->callback([request] {
+    showSights(request->network, request->image, request->threshold, request->out);
+  });
+}
+
+}  // namespace
+
+void addModelCommand(CLI::App& app) {
+  CLI::App* model = app.add_subcommand(
+      "model", "Bring a detector of your own: make it ready, and see what it sees");
+  model->require_subcommand(1);
+  model->footer(
+      "\nA network is an ONNX file and a model.json that says what its numbers mean. `import` "
+      "writes\nboth from the file that a training framework exports; `look` shows what one sees.\n"
+      "\n  perdure model import yolov8n.onnx --image street.jpg\n"
+      "  perdure model look yolov8n.perdure.onnx --image other.jpg --out other.png\n"
+      "\nperdure model import --help tells the options; services/inference/README.md the "
+      "families.");
+  addImport(*model, std::make_shared<Request>());
+  addLook(*model, std::make_shared<Request>());
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,10 @@
+// `perdure model`: bring a network of one's own, and see what it sees.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace perdure::tools {
+
+void addModelCommand(CLI::App& app);
+
+}  // namespace perdure::tools

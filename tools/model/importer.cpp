@@ -1,0 +1,81 @@
+#include "tools/model/importer.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <optional>
+
+#include "common/base/errors.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Debian's, which Debian's python3-onnx belongs to; another one in the PATH does not have it.
+constexpr const char* kPython = "/usr/bin/python3";
+
+/// The folder of perdure_model: in the source tree or an installation, seen from the program.
+std::optional<fs::path> pythonFolder() {
+  std::error_code error;
+  fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (int up = 0; up < 4 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
+    for (const char* there : {"tools/model", "share/perdure"}) {
+      if (fs::is_regular_file(folder / there / "perdure_model/__main__.py", error)) {
+        return folder / there;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+int run(const fs::path& folder, std::vector<std::string> words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    setenv("PYTHONPATH", folder.c_str(), 1);
+    execv(kPython, arguments.data());
+    _exit(127);
+  }
+  int status = 0;
+  if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status)) return 1;
+  return WEXITSTATUS(status);
+}
+
+}  // namespace
+
+fs::path importedPath(const fs::path& network, const fs::path& folder) {
+  const fs::path beside = network.parent_path();
+  return (folder.empty() ? beside : folder) / (network.stem().string() + ".perdure.onnx");
+}
+
+int importNetwork(const ImportRequest& request) {
+  const auto folder = pythonFolder();
+  if (!folder) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "perdure_model is missing; it belongs into tools/model of the source tree, "
+                       "or into share/perdure of the installation");
+  }
+  std::vector<std::string> words = {kPython,
+                                    "-B",
+                                    "-m",
+                                    "perdure_model",
+                                    request.network.string(),
+                                    "--out",
+                                    request.out.string()};
+  if (!request.reference.empty()) {
+    words.insert(words.end(), {"--reference", request.reference.string()});
+  }
+  words.insert(words.end(), request.arguments.begin(), request.arguments.end());
+  const int status = run(*folder, words);
+  if (status == 127) {
+    throw StartupError(ExitCode::kUnavailable,
+                       std::string(kPython) + " is missing; apt-get install python3-onnx");
+  }
+  return status;
+}
+
+}  // namespace perdure::tools

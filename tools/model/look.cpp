@@ -1,0 +1,116 @@
+#include "tools/model/look.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "common/base/errors.h"
+#include "services/inference/core/evidence.h"
+#include "services/inference/node.h"
+#include "tools/outputs/drawing.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The network's score back from the evidence: what calibration did is undone.
+Sight sightOf(const Detection& detection, const ModelInfo& model,
+              const inference::Calibration& calibration) {
+  const auto& a = detection.activations;
+  const auto best = std::max_element(a.begin() + 1, a.end());
+  const double log_odds =
+      (double{*best} - inference::logit(calibration.clutter_rate)) * calibration.temperature;
+  const auto k = static_cast<std::size_t>(best - a.begin()) - 1;
+  return {detection.box, model.classes.at(k), inference::sigmoid(log_odds)};
+}
+
+cv::Mat pixelsOf(const Frame& frame) {
+  auto* data = const_cast<std::uint8_t*>(frame.data->data());  // only copied from
+  return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), CV_8UC3, data)
+      .clone();
+}
+
+Frame frameOf(const cv::Mat& pixels) {
+  Frame frame;
+  frame.camera = "cam0";
+  frame.width = static_cast<std::uint32_t>(pixels.cols);
+  frame.height = static_cast<std::uint32_t>(pixels.rows);
+  frame.encoding = ImageEncoding::kBgr8;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(pixels.data,
+                                                                 pixels.data + pixels.total() * 3);
+  return frame;
+}
+
+}  // namespace
+
+Frame readPicture(const fs::path& file) {
+  const cv::Mat pixels = cv::imread(file.string(), cv::IMREAD_COLOR);
+  if (pixels.empty()) {
+    throw StartupError(ExitCode::kUnavailable, "the picture " + file.string() +
+                                                   " is missing or cannot be read; give --image a "
+                                                   "JPEG or PNG");
+  }
+  return frameOf(pixels);
+}
+
+Frame greyRamp(int width, int height) {
+  cv::Mat pixels(height, width, CV_8UC3);
+  for (int x = 0; x < width; ++x) pixels.col(x).setTo(cv::Scalar::all(40 + 170.0 * x / width));
+  return frameOf(pixels);
+}
+
+Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
+  inference::Config config;
+  config.model.path = network.string();
+  config.detection.score_threshold = threshold;
+  inference::Node node(config, 1);
+  const auto description =
+      inference::readModelFile(network.string(), "", inference::standardModelFolders()).description;
+  Look look;
+  look.input_width = description.input.width;
+  look.input_height = description.input.height;
+  const auto answer =
+      node.infer(frame != nullptr ? *frame : greyRamp(look.input_width, look.input_height));
+  if (!answer) {
+    throw StartupError(ExitCode::kConfiguration,
+                       network.string() + " fails on the picture: " + answer.error().detail + " (" +
+                           answer.error().code + ")");
+  }
+  for (const Detection& detection : answer->detections) {
+    look.sights.push_back(sightOf(detection, node.model(), description.calibration));
+  }
+  // Second answers to one object have lost evidence since they were emitted.
+  std::erase_if(look.sights, [&](const Sight& s) { return s.score < threshold; });
+  std::stable_sort(look.sights.begin(), look.sights.end(),
+                   [](const Sight& a, const Sight& b) { return a.score > b.score; });
+  return look;
+}
+
+void drawSights(const Frame& frame, const std::vector<Sight>& sights, const fs::path& file) {
+  cv::Mat image = pixelsOf(frame);
+  const cv::Rect all({}, image.size());
+  std::vector<cv::Rect> taken;
+  for (const Sight& sight : sights) {
+    const Box& b = sight.box;
+    const Colour colour = classColour(sight.name);
+    drawClosed(image, {{b.x1, b.y1}, {b.x2, b.y1}, {b.x2, b.y2}, {b.x1, b.y2}}, {colour, 2});
+    const std::string text = fmt::format("{} {:.2f}", sight.name, sight.score);
+    const cv::Size size = sizeOf(text) + cv::Size(6, 6);
+    const cv::Point at(static_cast<int>(std::clamp(b.x1, 0.0, double(image.cols))),
+                       static_cast<int>(std::clamp(b.y1, 0.0, double(image.rows))) - 2);
+    const cv::Rect place = placeFor(size, at, all, taken);
+    tint(image, place, colour, 0.85);
+    drawText(image, text, {place.x + 3, place.y + place.height - 4}, kPaper);
+    taken.push_back(place);
+  }
+  if (!cv::imwrite(file.string(), image)) {
+    throw StartupError(ExitCode::kUnavailable,
+                       file.string() + " cannot be written; choose another folder");
+  }
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,251 @@
+"""python3 -m perdure_model: the part of `perdure model import` that looks at graphs. Writes the
+network, its model.json and what to compare OpenCV's answers with; tells its findings."""
+
+import argparse
+import ast
+import json
+import sys
+from pathlib import Path
+
+try:
+    import numpy as np
+    import onnx
+except ImportError as missing:
+    print(f"perdure model: {missing.name} is missing; install it: apt-get install python3-onnx (deploy/install "
+          "--model)", file=sys.stderr)
+    sys.exit(69)
+
+from . import heads as tracing
+from . import level_families, output_families, sayings
+from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault
+from .finding import INPUTS
+from .graph import Graph
+from .opencv import Repair
+
+USUAL_CLUTTER_RATE = 0.79  # of the networks measured in services/inference/README.md
+
+
+def numbers(text):
+    return [float(n) for n in text.split(",")]
+
+
+def parsed(arguments):
+    parser = argparse.ArgumentParser(prog="perdure_model", description=__doc__)
+    parser.add_argument("network", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--reference", type=Path)
+    parser.add_argument("--classes", default="")
+    parser.add_argument("--family", default="", choices=["", *sayings.FAMILIES])
+    parser.add_argument("--size", default="")
+    parser.add_argument("--anchors", default="")
+    parser.add_argument("--priors", type=Path)
+    parser.add_argument("--variances", default="0.1,0.2")
+    parser.add_argument("--boxes", default="")
+    parser.add_argument("--y-first", action="store_true")
+    parser.add_argument("--bins", type=int)
+    parser.add_argument("--cell-offset", type=float)
+    for name in ("colour", "fit", "scale", "mean", "pad"):
+        parser.add_argument(f"--{name}", default="")
+    return parser.parse_args(arguments)
+
+
+class Request:
+    """The command line, read."""
+
+    def __init__(self, args):
+        self.family, self.bins, self.cell_offset = args.family, args.bins, args.cell_offset
+        self.boxes, self.y_first = args.boxes, args.y_first
+        self.names = names_of(args.classes) if args.classes else None
+        try:
+            self.size = [int(n) for n in args.size.split("x")] if args.size else None
+            groups = [numbers(g) for g in args.anchors.split("/")] if args.anchors else []
+            self.anchors = [list(zip(g[::2], g[1::2])) for g in groups] or None
+            self.variances = numbers(args.variances)
+            self.input = {k: numbers(v) if k in ("scale", "mean") else float(v) if k == "pad" else v
+                          for k in ("colour", "fit", "scale", "mean", "pad") if (v := getattr(args, k))}
+        except ValueError as e:
+            raise Fault(f"a number was expected: {e}; sizes are 640x640, lists 1,2,3", USAGE)
+        if self.size is not None and len(self.size) != 2 or any(len(g) % 2 for g in groups) or len(self.variances) != 2:
+            raise Fault("--size is WIDTHxHEIGHT, --anchors pairs W,H, --variances two numbers", USAGE)
+        if self.input.get("scale") and len(self.input["scale"]) == 1:
+            self.input["scale"] = self.input["scale"][0]
+        self.priors = priors_of(args.priors) if args.priors else None
+
+
+def names_of(text):
+    """A file with a name a line, or a list with commas."""
+    path = Path(text)
+    if path.is_file():
+        names = [line.strip() for line in path.read_text(errors="replace").splitlines() if line.strip()]
+    elif "," in text or not ("/" in text or text.endswith((".txt", ".names"))):
+        names = [name.strip() for name in text.split(",")]
+    else:
+        raise Fault(f"the file of class names {text} is missing; give a file with a name a line, or names with commas "
+                    "between", UNAVAILABLE)
+    if not all(names) or not names:
+        raise Fault(f"{text} holds no names, or an empty one; give a name for each class of the network", USAGE)
+    return distinct(names)
+
+
+def distinct(names):
+    """COCO's 91 have N/A eleven times: those become n/a-12 and so on."""
+    lower = [name.lower() for name in names]
+    return [n if lower.count(n) == 1 else f"{n}-{i}" for i, n in enumerate(lower)]
+
+
+def priors_of(path):
+    try:
+        priors = np.loadtxt(path, ndmin=2)
+    except OSError:
+        raise Fault(f"the file of priors {path} is missing or cannot be read", UNAVAILABLE)
+    except ValueError as e:
+        raise Fault(f"{path} cannot be read as priors ({e}); a line x y width height for each")
+    if priors.shape[1] != 4 or not (priors[:, 2:] > 0).all():
+        raise Fault(f"{path} does not hold priors; a line x y width height for each, in shares of the image")
+    return priors
+
+
+def names_in(graph):
+    """Ultralytics writes the class names into the file."""
+    try:
+        names = ast.literal_eval(graph.metadata["names"])
+        return distinct([str(names[i]) for i in sorted(names)] if isinstance(names, dict) else [str(n) for n in names])
+    except (KeyError, ValueError, SyntaxError, TypeError):
+        return None
+
+
+def recognise(path, graph, size, request):
+    sayings.refuse_own(path, graph)
+    heads, _ = tracing.find_heads(graph)
+    found = []
+    if heads and request.family not in ("ssd", "detr"):
+        found = level_families.candidates(level_families.Levels(graph, tracing.levels_of(heads), size, request),
+                                          request.family)
+    if request.names and any(f.classes == len(request.names) for f in found):
+        found = [f for f in found if f.classes == len(request.names)]
+    best = found[0] if found else None
+    choosing = tracing.choosing_operators(graph)
+    disagrees = best is not None and best.disagreement is not None and best.disagreement >= level_families.AGREES
+    if (best is None or disagrees) and choosing and request.family != "detr":
+        sayings.refuse_choosing(path, choosing, request.family)
+    if best is None or disagrees and not request.anchors:
+        best = output_families.find(output_families.Outputs(graph, size, request)) or best
+    if best is None:
+        shapes = ", ".join(f"{o} {'x'.join(map(str, graph.shape(o) or ['?']))}" for o in graph.outputs)
+        where = f"as {request.family}" if request.family else "as any family"
+        raise Fault(f"{path} is not known {where} by its outputs ({shapes}); give --family, or the right --classes, or "
+                    f"export it otherwise. {sayings.exports(request.family)}")
+    if best.disagreement is not None and best.disagreement >= level_families.AGREES:
+        raise Fault(f"{path} has the heads of {best.family}, but {best.compared}; give --family or --anchors. "
+                    f"{sayings.exports(best.family)}")
+    return best
+
+
+def check_names(path, found, request, graph):
+    names = request.names or names_in(graph)
+    if names is None:
+        raise Fault(f"{path} does not say the names of its {found.classes} classes; give --classes FILE or "
+                    "NAME,NAME,…", USAGE)
+    if len(names) != found.classes:
+        raise Fault(f"{path} ({found.family}) has {found.classes} classes and {len(names)} names were given; "
+                    "give as many, in the network's order")
+    return names
+
+
+def cut(path, graph, found):
+    was = {n.kind for n in graph.nodes}
+    graph.keep(found.cuts)
+    for old, new in found.cuts.items():  # the names may be taken: all others make way first
+        graph.rename(old, f"perdure_cut_{new}")
+    for new in found.cuts.values():
+        graph.rename(new, f"perdure_was_{new}")
+        graph.rename(f"perdure_cut_{new}", new)
+    sayings.refuse_inside(path, graph, found.family)
+    others = [i for i in graph.inputs if i != graph.image]
+    if others:
+        raise Fault(f"{path} needs the inputs {', '.join(others)} beside the image; export a network that takes an "
+                    "image only")
+    gone = [k for k in tracing.CHOOSING if k in was]
+    if gone:
+        found.notes.append(f"{', '.join(gone)} was cut off: Perdure takes the heads before it")
+
+
+def description(args, found, names, size, request):
+    keys = dict(found.keys)
+    if keys.get("boxes", {}).get("form") == "offsets":
+        keys["boxes"]["priors_file"] = args.out.name + ".priors.txt"
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        np.savetxt(str(args.out) + ".priors.txt", request.priors, fmt="%.7g")
+    return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
+            "family": found.family,
+            "input": {"width": size[0], "height": size[1], **INPUTS[found.family],
+                      **request.input}, "classes": names, **keys,
+            "calibration": {"temperature": 1.0, "clutter_rate": USUAL_CLUTTER_RATE}}
+
+
+def write_reference(graph, size, given, outputs, folder):
+    """What the network answers to pixels of noise, computed here: OpenCV must say the same."""
+    pixels = np.random.default_rng(11).uniform(0, 255, (1, 3, size[1], size[0]))
+    mean, scale = (np.broadcast_to(given[k], 3).reshape(3, 1, 1) for k in ("mean", "scale"))
+    image = ((pixels - mean) * scale).astype(np.float32)
+    values, stuck = graph.evaluate({graph.image: image}, outputs)
+    if any(o not in values for o in outputs):
+        return f"not compared with OpenCV's answers: {', '.join(sorted(set(stuck)))} has no counterpart here"
+    folder.mkdir(parents=True, exist_ok=True)
+    image.tofile(folder / "input.f32")
+    for name in outputs:
+        np.ascontiguousarray(values[name], np.float32).tofile(folder / f"{name}.f32")
+    return ""
+
+
+def run(args):
+    request = Request(args)
+    graph = Graph.load(args.network)
+    size = graph.fix_input(args.network, request.size)
+    graph.fold()
+    request.names = request.names or names_in(graph)
+    found = recognise(args.network, graph, size, request)
+    names = check_names(args.network, found, request, graph)
+    cut(args.network, graph, found)
+    outputs = list(found.cuts.values())
+    given = {**INPUTS[found.family], **request.input}
+    if args.reference:  # of the graph as it was, so that a wrong repair shows too
+        why = write_reference(graph, size, given, outputs, args.reference)
+        found.notes += [why] if why else []
+    repaired = Repair(graph).run()
+    graph.keep(outputs)
+    text = json.dumps(description(args, found, names, size, request), indent=1)
+    try:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        onnx.save(graph.to_model(), str(args.out))
+        Path(str(args.out) + ".model.json").write_text(text + "\n")
+    except OSError as e:
+        raise Fault(f"{e.filename or args.out} cannot be written ({e.strerror}); give --out DIR", UNAVAILABLE)
+    print(f"family      {found.family}, {found.classes} classes, input {size[0]}x{size[1]}")
+    print(f"cut at      {', '.join(outputs)}: {len(graph.nodes)} operators are left")
+    if repaired:
+        print(f"repaired    {', '.join(f'{what} ({n})' for what, n in sorted(repaired.items()))}")
+    print(f"decoding    {found.compared}")
+    usual = f" (usual for {found.family}; else give --colour, --scale, --mean, --fit)"
+    said = {"colour", "scale", "fit"} <= set(request.input)
+    print(f"input       {given['colour']}, (pixel − {given['mean']})·{given['scale']}, {given['fit']}"
+          f"{'' if said else usual}")
+    for note in found.notes:
+        print(f"note        {note}")
+
+
+def main():
+    args = parsed(sys.argv[1:])
+    try:
+        run(args)
+    except Fault as fault:
+        print(f"perdure model: {fault}", file=sys.stderr)
+        sys.exit(fault.status)
+    except Exception as e:  # a graph at odds with itself can go wrong anywhere
+        print(f"perdure model: {args.network} is not a graph that makes sense here ({type(e).__name__}: {e}); export "
+              "it again, with opset 12", file=sys.stderr)
+        sys.exit(CONFIGURATION)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""Where a graph's heads are: the convolutions behind its outputs, with only the decoding between."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# What exporters write behind the heads: shapes, activations, arithmetic, choosing.
+DECODING = {
+    "Reshape", "Transpose", "Concat", "Slice", "Split", "Squeeze", "Unsqueeze", "Flatten", "Identity", "Cast", "Expand",
+    "Tile", "Gather", "GatherElements", "GatherND", "ScatterND", "Shape", "Range", "ConstantOfShape", "Sigmoid",
+    "Softmax", "Tanh", "Mul", "Add", "Sub", "Div", "Pow", "Exp", "Log", "Neg", "Sqrt", "Max", "Min", "Clip", "Where",
+    "Equal", "Greater", "Less", "GreaterOrEqual", "LessOrEqual", "Not", "And", "Or", "Mod", "Floor",
+    "ReduceMax", "ReduceSum", "ReduceMin", "ArgMax", "TopK", "NonMaxSuppression", "NonZero", "Constant", "Abs", "Round",
+    "Ceil", "CumSum"}
+
+# Chooses boxes inside the network: the answer has no fixed meaning for each row.
+CHOOSING = ("NonMaxSuppression", "TopK", "NonZero", "BatchedNMS_TRT", "BatchedNMSDynamic_TRT", "EfficientNMS_TRT",
+            "MultiClassNMS", "If", "Loop", "Scan", "RoiAlign")
+
+
+@dataclass
+class Head:
+    name: str
+    channels: int
+    rows: int
+    columns: int
+
+
+def is_mean_of_bins(graph, node):
+    """YOLOv8's last convolution: one output, its weights 0, 1, 2 …"""
+    weight = graph.constant(node.inputs[1]) if node.kind == "Conv" and len(node.inputs) > 1 else None
+    return weight is not None and weight.shape[0] == 1 and weight.size > 1 and \
+        np.array_equal(weight.ravel(), np.arange(weight.size))
+
+
+def is_decoding(graph, node):
+    return node.kind in DECODING or node.kind in CHOOSING or bool(node.domain) or is_mean_of_bins(graph, node)
+
+
+def advanced(graph, name, consumers):
+    """A convolution's output, past a factor or summand for each channel (YOLOv7's implicit knowledge)."""
+    channels = graph.shape(name)
+    while channels and name not in graph.outputs and len(consumers.get(name, [])) == 1:
+        node = consumers[name][0]
+        others = [graph.constant(i) for i in node.inputs if i != name]
+        if node.kind not in ("Mul", "Add") or others[0] is None or len(others) != 1:
+            break
+        shape = [1] * (4 - others[0].ndim) + list(others[0].shape)
+        if shape != [1, channels[1], 1, 1]:
+            break
+        name = node.outputs[0]
+    return name
+
+
+def find_heads(graph):
+    """([Head] in the order in which the outputs put them together, the names of other tensors where
+    the decoding begins)."""
+    producers, consumers = graph.producers(), graph.consumers()
+    heads, others, seen = [], [], set()
+    todo = list(reversed(graph.outputs))
+    while todo:
+        name = todo.pop()
+        if name in seen or name == "" or name in graph.constants:
+            continue
+        seen.add(name)
+        node = producers.get(name)
+        if node is None:
+            others.append(name)
+        elif is_decoding(graph, node):
+            todo += reversed(node.inputs)
+        elif node.kind == "Conv" and graph.shape(name) is not None:
+            shape, last = graph.shape(name), advanced(graph, name, consumers)
+            if last not in [h.name for h in heads]:
+                heads.append(Head(last, shape[1], shape[2], shape[3]))
+        else:
+            others.append(name)
+    return heads, others
+
+
+def levels_of(heads):
+    """Heads of one resolution together, in the order of their first ones; finest first where mixed."""
+    levels = {}
+    for head in heads:
+        levels.setdefault((head.rows, head.columns), []).append(head)
+    return list(levels.values())
+
+
+def choosing_operators(graph):
+    return sorted({n.kind for n in graph.nodes if n.kind in CHOOSING})
+
+
+def decoding_nodes(graph, heads):
+    """The nodes between the heads and the outputs."""
+    producers = graph.producers()
+    inside, todo, stops = set(), list(graph.outputs), {h.name for h in heads}
+    while todo:
+        name = todo.pop()
+        node = producers.get(name)
+        if name in stops or node is None or id(node) in inside:
+            continue
+        inside.add(id(node))
+        todo += [i for i in node.inputs if i]
+    return [n for n in graph.nodes if id(n) in inside]

@@ -1,0 +1,218 @@
+"""Families that are known by their heads: YOLOv5, v7, v8, v11, YOLOX, NanoDet, FastestDet."""
+
+import numpy as np
+
+from . import decoding
+from .faults import Fault
+from .finding import Finding
+from .heads import decoding_nodes
+
+AS_THE_FILE = "decodes random heads as the file itself does (within {:.0e})"
+AGREES = 2e-3  # of 1 + the value, in float32 with random heads
+
+
+class Levels:
+    """The heads of a graph by levels, and what the file's own decoding makes of random values."""
+
+    def __init__(self, graph, levels, size, request):
+        self.graph, self.levels, self.size, self.request = graph, levels, size, request
+        self.strides = [round(size[0] / level[0].columns) for level in levels]
+        self.nodes = decoding_nodes(graph, [h for level in levels for h in level])
+        self.kinds = {n.kind for n in self.nodes}
+
+    def with_values(self, value):
+        """`value(shape)` in each head: (heads by level, all float tensors that follow)."""
+        heads = [[value((1, h.channels, h.rows, h.columns)).astype(np.float32) for h in level] for level in self.levels]
+        known = {h.name: v for level, values in zip(self.levels, heads) for h, v in zip(level, values)}
+        found, stuck = self.graph.evaluate(known)
+        for name in known:
+            found.pop(name)
+        return heads, [v for v in found.values() if v is not None and v.dtype.kind == "f"], stuck
+
+    def random(self):
+        generator = np.random.default_rng(7)
+        return self.with_values(lambda shape: generator.normal(0, 1, shape))
+
+    def count(self, each):
+        return all(len(level) == each for level in self.levels)
+
+    def same_channels(self, index):
+        found = {level[index].channels for level in self.levels}
+        return found.pop() if len(found) == 1 else None
+
+    def cuts(self, roles):
+        """{tensor: name in model.json} and the levels' keys; `roles` by the order of the heads."""
+        names, keys = {}, []
+        for level, stride in zip(self.levels, self.strides):
+            key = {"stride": stride}
+            for head, role in zip(level, roles):
+                if role:
+                    names[head.name] = key[role] = f"{role}{stride}"
+            keys.append(key)
+        return names, keys
+
+    def finish(self, finding, mine, random):
+        """Holds our decoding against the file's own."""
+        _, values, stuck = random
+        if not self.nodes:
+            finding.compared = "the file has no decoding of its own to compare with"
+            return finding
+        finding.disagreement = min((e for m in mine for e in [decoding.disagreement(m, values)] if e is not None),
+                                   default=None)
+        if finding.disagreement is None:
+            why = f"its {', '.join(sorted(set(stuck)))} was not computed" if stuck else "it has none for each box"
+            finding.compared = f"not compared with the file's own decoding: {why}"
+        elif finding.disagreement < AGREES:
+            finding.compared = AS_THE_FILE.format(max(finding.disagreement, 1e-7))
+        else:
+            finding.compared = f"decodes otherwise than the file itself (by {finding.disagreement:.2g})"
+        return finding
+
+
+def yolox(levels):
+    """Boxes, objectness and classes apart, in this order or objectness first (FastestDet)."""
+    if not levels.count(3):
+        return None
+    channels = [h.channels for h in levels.levels[0]]
+    if channels[:2] not in ([4, 1], [1, 4]) or [levels.same_channels(i) for i in range(3)] != channels:
+        return None
+    box = channels.index(4)
+    roles = ["box", "objectness", "classes"] if box == 0 else ["objectness", "box", "classes"]
+    soft = "Softmax" in levels.kinds
+    names, keys = levels.cuts(roles)
+    found = Finding("fastestdet" if soft else "yolox", channels[2], names,
+                    {"activation": {"class": "softmax" if soft else "sigmoid"}, "levels": keys})
+    random = levels.random()
+    heads = [[level[box], level[1 - box], level[2]] for level in random[0]]
+    if soft:
+        return levels.finish(found, [decoding.fastestdet(heads)] if len(heads) == 1 else [], random)
+    return levels.finish(found, [decoding.yolox(heads, levels.strides, d) for d in (True, False)], random)
+
+
+def yolov8(levels):
+    """Bins of four distances, and classes."""
+    if not levels.count(2):
+        return None
+    order = [0, 1]
+    first, second = levels.same_channels(0), levels.same_channels(1)
+    wanted = len(levels.request.names or [])
+    if first is None or second is None:
+        return None
+    if (second == 64 and first != 64) or (first == wanted and second % 4 == 0 and second >= 32 and first != 64):
+        order = [1, 0]
+    sides, classes = (first, second) if order == [0, 1] else (second, first)
+    if sides % 4 or sides < 8 or (sides != 64 and "Softmax" not in levels.kinds):
+        return None
+    bins = sides // 4
+    roles = ["box", "classes"] if order == [0, 1] else ["classes", "box"]
+    names, keys = levels.cuts(roles)
+    found = Finding("yolov8", classes, names, {"activation": {"class": "sigmoid"}, "bins": bins, "levels": keys})
+    random = levels.random()
+    heads = [[level[i] for i in order] for level in random[0]]
+    levels.finish(found, [decoding.yolov8(heads, levels.strides, bins)], random)
+    return found if sides == 64 or found.disagreement is not None else None
+
+
+def nanodet(levels):
+    """Classes and bins of four distances in one head."""
+    channels = levels.same_channels(0) if levels.count(1) else None
+    wanted = len(levels.request.names or [])
+    bins = levels.request.bins or 8
+    if channels is None or channels <= 4 * bins or (wanted and channels != wanted + 4 * bins):
+        return None
+    names, keys = levels.cuts(["tensor"])
+    found = Finding("nanodet", channels - 4 * bins, names,
+                    {"activation": {"class": "sigmoid"}, "bins": bins, "levels": keys})
+    offset = levels.request.cell_offset
+    found.keys["cell_offset"] = (0.0 if len(levels.levels) > 3 else 0.5) if offset is None else offset
+    if offset is None:
+        found.notes.append(f"cell_offset is {found.keys['cell_offset']:g}, as in "
+                           f"{'NanoDet-Plus (four strides)' if len(levels.levels) > 3 else 'NanoDet (three strides)'}; "
+                           "if all boxes lie half a cell aside give --cell-offset")
+    random = levels.random()
+    return levels.finish(found, [decoding.nanodet([level[0] for level in random[0]], found.classes)], random)
+
+
+def anchors_of(levels, count, classes):
+    """From the file's own decoding at raw values of zero, where a box is its anchor; [] elsewhere."""
+    _, values, _ = levels.with_values(np.zeros)
+    total = count * sum(level[0].rows * level[0].columns for level in levels.levels)
+    for value in values:
+        rows = decoding.as_rows(value, 5 + classes)
+        if rows is None or len(rows) != total or not (rows[:, 2:4] > 1).all():
+            continue
+        found, begin = [], 0
+        for level in levels.levels:
+            cells = level[0].rows * level[0].columns
+            found.append([[round(float(n), 3) for n in rows[begin + a * cells, 2:4]] for a in range(count)])
+            begin += count * cells
+        return found
+    return []
+
+
+def yolov5(levels):
+    """A head of anchors times (box, objectness, classes)."""
+    channels = levels.same_channels(0) if levels.count(1) else None
+    request = levels.request
+    given = request.anchors
+    count = len(given[0]) if given else 3
+    if channels is None or channels % count or channels // count < 6 or (levels.nodes and "Exp" in levels.kinds):
+        return None
+    classes = channels // count - 5
+    family = "yolov7" if request.family == "yolov7" else "yolov5"
+    names, keys = levels.cuts(["tensor"])
+    found = Finding(family, classes, names, {"activation": {"class": "sigmoid"}})
+    anchors = given or anchors_of(levels, count, classes)
+    if not anchors and len(keys) == 3:
+        anchors = decoding.YOLOV7_ANCHORS if family == "yolov7" else decoding.YOLOV5_ANCHORS
+        found.notes.append(f"its anchors are not in the file: those of {family} for COCO were taken; give --anchors if "
+                           "it was trained with others")
+    if len(anchors) != len(keys):
+        if request.family not in ("yolov5", "yolov7"):
+            return None
+        raise Fault(f"the network has {len(keys)} levels and its anchors are not known; say --anchors "
+                    "W,H,W,H,…/W,H,…, a group for each level")
+    for key, pairs in zip(keys, anchors):
+        key["anchors"] = pairs
+    found.keys["levels"] = keys
+    random = levels.random()
+    return levels.finish(found, [decoding.yolov5([level[0] for level in random[0]], levels.strides, anchors)], random)
+
+
+def yolov8_with_more(levels):
+    """Masks or key points beside boxes and classes: those are left out."""
+    wanted = len(levels.request.names or [])
+    picks = [(next((i for i, h in enumerate(level) if h.channels == 64), None),
+              next((i for i, h in enumerate(level) if h.channels == wanted), None)) for level in levels.levels]
+    if levels.count(2) or not wanted or wanted == 64 or any(None in pick for pick in picks):
+        return None
+    chosen = Levels(levels.graph, [[level[i] for i in pick] for level, pick in zip(levels.levels, picks)], levels.size,
+                    levels.request)
+    names, keys = chosen.cuts(["box", "classes"])
+    found = Finding("yolov8", wanted, names, {"activation": {"class": "sigmoid"}, "bins": 16, "levels": keys})
+    heads, values, _ = levels.random()
+    mine = decoding.yolov8([[level[i] for i in pick] for level, pick in zip(heads, picks)], levels.strides, 16)
+    more = {v.shape[1] - mine.shape[1] for v in values if v.ndim == 3 and v.shape[2] == len(mine)}
+    found.disagreement = min((decoding.disagreement(mine, values, m) for m in more if m >= 0), default=None)
+    if found.disagreement is None or found.disagreement >= AGREES:
+        return None
+    found.compared = AS_THE_FILE.format(max(found.disagreement, 1e-7))
+    found.notes.append("it answers more than boxes (masks or key points), which is left out")
+    return found
+
+
+RULES = {"yolox": yolox, "fastestdet": yolox, "yolov8": yolov8, "yolov5": yolov5, "yolov7": yolov5, "nanodet": nanodet}
+
+
+def candidates(levels, family):
+    """Findings of all rules that fit, those that decode as the file does first."""
+    if family and family not in RULES:
+        return []
+    rules = [RULES[family]] if family else list(dict.fromkeys(RULES.values()))
+    if family in ("", "yolov8"):
+        rules.append(yolov8_with_more)
+    found = [f for f in (rule(levels) for rule in rules) if f is not None]
+    if family:
+        found = [f for f in found if f.family == family]
+    agree = [f for f in found if f.disagreement is None or f.disagreement < AGREES]
+    return sorted(agree or found, key=lambda f: f.disagreement is None)

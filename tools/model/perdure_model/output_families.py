@@ -1,0 +1,189 @@
+"""Families that are known by their outputs: boxes and scores of all levels at once."""
+
+import numpy as np
+
+from .faults import Fault
+from .finding import Finding
+from .graph import Node
+from .heads import decoding_nodes, find_heads
+
+# The scores pass these as they are, so that an activation before them may be left out.
+PASSING = {"Reshape", "Transpose", "Concat", "Slice", "Squeeze", "Unsqueeze", "Flatten", "Identity", "Split", "Cast",
+           "Gather"}
+MANY_QUERIES = 1000  # more rows than that come from cells or priors, not from queries
+
+
+class Outputs:
+    def __init__(self, graph, size, request):
+        self.graph, self.size, self.request = graph, size, request
+        self.shapes = {o: graph.shape(o) for o in graph.outputs}
+
+    def of_rank(self, rank):
+        return {o: s for o, s in self.shapes.items() if s is not None and len(s) == rank and s[0] == 1}
+
+    def pair(self):
+        """(boxes, scores) where one output is (1,N,4) and another (1,N,C)."""
+        found = self.of_rank(3)
+        count = len(self.request.names or [])
+        pairs = [(b, s) for b in found for s in found if b != s and found[b][2] == 4 and found[b][1] == found[s][1]]
+        if not pairs:
+            return None
+        producers = self.graph.producers()
+
+        def likely(pair):
+            boxes, scores = pair
+            named = any(word in boxes.lower() for word in ("box", "loc", "coord"))
+            return (found[scores][2] in (count, count + 1), named, producers[scores].kind == "Softmax",
+                    producers[boxes].kind != "Softmax", producers[boxes].kind == "Sigmoid")
+
+        pairs.sort(key=likely, reverse=True)
+        if self.request.boxes:
+            pairs = [p for p in pairs if p[0] == self.request.boxes] or pairs
+        elif len(pairs) > 1 and likely(pairs[0]) == likely(pairs[1]):
+            raise Fault(f"the outputs {' and '.join(p[0] for p in pairs[:2])} could both be the boxes; say --boxes "
+                        "NAME")
+        return pairs[0]
+
+    def strip(self, name, boxes=0):
+        """Takes the sigmoid or soft-max behind which nothing but shapes follows out of the graph:
+        "sigmoid", "softmax" or "" where there is none. Of columns put together the first `boxes`
+        are no scores."""
+        producers = self.graph.producers()
+        found, todo = [], [name]
+        while todo:
+            node = producers.get(todo.pop())
+            if node is None:
+                continue
+            if node.kind in ("Sigmoid", "Softmax"):
+                found.append(node)
+            elif node.kind == "Concat" and boxes:
+                first = self.graph.shape(node.inputs[0])
+                if first is None or first[node.attributes["axis"]] != boxes:
+                    return ""
+                todo += node.inputs[1:]
+                boxes = 0
+            elif node.kind in PASSING and not node.domain:
+                todo += node.inputs if node.kind == "Concat" else node.inputs[:1]
+        kinds = {n.kind for n in found}
+        if len(kinds) != 1 or boxes:
+            return ""
+        for node in found:
+            if node.outputs[0] in self.graph.outputs:  # the outputs keep their names
+                node.kind, node.attributes = "Identity", {}
+            else:
+                self.graph.rename_uses(node.outputs[0], node.inputs[0])
+        return kinds.pop().lower()
+
+
+def parts_of(graph, name, shape):
+    """Adds Slices of the first four columns and of the others; returns their names."""
+    found = []
+    for part, begin, end in (("boxes", 0, 4), ("scores", 4, shape[2])):
+        inputs = [name]
+        for key, value in (("begin", begin), ("end", end), ("axis", 2)):
+            constant = f"perdure_{part}_{key}"
+            graph.constants[constant] = np.array([value], np.int64)
+            inputs.append(constant)
+        graph.nodes.append(Node("Slice", inputs, [f"perdure_{part}"]))
+        graph.shapes[f"perdure_{part}"] = [1, shape[1], end - begin]
+        found.append(f"perdure_{part}")
+    graph.outputs = graph.outputs + found
+    return found
+
+
+def single(outputs):
+    """One tensor: YOLOv5 (1,N,5+K), YOLOv8 (1,4+K,N), RT-DETR (1,Q,4+K)."""
+    graph, request = outputs.graph, outputs.request
+    wanted, family = len(request.names or []), request.family
+    for name, (_, rows, columns) in outputs.of_rank(3).items():
+        if family in ("yolov5", "yolov7", "") and columns > 5 and (columns == wanted + 5 or family):
+            found = Finding(family or "yolov5", columns - 5, {name: "predictions"})
+            found.keys = {"activation": {"class": "sigmoid", "applied": True},
+                          "outputs": {"predictions": "predictions"}}
+            found.notes.append("its heads were not found, or decode in a way of their own, so that its probabilities "
+                               "are taken: evidence ends at ±16")
+            return found
+        if family in ("yolov8", "") and rows > 4 and columns > rows and (rows == wanted + 4 or family):
+            found = Finding("yolov8", rows - 4, {name: "predictions"})
+            kind = outputs.strip(name, boxes=4)
+            found.keys = {"activation": {"class": "sigmoid", "applied": kind != "sigmoid"},
+                          "outputs": {"predictions": "predictions"}}
+            return found
+        if family in ("detr", "") and columns > 4 and rows <= MANY_QUERIES and columns == wanted + 4:
+            kind = outputs.strip(name, boxes=4)
+            boxes, scores = parts_of(graph, name, [1, rows, columns])
+            found = Finding("detr", columns - 4, {boxes: "boxes", scores: "scores"})
+            found.keys = {"activation": {"class": "sigmoid", "applied": kind != "sigmoid"},
+                          "outputs": {"boxes": "boxes", "scores": "scores"}}
+            return found
+    return None
+
+
+def box_form(outputs, name, family, found):
+    """boxes of model.json: offsets where priors are given, else what the numbers look like at raw
+    values of zero, where every box is its prior."""
+    graph, request = outputs.graph, outputs.request
+    form = {"y_first": True} if request.y_first else {}
+    if request.priors is not None:
+        rows = outputs.shapes[name][1]
+        if len(request.priors) != rows:
+            raise Fault(f"{len(request.priors)} priors were given for {rows} boxes; give a file with one line x y "
+                        "width height for each")
+        return {**form, "form": "offsets", "priors_file": "", "variances": request.variances}
+    if family == "detr":
+        return form
+    heads, _ = find_heads(graph)
+    known = {h.name: np.zeros((1, h.channels, h.rows, h.columns), np.float32) for h in heads}
+    boxes = graph.evaluate(known)[0].get(name)
+    kinds = {n.kind for n in decoding_nodes(graph, heads)} if heads else set()
+    if boxes is not None and "Exp" not in kinds:
+        raise Fault("the boxes of this network are offsets of its priors (nothing in the file decodes them); "
+                    "say --priors FILE with a line x y width height for each, in shares of the image")
+    if boxes is None:
+        found.notes.append("its boxes are taken for corners x1 y1 x2 y2 in shares of the image; if they come out "
+                           "elsewhere give --y-first, or --priors")
+        return form
+    b = boxes[0]
+    corners = bool((b[:, 2] >= b[:, 0]).all() and (b[:, 3] >= b[:, 1]).all())
+    form["form"] = "corners" if corners else "centre"
+    form["unit"] = "shares" if float(np.abs(b).max()) < 4 else "pixels"
+    return form
+
+
+def two(outputs):
+    """Boxes and scores: SSD and DETR."""
+    names = outputs.pair()
+    if names is None:
+        return None
+    graph, request = outputs.graph, outputs.request
+    boxes, scores = names
+    rows, columns = outputs.shapes[scores][1:]
+    wanted = len(request.names or [])
+    attends = any(n.kind == "MatMul" and all(graph.constant(i) is None for i in n.inputs) for n in graph.nodes)
+    family = request.family or ("detr" if attends and rows <= MANY_QUERIES else "ssd")
+    kind = outputs.strip(scores)
+    background = columns == wanted + 1
+    soft = kind == "softmax" or (kind == "" and background)
+    found = Finding(family, columns - 1 if background or (not wanted and (family == "ssd" or soft)) else columns,
+                    {boxes: "boxes", scores: "scores"})
+    place = ("first" if family == "ssd" else "last") if found.classes < columns else "none"
+    found.keys = {"activation": {"class": "softmax" if soft and place != "none" else "sigmoid", "background": place},
+                  "outputs": {"boxes": "boxes", "scores": "scores"}}
+    if kind == "softmax" and place == "none":
+        raise Fault(f"the scores of this network are a soft-max over {columns} classes without a background; "
+                    "give the names of all its columns but the background, or export the scores with it")
+    if kind == "":
+        found.notes.append("its scores are taken for raw values: no sigmoid or soft-max was found behind them")
+    form = box_form(outputs, boxes, family, found)
+    if form:
+        found.keys["boxes"] = form
+    return found
+
+
+def find(outputs):
+    family = outputs.request.family
+    found = two(outputs) if family in ("", "ssd", "detr") else None
+    found = found or single(outputs)
+    if found is not None:
+        found.compared = "its boxes are taken as the file gives them"
+    return found

@@ -1,0 +1,53 @@
+"""What is said where a network cannot be taken: the operator's name, and the export that works."""
+
+from .faults import Fault
+
+FAMILIES = ("yolov5", "yolov7", "yolov8", "yolox", "nanodet", "fastestdet", "ssd", "detr")
+
+EXPORTS = {
+    "yolov5": "python export.py --weights FILE.pt --include onnx --opset 12",
+    "yolov7": "python export.py --weights FILE.pt --grid (without --end2end)",
+    "yolov8": "yolo export model=FILE.pt format=onnx opset=12 nms=False",
+    "yolox": "python tools/export_onnx.py -n NAME -c FILE.pth --output-name FILE.onnx",
+    "nanodet": "python tools/export_onnx.py --cfg_path CONFIG --model_path FILE.ckpt",
+    "fastestdet": "python test.py --yaml CONFIG --weight FILE.pth --img IMAGE --onnx",
+    "ssd": "boxes [1,N,4] and scores [1,N,classes+1] as they are before the suppression "
+           "(TensorFlow: export_tflite_ssd_graph.py --add_postprocessing_op=false)",
+    "detr": "torch.onnx.export of the model without its post-processing: outputs pred_logits and pred_boxes",
+}
+
+INSIDE = ("TopK", "GridSample", "Einsum", "GatherElements", "GatherND", "ScatterND", "NonZero", "NonMaxSuppression",
+          "RoiAlign", "If", "Loop", "Scan", "DeformConv", "ConvInteger", "MatMulInteger", "DynamicQuantizeLinear")
+
+
+def exports(family):
+    if family in EXPORTS:
+        return f"Export {family} so: {EXPORTS[family]}"
+    return "Exports that work:" + "".join(f"\n  {k:10} {v}" for k, v in EXPORTS.items())
+
+
+def refuse_choosing(path, operators, family):
+    """The answer of a network that suppresses its boxes itself has no evidence for each class."""
+    raise Fault(f"{path} chooses its boxes itself (operator {', '.join(operators)}), and behind it no heads of a known "
+                f"family were found; Perdure needs the boxes before that choice, with a score for each class. "
+                f"{exports(family)}")
+
+
+def refuse_own(path, graph):
+    """The project's own family has calibrated numbers that no graph holds."""
+    if {"logits8", "box8"} <= set(graph.outputs):
+        raise Fault(f"{path} is of the project's own family perdure: use it as it is, with the model.json that "
+                    "tools/train wrote beside it")
+
+
+def refuse_inside(path, graph, family):
+    """Operators that are left after the cut and that OpenCV 4.6 has not."""
+    found = sorted({n.kind for n in graph.nodes if n.kind in INSIDE or n.domain})
+    if not found:
+        return
+    foreign = sorted({f"{n.domain}.{n.kind}" for n in graph.nodes if n.domain})
+    more = f" {', '.join(foreign)} belong to another runtime." if foreign else ""
+    if "TopK" in found and family == "detr":
+        more += " RT-DETR and its kin choose their queries so; take DETR, or a YOLO."
+    raise Fault(f"{path} computes with {', '.join(found)} inside the network, which OpenCV 4.6 does not have.{more} "
+                f"{exports(family)}")
