@@ -62,7 +62,7 @@ TEST(DecodePerdure, ACellMayLieOutsideTheObjectThatItFinds) {
   model.reach = 0.5;
   testing::TinyOnnx tiny;
   tiny.box = {-5.0F, 1.0F, 2.0F, 2.0F};
-  const Box& b = decoded(tiny, {0.05, {0, 1}}, model)[3].box;
+  const Box b = decoded(tiny, {0.05, {0, 1}}, model)[3].box;
   EXPECT_NEAR(b.x1, 48 - 32 * (softPlus(-5.0) - 0.5), 1e-5);
   EXPECT_GT(b.x1, 48) << "to the right of the cell's centre";
 }
