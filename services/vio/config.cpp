@@ -158,6 +158,12 @@ void describe(Config& c, Fields& f) {
   f.texts("input.cameras", c.cameras, {"whose frames are read; the first one leads"});
   f.integer("input.max_pending", c.max_pending, between(2, 1000),
             {"frames that may wait for their inertial samples"});
+  f.boolean("input.moving_mask", c.moving_mask.enabled,
+            {"reads `objects`, and puts no points on what moves"});
+  f.number("input.moving_mask_from", c.moving_mask.probability, between(0.05, 1),
+           {"probability of moving, and of existing, at least"});
+  f.number("input.moving_mask_longest", c.moving_mask.longest_s, positive(),
+           {"objects that are older are not believed", "s"});
   f.text("state.directory", c.state_directory,
          {"the state is kept here, each second, and resumed at a start; empty: nowhere", "",
           "give a folder that the service may write"});

@@ -7,12 +7,14 @@
 #include "common/config/fields.h"
 #include "services/vio/core/options.h"
 #include "services/vio/core/tracker.h"
+#include "services/vio/moving_mask.h"
 
 namespace perdure::vio {
 
 struct Config {
   Options core;
   TrackerOptions tracker;
+  MovingMaskOptions moving_mask;
   std::vector<std::string> cameras{"cam0", "cam1"};  ///< main: whose frames are read
   bool stereo = true;                                ///< use the second camera where there is one
   bool prefer_calibration = true;   ///< the IMU noise that comes with the calibration

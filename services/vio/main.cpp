@@ -35,6 +35,9 @@ void serve(service::Context& context, const vio::Config& config) {
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kImu, [&](const ImuSample& m) { node.onImu(m); });
   context.on(topics::kSpeed, [&](const SpeedSample& m) { node.onSpeed(m); });
+  if (config.moving_mask.enabled) {
+    context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
+  }
   std::vector<bus::Once> once(config.cameras.size());
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
     context.on(topics::frame(config.cameras[i]), [&, i](const Frame& m) {

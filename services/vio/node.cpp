@@ -50,6 +50,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       world_{instance, 0},
       speeds_(config.core.speed.max_age_s),
       waiting_(config.pair_tolerance_s),
+      moving_(config.moving_mask),
       motion_initialiser_(config.core) {}
 
 Node::~Node() = default;
@@ -214,7 +215,13 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
       seconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
     R = cameras_->estimator.predictRotation(imu_, now);
   }
-  return cameras_->tracker.track(first, second, R);
+  if (!started()) return cameras_->tracker.track(first, second, R);
+  const State& state = cameras_->estimator.state();
+  RigidTransform T_WB = state.nav.T_WB();
+  T_WB.p += seconds(now - state.time) * state.nav.v_WB;
+  if (R) T_WB.q = T_WB.q * Eigen::Quaterniond(R->transpose());
+  const auto masked = moving_.boxes(cameras_->models[0], world_, T_WB, *last_image_);
+  return cameras_->tracker.track(first, second, R, masked);
 }
 
 void Node::process(const FramePair& frames) {

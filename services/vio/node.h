@@ -38,6 +38,8 @@ class Node {
   void onImu(const ImuSample& sample);
   void onSpeed(const SpeedSample& sample);
   void onFrame(const Frame& frame);
+  /// What the object filter says of things that move; of use where input.moving_mask is on.
+  void onObjects(const Objects& objects) { moving_.onObjects(objects); }
   /// End of data: processes what still waits, with the last inertial sample held.
   void flush();
 
@@ -82,6 +84,7 @@ class Node {
   ImuBuffer imu_;
   SpeedHistory speeds_;
   WaitingFrames waiting_;
+  MovingMask moving_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;

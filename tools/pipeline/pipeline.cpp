@@ -45,6 +45,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
     outputs_->onObjects(objects);
+    if (vio_) vio_->onObjects(objects);
     const auto started = started_ms_.find(objects.stamp.sequence);
     if (started == started_ms_.end()) return;
     counts_.latency_ms.push_back(wallMs() - started->second);

@@ -135,7 +135,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
   }
 }
 
-void Tracker::detect(const cv::Mat& image) {
+void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked) {
   const auto missing = options_.max_points - static_cast<std::int64_t>(points_.size());
   if (missing <= 0) return;
   const int columns = static_cast<int>(options_.grid_columns);
@@ -147,6 +147,7 @@ void Tracker::detect(const cv::Mat& image) {
   const double cell_h = image.rows / static_cast<double>(rows);
   cv::Mat taken = cv::Mat::zeros(image.size(), CV_8UC1);
   const int radius = static_cast<int>(options_.min_distance_px);
+  for (const cv::Rect2f& box : masked) cv::rectangle(taken, cv::Rect(box), 255, cv::FILLED);
   for (const Point& p : points_) {
     cv::circle(taken, cv::Point(p.pixel), radius, 255, cv::FILLED);
     const int cell = std::min(static_cast<int>(p.pixel.y / cell_h), rows - 1) * columns +
@@ -242,7 +243,8 @@ TrackedFrame Tracker::result() const {
 }
 
 TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
-                            const std::optional<Eigen::Matrix3d>& R_now_before) {
+                            const std::optional<Eigen::Matrix3d>& R_now_before,
+                            const std::vector<cv::Rect2f>& masked) {
   const bool stereo = cameras_.size() == 2 && !second.empty();
   Images now;
   cv::Mat half;
@@ -251,7 +253,11 @@ TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
   now.levels.push_back(first);
   for (std::size_t i = 0; i < now.half.size(); i += 2) now.levels.push_back(now.half[i]);
   follow(now, R_now_before);
-  detect(first);
+  std::erase_if(points_, [&](const Point& p) {
+    return std::any_of(masked.begin(), masked.end(),
+                       [&](const cv::Rect2f& box) { return box.contains(p.pixel); });
+  });
+  detect(first, masked);
   if (stereo) {
     followIntoSecond(pyramid(first, options_.stereo_levels),
                      pyramid(second, options_.stereo_levels));

@@ -42,8 +42,10 @@ class Tracker {
   Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras);
 
   /// Images CV_8UC1; `second` may be empty. R_now_before: rotation of the body, where it is known.
+  /// masked: boxes in the first image without points.
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
-                     const std::optional<Eigen::Matrix3d>& R_now_before);
+                     const std::optional<Eigen::Matrix3d>& R_now_before,
+                     const std::vector<cv::Rect2f>& masked = {});
   /// Median image motion in pixels from `frames` ago to now; nothing where too little is known.
   std::optional<double> motionSince(std::size_t frames) const;
   /// Forgets all tracks; ids go on.
@@ -70,7 +72,7 @@ class Tracker {
   std::vector<cv::Point2f> seeds(const std::optional<Eigen::Matrix3d>& R) const;
   std::vector<bool> inliers(const std::vector<Match>& matches,
                             const std::optional<Eigen::Matrix3d>& R);
-  void detect(const cv::Mat& image);
+  void detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked);
   void followIntoSecond(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second);
   TrackedFrame result() const;
 
