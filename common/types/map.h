@@ -64,6 +64,7 @@ struct MapReply {
   std::string error;        ///< a sentence with the mend where !ok
   bool truncated = false;   ///< more objects matched than `limit`
   std::vector<MapObject> objects;
+  std::vector<ObjectBelief> beliefs;  ///< the objects in full, where one was asked for by its id
 };
 
 /// Full beliefs that come back from the map into the filter's working set.

@@ -9,6 +9,7 @@
 #include "common/base/ids.h"
 #include "common/math/rigid_transform.h"
 #include "common/types/detections.h"
+#include "common/types/ledger.h"
 
 namespace perdure {
 
@@ -51,6 +52,7 @@ struct ObjectBelief {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s in W, zero while static
   Memory memory = Memory::kWorking;
   bool recalled = false;  ///< came back from the map and not yet seen again
+  Ledger why;             ///< what existence and the classes' probabilities are made of
 
   const ClassBelief& best() const { return classes.front(); }
 };

@@ -18,6 +18,7 @@ inline constexpr Limits kAcceleration{-1e5, 1e5};   ///< m/s²
 inline constexpr Limits kSpeed{-1e5, 1e5};          ///< m/s
 inline constexpr Limits kMatrixEntry{-1e12, 1e12};  ///< covariances, transitions
 inline constexpr Limits kLogit{-1e6, 1e6};
+inline constexpr Limits kNats{-1e9, 1e9};  ///< sums of evidence
 inline constexpr Limits kNotNegative{0.0, 1e18};
 inline constexpr Limits kInset{-0.45, 0.45};  // of a box, per side
 inline constexpr Limits kPositive{1e-12, 1e12};
@@ -37,6 +38,7 @@ inline constexpr std::size_t kLandmarks = 65536;
 inline constexpr std::size_t kObjects = 16384;
 inline constexpr std::size_t kReplyObjects = 100000;
 inline constexpr std::size_t kReasons = 1024;
+inline constexpr std::size_t kEvidenceKinds = 64;
 /// Of a quaternion or a unit vector, and of the sum of a PMF.
 inline constexpr double kUnitTolerance = 1e-3;
 

@@ -2,38 +2,10 @@
 // from it. `a` is the archive, `d` the domain value, `w` the wire value. Internal to common/wire.
 #pragma once
 
-#include <concepts>
-
-#include "common/wire/bounds.h"
-#include "common/wire/types.h"
+#include "common/wire/describe_base.h"
+#include "common/wire/describe_objects.h"
 
 namespace perdure::wire {
-
-template <class D, class T>
-concept Is = std::same_as<std::remove_cv_t<D>, T>;
-
-template <class A, Is<FrameStamp> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("source", d.source, w.source);
-  a.value("sequence", d.sequence, w.seq);
-  a.time("time_ns", d.time, w.time_ns);
-  a.value("captured_ns", d.captured_ns, w.captured_ns);
-}
-
-template <class A, Is<WorldId> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("world", d.world, w.world);
-  a.value("epoch", d.epoch, w.epoch);
-}
-
-template <class A, class D, class W>
-void describeBox(A& a, D& d, W& w) {
-  a.number("x1", d.x1, w[0], kPixel);
-  a.number("y1", d.y1, w[1], kPixel);
-  a.number("x2", d.x2, w[2], kPixel);
-  a.number("y2", d.y2, w[3], kPixel);
-  a.ensure("box", "out_of_range", [&] { return d.x1 < d.x2 && d.y1 < d.y2; });
-}
 
 // --- sensors ---
 
@@ -199,106 +171,6 @@ void describe(A& a, D& d, W& w) {
   });
 }
 
-// --- objects ---
-
-template <class A, Is<ClassBelief> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.name("name", d.name, w.name);
-  a.probability("probability", d.probability, w.probability);
-  a.matrix("mean", d.mean, w.mean, kCoordinate);
-  a.covariance("covariance", d.covariance, w.covariance);
-  a.matrix("cross_pose", d.cross_pose, w.cross_pose, kMatrixEntry);
-}
-
-template <class D>
-bool sumsToOne(const D& classes) {
-  double sum = 0;
-  for (const auto& c : classes) sum += c.probability;
-  return !classes.empty() && sum > 1 - kUnitTolerance && sum < 1 + kUnitTolerance;
-}
-
-template <class A, Is<ObjectBelief> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("id", d.id, w.object_id);
-  a.ensure("id", "out_of_range", [&] { return d.id != 0; });
-  a.probability("existence", d.existence, w.existence);
-  a.value("confirmed", d.confirmed, w.confirmed);
-  a.list("classes", d.classes, w.classes, kClasses + 1);
-  a.ensure("classes", "bad_probabilities", [&] { return sumsToOne(d.classes); });
-  a.choice("visibility", d.visibility, w.visibility, Visibility::kBehind);
-  a.probability("visible_fraction", d.visible_fraction, w.visible_fraction);
-  a.value("blocked_by", d.blocked_by, w.blocked_by);
-  a.time("first_seen_ns", d.first_seen, w.first_seen_ns);
-  a.time("last_seen_ns", d.last_seen, w.last_seen_ns);
-  a.time("as_of_ns", d.as_of, w.as_of_ns);
-  a.value("hits", d.hits, w.hits);
-  a.value("visible_misses", d.visible_misses, w.visible_misses);
-  a.probability("moving", d.moving, w.moving);
-  a.matrix("velocity", d.velocity, w.velocity, kSpeed);
-  a.choice("memory", d.memory, w.memory, Memory::kLongTerm);
-  a.value("recalled", d.recalled, w.recalled);
-}
-
-template <class A, Is<Objects> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.object("stamp", d.stamp, w.stamp);
-  a.value("instance", d.instance, w.source);
-  a.object("world", d.world, w.reference);
-  a.pose("T_WB", d.T_WB, w.T_WB);
-  a.unit("up_W", d.up_W, w.up_W);
-  a.value("next_id", d.next_id, w.next_object_id);
-  a.list("objects", d.objects, w.items, kObjects);
-}
-
-template <class A, Is<ObjectState> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.object("stamp", d.stamp, w.stamp);
-  a.value("instance", d.instance, w.source);
-  a.object("world", d.world, w.reference);
-  a.object("object", d.object, w.belief);
-  a.value("id", d.object.id, w.object_id);  // the key: all that a dispose carries
-  a.ensureWire("id", "size_mismatch", [&] { return w.object_id == w.belief.object_id; });
-}
-
-template <class A, Is<Recalled> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("instance", d.instance, w.source);
-  a.object("world", d.world, w.reference);
-  a.value("restore", d.restore, w.restore);
-  a.value("client", d.client, w.client);
-  a.value("next_id", d.next_id, w.next_object_id);
-  a.list("objects", d.objects, w.items, kObjects);
-}
-
-template <class A, Is<Event> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.object("stamp", d.stamp, w.stamp);
-  a.value("instance", d.instance, w.source);
-  a.object("world", d.world, w.reference);
-  a.choice("kind", d.kind, w.kind, EventKind::kRestored);
-  a.value("object_id", d.object_id, w.object_id);
-  a.value("other_id", d.other_id, w.other_id);
-  a.text("class_name", d.class_name, w.class_name, kNameLength);
-  a.probability("probability", d.probability, w.probability);
-  a.text("detail", d.detail, w.detail, kTextLength);
-}
-
-template <class A, Is<Prediction> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("object_id", d.object_id, w.object_id);
-  a.text("class_name", d.class_name, w.class_name, kNameLength);
-  describeBox(a, d.box, w.corners);
-  a.probability("probability", d.probability, w.probability);
-}
-
-template <class A, Is<Predictions> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.object("stamp", d.stamp, w.stamp);
-  a.value("instance", d.instance, w.source);
-  a.text("camera", d.camera, w.camera, kNameLength);
-  a.list("predictions", d.predictions, w.items, kObjects);
-}
-
 // --- map ---
 
 template <class A, Is<MapObject> D, class W>
@@ -361,6 +233,7 @@ void describe(A& a, D& d, W& w) {
   a.text("error", d.error, w.error, kTextLength);
   a.value("truncated", d.truncated, w.truncated);
   a.list("objects", d.objects, w.items, kReplyObjects);
+  a.list("beliefs", d.beliefs, w.beliefs, kObjects);
 }
 
 // --- health ---

@@ -200,6 +200,7 @@ MapReply Node::answer(const MapQuery& query) {
       if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
       reply.truncated = found->truncated;
       reply.objects = std::move(found->objects);
+      reply.beliefs = std::move(found->beliefs);
       return reply;
     }
     blame(found.error());

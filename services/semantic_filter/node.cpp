@@ -265,7 +265,9 @@ void Node::insertRecalled(const Recalled& recalled) {
     ids_.atLeast(belief.id + 1);
     const auto same = [&](const Object& o) { return o.id == belief.id; };
     if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) continue;
-    const Object object = fromBelief(belief, pose_error_.product);
+    const Object object =
+        fromBelief(belief, pose_error_.product,
+                   recalled.restore ? ExistenceEvidence::kRestore : ExistenceEvidence::kRecall);
     events_.recalled(belief.id, recalled.restore);
     const auto insert = [&](Belief& b) {
       const auto at = std::find_if(b.objects.begin(), b.objects.end(),

@@ -9,6 +9,7 @@ namespace perdure::map_store {
 namespace {
 
 constexpr std::size_t kMostClasses = 4096;
+constexpr std::size_t kMostKinds = 4096;  // of evidence
 constexpr std::size_t kLongestName = 4096;
 
 class Writer {
@@ -68,6 +69,12 @@ class Reader {
     at_ += size;
     return value;
   }
+  /// Of a list; nothing, and not ok(), where there are more than `most`.
+  std::size_t takeCount(std::size_t most) {
+    const std::size_t count = take<std::uint32_t>();
+    if (count > most) ok_ = false;
+    return ok_ ? count : 0;
+  }
   template <class Derived>
   void takeInto(Eigen::MatrixBase<Derived>& m) {
     for (Eigen::Index c = 0; c < m.cols(); ++c) {
@@ -111,8 +118,67 @@ ClassBelief takeClass(Reader& in) {
   return belief;
 }
 
+void putNats(Writer& out, const std::vector<double>& nats) {
+  out.put(static_cast<std::uint32_t>(nats.size()));
+  for (const double each : nats) out.put(each);
+}
+
+std::vector<double> takeNats(Reader& in) {
+  std::vector<double> nats(in.takeCount(kMostKinds));
+  for (double& each : nats) each = in.takeReal();
+  return nats;
+}
+
+void putLedger(Writer& out, const Ledger& ledger) {
+  out.put(static_cast<std::uint32_t>(ledger.existence.size()));
+  for (const LedgerEntry& entry : ledger.existence) {
+    out.put(entry.log_odds);
+    out.put(entry.count);
+    out.put(entry.first);
+    out.put(entry.last);
+  }
+  out.put(static_cast<std::uint32_t>(ledger.classes.size()));
+  for (const ClassLedger& each : ledger.classes) {
+    out.put(each.name);
+    putNats(out, each.log_odds);
+  }
+  out.put(static_cast<std::uint32_t>(ledger.ousted.size()));
+  for (const OustedClass& each : ledger.ousted) {
+    out.put(each.name);
+    out.put(each.by);
+    out.put(each.at);
+    putNats(out, each.log_odds);
+  }
+}
+
+Ledger takeLedger(Reader& in) {
+  Ledger ledger;
+  ledger.existence.resize(in.takeCount(kMostKinds));
+  for (LedgerEntry& entry : ledger.existence) {
+    entry.log_odds = in.takeReal();
+    entry.count = in.take<std::uint32_t>();
+    entry.first = in.takeTime();
+    entry.last = in.takeTime();
+  }
+  ledger.classes.resize(in.takeCount(kMostClasses));
+  for (ClassLedger& each : ledger.classes) {
+    each.name = in.takeText();
+    each.log_odds = takeNats(in);
+  }
+  ledger.ousted.resize(in.takeCount(kMostClasses));
+  for (OustedClass& each : ledger.ousted) {
+    each.name = in.takeText();
+    each.by = in.takeText();
+    each.at = in.takeTime();
+    each.log_odds = takeNats(in);
+  }
+  return ledger;
+}
+
+bool known(std::uint16_t version) { return version >= 1 && version <= kBeliefFormat; }
+
 tl::unexpected<Reason> malformed(const Reader& in, std::uint16_t version) {
-  if (version != kBeliefFormat) {
+  if (!known(version)) {
     return fail("belief_malformed", "format " + std::to_string(version) + " is not known here");
   }
   return fail("belief_malformed", in.ok() ? "bytes are left over" : "bytes are missing or invalid");
@@ -138,13 +204,14 @@ Bytes encodeBelief(const ObjectBelief& belief) {
   out.put(belief.recalled);
   out.put(static_cast<std::uint32_t>(belief.classes.size()));
   for (const auto& each : belief.classes) putClass(out, each);
+  putLedger(out, belief.why);
   return out.take();
 }
 
 Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes) {
   Reader in(bytes);
   const auto version = in.take<std::uint16_t>();
-  if (version != kBeliefFormat) return malformed(in, version);
+  if (!known(version)) return malformed(in, version);
   ObjectBelief belief;
   belief.id = in.take<std::uint64_t>();
   belief.existence = in.takeReal();
@@ -159,9 +226,9 @@ Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes) {
   in.takeInto(belief.velocity);
   belief.memory = in.takeEnum(Memory::kLongTerm);
   belief.recalled = in.takeFlag();
-  const std::size_t classes = in.take<std::uint32_t>();
-  if (!in.ok() || classes > kMostClasses) return malformed(in, version);
+  const std::size_t classes = in.takeCount(kMostClasses);
   for (std::size_t i = 0; i < classes && in.ok(); ++i) belief.classes.push_back(takeClass(in));
+  if (version >= 2) belief.why = takeLedger(in);
   if (!in.finished()) return malformed(in, version);
   if (belief.classes.empty()) return fail("belief_malformed", "an object without a class");
   return belief;
@@ -187,7 +254,7 @@ Bytes encodeHeader(const Objects& objects) {
 Result<Objects> decodeHeader(std::span<const std::uint8_t> bytes) {
   Reader in(bytes);
   const auto version = in.take<std::uint16_t>();
-  if (version != kBeliefFormat) return malformed(in, version);
+  if (!known(version)) return malformed(in, version);
   Objects objects;
   objects.stamp.source = in.take<std::uint64_t>();
   objects.stamp.sequence = in.take<std::uint64_t>();

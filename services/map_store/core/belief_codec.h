@@ -12,8 +12,9 @@ namespace perdure::map_store {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The first two bytes of every blob. A reader refuses versions that it does not know.
-inline constexpr std::uint16_t kBeliefFormat = 1;
+/// The first two bytes of every blob. A reader refuses versions that it does not know. 1 has no
+/// ledger.
+inline constexpr std::uint16_t kBeliefFormat = 2;
 
 Bytes encodeBelief(const ObjectBelief& belief);
 /// Refuses ("belief_malformed") what is cut short, too long, of another version or without class.

@@ -49,6 +49,7 @@ struct Written {
 
 struct Found {
   std::vector<MapObject> objects;
+  std::vector<ObjectBelief> beliefs;  ///< of kById: the objects in full
   bool truncated = false;
   std::uint64_t malformed = 0;  ///< rows whose belief could not be read; left out
 };

@@ -13,16 +13,16 @@ constexpr char kInBox[] =
     "p.y1 >= ?3 AND p.y0 <= ?4 AND p.z1 >= ?5 AND p.z0 <= ?6 AND "
     "o.world = ?7 AND o.epoch = ?8 AND o.gone = 0 ";
 
-Result<MapObject> objectFrom(const Statement& row) {
+Result<PlacedBelief> beliefFrom(const Statement& row) {
   auto belief = decodeBelief(row.blob(4));
   if (!belief) return tl::unexpected<Reason>(belief.error());
   belief->visibility = static_cast<Visibility>(std::clamp<std::int64_t>(row.integer(2), 0, 4));
   belief->memory = row.integer(3) == 0 ? Memory::kWorking : Memory::kLongTerm;
-  return mapObjectOf(*belief, WorldId{row.id(0), static_cast<std::uint32_t>(row.integer(1))});
+  return PlacedBelief{{row.id(0), static_cast<std::uint32_t>(row.integer(1))}, std::move(*belief)};
 }
 
 /// Reads rows up to `limit`, and one more to know whether there are more.
-Result<Found> collect(Statement& statement, std::size_t limit) {
+Result<Found> collect(Statement& statement, std::size_t limit, bool in_full = false) {
   Found found;
   for (;;) {
     const auto row = statement.step();
@@ -33,9 +33,10 @@ Result<Found> collect(Statement& statement, std::size_t limit) {
       statement.reset();
       return found;
     }
-    auto object = objectFrom(statement);
-    if (object) {
-      found.objects.push_back(std::move(*object));
+    auto placed = beliefFrom(statement);
+    if (placed) {
+      found.objects.push_back(mapObjectOf(placed->belief, placed->world));
+      if (in_full) found.beliefs.push_back(std::move(placed->belief));
     } else {
       ++found.malformed;
     }
@@ -148,7 +149,7 @@ Result<Found> MapReader::find(const MapQuery& query, const WorldId& newest,
   const WorldId world = query.world.world != 0 ? query.world : newest;
   auto statement = statementFor(*connection_, query, world);
   if (!statement) return tl::unexpected<Reason>(statement.error());
-  return collect(*statement, limit);
+  return collect(*statement, limit, query.kind == MapQueryKind::kById);
 }
 
 Result<Found> MapReader::inSquare(const Square& square) const {

@@ -129,6 +129,12 @@ Result<void> create(const Connection& connection) {
   return transaction->commit();
 }
 
+/// Older tables are the same; their beliefs are read as they are.
+Result<void> adopt(const Connection& connection, const Identity& identity) {
+  if (identity.version == kSchemaVersion) return {};
+  return connection.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion));
+}
+
 /// A reason where the file is damaged; StartupError where it is not ours.
 Result<Connection> tryOpen(const StoreOptions& options) {
   auto connection = Connection::open(options.path, Connection::Mode::kReadWriteCreate);
@@ -142,10 +148,8 @@ Result<Connection> tryOpen(const StoreOptions& options) {
   }
   const auto prepared = prepareForWriting(*connection, options);
   if (!prepared) return tl::unexpected<Reason>(prepared.error());
-  if (identity->empty()) {
-    const auto created = create(*connection);
-    if (!created) return tl::unexpected<Reason>(created.error());
-  }
+  const auto ready = identity->empty() ? create(*connection) : adopt(*connection, *identity);
+  if (!ready) return tl::unexpected<Reason>(ready.error());
   return connection;
 }
 

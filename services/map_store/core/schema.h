@@ -9,7 +9,8 @@ namespace perdure::map_store {
 
 /// "PERD" in the database's header: tells our files from other programs'.
 inline constexpr int kApplicationId = 0x50455244;
-inline constexpr int kSchemaVersion = 1;
+/// 2: beliefs with ledgers. A map of version 1 is read, and becomes one of 2 when it is written.
+inline constexpr int kSchemaVersion = 2;
 
 struct StoreOptions {
   std::string path;

@@ -217,6 +217,28 @@ std::vector<Candidate> candidates(const Evidence& evidence, const FrameContext& 
   return all;
 }
 
+/// Normalises the weights, sets existence, and books both: what was expected before the box, what
+/// the network says, and for the classes what the fits make of that.
+void bookBirth(Object& object, const std::vector<Candidate>& kept, double ratio,
+               const FrameContext& frame) {
+  const double odds = frame.parameters->birth.odds;
+  object.existence = {odds / (1.0 + odds), ExistenceEvidence::kPrior, object.as_of};
+  object.existence.become(ratio / (1.0 + ratio), ExistenceEvidence::kHit, object.as_of);
+  const double other = frame.parameters->clutter.other_prior;
+  double frequency = 0.0, total = 0.0;
+  for (const auto& c : kept) frequency += c.prior.frequency, total += std::exp(c.log_weight);
+  std::vector<ClassNumber> prior = {{kOtherClass, std::log(other)}}, said;
+  for (const auto& c : kept) {
+    const double expected = std::log((1.0 - other) * c.prior.frequency / frequency);
+    prior.push_back({c.prior.name, expected});
+    said.push_back(
+        {c.prior.name, std::log(1.0 - other) + c.log_weight - std::log(total) - expected});
+  }
+  normalise(object, ClassEvidence::kGeometry);
+  object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kPrior, prior);
+  object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, said);
+}
+
 }  // namespace
 
 std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
@@ -306,12 +328,10 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   }
   addOther(object, other, evidence, *ray, range, frame);
   if (object.hypotheses.empty()) return std::nullopt;
-  const double ratio = std::exp(logBirthRatio(evidence, frame));
-  object.existence = ratio / (1.0 + ratio);
   object.first_seen = object.last_seen = object.as_of = now;
   object.pose_product = frame.pose_error.product;
   object.hits = 1;
-  normalise(object);
+  bookBirth(object, kept, std::exp(logBirthRatio(evidence, frame)), frame);
   object.hit_view = {frame.view.T_WC(), 1.0};
   object.last_view = frame.view.T_WC();
   return object;

@@ -73,13 +73,35 @@ bool sound(const Object& object) {
   return std::isfinite(sum) && sum > 0.0 && std::isfinite(object.existence);
 }
 
-void normalise(Object& object) {
+std::vector<ClassNumber> classShares(const Object& object) {
+  std::vector<ClassNumber> pmf;
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) {
+    const auto same = [&](const ClassNumber& c) { return c.name == h.class_name; };
+    const auto it = std::find_if(pmf.begin(), pmf.end(), same);
+    if (it == pmf.end()) {
+      pmf.push_back({h.class_name, h.weight});
+    } else {
+      it->value += h.weight;
+    }
+    sum += h.weight;
+  }
+  for (auto& c : pmf) c.value /= sum;
+  return pmf;
+}
+
+void book(Object& object, ClassEvidence why) {
+  object.classes.book(classShares(object), why, object.as_of);
+}
+
+void normalise(Object& object, ClassEvidence why) {
   double sum = 0.0;
   for (const auto& h : object.hypotheses) sum += h.weight;
   check(sum > 0.0, "an object keeps a hypothesis of positive weight");
   for (auto& h : object.hypotheses) h.weight /= sum;
   std::stable_sort(object.hypotheses.begin(), object.hypotheses.end(),
                    [](const auto& a, const auto& b) { return a.weight > b.weight; });
+  book(object, why);
 }
 
 void mergeInto(Hypothesis& a, const Hypothesis& b) {
@@ -119,13 +141,16 @@ ObjectBelief toBelief(const Object& object, double min_speed) {
   belief.moving = movingProbability(object, min_speed);
   if (object.best().moving) belief.velocity = object.best().x.tail<3>();
   belief.recalled = object.recalled;
+  belief.why = {object.existence.published(), object.classes.published(), object.classes.ousted()};
   return belief;
 }
 
-Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product) {
+Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product,
+                  ExistenceEvidence back) {
   Object object;
   object.id = belief.id;
-  object.existence = belief.existence;
+  object.existence = {belief.existence, belief.why.existence, back, belief.as_of};
+  object.classes = {belief.why.classes, belief.why.ousted};
   object.confirmed = belief.confirmed;
   for (const auto& c : belief.classes) {
     Hypothesis h;
@@ -153,7 +178,7 @@ Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product) {
   object.blocked_by = belief.blocked_by;
   object.recalled = true;
   object.remembers_all = false;
-  normalise(object);
+  normalise(object, ClassEvidence::kRestore);
   return object;
 }
 

@@ -11,6 +11,7 @@
 
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
+#include "services/semantic_filter/core/ledger.h"
 
 namespace perdure::semantic_filter {
 
@@ -45,7 +46,7 @@ struct Keyframe;
 
 struct Object {
   ObjectId id = 0;
-  double existence = 0.0;
+  Existence existence;
   std::vector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
   bool confirmed = false;
   TimePoint first_seen, last_seen, as_of;
@@ -66,6 +67,10 @@ struct Object {
   /// an estimate from the looks since then would lose it.
   bool remembers_all = true;
   std::uint32_t fresh_keyframes = 0;  ///< that came since the state was last smoothed
+  ClassAccount classes;               ///< why the hypotheses weigh what they weigh
+  /// Looks that were not used since the object was last brought up to date: nothing of what is
+  /// published changes while it is hidden, its ledger neither.
+  LedgerEntry hidden, away;
 
   const Hypothesis& best() const { return hypotheses.front(); }
 };
@@ -78,13 +83,18 @@ double fasterThan(const Hypothesis& h, double speed);
 double movingProbability(const Object& object, double min_speed);
 /// All numbers are finite and some weight is left.
 bool sound(const Object& object);
-/// Divides the weights by their sum and puts the heaviest first (stable).
-void normalise(Object& object);
+/// π of each class, in the order of its heaviest hypothesis.
+std::vector<ClassNumber> classShares(const Object& object);
+/// Books the weights as they are now, whatever their sum.
+void book(Object& object, ClassEvidence why);
+/// Divides the weights by their sum, puts the heaviest first (stable), and books them.
+void normalise(Object& object, ClassEvidence why);
 /// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.
 void mergeInto(Hypothesis& a, const Hypothesis& b);
 /// The published belief: per class its hypotheses as one Gaussian around the heaviest one.
 ObjectBelief toBelief(const Object& object, double min_speed);
-/// A belief that came back (restart, recall) as an object with one hypothesis for each class.
-Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product);
+/// A belief that came back as an object with one hypothesis for each class. `back` is kRestore or
+/// kRecall.
+Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
 
 }  // namespace perdure::semantic_filter

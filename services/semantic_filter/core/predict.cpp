@@ -1,6 +1,7 @@
 #include "services/semantic_filter/core/predict.h"
 
 #include <cmath>
+#include <utility>
 
 #include "common/math/gaussian.h"
 
@@ -93,19 +94,19 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
 
 /// What drove off unseen could be anywhere: it would claim any box. The object lives on as far as
 /// it may have stayed.
-void giveUpLostOnes(Object& object, double lost_sigma_m) {
+void giveUpLostOnes(Object& object, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
   for (const auto& h : object.hypotheses) {
     const double sigma = std::sqrt(h.P.topLeftCorner<2, 2>().trace());
     if (!h.moving || sigma < lost_sigma_m) kept += h.weight;
   }
   if (kept >= 1.0 - 1e-9) return;
-  object.existence *= kept;
+  object.existence.become(object.existence * kept, ExistenceEvidence::kLost, now);
   if (kept <= 1e-9) return;  // nothing is left of it; it will be buried
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
     return h.moving && std::sqrt(h.P.topLeftCorner<2, 2>().trace()) >= lost_sigma_m;
   });
-  normalise(object);
+  normalise(object, ClassEvidence::kMotion);
 }
 
 }  // namespace
@@ -137,8 +138,13 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
     h.C = (h.C * transition.transpose()).eval();
     keepConsistent(h, pose_error.covariance);
   }
-  giveUpLostOnes(object, parameters.lost_sigma_m);
-  if (dt > 0.0) object.existence *= std::exp(-dt / parameters.survival_s);
+  giveUpLostOnes(object, now, parameters.lost_sigma_m);
+  if (dt > 0.0) {
+    object.existence.become(object.existence * std::exp(-dt / parameters.survival_s),
+                            ExistenceEvidence::kTime, now);
+  }
+  object.existence.note(ExistenceEvidence::kHidden, std::exchange(object.hidden, {}));
+  object.existence.note(ExistenceEvidence::kAway, std::exchange(object.away, {}));
   object.as_of = now;
   predictScreen(object, walk);
   object.last_view = walk.T_WC;

@@ -25,6 +25,14 @@ Outline outlineOf(const Object& object, TimePoint now, const View& view) {
   return o;
 }
 
+/// A look that says nothing about the object, for its ledger.
+void noteUnused(Object& object, Visibility why, TimePoint now) {
+  const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
+  LedgerEntry& entry = away ? object.away : object.hidden;
+  if (entry.count++ == 0) entry.first = now;
+  entry.last = now;
+}
+
 /// How much another look of the same detector at one object may overlap with its box.
 bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
   const Box box_a{a.sides[0], a.sides[1], a.sides[2], a.sides[3]};
@@ -78,7 +86,10 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
   std::vector<Seen> seen;
   const ViewWalk walk = viewWalkOf(frame);
   for (std::size_t j = 0; j < sights.size(); ++j) {
-    if (sights[j].fraction <= 0.0) continue;
+    if (sights[j].fraction <= 0.0) {
+      noteUnused(belief.objects[j], sights[j].visibility, input.stamp.time);
+      continue;
+    }
     predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
     seen.push_back({j, look(belief.objects[j], sights[j], *input.boxes, frame)});
   }
@@ -183,7 +194,10 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
         bear(e, rangeFromLandmarks(e, input.points, parameters_.birth), input.stamp.time, frame);
     if (!object) continue;
     object->id = ids.idFor(input.stamp.sequence, z);
-    object->existence *= 1.0 - claimed[static_cast<Eigen::Index>(z)];
+    if (const double share = claimed[static_cast<Eigen::Index>(z)]; share > 0.0) {
+      object->existence.become(object->existence * (1.0 - share), ExistenceEvidence::kShared,
+                               input.stamp.time);
+    }
     tendHypotheses(*object, priors_, parameters_);
     if (object->hypotheses.empty()) continue;
     born.push_back(std::move(*object));

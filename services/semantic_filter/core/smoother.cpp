@@ -283,7 +283,7 @@ void rememberAndSmooth(Object& object, const Evidence& box, const std::array<boo
   Verdicts verdicts;
   for (const auto& name : names) smoothClass(object, name, looks, frame, verdicts);
   forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
-  normalise(object);
+  normalise(object, ClassEvidence::kMotion);
 }
 
 }  // namespace perdure::semantic_filter

@@ -109,7 +109,9 @@ void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate)
     lost += h.weight;
     return true;
   });
-  object.existence *= 1.0 - std::min(lost, 1.0);
+  if (lost <= 0.0) return;
+  object.existence.become(object.existence * (1.0 - std::min(lost, 1.0)),
+                          ExistenceEvidence::kMisshapen, object.as_of);
 }
 
 void pruneLightOnes(Object& object, const TendParameters& tend) {
@@ -164,12 +166,15 @@ void multiplyPmf(Object& a, const Object& b) {
   for (auto& h : a.hypotheses) {
     h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
   }
-  normalise(a);
+  normalise(a, ClassEvidence::kMerge);
 }
 
 void absorb(Object& a, const Object& b, const FrameContext& frame) {
   if (isOther(a) != isOther(b)) {
-    if (isOther(a)) a.hypotheses = b.hypotheses;
+    if (isOther(a)) {
+      a.hypotheses = b.hypotheses;
+      a.classes = b.classes;
+    }
   } else {
     const ClassPrior prior = frame.priors->of(a.best().class_name);
     const double weight = a.best().weight;
@@ -179,8 +184,9 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
     a.hypotheses.front().weight = weight;
     multiplyPmf(a, b);
   }
-  a.existence =
-      std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), frame.parameters->tend.certain);
+  a.existence.become(
+      std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), frame.parameters->tend.certain),
+      ExistenceEvidence::kMerge, a.as_of);
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);
@@ -229,13 +235,14 @@ void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters&
   weighPace(object, priors, parameters.motion);
   settleSlowOnes(object, parameters.motion.min_speed);
   mergeNearOnes(object, parameters.tend.hypothesis_merge);
-  normalise(object);
+  normalise(object, ClassEvidence::kMotion);
   pruneMisshapen(object, priors, parameters.tend.size_gate);
   if (object.hypotheses.empty()) return;
-  normalise(object);
+  normalise(object, ClassEvidence::kGeometry);
   pruneLightOnes(object, parameters.tend);
+  book(object, ClassEvidence::kPruning);
   addMovingTwin(object, priors, parameters.motion);
-  normalise(object);
+  normalise(object, ClassEvidence::kMotion);
 }
 
 namespace {

@@ -87,11 +87,6 @@ Hypothesis mix(const Hypothesis& none, double share_none,
   return result;
 }
 
-struct Shares {
-  double A = 1.0, none = 1.0;
-  std::vector<double> box;
-};
-
 Shares sharesOf(const HypothesisLook& h, const Eigen::VectorXd& eta) {
   Shares shares;
   shares.A = 1.0 - h.detection;
@@ -332,12 +327,16 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   for (std::size_t i = 0; i < shares.size(); ++i) {
     updateState(object.hypotheses[i], shares[i], look, boxes, repeated, frame);
   }
-  const double mean_A = weigh(object, shares, seen * hit.worth + 1.0 - seen);
+  const double exponent = seen * hit.worth + 1.0 - seen;
+  const LookReasons reasons = reasonsOf(object, shares, seen, hit.worth, exponent, boxes, frame);
+  const double mean_A = weigh(object, shares, exponent);
   const double r = object.existence;
-  object.existence = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
+  bookExistence(object,
+                std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain),
+                reasons);
   updateAzimuths(object, shares, hit.worth, boxes, frame);
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
-  if (sound(object)) normalise(object);
+  if (sound(object)) bookClasses(object, reasons);
   return own;
 }
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/look.h"
+#include "services/semantic_filter/core/attribution.h"
 
 namespace perdure::semantic_filter {
 

@@ -81,6 +81,17 @@ TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
   const auto object = toJson(objects)["objects"][0];
   EXPECT_EQ(object.size(), members<ObjectBelief>());
   EXPECT_EQ(object["classes"][0].size(), members<ClassBelief>());
+  Objects explained;
+  explained.objects = {examples.belief()};
+  Ledger& ledger = explained.objects[0].why;
+  ledger.existence = {examples.ledgerEntry()};
+  ledger.classes = {{"car", {1.0}}};
+  ledger.ousted = {{"van", "car", examples.time(), {2.0}}};
+  const auto why = toJson(explained)["objects"][0]["why"];
+  EXPECT_EQ(why.size(), 3u);  // its members but for logOdds() and empty(), which are functions
+  EXPECT_EQ(why["existence"][0].size(), members<LedgerEntry>());
+  EXPECT_EQ(why["classes"][0].size(), members<ClassLedger>());
+  EXPECT_EQ(why["ousted"][0].size(), members<OustedClass>());
   Calibration calibration;
   calibration.cameras = {examples.camera()};
   calibration.imu.emplace();

@@ -139,6 +139,20 @@ class Examples {
       m.side_insets.push_back(uniform(-0.4, 0.4));
     }
   }
+  LedgerEntry ledgerEntry() {
+    const auto first = static_cast<std::int64_t>(bits() >> 3);
+    return {uniform(), below(99), fromNanoseconds(first), fromNanoseconds(first + below(999))};
+  }
+  std::vector<double> nats() {
+    return several([&] { return uniform(); });
+  }
+  Ledger ledger() {
+    Ledger l;
+    l.existence = several([&] { return ledgerEntry(); });
+    l.classes = several([&] { return ClassLedger{word(), nats()}; });
+    if (coin()) l.ousted = {OustedClass{word(), word(), time(), nats()}};
+    return l;
+  }
   ObjectBelief belief() {
     ObjectBelief b;
     b.id = 1 + below(99);
@@ -158,6 +172,7 @@ class Examples {
     b.velocity = matrix<Eigen::Vector3d>();
     b.memory = coin() ? Memory::kWorking : Memory::kLongTerm;
     b.recalled = coin();
+    b.why = ledger();
     return b;
   }
   void fill(Objects& m) {
@@ -212,7 +227,14 @@ class Examples {
          below(99)};
   }
   void fill(MapReply& m) {
-    m = {bits(), bits(), bits(), coin(), word(), coin(), several([&] { return mapObject(); })};
+    m = {bits(),
+         bits(),
+         bits(),
+         coin(),
+         word(),
+         coin(),
+         several([&] { return mapObject(); }),
+         several([&] { return belief(); })};
   }
   void fill(Health& m) {
     m = {word(),         bits(),         below(99999), HealthState::kDegraded,

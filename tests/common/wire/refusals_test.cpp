@@ -137,6 +137,46 @@ TEST(Refusals, OfBeliefsThatAreNoProbabilities) {
   EXPECT_EQ(refusal(state), "out_of_range object.id");
 }
 
+ObjectState explained() {
+  ObjectState state = example<ObjectState>();
+  state.object.why.existence.assign(kExistenceEvidences, {0.5, 3, {}, fromNanoseconds(9)});
+  state.object.why.classes = {{"car", std::vector<double>(kClassEvidences, -0.1)}};
+  state.object.why.ousted = {{"van", "car", fromNanoseconds(9), {1.0, 2.0}}};
+  return state;
+}
+
+TEST(Refusals, OfLedgersThatAreNone) {
+  EXPECT_EQ(refusal(explained()), "");
+  ObjectState state = explained();
+  state.object.why.existence[2].log_odds = INFINITY;
+  EXPECT_EQ(refusal(state), "not_finite object.why.existence[2].log_odds");
+  state = explained();
+  state.object.why.existence[1].first = fromNanoseconds(10);
+  EXPECT_EQ(refusal(state), "out_of_range object.why.existence[1].last_ns");
+  state = explained();
+  state.object.why.existence.resize(kEvidenceKinds + 1, {});
+  EXPECT_EQ(refusal(state), "over_bound object.why.existence");
+  state = explained();
+  state.object.why.classes[0].log_odds[3] = 1e10;
+  EXPECT_EQ(refusal(state), "out_of_range object.why.classes[0].log_odds");
+  state = explained();
+  state.object.why.classes[0].name.clear();
+  EXPECT_EQ(refusal(state), "empty object.why.classes[0].name");
+  state = explained();
+  state.object.why.ousted.push_back(state.object.why.ousted[0]);
+  EXPECT_EQ(refusal(state), "over_bound object.why.ousted");
+}
+
+TEST(Refusals, AreNotForKindsOfEvidenceThatAreNotKnownYet) {
+  ObjectState state = explained();
+  state.object.why.existence.resize(kExistenceEvidences + 2, {0.25, 1, {}, {}});
+  state.object.why.classes[0].log_odds.resize(kClassEvidences + 1, 0.5);
+  Arena arena;
+  perdure_msg_ObjectState wire;
+  ASSERT_TRUE(encode(state, wire, arena));
+  EXPECT_EQ(decode<ObjectState>(wire)->object.why, state.object.why);
+}
+
 TEST(Refusals, AreNotForWhatRoundingPutALittleOutside) {
   ObjectState state = example<ObjectState>();
   state.object.existence = 1.0 + 1e-15;

@@ -33,6 +33,32 @@ TEST(BeliefCodec, GivesBackEveryBitOfABelief) {
   EXPECT_EQ(back->classes[1].mean, belief.classes[1].mean);
   EXPECT_EQ(back->classes[1].covariance, belief.classes[1].covariance);
   EXPECT_EQ(back->classes[0].cross_pose, belief.classes[0].cross_pose);
+  EXPECT_EQ(back->why, belief.why);
+}
+
+TEST(BeliefCodec, ReadsTheFormatWithoutLedgers) {
+  ObjectBelief belief = carAt(4, {1, 2, 3});
+  belief.why = {};
+  Bytes bytes = encodeBelief(belief);
+  bytes[0] = 1;
+  bytes.resize(bytes.size() - 3 * sizeof(std::uint32_t));  // three empty lists
+  const auto back = decodeBelief(bytes);
+  ASSERT_TRUE(back.has_value()) << back.error().detail;
+  EXPECT_TRUE(back->why.empty());
+  EXPECT_EQ(encodeBelief(*back), encodeBelief(belief));
+  bytes.push_back(0);
+  EXPECT_FALSE(decodeBelief(bytes).has_value());
+  Bytes header = encodeHeader(test::workingSet(9, {belief}));
+  header[0] = 1;
+  EXPECT_TRUE(decodeHeader(header).has_value());
+}
+
+TEST(BeliefCodec, RefusesALedgerThatClaimsMoreThanThereIs) {
+  ObjectBelief belief = carAt(4, {1, 2, 3});
+  belief.why = {};
+  Bytes bytes = encodeBelief(belief);
+  for (int i = 1; i <= 4; ++i) bytes[bytes.size() - 8 - static_cast<std::size_t>(i)] = 0xff;
+  EXPECT_EQ(decodeBelief(bytes).error().code, "belief_malformed");
 }
 
 TEST(BeliefCodec, GivesBackEveryBitOfAHeader) {
@@ -54,7 +80,7 @@ TEST(BeliefCodec, GivesBackEveryBitOfAHeader) {
 TEST(BeliefCodec, WritesItsVersionAndIdLittleEndian) {
   const Bytes bytes = encodeBelief(carAt(0x0102030405060708u, {0, 0, 0}));
   const Bytes head(bytes.begin(), bytes.begin() + 10);
-  EXPECT_EQ(head, (Bytes{1, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
+  EXPECT_EQ(head, (Bytes{2, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
 }
 
 TEST(BeliefCodec, RefusesEveryTruncation) {
@@ -71,7 +97,7 @@ TEST(BeliefCodec, RefusesLeftOverBytesOtherVersionsAndNoClass) {
   longer.push_back(0);
   EXPECT_FALSE(decodeBelief(longer).has_value());
   Bytes newer = encodeBelief(carAt(3, {1, 2, 3}));
-  newer[0] = 2;
+  newer[0] = 3;
   EXPECT_FALSE(decodeBelief(newer).has_value());
   ObjectBelief nothing = carAt(3, {1, 2, 3});
   nothing.classes.clear();

@@ -56,6 +56,12 @@ inline ObjectBelief carAt(ObjectId id, const Eigen::Vector3d& p, const std::stri
   belief.as_of = belief.last_seen;
   belief.hits = 7;
   belief.visible_fraction = 0.625;
+  belief.why.existence.resize(kExistenceEvidences);
+  belief.why.existence[0] = {-1.5, 1, belief.first_seen, belief.first_seen};
+  belief.why.existence[1] = {logOdds(belief.existence) + 1.5, 7, belief.first_seen,
+                             belief.last_seen};
+  belief.why.classes = {{name, {-0.25, std::log(0.9) + 0.25}}, {kOtherClass, {std::log(0.1)}}};
+  belief.why.ousted = {{"van", name, belief.first_seen, {0.5, 0.75, 1.5}}};
   return belief;
 }
 

@@ -150,6 +150,17 @@ TEST_F(MapQueries, CarryTheWholeObject) {
   EXPECT_EQ(object.memory, Memory::kWorking);
 }
 
+TEST_F(MapQueries, GiveTheWholeBeliefOfAnObjectThatIsAskedForByItsId) {
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = 9;
+  const auto beliefs = ask(query).beliefs;
+  ASSERT_EQ(beliefs.size(), 1u);
+  EXPECT_EQ(encodeBelief(beliefs[0]), encodeBelief(all_.objects[8]));
+  query.kind = MapQueryKind::kAll;
+  EXPECT_THAT(ask(query).beliefs, IsEmpty());
+}
+
 TEST_F(MapQueries, ShowObjectsThatLeftTheWorkingSetAsRemembered) {
   const Objects fewer = workingSet(2, {all_.objects[0]});
   ASSERT_TRUE(database_.write({&fewer, {}, {}}).has_value());

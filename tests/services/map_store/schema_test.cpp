@@ -115,6 +115,22 @@ TEST(Schema, RefusesAMapOfANewerVersion) {
   EXPECT_THAT(refusalOf([&] { openStore({path}); }).what(), HasSubstr("schema 99"));
 }
 
+TEST(Schema, TakesOverAMapOfTheFirstVersion) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("map.sqlite");
+  fill(path, 3);
+  const auto version = [&](const char* set) {
+    const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
+    EXPECT_TRUE(connection->execute(set).has_value());
+    return connection->integer("PRAGMA user_version").value();
+  };
+  EXPECT_EQ(version("PRAGMA user_version=1"), 1);
+  EXPECT_EQ(openStoreForReading(path).integer("SELECT count(*) FROM objects").value(), 3);
+  EXPECT_EQ(version("SELECT 1"), 1);  // a reader changes nothing
+  EXPECT_TRUE(openStore({path}).notice.empty());
+  EXPECT_EQ(version("SELECT 1"), 2);
+}
+
 TEST(Schema, SaysTheMendWhereTheFolderCannotBeMade) {
   const TemporaryFolder folder;
   std::ofstream(folder.file("file")) << "x";

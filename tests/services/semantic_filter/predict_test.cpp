@@ -26,7 +26,7 @@ Object biasedCar(const ViewWalk& walk) {
   h.P.setZero();
   h.x.segment<4>(kBias).setConstant(0.1);
   Object object;
-  object.existence = 0.9;
+  object.existence = {0.9, ExistenceEvidence::kPrior, object.as_of};
   object.hypotheses = {h};
   object.last_view = walk.T_WC;
   return object;

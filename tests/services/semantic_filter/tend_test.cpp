@@ -18,7 +18,7 @@ using testing::makeState;
 Object makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
   Object o;
   o.id = id;
-  o.existence = 0.9;
+  o.existence = {0.9, ExistenceEvidence::kPrior, o.as_of};
   o.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));
   o.hits = 4;
   o.visible_fraction = 1.0;
@@ -161,7 +161,7 @@ TEST_F(Tending, ADominantClassEndsTheOthers) {
   van.class_name = "van";
   van.weight = 0.003;
   o.hypotheses.push_back(van);
-  normalise(o);
+  normalise(o, ClassEvidence::kPrior);
   tendHypotheses(o, priors, parameters);
   EXPECT_EQ(o.hypotheses.size(), 1u);
   EXPECT_EQ(classProbability(o, "car"), 1.0);

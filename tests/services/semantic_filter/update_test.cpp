@@ -25,7 +25,7 @@ class Update : public ::testing::Test {
     frame.priors = &priors;
     frame.parameters = &parameters;
     object.id = 1;
-    object.existence = 0.6;
+    object.existence = {0.6, ExistenceEvidence::kPrior, object.as_of};
     object.hypotheses = {hypothesis("car", 0.7), hypothesis("van", 0.3)};
     object.hypotheses[1].x[6] = std::log(1.7);
   }
@@ -63,7 +63,8 @@ class Update : public ::testing::Test {
 
 bool sameBits(const Object& a, const Object& b) {
   if (a.hypotheses.size() != b.hypotheses.size()) return false;
-  if (std::memcmp(&a.existence, &b.existence, sizeof(double)) != 0) return false;
+  const double r_a = a.existence, r_b = b.existence;
+  if (std::memcmp(&r_a, &r_b, sizeof(double)) != 0) return false;
   if (std::memcmp(&a.screened, &b.screened, sizeof(double)) != 0) return false;
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
@@ -125,7 +126,7 @@ TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
 }
 
 TEST_F(Update, MissesFromOnePlaceSayAtMostThatItIsScreened) {
-  object.existence = 0.99;
+  object.existence = {0.99, ExistenceEvidence::kPrior, object.as_of};
   object.screened = 0.25;
   for (int k = 0; k < 100; ++k) update(object, lookAt({}, 1.0), Eigen::VectorXd(0), {}, frame);
   EXPECT_GT(object.screened, 0.99);
@@ -179,7 +180,7 @@ TEST_F(Update, AzimuthNeverTouchesExistenceClassOrMotion) {
   turned.x[kYaw] += M_PI / 2;
   turned.weight = 0.2;
   object.hypotheses.push_back(turned);
-  normalise(object);
+  normalise(object, ClassEvidence::kPrior);
   Object with = object;
   const ObjectLook l = lookAt(boxes, 1.0);
   update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);

@@ -1,0 +1,118 @@
+// Programs of the first version of the IDL beside those of today: each reads what the other writes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "common/bus/dds.h"
+#include "common/bus/wait_loop.h"
+#include "tests/common/bus/first_objects.h"
+#include "tests/common/bus/isolation.h"
+#include "tests/common/wire/examples.h"
+
+namespace perdure::bus {
+namespace {
+
+/// Waits until `done`, or gives up after ten seconds.
+template <class Done>
+bool eventually(WaitLoop& loop, Done done) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!done() && std::chrono::steady_clock::now() < end) {
+    loop.runOnce(std::chrono::milliseconds(20));
+  }
+  return done();
+}
+
+class Evolution : public testing::Test {
+ protected:
+  /// The topic as a program of the first version declares it.
+  dds_entity_t firstTopic() const {
+    dds_topic_descriptor_t first = perdure_first_Recalled_desc;
+    first.m_typename = wire::Type<Recalled>::descriptor().m_typename;
+    return dds_create_topic(there.handle(), &first, there.wireName("recalled").c_str(), nullptr,
+                            nullptr);
+  }
+  static QosPtr reliable() {
+    QosPtr qos(dds_create_qos());
+    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 8);
+    return qos;
+  }
+
+  Domain domain{Options{}};
+  Participant here{domain, "today"}, there{domain, "first"};
+  WaitLoop loop{here};
+};
+
+TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedger) {
+  Reader<Recalled> reader(here, topics::kRecalled);
+  std::vector<Recalled> got;
+  loop.on(reader, [&](const Recalled& m) { got.push_back(m); });
+  const dds_entity_t writer =
+      dds_create_writer(there.handle(), firstTopic(), reliable().get(), nullptr);
+  ASSERT_GT(writer, 0);
+  ASSERT_TRUE(eventually(loop, [&] { return reader.matched() == 1; }));
+
+  std::vector<perdure_first_ObjectBelief> items(2);
+  std::string name = "car";
+  perdure_first_ClassBelief car{};
+  car.name = name.data();
+  car.probability = 1.0;
+  for (int i = 0, next = 0; i < 7; next += 7 - i, ++i) car.covariance[next] = 1.0;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    items[i].object_id = 10 + i;
+    items[i].existence = 0.5;
+    items[i].classes = {1, 1, &car, false};
+    items[i].hits = 7;
+    items[i].recalled = true;
+  }
+  perdure_first_Recalled message{};
+  message.client = 99;
+  message.items = {2, 2, items.data(), false};
+  ASSERT_EQ(dds_write(writer, &message), DDS_RETCODE_OK);
+  ASSERT_TRUE(eventually(loop, [&] { return !got.empty(); }));
+  ASSERT_EQ(got[0].objects.size(), 2u);
+  EXPECT_EQ(got[0].client, 99u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(got[0].objects[i].id, 10 + i);
+    EXPECT_EQ(got[0].objects[i].best().name, "car");
+    EXPECT_EQ(got[0].objects[i].hits, 7u);
+    EXPECT_TRUE(got[0].objects[i].recalled);
+    EXPECT_TRUE(got[0].objects[i].why.empty());
+    EXPECT_TRUE(got[0].objects[i].why.classes.empty());
+  }
+}
+
+TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedger) {
+  const dds_entity_t reader =
+      dds_create_reader(there.handle(), firstTopic(), reliable().get(), nullptr);
+  ASSERT_GT(reader, 0);
+  Writer<Recalled> writer(here, topics::kRecalled);
+  ASSERT_TRUE(eventually(loop, [&] { return writer.matched() == 1; }));
+  wire::Examples examples(3);
+  Recalled message;
+  while (message.objects.size() < 3) message.objects.push_back(examples.belief());
+  ASSERT_FALSE(message.objects[0].why.empty());
+  ASSERT_TRUE(writer.write(message));
+  void* sample = nullptr;
+  dds_sample_info_t info{};
+  ASSERT_TRUE(
+      eventually(loop, [&] { return sample || dds_take(reader, &sample, &info, 1, 1) > 0; }));
+  ASSERT_TRUE(info.valid_data);
+  const auto& got = *static_cast<const perdure_first_Recalled*>(sample);
+  ASSERT_EQ(got.items._length, 3u);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const auto& [read, sent] = std::tie(got.items._buffer[i], message.objects[i]);
+    EXPECT_EQ(read.object_id, sent.id);
+    EXPECT_EQ(read.existence, sent.existence);
+    EXPECT_EQ(read.recalled, sent.recalled);
+    EXPECT_EQ(read.classes._length, sent.classes.size());
+    EXPECT_STREQ(read.classes._buffer[0].name, sent.best().name.c_str());
+  }
+  dds_return_loan(reader, &sample, 1);
+}
+
+}  // namespace
+}  // namespace perdure::bus
