@@ -83,6 +83,29 @@ TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
   EXPECT_EQ(answers[0].next_id, 4u);
   ASSERT_EQ(answers[0].objects.size(), 3u);
   EXPECT_EQ(answers[0].objects[2].best().mean, frame(1, 3).objects[2].best().mean);
+  EXPECT_EQ(answers[0].objects[2].why, frame(1, 3).objects[2].why);
+}
+
+TEST_F(MapStoreProcess, SaysWhyOverDdsAndFromItsFileAlike) {
+  const auto child = start();
+  ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
+  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
+  const std::string perdure = (programs() / "perdure").string();
+  const auto why = [&](const char* id, std::vector<std::string> source) {
+    source.insert(source.begin(), {perdure, "map", "why", id});
+    Child command(source, folder_.file("why"));
+    const int code = command.wait(20s);
+    return std::make_pair(code, command.log());
+  };
+  const std::vector<std::string> file = {"--db", folder_.file("map.sqlite")};
+  const auto asked = why("3", {});
+  EXPECT_EQ(asked.first, 0) << asked.second;
+  EXPECT_THAT(asked.second, HasSubstr("Object 3 exists with probability 0.970"));
+  EXPECT_THAT(asked.second, HasSubstr("7 looks showed it"));
+  EXPECT_EQ(why("3", file), asked);
+  const auto unknown = why("17", file);
+  EXPECT_NE(unknown.first, 0);
+  EXPECT_THAT(unknown.second, HasSubstr("no object 17"));
 }
 
 TEST_F(MapStoreProcess, ShowsItsTilesToALateJoiner) {

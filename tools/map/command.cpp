@@ -11,6 +11,8 @@
 #include "common/base/errors.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
+#include "tools/map/why.h"
+#include "tools/outputs/ledger_json.h"
 
 namespace perdure::tools {
 namespace {
@@ -62,15 +64,31 @@ void list(const Request& request) {
   std::cout << (request.json ? jsonOf(reply.objects).dump(1) + "\n" : toTable(reply.objects));
 }
 
-void show(const Request& request) {
-  const MapReply reply = ask(request);
+/// Asks for one object by its id. Throws StartupError where there is none.
+MapReply askForOne(const Request& request) {
+  MapReply reply = ask(request);
   if (reply.objects.empty()) {
     throw StartupError(ExitCode::kFailure,
                        "the map has no object " + std::to_string(request.query.object_id) +
                            "; `perdure map list` shows those it has");
   }
-  const MapObject& object = reply.objects.front();
+  return reply;
+}
+
+void show(const Request& request) {
+  const MapObject object = askForOne(request).objects.front();
   std::cout << (request.json ? toJson(object).dump(1) + "\n" : toText(object));
+}
+
+void why(const Request& request) {
+  const MapReply reply = askForOne(request);
+  if (reply.beliefs.empty()) {
+    throw StartupError(ExitCode::kFailure,
+                       "this map_store is an older one and does not say why; start one of this "
+                       "version, or read its file with --db");
+  }
+  const ObjectBelief& belief = reply.beliefs.front();
+  std::cout << (request.json ? toJson(belief.why).dump(1) + "\n" : toWhy(belief));
 }
 
 void chooseKind(Request& request) {
@@ -145,6 +163,14 @@ void addMapCommand(CLI::App& app) {
     show(*request);
   });
 
+  CLI::App* explaining = map->add_subcommand("why", "Why an object is believed, entry by entry");
+  explaining->add_option("ID", request->query.object_id, "the object's id")->required();
+  explaining->add_flag("--json", request->json, "the ledger as JSON");
+  explaining->callback([request] {
+    request->query.kind = MapQueryKind::kById;
+    why(*request);
+  });
+
   CLI::App* query = map->add_subcommand("query", "Objects of a class, or in a place");
   query->add_option("--class", request->query.class_name, "of this most probable class");
   query->add_option("--radius", request->radius, "X Y Z R: centres within R metres, nearest first")
@@ -166,7 +192,8 @@ void addMapCommand(CLI::App& app) {
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
 
-  for (CLI::App* command : {listing, showing, query, exporting}) addSource(*command, *request);
+  for (CLI::App* command : {listing, showing, explaining, query, exporting})
+    addSource(*command, *request);
 }
 
 }  // namespace perdure::tools

@@ -60,6 +60,7 @@ MapReply askMapFile(const std::string& path, const MapQuery& query) {
   MapReply reply;
   reply.truncated = found->truncated;
   reply.objects = std::move(found->objects);
+  reply.beliefs = std::move(found->beliefs);
   return reply;
 }
 

@@ -10,6 +10,7 @@
 #include "common/math/so3.h"
 #include "tools/outputs/evolution_picture.h"
 #include "tools/outputs/geodesy.h"
+#include "tools/outputs/ledger_json.h"
 #include "tools/outputs/map_picture.h"
 
 namespace perdure::tools {
@@ -19,10 +20,6 @@ using Json = nlohmann::ordered_json;
 
 // Declared, not measured: where no GNSS is at hand the map still opens in any viewer, at 0°, 0°.
 constexpr GeoAnchor kDefaultAnchor{};
-
-// Ten significant digits read back to better than a micrometre over a town, and hide the last bits
-// in which two compilers may differ.
-double rounded(double value) { return std::stod(fmt::format("{:.10g}", value)); }
 
 template <class Derived>
 Json numbersOf(const Eigen::MatrixBase<Derived>& vector) {
@@ -96,7 +93,8 @@ Json toJson(const ObjectBelief& belief) {
           {"hits", belief.hits},
           {"visible_misses", belief.visible_misses},
           {"moving", rounded(belief.moving)},
-          {"memory", belief.memory == Memory::kWorking ? "working" : "long_term"}};
+          {"memory", belief.memory == Memory::kWorking ? "working" : "long_term"},
+          {"why", toJson(belief.why)}};
 }
 
 OutputWriter::OutputWriter(std::filesystem::path folder, std::string sequence)

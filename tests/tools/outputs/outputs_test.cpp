@@ -41,6 +41,7 @@ ObjectBelief carAt(ObjectId id, double x, bool confirmed = true) {
   car.mean << x, 2.0, 0.5, 0.1, std::log(4.0), std::log(1.6), std::log(1.5);
   object.classes.push_back(car);
   object.visible_fraction = 1.0;
+  object.why.existence = {{-1.0, 1, {}, {}}, {3.25, 2, {}, {}}};
   return object;
 }
 
@@ -217,6 +218,7 @@ TEST(OutputWriter, LeavesEveryFileWellFormed) {
   const auto objects = nlohmann::json::parse(textOf(folder / "objects.json"));
   EXPECT_EQ(objects["objects"][0]["classes"]["car"]["covariance"].size(), 7u);
   EXPECT_EQ(objects["objects"][0]["memory"], "working");
+  EXPECT_EQ(objects["objects"][0]["why"]["existence"]["hit"]["log_odds"], 3.25);
   EXPECT_EQ(nlohmann::json::parse(textOf(folder / "events.jsonl"))["event"], "born");
   const auto map = nlohmann::json::parse(textOf(folder / "map.geojson"));
   EXPECT_EQ(map["type"], "FeatureCollection");
