@@ -59,6 +59,8 @@ const char* nameOf(ClassEvidence kind) {
       return "merge";
     case ClassEvidence::kRestore:
       return "restore";
+    case ClassEvidence::kContext:
+      return "context";
   }
   failCheck("evidence of a class is one of those declared", std::source_location::current());
 }

@@ -40,8 +40,9 @@ enum class ClassEvidence : std::uint8_t {
   kPruning,     ///< explanations that were given up; the others share what they had
   kMerge,       ///< what another object knew that turned out to be the same
   kRestore,     ///< what was believed before this ledger
+  kContext,     ///< what stands near it; laid over what is published, never kept
 };
-inline constexpr std::size_t kClassEvidences = 8;
+inline constexpr std::size_t kClassEvidences = 9;
 
 const char* nameOf(ExistenceEvidence kind);  ///< "prior", "hit", …
 const char* nameOf(ClassEvidence kind);      ///< "prior", "activation", …

@@ -181,6 +181,8 @@ void describeTend(Parameters& p, Fields& fields) {
 void describe(Config& c, Fields& fields) {
   fields.text("class_priors", c.class_priors,
               {"file of sizes and detection probabilities by class"});
+  fields.text("context", c.context,
+              {"file of what stands near what, from `perdure map learn-context`; empty: off"});
   fields.integer("history.frames", c.history.frames, between(2, 1000),
                  {"frames for which late detections are still applied"});
   fields.boolean("history.wait_for_detections", c.history.wait_for_detections,

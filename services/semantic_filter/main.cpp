@@ -59,8 +59,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
     for (const auto& state : changes.written) (void)states.write(state);
     for (const auto& state : changes.gone) (void)states.dispose(state);
   };
-  semantic_filter::Node node(config, semantic_filter::loadClassPriors(config.class_priors),
-                             context.instance(),
+  semantic_filter::Node node(config, semantic_filter::loadPriors(config), context.instance(),
                              {.objects = publish,
                               .events = context.sink(topics::kEvents),
                               .predictions = context.sink(topics::kPredictions)});

@@ -4,6 +4,7 @@
 
 #include "common/base/check.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/context.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -218,6 +219,7 @@ void Node::publish(const Entry& entry) {
   objects.next_id = ids_.next();
   for (const auto& object : belief_.objects) {
     objects.objects.push_back(toBelief(object, config_.filter.motion.min_speed));
+    addContext(objects.objects.back(), object);
     if (objects.objects.back().moving <= 0.5) continue;
     const double dt = toSeconds(entry.input.stamp.time - object.as_of);
     for (auto& c : objects.objects.back().classes) {
@@ -257,7 +259,7 @@ void Node::publishPredictions(const Entry& entry) {
 
 void Node::insertRecalled(const Recalled& recalled) {
   ids_.atLeast(recalled.next_id);
-  for (const auto& belief : recalled.objects) {
+  for (auto belief : recalled.objects) {
     if (belief.classes.empty() || belief.id == 0) {
       reasons_.add("recalled_malformed");
       continue;
@@ -265,6 +267,7 @@ void Node::insertRecalled(const Recalled& recalled) {
     ids_.atLeast(belief.id + 1);
     const auto same = [&](const Object& o) { return o.id == belief.id; };
     if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) continue;
+    removeContext(belief);
     const Object object =
         fromBelief(belief, pose_error_.product,
                    recalled.restore ? ExistenceEvidence::kRestore : ExistenceEvidence::kRecall);

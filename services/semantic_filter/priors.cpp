@@ -11,6 +11,7 @@
 
 #include "common/base/errors.h"
 #include "common/types/objects.h"
+#include "services/semantic_filter/context_file.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -139,6 +140,12 @@ ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
     priors.classes.push_back(p);
   }
   reader.throwIfAny();
+  return priors;
+}
+
+ClassPriors loadPriors(const Config& config) {
+  ClassPriors priors = loadClassPriors(config.class_priors);
+  if (!config.context.empty()) priors.context = loadContext(config.context);
   return priors;
 }
 

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "common/base/errors.h"
+#include "services/semantic_filter/context_file.h"
+#include "tools/map/learn_context.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -24,6 +26,8 @@ struct Request {
   bool json = false, geojson = false;
   std::string out;
   std::vector<double> radius, box, anchor;
+  std::vector<std::string> maps;
+  LearnOptions learn;
   MapQuery query;
 };
 
@@ -117,6 +121,35 @@ std::optional<GeoAnchor> anchorOf(const Request& request) {
   return GeoAnchor{{}, a[0], a[1], a[2], a[3] * std::numbers::pi / 180.0};
 }
 
+void write(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::trunc);
+  if (!(file << text)) {
+    throw StartupError(ExitCode::kUnavailable, path +
+                                                   " cannot be written; give --out a "
+                                                   "file in a folder that you may write");
+  }
+}
+
+void learnContextOf(const Request& request) {
+  std::vector<map_store::PlacedBelief> beliefs;
+  for (const std::string& map : request.maps) {
+    auto more = beliefsOfMapFile(map);
+    std::move(more.begin(), more.end(), std::back_inserter(beliefs));
+  }
+  const LearntContext learnt = learnContext(std::move(beliefs), request.learn);
+  if (learnt.matrix.empty()) {
+    throw StartupError(ExitCode::kFailure,
+                       fmt::format("no two things of known class stand within {} m of each other "
+                                   "in these maps; give maps with more, or a larger --radius",
+                                   request.learn.radius_m));
+  }
+  const std::string note = fmt::format(
+      "Learned by `perdure map learn-context`: {} things, {} pairs.", learnt.objects, learnt.pairs);
+  write(request.out, semantic_filter::formatContext(learnt.matrix, note));
+  std::cout << fmt::format("{}: {} classes from {} things, {} pairs of which are near\n",
+                           request.out, learnt.matrix.classes.size(), learnt.objects, learnt.pairs);
+}
+
 void exportMap(const Request& request) {
   const MapReply reply = ask(request);
   const auto json =
@@ -125,11 +158,7 @@ void exportMap(const Request& request) {
     std::cout << json.dump(1) << "\n";
     return;
   }
-  std::ofstream file(request.out, std::ios::trunc);
-  if (!(file << json.dump(1) << "\n")) {
-    throw StartupError(ExitCode::kUnavailable, request.out + " cannot be written; give --out a "
-                                               "file in a folder that you may write");
-  }
+  write(request.out, json.dump(1) + "\n");
 }
 
 void addSource(CLI::App& command, Request& request) {
@@ -191,6 +220,20 @@ void addMapCommand(CLI::App& app) {
       ->expected(4);
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
+
+  CLI::App* learning = map->add_subcommand(
+      "learn-context", "What stands near what in maps, for the filter's context");
+  learning->add_option("MAP", request->maps, "files of map_store")->required()->type_name("FILE");
+  learning->add_option("--out", request->out, "the filter's key context names this file")
+      ->required()
+      ->type_name("FILE");
+  learning
+      ->add_option("--radius", request->learn.radius_m, "what is further apart is not near, metres")
+      ->check(CLI::Range(0.1, 100.0));
+  learning
+      ->add_option("--smoothing", request->learn.smoothing, "pairs by chance, added to each count")
+      ->check(CLI::PositiveNumber);
+  learning->callback([request] { learnContextOf(*request); });
 
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);

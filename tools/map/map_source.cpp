@@ -6,13 +6,18 @@
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
-#include "services/map_store/core/map_database.h"
 
 namespace perdure::tools {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
+
+[[noreturn]] void cannotRead(const std::string& path, const Reason& reason) {
+  throw StartupError(ExitCode::kUnavailable,
+                     path + " cannot be read: " + reason.detail +
+                         "; map_store sets a damaged file aside at its next start");
+}
 
 }  // namespace
 
@@ -52,16 +57,19 @@ MapReply askMapFile(const std::string& path, const MapQuery& query) {
   const auto working = reader.working();
   const WorldId newest = working && *working ? (*working)->world : WorldId{};
   auto found = reader.find(query, newest, query.limit);
-  if (!found) {
-    throw StartupError(ExitCode::kUnavailable,
-                       path + " cannot be read: " + found.error().detail +
-                           "; map_store sets a damaged file aside at its next start");
-  }
+  if (!found) cannotRead(path, found.error());
   MapReply reply;
   reply.truncated = found->truncated;
   reply.objects = std::move(found->objects);
   reply.beliefs = std::move(found->beliefs);
   return reply;
+}
+
+std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path) {
+  const auto connection = map_store::openStoreForReading(path);
+  auto beliefs = map_store::MapReader(&connection).beliefs();
+  if (!beliefs) cannotRead(path, beliefs.error());
+  return std::move(*beliefs);
 }
 
 }  // namespace perdure::tools

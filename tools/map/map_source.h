@@ -2,10 +2,12 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/bus/domain.h"
 #include "common/types/map.h"
+#include "services/map_store/core/map_database.h"
 
 namespace perdure::tools {
 
@@ -18,5 +20,7 @@ Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query
 /// Reads a map's file, also beside the running service. Places are looked for in query.world, or
 /// where it names none in the newest frame of reference.
 MapReply askMapFile(const std::string& path, const MapQuery& query);
+/// All objects of a map's file in full. Throws StartupError.
+std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path);
 
 }  // namespace perdure::tools

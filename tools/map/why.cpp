@@ -78,6 +78,8 @@ const char* sentence(ClassEvidence kind) {
       return "objects that were the same thing";
     case ClassEvidence::kRestore:
       return "believed before this ledger";
+    case ClassEvidence::kContext:
+      return "what stands near it";
   }
   return "";
 }

@@ -39,7 +39,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   openData();
   openOdometry(options);
   openDetections(options);
-  const auto priors = semantic_filter::loadClassPriors(configs_.semantic_filter.class_priors);
+  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
   outputs_ = std::make_unique<OutputWriter>(options.out, sequenceName(options));
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {

@@ -66,6 +66,8 @@ class MapReader {
   /// Of kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id); at most `limit`.
   /// kByRadius and kByBox look in query.world, or where that is 0 in `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
+  /// All objects on the map, in full, by id; rows that cannot be read are left out.
+  Result<std::vector<PlacedBelief>> beliefs() const;
   Result<Found> inSquare(const Square& square) const;
   Result<std::map<Square, std::uint32_t>> squares() const;  ///< with counts of objects
   /// The working set as it was at the last commit; nothing on an empty map.

@@ -152,6 +152,19 @@ Result<Found> MapReader::find(const MapQuery& query, const WorldId& newest,
   return collect(*statement, limit, query.kind == MapQueryKind::kById);
 }
 
+Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
+  auto rows =
+      connection_->prepare(std::string(kColumns) + "FROM objects o WHERE o.gone = 0 ORDER BY o.id");
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  std::vector<PlacedBelief> beliefs;
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return beliefs;
+    if (auto placed = beliefFrom(*rows)) beliefs.push_back(std::move(*placed));
+  }
+}
+
 Result<Found> MapReader::inSquare(const Square& square) const {
   auto statement = connection_->prepare(
       std::string(kColumns) +

@@ -68,6 +68,7 @@ struct Object {
   bool remembers_all = true;
   std::uint32_t fresh_keyframes = 0;  ///< that came since the state was last smoothed
   ClassAccount classes;               ///< why the hypotheses weigh what they weigh
+  std::vector<ClassNumber> context;   ///< nats, laid over what is published (core/context.h)
   /// Looks that were not used since the object was last brought up to date: nothing of what is
   /// published changes while it is hidden, its ledger neither.
   LedgerEntry hidden, away;

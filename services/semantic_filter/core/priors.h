@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -20,11 +21,27 @@ struct ClassPrior {
   double azimuth_sigma = 0.35;         ///< radians, floor of what a network's azimuth deserves
 };
 
+/// How often things of two classes stand near each other, learned from maps (core/context.h).
+struct ContextMatrix {
+  double radius_m = 0.0;             ///< what is further away is not near
+  std::vector<std::string> classes;  ///< empty: no context
+  Eigen::MatrixXd log_ratio;         ///< log P(a near b) / (P(a) P(b)); symmetric, as `classes`
+
+  bool empty() const { return classes.empty(); }
+  /// 0 for classes that it does not name.
+  double of(const std::string& a, const std::string& b) const {
+    const auto i = std::find(classes.begin(), classes.end(), a) - classes.begin();
+    const auto j = std::find(classes.begin(), classes.end(), b) - classes.begin();
+    return i < log_ratio.rows() && j < log_ratio.cols() ? log_ratio(i, j) : 0.0;
+  }
+};
+
 /// Priors by name, with a documented fallback for names that are not listed.
 struct ClassPriors {
   std::vector<ClassPrior> classes;
   ClassPrior fallback;  ///< broad; its name is empty
   ClassPrior other;     ///< of a thing of no known class; its name is kOtherClass
+  ContextMatrix context;
 
   ClassPrior of(const std::string& name) const {
     for (const auto& c : classes) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "services/semantic_filter/core/association.h"
+#include "services/semantic_filter/core/context.h"
 #include "services/semantic_filter/core/smoother.h"
 #include "services/semantic_filter/core/update.h"
 
@@ -225,6 +226,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
   report.merges = mergeObjects(belief.objects, frame);
   confirmAndBury(belief.objects, frame);
+  contextualise(belief.objects, priors_.context);
   return report;
 }
 

@@ -71,6 +71,9 @@ class Restless {
     priors_ = testing::makePriors();
     priors_.classes[0].moving = 0.2;
     priors_.classes[0].speed_sigma = 6.0;
+    priors_.context.radius_m = 12.0;
+    priors_.context.classes = {"car", "chair", "van"};
+    priors_.context.log_ratio = Eigen::Matrix3d::Constant(-0.7) + 1.2 * Eigen::Matrix3d::Identity();
     config_ = config;
     for (int i = 0; i < 9; ++i) things_.push_back(anyObject(random_));
     begin();
