@@ -13,13 +13,12 @@
 #include "common/types/health.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
+#include "services/vio/cameras.h"
 #include "services/vio/config.h"
 #include "services/vio/core/descriptor.h"
-#include "services/vio/core/estimator.h"
 #include "services/vio/core/initialiser.h"
 #include "services/vio/core/motion_initialiser.h"
 #include "services/vio/core/speed_history.h"
-#include "services/vio/core/tracker.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {
@@ -58,8 +57,6 @@ class Node {
   std::string status() const;
 
  private:
-  struct Cameras;
-
   void clockJumpedBack();
   void drain(bool all);
   bool ready() const;

@@ -1,0 +1,33 @@
+#include "services/vio/cameras.h"
+
+#include <algorithm>
+
+namespace perdure::vio {
+namespace {
+
+bool sameCamera(const CameraCalibration& a, const CameraCalibration& b) {
+  return a.name == b.name && a.width == b.width && a.height == b.height && a.fx == b.fx &&
+         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion &&
+         a.distortion_coefficients == b.distortion_coefficients &&
+         a.T_BC.matrix() == b.T_BC.matrix() && a.time_offset_s == b.time_offset_s;
+}
+
+std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
+  std::vector<RigidTransform> T_BC;
+  for (const CameraModel& m : all) T_BC.push_back(m.T_BC());
+  return T_BC;
+}
+
+}  // namespace
+
+Cameras::Cameras(const Config& config, const Options& options, const std::vector<CameraModel>& all)
+    : tracker(config.tracker, all),
+      estimator(options, extrinsics(all), all[0].calibration().time_offset_s),
+      models(all) {}
+
+bool sameCameras(const Calibration& a, const Calibration& b) {
+  return std::equal(a.cameras.begin(), a.cameras.end(), b.cameras.begin(), b.cameras.end(),
+                    sameCamera);
+}
+
+}  // namespace perdure::vio

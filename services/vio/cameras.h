@@ -1,0 +1,26 @@
+// What exists once the cameras are known.
+#pragma once
+
+#include <vector>
+
+#include "common/camera/camera_model.h"
+#include "common/types/sensors.h"
+#include "services/vio/config.h"
+#include "services/vio/core/estimator.h"
+#include "services/vio/core/tracker.h"
+
+namespace perdure::vio {
+
+/// One or two cameras, the first leads, with the tracker and the filter that are made for them.
+struct Cameras {
+  Cameras(const Config& config, const Options& options, const std::vector<CameraModel>& all);
+
+  Tracker tracker;
+  Estimator estimator;
+  std::vector<CameraModel> models;
+};
+
+/// The same cameras in the same order, to the last digit.
+bool sameCameras(const Calibration& a, const Calibration& b);
+
+}  // namespace perdure::vio

@@ -1,0 +1,120 @@
+// usage: vio_against_klt DATASET
+// What vio takes for each frame of a dataset, beside what OpenCV alone takes to follow 200 points
+// from frame to frame of the same: processor time of this thread, decoding left out. The ratio says
+// more than milliseconds where the machine is shared.
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <vector>
+
+#include "common/replay/dataset.h"
+#include "common/vision/image.h"
+#include "services/vio/node.h"
+
+namespace {
+
+using namespace perdure;
+
+double cpuMs() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+/// OpenCV's defaults: windows of 21 pixels, three levels above the image. Filled up to 200 points
+/// when fewer than 150 are left.
+class PlainTracker {
+ public:
+  void follow(const cv::Mat& image) {
+    std::vector<cv::Point2f> kept;
+    if (!before_.empty() && !points_.empty()) {
+      std::vector<cv::Point2f> now;
+      std::vector<std::uint8_t> found;
+      cv::calcOpticalFlowPyrLK(before_, image, points_, now, found, cv::noArray());
+      for (std::size_t i = 0; i < now.size(); ++i) {
+        if (found[i]) kept.push_back(now[i]);
+      }
+    }
+    if (kept.size() < 150) {
+      cv::Mat open(image.size(), CV_8UC1, cv::Scalar(255));
+      for (const cv::Point2f& p : kept) cv::circle(open, cv::Point(p), 12, 0, cv::FILLED);
+      std::vector<cv::Point2f> fresh;
+      cv::goodFeaturesToTrack(image, fresh, 200 - static_cast<int>(kept.size()), 0.01, 12.0, open);
+      kept.insert(kept.end(), fresh.begin(), fresh.end());
+    }
+    points_ = std::move(kept);
+    before_ = image.clone();
+  }
+
+ private:
+  cv::Mat before_;
+  std::vector<cv::Point2f> points_;
+};
+
+double quantile(std::vector<double> values, double q) {
+  const auto at = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+void print(const char* what, const std::vector<double>& ms) {
+  std::printf("%-28s median %6.2f ms   p99 %6.2f ms\n", what, quantile(ms, 0.5),
+              quantile(ms, 0.99));
+}
+
+int compare(const char* folder) {
+  cv::setNumThreads(1);
+  replay::DatasetOptions options;
+  options.path = folder;
+  options.encoding = options.second_encoding = ImageEncoding::kMono8;
+  const auto dataset = replay::Dataset::open(options);
+  vio::Node node(vio::Config{}, 1, {[](const Odometry&) {}, [](const Landmarks&) {}});
+  node.onCalibration(dataset->calibration());
+  PlainTracker tracker;
+  std::vector<double> vio_ms, klt_ms;
+  double since = 0.0;  // a frame may be worked off when a later sample comes
+  while (const auto message = dataset->next()) {
+    const double begin = cpuMs();
+    if (const auto* imu = std::get_if<ImuSample>(&*message)) node.onImu(*imu);
+    if (const auto* speed = std::get_if<SpeedSample>(&*message)) node.onSpeed(*speed);
+    const auto* frame = std::get_if<Frame>(&*message);
+    if (frame) node.onFrame(*frame);
+    since += cpuMs() - begin;
+    if (!frame || frame->camera != dataset->calibration().cameras[0].name) continue;
+    vio_ms.push_back(since);
+    since = 0.0;
+    const auto image = vision::monoOf(*frame);
+    if (!image) continue;
+    const double klt = cpuMs();
+    tracker.follow(*image);
+    klt_ms.push_back(cpuMs() - klt);
+  }
+  if (vio_ms.empty() || klt_ms.empty()) {
+    std::fprintf(stderr, "%s holds no frames that can be read\n", folder);
+    return 66;
+  }
+  print("vio", vio_ms);
+  print("OpenCV alone, 200 points", klt_ms);
+  std::printf("ratio of the medians %.2f over %zu frames\n",
+              quantile(vio_ms, 0.5) / quantile(klt_ms, 0.5), vio_ms.size());
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2 || argv[1][0] == '-') {
+    std::fprintf(stderr,
+                 "usage: vio_against_klt DATASET (EuRoC, KITTI raw or a simulated folder)\n");
+    return 64;
+  }
+  try {
+    return compare(argv[1]);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return 66;
+  }
+}
