@@ -7,7 +7,7 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kSamples = 512;
-constexpr double kAcceleration = 2.0;  // m/s², unknown
+constexpr double kSpeedChange = 2.0;  // m/s², unknown
 
 }  // namespace
 
@@ -36,7 +36,7 @@ std::optional<SpeedReading> SpeedHistory::at(TimePoint time) const {
   const TimedSpeed& nearest = after == samples_.end() ? samples_.back() : *after;
   const double age = std::abs(toSeconds(nearest.time - time));
   if (age > max_age_s_) return std::nullopt;
-  return SpeedReading{nearest.speed, nearest.sigma + kAcceleration * age};
+  return SpeedReading{nearest.speed, nearest.sigma + kSpeedChange * age};
 }
 
 }  // namespace perdure::vio
