@@ -157,9 +157,9 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
   if (first_estimates) {
     from = state.nav_linear;
     from.v_WB += std::min(1.0, x.dt / kFollow) * (state.nav.v_WB - from.v_WB);
-    Nav upright = from;
-    upright.q_WB = state.nav.q_WB;
-    to_linear = predict(upright, x, gravity);
+    Nav turned = from;
+    turned.q_WB = state.nav.q_WB;
+    to_linear = predict(turned, x, gravity);
   }
   const Matrix15d Phi = transition(from, to_linear, x, R0, gravity);
   Matrix15d G = Matrix15d::Identity();
