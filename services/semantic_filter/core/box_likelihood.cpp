@@ -98,6 +98,17 @@ Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box
   return S;
 }
 
+bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
+  for (int axis = 0; axis < 2; ++axis) {
+    const double reach =
+        5.0 * std::sqrt(std::max(covariance(axis, axis), covariance(axis + 2, axis + 2)) +
+                        z.variance[axis]);
+    if (z.sides[axis] > p.sides[axis + 2] + reach) return false;
+    if (p.sides[axis] > z.sides[axis + 2] + reach) return false;
+  }
+  return true;
+}
+
 std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                     const std::array<bool, 4>& hidden) {
   std::array<bool, 4> use;

@@ -64,6 +64,10 @@ double logClutter(const BoxMeasurement& z, double width, double height,
 Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
                                     const Eigen::Matrix<double, 6, 6>& P_pose);
 
+/// Whether the box lies near enough to be worth scoring, by five deviations.
+bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& predicted,
+                const Eigen::Matrix4d& covariance);
+
 struct BoxScore {
   double log_density = 0.0;  ///< of measured sides, with the probability of the censored ones
   double nis = 0.0;          ///< squared Mahalanobis distance of the measured sides

@@ -9,10 +9,12 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
-struct Corner {
-  Eigen::Vector3d p_C;
-  Eigen::Matrix<double, 3, kStateDim> J;  ///< d p_C / d x
-  Eigen::Matrix<double, 3, 6> J_pose;
+/// The cuboid and its eight corners before the camera.
+struct Corners {
+  Eigen::Matrix3d R_WO, R_CW, R_CB;
+  Eigen::Vector3d size;                  ///< length, width, height
+  std::array<Eigen::Vector3d, 8> local;  ///< from the centre, along the cuboid's axes
+  std::array<Eigen::Vector3d, 8> p_C;
 };
 
 struct ImagePoint {
@@ -20,21 +22,29 @@ struct ImagePoint {
   int corner;  ///< -1: a cut by the near plane
 };
 
-Corner makeCorner(int i, const State& x, const View& view, const Eigen::Matrix3d& R_WO,
-                  const Eigen::Matrix3d& R_CW) {
-  const Eigen::Vector3d unit((i & 1) ? 0.5 : -0.5, (i & 2) ? 0.5 : -0.5, (i & 4) ? 0.5 : -0.5);
-  const Eigen::Vector3d local = x.segment<3>(kSize).array().exp() * unit.array();
-  const Eigen::Vector3d offset_W = R_WO * local;
-  const Eigen::Vector3d p_B = view.T_WB.inverse() * Eigen::Vector3d(x.head<3>() + offset_W);
-  const Eigen::Matrix3d R_CB = view.camera->T_BC().R().transpose();
-  Corner c;
-  c.p_C = R_CB * (p_B - view.camera->T_BC().p);
-  c.J.setZero();
-  c.J.leftCols<3>() = R_CW;
-  c.J.col(kYaw) = R_CW * R_WO.col(2).cross(offset_W);
-  for (int k = 0; k < 3; ++k) c.J.col(kSize + k) = R_CW * R_WO.col(k) * local[k];
-  c.J_pose.leftCols<3>() = R_CB * skew(p_B);
-  c.J_pose.rightCols<3>() = -R_CW;
+Eigen::Vector3d cornerOf(int i, const Eigen::Vector3d& size) {
+  return {(i & 1) ? 0.5 * size.x() : -0.5 * size.x(), (i & 2) ? 0.5 * size.y() : -0.5 * size.y(),
+          (i & 4) ? 0.5 * size.z() : -0.5 * size.z()};
+}
+
+/// Nothing where all of it lies behind the near plane.
+std::optional<Corners> cornersBeforeCamera(const State& x, const View& view) {
+  Corners c;
+  const RigidTransform T_WC = view.T_WC();
+  c.R_CW = T_WC.q.conjugate().toRotationMatrix();
+  const Eigen::Vector3d centre_C = c.R_CW * (x.head<3>() - T_WC.p);
+  c.size = x.segment<3>(kSize).array().exp();
+  if (centre_C.z() + 0.5 * c.size.norm() < kNear) return std::nullopt;
+  c.R_CB = view.camera->T_BC().q.conjugate().toRotationMatrix();
+  c.R_WO = uprightRotation(x[kYaw], view.up_W);
+  const Eigen::Matrix3d R_CO = c.R_CW * c.R_WO;
+  bool any = false;
+  for (int i = 0; i < 8; ++i) {
+    c.local[i] = cornerOf(i, c.size);
+    c.p_C[i] = centre_C + R_CO * c.local[i];
+    any = any || c.p_C[i].z() >= kNear;
+  }
+  if (!any) return std::nullopt;
   return c;
 }
 
@@ -46,28 +56,39 @@ Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C) {
           camera.cy() + camera.fy() * direction.y() * 4.0};
 }
 
-void setSide(ProjectedBox& box, int side, const ImagePoint& point, const CameraModel& camera,
-             const std::array<Corner, 8>& corners) {
+void setSide(ProjectedBox& box, int side, const ImagePoint& point, const View& view,
+             const Corners& corners) {
   box.sides[side] = point.pixel[side % 2];
   Eigen::Matrix<double, 2, 3> J_point;
-  if (point.corner < 0 || !camera.project(corners[point.corner].p_C, &J_point)) {
+  if (point.corner < 0 || !view.camera->project(corners.p_C[point.corner], &J_point)) {
     box.exact[side] = false;
     return;
   }
-  box.H.row(side) = J_point.row(side % 2) * corners[point.corner].J;
-  box.H_pose.row(side) = J_point.row(side % 2) * corners[point.corner].J_pose;
+  const Eigen::Vector3d& local = corners.local[point.corner];
+  const Eigen::RowVector3d by_C = J_point.row(side % 2);
+  const Eigen::RowVector3d by_W = by_C * corners.R_CW;
+  const Eigen::RowVector3d by_O = by_W * corners.R_WO;
+  box.H.row(side).head<3>() = by_W;
+  box.H(side, kYaw) = by_O.y() * local.x() - by_O.x() * local.y();  // turns x towards y
+  box.H.row(side).segment<3>(kSize) = by_O.cwiseProduct(local.transpose());
+  const Eigen::Vector3d p_B =
+      corners.R_CB.transpose() * corners.p_C[point.corner] + view.camera->T_BC().p;
+  const Eigen::Vector3d by_B = (by_C * corners.R_CB).transpose();
+  box.H_pose.row(side).head<3>() = by_B.cross(p_B).transpose();
+  box.H_pose.row(side).tail<3>() = -by_W;
 }
 
-std::vector<ImagePoint> imagePoints(const std::array<Corner, 8>& corners,
-                                    const CameraModel& camera) {
-  std::vector<ImagePoint> points;
+using ImagePoints = InplaceVector<ImagePoint, kMostOutline>;
+
+ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
+  ImagePoints points;
   for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d& a = corners[i].p_C;
+    const Eigen::Vector3d& a = corners.p_C[i];
     if (a.z() >= kNear) points.push_back({pixelOf(camera, a), i});
     for (int axis = 1; axis < 8; axis <<= 1) {
       const int j = i | axis;
       if (j == i) continue;
-      const Eigen::Vector3d& b = corners[j].p_C;
+      const Eigen::Vector3d& b = corners.p_C[j];
       if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
       const double s = (kNear - a.z()) / (b.z() - a.z());
       points.push_back({pixelOf(camera, a + s * (b - a)), -1});
@@ -82,39 +103,22 @@ Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
   return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
 }
 
-std::array<Eigen::Vector3d, 8> corners(const State& x, const Eigen::Vector3d& up_W) {
-  const Eigen::Matrix3d R_WO = uprightRotation(x[kYaw], up_W);
-  std::array<Eigen::Vector3d, 8> result;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d unit((i & 1) ? 0.5 : -0.5, (i & 2) ? 0.5 : -0.5, (i & 4) ? 0.5 : -0.5);
-    result[i] =
-        x.head<3>() + R_WO * Eigen::Vector3d(x.segment<3>(kSize).array().exp() * unit.array());
-  }
-  return result;
-}
-
 std::optional<ProjectedBox> projectCuboid(const State& x, const View& view) {
-  const Eigen::Matrix3d R_WO = uprightRotation(x[kYaw], view.up_W);
-  const Eigen::Matrix3d R_CW = view.T_WC().R().transpose();
-  std::array<Corner, 8> all;
-  ProjectedBox box;
-  box.nearest_m = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 8; ++i) {
-    all[i] = makeCorner(i, x, view, R_WO, R_CW);
-    box.nearest_m = std::min(box.nearest_m, std::max(all[i].p_C.z(), kNear));
-  }
-  const auto points = imagePoints(all, *view.camera);
-  if (points.empty()) return std::nullopt;
+  const auto corners = cornersBeforeCamera(x, view);
+  if (!corners) return std::nullopt;
+  std::optional<ProjectedBox> result(std::in_place);
+  ProjectedBox& box = *result;
+  const auto points = imagePoints(*corners, *view.camera);
   for (int side = 0; side < 4; ++side) {
-    const ImagePoint* extreme = &points.front();
+    const ImagePoint* extreme = &points[0];
     for (const auto& point : points) {
       const double d = point.pixel[side % 2] - extreme->pixel[side % 2];
       if (side < 2 ? d < 0 : d > 0) extreme = &point;
     }
-    setSide(box, side, *extreme, *view.camera, all);
+    setSide(box, side, *extreme, view, *corners);
   }
   for (const auto& point : points) box.points.push_back(point.pixel);
-  return box;
+  return result;
 }
 
 std::optional<ProjectedBox> projectObserved(const State& x, const View& view,

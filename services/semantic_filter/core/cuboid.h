@@ -5,10 +5,10 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
-#include <vector>
 
 #include "common/camera/camera_model.h"
 #include "services/semantic_filter/core/object.h"
+#include "services/semantic_filter/core/polygon.h"
 
 namespace perdure::semantic_filter {
 
@@ -26,14 +26,11 @@ struct ProjectedBox {
   Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
   Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();  ///< by [θ, p] of T_WB
   std::array<bool, 4> exact{true, true, true, true};  ///< false: set by the near plane's cut
-  double nearest_m = 0.0;                             ///< least depth of a corner that is in front
-  std::vector<Eigen::Vector2d> points;  ///< images of corners and cuts, for the outline
+  Polygon points;  ///< images of corners and cuts, in no order, for the outline
 };
 
 /// R_WO of an upright cuboid.
 Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
-/// The eight corners in W.
-std::array<Eigen::Vector3d, 8> corners(const State& x, const Eigen::Vector3d& up_W);
 /// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
 std::optional<ProjectedBox> projectCuboid(const State& x, const View& view);
 

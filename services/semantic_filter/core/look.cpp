@@ -9,22 +9,11 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kNever = 1e9;              // a change of view that never counts
 
-bool mayMatch(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
-  for (int axis = 0; axis < 2; ++axis) {
-    const double reach =
-        5.0 * std::sqrt(std::max(covariance(axis, axis), covariance(axis + 2, axis + 2)) +
-                        z.variance[axis]);
-    if (z.sides[axis] > p.sides[axis + 2] + reach) return false;
-    if (p.sides[axis] > z.sides[axis + 2] + reach) return false;
-  }
-  return true;
-}
-
 void scoreBoxes(HypothesisLook& h, const std::string& class_name, const Sight& sight,
                 const std::vector<Evidence>& boxes, const FrameContext& frame) {
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const Evidence& e = boxes[i];
-    if (!mayMatch(e.z, *h.box, h.covariance)) continue;
+    if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
     const auto score = scoreBox(e.z, *h.box, h.covariance, sight.hidden, frame.parameters->box.gate,
                                 frame.parameters->box.tail);
     if (!score) continue;

@@ -10,10 +10,14 @@ double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Ve
 }
 
 Polygon convexHull(Polygon points) {
+  const bool finite = std::all_of(points.begin(), points.end(),
+                                  [](const Eigen::Vector2d& p) { return p.allFinite(); });
+  if (points.empty() || !finite) return {};
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
     return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
   });
-  Polygon hull(2 * points.size() + 1);
+  InplaceVector<Eigen::Vector2d, 2 * (kMostOutline + 8) + 1> hull;
+  hull.resize(2 * points.size() + 1);
   std::size_t k = 0;
   const auto extend = [&](const Eigen::Vector2d& p, std::size_t floor) {
     while (k >= floor + 2 && cross(hull[k - 2], hull[k - 1], p) <= 0) --k;
@@ -21,9 +25,10 @@ Polygon convexHull(Polygon points) {
   };
   for (const auto& p : points) extend(p, 0);
   const std::size_t lower = k - 1;
-  for (auto it = points.rbegin() + 1; it != points.rend(); ++it) extend(*it, lower);
-  hull.resize(k > 1 ? k - 1 : k);
-  return hull;
+  for (std::size_t i = points.size() - 1; i-- > 0;) extend(points[i], lower);
+  Polygon result;
+  for (std::size_t i = 0; i < (k > 1 ? k - 1 : k); ++i) result.push_back(hull[i]);
+  return result;
 }
 
 double polygonArea(const Polygon& p) {

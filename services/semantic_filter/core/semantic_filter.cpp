@@ -43,6 +43,43 @@ bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
 
 }  // namespace
 
+/// What a frame expects of each object's best hypothesis; worked out when first asked for.
+class Expected {
+ public:
+  Expected(const Belief& belief, const FrameInput& input, const BoxParameters& parameters)
+      : belief_(belief), input_(input), parameters_(parameters), at_(belief.objects.size()) {}
+
+  bool matches(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
+    const Entry& e = entryOf(j);
+    return e.box && mayOverlap(box.z, *e.box, e.covariance) &&
+           scoreBox(box.z, *e.box, e.covariance, hidden, parameters_.gate, parameters_.tail);
+  }
+
+ private:
+  struct Entry {
+    bool known = false;
+    std::optional<ProjectedBox> box;
+    Eigen::Matrix4d covariance;
+  };
+
+  const Entry& entryOf(std::size_t j) {
+    Entry& e = at_[j];
+    if (e.known) return e;
+    e.known = true;
+    const Object& object = belief_.objects[j];
+    const Hypothesis& best = object.best();
+    const State x = stateAt(best, toSeconds(input_.stamp.time - object.as_of));
+    e.box = projectObserved(x, input_.view, input_.model.insets->of(best.class_name));
+    if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
+    return e;
+  }
+
+  const Belief& belief_;
+  const FrameInput& input_;
+  const BoxParameters& parameters_;
+  std::vector<Entry> at_;
+};
+
 ObjectId IdBook::idFor(std::uint64_t frame_sequence, std::size_t box) {
   const auto [it, fresh] = given_.try_emplace({frame_sequence, box}, next_);
   if (fresh) ++next_;
@@ -122,19 +159,6 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
   return association.claimed;
 }
 
-bool SemanticFilter::matches(const Object& object, const Sight& sight, const Evidence& box,
-                             const FrameInput& input) const {
-  const State x = stateAt(object.best(), toSeconds(input.stamp.time - object.as_of));
-  const auto predicted =
-      projectObserved(x, input.view, input.model.insets->of(object.best().class_name));
-  if (!predicted) return false;
-  const auto covariance =
-      predictedCovariance(object.best(), *predicted, input.pose_error.covariance);
-  return scoreBox(box.z, *predicted, covariance, sight.hidden, parameters_.box.gate,
-                  parameters_.box.tail)
-      .has_value();
-}
-
 void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
                             const FrameInput& input) const {
   std::vector<std::size_t> hidden;
@@ -142,16 +166,20 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
     const bool solid = belief.objects[j].existence >= parameters_.visibility.solid;
     if (solid && sights[j].visibility == Visibility::kOccluded) hidden.push_back(j);
   }
+  if (hidden.empty()) return;
+  Expected expected(belief, input, parameters_.box);
   for (const auto& e : *input.boxes) {
-    if (hidden.empty()) return;
-    bool expected = false;
-    for (std::size_t j = 0; j < sights.size() && !expected; ++j) {
-      expected = sights[j].fraction > 0.0 && matches(belief.objects[j], sights[j], e, input);
-    }
-    if (expected) continue;
+    std::vector<std::size_t> may_be;
     for (const std::size_t j : hidden) {
+      if (expected.matches(j, {}, e)) may_be.push_back(j);
+    }
+    bool others = may_be.empty();
+    for (std::size_t j = 0; j < sights.size() && !others; ++j) {
+      others = sights[j].fraction > 0.0 && expected.matches(j, sights[j].hidden, e);
+    }
+    if (others) continue;
+    for (const std::size_t j : may_be) {
       sights[j].hidden = {};
-      if (!matches(belief.objects[j], sights[j], e, input)) continue;
       sights[j].fraction = parameters_.visibility.minimum;
       sights[j].visibility = Visibility::kPartial;
       belief.objects[j].visibility = Visibility::kPartial;
@@ -160,13 +188,12 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
   }
 }
 
-bool SemanticFilter::leavesView(const Belief& belief, const std::vector<Sight>& sights,
-                                const Evidence& box, const FrameInput& input) const {
+bool SemanticFilter::leavesView(Expected& expected, const Belief& belief,
+                                const std::vector<Sight>& sights, const Evidence& box) {
   if (box.z.count() == 4) return false;  // what leaves is cut by the border
   for (std::size_t j = 0; j < sights.size(); ++j) {
-    const Object& o = belief.objects[j];
-    if (sights[j].visibility != Visibility::kOutOfView || !o.confirmed) continue;
-    if (matches(o, sights[j], box, input)) return true;
+    if (sights[j].visibility != Visibility::kOutOfView || !belief.objects[j].confirmed) continue;
+    if (expected.matches(j, sights[j].hidden, box)) return true;
   }
   return false;
 }
@@ -176,6 +203,7 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
                             const FrameContext& frame, IdBook& ids) const {
   const auto& boxes = *input.boxes;
   std::vector<Object> born;
+  Expected expected(belief, input, parameters_.box);
   std::vector<std::size_t> accepted;
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (claimed[static_cast<Eigen::Index>(z)] > parameters_.birth.claimed) accepted.push_back(z);
@@ -190,7 +218,7 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
     const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
       return sameThing(boxes[other].z, e.z);
     });
-    if (doubled || leavesView(belief, sights, e, input)) continue;
+    if (doubled || leavesView(expected, belief, sights, e)) continue;
     auto object =
         bear(e, rangeFromLandmarks(e, input.points, parameters_.birth), input.stamp.time, frame);
     if (!object) continue;

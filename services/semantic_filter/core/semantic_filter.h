@@ -47,6 +47,8 @@ struct StepReport {
   std::size_t broken = 0;  ///< objects whose numbers went bad, and which were dropped
 };
 
+class Expected;
+
 class SemanticFilter {
  public:
   SemanticFilter(const Parameters& parameters, const ClassPriors& priors)
@@ -75,11 +77,9 @@ class SemanticFilter {
   /// A box that no visible object expects and that matches a hidden one says that the blocker was
   /// misjudged: that object can be seen.
   void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input) const;
-  bool matches(const Object& object, const Sight& sight, const Evidence& box,
-               const FrameInput& input) const;
   /// The rest of an object that is almost out of the image is no new object.
-  bool leavesView(const Belief& belief, const std::vector<Sight>& sights, const Evidence& box,
-                  const FrameInput& input) const;
+  static bool leavesView(Expected& expected, const Belief& belief, const std::vector<Sight>& sights,
+                         const Evidence& box);
   void births(Belief& belief, const std::vector<Sight>& sights, const Eigen::VectorXd& claimed,
               const FrameInput& input, const FrameContext& frame, IdBook& ids) const;
 

@@ -1,0 +1,199 @@
+// Processor time and heap allocations of the filter for each frame, with so many things in view:
+// a field of chairs, people and cars that a camera drives through, seen by a network that misses
+// one in ten and makes false boxes, poses that drift and say so. One thread.
+#include <ctime>
+
+#include <algorithm>
+#include <cstdlib>
+#include <deque>
+#include <iostream>
+#include <random>
+
+#include <fmt/format.h>
+
+#include "services/semantic_filter/priors.h"
+#include "tests/bench/allocations.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter::bench {
+namespace {
+
+using testing::stampOf;
+using testing::TrueObject;
+
+constexpr double kMetresAFrame = 0.25, kAhead = 45.0, kHalfWidth = 22.0;
+constexpr double kFalseBoxes = 2.0, kDetected = 0.9;
+
+double cpuMs() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+CameraCalibration makeLookout() {
+  CameraCalibration camera = testing::makeCamera();
+  camera.height = 720;
+  camera.cy = 300.0;
+  // Four metres up and 12° down: little hides behind something else.
+  const Eigen::AngleAxisd down(0.21, Eigen::Vector3d::UnitY());
+  camera.T_BC = RigidTransform(down.toRotationMatrix() * camera.T_BC.R(), {0.0, 0.0, 3.0});
+  return camera;
+}
+
+/// Things at random on both sides of the way, as many in view at any time as asked.
+class Field {
+ public:
+  Field(std::size_t in_view, std::uint32_t seed) : random_(seed) {
+    density_ = 1.3 * static_cast<double>(in_view) / kAhead;
+  }
+  /// What stands within sight of `x`, new things ahead.
+  const std::deque<TrueObject>& near(double x) {
+    for (; planted_ < x + kAhead; planted_ += 1.0 / density_) plant();
+    while (!things_.empty() && things_.front().x.x() < x - 2.0) things_.pop_front();
+    return things_;
+  }
+
+ private:
+  void plant() {
+    std::uniform_real_distribution<double> u(0.0, 1.0);
+    for (int attempt = 0; attempt < 50; ++attempt) {
+      const double side = (u(random_) < 0.5 ? -1.0 : 1.0) * (1.5 + kHalfWidth * u(random_));
+      const double yaw = 2.0 * M_PI * u(random_), kind = u(random_);
+      TrueObject thing =
+          kind < 0.5 ? TrueObject{testing::makeState(planted_, side, 0.45, yaw, .5, .5, .9), "chair"}
+          : kind < 0.9
+              ? TrueObject{testing::makeState(planted_, side, 0.87, yaw, .5, .6, 1.74), "person"}
+              : TrueObject{testing::makeState(planted_, side, 0.75, yaw, 4.2, 1.8, 1.5), "car"};
+      const double room = kind < 0.9 ? 1.2 : 4.5;
+      const bool free = std::none_of(things_.begin(), things_.end(), [&](const TrueObject& o) {
+        return (o.x - thing.x).head<2>().norm() < room;
+      });
+      if (!free) continue;
+      things_.push_back(thing);
+      return;
+    }
+  }
+
+  std::mt19937 random_;
+  double density_, planted_ = 4.0;
+  std::deque<TrueObject> things_;
+};
+
+ModelInfo makeModelOfField() {
+  ModelInfo info;
+  info.hash = 17;
+  info.name = "synthetic";
+  info.classes = {"car", "chair", "person"};
+  return info;
+}
+
+struct Sample {
+  double cpu_ms = 0.0;
+  std::uint64_t allocations = 0;
+  std::size_t in_view = 0, objects = 0, boxes = 0;
+};
+
+class Drive {
+ public:
+  Drive(std::size_t in_view, std::uint32_t seed)
+      : field_(in_view, seed),
+        random_(seed + 1),
+        camera_(makeLookout()),
+        model_(camera_),
+        node_(Config{}, loadPriors(Config{}), 9,
+              {[this](const Objects& m) { newest_ = m; }, {}, {}}) {
+    node_.onCalibration(testing::calibrationOf(camera_));
+    node_.onModel(makeModelOfField());
+  }
+
+  Sample frame(std::uint64_t k) {
+    Odometry odometry = testing::odometryAt(k, testing::driveTo(0, 0.0));
+    odometry.T_WB.p.x() = kMetresAFrame * static_cast<double>(k);
+    odometry.has_increment = true;
+    odometry.transition.setIdentity();
+    odometry.increment_covariance.diagonal().setConstant(1e-8);
+    odometry.covariance.diagonal().setConstant(1e-4);
+    const Detections detections = look(k, odometry.T_WB);
+    const auto before = tests::allocations();
+    const double start = cpuMs();
+    node_.onOdometry(odometry);
+    node_.onDetections(detections);
+    Sample sample;
+    sample.cpu_ms = cpuMs() - start;
+    sample.allocations = tests::allocationsSince(before).own;
+    sample.boxes = detections.detections.size();
+    sample.objects = newest_.objects.size();
+    for (const auto& o : newest_.objects) sample.in_view += o.visible_fraction > 0.0 ? 1 : 0;
+    return sample;
+  }
+
+ private:
+  Detections look(std::uint64_t k, const RigidTransform& T_WB) {
+    std::uniform_real_distribution<double> u(0.0, 1.0);
+    std::vector<Detection> list;
+    const View view{&model_, T_WB, Eigen::Vector3d::UnitZ()};
+    for (const TrueObject& thing : field_.near(T_WB.p.x())) {
+      if (u(random_) > kDetected) continue;
+      auto d = testing::detect(thing, view, BoxParameters{}, 1.0, 4.0, random_);
+      if (!d || d->box.width() * d->box.height() < 100.0) continue;
+      d->activations = {0.0F};
+      for (const auto& name : makeModelOfField().classes) {
+        d->activations.push_back(name == thing.class_name ? 4.0F : -4.0F);
+      }
+      list.push_back(*d);
+    }
+    for (int i = std::poisson_distribution<int>(kFalseBoxes)(random_); i > 0; --i) {
+      const double w = 20.0 + 80.0 * u(random_), h = 20.0 + 80.0 * u(random_);
+      const double x = (camera_.width - w) * u(random_), y = (camera_.height - h) * u(random_);
+      list.push_back({});
+      list.back().box = {x, y, x + w, y + h};
+      list.back().activations = {0.0F, -2.0F, -1.0F, -2.0F};
+    }
+    return testing::detectionsAt(k, std::move(list));
+  }
+
+  Field field_;
+  std::mt19937 random_;
+  CameraCalibration camera_;
+  CameraModel model_;
+  Objects newest_;
+  Node node_;
+};
+
+double quantile(std::vector<double> values, double q) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+}
+
+void report(std::size_t asked, int frames) {
+  Drive drive(asked, 1);
+  constexpr std::uint64_t kWarmUp = 60;
+  for (std::uint64_t k = 0; k < kWarmUp; ++k) drive.frame(k);
+  std::vector<double> ms, allocations, in_view, boxes, objects;
+  for (int i = 0; i < frames; ++i) {
+    const Sample s = drive.frame(kWarmUp + static_cast<std::uint64_t>(i));
+    ms.push_back(s.cpu_ms);
+    allocations.push_back(static_cast<double>(s.allocations));
+    in_view.push_back(static_cast<double>(s.in_view));
+    objects.push_back(static_cast<double>(s.objects));
+    boxes.push_back(static_cast<double>(s.boxes));
+  }
+  std::cout << fmt::format("{:>8.0f} {:>8.0f} {:>8.0f} {:>10.2f} {:>10.2f} {:>12.0f}\n",
+                           quantile(in_view, 0.5), quantile(objects, 0.5), quantile(boxes, 0.5),
+                           quantile(ms, 0.5), quantile(ms, 0.99), quantile(allocations, 0.5))
+            << std::flush;
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter::bench
+
+int main(int argc, char** argv) {
+  using perdure::semantic_filter::bench::report;
+  const int frames = argc > 1 ? std::atoi(argv[1]) : 200;
+  if (frames < 1) {
+    std::cerr << "usage: filter_bench [FRAMES]   (from the repository's root)\n";
+    return 64;
+  }
+  std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";
+  for (const std::size_t n : {20UL, 60UL, 200UL}) report(n, frames);
+}
