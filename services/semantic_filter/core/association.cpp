@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "common/base/check.h"
 
@@ -11,18 +12,31 @@ namespace {
 constexpr int kMaxIterations = 200;
 constexpr double kTolerance = 1e-9;
 
-/// psi / (1 + sum over the row's other boxes): what object j offers each box.
-Eigen::MatrixXd offers(const Eigen::MatrixXd& psi, const Eigen::MatrixXd& eta) {
-  const Eigen::MatrixXd weighted = psi.cwiseProduct(eta);
-  const Eigen::VectorXd total = weighted.rowwise().sum();
-  Eigen::MatrixXd mu(psi.rows(), psi.cols());
-  for (Eigen::Index j = 0; j < psi.rows(); ++j) {
-    for (Eigen::Index z = 0; z < psi.cols(); ++z) {
-      const double others = std::max(total[j] - weighted(j, z), 0.0);
-      mu(j, z) = psi(j, z) / (1.0 + others);
+/// Object j may have made box z.
+struct Pair {
+  Eigen::Index j, z;
+  double psi, eta;
+  double mu = 0.0;  ///< what object j offers box z: psi / (1 + sum over its other boxes)
+};
+
+std::vector<Pair> pairsOf(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) {
+  std::vector<Pair> pairs;
+  for (Eigen::Index z = 0; z < psi.cols(); ++z) {
+    for (Eigen::Index j = 0; j < psi.rows(); ++j) {
+      if (psi(j, z) > 0.0) pairs.push_back({j, z, psi(j, z), 1.0 / fresh[z]});
     }
   }
-  return mu;
+  return pairs;
+}
+
+void offer(std::vector<Pair>& pairs, Eigen::VectorXd& by_object, Eigen::VectorXd& to_box) {
+  by_object.setZero();
+  to_box.setZero();
+  for (const Pair& p : pairs) by_object[p.j] += p.psi * p.eta;
+  for (Pair& p : pairs) {
+    p.mu = p.psi / (1.0 + std::max(by_object[p.j] - p.psi * p.eta, 0.0));
+    to_box[p.z] += p.mu;
+  }
 }
 
 }  // namespace
@@ -30,24 +44,23 @@ Eigen::MatrixXd offers(const Eigen::MatrixXd& psi, const Eigen::MatrixXd& eta) {
 Association associate(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) {
   check(psi.cols() == fresh.size(), "one weight of freshness for each box");
   Association result;
-  result.eta = Eigen::MatrixXd::Ones(psi.rows(), psi.cols());
-  for (Eigen::Index z = 0; z < psi.cols(); ++z) result.eta.col(z) /= fresh[z];
-  Eigen::MatrixXd mu = offers(psi, result.eta);
+  auto pairs = pairsOf(psi, fresh);
+  Eigen::VectorXd by_object(psi.rows()), to_box(psi.cols());
+  offer(pairs, by_object, to_box);
   for (; result.iterations < kMaxIterations; ++result.iterations) {
-    const Eigen::VectorXd column = mu.colwise().sum();
     double change = 0.0;
-    for (Eigen::Index j = 0; j < psi.rows(); ++j) {
-      for (Eigen::Index z = 0; z < psi.cols(); ++z) {
-        const double next = 1.0 / (fresh[z] + std::max(column[z] - mu(j, z), 0.0));
-        change = std::max(change, std::abs(next - result.eta(j, z)));
-        result.eta(j, z) = next;
-      }
+    for (Pair& p : pairs) {
+      const double next = 1.0 / (fresh[p.z] + std::max(to_box[p.z] - p.mu, 0.0));
+      change = std::max(change, std::abs(next - p.eta));
+      p.eta = next;
     }
-    mu = offers(psi, result.eta);
+    offer(pairs, by_object, to_box);
     if (change < kTolerance) break;
   }
-  const Eigen::VectorXd column = mu.colwise().sum();
-  result.claimed = (column.array() / (fresh.array() + column.array())).matrix();
+  const Eigen::VectorXd free = (fresh + to_box).cwiseInverse();
+  result.eta = free.transpose().replicate(psi.rows(), 1);
+  for (const Pair& p : pairs) result.eta(p.j, p.z) = p.eta;
+  result.claimed = to_box.cwiseProduct(free);
   return result;
 }
 

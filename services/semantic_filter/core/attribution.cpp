@@ -41,11 +41,11 @@ double excusedByScreen(const Object& object, const std::vector<ClassNumber>& pmf
 /// log A of a class against the same look by a network that tells no class from clutter: each box
 /// without its g_k.
 double saidByNetwork(const Object& object, const std::vector<Shares>& shares,
-                     const std::string& class_name, const std::vector<Evidence>& boxes,
-                     const FrameContext& frame) {
+                     const std::string& class_name, const std::vector<std::size_t>& looked_at,
+                     const std::vector<Evidence>& boxes, const FrameContext& frame) {
   std::vector<double> unsaid;  // 1 / g_k, of each box
-  for (const Evidence& box : boxes) {
-    unsaid.push_back(std::exp(-logRatio(box, *frame.model, class_name)));
+  for (const std::size_t z : looked_at) {
+    unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name)));
   }
   double with = 0.0, without = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -62,11 +62,11 @@ double saidByNetwork(const Object& object, const std::vector<Shares>& shares,
 }  // namespace
 
 LookReasons reasonsOf(const Object& object, const std::vector<Shares>& shares, double seen,
-                      double worth, double exponent, const std::vector<Evidence>& boxes,
-                      const FrameContext& frame) {
+                      double worth, double exponent, const std::vector<std::size_t>& looked_at,
+                      const std::vector<Evidence>& boxes, const FrameContext& frame) {
   LookReasons reasons;
   const auto pmf = classShares(object);
-  if (!(seen >= 0.5) || boxes.empty()) {  // a number gone bad is no hit
+  if (!(seen >= 0.5) || looked_at.empty()) {  // a number gone bad is no hit
     reasons.kind = ExistenceEvidence::kMiss;
     reasons.excused = excusedByScreen(object, pmf, shares, exponent);
     return reasons;
@@ -74,7 +74,8 @@ LookReasons reasonsOf(const Object& object, const std::vector<Shares>& shares, d
   if (worth < kLittleWorth) reasons.kind = ExistenceEvidence::kRepeated;
   std::vector<ClassNumber> said;
   for (const ClassNumber& c : pmf) {
-    said.push_back({c.name, exponent * saidByNetwork(object, shares, c.name, boxes, frame)});
+    said.push_back(
+        {c.name, exponent * saidByNetwork(object, shares, c.name, looked_at, boxes, frame)});
   }
   reasons.activation = gains(pmf, said);
   return reasons;

@@ -14,7 +14,7 @@ namespace perdure::semantic_filter {
 struct Shares {
   double A = 1.0;           ///< P(look | it) against P(look | nothing there)
   double none = 1.0;        ///< posterior share of "none of the boxes"
-  std::vector<double> box;  ///< posterior share of each box
+  std::vector<double> box;  ///< posterior share of each box of the look
 };
 
 /// What is known of a look before the weights change.
@@ -25,11 +25,11 @@ struct LookReasons {
   std::vector<ClassNumber> activation;
 };
 
-/// `seen` is the probability that one of the boxes is the object's, `worth` the look's where one
+/// `looked_at` are the look's boxes; `seen` is the probability that one of the boxes is the object's, `worth` the look's where one
 /// is, `exponent` that of A between classes (update.h).
 LookReasons reasonsOf(const Object& object, const std::vector<Shares>& shares, double seen,
-                      double worth, double exponent, const std::vector<Evidence>& boxes,
-                      const FrameContext& frame);
+                      double worth, double exponent, const std::vector<std::size_t>& looked_at,
+                      const std::vector<Evidence>& boxes, const FrameContext& frame);
 
 /// Sets existence and books it.
 void bookExistence(Object& object, double r, const LookReasons& reasons);

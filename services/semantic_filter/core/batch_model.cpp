@@ -58,6 +58,7 @@ BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class
     : looks_(looks),
       frame_(frame),
       prior_(frame.priors->of(class_name)),
+      class_name_(class_name),
       yaw_(yaw),
       dim_(moving ? kMostFree : kGeometry) {
   // At birth "other" has three scales, which one Gaussian has to cover here.
@@ -93,7 +94,7 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
     const Keyframe& k = *looks_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    const auto box = projectObserved(then, k.from->view, k.from->insets->of(prior_.name));
+    const auto box = projectObserved(then, k.from->view, k.from->insets->of(class_name_));
     if (!box) return std::nullopt;
     const auto use = comparableSides(k.z, *box, k.hidden);
     const auto row = static_cast<Eigen::Index>(4 * i);

@@ -91,6 +91,7 @@ class BatchModel {
   const Looks& looks_;
   const FrameContext& frame_;
   ClassPrior prior_;
+  std::string class_name_;
   double yaw_;
   int dim_;
   Eigen::Matrix3d size_information_, speed_information_ = Eigen::Matrix3d::Zero();

@@ -204,7 +204,8 @@ struct Candidate {
 std::vector<Candidate> candidates(const Evidence& evidence, const FrameContext& frame) {
   std::vector<Candidate> all;
   for (const auto& name : frame.model->classes) {
-    const ClassPrior prior = frame.priors->of(name);
+    ClassPrior prior = frame.priors->of(name);
+    prior.name = name;
     all.push_back({prior, std::log(prior.frequency) + logRatio(evidence, *frame.model, name)});
   }
   std::stable_sort(all.begin(), all.end(),

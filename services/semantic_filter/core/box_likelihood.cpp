@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/math/chi2.h"
-#include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -16,9 +16,17 @@ double logBelowZero(double mean, double variance) {
 
 /// log of the multivariate t density in n dimensions, by the squared Mahalanobis distance and the
 /// log-determinant of its scale matrix.
-double logStudent(double nis, double log_det, double n, double tail) {
-  return std::lgamma(0.5 * (tail + n)) - std::lgamma(0.5 * tail) -
-         0.5 * (n * std::log(tail * M_PI) + log_det) - 0.5 * (tail + n) * std::log1p(nis / tail);
+double logStudent(double nis, double log_det, int n, double tail) {
+  thread_local double cached_tail = -1.0;
+  thread_local std::array<double, 5> constant{};  // of 1..4 degrees of freedom
+  if (cached_tail != tail) {
+    for (int i = 1; i <= 4; ++i) {
+      constant[i] = std::lgamma(0.5 * (tail + i)) - std::lgamma(0.5 * tail) -
+                    0.5 * i * std::log(tail * M_PI);
+    }
+    cached_tail = tail;
+  }
+  return constant[n] - 0.5 * log_det - 0.5 * (tail + n) * std::log1p(nis / tail);
 }
 
 /// χ² quantiles of one gate for 1..4 degrees of freedom, computed once per gate value.
@@ -91,11 +99,15 @@ double logClutter(const BoxMeasurement& z, double width, double height,
 
 Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
                                     const Eigen::Matrix<double, 6, 6>& P_pose) {
-  const Eigen::Matrix4d cross = box.H * h.C * box.H_pose.transpose();
-  Eigen::Matrix4d S = box.H * h.P * box.H.transpose() + cross + cross.transpose() +
-                      box.H_pose * P_pose * box.H_pose.transpose();
-  makeSymmetric(S);
-  return S;
+  // No side depends on the velocity.
+  const Eigen::Matrix<double, 4, kVelocity> H = box.H.leftCols<kVelocity>();
+  const Eigen::Matrix<double, 4, kVelocity> HP =
+      H.lazyProduct(h.P.topLeftCorner<kVelocity, kVelocity>());
+  const Eigen::Matrix<double, 4, 6> HC = H.lazyProduct(h.C.topRows<kVelocity>());
+  const Eigen::Matrix<double, 4, 6> pose = HC + 0.5 * box.H_pose.lazyProduct(P_pose);
+  const Eigen::Matrix4d half =
+      0.5 * HP.lazyProduct(H.transpose()) + pose.lazyProduct(box.H_pose.transpose());
+  return half + half.transpose();
 }
 
 bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
@@ -122,11 +134,16 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
   const auto use = comparableSides(z, predicted, hidden);
   const int n = static_cast<int>(std::count(use.begin(), use.end(), true));
   if (n == 0) return std::nullopt;
-  Eigen::VectorXd nu(n);
-  Eigen::MatrixXd S(n, n);
+  // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
+  Eigen::Vector4d nu = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d S = covariance;
+  S.diagonal() += z.variance;
   BoxScore score;
-  for (int i = 0, a = 0; i < 4; ++i) {
+  for (int i = 0; i < 4; ++i) {
     if (!use[i]) {
+      S.row(i).setZero();
+      S.col(i).setZero();
+      S(i, i) = 1.0;
       // The true side lies at or beyond the observed end: left and top to smaller coordinates.
       const double beyond =
           i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
@@ -135,18 +152,14 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
       }
       continue;
     }
-    nu[a] = z.sides[i] - predicted.sides[i];
-    for (int j = 0, b = 0; j < 4; ++j) {
-      if (use[j]) S(a, b++) = covariance(i, j) + (i == j ? z.variance[i] : 0.0);
-    }
-    ++a;
+    nu[i] = z.sides[i] - predicted.sides[i];
   }
-  const Cholesky chol(S);
-  if (!chol.positive()) return std::nullopt;
-  score.nis = chol.whiten(nu).squaredNorm();
+  if (!choleskyInPlace(S)) return std::nullopt;
+  whiten(S, nu);
+  score.nis = nu.squaredNorm();
   score.dof = n;
   if (score.nis > gateThreshold(gate, n)) return std::nullopt;
-  score.log_density += logStudent(score.nis, chol.logDeterminant(), n, tail);
+  score.log_density += logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), n, tail);
   return score;
 }
 

@@ -9,18 +9,33 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kNever = 1e9;              // a change of view that never counts
 
-void scoreBoxes(HypothesisLook& h, const std::string& class_name, const Sight& sight,
+void scoreBoxes(HypothesisLook& h, const std::string& class_name, const ObjectLook& look,
                 const std::vector<Evidence>& boxes, const FrameContext& frame) {
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const Evidence& e = boxes[i];
+  for (std::size_t i = 0; i < look.boxes.size(); ++i) {
+    const Evidence& e = boxes[look.boxes[i]];
     if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
-    const auto score = scoreBox(e.z, *h.box, h.covariance, sight.hidden, frame.parameters->box.gate,
-                                frame.parameters->box.tail);
+    const auto score = scoreBox(e.z, *h.box, h.covariance, look.sight.hidden,
+                                frame.parameters->box.gate, frame.parameters->box.tail);
     if (!score) continue;
     const double log_l = logRatio(e, *frame.model, class_name) + score->log_density - e.log_clutter;
     h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
     h.nis[i] = score->nis / score->dof;
   }
+}
+
+HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const Sight& sight,
+                      const FrameContext& frame) {
+  HypothesisLook h;
+  h.box = projectObserved(hypothesis.x, frame.view, frame.offsetOf(hypothesis.class_name));
+  h.hit_looks = sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view,
+                            frame.parameters->looks);
+  if (!h.box) return h;
+  h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
+  const double size =
+      std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
+  h.detection = sight.fraction * (1.0 - object.screened) *
+                detectionProbability(frame.priors->of(hypothesis.class_name), size, frame);
+  return h;
 }
 
 }  // namespace
@@ -52,31 +67,31 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
                 const FrameContext& frame) {
   ObjectLook result;
   result.sight = sight;
-  const auto& looks = frame.parameters->looks;
+  result.hypotheses.reserve(object.hypotheses.size());
   for (const auto& hypothesis : object.hypotheses) {
-    HypothesisLook h;
-    h.likelihood.assign(boxes.size(), 0.0);
-    h.nis.assign(boxes.size(), 0.0);
-    h.box = projectObserved(hypothesis.x, frame.view, frame.offsetOf(hypothesis.class_name));
-    h.hit_looks = sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view, looks);
-    if (h.box) {
-      h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
-      const double size =
-          std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
-      h.detection = sight.fraction * (1.0 - object.screened) *
-                    detectionProbability(frame.priors->of(hypothesis.class_name), size, frame);
-      scoreBoxes(h, hypothesis.class_name, sight, boxes, frame);
-    }
-    result.hypotheses.push_back(std::move(h));
+    result.hypotheses.push_back(lookAt(hypothesis, object, sight, frame));
+  }
+  for (std::size_t z = 0; z < boxes.size(); ++z) {
+    const bool near = std::any_of(
+        result.hypotheses.begin(), result.hypotheses.end(), [&](const HypothesisLook& h) {
+          return h.box && mayOverlap(boxes[z].z, *h.box, h.covariance);
+        });
+    if (near) result.boxes.push_back(z);
+  }
+  for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {
+    HypothesisLook& h = result.hypotheses[i];
+    h.likelihood.assign(result.boxes.size(), 0.0);
+    h.nis.assign(result.boxes.size(), 0.0);
+    if (h.box) scoreBoxes(h, object.hypotheses[i].class_name, result, boxes, frame);
   }
   return result;
 }
 
-double associationWeight(const Object& object, const ObjectLook& look, std::size_t z) {
+double associationWeight(const Object& object, const ObjectLook& look, std::size_t box) {
   double made = 0.0, silent = 0.0;
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
     const HypothesisLook& h = look.hypotheses[i];
-    made += object.hypotheses[i].weight * h.detection * h.likelihood[z];
+    made += object.hypotheses[i].weight * h.detection * h.likelihood[box];
     silent += object.hypotheses[i].weight * (1.0 - h.detection);
   }
   const double r = object.existence;

@@ -19,13 +19,14 @@ struct HypothesisLook {
   std::optional<ProjectedBox> box;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
   double detection = 0.0;          ///< v P_D: probability that the network reports it
-  std::vector<double> likelihood;  ///< L(z) for each box, 0 outside the gate
+  std::vector<double> likelihood;  ///< L(z) for each box of the look, 0 outside the gate
   std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
   double hit_looks = 0.0;          ///< earlier looks that share this view, if it is true
 };
 
 struct ObjectLook {
   Sight sight;
+  std::vector<std::size_t> boxes;  ///< of the frame, those that lie near one of the hypotheses
   std::vector<HypothesisLook> hypotheses;
 };
 
@@ -53,8 +54,8 @@ double detectionProbability(const ClassPrior& prior, double size_px, const Frame
 ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
                 const FrameContext& frame);
 
-/// "Object made box z" against "object made none, or is not there": a row of associate's psi.
-double associationWeight(const Object& object, const ObjectLook& look, std::size_t z);
+/// "Object made this box of the look" against "object made none, or is not there".
+double associationWeight(const Object& object, const ObjectLook& look, std::size_t box);
 
 /// Earlier looks that a look at `position` from here shares its errors with.
 double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,

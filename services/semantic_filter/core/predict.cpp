@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -15,10 +16,9 @@ void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m) {
     h.P(kYaw, kYaw) += m.yaw_walk * m.yaw_walk * dt;
     return;
   }
-  StateCovariance F = StateCovariance::Identity();
-  F.block<3, 3>(0, kVelocity).diagonal().setConstant(dt);
-  h.P = (F * h.P * F.transpose()).eval();
-  h.C = (F * h.C).eval();
+  h.P.topRows<3>() += dt * h.P.bottomRows<3>();
+  h.P.leftCols<3>() += dt * h.P.rightCols<3>();
+  h.C.topRows<3>() += dt * h.C.bottomRows<3>();
   const double q = m.acceleration * m.acceleration;
   for (int i = 0; i < 3; ++i) {
     const double axis_q = i < 2 ? q : 0.01 * q;
@@ -74,12 +74,23 @@ Matrix6d transitionSince(const Object& object, const PoseError& pose_error) {
   return sane ? transition : Matrix6d::Zero();
 }
 
+/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see.
+bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
+  Matrix6d L = P_pose;
+  if (!choleskyInPlace(L)) return false;
+  CrossPose B = h.C;
+  whitenRows(L, B);
+  StateCovariance rest = h.P - B.lazyProduct(B.transpose()) / share;
+  if (!h.moving) rest.diagonal().tail<3>().setOnes();  // it has no velocity
+  return choleskyInPlace(rest);
+}
+
 /// [P C; Cᵀ P_pose] must stay a covariance. Transitions are approximate, and vio's own updates
 /// shrink P_pose: C is scaled down where the pose would explain more of P than there is. (Much of
 /// P may well be the pose: a limit of .9 here costs half of the recall on KITTI.)
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
   constexpr double kExplained = 0.9999;
-  if (h.C.isZero(0.0)) return;
+  if (h.C.isZero(0.0) || isExplained(h, P_pose, kExplained)) return;
   const Eigen::Index n = h.moving ? kStateDim : kVelocity;
   const Cholesky P(h.P.topLeftCorner(n, n));
   const Cholesky pose(P_pose);
@@ -135,7 +146,7 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
   for (auto& h : object.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
     predictBias(h, object.last_view, walk);
-    h.C = (h.C * transition.transpose()).eval();
+    h.C = h.C.lazyProduct(transition.transpose()).eval();
     keepConsistent(h, pose_error.covariance);
   }
   giveUpLostOnes(object, now, parameters.lost_sigma_m);

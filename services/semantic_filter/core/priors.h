@@ -43,14 +43,12 @@ struct ClassPriors {
   ClassPrior other;     ///< of a thing of no known class; its name is kOtherClass
   ContextMatrix context;
 
-  ClassPrior of(const std::string& name) const {
+  /// The fallback, whose name is empty, where there is none of that name.
+  const ClassPrior& of(const std::string& name) const {
     for (const auto& c : classes) {
       if (c.name == name) return c;
     }
-    if (name == other.name) return other;
-    ClassPrior c = fallback;
-    c.name = name;
-    return c;
+    return name == other.name ? other : fallback;
   }
 };
 

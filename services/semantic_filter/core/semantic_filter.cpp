@@ -140,13 +140,16 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
   const auto& boxes = *input.boxes;
   const auto n = static_cast<Eigen::Index>(seen.size());
   const auto m = static_cast<Eigen::Index>(boxes.size());
-  Eigen::MatrixXd psi(n, m);
+  Eigen::MatrixXd psi = Eigen::MatrixXd::Zero(n, m);
   Eigen::VectorXd fresh(m);
   for (Eigen::Index z = 0; z < m; ++z) {
     fresh[z] = 1.0 + std::exp(logBirthRatio(boxes[static_cast<std::size_t>(z)], frame));
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const Seen& s = seen[static_cast<std::size_t>(j)];
-      psi(j, z) = associationWeight(belief.objects[s.object], s.look, static_cast<std::size_t>(z));
+  }
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Seen& s = seen[static_cast<std::size_t>(j)];
+    for (std::size_t i = 0; i < s.look.boxes.size(); ++i) {
+      psi(j, static_cast<Eigen::Index>(s.look.boxes[i])) =
+          associationWeight(belief.objects[s.object], s.look, i);
     }
   }
   const Association association = associate(psi, fresh);

@@ -196,7 +196,7 @@ Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smoothed& still,
                  const Smoothed& moving, const FrameContext& frame) {
   constexpr double kSurest = 15.0;  // nats
-  const ClassPrior prior = frame.priors->of(name);
+  const ClassPrior& prior = frame.priors->of(name);
   const auto& motion = frame.parameters->motion;
   const Eigen::VectorXd doubts = still.doubts().cwiseMin(moving.doubts());
   const double pace =

@@ -103,7 +103,7 @@ bool scaleIsOpen(const Object& object, const TendParameters& tend) {
 void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
-    const ClassPrior prior = priors.of(h.class_name);
+    const ClassPrior& prior = priors.of(h.class_name);
     const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
     if (squaredMahalanobis(d, prior.log_size_covariance) < size_gate * size_gate) return false;
     lost += h.weight;
@@ -132,7 +132,7 @@ bool hasMoving(const Object& object) {
 
 void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
   if (object.running_nis < motion.start_nis || hasMoving(object)) return;
-  const ClassPrior prior = priors.of(object.best().class_name);
+  const ClassPrior& prior = priors.of(object.best().class_name);
   if (prior.moving <= 0.0 || object.hits < 3) return;
   Hypothesis twin = object.best();
   twin.moving = true;
@@ -176,7 +176,7 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
       a.classes = b.classes;
     }
   } else {
-    const ClassPrior prior = frame.priors->of(a.best().class_name);
+    const ClassPrior& prior = frame.priors->of(a.best().class_name);
     const double weight = a.best().weight;
     if (!a.best().moving) {  // velocities are not fused: a moving one keeps its own state
       a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
@@ -15,55 +16,55 @@ constexpr double kAzimuthOutlier = 0.2;  // share of azimuths that say nothing
 constexpr double kAzimuthFlip = 0.1;     // share of azimuths that are turned by 180°
 constexpr double kMaxHead = 6.0;         // nats
 
-/// Rows of the measurement that take part, stacked.
+using SideRows = Eigen::Matrix<double, 4, kVelocity>;  // no side depends on the velocity
+using Gains = Eigen::Matrix<double, kStateDim, 4>;
+
+/// The sides that take part; the others have a residual and derivatives of 0.
 struct Innovation {
-  Eigen::VectorXd residual, variance;
-  Eigen::MatrixXd H, H_pose;
+  Eigen::Vector4d residual = Eigen::Vector4d::Zero(), variance = Eigen::Vector4d::Ones();
+  SideRows H = SideRows::Zero();
+  Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();
+  int count = 0;
 };
 
 /// Measured sides, and those cut sides whose prediction wrongly ends inside the cut.
 Innovation innovation(const BoxMeasurement& z, const ProjectedBox& p,
                       const std::array<bool, 4>& hidden) {
-  std::vector<int> rows;
+  Innovation y;
   const auto use = comparableSides(z, p, hidden);
   for (int i = 0; i < 4; ++i) {
     const double inside = i < 2 ? p.sides[i] - z.sides[i] : z.sides[i] - p.sides[i];
-    if (use[i] || (p.exact[i] && inside > 0.0)) rows.push_back(i);
+    if (!use[i] && !(p.exact[i] && inside > 0.0)) continue;
+    y.residual[i] = z.sides[i] - p.sides[i];
+    y.variance[i] = z.variance[i];
+    y.H.row(i) = p.H.row(i).head<kVelocity>();
+    y.H_pose.row(i) = p.H_pose.row(i);
+    ++y.count;
   }
-  Innovation result;
-  const auto n = static_cast<Eigen::Index>(rows.size());
-  result.residual.resize(n);
-  result.variance.resize(n);
-  result.H.resize(n, kStateDim);
-  result.H_pose.resize(n, 6);
-  for (Eigen::Index a = 0; a < n; ++a) {
-    result.residual[a] = z.sides[rows[a]] - p.sides[rows[a]];
-    result.variance[a] = z.variance[rows[a]];
-    result.H.row(a) = p.H.row(rows[a]);
-    result.H_pose.row(a) = p.H_pose.row(rows[a]);
-  }
-  return result;
+  return y;
 }
 
+/// K = W L⁻¹ with S = L Lᵀ and W = (P Hᵀ + C H_gᵀ) L⁻ᵀ, so that K S Kᵀ = W Wᵀ.
 struct Gain {
-  Eigen::MatrixXd K, S;
+  Gains W;
+  Eigen::Matrix4d L;
 };
 
-Gain gainOf(const Hypothesis& h, const Innovation& y, const Matrix6d& P_pose) {
-  const Eigen::MatrixXd PHt = h.P * y.H.transpose() + h.C * y.H_pose.transpose();
-  Gain gain;
-  gain.S =
-      y.H * PHt + y.H_pose * (h.C.transpose() * y.H.transpose() + P_pose * y.H_pose.transpose());
-  gain.S.diagonal() += y.variance;
-  makeSymmetric(gain.S);
-  gain.K = solveSymmetric(gain.S, PHt.transpose()).transpose();
+/// Nothing where S is not positive definite. `PHt` is P Hᵀ + C H_gᵀ, `S` without R.
+std::optional<Gain> gainOf(const Gains& PHt, const Eigen::Matrix4d& S,
+                           const Eigen::Vector4d& variance) {
+  Gain gain{PHt, S};
+  gain.L.diagonal() += variance;
+  if (!choleskyInPlace(gain.L)) return std::nullopt;
+  whitenRows(gain.L, gain.W);
   return gain;
 }
 
 /// How much the noise of an outlier is widened: the weight of a t distribution, inverted.
-double doubtOf(const Innovation& y, const Eigen::MatrixXd& S, double tail) {
-  const double nis = squaredMahalanobis(y.residual, S);
-  return std::max(1.0, (tail + nis) / (tail + static_cast<double>(y.residual.size())));
+double doubtOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
+  Eigen::Vector4d whitened = y.residual;
+  whiten(L, whitened);
+  return std::max(1.0, (tail + whitened.squaredNorm()) / (tail + y.count));
 }
 
 /// Moment match of "no box" and each box by their shares (the second half of PDA).
@@ -87,11 +88,14 @@ Hypothesis mix(const Hypothesis& none, double share_none,
   return result;
 }
 
-Shares sharesOf(const HypothesisLook& h, const Eigen::VectorXd& eta) {
+Shares sharesOf(const HypothesisLook& h, const std::vector<std::size_t>& looked_at,
+                const Eigen::VectorXd& eta) {
   Shares shares;
   shares.A = 1.0 - h.detection;
-  for (std::size_t z = 0; z < h.likelihood.size(); ++z) {
-    shares.box.push_back(h.detection * eta[static_cast<Eigen::Index>(z)] * h.likelihood[z]);
+  shares.box.reserve(looked_at.size());
+  for (std::size_t i = 0; i < looked_at.size(); ++i) {
+    const double free = eta[static_cast<Eigen::Index>(looked_at[i])];
+    shares.box.push_back(h.detection * free * h.likelihood[i]);
     shares.A += shares.box.back();
   }
   for (auto& b : shares.box) b /= shares.A;
@@ -102,10 +106,10 @@ Shares sharesOf(const HypothesisLook& h, const Eigen::VectorXd& eta) {
 void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
                  const std::vector<Evidence>& boxes, double repeated, const FrameContext& frame) {
   std::vector<std::pair<double, Hypothesis>> parts;
-  for (std::size_t z = 0; z < boxes.size(); ++z) {
-    if (shares.box[z] < kNegligible) continue;
-    parts.emplace_back(shares.box[z],
-                       updateWithBox(h, boxes[z].z, look.sight.hidden, repeated, frame));
+  for (std::size_t i = 0; i < shares.box.size(); ++i) {
+    if (shares.box[i] < kNegligible) continue;
+    const BoxMeasurement& z = boxes[look.boxes[i]].z;
+    parts.emplace_back(shares.box[i], updateWithBox(h, z, look.sight.hidden, repeated, frame));
   }
   if (parts.empty()) return;
   const double weight = h.weight;
@@ -134,17 +138,22 @@ void weighYawModes(Object& object, const std::vector<double>& likelihood) {
 }
 
 void updateAzimuths(Object& object, const std::vector<Shares>& shares, double worth,
-                    const std::vector<Evidence>& boxes, const FrameContext& frame) {
+                    const std::vector<std::size_t>& looked_at, const std::vector<Evidence>& boxes,
+                    const FrameContext& frame) {
+  const bool any = std::any_of(looked_at.begin(), looked_at.end(),
+                               [&](std::size_t z) { return boxes[z].azimuth.has_value(); });
+  if (!any) return;
   std::vector<double> likelihood(object.hypotheses.size(), 1.0);
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
-    const ClassPrior prior = frame.priors->of(object.hypotheses[i].class_name);
+    const ClassPrior& prior = frame.priors->of(object.hypotheses[i].class_name);
     if (!prior.has_yaw) continue;
-    for (std::size_t z = 0; z < boxes.size(); ++z) {
-      if (!boxes[z].azimuth || shares[i].box[z] < 0.2) continue;
-      const double sigma = std::max(boxes[z].azimuth_sigma, prior.azimuth_sigma);
-      const double weight = shares[i].box[z] * std::sqrt(worth);
+    for (std::size_t b = 0; b < looked_at.size(); ++b) {
+      const Evidence& box = boxes[looked_at[b]];
+      if (!box.azimuth || shares[i].box[b] < 0.2) continue;
+      const double sigma = std::max(box.azimuth_sigma, prior.azimuth_sigma);
+      const double weight = shares[i].box[b] * std::sqrt(worth);
       likelihood[i] *= std::pow(
-          updateWithAzimuth(object.hypotheses[i], *boxes[z].azimuth, sigma, weight, frame), weight);
+          updateWithAzimuth(object.hypotheses[i], *box.azimuth, sigma, weight, frame), weight);
     }
   }
   weighYawModes(object, likelihood);
@@ -161,7 +170,7 @@ double probabilitySeen(const Object& object, const std::vector<Shares>& shares) 
   return total > 0.0 ? seen / total : 0.0;
 }
 
-/// The box that is the object's beyond reasonable doubt.
+/// The box of the look that is the object's beyond reasonable doubt.
 std::optional<std::size_t> surelyOwn(const Object& object, const std::vector<Shares>& shares) {
   constexpr double kSurely = 0.8;
   double total = 0.0;
@@ -188,7 +197,7 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
   object.last_seen = object.as_of;
   const auto& box = shares.front().box;
   const auto z = std::max_element(box.begin(), box.end()) - box.begin();
-  if (box[z] > 0.5) {
+  if (!box.empty() && box[z] > 0.5) {
     object.running_nis = 0.85 * object.running_nis + 0.15 * look.hypotheses.front().nis[z];
   }
 }
@@ -253,34 +262,51 @@ double weigh(Object& object, const std::vector<Shares>& shares, double worth) {
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repeated,
                          const FrameContext& frame) {
-  Hypothesis posterior = prior;
+  const Matrix6d& P_pose = frame.pose_error.covariance;
   State x = prior.x;
   double doubt = 1.0;
+  Innovation y;
+  std::optional<Gain> gain;
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
     const auto box = projectObserved(x, frame.view, frame.offsetOf(prior.class_name));
     if (!box) break;
-    Innovation y = innovation(z, *box, hidden);
-    if (y.residual.size() == 0) break;
-    y.variance *= repeated;
-    Gain gain = gainOf(prior, y, frame.pose_error.covariance);
-    if (i == 0) doubt = doubtOf(y, gain.S, frame.parameters->box.tail);
-    if (doubt > 1.0) {
-      y.variance *= doubt;
-      gain = gainOf(prior, y, frame.pose_error.covariance);
+    Innovation now = innovation(z, *box, hidden);
+    if (now.count == 0) break;
+    now.variance *= repeated * doubt;
+    const Gains PHt = prior.P.leftCols<kVelocity>().lazyProduct(now.H.transpose()) +
+                      prior.C.lazyProduct(now.H_pose.transpose());
+    const Eigen::Matrix<double, 4, 6> pose =
+        now.H.lazyProduct(prior.C.topRows<kVelocity>()) + now.H_pose.lazyProduct(P_pose);
+    const Eigen::Matrix4d S = now.H.lazyProduct(PHt.topRows<kVelocity>()) +
+                              now.H_pose.lazyProduct(pose.transpose());
+    auto next_gain = gainOf(PHt, S, now.variance);
+    if (i == 0 && next_gain) {
+      doubt = doubtOf(now, next_gain->L, frame.parameters->box.tail);
+      now.variance *= doubt;
+      if (doubt > 1.0) next_gain = gainOf(PHt, S, now.variance);
     }
+    if (!next_gain) break;
     State back = prior.x - x;
     back[kYaw] = wrapAngle(back[kYaw]);
-    State next = prior.x + gain.K * (y.residual - y.H * back);
+    Eigen::Vector4d whitened = now.residual - now.H.lazyProduct(back.head<kVelocity>());
+    whiten(next_gain->L, whitened);
+    State next = prior.x + next_gain->W * whitened;
     next[kYaw] = wrapAngle(next[kYaw]);
     if (!next.allFinite()) break;
     const double step = (next.head<3>() - x.head<3>()).norm();
     x = next;
-    posterior.x = x;
-    posterior.P = prior.P - gain.K * gain.S * gain.K.transpose();
-    posterior.C = prior.C - gain.K * (y.H * prior.C + y.H_pose * frame.pose_error.covariance);
+    y = now;
+    gain = next_gain;
     if (step < 0.01) break;
   }
-  makeSymmetric(posterior.P);
+  Hypothesis posterior = prior;
+  if (!gain) return posterior;
+  posterior.x = x;
+  posterior.P -= gain->W.lazyProduct(gain->W.transpose());
+  Eigen::Matrix<double, 6, 4> pose =
+      (y.H.lazyProduct(prior.C.topRows<kVelocity>()) + y.H_pose.lazyProduct(P_pose)).transpose();
+  whitenRows(gain->L, pose);
+  posterior.C -= gain->W.lazyProduct(pose.transpose());
   return posterior;
 }
 
@@ -318,7 +344,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const FrameContext& frame) {
   if (look.sight.fraction <= 0.0) return std::nullopt;
   std::vector<Shares> shares;
-  for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, eta));
+  for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, look.boxes, eta));
   const double seen = probabilitySeen(object, shares);
   const Worth hit = worthOf(object, look, shares, frame.parameters->looks.correlation);
   const auto own = surelyOwn(object, shares);
@@ -328,16 +354,17 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
     updateState(object.hypotheses[i], shares[i], look, boxes, repeated, frame);
   }
   const double exponent = seen * hit.worth + 1.0 - seen;
-  const LookReasons reasons = reasonsOf(object, shares, seen, hit.worth, exponent, boxes, frame);
+  const LookReasons reasons = 
+      reasonsOf(object, shares, seen, hit.worth, exponent, look.boxes, boxes, frame);
   const double mean_A = weigh(object, shares, exponent);
   const double r = object.existence;
   bookExistence(object,
                 std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain),
                 reasons);
-  updateAzimuths(object, shares, hit.worth, boxes, frame);
+  updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
   if (sound(object)) bookClasses(object, reasons);
-  return own;
+  return own ? std::optional(look.boxes[*own]) : std::nullopt;
 }
 
 }  // namespace perdure::semantic_filter

@@ -14,7 +14,8 @@
 namespace perdure::semantic_filter {
 
 /// Everything at once for one object that can be seen (look.sight.fraction > 0). `eta` is the
-/// object's row of Association::eta. Does nothing at v = 0. Returns the box that is surely its own.
+/// object's row of Association::eta, by the frame's boxes. Does nothing at v = 0. Returns the box that
+/// is surely its own.
 std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const Eigen::VectorXd& eta, const std::vector<Evidence>& boxes,
                                   const FrameContext& frame);

@@ -1,0 +1,47 @@
+// S = L Lᵀ of the small matrices of fixed size that a filter takes by the thousand: on the stack,
+// and without the cost of a call for any size (gaussian.h has those).
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+namespace perdure {
+
+/// Puts L of S = L Lᵀ into S's lower triangle; the upper one is neither read nor written. False
+/// where S is not positive definite: S is then void.
+template <int N>
+bool choleskyInPlace(Eigen::Matrix<double, N, N>& S) {
+  for (int j = 0; j < N; ++j) {
+    double pivot = S(j, j);
+    for (int k = 0; k < j; ++k) pivot -= S(j, k) * S(j, k);
+    if (!(pivot > 0.0)) return false;
+    pivot = std::sqrt(pivot);
+    S(j, j) = pivot;
+    for (int i = j + 1; i < N; ++i) {
+      double sum = S(i, j);
+      for (int k = 0; k < j; ++k) sum -= S(i, k) * S(j, k);
+      S(i, j) = sum / pivot;
+    }
+  }
+  return true;
+}
+
+/// B ← B L⁻ᵀ: the rows of B, M × N, whitened.
+template <int N, int M>
+void whitenRows(const Eigen::Matrix<double, N, N>& L, Eigen::Matrix<double, M, N>& B) {
+  for (int j = 0; j < N; ++j) {
+    for (int k = 0; k < j; ++k) B.col(j) -= L(j, k) * B.col(k);
+    B.col(j) /= L(j, j);
+  }
+}
+
+/// b ← L⁻¹ b.
+template <int N>
+void whiten(const Eigen::Matrix<double, N, N>& L, Eigen::Matrix<double, N, 1>& b) {
+  for (int i = 0; i < N; ++i) {
+    for (int k = 0; k < i; ++k) b[i] -= L(i, k) * b[k];
+    b[i] /= L(i, i);
+  }
+}
+
+}  // namespace perdure
