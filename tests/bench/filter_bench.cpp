@@ -108,7 +108,10 @@ class Drive {
 
   Sample frame(std::uint64_t k) {
     Odometry odometry = testing::odometryAt(k, testing::driveTo(0, 0.0));
-    odometry.T_WB.p.x() = kMetresAFrame * static_cast<double>(k);
+    const double s = kMetresAFrame * static_cast<double>(k);
+    odometry.T_WB = RigidTransform(
+        Eigen::Quaterniond(Eigen::AngleAxisd(0.02 * std::sin(0.3 * s), Eigen::Vector3d::UnitZ())),
+        Eigen::Vector3d(s, 0.0, odometry.T_WB.p.z()));
     odometry.has_increment = true;
     odometry.transition.setIdentity();
     odometry.increment_covariance.diagonal().setConstant(1e-8);

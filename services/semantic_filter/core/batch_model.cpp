@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
@@ -18,37 +18,20 @@ constexpr double kAzimuthTail = 3.0;
 constexpr double kAcross = 0.2;   // share of a class's speed across its length
 constexpr double kUpwards = 0.2;  // m/s
 
-Matrix6d transitionBetween(const PoseError& earlier, const PoseError& later) {
-  if (earlier.product == later.product) return Matrix6d::Identity();
-  const Matrix6d transition = later.product * inverse(earlier.product);
-  const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargestTransition;
-  return sane ? transition : Matrix6d::Identity();
-}
-
-template <class Block>
-Eigen::MatrixXd assemble(std::size_t looks, const Block& of) {
-  const auto n = static_cast<Eigen::Index>(4 * looks);
-  Eigen::MatrixXd R(n, n);
-  for (std::size_t i = 0; i < looks; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
-      const Eigen::Matrix4d block = of(i, j);
-      R.block<4, 4>(row, column) = block;
-      R.block<4, 4>(column, row) = block.transpose();
-    }
-  }
-  return R;
+Matrix6d transition(const PoseError& earlier, const PoseError& later) {
+  return transitionBetween(earlier.product, later.product).value_or(Matrix6d::Identity());
 }
 
 }  // namespace
 
-Looks::Looks(const Keyframes& keyframes) : keyframes_(&keyframes) {
-  for (std::size_t i = 0; i < keyframes.size(); ++i) {
-    const PoseError& later = keyframes[i]->from->error;
-    for (std::size_t j = 0; j <= i; ++j) {
-      const PoseError& earlier = keyframes[j]->from->error;
-      exact_ = exact_ && earlier.covariance.isZero(0.0);
-      pairs_.push_back(transitionBetween(earlier, later) * earlier.covariance);
+Looks::Looks(const Keyframes& keyframes)
+    : keyframes_(&keyframes), pairs_(keyframes.size() * (keyframes.size() + 1) / 2) {
+  for (std::size_t j = 0; j < keyframes.size(); ++j) {
+    const PoseError& earlier = keyframes[j]->from->error;
+    exact_ = exact_ && earlier.covariance.isZero(0.0);
+    for (std::size_t i = j; i < keyframes.size() && !exact_; ++i) {
+      pairs_[i * (i + 1) / 2 + j] =
+          transition(earlier, keyframes[i]->from->error).lazyProduct(earlier.covariance);
     }
   }
 }
@@ -112,31 +95,46 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
   return s;
 }
 
-Eigen::MatrixXd BatchModel::covariance(const State& x, const Stack& s,
-                                       const Eigen::VectorXd& doubts) const {
-  // A doubtful box says nothing of the pose: its doubt does not widen the error that all share.
-  return assemble(looks_.size(), [&](std::size_t i, std::size_t j) -> Eigen::Matrix4d {
-    const double doubt =
-        std::sqrt(doubts[static_cast<Eigen::Index>(i)] * doubts[static_cast<Eigen::Index>(j)]);
-    const Eigen::Matrix4d own = doubt * ownShare(x, s, i, j);
-    return looks_.exactPoses() ? own : Eigen::Matrix4d(own + poseShare(s, i, j));
-  });
+SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
+  const auto n = static_cast<Eigen::Index>(4 * looks_.size());
+  SideCovariance covariance;
+  covariance.own.setZero(n, n);
+  if (!looks_.exactPoses()) covariance.pose.resize(n, n);
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
+      covariance.own.block<4, 4>(row, column) = ownShare(x, s, i, j);
+      if (looks_.exactPoses()) continue;
+      const Eigen::Matrix<double, 4, 6> J_i = s.J_pose[i].lazyProduct(looks_.poses(i, j));
+      covariance.pose.block<4, 4>(row, column) = J_i.lazyProduct(s.J_pose[j].transpose());
+    }
+  }
+  return covariance;
 }
 
-Eigen::VectorXd BatchModel::withoutPose(const Stack& s, const Cholesky& R) const {
-  if (looks_.exactPoses()) return s.residual;
-  const Eigen::MatrixXd pose =
-      assemble(looks_.size(), [&](std::size_t i, std::size_t j) { return poseShare(s, i, j); });
-  return s.residual - pose * R.solve(s.residual);
+Eigen::MatrixXd SideCovariance::with(const Eigen::VectorXd& doubts) const {
+  Eigen::MatrixXd R = own;
+  for (Eigen::Index j = 0; j < doubts.size(); ++j) {
+    for (Eigen::Index i = j; i < doubts.size(); ++i) {
+      R.block<4, 4>(4 * i, 4 * j) *= std::sqrt(doubts[i] * doubts[j]);
+    }
+  }
+  if (pose.size() > 0) R.triangularView<Eigen::Lower>() += pose;
+  return R;
 }
 
-std::pair<double, double> BatchModel::deviation(const State& x, const Stack& s,
-                                                const Eigen::VectorXd& residual,
-                                                std::size_t i) const {
-  const Eigen::Vector4d r = residual.segment<4>(static_cast<Eigen::Index>(4 * i));
-  const Eigen::Matrix4d R = ownShare(x, s, i, i);
-  const auto count = std::count(s.counts[i].begin(), s.counts[i].end(), true);
-  return {squaredMahalanobis(r, R), static_cast<double>(count)};
+Eigen::VectorXd SideCovariance::withoutPose(const Eigen::VectorXd& residual,
+                                            const Cholesky& R) const {
+  if (pose.size() == 0) return residual;
+  return residual - pose.selfadjointView<Eigen::Lower>() * R.solve(residual);
+}
+
+double SideCovariance::deviation(const Eigen::VectorXd& residual, Eigen::Index look) const {
+  Eigen::Matrix4d L = own.block<4, 4>(4 * look, 4 * look);
+  Eigen::Vector4d r = residual.segment<4>(4 * look);
+  if (!choleskyInPlace(L)) return 0.0;
+  whiten(L, r);
+  return r.squaredNorm();
 }
 
 Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw,
@@ -188,7 +186,7 @@ Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const PoseError& then = looks_.keyframes()[i]->from->error;
     c.middleCols<4>(static_cast<Eigen::Index>(4 * i)) =
-        transitionBetween(then, frame_.pose_error) * then.covariance * s.J_pose[i].transpose();
+        transition(then, frame_.pose_error) * then.covariance * s.J_pose[i].transpose();
   }
   return c;
 }
@@ -200,12 +198,8 @@ double BatchModel::age(std::size_t i) const {
              : 0.0;
 }
 
-/// Covariance of the sides of look i (the later one) and j: by the errors of their poses.
-Eigen::Matrix4d BatchModel::poseShare(const Stack& s, std::size_t i, std::size_t j) const {
-  return s.J_pose[i] * looks_.poses(i, j) * s.J_pose[j].transpose();
-}
-
-/// The same by what the network and the thing itself do.
+/// Covariance of the sides of look i (the later one) and j, by what the network and the thing itself
+/// do.
 Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t i,
                                      std::size_t j) const {
   const Keyframe& a = *looks_.keyframes()[i];

@@ -33,7 +33,7 @@ class Looks {
 };
 
 /// Dimensions that a batch estimates: the cuboid, and the velocity of what moves.
-inline constexpr int kGeometry = 7, kMostFree = 10;
+inline constexpr int kMostFree = kGeometry + 3;
 using FreeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFree, 1>;
 using FreeMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree, kMostFree>;
 
@@ -43,6 +43,21 @@ struct Stack {
   Eigen::MatrixXd J;         ///< by geometry (and velocity)
   std::vector<Eigen::Matrix<double, 4, 6>> J_pose;
   std::vector<std::array<bool, 4>> counts;
+};
+
+/// Of the rows of a Stack given the cuboid, in two parts; of each the lower triangle alone.
+struct SideCovariance {
+  Eigen::MatrixXd own;   ///< by what the network and the thing itself do: noise, b, acceleration
+  Eigen::MatrixXd pose;  ///< by the pose errors; of no size where poses are exact
+
+  /// The whole, its own part widened by the looks' doubts. A doubtful box says nothing of the pose:
+  /// its doubt does not widen the error that all share.
+  Eigen::MatrixXd with(const Eigen::VectorXd& doubts) const;
+  /// What is left of the residuals when the pose errors have been estimated from them: a common
+  /// pose error is no contradiction. R is the whole.
+  Eigen::VectorXd withoutPose(const Eigen::VectorXd& residual, const Cholesky& R) const;
+  /// Squared deviation of one look with these residuals.
+  double deviation(const Eigen::VectorXd& residual, Eigen::Index look) const;
 };
 
 struct Quadratic {
@@ -62,14 +77,7 @@ class BatchModel {
   State at(const State& x, const FreeVector& step) const;
   /// Nothing where a look does not see the cuboid at all.
   std::optional<Stack> linearise(const State& x) const;
-  /// Of all rows given the cuboid: noise, b, pose errors, acceleration.
-  Eigen::MatrixXd covariance(const State& x, const Stack& s, const Eigen::VectorXd& doubts) const;
-  /// What is left of the residuals when the pose errors have been estimated from them: a common
-  /// pose error is no contradiction. R is the covariance.
-  Eigen::VectorXd withoutPose(const Stack& s, const Cholesky& R) const;
-  /// Squared deviation of one look with these residuals, and how many sides count.
-  std::pair<double, double> deviation(const State& x, const Stack& s,
-                                      const Eigen::VectorXd& residual, std::size_t look) const;
+  SideCovariance covariance(const State& x, const Stack& s) const;
   /// Looks (whitened Jacobian and residual) and priors at x.
   Quadratic quadratic(const State& x, const Eigen::MatrixXd& Jw, const Eigen::VectorXd& rw) const;
   /// Twice the negative logarithm of the priors, but for a constant and the azimuths.
@@ -84,7 +92,6 @@ class BatchModel {
 
  private:
   double age(std::size_t look) const;
-  Eigen::Matrix4d poseShare(const Stack& s, std::size_t i, std::size_t j) const;
   Eigen::Matrix4d ownShare(const State& x, const Stack& s, std::size_t i, std::size_t j) const;
   void addAzimuths(const State& x, Quadratic& q) const;
 

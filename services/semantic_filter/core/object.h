@@ -24,6 +24,7 @@ using State = Eigen::Matrix<double, kStateDim, 1>;
 using StateCovariance = Eigen::Matrix<double, kStateDim, kStateDim>;
 using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< P_xg with the pose error [θ, p]
 inline constexpr int kYaw = 3, kSize = 4, kBias = 7, kVelocity = 11;
+inline constexpr int kGeometry = kBias;  ///< dimensions of the cuboid alone
 
 struct Hypothesis {
   std::string class_name;
@@ -66,7 +67,8 @@ struct Object {
   /// False for one that came back (restart, recall): what it knew before is in its state alone, and
   /// an estimate from the looks since then would lose it.
   bool remembers_all = true;
-  std::uint32_t fresh_keyframes = 0;  ///< that came since the state was last smoothed
+  std::uint32_t fresh_keyframes = 0;     ///< that came since the state was last smoothed
+  std::uint32_t smoothing_patience = 1;  ///< grows while smoothing finds little to mend
   ClassAccount classes;               ///< why the hypotheses weigh what they weigh
   std::vector<ClassNumber> context;   ///< nats, laid over what is published (core/context.h)
   /// Looks that were not used since the object was last brought up to date: nothing of what is

@@ -64,16 +64,6 @@ void predictScreen(Object& object, const ViewWalk& walk) {
   object.screened = walk.screened + keep * (object.screened - walk.screened);
 }
 
-/// The transition since the object was brought up to date. vio's updates make the product of
-/// transitions small, so that its inverse may lose its sense: then nothing is left of C.
-Matrix6d transitionSince(const Object& object, const PoseError& pose_error) {
-  constexpr double kLargest = 10.0;
-  if (object.pose_product == pose_error.product) return Matrix6d::Identity();
-  const Matrix6d transition = pose_error.product * inverse(object.pose_product);
-  const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargest;
-  return sane ? transition : Matrix6d::Zero();
-}
-
 /// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see.
 bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
   Matrix6d L = P_pose;
@@ -122,6 +112,20 @@ void giveUpLostOnes(Object& object, TimePoint now, double lost_sigma_m) {
 
 }  // namespace
 
+std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later) {
+  constexpr double kLargest = 10.0;
+  if (earlier == later) return Matrix6d::Identity();
+  // Most objects of a frame were brought up to date at the same frame before.
+  thread_local Matrix6d product = Matrix6d::Identity(), inverted = Matrix6d::Identity();
+  if (earlier != product) {
+    product = earlier;
+    inverted = inverse(earlier);
+  }
+  const Matrix6d transition = later.lazyProduct(inverted);
+  const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargest;
+  return sane ? std::optional(transition) : std::nullopt;
+}
+
 double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
                   const ViewScales& scales) {
   const Eigen::Vector3d ray_a = position - a.p, ray_b = position - b.p;
@@ -142,7 +146,9 @@ State stateAt(const Hypothesis& h, double dt) {
 void predict(Object& object, TimePoint now, const PoseError& pose_error,
              const MotionParameters& parameters, const ViewWalk& walk) {
   const double dt = toSeconds(now - object.as_of);
-  const Matrix6d transition = transitionSince(object, pose_error);
+  // Where the transition is lost nothing is left of C.
+  const Matrix6d transition =
+      transitionBetween(object.pose_product, pose_error.product).value_or(Matrix6d::Zero());
   for (auto& h : object.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
     predictBias(h, object.last_view, walk);

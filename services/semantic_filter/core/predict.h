@@ -2,6 +2,8 @@
 // of the pose error are applied when an object can next be seen; hidden beliefs stay untouched.
 #pragma once
 
+#include <optional>
+
 #include "services/semantic_filter/core/box_likelihood.h"
 #include "services/semantic_filter/core/object.h"
 #include "services/semantic_filter/core/parameters.h"
@@ -15,6 +17,10 @@ struct PoseError {
   /// product A has at product B the cross-covariance C (B A⁻¹)ᵀ.
   Matrix6d product = Matrix6d::Identity();
 };
+
+/// The transition of the pose error between two products of transitions. vio's updates make the
+/// products small, so that the inverse may lose its sense: then nothing.
+std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
 /// x at a later time: static ones stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);

@@ -153,13 +153,27 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
     }
   }
   const Association association = associate(psi, fresh);
+  std::vector<Object*> to_smooth;
   for (Eigen::Index j = 0; j < n; ++j) {
     const Seen& s = seen[static_cast<std::size_t>(j)];
     Object& object = belief.objects[s.object];
     const auto own = update(object, s.look, association.eta.row(j), boxes, frame);
-    if (own && sound(object)) rememberAndSmooth(object, boxes[*own], s.look.sight.hidden, frame);
+    if (own && sound(object) && rememberLook(object, boxes[*own], s.look.sight.hidden, frame)) {
+      to_smooth.push_back(&object);
+    }
   }
+  smoothNeediest(to_smooth, frame);
   return association.claimed;
+}
+
+/// As many as a frame has time for; the others wait.
+void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame) {
+  std::stable_sort(objects.begin(), objects.end(), [](const Object* a, const Object* b) {
+    return smoothingNeed(*a) > smoothingNeed(*b);
+  });
+  const auto most = static_cast<std::size_t>(frame.parameters->smooth.per_frame);
+  if (objects.size() > most) objects.resize(most);
+  for (Object* object : objects) smooth(*object, frame);
 }
 
 void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,

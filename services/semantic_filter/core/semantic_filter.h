@@ -74,6 +74,7 @@ class SemanticFilter {
   /// Updates what is seen; returns for each box how much of it is claimed.
   Eigen::VectorXd associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
                                      const FrameInput& input, const FrameContext& frame) const;
+  static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
   /// A box that no visible object expects and that matches a hidden one says that the blocker was
   /// misjudged: that object can be seen.
   void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input) const;

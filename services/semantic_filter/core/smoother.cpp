@@ -14,26 +14,52 @@ namespace {
 constexpr int kRounds = 12;
 constexpr double kContradicted = 25.0;  // of about four degrees of freedom
 
-/// Weights of a t distribution for whole looks; returns which contradict x.
-Eigen::ArrayXi doubtLooks(const BatchModel& model, const State& x, const Stack& s,
-                          const Cholesky& R, double tail, Eigen::VectorXd& doubts) {
-  const Eigen::VectorXd residual = model.withoutPose(s, R);
-  Eigen::ArrayXi contradicted(doubts.size());
-  for (Eigen::Index i = 0; i < doubts.size(); ++i) {
-    const auto [nis, count] = model.deviation(x, s, residual, static_cast<std::size_t>(i));
-    doubts[i] = std::max(1.0, (tail + nis) / (tail + count));
-    contradicted[i] = nis > kContradicted ? 1 : 0;
-  }
-  return contradicted;
-}
-
 struct Fit {
   State x;
   Stack stack;
+  SideCovariance covariance;
+  State covariance_at;  ///< the x that it is of
   Eigen::VectorXd doubts;
   Eigen::ArrayXi contradicted;
   Cholesky R;
 };
+
+/// Weights of a t distribution for whole looks, and which of them contradict x. Whether the weights
+/// changed enough to matter.
+bool doubtLooks(Fit& fit, double tail) {
+  constexpr double kMatters = 0.05;
+  const Eigen::VectorXd residual = fit.covariance.withoutPose(fit.stack.residual, fit.R);
+  fit.contradicted.resize(fit.doubts.size());
+  bool matters = false;
+  for (Eigen::Index i = 0; i < fit.doubts.size(); ++i) {
+    const double nis = fit.covariance.deviation(residual, i);
+    const auto& counts = fit.stack.counts[static_cast<std::size_t>(i)];
+    const auto n = static_cast<double>(std::count(counts.begin(), counts.end(), true));
+    const double doubt = std::max(1.0, (tail + nis) / (tail + n));
+    matters = matters || std::abs(doubt - fit.doubts[i]) > kMatters * fit.doubts[i];
+    fit.doubts[i] = doubt;
+    fit.contradicted[i] = nis > kContradicted ? 1 : 0;
+  }
+  return matters;
+}
+
+/// The covariance changes little with x: it is taken anew where the thing has moved in the view.
+bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
+  constexpr double kLittle = 0.02, kLittleTurn = 0.05;  // of the distance; rad
+  const double distance = (fit.x.head<3>() - from).norm();
+  return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance ||
+         std::abs(wrapAngle(fit.x[kYaw] - fit.covariance_at[kYaw])) > kLittleTurn ||
+         (fit.x - fit.covariance_at).segment<3>(kSize).cwiseAbs().maxCoeff() > kLittleTurn;
+}
+
+bool factorise(const BatchModel& model, Fit& fit, bool anew) {
+  if (anew) {
+    fit.covariance = model.covariance(fit.x, fit.stack);
+    fit.covariance_at = fit.x;
+  }
+  fit.R = Cholesky(fit.covariance.with(fit.doubts));
+  return fit.R.positive();
+}
 
 /// One step of Levenberg and Marquardt's. False where none lowers the cost.
 bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) {
@@ -62,25 +88,25 @@ bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) 
   return false;
 }
 
-std::optional<Fit> fitLooks(const BatchModel& model, const State& start, std::size_t looks,
+std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const Looks& looks,
                             double tail) {
   Fit fit;
   fit.x = start;
-  fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks));
+  fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
   auto stack = model.linearise(fit.x);
   if (!stack) return std::nullopt;
   fit.stack = std::move(*stack);
+  if (!factorise(model, fit, true)) return std::nullopt;
+  const Eigen::Vector3d from = looks.keyframes().back()->from->T_WC.p;
   double damping = 1e-4;
   for (int round = 0; round < kRounds; ++round) {
-    fit.R = Cholesky(model.covariance(fit.x, fit.stack, fit.doubts));
-    if (!fit.R.positive()) return std::nullopt;
     double moved = 0.0;
     const bool better = descend(model, fit, damping, moved);
-    fit.contradicted = doubtLooks(model, fit.x, fit.stack, fit.R, tail, fit.doubts);
+    const bool doubted = doubtLooks(fit, tail);
+    const bool elsewhere = movedInView(fit, from);
+    if ((doubted || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
     if (round > 0 && (!better || moved < 0.005)) break;
   }
-  fit.R = Cholesky(model.covariance(fit.x, fit.stack, fit.doubts));
-  if (!fit.R.positive()) return std::nullopt;
   return fit;
 }
 
@@ -146,7 +172,7 @@ std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& loo
   const BatchModel model(looks, start.moving, start.class_name, start.x[kYaw], frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
-  const auto fit = fitLooks(model, x, looks.size(), frame.parameters->box.tail);
+  const auto fit = fitLooks(model, x, looks, frame.parameters->box.tail);
   if (!fit) return std::nullopt;
   const auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
@@ -165,7 +191,7 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts) const {
   x.segment<4>(kBias).setZero();
   const auto s = model.linearise(x);
   if (!s) return kImpossible;
-  const Cholesky R(model.covariance(x, *s, doubts));
+  const Cholesky R(model.covariance(x, *s).with(doubts));
   if (!R.positive()) return kImpossible;
   const Eigen::MatrixXd Jw = R.whiten(s->J);
   const Eigen::VectorXd rw = R.whiten(s->residual);
@@ -266,17 +292,31 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
 
 }  // namespace
 
-void rememberAndSmooth(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
-                       const FrameContext& frame) {
+bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
+                  const FrameContext& frame) {
   const auto& p = *frame.parameters;
-  if (p.smooth.keyframes == 0 || !frame.key_view || !object.remembers_all) return;
+  if (p.smooth.keyframes == 0 || !frame.key_view || !object.remembers_all) return false;
   const ViewScales scales{p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle};
   Keyframe keyframe{frame.key_view, box.z, hidden, box.azimuth, box.azimuth_sigma};
-  if (!remember(object, std::move(keyframe), scales, p.smooth)) return;
-  if (object.keyframes.size() < static_cast<std::size_t>(p.smooth.least)) return;
-  // One look more among many changes little: wait for an eighth of them.
-  if (++object.fresh_keyframes * 8 < object.keyframes.size()) return;
+  if (!remember(object, std::move(keyframe), scales, p.smooth)) return false;
+  if (object.keyframes.size() < static_cast<std::size_t>(p.smooth.least)) return false;
+  ++object.fresh_keyframes;
+  return smoothingNeed(object) >= 1.0;
+}
+
+double smoothingNeed(const Object& object) {
+  // One look more among many changes little: an eighth of them is waited for, and more where the
+  // last fits had little to mend.
+  return 8.0 * object.fresh_keyframes /
+         (static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
+}
+
+void smooth(Object& object, const FrameContext& frame) {
+  constexpr std::uint32_t kMostPatience = 8;
+  constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
+  const auto& p = *frame.parameters;
   object.fresh_keyframes = 0;
+  const Hypothesis before = object.best();
   const Looks looks(object.keyframes);
   std::set<std::string> names;
   for (const auto& h : object.hypotheses) names.insert(h.class_name);
@@ -284,6 +324,11 @@ void rememberAndSmooth(Object& object, const Evidence& box, const std::array<boo
   for (const auto& name : names) smoothClass(object, name, looks, frame, verdicts);
   forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
   normalise(object, ClassEvidence::kMotion);
+  const bool same = before.class_name == object.best().class_name &&
+                    before.moving == object.best().moving;
+  const bool settled = same && distance2(before, object.best()) < kLittle;
+  object.smoothing_patience =
+      settled ? std::min(2 * object.smoothing_patience, kMostPatience) : 1;
 }
 
 }  // namespace perdure::semantic_filter

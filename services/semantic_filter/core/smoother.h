@@ -43,9 +43,13 @@ class Smoothed {
   double start_yaw_ = 0.0;
 };
 
-/// Remembers this box of the object's and, where it shows something new, smooths its hypotheses and
-/// weighs within each class whether it moves.
-void rememberAndSmooth(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
-                       const FrameContext& frame);
+/// Remembers this box of the object's where it shows something new. Whether the object is then to be
+/// smoothed.
+bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
+                  const FrameContext& frame);
+/// How much there is to gain: 1 and more is worth it.
+double smoothingNeed(const Object& object);
+/// Smooths the object's hypotheses and weighs within each class whether it moves.
+void smooth(Object& object, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

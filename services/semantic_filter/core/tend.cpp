@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/keyframe.h"
 #include "services/semantic_filter/core/polygon.h"
@@ -11,7 +13,6 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr int kGeometry = 7;          // dimensions without velocity
 constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
 
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
@@ -21,17 +22,13 @@ Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
   return d;
 }
 
-/// Squared Mahalanobis distance of the lighter hypothesis in the heavier one's covariance.
-double distance2(const Hypothesis& a, const Hypothesis& b) {
-  const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();
-  const Vector7d d = geometryDifference(a, b);
-  double result = squaredMahalanobis(d, P);
-  if (a.moving) {
-    const Eigen::Vector3d dv = (a.x - b.x).tail<3>();
-    const Eigen::Matrix3d Pv = a.P.bottomRightCorner<3, 3>();
-    result += squaredMahalanobis(dv, Pv);
-  }
-  return result;
+template <int N>
+double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<double, N, N>& P) {
+  Eigen::Matrix<double, N, N> L = P;
+  if (!choleskyInPlace(L)) return std::numeric_limits<double>::infinity();
+  Eigen::Matrix<double, N, 1> whitened = d;
+  whiten(L, whitened);
+  return whitened.squaredNorm();
 }
 
 /// The hypothesis given that v = 0: what it took for motion was the error of its place.
@@ -105,7 +102,7 @@ void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate)
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
     const ClassPrior& prior = priors.of(h.class_name);
     const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
-    if (squaredMahalanobis(d, prior.log_size_covariance) < size_gate * size_gate) return false;
+    if (deviation2<3>(d, prior.log_size_covariance) < size_gate * size_gate) return false;
     lost += h.weight;
     return true;
   });
@@ -230,6 +227,16 @@ bool older(const Object& a, const Object& b) {
 }
 
 }  // namespace
+
+double distance2(const Hypothesis& a, const Hypothesis& b) {
+  const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();
+  double result = deviation2<kGeometry>(geometryDifference(a, b), P);
+  if (a.moving) {
+    const Eigen::Matrix3d P_v = a.P.bottomRightCorner<3, 3>();
+    result += deviation2<3>((a.x - b.x).tail<3>(), P_v);
+  }
+  return result;
+}
 
 void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters) {
   weighPace(object, priors, parameters.motion);
@@ -357,9 +364,14 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
 }
 
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
-  const Eigen::Matrix<double, 3, 6> C = h.C.topRows<3>();
-  const Eigen::Matrix<double, 3, 6> B = regressOn(P_pose, C);
-  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - B.cwiseProduct(C).sum(), 0.0));
+  Eigen::Matrix<double, 3, 6> shared = h.C.topRows<3>();
+  Matrix6d L = P_pose;
+  if (choleskyInPlace(L)) {
+    whitenRows(L, shared);
+  } else {
+    shared.setZero();
+  }
+  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
 }
 
 void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {

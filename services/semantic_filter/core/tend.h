@@ -17,6 +17,10 @@ struct MergeRecord {
 /// gets a moving twin and one that is misplaced along the ray. Nothing may be left.
 void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters);
 
+/// Squared Mahalanobis distance of b from a by a's covariance: geometry, yaw modulo 180°, and the
+/// velocity where a moves.
+double distance2(const Hypothesis& a, const Hypothesis& b);
+
 /// Shared volume over joint volume of two upright cuboids.
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 
