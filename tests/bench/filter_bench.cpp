@@ -193,10 +193,13 @@ void report(std::size_t asked, int frames) {
 int main(int argc, char** argv) {
   using perdure::semantic_filter::bench::report;
   const int frames = argc > 1 ? std::atoi(argv[1]) : 200;
-  if (frames < 1) {
-    std::cerr << "usage: filter_bench [FRAMES]   (from the repository's root)\n";
+  const int in_view = argc > 2 ? std::atoi(argv[2]) : 0;
+  if (frames < 1 || in_view < 0 || argc > 3) {
+    std::cerr << "usage: filter_bench [FRAMES [IN_VIEW]]   (from the repository's root)\n";
     return 64;
   }
   std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";
-  for (const std::size_t n : {20UL, 60UL, 200UL}) report(n, frames);
+  for (const int n : {20, 60, 200}) {
+    if (in_view == 0 || in_view == n) report(static_cast<std::size_t>(n), frames);
+  }
 }

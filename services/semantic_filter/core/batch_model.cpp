@@ -100,10 +100,13 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
   SideCovariance covariance;
   covariance.own.setZero(n, n);
   if (!looks_.exactPoses()) covariance.pose.resize(n, n);
+  std::vector<Aspect> aspects;
+  for (const auto& k : looks_.keyframes()) aspects.push_back(aspectOf(x.head<3>(), k->from->T_WC));
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
+      const double alike = std::exp(-viewChange(aspects[i], aspects[j], scales_));
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
-      covariance.own.block<4, 4>(row, column) = ownShare(x, s, i, j);
+      covariance.own.block<4, 4>(row, column) = ownShare(s, i, j, alike);
       if (looks_.exactPoses()) continue;
       const Eigen::Matrix<double, 4, 6> J_i = s.J_pose[i].lazyProduct(looks_.poses(i, j));
       covariance.pose.block<4, 4>(row, column) = J_i.lazyProduct(s.J_pose[j].transpose());
@@ -199,9 +202,9 @@ double BatchModel::age(std::size_t i) const {
 }
 
 /// Covariance of the sides of look i (the later one) and j, by what the network and the thing itself
-/// do.
-Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t i,
-                                     std::size_t j) const {
+/// do. `alike` is the correlation of b from the two views.
+Eigen::Matrix4d BatchModel::ownShare(const Stack& s, std::size_t i, std::size_t j,
+                                     double alike) const {
   const Keyframe& a = *looks_.keyframes()[i];
   const Keyframe& b = *looks_.keyframes()[j];
   Eigen::Matrix4d block = Eigen::Matrix4d::Zero();
@@ -213,11 +216,9 @@ Eigen::Matrix4d BatchModel::ownShare(const State& x, const Stack& s, std::size_t
     block += variance * s.J.block<4, 3>(static_cast<Eigen::Index>(4 * i), 0) *
              s.J.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0).transpose();
   }
-  const double rho =
-      i == j ? 1.0 : std::exp(-viewChange(x.head<3>(), a.from->T_WC, b.from->T_WC, scales_));
   for (int side = 0; side < 4; ++side) {
     if (s.counts[i][side] && s.counts[j][side]) {
-      block(side, side) += rho * std::sqrt(a.z.lasting[side] * b.z.lasting[side]);
+      block(side, side) += alike * std::sqrt(a.z.lasting[side] * b.z.lasting[side]);
     }
     if (i == j) block(side, side) += s.counts[i][side] ? a.z.variance[side] : kNoInformation;
   }

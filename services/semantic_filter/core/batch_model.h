@@ -92,7 +92,7 @@ class BatchModel {
 
  private:
   double age(std::size_t look) const;
-  Eigen::Matrix4d ownShare(const State& x, const Stack& s, std::size_t i, std::size_t j) const;
+  Eigen::Matrix4d ownShare(const Stack& s, std::size_t i, std::size_t j, double alike) const;
   void addAzimuths(const State& x, Quadratic& q) const;
 
   const Looks& looks_;

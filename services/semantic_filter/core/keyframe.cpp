@@ -1,6 +1,7 @@
 #include "services/semantic_filter/core/keyframe.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace perdure::semantic_filter {
@@ -8,39 +9,48 @@ namespace {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
+/// What one look shows of a thing, as far as other looks may differ.
+struct Glimpse {
+  Aspect aspect;
+  Eigen::Vector2d centre;  ///< of the box, rad
+  double log_height;
+};
+
+Glimpse glimpseOf(const Eigen::Vector3d& place, const Keyframe& k) {
+  const Eigen::Vector2d centre(k.z.sides[0] + k.z.sides[2], k.z.sides[1] + k.z.sides[3]);
+  return {aspectOf(place, k.from->T_WC), 0.5 * centre / k.from->camera.fx(),
+          std::log(k.z.height())};
+}
+
 /// By the view from the two places, or by the boxes where the thing itself moves.
-double changeBetween(const Eigen::Vector3d& place, const Keyframe& a, const Keyframe& b,
-                     const ViewScales& scales) {
-  const auto centre = [](const BoxMeasurement& z) -> Eigen::Vector2d {
-    return Eigen::Vector2d(z.sides[0] + z.sides[2], z.sides[1] + z.sides[3]) / 2.0;
-  };
-  const double shift = (centre(a.z) - centre(b.z)).norm() / a.from->camera.fx();
-  const double growth = std::abs(std::log(a.z.height() / b.z.height()));
-  return std::max(viewChange(place, a.from->T_WC, b.from->T_WC, scales),
-                  shift / scales.image_angle + growth / scales.log_distance);
+double changeBetween(const Glimpse& a, const Glimpse& b, const ViewScales& scales) {
+  return std::max(viewChange(a.aspect, b.aspect, scales),
+                  (a.centre - b.centre).norm() / scales.image_angle +
+                      std::abs(a.log_height - b.log_height) / scales.log_distance);
 }
 
-/// Change of view to the nearest of the others.
-double apart(const Eigen::Vector3d& place, const Keyframes& all, std::size_t of,
-             const ViewScales& scales) {
-  double least = std::numeric_limits<double>::infinity();
+/// The look that is least apart from the nearest other one. The newest stays: what moves is
+/// estimated at its time.
+std::size_t leastApart(const Eigen::Vector3d& place, const Keyframes& all,
+                       const ViewScales& scales) {
+  std::vector<Glimpse> glimpses;
+  for (const auto& k : all) glimpses.push_back(glimpseOf(place, *k));
+  std::vector<double> apart(all.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i != of) least = std::min(least, changeBetween(place, *all[i], *all[of], scales));
+    for (std::size_t j = 0; j < i; ++j) {
+      const double change = changeBetween(glimpses[i], glimpses[j], scales);
+      apart[i] = std::min(apart[i], change);
+      apart[j] = std::min(apart[j], change);
+    }
   }
-  return least;
+  return static_cast<std::size_t>(std::min_element(apart.begin(), apart.end() - 1) -
+                                  apart.begin());
 }
 
-/// The newest stays: what moves is estimated at its time.
 void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales,
           std::size_t limit) {
   while (all.size() > limit) {
-    std::size_t least = 0;
-    double least_apart = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i + 1 < all.size(); ++i) {
-      const double d = apart(place, all, i, scales);
-      if (d < least_apart) least = i, least_apart = d;
-    }
-    all.erase(all.begin() + static_cast<std::ptrdiff_t>(least));
+    all.erase(all.begin() + static_cast<std::ptrdiff_t>(leastApart(place, all, scales)));
   }
 }
 
@@ -49,8 +59,9 @@ void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales
 bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
               const SmoothParameters& parameters) {
   const Eigen::Vector3d place = object.best().x.head<3>();
+  const Glimpse now = glimpseOf(place, keyframe);
   for (const auto& other : object.keyframes) {
-    if (changeBetween(place, *other, keyframe, scales) < parameters.new_view) return false;
+    if (changeBetween(glimpseOf(place, *other), now, scales) < parameters.new_view) return false;
   }
   object.keyframes.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
   thin(place, object.keyframes, scales, static_cast<std::size_t>(parameters.keyframes));

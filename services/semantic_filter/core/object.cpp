@@ -67,7 +67,8 @@ double movingProbability(const Object& object, double min_speed) {
 bool sound(const Object& object) {
   double sum = 0.0;
   for (const auto& h : object.hypotheses) {
-    if (!h.x.allFinite() || !h.P.allFinite() || !h.C.allFinite()) return false;
+    // A sum is finite where all that it is of is.
+    if (!std::isfinite(h.x.sum() + h.P.sum() + h.C.sum())) return false;
     sum += h.weight;
   }
   return std::isfinite(sum) && sum > 0.0 && std::isfinite(object.existence);

@@ -126,15 +126,21 @@ std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6
   return sane ? std::optional(transition) : std::nullopt;
 }
 
+Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC) {
+  const Eigen::Vector3d ray = position - T_WC.p;
+  const double distance = std::max(ray.norm(), 1e-3);
+  const Eigen::Vector3d ray_W = ray / distance;
+  return {ray_W, T_WC.q.conjugate() * ray_W, std::log(distance)};
+}
+
+double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales) {
+  return (a.ray_W - b.ray_W).norm() / scales.angle + (a.ray_C - b.ray_C).norm() / scales.image_angle +
+         std::abs(a.log_distance - b.log_distance) / scales.log_distance;
+}
+
 double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
                   const ViewScales& scales) {
-  const Eigen::Vector3d ray_a = position - a.p, ray_b = position - b.p;
-  const double far_a = std::max(ray_a.norm(), 1e-3), far_b = std::max(ray_b.norm(), 1e-3);
-  const Eigen::Vector3d image_a = a.q.conjugate() * ray_a / far_a;
-  const Eigen::Vector3d image_b = b.q.conjugate() * ray_b / far_b;
-  return (ray_a / far_a - ray_b / far_b).norm() / scales.angle +
-         (image_a - image_b).norm() / scales.image_angle +
-         std::abs(std::log(far_a / far_b)) / scales.log_distance;
+  return viewChange(aspectOf(position, a), aspectOf(position, b), scales);
 }
 
 State stateAt(const Hypothesis& h, double dt) {

@@ -29,6 +29,13 @@ State stateAt(const Hypothesis& h, double dt);
 struct ViewScales {
   double angle, log_distance, image_angle;
 };
+/// Of a point from one camera pose.
+struct Aspect {
+  Eigen::Vector3d ray_W, ray_C;  ///< unit, from the camera to it
+  double log_distance;
+};
+Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);
+double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales);
 double viewChange(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
                   const RigidTransform& T_WC_b, const ViewScales& scales);
 /// What changes at an object as the view of it changes, and goes back to where it began.

@@ -312,7 +312,7 @@ double smoothingNeed(const Object& object) {
 }
 
 void smooth(Object& object, const FrameContext& frame) {
-  constexpr std::uint32_t kMostPatience = 8;
+  const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smooth.patience);
   constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
   const auto& p = *frame.parameters;
   object.fresh_keyframes = 0;
@@ -328,7 +328,7 @@ void smooth(Object& object, const FrameContext& frame) {
                     before.moving == object.best().moving;
   const bool settled = same && distance2(before, object.best()) < kLittle;
   object.smoothing_patience =
-      settled ? std::min(2 * object.smoothing_patience, kMostPatience) : 1;
+      settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
 }
 
 }  // namespace perdure::semantic_filter

@@ -335,29 +335,42 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   return isCovariance(fused.P.topLeftCorner<7, 7>()) && fused.x.allFinite() ? fused : a;
 }
 
+namespace {
+
+/// Half the diagonal of the best hypothesis' cuboid.
+double reachOf(const Object& object) {
+  return 0.5 * object.best().x.segment<3>(kSize).array().exp().matrix().norm();
+}
+
+bool touch(const Object& a, const Object& b, double reach) {
+  return (a.best().x - b.best().x).head<3>().squaredNorm() <= reach * reach;
+}
+
+bool oneHasBeenSeen(const Object& a, const Object& b) {
+  return bothSeen(a, b) || hides(a, b) || hides(b, a);
+}
+
+}  // namespace
+
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
+  std::vector<double> reach;
+  for (const Object& o : objects) reach.push_back(reachOf(o));
   for (std::size_t i = 0; i < objects.size(); ++i) {
     for (std::size_t j = i + 1; j < objects.size();) {
-      if (!bothSeen(objects[i], objects[j]) && !hides(objects[i], objects[j]) &&
-          !hides(objects[j], objects[i])) {
+      Object &a = objects[i], &b = objects[j];
+      if (!touch(a, b, reach[i] + reach[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
+          !sameSpace(a, b, frame)) {
         ++j;
         continue;
       }
-      const State& a = objects[i].best().x;
-      const State& b = objects[j].best().x;
-      const double reach = a.segment<3>(kSize).array().exp().matrix().norm() +
-                           b.segment<3>(kSize).array().exp().matrix().norm();
-      if ((a - b).head<3>().norm() > 0.5 * reach || !sameKind(objects[i], objects[j]) ||
-          !sameSpace(objects[i], objects[j], frame)) {
-        ++j;
-        continue;
-      }
-      bringUpToDate(objects[i], objects[j], frame);
-      if (older(objects[j], objects[i])) std::swap(objects[i], objects[j]);
-      absorb(objects[i], objects[j], frame);
-      merges.push_back({objects[i].id, objects[j].id});
+      bringUpToDate(a, b, frame);
+      if (older(b, a)) std::swap(a, b);
+      absorb(a, b, frame);
+      merges.push_back({a.id, b.id});
       objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+      reach.erase(reach.begin() + static_cast<std::ptrdiff_t>(j));
+      reach[i] = reachOf(objects[i]);
     }
   }
   return merges;

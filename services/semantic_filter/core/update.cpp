@@ -104,12 +104,14 @@ Shares sharesOf(const HypothesisLook& h, const std::vector<std::size_t>& looked_
 }
 
 void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
-                 const std::vector<Evidence>& boxes, double repeated, const FrameContext& frame) {
+                 const HypothesisLook& seen, const std::vector<Evidence>& boxes, double repeated,
+                 const FrameContext& frame) {
+  const ProjectedBox* at_prior = seen.box ? &*seen.box : nullptr;
   std::vector<std::pair<double, Hypothesis>> parts;
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
-    parts.emplace_back(shares.box[i], updateWithBox(h, z, look.sight.hidden, repeated, frame));
+    parts.emplace_back(shares.box[i], updateWithBox(h, z, look.sight.hidden, repeated, frame, at_prior));
   }
   if (parts.empty()) return;
   const double weight = h.weight;
@@ -261,16 +263,19 @@ double weigh(Object& object, const std::vector<Shares>& shares, double worth) {
 
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repeated,
-                         const FrameContext& frame) {
+                         const FrameContext& frame, const ProjectedBox* at_prior) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   State x = prior.x;
   double doubt = 1.0;
   Innovation y;
   std::optional<Gain> gain;
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
-    const auto box = projectObserved(x, frame.view, frame.offsetOf(prior.class_name));
-    if (!box) break;
-    Innovation now = innovation(z, *box, hidden);
+    std::optional<ProjectedBox> box;
+    if (i > 0 || !at_prior) {
+      box = projectObserved(x, frame.view, frame.offsetOf(prior.class_name));
+      if (!box) break;
+    }
+    Innovation now = innovation(z, box ? *box : *at_prior, hidden);
     if (now.count == 0) break;
     now.variance *= repeated * doubt;
     const Gains PHt = prior.P.leftCols<kVelocity>().lazyProduct(now.H.transpose()) +
@@ -351,7 +356,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   count(object, seen, shares, look);
   const double repeated = repetition(object, frame);
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    updateState(object.hypotheses[i], shares[i], look, boxes, repeated, frame);
+    updateState(object.hypotheses[i], shares[i], look, look.hypotheses[i], boxes, repeated, frame);
   }
   const double exponent = seen * hit.worth + 1.0 - seen;
   const LookReasons reasons = 

@@ -21,10 +21,11 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const FrameContext& frame);
 
 /// One hypothesis against one box: the iterated consider-EKF. The box's variance counts `repeated`
-/// times, and more where the box is an outlier.
+/// times, and more where the box is an outlier. `at_prior` is the projection of the prior where it is
+/// known already.
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repeated,
-                         const FrameContext& frame);
+                         const FrameContext& frame, const ProjectedBox* at_prior = nullptr);
 
 /// A network's azimuth as a weak measurement of yaw modulo 180°, with `weight` in (0, 1]; head or
 /// tail is kept as log-odds. Returns the likelihood of the azimuth, for weighing yaw modes only.
