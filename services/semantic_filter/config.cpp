@@ -122,10 +122,12 @@ void describeSmooth(SmoothParameters& p, Fields& fields) {
   fields.integer("smooth.keyframes", p.keyframes, between(0, 100),
                  {"looks that are remembered of an object; 0: nothing is estimated from them"});
   fields.integer("smooth.least", p.least, between(3, 100), {"fewer are not estimated from"});
-  fields.integer("smooth.per_frame", p.per_frame, between(1, 10000),
-                 {"objects that are smoothed in one frame at most, those in most need; the others wait"});
-  fields.integer("smooth.patience", p.patience, between(1, 1000),
-                 {"where smoothing finds little to mend it is done up to so many times more seldom"});
+  fields.integer(
+      "smooth.per_frame", p.per_frame, between(1, 10000),
+      {"objects that are smoothed in one frame at most, those in most need; the others wait"});
+  fields.integer(
+      "smooth.patience", p.patience, between(1, 1000),
+      {"where smoothing finds little to mend it is done up to so many times more seldom"});
   fields.number("smooth.new_view", p.new_view, positive(),
                 {"change of view (b's correlation falls to 1/e at 1) that is remembered"});
   fields.number("smooth.place", p.place, positive(),

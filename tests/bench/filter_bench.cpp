@@ -1,15 +1,14 @@
 // Processor time and heap allocations of the filter for each frame, with so many things in view:
 // a field of chairs, people and cars that a camera drives through, seen by a network that misses
 // one in ten and makes false boxes, poses that drift and say so. One thread.
-#include <ctime>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <deque>
 #include <iostream>
 #include <random>
-
-#include <fmt/format.h>
 
 #include "services/semantic_filter/priors.h"
 #include "tests/bench/allocations.h"
@@ -60,7 +59,8 @@ class Field {
       const double side = (u(random_) < 0.5 ? -1.0 : 1.0) * (1.5 + kHalfWidth * u(random_));
       const double yaw = 2.0 * M_PI * u(random_), kind = u(random_);
       TrueObject thing =
-          kind < 0.5 ? TrueObject{testing::makeState(planted_, side, 0.45, yaw, .5, .5, .9), "chair"}
+          kind < 0.5
+              ? TrueObject{testing::makeState(planted_, side, 0.45, yaw, .5, .5, .9), "chair"}
           : kind < 0.9
               ? TrueObject{testing::makeState(planted_, side, 0.87, yaw, .5, .6, 1.74), "person"}
               : TrueObject{testing::makeState(planted_, side, 0.75, yaw, 4.2, 1.8, 1.5), "car"};

@@ -25,8 +25,8 @@ struct LookReasons {
   std::vector<ClassNumber> activation;
 };
 
-/// `looked_at` are the look's boxes; `seen` is the probability that one of the boxes is the object's, `worth` the look's where one
-/// is, `exponent` that of A between classes (update.h).
+/// `looked_at` are the look's boxes; `seen` is the probability that one of the boxes is the
+/// object's, `worth` the look's where one is, `exponent` that of A between classes (update.h).
 LookReasons reasonsOf(const Object& object, const std::vector<Shares>& shares, double seen,
                       double worth, double exponent, const std::vector<std::size_t>& looked_at,
                       const std::vector<Evidence>& boxes, const FrameContext& frame);

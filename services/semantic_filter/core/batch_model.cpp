@@ -201,8 +201,8 @@ double BatchModel::age(std::size_t i) const {
              : 0.0;
 }
 
-/// Covariance of the sides of look i (the later one) and j, by what the network and the thing itself
-/// do. `alike` is the correlation of b from the two views.
+/// Covariance of the sides of look i (the later one) and j, by what the network and the thing
+/// itself do. `alike` is the correlation of b from the two views.
 Eigen::Matrix4d BatchModel::ownShare(const Stack& s, std::size_t i, std::size_t j,
                                      double alike) const {
   const Keyframe& a = *looks_.keyframes()[i];

@@ -21,8 +21,8 @@ double logStudent(double nis, double log_det, int n, double tail) {
   thread_local std::array<double, 5> constant{};  // of 1..4 degrees of freedom
   if (cached_tail != tail) {
     for (int i = 1; i <= 4; ++i) {
-      constant[i] = std::lgamma(0.5 * (tail + i)) - std::lgamma(0.5 * tail) -
-                    0.5 * i * std::log(tail * M_PI);
+      constant[i] =
+          std::lgamma(0.5 * (tail + i)) - std::lgamma(0.5 * tail) - 0.5 * i * std::log(tail * M_PI);
     }
     cached_tail = tail;
   }

@@ -43,8 +43,7 @@ std::size_t leastApart(const Eigen::Vector3d& place, const Keyframes& all,
       apart[j] = std::min(apart[j], change);
     }
   }
-  return static_cast<std::size_t>(std::min_element(apart.begin(), apart.end() - 1) -
-                                  apart.begin());
+  return static_cast<std::size_t>(std::min_element(apart.begin(), apart.end() - 1) - apart.begin());
 }
 
 void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales,

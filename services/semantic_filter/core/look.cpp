@@ -27,8 +27,8 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const 
                       const FrameContext& frame) {
   HypothesisLook h;
   h.box = projectObserved(hypothesis.x, frame.view, frame.offsetOf(hypothesis.class_name));
-  h.hit_looks = sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view,
-                            frame.parameters->looks);
+  h.hit_looks =
+      sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view, frame.parameters->looks);
   if (!h.box) return h;
   h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
   const double size =
@@ -72,10 +72,10 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
     result.hypotheses.push_back(lookAt(hypothesis, object, sight, frame));
   }
   for (std::size_t z = 0; z < boxes.size(); ++z) {
-    const bool near = std::any_of(
-        result.hypotheses.begin(), result.hypotheses.end(), [&](const HypothesisLook& h) {
-          return h.box && mayOverlap(boxes[z].z, *h.box, h.covariance);
-        });
+    const bool near = std::any_of(result.hypotheses.begin(), result.hypotheses.end(),
+                                  [&](const HypothesisLook& h) {
+                                    return h.box && mayOverlap(boxes[z].z, *h.box, h.covariance);
+                                  });
     if (near) result.boxes.push_back(z);
   }
   for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {

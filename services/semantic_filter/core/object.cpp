@@ -100,8 +100,11 @@ void normalise(Object& object, ClassEvidence why) {
   for (const auto& h : object.hypotheses) sum += h.weight;
   check(sum > 0.0, "an object keeps a hypothesis of positive weight");
   for (auto& h : object.hypotheses) h.weight /= sum;
-  std::stable_sort(object.hypotheses.begin(), object.hypotheses.end(),
-                   [](const auto& a, const auto& b) { return a.weight > b.weight; });
+  const auto heavier = [](const auto& a, const auto& b) { return a.weight > b.weight; };
+  auto& hs = object.hypotheses;
+  if (!std::is_sorted(hs.begin(), hs.end(), heavier)) {  // which moves nothing
+    std::stable_sort(hs.begin(), hs.end(), heavier);
+  }
   book(object, why);
 }
 

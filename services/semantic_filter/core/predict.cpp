@@ -134,7 +134,8 @@ Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC) {
 }
 
 double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales) {
-  return (a.ray_W - b.ray_W).norm() / scales.angle + (a.ray_C - b.ray_C).norm() / scales.image_angle +
+  return (a.ray_W - b.ray_W).norm() / scales.angle +
+         (a.ray_C - b.ray_C).norm() / scales.image_angle +
          std::abs(a.log_distance - b.log_distance) / scales.log_distance;
 }
 

@@ -250,8 +250,10 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
     accepted.push_back(z);
   }
   std::move(born.begin(), born.end(), std::back_inserter(belief.objects));
-  std::stable_sort(belief.objects.begin(), belief.objects.end(),
-                   [](const auto& a, const auto& b) { return a.id < b.id; });
+  const auto older = [](const auto& a, const auto& b) { return a.id < b.id; };
+  if (!std::is_sorted(belief.objects.begin(), belief.objects.end(), older)) {
+    std::stable_sort(belief.objects.begin(), belief.objects.end(), older);
+  }
 }
 
 StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook& ids) const {

@@ -324,11 +324,10 @@ void smooth(Object& object, const FrameContext& frame) {
   for (const auto& name : names) smoothClass(object, name, looks, frame, verdicts);
   forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
   normalise(object, ClassEvidence::kMotion);
-  const bool same = before.class_name == object.best().class_name &&
-                    before.moving == object.best().moving;
+  const bool same =
+      before.class_name == object.best().class_name && before.moving == object.best().moving;
   const bool settled = same && distance2(before, object.best()) < kLittle;
-  object.smoothing_patience =
-      settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
+  object.smoothing_patience = settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
 }
 
 }  // namespace perdure::semantic_filter

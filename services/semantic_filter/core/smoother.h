@@ -43,8 +43,8 @@ class Smoothed {
   double start_yaw_ = 0.0;
 };
 
-/// Remembers this box of the object's where it shows something new. Whether the object is then to be
-/// smoothed.
+/// Remembers this box of the object's where it shows something new. Whether the object is then to
+/// be smoothed.
 bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
                   const FrameContext& frame);
 /// How much there is to gain: 1 and more is worth it.

@@ -12,9 +12,9 @@ struct MergeRecord {
 };
 
 /// Merges and prunes an object's hypotheses: near ones of the same class and motion become one,
-/// light ones go, so do those that no longer have the size of their class, a dominant class ends the
-/// others, a moving one that stands still is static, and a static object that its boxes contradict
-/// gets a moving twin and one that is misplaced along the ray. Nothing may be left.
+/// light ones go, so do those that no longer have the size of their class, a dominant class ends
+/// the others, a moving one that stands still is static, and a static object that its boxes
+/// contradict gets a moving twin and one that is misplaced along the ray. Nothing may be left.
 void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters);
 
 /// Squared Mahalanobis distance of b from a by a's covariance: geometry, yaw modulo 180°, and the

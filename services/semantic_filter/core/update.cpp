@@ -111,7 +111,8 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
-    parts.emplace_back(shares.box[i], updateWithBox(h, z, look.sight.hidden, repeated, frame, at_prior));
+    parts.emplace_back(shares.box[i],
+                       updateWithBox(h, z, look.sight.hidden, repeated, frame, at_prior));
   }
   if (parts.empty()) return;
   const double weight = h.weight;
@@ -282,8 +283,8 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                       prior.C.lazyProduct(now.H_pose.transpose());
     const Eigen::Matrix<double, 4, 6> pose =
         now.H.lazyProduct(prior.C.topRows<kVelocity>()) + now.H_pose.lazyProduct(P_pose);
-    const Eigen::Matrix4d S = now.H.lazyProduct(PHt.topRows<kVelocity>()) +
-                              now.H_pose.lazyProduct(pose.transpose());
+    const Eigen::Matrix4d S =
+        now.H.lazyProduct(PHt.topRows<kVelocity>()) + now.H_pose.lazyProduct(pose.transpose());
     auto next_gain = gainOf(PHt, S, now.variance);
     if (i == 0 && next_gain) {
       doubt = doubtOf(now, next_gain->L, frame.parameters->box.tail);
@@ -359,7 +360,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
     updateState(object.hypotheses[i], shares[i], look, look.hypotheses[i], boxes, repeated, frame);
   }
   const double exponent = seen * hit.worth + 1.0 - seen;
-  const LookReasons reasons = 
+  const LookReasons reasons =
       reasonsOf(object, shares, seen, hit.worth, exponent, look.boxes, boxes, frame);
   const double mean_A = weigh(object, shares, exponent);
   const double r = object.existence;

@@ -14,15 +14,15 @@
 namespace perdure::semantic_filter {
 
 /// Everything at once for one object that can be seen (look.sight.fraction > 0). `eta` is the
-/// object's row of Association::eta, by the frame's boxes. Does nothing at v = 0. Returns the box that
-/// is surely its own.
+/// object's row of Association::eta, by the frame's boxes. Does nothing at v = 0. Returns the box
+/// that is surely its own.
 std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const Eigen::VectorXd& eta, const std::vector<Evidence>& boxes,
                                   const FrameContext& frame);
 
 /// One hypothesis against one box: the iterated consider-EKF. The box's variance counts `repeated`
-/// times, and more where the box is an outlier. `at_prior` is the projection of the prior where it is
-/// known already.
+/// times, and more where the box is an outlier. `at_prior` is the projection of the prior where it
+/// is known already.
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repeated,
                          const FrameContext& frame, const ProjectedBox* at_prior = nullptr);
