@@ -41,7 +41,15 @@ struct MapHeader {
   std::uint32_t tiles = 0, objects = 0;
 };
 
-enum class MapQueryKind : std::uint8_t { kById = 0, kByClass, kByRadius, kByBox, kAll, kRestore };
+enum class MapQueryKind : std::uint8_t {
+  kById = 0,
+  kByClass,
+  kByRadius,
+  kByBox,
+  kAll,
+  kRestore,  ///< the newest working set of another filter, on `recalled`
+  kRecall,   ///< what is near a place and in no working set, in full, on `recalled`
+};
 
 struct MapQuery {
   InstanceId client = 0;
@@ -52,7 +60,7 @@ struct MapQuery {
   Eigen::Vector3d low = Eigen::Vector3d::Zero();   ///< box corner, or centre of the sphere
   Eigen::Vector3d high = Eigen::Vector3d::Zero();  ///< box corner
   double radius = 0.0;
-  WorldId world;           ///< kRestore: the frame of reference to restore
+  WorldId world;  ///< kRestore, kRecall: the frame of reference that is meant
   std::uint32_t limit = 1000;
 };
 
@@ -61,8 +69,8 @@ struct MapReply {
   std::uint64_t request = 0;
   InstanceId instance = 0;
   bool ok = true;
-  std::string error;        ///< a sentence with the mend where !ok
-  bool truncated = false;   ///< more objects matched than `limit`
+  std::string error;       ///< a sentence with the mend where !ok
+  bool truncated = false;  ///< more objects matched than `limit`
   std::vector<MapObject> objects;
   std::vector<ObjectBelief> beliefs;  ///< the objects in full, where one was asked for by its id
 };
@@ -72,9 +80,13 @@ struct Recalled {
   InstanceId instance = 0;
   WorldId world;          ///< frame of the beliefs
   bool restore = false;   ///< the working set of a filter that went away, in answer to kRestore
-  InstanceId client = 0;  ///< for whom, where restore
+  InstanceId client = 0;  ///< for whom; 0: for every filter
   ObjectId next_id = 1;
   std::vector<ObjectBelief> objects;
+  std::uint64_t request = 0;  ///< of the query; 0: not known
+  /// Time of the newest frame of the client's whose working set is on the disk; 0: none.
+  TimePoint kept;
+  bool truncated = false;  ///< there are more near that place: these are the nearest
 };
 
 }  // namespace perdure

@@ -214,7 +214,7 @@ template <class A, Is<MapQuery> D, class W>
 void describe(A& a, D& d, W& w) {
   a.value("client", d.client, w.client);
   a.value("request", d.request, w.request);
-  a.choice("kind", d.kind, w.kind, MapQueryKind::kRestore);
+  a.choice("kind", d.kind, w.kind, MapQueryKind::kRecall);
   a.value("object_id", d.object_id, w.object_id);
   a.text("class_name", d.class_name, w.class_name, kNameLength);
   a.matrix("low", d.low, w.low, kCoordinate);

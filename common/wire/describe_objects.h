@@ -104,6 +104,9 @@ void describe(A& a, D& d, W& w) {
   a.value("client", d.client, w.client);
   a.value("next_id", d.next_id, w.next_object_id);
   a.list("objects", d.objects, w.items, kObjects);
+  a.value("request", d.request, w.request);
+  a.time("kept_ns", d.kept, w.kept_ns);
+  a.value("truncated", d.truncated, w.truncated);
 }
 
 template <class A, Is<Event> D, class W>

@@ -16,6 +16,7 @@ std::string faultOf(const MapQuery& query) {
   if (query.limit == 0) return "limit is 0; ask for at least one object";
   switch (query.kind) {
     case MapQueryKind::kByRadius:
+    case MapQueryKind::kRecall:
       if (!query.low.allFinite() || !std::isfinite(query.radius) || query.radius < 0.0) {
         return "a radius query needs a finite centre and a radius of at least 0 m";
       }
@@ -60,6 +61,8 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
     blame(working.error());
   } else if (*working) {
     newest_ = std::move(**working);
+    kept_of_ = newest_->instance;
+    kept_ = newest_->stamp.time;
     next_id_ = std::max(next_id_, newest_->next_id);
   }
   if (next_id_ > 1) next_id_ += kIdReserve;
@@ -142,6 +145,8 @@ void Node::commit() {
   }
   failure_.clear();
   dirty_ = false;
+  kept_of_ = newest_->instance;
+  kept_ = newest_->stamp.time;
   left_.clear();
   removed_.clear();
   ++commits_;
@@ -177,6 +182,7 @@ void Node::publishSquare(const Square& square) {
 
 void Node::onQuery(const MapQuery& query) {
   if (query.kind == MapQueryKind::kRestore) return restore(query);
+  if (query.kind == MapQueryKind::kRecall && faultOf(query).empty()) return recall(query);
   if (const MapReply* again = replies_.find(query.client, query.request)) {
     reasons_.add("query_repeated");
     return outputs_.reply(*again);
@@ -231,6 +237,25 @@ void Node::restore(const MapQuery& query) {
     }
   }
   reasons_.add("restores");
+  outputs_.recalled(recalled);
+}
+
+/// What the filter has just let go is written first: the answer is about what it has now.
+void Node::recall(const MapQuery& query) {
+  if (dirty_) commit();
+  const auto limit = std::min(query.limit, static_cast<std::uint32_t>(config_.query_limit));
+  auto found = database_.reader().longTermNear(query.low, query.radius, query.world, limit);
+  if (!found) return blame(found.error());
+  if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
+  Recalled recalled;
+  recalled.instance = instance_;
+  recalled.world = query.world;
+  recalled.client = query.client;
+  recalled.next_id = next_id_;
+  recalled.objects = std::move(found->beliefs);
+  recalled.request = query.request;
+  if (kept_of_ == query.client) recalled.kept = kept_;
+  recalled.truncated = found->truncated;
   outputs_.recalled(recalled);
 }
 

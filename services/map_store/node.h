@@ -59,6 +59,7 @@ class Node {
   void publishSquare(const Square& square);
   MapReply answer(const MapQuery& query);
   void restore(const MapQuery& query);
+  void recall(const MapQuery& query);
   const Objects* workingSetFor(const MapQuery& query) const;
   void blame(const Reason& reason);
 
@@ -74,6 +75,8 @@ class Node {
   std::map<ObjectId, PlacedBelief> left_;
   std::map<ObjectId, Removal> removed_;
   ObjectId next_id_ = 1;
+  InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk
+  TimePoint kept_;          ///< of its newest frame there
   std::uint64_t revision_ = 0;
   bool dirty_ = false, published_once_ = false, header_stale_ = false;
   std::optional<Duration> committed_at_, published_at_;

@@ -22,11 +22,23 @@ Event make(const Event& blank, EventKind kind, const ObjectBelief& object, doubl
 
 }  // namespace
 
+/// What was said of it before it went is not said again.
+EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
+  Known known;
+  known.confirmed = known.ever_confirmed = o.confirmed;
+  known.resolved = o.confirmed && o.best().probability >= kResolved;
+  known.hidden = isHidden(o.visibility);
+  known.moving = o.moving > 0.5;
+  known.class_name = o.best().name;
+  return known;
+}
+
 void EventTracker::recalled(ObjectId id, bool restored) { recalled_[id] = restored; }
 
 void EventTracker::clear() {
   known_.clear();
   recalled_.clear();
+  archived_.clear();
 }
 
 void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Event>& events,
@@ -90,7 +102,7 @@ std::vector<Event> EventTracker::update(const Objects& objects,
                                                      : EventKind::kRecalled;
       events.push_back(make(blank, kind, o, o.existence));
       if (back != recalled_.end()) {
-        it->second.confirmed = it->second.ever_confirmed = o.confirmed;
+        it->second = comeBack(o);
         recalled_.erase(back);
       }
     }
@@ -101,15 +113,16 @@ std::vector<Event> EventTracker::update(const Objects& objects,
       ++it;
       continue;
     }
-    if (it->second.ever_confirmed) {
+    if (const bool kept = archived_.contains(it->first); kept || it->second.ever_confirmed) {
       Event e = blank;
-      e.kind = EventKind::kGone;
+      e.kind = kept ? EventKind::kArchived : EventKind::kGone;
       e.object_id = it->first;
       e.class_name = it->second.class_name;
       events.push_back(e);
     }
     it = known_.erase(it);
   }
+  archived_.clear();
   return events;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <vector>
 
 #include "common/types/objects.h"
@@ -15,6 +16,8 @@ class EventTracker {
   std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
   /// Objects that came back from the map with this id; the next update says so.
   void recalled(ObjectId id, bool restored);
+  /// Objects that wait on the map from now on; the next update says so.
+  void archived(ObjectId id) { archived_.insert(id); }
   void clear();
 
  private:
@@ -24,11 +27,13 @@ class EventTracker {
     std::string class_name;
   };
 
+  static Known comeBack(const ObjectBelief& object);
   void compare(const ObjectBelief& object, Known& known, std::vector<Event>& events,
                const Event& blank);
 
   std::map<ObjectId, Known> known_;
   std::map<ObjectId, bool> recalled_;
+  std::set<ObjectId> archived_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -33,8 +33,8 @@ class Gate {
   std::deque<std::function<void()>> held_;
 };
 
-void askForRestore(service::Context& context, const semantic_filter::Config& config, Gate& gate) {
-  auto& queries = context.writer(topics::kMapQuery);
+void askForRestore(service::Context& context, bus::Writer<MapQuery>& queries,
+                   const semantic_filter::Config& config, Gate& gate) {
   context.every(std::chrono::milliseconds(100), [&, tries = 0]() mutable {
     if (gate.isOpen()) return;
     if (0.1 * tries++ > config.restore.timeout_s) {
@@ -51,6 +51,7 @@ void askForRestore(service::Context& context, const semantic_filter::Config& con
 
 void serve(service::Context& context, const semantic_filter::Config& config) {
   auto& states = context.writer(topics::kObjectState);
+  auto& queries = context.writer(topics::kMapQuery);
   semantic_filter::ObjectStates changed;
   const auto publish = [&, objects = context.sink(topics::kObjects)](const Objects& m) {
     objects(m);
@@ -62,7 +63,8 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   semantic_filter::Node node(config, semantic_filter::loadPriors(config), context.instance(),
                              {.objects = publish,
                               .events = context.sink(topics::kEvents),
-                              .predictions = context.sink(topics::kPredictions)});
+                              .predictions = context.sink(topics::kPredictions),
+                              .queries = [&](const MapQuery& m) { (void)queries.write(m); }});
   Gate gate;
   bus::Once odometry_once, detections_once;
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
@@ -83,7 +85,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
     if (!detections_once.first(m.stamp.source, m.stamp.sequence)) return;
     gate.pass([&, m] { node.onDetections(m); });
   });
-  askForRestore(context, config, gate);
+  askForRestore(context, queries, config, gate);
   context.onHealth([&] {
     context.health().state(gate.isOpen() ? HealthState::kOk : HealthState::kStarting,
                            gate.isOpen() ? "" : "waits for the map store's working set");

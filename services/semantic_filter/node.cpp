@@ -18,7 +18,8 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
     : config_(config),
       instance_(instance),
       outputs_(std::move(outputs)),
-      filter_(config.filter, priors) {}
+      filter_(config.filter, priors),
+      long_term_(config.filter.memory) {}
 
 void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) {
@@ -87,6 +88,7 @@ void Node::beginWorld(const WorldId& world) {
   pose_error_ = {};
   last_T_WB_.reset();
   events_.clear();
+  long_term_.clear();
   if (waiting_recalled_ && waiting_recalled_->world == world) insertRecalled(*waiting_recalled_);
   waiting_recalled_.reset();
 }
@@ -206,7 +208,9 @@ void Node::stepAgainFrom(std::size_t index) {
 void Node::flush() {
   if (history_.empty() || history_.back().stepped) return;
   stepEntry(history_.back());
+  letGo(history_.back());
   publish(history_.back());
+  askTheMap(history_.back());
 }
 
 void Node::publish(const Entry& entry) {
@@ -255,42 +259,6 @@ void Node::publishPredictions(const Entry& entry) {
         {object.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability});
   }
   outputs_.predictions(predictions);
-}
-
-void Node::insertRecalled(const Recalled& recalled) {
-  ids_.atLeast(recalled.next_id);
-  for (auto belief : recalled.objects) {
-    if (belief.classes.empty() || belief.id == 0) {
-      reasons_.add("recalled_malformed");
-      continue;
-    }
-    ids_.atLeast(belief.id + 1);
-    const auto same = [&](const Object& o) { return o.id == belief.id; };
-    if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) continue;
-    removeContext(belief);
-    const Object object =
-        fromBelief(belief, pose_error_.product,
-                   recalled.restore ? ExistenceEvidence::kRestore : ExistenceEvidence::kRecall);
-    events_.recalled(belief.id, recalled.restore);
-    const auto insert = [&](Belief& b) {
-      const auto at = std::find_if(b.objects.begin(), b.objects.end(),
-                                   [&](const Object& o) { return o.id > object.id; });
-      b.objects.insert(at, object);
-    };
-    insert(belief_);
-    for (auto& entry : history_) insert(entry.before);
-  }
-}
-
-void Node::onRecalled(const Recalled& recalled) {
-  if (recalled.restore && recalled.client != instance_) return;
-  ids_.atLeast(recalled.next_id);
-  if (!world_) {
-    waiting_recalled_ = recalled;
-    return;
-  }
-  if (recalled.world != *world_) return reasons_.add("recalled_of_other_world");
-  insertRecalled(recalled);
 }
 
 }  // namespace perdure::semantic_filter

@@ -15,6 +15,7 @@
 #include "common/base/sink.h"
 #include "common/types/map.h"
 #include "services/semantic_filter/config.h"
+#include "services/semantic_filter/core/long_term.h"
 #include "services/semantic_filter/core/semantic_filter.h"
 #include "services/semantic_filter/events.h"
 
@@ -24,6 +25,7 @@ struct Outputs {
   Sink<Objects> objects;  ///< one for each odometry frame, in order
   Sink<Event> events;
   Sink<Predictions> predictions;
+  Sink<MapQuery> queries = {};  ///< to the map, for what comes near
 };
 
 class Node {
@@ -62,7 +64,13 @@ class Node {
   void stepAgainFrom(std::size_t index);
   void publish(const Entry& entry);
   void publishPredictions(const Entry& entry);
+  // In node_memory.cpp.
   void insertRecalled(const Recalled& recalled);
+  void insert(const Object& object);
+  void restore(const ObjectBelief& belief);
+  void recall(const ObjectBelief& belief);
+  void letGo(const Entry& entry);
+  void askTheMap(const Entry& entry);
 
   Config config_;
   InstanceId instance_;
@@ -82,6 +90,7 @@ class Node {
   std::vector<MergeRecord> late_merges_;
   std::optional<Recalled> waiting_recalled_;
   EventTracker events_;
+  LongTerm long_term_;
   ReasonCounts reasons_;
 };
 

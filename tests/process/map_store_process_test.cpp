@@ -86,6 +86,32 @@ TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
   EXPECT_EQ(answers[0].objects[2].why, frame(1, 3).objects[2].why);
 }
 
+TEST_F(MapStoreProcess, GivesBackWhatLeftTheWorkingSetAndSaysThatItHasIt) {
+  const auto child = start();
+  bus::Reader<Recalled> recalled(participant_, bus::topics::kRecalled);
+  bus::Writer<MapQuery> queries(participant_, bus::topics::kMapQuery);
+  ASSERT_TRUE(eventually(5s, [&] { return recalled.matched() > 0 && queries.matched() > 0; }));
+  ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
+  ASSERT_TRUE(objects_.write(frame(2, 1)).has_value());
+  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
+  MapQuery query;
+  query.client = frame(1, 3).instance;
+  query.request = 5;
+  query.kind = MapQueryKind::kRecall;
+  query.radius = 100.0;
+  query.world = frame(1, 3).world;
+  ASSERT_TRUE(queries.write(query).has_value());
+  std::vector<Recalled> answers;
+  ASSERT_TRUE(eventually(5s, [&] {
+    recalled.drain([&](const Recalled& r) { answers.push_back(r); });
+    return !answers.empty();
+  })) << child->log();
+  EXPECT_EQ(answers[0].request, 5u);
+  EXPECT_EQ(answers[0].kept, frame(2, 1).stamp.time);
+  ASSERT_EQ(answers[0].objects.size(), 2u);
+  EXPECT_EQ(answers[0].objects[1].best().mean, frame(1, 3).objects[2].best().mean);
+}
+
 TEST_F(MapStoreProcess, SaysWhyOverDdsAndFromItsFileAlike) {
   const auto child = start();
   ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
@@ -158,9 +184,9 @@ TEST_F(MapStoreProcess, EndsWithinASecondAndLeavesAFileThatTheCommandReads) {
   ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 4; }));
   child->signal(SIGTERM);
   EXPECT_EQ(child->wait(1s), 0) << child->log();
-  Child command({(programs() / "perdure").string(), "map", "list", "--db",
-                 folder_.file("map.sqlite")},
-                folder_.file("list"));
+  Child command(
+      {(programs() / "perdure").string(), "map", "list", "--db", folder_.file("map.sqlite")},
+      folder_.file("list"));
   EXPECT_EQ(command.wait(10s), 0) << command.log();
   EXPECT_THAT(command.log(), HasSubstr("car"));
 }

@@ -36,8 +36,8 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--config", options.configs, "service=FILE in place of config/service.yaml")
       ->take_all();
   app.add_option("--set", options.assignments,
-                 "service.key=value; services are vio, semantic_filter, inference and detector, "
-                 "the simulated one")
+                 "service.key=value; services are vio, semantic_filter, inference, map_store and "
+                 "detector, the simulated one")
       ->take_all();
   app.add_flag("--pictures", options.pictures, "Also overlay.mp4: the frames with the objects");
   app.add_flag("--quiet", options.quiet, "No progress");

@@ -15,7 +15,7 @@ namespace perdure::tools {
 namespace {
 
 // Fixed, so that nothing in the outputs depends on the run.
-constexpr InstanceId kCapture = 1, kVio = 2, kInference = 3, kFilter = 4;
+constexpr InstanceId kCapture = 1, kVio = 2, kInference = 3, kFilter = 4, kMapStore = 5;
 
 double wallMs() {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
@@ -39,26 +39,42 @@ Pipeline::Pipeline(const PipelineOptions& options)
   openData();
   openOdometry(options);
   openDetections(options);
-  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
   outputs_ = std::make_unique<OutputWriter>(options.out, sequenceName(options));
+  openFilter();
+  outputs_->onCalibration(dataset_->calibration());
+  filter_->onCalibration(dataset_->calibration());
+  if (inference_) filter_->onModel(inference_->model());
+  if (simulated_) filter_->onModel(simulated_->info());
+}
+
+void Pipeline::openFilter() {
+  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
     outputs_->onObjects(objects);
+    map_->onObjects(objects);
     if (vio_) vio_->onObjects(objects);
     const auto started = started_ms_.find(objects.stamp.sequence);
     if (started == started_ms_.end()) return;
     counts_.latency_ms.push_back(wallMs() - started->second);
     started_ms_.erase(started);
   };
-  sinks.events = [this](const Event& event) { outputs_->onEvent(event); };
-  sinks.predictions = [](const Predictions&) {};
+  sinks.events = [this](const Event& event) {
+    outputs_->onEvent(event);
+    map_->onEvent(event);
+  };
+  sinks.queries = [this](const MapQuery& query) { map_->onQuery(query); };
   filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors, kFilter,
                                                     std::move(sinks));
-  outputs_->onCalibration(dataset_->calibration());
-  filter_->onCalibration(dataset_->calibration());
-  if (inference_) filter_->onModel(inference_->model());
-  if (simulated_) filter_->onModel(simulated_->info());
+  map_ =
+      std::make_unique<MapMemory>(configs_.map_store, outputs_->folder() / "map.sqlite", kMapStore,
+                                  [this](const Recalled& m) { filter_->onRecalled(m); });
+}
+
+/// What the filter has said reaches the map, and its questions are answered.
+void Pipeline::remember() {
+  timer_.timeTowardsNext("map_store", [&] { map_->work(); });
 }
 
 Pipeline::~Pipeline() = default;
@@ -161,6 +177,7 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
   if (simulated_) offerDue(TimePoint::max());
   deliver();
   timer_.timeTowardsNext("semantic_filter", [&] { filter_->flush(); });
+  timer_.time("map_store", [&] { map_->finish(); });
 }
 
 void Pipeline::handle(const replay::Message& message) {
@@ -196,6 +213,7 @@ void Pipeline::handleFrame(const Frame& frame) {
   detect(frame);
   deliver();
   timer_.time("semantic_filter", [] {});
+  timer_.time("map_store", [] {});
 }
 
 void Pipeline::detect(const Frame& frame) {
@@ -254,10 +272,12 @@ void Pipeline::deliver() {
     if (waits_for_detections_.size() > 64)
       waits_for_detections_.erase(waits_for_detections_.begin());
     timer_.timeTowardsNext("semantic_filter", [&] { deliverDetections(frame); });
+    remember();
     landmarks_.erase(landmarks_.begin(), landmarks_.upper_bound(frame));
   }
   while (!waiting_.empty() && waits_for_detections_.contains(waiting_.begin()->first)) {
     timer_.timeTowardsNext("semantic_filter", [&] { deliverDetections(waiting_.begin()->first); });
+    remember();
   }
   while (waiting_.size() > 256) waiting_.erase(waiting_.begin());
 }
@@ -287,6 +307,7 @@ std::string Pipeline::drawOverlay(
 std::map<std::string, ReasonCounts> Pipeline::reasons() const {
   std::map<std::string, ReasonCounts> all{{"capture", dataset_->reasons()},
                                           {"semantic_filter", filter_->reasons()},
+                                          {"map_store", map_->reasons()},
                                           {"pipeline", reasons_}};
   if (vio_) all["vio"] = vio_->reasons();
   return all;

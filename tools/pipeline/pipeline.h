@@ -15,6 +15,7 @@
 #include "services/vio/node.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
+#include "tools/pipeline/map_memory.h"
 #include "tools/pipeline/odometry_source.h"
 #include "tools/pipeline/settings.h"
 
@@ -54,6 +55,8 @@ class Pipeline {
   void openOdometry(const PipelineOptions& options);
   void openDetections(const PipelineOptions& options);
   void openData();
+  void openFilter();
+  void remember();
   replay::DatasetOptions dataOptions() const;
   void handle(const replay::Message& message);
   void handleFrame(const Frame& frame);
@@ -75,6 +78,7 @@ class Pipeline {
   std::unique_ptr<SimulatedDetections> simulated_;
   std::unique_ptr<vio::Node> vio_;
   std::unique_ptr<semantic_filter::Node> filter_;
+  std::unique_ptr<MapMemory> map_;
   bool uses_vio_ = false;
   std::uint64_t model_hash_ = 0;
   std::optional<TimePoint> first_frame_;

@@ -20,11 +20,13 @@ std::vector<Service> describeAll(ServiceConfigs& configs) {
   std::vector<Service> services{{"vio", "vio.yaml", {}},
                                 {"semantic_filter", "semantic_filter.yaml", {}},
                                 {"inference", "inference.yaml", {}},
+                                {"map_store", "map_store.yaml", {}},
                                 {"detector", "simulated_detector.yaml", {}}};
   vio::describe(configs.vio, services[0].fields);
   semantic_filter::describe(configs.semantic_filter, services[1].fields);
   inference::describe(configs.inference, services[2].fields);
-  describe(configs.detector, services[3].fields);
+  map_store::describe(configs.map_store, services[3].fields);
+  describe(configs.detector, services[4].fields);
   return services;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/inference/config.h"
+#include "services/map_store/config.h"
 #include "services/semantic_filter/config.h"
 #include "services/vio/config.h"
 #include "tools/pipeline/simulated_source.h"
@@ -34,8 +35,9 @@ struct ServiceConfigs {
   vio::Config vio;
   semantic_filter::Config semantic_filter;
   inference::Config inference;
-  DetectorConfig detector;   ///< of --detections simulated; service `detector`
-  std::uint64_t digest = 0;  ///< of all values
+  map_store::Config map_store;  ///< its path is OUT/map.sqlite, whatever it says
+  DetectorConfig detector;      ///< of --detections simulated; service `detector`
+  std::uint64_t digest = 0;     ///< of all values
 };
 
 /// Throws StartupError: kConfiguration with all that is wrong, kUsage for an unknown service.

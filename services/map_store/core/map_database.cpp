@@ -175,6 +175,19 @@ Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
   return {};
 }
 
+/// Those of the last working set that are on the map and were no longer confirmed.
+Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
+  auto rows = connection_.prepare(
+      "SELECT w.id FROM working w JOIN objects o ON o.id = w.id WHERE w.belief IS NOT NULL");
+  if (!rows) return failed(rows.error());
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return failed(row.error());
+    if (!*row) return {};
+    ids.insert(rows->id(0));
+  }
+}
+
 Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
@@ -242,6 +255,7 @@ Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
   for (const auto& belief : batch.working->objects) alive.insert(belief.id);
   for (const auto& [id, row] : committed_) away.insert(id);
   for (const auto& [id, placed] : batch.left) away.insert(id);
+  if (done) done = addDoubtful(away);
   for (const ObjectId id : away) {
     if (done && !alive.contains(id)) done = markLeft(id, change);
   }

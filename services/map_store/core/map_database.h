@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -49,7 +50,7 @@ struct Written {
 
 struct Found {
   std::vector<MapObject> objects;
-  std::vector<ObjectBelief> beliefs;  ///< of kById: the objects in full
+  std::vector<ObjectBelief> beliefs;  ///< of kById and longTermNear: the objects in full
   bool truncated = false;
   std::uint64_t malformed = 0;  ///< rows whose belief could not be read; left out
 };
@@ -68,6 +69,9 @@ class MapReader {
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
+  /// What is nearer than radius and not in the working set as committed: nearest first, in full.
+  Result<Found> longTermNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
+                             std::uint32_t limit) const;
   Result<Found> inSquare(const Square& square) const;
   Result<std::map<Square, std::uint32_t>> squares() const;  ///< with counts of objects
   /// The working set as it was at the last commit; nothing on an empty map.
@@ -108,6 +112,7 @@ class MapDatabase {
   Result<void> put(const PlacedBelief& placed, TimePoint now, Change& change);
   Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes);
   Result<void> putObjects(const Batch& batch, Change& change);
+  Result<void> addDoubtful(std::set<ObjectId>& ids) const;
   Result<void> markLeft(ObjectId id, Change& change);
   Result<void> remove(ObjectId id, const Removal& removal, Change& change);
   Result<void> putWorking(const Objects& working, const Change& change);

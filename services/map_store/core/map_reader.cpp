@@ -61,11 +61,12 @@ Result<Statement> byBox(const Connection& connection, const MapQuery& query, con
 }
 
 Result<Statement> byRadius(const Connection& connection, const MapQuery& query,
-                           const WorldId& world) {
+                           const WorldId& world, const std::string& condition = "") {
   constexpr char kSquaredDistance[] =
       "((o.x - ?9) * (o.x - ?9) + (o.y - ?10) * (o.y - ?10) + (o.z - ?11) * (o.z - ?11))";
-  auto statement = connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
-                                      " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
+  auto statement =
+      connection.prepare(std::string(kColumns) + kInBox + condition + "AND " + kSquaredDistance +
+                         " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
   if (!statement) return statement;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(query.radius);
   bindBox(*statement, query.low - reach, query.low + reach, world);
@@ -95,9 +96,10 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
     case MapQueryKind::kAll:
       return connection.prepare(from + "ORDER BY o.id");
     case MapQueryKind::kRestore:
+    case MapQueryKind::kRecall:
       break;
   }
-  return fail("query_invalid", "a restore is not a question about the map");
+  return fail("query_invalid", "a restore or recall is not a question about the map");
 }
 
 /// The beliefs of the working set; confirmed ones are in `objects`.
@@ -163,6 +165,17 @@ Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
     if (!*row) return beliefs;
     if (auto placed = beliefFrom(*rows)) beliefs.push_back(std::move(*placed));
   }
+}
+
+Result<Found> MapReader::longTermNear(const Eigen::Vector3d& centre, double radius,
+                                      const WorldId& world, std::uint32_t limit) const {
+  MapQuery query;
+  query.low = centre;
+  query.radius = radius;
+  auto statement =
+      byRadius(*connection_, query, world, "AND o.id NOT IN (SELECT id FROM working) ");
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  return collect(*statement, limit, true);
 }
 
 Result<Found> MapReader::inSquare(const Square& square) const {

@@ -156,6 +156,7 @@ Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product,
   object.existence = {belief.existence, belief.why.existence, back, belief.as_of};
   object.classes = {belief.why.classes, belief.why.ousted};
   object.confirmed = belief.confirmed;
+  object.once_confirmed = belief.confirmed || back == ExistenceEvidence::kRecall;
   for (const auto& c : belief.classes) {
     Hypothesis h;
     h.class_name = c.name;

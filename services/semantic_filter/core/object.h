@@ -50,6 +50,7 @@ struct Object {
   Existence existence;
   std::vector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
   bool confirmed = false;
+  bool once_confirmed = false;  ///< it was; hence the map knows it
   TimePoint first_seen, last_seen, as_of;
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
   std::uint32_t hits = 0, visible_misses = 0;

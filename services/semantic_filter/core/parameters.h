@@ -117,6 +117,14 @@ struct SmoothParameters {
   double least_weight = 0.02;   ///< of a hypothesis that is worth it
 };
 
+/// Of what leaves the working set for the map and comes back (DESIGN 5, item 13).
+struct MemoryParameters {
+  bool archive = true;
+  double recall_m = 100.0;  ///< from the body: what the map holds nearer than this comes back
+  double margin_m = 30.0;   ///< and leaves when it is farther than both together
+  double after_s = 5.0;     ///< and was not seen for so long
+};
+
 struct Parameters {
   BoxParameters box;
   ClutterParameters clutter;
@@ -127,6 +135,7 @@ struct Parameters {
   VisibilityParameters visibility;
   TendParameters tend;
   SmoothParameters smooth;
+  MemoryParameters memory;
 };
 
 }  // namespace perdure::semantic_filter

@@ -186,6 +186,7 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
       ExistenceEvidence::kMerge, a.as_of);
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
+  a.once_confirmed = a.once_confirmed || b.once_confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);
   a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
   a.support = std::max(a.support, b.support);
@@ -398,7 +399,7 @@ void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
     }
     if (o.existence >= parameters.confirm && o.hits >= parameters.confirm_hits &&
         sigma < parameters.confirm_sigma_m) {
-      o.confirmed = true;
+      o.confirmed = o.once_confirmed = true;
     }
   }
   std::erase_if(objects, [&](const Object& o) {

@@ -133,7 +133,7 @@ class Examples {
     m = {stamp(), word(), bits(), bits(), several([&] { return detection(); })};
   }
   void fill(ModelInfo& m) {
-    m = {bits(),     bits(),     word(),       several([&] { return word(); }),
+    m = {bits(),     bits(),     word(),        several([&] { return word(); }),
          below(999), below(999), uniform(0, 1), {}};
     for (std::size_t i = 0; i < 4 * m.classes.size(); ++i) {
       m.side_insets.push_back(uniform(-0.4, 0.4));
@@ -180,7 +180,8 @@ class Examples {
   }
   void fill(ObjectState& m) { m = {stamp(), bits(), world(), belief()}; }
   void fill(Recalled& m) {
-    m = {bits(), world(), coin(), bits(), bits(), several([&] { return belief(); })};
+    m = {bits(), world(), coin(), bits(), bits(), several([&] { return belief(); }),
+         bits(), time(),  coin()};
   }
   void fill(Event& m) {
     m = {stamp(), bits(),        world(), static_cast<EventKind>(below(15)), bits(), bits(),
@@ -217,7 +218,7 @@ class Examples {
   void fill(MapQuery& m) {
     m = {bits(),
          bits(),
-         static_cast<MapQueryKind>(below(6)),
+         static_cast<MapQueryKind>(below(7)),
          bits(),
          word(),
          matrix<Eigen::Vector3d>(),

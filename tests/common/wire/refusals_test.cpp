@@ -193,7 +193,7 @@ TEST(Refusals, OfTwoIdsInOneState) {
 
 TEST(Refusals, OfEnumsOutOfRange) {
   EXPECT_EQ(decodeRefusal(example<Event>(), [](auto& w) { w.kind = 200; }), "bad_enum kind");
-  EXPECT_EQ(decodeRefusal(example<MapQuery>(), [](auto& w) { w.kind = 6; }), "bad_enum kind");
+  EXPECT_EQ(decodeRefusal(example<MapQuery>(), [](auto& w) { w.kind = 7; }), "bad_enum kind");
   EXPECT_EQ(decodeRefusal(example<Odometry>(), [](auto& w) { w.state = 3; }), "bad_enum state");
   EXPECT_EQ(decodeRefusal(example<Health>(), [](auto& w) { w.state = 4; }), "bad_enum state");
 }
