@@ -141,9 +141,8 @@ void describeSmooth(SmoothParameters& p, Fields& fields) {
 void describeMemory(MemoryParameters& p, Fields& fields) {
   fields.boolean("memory.archive", p.archive,
                  {"what is far and was not seen for long waits on the map, until it comes near"});
-  fields.number(
-      "memory.recall_m", p.recall_m, between(5, 10000),
-      {"what the map holds nearer to the body comes back: farther than things are seen", "m"});
+  fields.number("memory.recall_m", p.recall_m, between(5, 10000),
+                {"what the map holds nearer to the body comes back", "m"});
   fields.number("memory.margin_m", p.margin_m, between(3, 10000),
                 {"what is farther than recall_m by more than this leaves", "m"});
   fields.number("memory.after_s", p.after_s, positive(), {"and was not seen for this time", "s"});

@@ -87,6 +87,7 @@ void runPipeline(const Setting& setting, const fs::path& folder, const fs::path&
   options.detections = "simulated";
   options.seed = setting.detections_seed;
   options.out = out.string();
+  options.assignments = setting.assignments;
   tools::Pipeline pipeline(options);
   pipeline.run([](const tools::PipelineCounts&) {});
   pipeline.finish();
@@ -178,7 +179,10 @@ std::vector<sim::TruthObject> Outcome::standing(const std::string& class_name) c
 
 Outcome runScene(const Setting& setting) {
   const fs::path folder = sceneFolder(setting);
-  const fs::path out = folder.string() + ".out" + std::to_string(setting.detections_seed);
+  std::string assignments;
+  for (const auto& one : setting.assignments) assignments += one + " ";
+  const fs::path out = folder.string() + ".out" + std::to_string(setting.detections_seed) +
+                       (assignments.empty() ? "" : "-" + toHex(digest(assignments)));
   runPipeline(setting, folder, out);
   Outcome run{tools::readSimulatedTruth(folder), {}, {}, {}, {}, {}, {}, {}};
   run.inst_rows = tools::readObjectRows(out / "objects_inst.csv");

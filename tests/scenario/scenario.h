@@ -24,6 +24,7 @@ struct Setting {
   double rate_hz = 10.0;   ///< of the frames
   std::int64_t detections_seed = 1;
   bool images = false;  ///< rendered, and vio over them in place of true poses
+  std::vector<std::string> assignments = {};  ///< service.key=value
 };
 
 /// An object of the map at the end, as objects.json has it.

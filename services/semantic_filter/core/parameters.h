@@ -120,9 +120,9 @@ struct SmoothParameters {
 /// Of what leaves the working set for the map and comes back (DESIGN 5, item 13).
 struct MemoryParameters {
   bool archive = true;
-  double recall_m = 100.0;  ///< from the body: what the map holds nearer than this comes back
-  double margin_m = 30.0;   ///< and leaves when it is farther than both together
-  double after_s = 5.0;     ///< and was not seen for so long
+  double recall_m = 60.0;  ///< from the body: what the map holds nearer than this comes back
+  double margin_m = 20.0;  ///< and leaves when it is farther than both together
+  double after_s = 5.0;    ///< and was not seen for so long
 };
 
 struct Parameters {

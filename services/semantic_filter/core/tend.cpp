@@ -223,7 +223,9 @@ void bringUpToDate(Object& a, Object& b, const FrameContext& frame) {
   }
 }
 
+/// Whose id survives: that which was claimed, whatever guesses at it are older.
 bool older(const Object& a, const Object& b) {
+  if (a.once_confirmed != b.once_confirmed) return a.once_confirmed;
   return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
 }
 

@@ -30,6 +30,14 @@ const std::vector<TrueObject> kStreet = {{makeState(18, 3.5, 0.75, 0.1, 4.3, 1.7
                                          {makeState(22, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
                                          {makeState(30, 4.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
 
+constexpr MemoryParameters kMemory{true, 100.0, 30.0, 5.0};
+
+Config configWith(const MemoryParameters& memory) {
+  Config config;
+  config.filter.memory = memory;
+  return config;
+}
+
 /// The body always looks along x, with the weave that gives parallax.
 RigidTransform bodyAt(double x) {
   return RigidTransform(
@@ -62,7 +70,7 @@ struct Pair {
   std::uint64_t frame = 0;
   double x = 0.0;
 
-  explicit Pair(const Config& config = {})
+  explicit Pair(const Config& config = configWith(kMemory))
       : filter(config, makePriors(), 9,
                {.objects =
                     [this](const Objects& m) {
@@ -257,7 +265,7 @@ TEST(LongTermMemory, ARestartedFilterRecallsWhatItsPredecessorArchived) {
   std::vector<Objects> objects;
   std::vector<MapQuery> queries;
   std::vector<Recalled> answers;
-  Node second({}, makePriors(), 10,
+  Node second(configWith(kMemory), makePriors(), 10,
               {.objects = [&](const Objects& m) { objects.push_back(m); },
                .events = {},
                .predictions = {},
@@ -323,7 +331,7 @@ Object thingAt(ObjectId id, double x, double seen_s) {
 }
 
 struct Leavers {
-  LongTerm memory{MemoryParameters{}};
+  LongTerm memory{kMemory};
   /// Of a filter at the origin that asks and is answered all along.
   LongTerm::Leaving after(const std::vector<Object>& objects, double now_s = 20.0) {
     (void)memory.leaving(objects, Eigen::Vector3d::Zero(), at(now_s), at(now_s - 3.0));
@@ -366,7 +374,7 @@ TEST(LongTerm, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
 }
 
 TEST(LongTerm, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
-  LongTerm memory{MemoryParameters{}};
+  LongTerm memory{kMemory};
   const std::vector<Object> things = {thingAt(1, 140, 10)};
   const auto question = memory.ask(Eigen::Vector3d::Zero(), at(14.0));
   ASSERT_TRUE(memory.answered(question->request, at(14.0), false));
@@ -377,7 +385,7 @@ TEST(LongTerm, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
 }
 
 TEST(LongTerm, AsksAsTheBodyMovesAndAgainWhereThereWasMoreThanOneAnswerHolds) {
-  LongTerm memory{MemoryParameters{}};
+  LongTerm memory{kMemory};
   std::size_t asked = 0;
   for (int k = 0; k < 1000; ++k) {  // 10 m/s for 100 s
     const Eigen::Vector3d here(k * 1.0, 0, 0);
