@@ -69,7 +69,8 @@ struct Objects {
 };
 
 /// The newest state of one object of the working set; latched on `object_state`, keyed by its id,
-/// and disposed when the object is gone or merged away.
+/// and disposed when the object leaves it: gone, merged away, or archived (it is then on the map;
+/// the events say which).
 struct ObjectState {
   FrameStamp stamp;
   InstanceId instance = 0;

@@ -96,6 +96,7 @@ Cost drive(const MapFile& file, std::uint64_t frames) {
   map_store::Node store(file.config(), 6,
                         {[](auto&) {}, [](auto&) {}, [](auto&) {}, [](auto&) {},
                          [&](const Recalled& r) { answers.push_back(r); }});
+  store.tick(Duration(0));  // publishes the whole map, once at its start
   Node filter(
       {}, makePriors(), 10,
       {.objects = [&](const Objects& m) { objects.push_back(m); },

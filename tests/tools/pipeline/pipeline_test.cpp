@@ -216,7 +216,7 @@ TEST(Pipeline, WhatCannotStartSaysTheMend) {
   options = streetOptions(street, "out");
   options.assignments = {"planner.speed=3"};
   EXPECT_THAT(errorOf(options),
-              HasSubstr("services are vio, semantic_filter, inference, detector"));
+              HasSubstr("services are vio, semantic_filter, inference, map_store, detector"));
   options.assignments = {"semantic_filter.no_such_key=3"};
   EXPECT_THAT(errorOf(options), HasSubstr("no_such_key"));
   options = streetOptions(street, "out");
