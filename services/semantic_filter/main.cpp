@@ -66,7 +66,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
                               .predictions = context.sink(topics::kPredictions),
                               .queries = [&](const MapQuery& m) { (void)queries.write(m); }});
   Gate gate;
-  bus::Once odometry_once, detections_once;
+  bus::Once odometry_once;  // repeated detections are the node's to count
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
@@ -81,10 +81,8 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   });
   context.on(topics::kLandmarks,
              [&](const Landmarks& m) { gate.pass([&, m] { node.onLandmarks(m); }); });
-  context.on(topics::kDetections, [&](const Detections& m) {
-    if (!detections_once.first(m.stamp.source, m.stamp.sequence)) return;
-    gate.pass([&, m] { node.onDetections(m); });
-  });
+  context.on(topics::kDetections,
+             [&](const Detections& m) { gate.pass([&, m] { node.onDetections(m); }); });
   askForRestore(context, queries, config, gate);
   context.onHealth([&] {
     context.health().state(gate.isOpen() ? HealthState::kOk : HealthState::kStarting,

@@ -10,7 +10,8 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kMaxEarly = 16;
-constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not primed
+constexpr std::chrono::seconds kFuture{10};  // further ahead of odometry nothing waits for it
+constexpr double kPredictionFloor = 0.05;    // r·π·v below which inference is not primed
 
 }  // namespace
 
@@ -32,16 +33,16 @@ void Node::onCalibration(const Calibration& calibration) {
 }
 
 void Node::onModel(const ModelInfo& model) {
-  const bool changed = newest_model_ != 0 && newest_model_ != model.hash;
-  models_[model.hash] = makeModel(model);
-  newest_model_ = model.hash;
-  if (!changed || history_.empty()) return;
+  if (const auto added = models_.add(model); !added) reasons_.add(added.error());
+}
+
+void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
   Event event;
-  event.stamp = history_.back().input.stamp;
+  event.stamp = stamp;
   event.instance = instance_;
   event.world = *world_;
   event.kind = EventKind::kModelChanged;
-  event.detail = model.name;
+  event.detail = detail;
   if (outputs_.events) outputs_.events(event);
 }
 
@@ -118,6 +119,7 @@ void Node::onOdometry(const Odometry& odometry) {
     attach(entry, *early);
     early_.erase(early);
   }
+  forgetEarlyBefore(odometry.stamp.time);
   if (entry.input.boxes || !config_.history.wait_for_detections) flush();
 }
 
@@ -140,21 +142,32 @@ void Node::onLandmarks(const Landmarks& landmarks) {
   reasons_.add("landmarks_of_unknown_frame");
 }
 
+/// Why a message is no evidence, as Health counts it; nullptr where it may be.
+const char* Node::refusalOf(const Detections& detections) const {
+  if (camera_ && !detections.camera.empty() && detections.camera != camera_name_) {
+    return "detections_of_other_camera";
+  }
+  const Model* model = models_.find(detections.model_hash);
+  if (!model) return "detections_of_unknown_model";
+  for (const auto& detection : detections.detections) {
+    if (const char* flaw = flawOf(detection, *model)) return flaw;
+  }
+  return nullptr;
+}
+
 bool Node::attach(Entry& entry, const Detections& detections) {
+  if (const char* refusal = refusalOf(detections)) {
+    reasons_.add(refusal);
+    return false;
+  }
   if (entry.input.boxes) {
     reasons_.add("detections_repeated");
     return false;
   }
-  if (!detections.camera.empty() && detections.camera != camera_name_) {
-    reasons_.add("detections_of_other_camera");
-    return false;
+  entry.input.model = *models_.find(detections.model_hash);
+  if (const auto change = models_.use(detections.model_hash, entry.input.stamp.time)) {
+    tellModelChange(entry.input.stamp, *change);
   }
-  const auto model = models_.find(detections.model_hash);
-  if (model == models_.end()) {
-    reasons_.add("detections_of_unknown_model");
-    return false;
-  }
-  entry.input.model = model->second;
   entry.input.boxes.emplace();
   for (const auto& detection : detections.detections) {
     auto evidence =
@@ -163,7 +176,7 @@ bool Node::attach(Entry& entry, const Detections& detections) {
     if (evidence) {
       entry.input.boxes->push_back(std::move(*evidence));
     } else {
-      reasons_.add("detection_malformed");
+      reasons_.add("detection_outside_image");
     }
   }
   return true;
@@ -178,14 +191,32 @@ void Node::onDetections(const Detections& detections) {
     reasons_.add("detections_late");
     return stepAgainFrom(i);
   }
-  if (!history_.empty() && detections.stamp.time <= history_.back().input.stamp.time) {
-    return reasons_.add("detections_too_late");
+  if (const char* refusal = refusalOf(detections)) return reasons_.add(refusal);
+  if (!history_.empty()) {
+    const TimePoint newest = history_.back().input.stamp.time;
+    if (detections.stamp.time <= newest) return reasons_.add("detections_too_late");
+    if (detections.stamp.time > newest + kFuture) return reasons_.add("detections_of_the_future");
+  }
+  keepEarly(detections);
+}
+
+/// Of too many the furthest ahead goes: invented stamps must not drive out what is needed next.
+void Node::keepEarly(const Detections& detections) {
+  for (const auto& d : early_) {
+    if (d.stamp.sameFrame(detections.stamp)) return reasons_.add("detections_repeated");
   }
   early_.push_back(detections);
-  if (early_.size() > kMaxEarly) {
-    early_.pop_front();
-    reasons_.add("detections_without_odometry");
-  }
+  if (early_.size() <= kMaxEarly) return;
+  const auto sooner = [](const auto& a, const auto& b) { return a.stamp.time < b.stamp.time; };
+  early_.erase(history_.empty() ? early_.begin()
+                                : std::max_element(early_.begin(), early_.end(), sooner));
+  reasons_.add("detections_without_odometry");
+}
+
+void Node::forgetEarlyBefore(TimePoint time) {
+  const auto gone =
+      std::erase_if(early_, [&](const Detections& d) { return d.stamp.time <= time; });
+  if (gone > 0) reasons_.add("detections_without_odometry", gone);
 }
 
 void Node::stepEntry(Entry& entry) {

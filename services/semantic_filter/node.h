@@ -18,6 +18,7 @@
 #include "services/semantic_filter/core/long_term.h"
 #include "services/semantic_filter/core/semantic_filter.h"
 #include "services/semantic_filter/events.h"
+#include "services/semantic_filter/model_book.h"
 
 namespace perdure::semantic_filter {
 
@@ -59,7 +60,11 @@ class Node {
   FrameInput makeInput(const Odometry& odometry);
   void advancePoseError(const Odometry& odometry);
   void beginWorld(const WorldId& world);
+  const char* refusalOf(const Detections& detections) const;
   bool attach(Entry& entry, const Detections& detections);
+  void tellModelChange(const FrameStamp& stamp, const std::string& detail);
+  void keepEarly(const Detections& detections);
+  void forgetEarlyBefore(TimePoint time);
   void stepEntry(Entry& entry);
   void stepAgainFrom(std::size_t index);
   void publish(const Entry& entry);
@@ -78,8 +83,7 @@ class Node {
   SemanticFilter filter_;
   std::shared_ptr<const CameraModel> camera_;  // shared with the entries that were made with it
   std::string camera_name_;
-  std::map<std::uint64_t, Model> models_;
-  std::uint64_t newest_model_ = 0;
+  ModelBook models_;
   std::optional<WorldId> world_;
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;

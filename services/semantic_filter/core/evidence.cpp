@@ -29,18 +29,34 @@ BoxNoise boxNoise(const Model& model, double image_width) {
   return {model.box_sigma, model.input_width > 0.0 ? image_width / model.input_width : 0.0};
 }
 
+const char* flawOf(const Detection& detection, const Model& model) {
+  const Box& b = detection.box;
+  if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return "detections_not_finite";
+  if (b.x1 >= b.x2 || b.y1 >= b.y2) return "detections_box_inside_out";
+  if (detection.activations.size() != model.classes.size() + 1) {
+    return "detections_classes_mismatch";
+  }
+  for (const float a : detection.activations) {
+    if (std::isnan(a - detection.activations[0])) return "detections_not_finite";
+  }
+  for (const double sigma : detection.side_sigma) {
+    if (!std::isfinite(sigma)) return "detections_not_finite";
+  }
+  if (!detection.azimuth) return nullptr;
+  if (!std::isfinite(*detection.azimuth + detection.azimuth_sigma)) return "detections_not_finite";
+  return detection.azimuth_sigma > 0.0 ? nullptr : "detections_azimuth_without_sigma";
+}
+
 std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
                                      double height, const BoxParameters& box,
                                      const ClutterParameters& clutter) {
   const Box& b = detection.box;
-  if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return std::nullopt;
-  if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
+  if (flawOf(detection, model)) return std::nullopt;
   Evidence e;
   const double zero = detection.activations[0];
   double best = -clutter.max_log_ratio, odds = 0.0;
   for (std::size_t k = 0; k < model.classes.size(); ++k) {
     const double ratio = detection.activations[k + 1] - zero;
-    if (std::isnan(ratio)) return std::nullopt;
     e.log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
     best = std::max(best, e.log_ratio.back());
     odds += std::exp(e.log_ratio.back());

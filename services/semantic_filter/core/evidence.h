@@ -47,7 +47,12 @@ struct Evidence {
   double azimuth_sigma = 0.35;
 };
 
-/// Nothing for a detection that is not usable: an empty box, or a wrong number of activations.
+/// What no network can mean, as Health counts it: "detections_not_finite",
+/// "detections_box_inside_out", "detections_classes_mismatch", "detections_azimuth_without_sigma".
+/// A message that holds one such detection is no evidence: what is missing in it would be a miss.
+const char* flawOf(const Detection& detection, const Model& model);
+
+/// Nothing for a flawed detection, or one that leaves no pixel in the image.
 std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
                                      double height, const BoxParameters& box,
                                      const ClutterParameters& clutter);

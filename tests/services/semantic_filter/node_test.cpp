@@ -215,15 +215,19 @@ TEST(Node, WrongInputIsCountedAndHarmless) {
   h.node.onOdometry(odometryAt(5, driveTo(5, 0.4)));
   Detections d = detectionsAt(5, boxesAt(kStreet, 5, 0.4));
   d.detections[0].activations.resize(2);
+  h.node.onDetections(d);
+  d = detectionsAt(5, boxesAt(kStreet, 5, 0.4));
   d.detections[1].box.x1 = std::nan("");
   h.node.onDetections(d);
-  h.node.onDetections(d);
+  h.node.onDetections(detectionsAt(5, boxesAt(kStreet, 5, 0.4)));
+  h.node.onDetections(detectionsAt(5, boxesAt(kStreet, 5, 0.4)));
   Detections unknown = detectionsAt(6, {});
   unknown.model_hash = 99;
   h.node.onOdometry(odometryAt(6, driveTo(6, 0.4)));
   h.node.onDetections(unknown);
   EXPECT_EQ(h.node.reasons().of("odometry_not_finite"), 1u);
-  EXPECT_EQ(h.node.reasons().of("detection_malformed"), 2u);
+  EXPECT_EQ(h.node.reasons().of("detections_classes_mismatch"), 1u);
+  EXPECT_EQ(h.node.reasons().of("detections_not_finite"), 1u);
   EXPECT_EQ(h.node.reasons().of("detections_repeated"), 1u);
   EXPECT_EQ(h.node.reasons().of("detections_of_unknown_model"), 1u);
 }

@@ -1,0 +1,61 @@
+#include "services/semantic_filter/model_book.h"
+
+#include <utility>
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr std::size_t kMaxModels = 64;
+constexpr std::size_t kMaxNamed = 8;  // classes in a sentence
+
+/// "; new classes: a, b and 3 more" for what `model` has beyond `other`.
+std::string beyond(const Model& model, const Model& other, const std::string& title) {
+  std::string text;
+  std::size_t n = 0;
+  for (const auto& name : model.classes) {
+    if (other.index.contains(name) || ++n > kMaxNamed) continue;
+    text += (text.empty() ? "" : ", ") + name;
+  }
+  if (n > kMaxNamed) text += " and " + std::to_string(n - kMaxNamed) + " more";
+  return n == 0 ? "" : "; " + title + ": " + text;
+}
+
+}  // namespace
+
+Result<void> ModelBook::add(const ModelInfo& info) {
+  const auto [it, fresh] = entries_.try_emplace(info.hash, Entry{info.name, makeModel(info)});
+  if (!fresh) {
+    if (it->second.model.classes == info.classes) return {};
+    return fail("model_contradicts_its_hash", info.name);
+  }
+  order_.push_back(info.hash);
+  if (order_.size() <= kMaxModels) return {};
+  if (order_.front() == used_) {  // the one in use stays
+    order_.pop_front();
+    order_.push_back(used_);
+  }
+  entries_.erase(order_.front());
+  order_.pop_front();
+  return {};
+}
+
+const Model* ModelBook::find(std::uint64_t hash) const {
+  const auto it = entries_.find(hash);
+  return it == entries_.end() ? nullptr : &it->second.model;
+}
+
+std::optional<std::string> ModelBook::use(std::uint64_t hash, TimePoint time) {
+  const bool first = used_ == 0;
+  if (!first && time < used_at_) return std::nullopt;
+  used_at_ = time;
+  if (hash == used_) return std::nullopt;
+  const std::uint64_t before = std::exchange(used_, hash);
+  const auto from = entries_.find(before);
+  if (first || from == entries_.end()) return std::nullopt;
+  const Entry& to = entries_.at(hash);
+  return to.name + " instead of " + from->second.name +
+         beyond(to.model, from->second.model, "new classes") +
+         beyond(from->second.model, to.model, "kept without new evidence");
+}
+
+}  // namespace perdure::semantic_filter

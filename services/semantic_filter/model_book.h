@@ -1,0 +1,36 @@
+// The models whose detections may come, and the one in use: what changes when inference is swapped.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "common/base/result.h"
+#include "services/semantic_filter/core/evidence.h"
+
+namespace perdure::semantic_filter {
+
+class ModelBook {
+ public:
+  /// Reason: "model_contradicts_its_hash": what was said first of a hash stands.
+  Result<void> add(const ModelInfo& info);
+  /// nullptr where no model of this hash was told, or too many since then.
+  const Model* find(std::uint64_t hash) const;
+  /// Detections of this (known) model are used in a frame of this time. Where the frame is newer
+  /// than all before and their model was another one: a sentence on what changes.
+  std::optional<std::string> use(std::uint64_t hash, TimePoint time);
+
+ private:
+  struct Entry {
+    std::string name;
+    Model model;
+  };
+  std::map<std::uint64_t, Entry> entries_;
+  std::deque<std::uint64_t> order_;  ///< of arrival
+  std::uint64_t used_ = 0;
+  TimePoint used_at_;
+};
+
+}  // namespace perdure::semantic_filter
