@@ -133,6 +133,25 @@ std::size_t RawReader::matched() const {
   return status.current_count;
 }
 
+std::optional<std::int32_t> RawReader::strongestBut(const RawWriter& own) const {
+  constexpr std::size_t kMost = 64;
+  std::array<dds_instance_handle_t, kMost> writers{};
+  dds_instance_handle_t self = 0;
+  dds_get_instance_handle(own.handle(), &self);
+  const dds_return_t n = dds_get_matched_publications(handle(), writers.data(), kMost);
+  std::optional<std::int32_t> strongest;
+  for (std::size_t i = 0; n > 0 && i < std::min(static_cast<std::size_t>(n), kMost); ++i) {
+    if (writers[i] == self) continue;
+    const std::unique_ptr<dds_builtintopic_endpoint_t, decltype(&dds_builtintopic_free_endpoint)>
+        data(dds_get_matched_publication_data(handle(), writers[i]),
+             &dds_builtintopic_free_endpoint);
+    std::int32_t strength = 0;
+    if (!data || !dds_qget_ownership_strength(data->qos, &strength)) continue;
+    strongest = std::max(strongest.value_or(strength), strength);
+  }
+  return strongest;
+}
+
 void RawReader::report(ReasonCounts& counts) const {
   addRefusals(counts);
   dds_requested_incompatible_qos_status_t qos{};
@@ -214,6 +233,8 @@ Result<void> RawWriter::writeWire(const void* wire) {
   count("write", reason);
   return tl::unexpected(reason);
 }
+
+void RawWriter::unregisterWire(const void* wire) { dds_unregister_instance(handle(), wire); }
 
 Result<void> RawWriter::disposeWire(const void* wire) {
   const dds_return_t code = dds_dispose(handle(), wire);

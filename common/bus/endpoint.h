@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "common/base/result.h"
@@ -42,10 +43,15 @@ class Endpoint {
   std::map<std::string, std::string> first_details_;
 };
 
+class RawWriter;
+
 class RawReader : public Endpoint {
  public:
   /// How many writers are matched now.
   std::size_t matched() const;
+  /// The highest strength among the matched writers of an exclusive topic but `own`; nothing where
+  /// there are no others.
+  std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
   /// Adds what DDS and the checks counted since the start: <topic>_malformed_<reason>,
   /// _incompatible_qos, _sample_lost, _writers_silent (how many are now).
   void report(ReasonCounts& counts) const;
@@ -109,6 +115,7 @@ class RawWriter : public Endpoint {
   RawWriter(const Participant& participant, const std::string& topic, const WriterOptions& options);
   Result<void> writeWire(const void* wire);
   Result<void> disposeWire(const void* wire);
+  void unregisterWire(const void* wire);
 
  private:
   std::int32_t strength_;
@@ -128,6 +135,11 @@ class Writer : public RawWriter {
       return encoded;
     }
     return writeWire(&sample);
+  }
+  /// Of an exclusive topic without a key: until the next write readers hear the next strongest.
+  void release() {
+    typename wire::Type<T>::Wire sample{};
+    unregisterWire(&sample);
   }
   /// The instance with this value's key is gone, for late joiners too. Only the key is read.
   Result<void> dispose(const T& key) {

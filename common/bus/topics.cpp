@@ -25,7 +25,7 @@ Qos exclusive(int depth, double rate_hz) {
   return {.depth = depth, .exclusive = true, .lease_s = leaseFor(rate_hz)};
 }
 
-using Table = std::array<TopicInfo, 18>;
+using Table = std::array<TopicInfo, 19>;
 
 Table makeTable() {
   using namespace topics;
@@ -39,6 +39,7 @@ Table makeTable() {
       row(kLandmarks, reliable(64), kCameraHz, kRecorded),
       row(kDetections, exclusive(8, kCameraHz), kCameraHz, kRecorded),
       row(kModel, latched(1), 0, kRecorded),
+      row(kSwap, reliable(16), 0, kRecorded),
       row(kObjects, reliable(8), kCameraHz, kRecorded),
       row(kObjectState, latched(1), 0, kNotRecorded),
       row(kRecalled, reliable(8), 0, kRecorded),

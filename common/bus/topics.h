@@ -50,6 +50,7 @@ inline const Topic<Odometry> kOdometry{"odometry"};
 inline const Topic<Landmarks> kLandmarks{"landmarks"};
 inline const Topic<Detections> kDetections{"detections"};
 inline const Topic<ModelInfo> kModel{"model"};
+inline const Topic<SwapNotice> kSwap{"inference/swap"};
 inline const Topic<Objects> kObjects{"objects"};
 inline const Topic<ObjectState> kObjectState{"object_state"};
 inline const Topic<Recalled> kRecalled{"recalled"};
@@ -77,7 +78,8 @@ bool withTopic(const std::string& name, Visit visit) {
     offer(frame(name.substr(kFramePrefix.size())));
   }
   offer(kImu), offer(kSpeed), offer(kCalibration), offer(kOdometry), offer(kLandmarks);
-  offer(kDetections), offer(kModel), offer(kObjects), offer(kObjectState), offer(kRecalled);
+  offer(kDetections), offer(kModel), offer(kSwap), offer(kObjects), offer(kObjectState),
+      offer(kRecalled);
   offer(kEvents), offer(kPredictions), offer(kMap), offer(kMapHeader), offer(kMapQuery);
   offer(kMapReply), offer(kHealth);
   return found;

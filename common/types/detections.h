@@ -54,9 +54,30 @@ struct ModelInfo {
   std::uint32_t input_width = 0, input_height = 0;
   double box_sigma = 0.0;  ///< standard deviation of a box's side relative to its size; 0 = unknown
   /// Four a class, or none: how far the sides (x1, y1, x2, y2) of its boxes lie inside the image of
-  /// the object's cuboid on average, in widths and heights of that image. A car's outline is rounder
-  /// than its cuboid's.
+  /// the object's cuboid on average, in widths and heights of that image. A car's outline is
+  /// rounder than its cuboid's.
   std::vector<double> side_insets;
+};
+
+/// How one inference process follows another while frames go on (services/inference/README.md).
+enum class SwapStep : std::uint8_t {
+  kRehearsing = 0,  ///< `instance` infers beside `about`, unheard
+  kTookOver,        ///< it is heard now; `about` watches it for probation_s
+  kPassed,          ///< its probation is over: `about` may retire
+  kRolledBack,      ///< `about` (or, where it is 0, `instance` itself) is not to be heard: `reason`
+  kRetired,         ///< `instance` ends, because `about` has passed
+};
+const char* nameOf(SwapStep step);  ///< "rehearsing", "took_over", …
+
+/// On the topic `inference/swap`. Any program may take part: it is told and obeyed by DDS alone.
+struct SwapNotice {
+  InstanceId instance = 0;
+  InstanceId about = 0;
+  SwapStep step = SwapStep::kRehearsing;
+  double probation_s = 0.0;
+  std::string model;   ///< name of the newcomer's
+  std::string reason;  ///< snake_case, of a roll-back
+  std::string detail;
 };
 
 }  // namespace perdure

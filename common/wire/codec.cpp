@@ -55,6 +55,7 @@ template struct Instances<Odometry>;
 template struct Instances<Landmarks>;
 template struct Instances<Detections>;
 template struct Instances<ModelInfo>;
+template struct Instances<SwapNotice>;
 template struct Instances<Objects>;
 template struct Instances<ObjectState>;
 template struct Instances<Recalled>;

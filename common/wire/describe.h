@@ -166,9 +166,19 @@ void describe(A& a, D& d, W& w) {
   a.ensure("input_height", "out_of_range", [&] { return d.input_height <= kImageSide; });
   a.number("box_sigma", d.box_sigma, w.box_sigma, kNotNegative);
   a.numbers("side_insets", d.side_insets, w.side_insets, kInset, 4 * kClasses);
-  a.ensure("side_insets", "size_mismatch", [&] {
-    return d.side_insets.empty() || d.side_insets.size() == 4 * d.classes.size();
-  });
+  a.ensure("side_insets", "size_mismatch",
+           [&] { return d.side_insets.empty() || d.side_insets.size() == 4 * d.classes.size(); });
+}
+
+template <class A, Is<SwapNotice> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("instance", d.instance, w.source);
+  a.value("about", d.about, w.about);
+  a.choice("step", d.step, w.step, SwapStep::kRetired);
+  a.number("probation_s", d.probation_s, w.probation_s, kNotNegative);
+  a.text("model", d.model, w.model, kTextLength);
+  a.text("reason", d.reason, w.reason, kNameLength);
+  a.text("detail", d.detail, w.detail, kTextLength);
 }
 
 // --- map ---

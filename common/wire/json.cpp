@@ -153,6 +153,7 @@ template Json toJson(const Odometry&);
 template Json toJson(const Landmarks&);
 template Json toJson(const Detections&);
 template Json toJson(const ModelInfo&);
+template Json toJson(const SwapNotice&);
 template Json toJson(const Objects&);
 template Json toJson(const ObjectState&);
 template Json toJson(const Recalled&);

@@ -43,6 +43,8 @@ struct Type<Detections> : TypeOf<perdure_msg_Detections, &perdure_msg_Detections
 template <>
 struct Type<ModelInfo> : TypeOf<perdure_msg_ModelInfo, &perdure_msg_ModelInfo_desc> {};
 template <>
+struct Type<SwapNotice> : TypeOf<perdure_msg_SwapNotice, &perdure_msg_SwapNotice_desc> {};
+template <>
 struct Type<Objects> : TypeOf<perdure_msg_Objects, &perdure_msg_Objects_desc> {};
 template <>
 struct Type<ObjectState> : TypeOf<perdure_msg_ObjectState, &perdure_msg_ObjectState_desc> {};

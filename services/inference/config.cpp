@@ -31,6 +31,10 @@ void describe(Config& config, config::Fields& fields) {
                  {"stand by: offer one less than the strength, and take over when the owner dies"});
   fields.number("ownership.period_s", config.ownership.period_s, between(0.005, 10.0),
                 {"expected time between frames; the lease is three of them, at least 100 ms", "s"});
+  fields.number("ownership.probation_s", config.ownership.probation_s, between(0, 86400),
+                {"above 0: follow the process that is heard: rehearse beside it, take over, be "
+                 "watched by it for so long, and then tell it to retire",
+                 "s"});
 }
 
 double leaseSeconds(const OwnershipConfig& ownership) {

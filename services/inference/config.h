@@ -27,6 +27,7 @@ struct OwnershipConfig {
   std::int64_t strength = 10;
   bool standby = false;
   double period_s = 0.1;
+  double probation_s = 0.0;
 };
 
 struct Config {

@@ -12,25 +12,31 @@ void run(service::Context& context, const inference::Config& config) {
                      node.model().classes.size(), toHex(node.model().hash));
   const auto& ownership = config.ownership;
   const double lease_s = inference::leaseSeconds(ownership);
-  const auto strength = static_cast<std::int32_t>(ownership.strength - (ownership.standby ? 1 : 0));
-  auto& detections = context.writer(bus::topics::kDetections, {strength, lease_s});
+  auto& detections = context.writer(bus::topics::kDetections,
+                                    {inference::Worker::firstStrength(ownership), lease_s});
+  auto& notices = context.writer(bus::topics::kSwap);
   (void)context.writer(bus::topics::kModel).write(node.model());
-  const auto& rivals = context.on(bus::topics::kDetections, [](const Detections&) {});
-  inference::Worker worker(node, ownership, detections, rivals, context.health());
+  inference::Worker* worker = nullptr;  // handlers run when it is there: in context.run()
+  const auto& rivals =
+      context.on(bus::topics::kDetections, [&](const Detections& heard) { worker->heard(heard); });
+  inference::Worker the_worker(node, ownership, {detections, rivals, notices}, context.health(),
+                               [&] { context.stop(); });
+  worker = &the_worker;
 
+  context.on(bus::topics::kModel, [&](const ModelInfo& model) { worker->learn(model); });
+  context.on(bus::topics::kSwap, [&](const SwapNotice& notice) { worker->told(notice); });
   context.on(bus::topics::frame(config.detection.camera),
-             [&](const Frame& frame) { worker.offer(frame); });
-  context.every(durationFromSeconds(lease_s / 5), [&] { worker.assertAlive(); });
-  context.countReasons([&](ReasonCounts& counts) { worker.report(counts); });
+             [&](const Frame& frame) { worker->offer(frame); });
+  context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
+  context.countReasons([&](ReasonCounts& counts) { worker->report(counts); });
   context.onHealth([&] {
-    const bool in_form = worker.inForm();
-    context.health().state(in_form ? HealthState::kOk : HealthState::kDegraded,
-                           in_form
-                               ? worker.lastProblem()
-                               : "results came later than the lease: give it a core of its own, a "
-                                 "smaller network, or a longer ownership.period_s");
+    const auto [state, message] = worker->state();
+    context.health().state(state, message);
   });
   context.run();
+  detections.waitForAcknowledgement(0.2);
+  notices.waitForAcknowledgement(0.2);
+  if (const std::string why = worker->failure(); !why.empty()) throw std::runtime_error(why);
 }
 
 }  // namespace

@@ -1,21 +1,38 @@
 #include "services/inference/worker.h"
 
 namespace perdure::inference {
+namespace {
 
-Worker::Worker(Node& node, const OwnershipConfig& ownership, bus::Writer<Detections>& writer,
-               const bus::RawReader& rivals, service::HealthMeter& health)
+constexpr std::int32_t kAbove = 10;  // by which one that leads is stronger than all others
+constexpr std::int32_t kMostStrength = 1'000'000'000;
+
+Ownership firstOwnership(const OwnershipConfig& config, Duration lease) {
+  return config.probation_s > 0 ? Ownership::unheard(lease)
+                                : Ownership(config.strength, config.standby, lease);
+}
+
+}  // namespace
+
+Worker::Worker(Node& node, const OwnershipConfig& ownership, WorkerBus bus,
+               service::HealthMeter& health, std::function<void()> end)
     : node_(node),
       lease_(durationFromSeconds(leaseSeconds(ownership))),
-      ownership_(ownership.strength, ownership.standby, lease_),
-      writer_(writer),
-      rivals_(rivals),
-      health_(health) {
+      bus_(bus),
+      health_(health),
+      end_(std::move(end)),
+      ownership_(firstOwnership(ownership, lease_)),
+      swap_({node.model().instance, node.model().name, ownership.probation_s, lease_}) {
+  swap_.learn(node.model());
   thread_ = std::thread([this] { run(); });
 }
 
 Worker::~Worker() {
   queue_.close();
   thread_.join();
+}
+
+std::int32_t Worker::firstStrength(const OwnershipConfig& ownership) {
+  return static_cast<std::int32_t>(firstOwnership(ownership, Duration{}).strength());
 }
 
 void Worker::offer(const Frame& frame) {
@@ -30,7 +47,28 @@ void Worker::assertAlive() {
   const auto busy = busy_since_.load();
   if (busy != Clock::time_point::max() && now - busy > lease_) return;
   last_alive_ = now;
-  writer_.assertLiveliness();
+  const std::lock_guard lock(mutex_);
+  if (silent_) return;
+  bus_.detections.assertLiveliness();
+  swap_.tick(now);
+  obey();
+}
+
+void Worker::heard(const Detections& detections) {
+  const std::lock_guard lock(mutex_);
+  swap_.heard(detections, Clock::now());
+  obey();
+}
+
+void Worker::told(const SwapNotice& notice) {
+  const std::lock_guard lock(mutex_);
+  swap_.told(notice, Clock::now());
+  obey();
+}
+
+void Worker::learn(const ModelInfo& model) {
+  const std::lock_guard lock(mutex_);
+  swap_.learn(model);
 }
 
 /// A process that was stopped cannot have said that it lives; DDS may not yet have told it so.
@@ -45,44 +83,103 @@ void Worker::run() {
     if (result) {
       publish(*result, Clock::now() - job->since);
     } else {
-      const std::lock_guard lock(mutex_);
-      reasons_.add(result.error());
-      last_problem_ = result.error().code + ": " + result.error().detail;
+      noteFailure(result.error());
     }
     busy_since_ = Clock::time_point::max();
   }
 }
 
+void Worker::noteFailure(const Reason& reason) {
+  const std::lock_guard lock(mutex_);
+  reasons_.add(reason);
+  last_problem_ = reason.code + ": " + reason.detail;
+  if (reason.code == "frame_malformed") return;  // capture's fault, not the network's
+  const auto now = Clock::now();
+  if (ownership_.noteFailure(now)) {
+    reasons_.add("form_lost");
+    adoptStrength(now);
+    bus_.detections.release();  // it may be long until the next result, which would tell readers
+  }
+  swap_.ownFailure(reason, now);
+  obey();
+}
+
+void Worker::adoptStrength(Clock::time_point now) {
+  const auto strength = static_cast<std::int32_t>(ownership_.strength());
+  if (strength == bus_.detections.strength()) return;
+  // A change of strength travels apart from the data: what is written with it may overtake it.
+  if (strength < bus_.detections.strength() && bus_.rivals.matched() > 1)
+    hold_until_ = now + lease_;
+  bus_.detections.setStrength(strength);
+}
+
 void Worker::publish(const Detections& detections, Duration age) {
+  const std::lock_guard lock(mutex_);
   const auto now = Clock::now();
   noteLapse(now);
-  const auto strength = static_cast<std::int32_t>(
-      ownership_.strengthFor(now, age, writer_.livelinessLost() + lapses_.load()));
-  // A change of strength travels apart from the data: what is written with it may overtake it.
-  if (strength < writer_.strength() && rivals_.matched() > 1) hold_until_ = now + lease_;
-  if (strength != writer_.strength()) writer_.setStrength(strength);
-  if (in_form_ != ownership_.inForm()) {
-    in_form_ = ownership_.inForm();
-    count(in_form_ ? "form_regained" : "form_lost");
+  if (silent_) return;
+  const bool was_in_form = ownership_.inForm();
+  ownership_.strengthFor(now, age, bus_.detections.livelinessLost() + lapses_.load(),
+                         swap_.alone(now));
+  adoptStrength(now);
+  if (was_in_form != ownership_.inForm()) {
+    reasons_.add(ownership_.inForm() ? "form_regained" : "form_lost");
   }
-  if (now < hold_until_) return count("held_back");
-  if (writer_.write(detections)) health_.frameOut();
+  swap_.ownResult(detections, ownership_.inForm(), now);
+  obey();
+  if (silent_) return;
+  if (now < hold_until_) return reasons_.add("held_back");
+  if (bus_.detections.write(detections)) health_.frameOut();
   last_alive_ = Clock::now();  // a write says "I live" too
 }
 
-void Worker::count(const char* code) {
-  const std::lock_guard lock(mutex_);
-  reasons_.add(code);
+void Worker::obey() {
+  const Swap::Actions actions = swap_.take();
+  if (actions.lead) {
+    const std::int32_t others = bus_.rivals.strongestBut(bus_.detections).value_or(0);
+    ownership_.lead(std::max(std::min(others, kMostStrength) + kAbove, bus_.detections.strength()));
+    bus_.detections.setStrength(static_cast<std::int32_t>(ownership_.strength()));
+    hold_until_ = {};
+  }
+  if (actions.yield) {
+    silent_ = true;
+    bus_.detections.setStrength(static_cast<std::int32_t>(Ownership::kOutOfForm - 1));
+    bus_.detections.release();
+  }
+  for (const Detections& d : actions.again) {
+    if (silent_) break;
+    if (bus_.detections.write(d)) reasons_.add("said_again");
+  }
+  for (const SwapNotice& notice : actions.notices) (void)bus_.notices.write(notice);
+  if (!actions.end) return;
+  failure_ = actions.failure;
+  end_();
 }
 
 void Worker::report(ReasonCounts& counts) const {
   const std::lock_guard lock(mutex_);
   for (const auto& [reason, n] : reasons_.all()) counts.add(reason, n);
+  for (const auto& [reason, n] : swap_.reasons().all()) counts.add(reason, n);
 }
 
-std::string Worker::lastProblem() const {
+std::pair<HealthState, std::string> Worker::state() const {
   const std::lock_guard lock(mutex_);
-  return last_problem_;
+  if (!failure_.empty()) return {HealthState::kFailed, failure_};
+  if (!ownership_.inForm()) {
+    return {HealthState::kDegraded,
+            last_problem_.empty()
+                ? "results came later than the lease: give it a core of its own, a smaller "
+                  "network, or a longer ownership.period_s"
+                : last_problem_};
+  }
+  if (ownership_.spare())
+    return {HealthState::kOk, "stands by: another one took over and is heard"};
+  return {HealthState::kOk, swap_.message().empty() ? last_problem_ : swap_.message()};
+}
+
+std::string Worker::failure() const {
+  const std::lock_guard lock(mutex_);
+  return failure_;
 }
 
 }  // namespace perdure::inference

@@ -1,9 +1,9 @@
-// The thread that runs the network, and the writer of its results: newest frame first, and with
-// the strength that the process deserves (DESIGN: Liveliness).
+// The thread that runs the network, behind a queue of one, and what it may write: the newest frame
+// counts, results carry the strength that this process deserves, and a newcomer may follow it.
 #pragma once
 
 #include <atomic>
-#include <chrono>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -12,30 +12,45 @@
 #include "common/bus/endpoint.h"
 #include "common/service/health.h"
 #include "services/inference/core/ownership.h"
+#include "services/inference/core/swap.h"
 #include "services/inference/node.h"
 
 namespace perdure::inference {
 
+/// Where a worker speaks and listens.
+struct WorkerBus {
+  bus::Writer<Detections>& detections;
+  /// Reads `detections`: it matches our own writer, and those of other processes.
+  const bus::RawReader& rivals;
+  bus::Writer<SwapNotice>& notices;
+};
+
 class Worker {
  public:
-  /// `rivals` reads `detections`: it matches our own writer, and those of other processes.
-  Worker(Node& node, const OwnershipConfig& ownership, bus::Writer<Detections>& writer,
-         const bus::RawReader& rivals, service::HealthMeter& health);
+  /// `end` ends the process; it is called from any thread.
+  Worker(Node& node, const OwnershipConfig& ownership, WorkerBus bus, service::HealthMeter& health,
+         std::function<void()> end);
   /// Ends within the time of one frame.
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
+  /// The strength to begin with.
+  static std::int32_t firstStrength(const OwnershipConfig& ownership);
+
   /// A frame to look at; one that still waits is dropped and counted.
   void offer(const Frame& frame);
   /// To be called several times in a lease: says "I live", unless the network is stuck.
   void assertAlive();
+  void heard(const Detections& detections);
+  void told(const SwapNotice& notice);
+  void learn(const ModelInfo& model);
 
   void report(ReasonCounts& counts) const;
-  /// Whether results are written with full strength.
-  bool inForm() const { return in_form_; }
-  /// The last thing that went wrong, for people; empty where nothing did.
-  std::string lastProblem() const;
+  /// What Health says of it: a sentence where something is to be told.
+  std::pair<HealthState, std::string> state() const;
+  /// Why this process was in vain; empty where it was not.
+  std::string failure() const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -45,24 +60,28 @@ class Worker {
   };
   void run();
   void publish(const Detections& detections, Duration age);
+  void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
-  void count(const char* code);
+  void adoptStrength(Clock::time_point now);
+  /// Does what the swap asks for.
+  void obey();
 
   Node& node_;
   const Duration lease_;
-  Ownership ownership_;
-  Clock::time_point hold_until_{};  ///< results are kept back after the strength was lowered
-  bus::Writer<Detections>& writer_;
-  const bus::RawReader& rivals_;
+  WorkerBus bus_;
   service::HealthMeter& health_;
+  std::function<void()> end_;
   BoundedQueue<Job> queue_{1, Overflow::kDropOldest};
   std::atomic<Clock::time_point> last_alive_{Clock::now()};
   std::atomic<Clock::time_point> busy_since_{Clock::time_point::max()};
   std::atomic<std::uint64_t> lapses_{0};
-  std::atomic<bool> in_form_{true};
-  mutable std::mutex mutex_;
+  mutable std::mutex mutex_;  ///< of all that follows, and of the writers
+  Ownership ownership_;
+  Swap swap_;
+  Clock::time_point hold_until_{};  ///< results are kept back after the strength was lowered
+  bool silent_ = false;
+  std::string failure_, last_problem_;
   ReasonCounts reasons_;
-  std::string last_problem_;
   std::thread thread_;
 };
 

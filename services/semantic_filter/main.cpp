@@ -70,6 +70,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
+  context.on(topics::kSwap, [&](const SwapNotice& m) { node.onSwap(m); });
   context.on(topics::kRecalled, [&](const Recalled& m) {
     node.onRecalled(m);
     if (m.restore && m.client == context.instance()) gate.open();

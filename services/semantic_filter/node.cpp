@@ -36,6 +36,13 @@ void Node::onModel(const ModelInfo& model) {
   if (const auto added = models_.add(model); !added) reasons_.add(added.error());
 }
 
+/// Who looks at the frames is inference's business; that a newcomer failed is told as an event.
+void Node::onSwap(const SwapNotice& notice) {
+  if (notice.step != SwapStep::kRolledBack || history_.empty()) return;
+  tellModelChange(history_.back().input.stamp, notice.model + " was rolled back, " +
+                                                   notice.reason + ": " + notice.detail);
+}
+
 void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
   Event event;
   event.stamp = stamp;

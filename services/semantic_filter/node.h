@@ -35,6 +35,7 @@ class Node {
 
   void onCalibration(const Calibration& calibration);
   void onModel(const ModelInfo& model);
+  void onSwap(const SwapNotice& notice);
   void onOdometry(const Odometry& odometry);
   void onLandmarks(const Landmarks& landmarks);
   void onDetections(const Detections& detections);

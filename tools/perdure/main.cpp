@@ -8,6 +8,7 @@
 #include "tools/demo/command.h"
 #include "tools/detect/command.h"
 #include "tools/evaluate/command.h"
+#include "tools/inference/command.h"
 #include "tools/map/command.h"
 #include "tools/model/command.h"
 #include "tools/pipeline/command.h"
@@ -43,6 +44,7 @@ int main(int argc, char** argv) {
   perdure::tools::addEvaluateCommand(app);
   perdure::tools::addDetectCommand(app);
   perdure::tools::addModelCommand(app);
+  perdure::tools::addInferenceCommand(app);
   perdure::tools::addSimulateCommand(app);
   perdure::tools::addMapCommand(app);
   perdure::tools::addDemoCommand(app);

@@ -332,6 +332,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.first_seen = object.last_seen = object.as_of = now;
   object.pose_product = frame.pose_error.product;
   object.hits = 1;
+  object.asked = frame.model->names;
   bookBirth(object, kept, std::exp(logBirthRatio(evidence, frame)), frame);
   object.hit_view = {frame.view.T_WC(), 1.0};
   object.last_view = frame.view.T_WC();

@@ -8,6 +8,7 @@ namespace perdure::semantic_filter {
 Model makeModel(const ModelInfo& info) {
   Model model;
   model.classes = info.classes;
+  model.names = std::make_shared<const ClassNames>(info.classes.begin(), info.classes.end());
   for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
   model.input_width = info.input_width;
   model.box_sigma = info.box_sigma;

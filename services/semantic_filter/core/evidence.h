@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,9 +27,12 @@ struct Insets {
   }
 };
 
+using ClassNames = std::set<std::string>;
+
 /// What the filter keeps of a ModelInfo.
 struct Model {
   std::vector<std::string> classes;
+  std::shared_ptr<const ClassNames> names = std::make_shared<const ClassNames>();  ///< the same
   std::map<std::string, std::size_t> index;  ///< name to position in `classes`
   double input_width = 0.0;                  ///< of the network, 0 = unknown
   double box_sigma = 0.0;

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -70,8 +71,10 @@ struct Object {
   bool remembers_all = true;
   std::uint32_t fresh_keyframes = 0;     ///< that came since the state was last smoothed
   std::uint32_t smoothing_patience = 1;  ///< grows while smoothing finds little to mend
-  ClassAccount classes;                  ///< why the hypotheses weigh what they weigh
-  std::vector<ClassNumber> context;      ///< nats, laid over what is published (core/context.h)
+  /// Classes that the models which saw it could name; none of one that came back.
+  std::shared_ptr<const std::set<std::string>> asked;
+  ClassAccount classes;              ///< why the hypotheses weigh what they weigh
+  std::vector<ClassNumber> context;  ///< nats, laid over what is published (core/context.h)
   /// Looks that were not used since the object was last brought up to date: nothing of what is
   /// published changes while it is hidden, its ledger neither.
   LedgerEntry hidden, away;

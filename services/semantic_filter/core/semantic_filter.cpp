@@ -5,6 +5,7 @@
 
 #include "services/semantic_filter/core/association.h"
 #include "services/semantic_filter/core/context.h"
+#include "services/semantic_filter/core/new_classes.h"
 #include "services/semantic_filter/core/smoother.h"
 #include "services/semantic_filter/core/update.h"
 
@@ -130,6 +131,9 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
     }
     predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
     seen.push_back({j, look(belief.objects[j], sights[j], *input.boxes, frame)});
+    if (admitNewClasses(belief.objects[j], seen.back().look, *input.boxes, frame)) {
+      seen.back().look = look(belief.objects[j], sights[j], *input.boxes, frame);
+    }
   }
   return seen;
 }

@@ -178,6 +178,34 @@ TEST_F(Bus, StrengthDecidesWhoIsHeardAndMayChange) {
   }));
 }
 
+TEST_F(Bus, AnOwnerThatLetsTheTopicGoIsFollowedAtOnceByTheNextStrongest) {
+  Reader<Detections> reader(here, topics::kDetections);
+  std::vector<InstanceId> heard;
+  loop.on(reader, [&](const Detections& m) { heard.push_back(m.instance); });
+  constexpr double kLongLease = 60.0;  // it cannot be what decides here
+  Writer<Detections> owner(here, topics::kDetections, {.strength = 10, .lease_s = kLongLease});
+  Writer<Detections> spare(there, topics::kDetections, {.strength = 9, .lease_s = kLongLease});
+  const auto say = [&](Writer<Detections>& writer, InstanceId who) {
+    Detections m;
+    m.camera = "cam0";
+    m.instance = who;
+    EXPECT_TRUE(writer.write(m));
+    for (int i = 0; i < 5; ++i) loop.runOnce(kStep);
+  };
+  ASSERT_TRUE(runUntil(loop, [&] { return reader.matched() == 2; }));
+  EXPECT_EQ(reader.strongestBut(owner), 9);
+  EXPECT_EQ(reader.strongestBut(spare), 10);
+  say(owner, 1), say(spare, 2);
+  EXPECT_THAT(heard, ElementsAre(1));
+  owner.release();
+  say(spare, 2);
+  EXPECT_THAT(heard, ElementsAre(1, 2));
+  say(owner, 1), say(spare, 2);
+  EXPECT_THAT(heard, ElementsAre(1, 2, 1)) << "its next write takes it again";
+  spare.setStrength(30);
+  EXPECT_TRUE(runUntil(loop, [&] { return reader.strongestBut(owner) == 30; }));
+}
+
 TEST_F(Bus, AnOwnerThatMissesItsLeaseIsTold) {
   Reader<Detections> reader(here, topics::kDetections);
   Writer<Detections> writer(there, topics::kDetections, {.lease_s = 0.1});

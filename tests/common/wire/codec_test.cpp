@@ -12,8 +12,8 @@ template <class T>
 class Codec : public testing::Test {};
 
 using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
-                                Detections, ModelInfo, Objects, ObjectState, Recalled, Event,
-                                Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+                                Detections, ModelInfo, SwapNotice, Objects, ObjectState, Recalled,
+                                Event, Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Codec, Messages);
 
 TYPED_TEST(Codec, BringsEveryFieldThereAndBackToTheBit) {

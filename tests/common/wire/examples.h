@@ -237,6 +237,9 @@ class Examples {
          several([&] { return mapObject(); }),
          several([&] { return belief(); })};
   }
+  void fill(SwapNotice& m) {
+    m = {bits(), bits(), SwapStep::kRolledBack, uniform(0, 99), word(), word(), word()};
+  }
   void fill(Health& m) {
     m = {word(),         bits(),         below(99999), HealthState::kDegraded,
          word(),         bits(),         bits(),       bits(),

@@ -127,8 +127,8 @@ class Vandal {
 template <class T>
 class Damaged : public testing::Test {};
 using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
-                                Detections, ModelInfo, Objects, ObjectState, Recalled, Event,
-                                Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+                                Detections, ModelInfo, SwapNotice, Objects, ObjectState, Recalled,
+                                Event, Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Damaged, Messages);
 
 TYPED_TEST(Damaged, MessagesGiveASoundValueOrAReason) {

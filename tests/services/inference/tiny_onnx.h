@@ -1,6 +1,6 @@
 // A network of the family perdure written at run time as ONNX: a 64×48 input, one stride of 32
-// (2×2 cells, the lower ones beyond the border), two classes, four bins. Its output does not depend
-// on the image, so that what must come out is known exactly.
+// (2×2 cells, the lower ones beyond the border), two classes, four bins. What must come out is
+// known exactly: it depends on nothing, or on how bright the image is.
 #pragma once
 
 #include <cstdint>
@@ -40,6 +40,9 @@ struct TinyOnnx {
   std::vector<float> box = {0.5F, 1.0F, -0.5F, 2.0F};        ///< left, top, right, bottom
   std::vector<float> logits = {0.0F, 1.0F, -2.0F};           ///< background, car, person
   std::vector<float> azimuth = {0, 6, 0, 0, 0, 0.5F, 0, 0};  ///< bins, residuals
+  /// Added to each of the outputs for each unit of brightness of the cell's corner; none: 0.
+  std::vector<float> box_by_light, logits_by_light;
+  std::string name = "tiny", classes_json = R"(["car", "person"])";
   std::string azimuth_json = R"("azimuth": {"bins": 4, "sigma": 0.2, "classes": ["car"]},)";
 
   /// Writes tiny.onnx and tiny.onnx.model.json; returns the path of tiny.onnx.
@@ -52,10 +55,10 @@ struct TinyOnnx {
   }
 
   std::string json() const {
-    return R"({"name": "tiny", "family": "perdure",
+    return R"({"family": "perdure", "name": ")" + name + R"(",
       "input": {"width": 64, "height": 48, "fit": "letterbox_top_left", "colour": "rgb"},
-      "classes": ["car", "person"], )" +
-           azimuth_json +
+      "classes": )" +
+           classes_json + ", " + azimuth_json +
            R"( "calibration": {"temperature": 2.0, "clutter_rate": 0.75},
       "levels": [{"stride": 32, "box": "box32", "logits": "logits32", "azimuth": "azimuth32"}]})";
   }
@@ -75,8 +78,9 @@ struct TinyOnnx {
     const auto type = Protobuf().number(1, 1).message(2, shape);
     return Protobuf().bytes(1, name).message(2, Protobuf().message(1, type));
   }
-  /// Adds a 1×1 convolution of stride 32 without weights: its output is `bias` in every cell.
-  static void addHead(Protobuf& graph, const std::string& name, const std::vector<float>& bias) {
+  /// Adds a 1×1 convolution of stride 32: its output is `bias` + `light` · pixel in every cell.
+  static void addHead(Protobuf& graph, const std::string& name, const std::vector<float>& bias,
+                      const std::vector<float>& light = {}) {
     const auto n = static_cast<std::uint64_t>(bias.size());
     Protobuf node;
     node.bytes(1, "images").bytes(1, name + ".w").bytes(1, name + ".b").bytes(2, name);
@@ -86,15 +90,17 @@ struct TinyOnnx {
     };
     node.message(5, ints("kernel_shape", 1)).message(5, ints("strides", 32));
     graph.message(1, node);
-    graph.message(5, tensor(name + ".w", {n, 3, 1, 1}, std::vector<float>(bias.size() * 3)));
+    std::vector<float> weights(bias.size() * 3);
+    for (std::size_t i = 0; i < light.size(); ++i) weights[3 * i] = light[i];
+    graph.message(5, tensor(name + ".w", {n, 3, 1, 1}, weights));
     graph.message(5, tensor(name + ".b", {n}, bias));
     graph.message(12, value(name, {1, n, 2, 2}));
   }
   std::string onnx() const {
     Protobuf graph;
     graph.bytes(2, "tiny");
-    addHead(graph, "box32", box);
-    addHead(graph, "logits32", logits);
+    addHead(graph, "box32", box, box_by_light);
+    addHead(graph, "logits32", logits, logits_by_light);
     addHead(graph, "azimuth32", azimuth);
     graph.message(11, value("images", {1, 3, 48, 64}));
     return Protobuf().number(1, 6).message(7, graph).message(8, Protobuf().number(2, 11)).text();

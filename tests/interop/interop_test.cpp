@@ -1,0 +1,125 @@
+// Another vendor's DDS reads `objects` and feeds `detections`: Fast DDS 2.9 on types that
+// fastddsgen made from the same IDL, with the real semantic_filter between.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "common/bus/wait_loop.h"
+#include "tests/process/support.h"
+#include "tests/services/run_until.h"
+
+namespace perdure {
+namespace {
+
+using namespace std::chrono_literals;
+
+Calibration calibration() {
+  Calibration c;
+  c.source = 77;
+  CameraCalibration camera;
+  camera.name = "cam0";
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 500;
+  camera.cx = 320;
+  camera.cy = 240;
+  Eigen::Matrix3d R;  // camera in body: z forward along body x, x right, y down
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  camera.T_BC = RigidTransform(R, Eigen::Vector3d::Zero());
+  c.cameras.push_back(camera);
+  return c;
+}
+
+/// The bodies of the lines "frame K next N objects M | …" by frame.
+std::map<std::uint64_t, std::string> linesOf(const std::string& log) {
+  std::map<std::uint64_t, std::string> lines;
+  std::istringstream text(log);
+  for (std::string line; std::getline(text, line);) {
+    std::istringstream words(line);
+    std::string frame;
+    std::uint64_t k = 0;
+    if (words >> frame >> k && frame == "frame") lines[k] = line;
+  }
+  return lines;
+}
+
+/// What the peer must have printed of the message that we have read ourselves.
+std::string expected(const Objects& m) {
+  std::ostringstream text;
+  text << "frame " << m.stamp.sequence << " next " << m.next_id << " objects " << m.objects.size();
+  for (const auto& o : m.objects) {
+    char line[256];
+    std::snprintf(line, sizeof line, " | %lu %s %.3f %.2f %.2f %.2f", o.id, o.best().name.c_str(),
+                  o.existence, o.best().mean[0], o.best().mean[1], o.best().mean[2]);
+    text << line;
+  }
+  return text.str();
+}
+
+TEST(Interop, FastDdsFeedsDetectionsAndReadsObjects) {
+  test::Folder folder;
+  const bus::Domain domain(test::ownNetwork());
+  const bus::Participant participant(domain, "test");
+  bus::Writer<Odometry> odometry(participant, bus::topics::kOdometry);
+  bus::Writer<Calibration> calibrations(participant, bus::topics::kCalibration);
+  bus::Reader<Objects> objects(participant, bus::topics::kObjects);
+  bus::Reader<Detections> detections(participant, bus::topics::kDetections);
+  bus::WaitLoop loop(participant);
+  std::map<std::uint64_t, std::string> ours;
+  std::set<std::uint64_t> detected;
+  std::size_t boxes = 0, things = 0;
+  loop.on(objects, [&](const Objects& m) {
+    ours[m.stamp.sequence] = expected(m);
+    things = m.objects.size();
+  });
+  loop.on(detections, [&](const Detections& m) {
+    detected.insert(m.stamp.sequence);
+    boxes += m.detections.size();
+    ASSERT_EQ(m.detections.size(), 1u);
+    EXPECT_EQ(m.detections[0].box.x2, 360.25);
+    EXPECT_EQ(m.detections[0].activations, (std::vector<float>{0.0F, 4.0F, -4.0F}));
+  });
+  const test::Child filter(
+      {(test::programs() / "perdure-semantic-filter").string(), "--set",
+       "class_priors=" + (test::sources() / "config" / "class_priors.yaml").string(), "--set",
+       "restore.timeout_s=0.2"},
+      folder.file("filter.log"));
+  ASSERT_TRUE(calibrations.write(calibration()));
+  const char* domain_id = std::getenv("PERDURE_DOMAIN");
+  const test::Child peer({std::getenv("PERDURE_FAST_PEER"), domain_id ? domain_id : "0", "280.5",
+                          "200", "360.25", "270"},
+                         folder.file("peer.log"));
+  const auto matched = [&] { return odometry.matched() >= 2 && detections.matched() >= 1; };
+  ASSERT_TRUE(test::runUntil(loop, matched))
+      << odometry.matched() << " readers of odometry, " << detections.matched()
+      << " writers of detections; " << peer.log();
+  constexpr std::uint64_t kFrames = 60;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    Odometry pose;
+    pose.stamp.source = 77;
+    pose.stamp.sequence = k;
+    pose.stamp.time = fromNanoseconds(static_cast<std::int64_t>(k) * 100'000'000);
+    pose.instance = 78;
+    pose.world = {5, 0};
+    pose.state = OdometryState::kTracking;
+    pose.T_WB.p.x() = 0.02 * static_cast<double>(k);
+    ASSERT_TRUE(odometry.write(pose));
+    const auto end = std::chrono::steady_clock::now() + 30ms;
+    while (std::chrono::steady_clock::now() < end) loop.runOnce(5ms);
+  }
+  EXPECT_GE(boxes, kFrames - 5) << "detections that Fast DDS wrote and Cyclone DDS read";
+  EXPECT_GE(things, 1u) << "the filter believes in what it was fed\n" << filter.log();
+  const auto theirs = linesOf(peer.log());
+  EXPECT_GE(theirs.size(), kFrames - 10);
+  std::size_t with_things = 0;
+  for (const auto& [frame, line] : theirs) {
+    if (!ours.contains(frame)) continue;
+    EXPECT_EQ(line, ours.at(frame));
+    with_things += line.find('|') != std::string::npos;
+  }
+  EXPECT_GE(with_things, kFrames / 2) << "beliefs that Cyclone DDS wrote and Fast DDS read";
+}
+
+}  // namespace
+}  // namespace perdure

@@ -1,0 +1,224 @@
+// The topics around inference for tests of swaps: frames and odometry go out at a steady pace,
+// detections, objects, events, notices and health come back. Real processes on their own network.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <map>
+#include <memory>
+#include <set>
+
+#include "common/bus/once.h"
+#include "tests/process/support.h"
+#include "tests/services/inference/tiny_onnx.h"
+#include "tests/services/run_until.h"
+
+namespace perdure::inference::testing {
+
+using namespace std::chrono_literals;
+
+/// Two or more boxes that a filter takes for things; `by_light` changes what it says of bright
+/// frames: "" nothing, "nan", "empty", "elsewhere".
+inline TinyOnnx swapNetwork(const std::string& name, const std::string& by_light = "") {
+  TinyOnnx net;
+  net.name = name;
+  net.box = {-1.2F, -1.2F, -1.2F, -1.2F};
+  net.logits = {0.0F, 5.0F, -2.0F};
+  if (by_light == "nan") net.logits_by_light = {0.0F, 3e38F, 0.0F};
+  if (by_light == "empty") net.logits_by_light = {1e4F, 0.0F, 0.0F};
+  if (by_light == "elsewhere") net.box_by_light = {-1e4F, -1e4F, 9.0F, 9.0F};
+  return net;
+}
+
+class SwapRig {
+ public:
+  explicit SwapRig(double rate_hz, double period_s)
+      : period_(durationFromSeconds(1.0 / rate_hz)), period_s_(period_s) {
+    loop_.on(detections_, [this](const Detections& d) {
+      by_frame_[d.stamp.sequence].push_back(d.instance);
+      last_heard_ = d.instance;
+      newest_ = std::max(newest_, d.stamp.sequence);
+    });
+    loop_.on(objects_, [this](const Objects& m) {
+      ++object_messages_[m.stamp.sequence];
+      last_objects_ = m;
+    });
+    loop_.on(notices_, [this](const SwapNotice& n) { said_.push_back(n); });
+    loop_.on(events_, [this](const Event& e) { happened_.push_back(e); });
+    loop_.on(models_, [this](const ModelInfo& m) { known_models_[m.name] = m; });
+    loop_.on(health_, [this](const Health& h) { healths_[h.instance] = h; });
+  }
+
+  std::vector<std::string> inference(const std::string& model,
+                                     std::vector<std::string> settings = {}) const {
+    std::vector<std::string> command = {(test::programs() / "perdure-inference").string(), "--set",
+                                        "model.path=" + model, "--set",
+                                        "ownership.period_s=" + std::to_string(period_s_)};
+    for (auto& s : settings) command.insert(command.end(), {"--set", std::move(s)});
+    return command;
+  }
+  std::unique_ptr<test::Child> start(const std::vector<std::string>& command,
+                                     const std::string& name) {
+    return std::make_unique<test::Child>(command, folder.file(name + ".log"));
+  }
+  std::unique_ptr<test::Child> startFilter() {
+    const auto config = test::sources() / "config";
+    return start({(test::programs() / "perdure-semantic-filter").string(), "--set",
+                  "class_priors=" + (config / "class_priors.yaml").string(), "--set",
+                  "restore.timeout_s=0.2"},
+                 "filter");
+  }
+  std::unique_ptr<test::Child> swap(const std::string& model, double probation_s,
+                                    const std::string& name, std::vector<std::string> more = {}) {
+    std::vector<std::string> command = {(test::programs() / "perdure").string(),
+                                        "inference",
+                                        "swap",
+                                        "--model",
+                                        model,
+                                        "--probation",
+                                        std::to_string(probation_s),
+                                        "--set",
+                                        "ownership.period_s=" + std::to_string(period_s_),
+                                        "--log",
+                                        folder.file(name + ".newcomer.log")};
+    command.insert(command.end(), more.begin(), more.end());
+    return start(command, name);
+  }
+  std::string model(const TinyOnnx& net) { return net.write(folder.file("model-" + net.name)); }
+
+  /// One frame with its odometry now, and its period.
+  void sendFrame() {
+    const auto begin = std::chrono::steady_clock::now();
+    const auto pixels = std::make_shared<const std::vector<std::uint8_t>>(
+        64 * 48, static_cast<std::uint8_t>(bright ? 250 : 0));
+    Frame frame;
+    frame.stamp.source = 77;
+    frame.stamp.sequence = next_;
+    frame.stamp.time = fromNanoseconds(static_cast<std::int64_t>(next_) * period_.count());
+    ++next_;
+    frame.camera = "cam0";
+    frame.width = 64;
+    frame.height = 48;
+    frame.data = pixels;
+    Odometry odometry;
+    odometry.stamp = frame.stamp;
+    odometry.instance = 78;
+    odometry.world = {5, 0};
+    odometry.state = OdometryState::kTracking;
+    ASSERT_TRUE(frames_.write(frame));
+    ASSERT_TRUE(odometry_.write(odometry));
+    for (auto now = begin; now < begin + period_; now = std::chrono::steady_clock::now()) {
+      loop_.runOnce(std::min<std::chrono::nanoseconds>(2ms, begin + period_ - now));
+    }
+  }
+  void sendFrames(int n) {
+    for (int i = 0; i < n; ++i) sendFrame();
+  }
+  /// Sends frames until it is so; false after `seconds` of them.
+  bool sendUntil(double seconds, const std::function<bool()>& so) {
+    const int most = static_cast<int>(seconds / toSeconds(period_));
+    for (int n = 0; n < most && !so(); ++n) sendFrame();
+    return so();
+  }
+  bool modelsKnown(std::size_t inferences) {
+    return test::runUntil(loop_, [&] {
+      return frames_.matched() >= inferences && detections_.matched() >= inferences;
+    });
+  }
+  void sendCalibration() {
+    Calibration c;
+    c.source = 77;
+    CameraCalibration camera;
+    camera.name = "cam0";
+    camera.width = 64;
+    camera.height = 48;
+    camera.fx = camera.fy = 60;
+    camera.cx = 32;
+    camera.cy = 24;
+    Eigen::Matrix3d R;  // camera in body: z forward along body x, x right, y down
+    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    camera.T_BC = RigidTransform(R, Eigen::Vector3d::Zero());
+    c.cameras.push_back(camera);
+    ASSERT_TRUE(calibration_.write(c));
+  }
+
+  std::uint64_t next() const { return next_; }
+  InstanceId heard() const { return last_heard_; }
+  /// Frames in [first, last) that nobody answered; their longest run goes to `longest`.
+  int unanswered(std::uint64_t first, std::uint64_t last, int* longest = nullptr) const {
+    int count = 0, run = 0, most = 0;
+    for (std::uint64_t i = first; i < last; ++i) {
+      run = by_frame_.contains(i) ? 0 : run + 1;
+      most = std::max(most, run);
+      count += run > 0;
+    }
+    if (longest) *longest = most;
+    return count;
+  }
+  /// Messages beyond the first of each frame: readers drop them.
+  int repeated(std::uint64_t first, std::uint64_t last) const {
+    int n = 0;
+    for (const auto& [frame, who] : by_frame_) {
+      if (frame >= first && frame < last) n += static_cast<int>(who.size()) - 1;
+    }
+    return n;
+  }
+  std::set<InstanceId> answerers(std::uint64_t first, std::uint64_t last) const {
+    std::set<InstanceId> all;
+    for (const auto& [frame, who] : by_frame_) {
+      if (frame >= first && frame < last) all.insert(who.begin(), who.end());
+    }
+    return all;
+  }
+  bool said(SwapStep step, const std::string& reason = "") const {
+    return std::any_of(said_.begin(), said_.end(), [&](const SwapNotice& n) {
+      return n.step == step && (reason.empty() || n.reason == reason);
+    });
+  }
+  bool happened(const std::string& part) const {
+    return std::any_of(happened_.begin(), happened_.end(), [&](const Event& e) {
+      return e.kind == EventKind::kModelChanged && e.detail.find(part) != std::string::npos;
+    });
+  }
+  std::set<ObjectId> objectIds() const {
+    std::set<ObjectId> ids;
+    for (const auto& o : last_objects_.objects) ids.insert(o.id);
+    return ids;
+  }
+  const std::map<std::uint64_t, int>& objectMessages() const { return object_messages_; }
+  const std::map<InstanceId, Health>& healths() const { return healths_; }
+  void forgetNotices() { said_.clear(), happened_.clear(); }
+  std::size_t inferencesHeardOf() const { return detections_.matched(); }
+  bus::WaitLoop& loop() { return loop_; }
+
+  test::Folder folder;
+  bool bright = false;
+
+ private:
+  Duration period_;
+  double period_s_;
+  bus::Domain domain_{test::ownNetwork()};
+  bus::Participant participant_{domain_, "test"};
+  bus::Writer<Frame> frames_{participant_, bus::topics::frame("cam0")};
+  bus::Writer<Odometry> odometry_{participant_, bus::topics::kOdometry};
+  bus::Writer<Calibration> calibration_{participant_, bus::topics::kCalibration};
+  bus::Reader<Detections> detections_{participant_, bus::topics::kDetections};
+  bus::Reader<Objects> objects_{participant_, bus::topics::kObjects};
+  bus::Reader<Event> events_{participant_, bus::topics::kEvents};
+  bus::Reader<ModelInfo> models_{participant_, bus::topics::kModel};
+  bus::Reader<SwapNotice> notices_{participant_, bus::topics::kSwap};
+  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
+  bus::WaitLoop loop_{participant_};
+  std::uint64_t next_ = 0, newest_ = 0;
+  InstanceId last_heard_ = 0;
+  std::map<std::uint64_t, std::vector<InstanceId>> by_frame_;
+  std::map<std::uint64_t, int> object_messages_;
+  Objects last_objects_;
+  std::vector<SwapNotice> said_;
+  std::vector<Event> happened_;
+  std::map<std::string, ModelInfo> known_models_;
+  std::map<InstanceId, Health> healths_;
+};
+
+}  // namespace perdure::inference::testing

@@ -1,0 +1,356 @@
+// A newcomer and the old one as two state machines on one simulated topic: what each says, who is
+// heard, and that no frame is lost whatever the newcomer does.
+#include "services/inference/core/swap.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+#include <set>
+
+namespace perdure::inference {
+namespace {
+
+using std::chrono::milliseconds;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+constexpr InstanceId kOld = 1, kNew = 2;
+constexpr Duration kLease = milliseconds(100);
+constexpr auto kPeriod = milliseconds(33);
+
+ModelInfo modelOf(std::uint64_t hash, std::vector<std::string> classes) {
+  ModelInfo model;
+  model.hash = hash;
+  model.name = hash == kOld ? "old" : "new";
+  model.classes = std::move(classes);
+  return model;
+}
+
+Detection boxAt(double x, float nats) {
+  Detection d;
+  d.box = {x, 10, x + 40, 60};
+  d.activations = {0.0F, nats, -3.0F};
+  return d;
+}
+
+Detections listOf(InstanceId who, std::uint64_t frame, std::vector<Detection> boxes) {
+  Detections d;
+  d.instance = d.model_hash = who;
+  d.stamp.source = 7;
+  d.stamp.sequence = frame;
+  d.detections = std::move(boxes);
+  return d;
+}
+
+/// What a process answers to a frame; nothing: it is stopped, or dead.
+using Answer = std::function<std::optional<Result<Detections>>(std::uint64_t frame)>;
+
+Answer sees(InstanceId who, std::vector<Detection> boxes) {
+  return [=](std::uint64_t frame) { return listOf(who, frame, boxes); };
+}
+
+const std::vector<Detection> kStreet = {boxAt(20, 4), boxAt(200, 3), boxAt(300, -2)};
+
+/// The topic, with the ownership of DDS: the strongest that was heard within a lease.
+struct Bus {
+  struct Process {
+    Process(Swap swap_of, Answer answer_of, int strength_of)
+        : swap(std::move(swap_of)), answer(std::move(answer_of)), strength(strength_of) {}
+    Swap swap;
+    Answer answer;
+    int strength;
+    bool silent = false, ended = false;
+    std::string failure;
+    Swap::Time wrote{};
+  };
+  std::map<InstanceId, Process> processes;
+  std::vector<SwapNotice> notices;
+  std::vector<Detections> heard;
+  Swap::Time now{std::chrono::hours(1)};
+  std::uint64_t frame = 0;
+
+  Bus() { setClasses({"car", "person"}, {"car", "person"}); }
+  void setClasses(const std::vector<std::string>& old, const std::vector<std::string>& fresh) {
+    constexpr double kProbation = 2.0;
+    processes.clear();
+    processes.try_emplace(kOld, Swap({kOld, "old", 0.0, kLease}), sees(kOld, kStreet), 10);
+    processes.try_emplace(kNew, Swap({kNew, "new", kProbation, kLease}), sees(kNew, kStreet), -1);
+    for (auto& [id, p] : processes) {
+      p.swap.learn(modelOf(kOld, old));
+      p.swap.learn(modelOf(kNew, fresh));
+    }
+  }
+  Process& elder() { return processes.at(kOld); }
+  Process& newcomer() { return processes.at(kNew); }
+
+  InstanceId owner() const {
+    InstanceId best = 0;
+    for (const auto& [id, p] : processes) {
+      const bool lives = !p.silent && !p.ended && now - p.wrote <= kLease;
+      if (lives && (best == 0 || p.strength > processes.at(best).strength)) best = id;
+    }
+    return best;
+  }
+  void deliver(const Detections& d) {
+    processes.at(d.instance).wrote = now;
+    if (owner() != d.instance) return;
+    heard.push_back(d);
+    for (auto& [id, p] : processes) {
+      if (p.ended) continue;
+      p.swap.heard(d, now);
+      obey(id);
+    }
+  }
+  void obey(InstanceId id) {
+    Process& p = processes.at(id);
+    const Swap::Actions actions = p.swap.take();
+    if (actions.lead) p.strength = std::max(elder().strength, newcomer().strength) + 10;
+    p.silent = p.silent || actions.yield;
+    for (const Detections& d : actions.again) deliver(d);
+    for (const SwapNotice& n : actions.notices) {
+      notices.push_back(n);
+      for (auto& [other, q] : processes) {
+        if (other == id || q.ended) continue;
+        q.swap.told(n, now);
+        obey(other);
+      }
+    }
+    p.ended = p.ended || actions.end;
+    if (actions.end) p.failure = actions.failure;
+  }
+  void step() {
+    for (auto& [id, p] : processes) {
+      if (p.ended) continue;
+      const auto answer = p.answer(frame);
+      if (!answer) continue;
+      if (*answer) {
+        p.swap.ownResult(**answer, true, now);
+        obey(id);
+        if (!p.silent) deliver(**answer);
+      } else {
+        p.swap.ownFailure(answer->error(), now);
+        obey(id);
+      }
+    }
+    ++frame;
+    for (int i = 0; i < 2; ++i) {
+      now += kPeriod / 2;
+      for (auto& [id, p] : processes) {
+        if (!p.ended && p.answer(frame)) p.swap.tick(now), obey(id);
+      }
+    }
+  }
+  void run(int frames) {
+    for (int i = 0; i < frames; ++i) step();
+  }
+  void runUntilTakenOver() {
+    for (int i = 0; i < 100 && owner() != kNew; ++i) step();
+    ASSERT_EQ(owner(), kNew);
+  }
+  std::set<std::uint64_t> answered() const {
+    std::set<std::uint64_t> frames;
+    for (const auto& d : heard) frames.insert(d.stamp.sequence);
+    return frames;
+  }
+  std::vector<SwapStep> steps() const {
+    std::vector<SwapStep> all;
+    for (const auto& n : notices) all.push_back(n.step);
+    return all;
+  }
+};
+
+TEST(Swap, ANewcomerRehearsesTakesOverPassesAndTheOldOneRetires) {
+  Bus bus;
+  bus.run(10);
+  EXPECT_EQ(bus.owner(), kOld) << "it rehearses";
+  bus.run(100);
+  EXPECT_EQ(bus.owner(), kNew);
+  EXPECT_THAT(bus.steps(), ElementsAre(SwapStep::kRehearsing, SwapStep::kTookOver,
+                                       SwapStep::kPassed, SwapStep::kRetired));
+  EXPECT_TRUE(bus.elder().ended);
+  EXPECT_EQ(bus.elder().failure, "");
+  EXPECT_FALSE(bus.newcomer().ended);
+  EXPECT_EQ(bus.answered().size(), bus.frame);
+  EXPECT_THAT(bus.notices.back().detail, HasSubstr("100 % of"));
+}
+
+TEST(Swap, TheProbationLastsAsLongAsItWasAskedFor) {
+  Bus bus;
+  bus.runUntilTakenOver();
+  const auto taken = bus.now;
+  while (!bus.elder().ended) bus.step();
+  EXPECT_NEAR(toSeconds(bus.now - taken), 2.0, 0.05);
+}
+
+struct Nonsense {
+  std::string reason;
+  Answer answer;
+};
+
+std::vector<Nonsense> nonsense() {
+  std::vector<Detection> flood, elsewhere;
+  for (int i = 0; i < 30; ++i) flood.push_back(boxAt(20 + 6 * i, 1));
+  for (int i = 0; i < 3; ++i) elsewhere.push_back(boxAt(500 + 60 * i, 4));
+  return {{"empty", sees(kNew, {})},
+          {"flood", sees(kNew, flood)},
+          {"elsewhere", sees(kNew, elsewhere)},
+          {"fails", [](std::uint64_t) {
+             return Result<Detections>(fail("model_output_not_finite", "NaN"));
+           }}};
+}
+
+TEST(Swap, NonsenseFromTheStartIsNeverHeard) {
+  for (const auto& [reason, answer] : nonsense()) {
+    SCOPED_TRACE(reason);
+    Bus bus;
+    bus.newcomer().answer = answer;
+    bus.run(100);
+    EXPECT_EQ(bus.owner(), kOld);
+    EXPECT_TRUE(bus.newcomer().ended);
+    EXPECT_THAT(bus.newcomer().failure, HasSubstr(reason));
+    for (const auto& d : bus.heard) EXPECT_EQ(d.instance, kOld);
+    EXPECT_EQ(bus.answered().size(), bus.frame);
+    EXPECT_EQ(bus.notices.back().step, SwapStep::kRolledBack);
+    EXPECT_EQ(bus.notices.back().reason, reason);
+  }
+}
+
+TEST(Swap, NonsenseOnProbationIsRolledBackWithinTheWindow) {
+  for (const auto& [reason, answer] : nonsense()) {
+    SCOPED_TRACE(reason);
+    Bus bus;
+    bus.runUntilTakenOver();
+    bus.run(5);
+    bus.newcomer().answer = answer;
+    const auto turned = bus.frame;
+    while (bus.owner() != kOld && bus.frame < turned + 60) bus.step();
+    EXPECT_LE(bus.frame - turned, Judge::kWindow + Judge::kEnough);
+    bus.run(100);
+    EXPECT_EQ(bus.owner(), kOld);
+    EXPECT_FALSE(bus.elder().ended);
+    EXPECT_TRUE(bus.newcomer().ended);
+    EXPECT_EQ(bus.notices.back().step, SwapStep::kRolledBack);
+    EXPECT_EQ(bus.notices.back().reason, reason);
+    EXPECT_THAT(bus.elder().swap.message(), HasSubstr(reason));
+    EXPECT_EQ(bus.elder().swap.reasons().of("swap_rolled_back_" + reason), 1u);
+    EXPECT_EQ(bus.answered().size(), bus.frame) << "frames that failed were answered afterwards";
+  }
+}
+
+TEST(Swap, ANewcomerThatDiesOnProbationLosesNoFrameAndIsKeptDown) {
+  Bus bus;
+  bus.runUntilTakenOver();
+  bus.run(5);
+  bus.newcomer().answer = [](std::uint64_t) { return std::nullopt; };
+  bus.run(100);
+  EXPECT_EQ(bus.owner(), kOld);
+  EXPECT_EQ(bus.answered().size(), bus.frame);
+  EXPECT_EQ(bus.notices.back().reason, "silent");
+  EXPECT_GT(bus.elder().strength, bus.newcomer().strength) << "should it wake";
+  EXPECT_FALSE(bus.elder().ended);
+}
+
+TEST(Swap, ANewcomerThatWakesIsToldAndEnds) {
+  Bus bus;
+  bus.runUntilTakenOver();
+  bus.newcomer().answer = [](std::uint64_t) { return std::nullopt; };
+  bus.run(30);
+  ASSERT_EQ(bus.owner(), kOld);
+  bus.newcomer().swap.ownResult(listOf(kNew, bus.frame, kStreet), false, bus.now);
+  bus.obey(kNew);
+  EXPECT_TRUE(bus.newcomer().ended);
+  bus.run(60);
+  EXPECT_EQ(bus.owner(), kOld);
+}
+
+TEST(Swap, WithoutTheOldOneTheNewcomerIsHeardAtOnceAndAsksNobody) {
+  Bus bus;
+  bus.elder().ended = true;
+  bus.run(150);
+  EXPECT_EQ(bus.owner(), kNew);
+  EXPECT_THAT(bus.steps(),
+              ElementsAre(SwapStep::kRehearsing, SwapStep::kTookOver, SwapStep::kPassed));
+  EXPECT_EQ(bus.answered().size(), bus.frame);
+}
+
+TEST(Swap, TheOldOneThatDiesWhileTheNewcomerRehearsesLeavesItTheTopic) {
+  Bus bus;
+  bus.run(8);
+  bus.elder().ended = true;
+  bus.run(200);
+  EXPECT_EQ(bus.owner(), kNew);
+  EXPECT_GE(bus.answered().size() + 4, bus.frame);
+}
+
+TEST(Swap, ALateResultOnProbationRollsBack) {
+  Bus bus;
+  bus.runUntilTakenOver();
+  bus.newcomer().swap.ownResult(listOf(kNew, bus.frame, kStreet), false, bus.now);
+  bus.obey(kNew);
+  bus.run(10);
+  EXPECT_EQ(bus.notices.back().reason, "late");
+  EXPECT_EQ(bus.owner(), kOld);
+  EXPECT_EQ(bus.answered().size(), bus.frame);
+}
+
+TEST(Swap, APassOfOneThatIsNotHeardRetiresNobody) {
+  Bus bus;
+  bus.run(5);
+  SwapNotice lie;
+  lie.instance = 99;
+  lie.about = kOld;
+  lie.step = SwapStep::kPassed;
+  bus.elder().swap.told(lie, bus.now);
+  bus.obey(kOld);
+  EXPECT_FALSE(bus.elder().ended);
+  EXPECT_EQ(bus.elder().swap.reasons().of("swap_passed_unheard"), 1u);
+}
+
+TEST(Swap, OtherClassesAreNoNonsense) {
+  Bus bus;
+  bus.setClasses({"car", "person"}, {"bench", "hydrant"});
+  bus.newcomer().answer = sees(kNew, {boxAt(600, 4)});
+  bus.run(200);
+  EXPECT_EQ(bus.owner(), kNew) << "it cannot know cars";
+  EXPECT_TRUE(bus.elder().ended);
+}
+
+TEST(Swap, ABlindOldOneIsNoMeasure) {
+  Bus bus;
+  bus.elder().answer = sees(kOld, {});
+  bus.run(200);
+  EXPECT_EQ(bus.owner(), kNew) << "boxes where the old one sees none are no flood";
+}
+
+TEST(Judge, AsksForNonsenseOnlyWhereThereIsEnoughToCompare) {
+  Judge judge;
+  judge.learn(modelOf(kOld, {"car", "person"}));
+  judge.learn(modelOf(kNew, {"car", "person"}));
+  for (std::size_t i = 0; i < Judge::kEnough; ++i) {
+    EXPECT_FALSE(judge.complaint()) << i;
+    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, {}));
+  }
+  ASSERT_TRUE(judge.complaint());
+  EXPECT_EQ(judge.complaint()->code, "empty");
+  judge.reset();
+  EXPECT_FALSE(judge.complaint());
+  for (std::size_t i = 0; i < 50; ++i) {  // half of what the old one sees is enough
+    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, {boxAt(21, 0.1F)}));
+    EXPECT_FALSE(judge.complaint());
+  }
+  EXPECT_EQ(judge.summary(), "50 frames; 50 % of 100 sure things found");
+}
+
+TEST(Judge, ComplainsOfDetectionsWhoseModelNobodyPublished) {
+  Judge judge;
+  judge.learn(modelOf(kOld, {"car", "person"}));
+  for (std::size_t i = 0; i < Judge::kEnough; ++i) {
+    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, kStreet));
+  }
+  ASSERT_TRUE(judge.complaint());
+  EXPECT_EQ(judge.complaint()->code, "unknown_model");
+}
+
+}  // namespace
+}  // namespace perdure::inference

@@ -1,0 +1,33 @@
+// The inference process that `perdure inference swap` starts. It is not tied to the command: it
+// lives on, in a session of its own, whatever becomes of who started it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace perdure::tools {
+
+class Newcomer {
+ public:
+  /// Standard output and error go to the file `log`. Throws StartupError where it cannot be run.
+  Newcomer(const std::vector<std::string>& command, std::string log);
+
+  pid_t pid() const { return pid_; }
+  /// Its exit status, or 128 + the signal that ended it; nothing while it runs.
+  std::optional<int> ended();
+  /// SIGTERM; after some seconds SIGKILL. Returns when it is gone.
+  void stop();
+  /// The last line that it logged, which says why it ended.
+  std::string lastLine() const;
+  const std::string& log() const { return log_; }
+
+ private:
+  std::string log_;
+  pid_t pid_ = 0;
+  std::optional<int> status_;
+};
+
+}  // namespace perdure::tools
