@@ -37,7 +37,7 @@ class Ownership {
     } else if (!in_form_) {
       in_form_ = ++good_ >= kGoodResults && now - lost_at_ >= kLeases * lease_;
     }
-    spare_ = spare_ && !alone;
+    if (in_form_ && alone) spare_ = false;  // one that just woke has heard nobody yet
     return strength();
   }
   /// The network gave no result. True where form is lost by it.

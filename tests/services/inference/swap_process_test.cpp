@@ -44,7 +44,7 @@ struct Drive {
 };
 
 void expectNothingLost(const SwapRig& rig, std::uint64_t first, std::uint64_t last) {
-  EXPECT_EQ(rig.unanswered(first, last), 0);
+  EXPECT_EQ(rig.unanswered(first, last), 0) << rig.story(first, last);
   for (std::uint64_t k = first; k < last; ++k) {
     const auto it = rig.objectMessages().find(k);
     EXPECT_EQ(it == rig.objectMessages().end() ? 0 : it->second, 1) << "objects of frame " << k;

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <sstream>
 
 #include "common/bus/once.h"
 #include "tests/process/support.h"
@@ -25,7 +26,7 @@ inline TinyOnnx swapNetwork(const std::string& name, const std::string& by_light
   net.name = name;
   net.box = {-1.2F, -1.2F, -1.2F, -1.2F};
   net.logits = {0.0F, 5.0F, -2.0F};
-  if (by_light == "nan") net.logits_by_light = {0.0F, 3e38F, 0.0F};
+  if (by_light == "nan") net.logits_by_light = {0.0F, 2e36F, 0.0F};  // ∞ from 170 on
   if (by_light == "empty") net.logits_by_light = {1e4F, 0.0F, 0.0F};
   if (by_light == "elsewhere") net.box_by_light = {-1e4F, -1e4F, 9.0F, 9.0F};
   return net;
@@ -44,7 +45,10 @@ class SwapRig {
       ++object_messages_[m.stamp.sequence];
       last_objects_ = m;
     });
-    loop_.on(notices_, [this](const SwapNotice& n) { said_.push_back(n); });
+    loop_.on(notices_, [this](const SwapNotice& n) {
+      said_.push_back(n);
+      said_at_.emplace_back(next_, nameOf(n.step));
+    });
     loop_.on(events_, [this](const Event& e) { happened_.push_back(e); });
     loop_.on(models_, [this](const ModelInfo& m) { known_models_[m.name] = m; });
     loop_.on(health_, [this](const Health& h) { healths_[h.instance] = h; });
@@ -156,6 +160,23 @@ class SwapRig {
     if (longest) *longest = most;
     return count;
   }
+  /// Frames that nobody answered and what was said at which frame, for a person who looks for why.
+  std::string story(std::uint64_t first, std::uint64_t last) const {
+    std::ostringstream text;
+    for (const auto& [frame, step] : said_at_) {
+      if (frame >= first && frame < last) text << step << " at " << frame << "; ";
+    }
+    text << "unanswered:";
+    for (std::uint64_t i = first; i < last; ++i) {
+      if (!by_frame_.contains(i)) text << ' ' << i;
+    }
+    for (const auto& [instance, h] : healths_) {
+      text << "\n"
+           << h.process << " " << h.pid << ": in " << h.frames_in << " dropped " << h.dropped;
+      for (const auto& [reason, n] : h.reasons) text << ' ' << reason << '=' << n;
+    }
+    return text.str();
+  }
   /// Messages beyond the first of each frame: readers drop them.
   int repeated(std::uint64_t first, std::uint64_t last) const {
     int n = 0;
@@ -216,6 +237,7 @@ class SwapRig {
   std::map<std::uint64_t, int> object_messages_;
   Objects last_objects_;
   std::vector<SwapNotice> said_;
+  std::vector<std::pair<std::uint64_t, std::string>> said_at_;  ///< and before which frame
   std::vector<Event> happened_;
   std::map<std::string, ModelInfo> known_models_;
   std::map<InstanceId, Health> healths_;

@@ -134,10 +134,13 @@ TEST_F(Takeover, AStoppedOwnerThatWakesSendsNothingOld) {
   const std::size_t woken_at = arrivals_.size();
   const std::uint64_t newest = arrivals_.back().second;
   first->signal(SIGCONT);
-  EXPECT_LT(framesUntilHeard(owner_id, 40), 40) << "it comes back when its results are good";
+  sendFrames(40);
+  EXPECT_NE(owner(), owner_id) << "it takes nothing back unasked";
   for (std::size_t i = woken_at; i < arrivals_.size(); ++i) {
     EXPECT_GE(arrivals_[i].second, newest) << "an old result came through";
   }
+  second->signal(SIGKILL);
+  EXPECT_LT(framesUntilHeard(owner_id, 10), 10) << "in form again it is a warm spare";
 }
 
 TEST_F(Takeover, AnOrderedEndLosesNoFrame) {
