@@ -33,7 +33,8 @@ inline constexpr std::size_t kImageBytes = 256u << 20;
 inline constexpr std::size_t kCameras = 16;
 inline constexpr std::size_t kCoefficients = 8;
 inline constexpr std::size_t kClasses = 8192;
-inline constexpr std::size_t kDetections = 8192;
+inline constexpr std::size_t kDetections =
+    1024;  ///< inference gives at most 512; each costs the filter .8 ms
 inline constexpr std::size_t kLandmarks = 65536;
 inline constexpr std::size_t kObjects = 16384;
 inline constexpr std::size_t kReplyObjects = 100000;

@@ -1,5 +1,6 @@
 // Another vendor's DDS reads `objects` and feeds `detections`: Fast DDS 2.9 on types that
-// fastddsgen made from the same IDL, with the real semantic_filter between.
+// fastddsgen made from the same IDL, by way of the gateway, with the real semantic_filter behind
+// it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -67,14 +68,12 @@ TEST(Interop, FastDdsFeedsDetectionsAndReadsObjects) {
   bus::Reader<Detections> detections(participant, bus::topics::kDetections);
   bus::WaitLoop loop(participant);
   std::map<std::uint64_t, std::string> ours;
-  std::set<std::uint64_t> detected;
   std::size_t boxes = 0, things = 0;
   loop.on(objects, [&](const Objects& m) {
     ours[m.stamp.sequence] = expected(m);
     things = m.objects.size();
   });
   loop.on(detections, [&](const Detections& m) {
-    detected.insert(m.stamp.sequence);
     boxes += m.detections.size();
     ASSERT_EQ(m.detections.size(), 1u);
     EXPECT_EQ(m.detections[0].box.x2, 360.25);
@@ -86,6 +85,11 @@ TEST(Interop, FastDdsFeedsDetectionsAndReadsObjects) {
        "restore.timeout_s=0.2"},
       folder.file("filter.log"));
   ASSERT_TRUE(calibrations.write(calibration()));
+  const test::Child gateway(
+      {"/bin/sh", "-c",
+       "eval \"$(" + (test::programs() / "perdure").string() + " env)\" && exec " +
+           (test::programs() / "final_gateway").string()},
+      folder.file("gateway.log"));
   const char* domain_id = std::getenv("PERDURE_DOMAIN");
   const test::Child peer({std::getenv("PERDURE_FAST_PEER"), domain_id ? domain_id : "0", "280.5",
                           "200", "360.25", "270"},
@@ -94,30 +98,36 @@ TEST(Interop, FastDdsFeedsDetectionsAndReadsObjects) {
   ASSERT_TRUE(test::runUntil(loop, matched))
       << odometry.matched() << " readers of odometry, " << detections.matched()
       << " writers of detections; " << peer.log();
-  constexpr std::uint64_t kFrames = 60;
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
+  std::uint64_t next = 0;
+  const auto send = [&] {
     Odometry pose;
     pose.stamp.source = 77;
-    pose.stamp.sequence = k;
-    pose.stamp.time = fromNanoseconds(static_cast<std::int64_t>(k) * 100'000'000);
+    pose.stamp.sequence = next;
+    pose.stamp.time = fromNanoseconds(static_cast<std::int64_t>(next) * 100'000'000);
     pose.instance = 78;
     pose.world = {5, 0};
     pose.state = OdometryState::kTracking;
-    pose.T_WB.p.x() = 0.02 * static_cast<double>(k);
+    pose.T_WB.p.x() = 0.005 * static_cast<double>(next++);
     ASSERT_TRUE(odometry.write(pose));
     const auto end = std::chrono::steady_clock::now() + 30ms;
     while (std::chrono::steady_clock::now() < end) loop.runOnce(5ms);
-  }
-  EXPECT_GE(boxes, kFrames - 5) << "detections that Fast DDS wrote and Cyclone DDS read";
+  };
+  // Until the last of the five ways is open: what went before was heard by some only.
+  while (next < 300 && (boxes == 0 || linesOf(peer.log()).empty())) send();
+  constexpr std::uint64_t kFrames = 60, kUnderWay = 5;
+  const std::uint64_t first = next;
+  boxes = 0;
+  while (next < first + kFrames) send();
+  EXPECT_GE(boxes, kFrames - kUnderWay) << "detections that Fast DDS wrote and Cyclone DDS read";
   EXPECT_GE(things, 1u) << "the filter believes in what it was fed\n" << filter.log();
-  const auto theirs = linesOf(peer.log());
-  EXPECT_GE(theirs.size(), kFrames - 10);
-  std::size_t with_things = 0;
-  for (const auto& [frame, line] : theirs) {
-    if (!ours.contains(frame)) continue;
+  std::size_t compared = 0, with_things = 0;
+  for (const auto& [frame, line] : linesOf(peer.log())) {
+    if (frame < first || !ours.contains(frame)) continue;
     EXPECT_EQ(line, ours.at(frame));
+    ++compared;
     with_things += line.find('|') != std::string::npos;
   }
+  EXPECT_GE(compared, kFrames - 2 * kUnderWay);
   EXPECT_GE(with_things, kFrames / 2) << "beliefs that Cyclone DDS wrote and Fast DDS read";
 }
 

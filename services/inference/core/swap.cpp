@@ -5,10 +5,10 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::size_t kRemembered = 32;     // results of each side
-constexpr std::size_t kHeard = 128;         // frames
-constexpr int kSilence = 3;                 // own results without one of the newcomer's
-constexpr int kWorth = 4;                   // leases, for which a result is worth saying again
+constexpr std::size_t kRemembered = 32;  // results of each side
+constexpr std::size_t kHeard = 128;      // frames
+constexpr int kSilence = 3;              // leases, and own results, without one of the newcomer's
+constexpr int kWorth = 4;                // leases, for which a result is worth saying again
 constexpr std::chrono::seconds kNobody{3};  // until a newcomer believes that it is alone
 constexpr std::chrono::seconds kGrace{10};  // beyond a probation, for its last word
 
@@ -40,7 +40,8 @@ void Swap::ownResult(const Detections& own, bool in_form, Time now) {
   if (in_form) keep(own_, Made{own, now}, kRemembered);
   const auto other = findFrame(others_, own.stamp, [](const auto& d) { return d.stamp; });
   if (other != others_.rend()) compare(own, *other);
-  if (watch_ && ++watch_->silent_results >= kSilence && now - other_at_ > options_.lease) {
+  if (watch_ && ++watch_->silent_results >= kSilence &&
+      now - other_at_ > kSilence * options_.lease) {
     return takeBack({"silent", "nothing was heard from it for " + milliseconds(now - other_at_)},
                     now);
   }

@@ -87,6 +87,26 @@ TEST(Swap, ANewcomerThatGoesBlindOnProbationIsRolledBack) {
   expectNothingLost(d.rig, first, d.rig.next() - kSettled / 2);
 }
 
+TEST(Swap, AStrangersServiceIsHeardAndWhenItDiesTheOldOneIs) {
+  Drive d(0.1);
+  const auto programs = test::programs();
+  const auto stub = d.rig.start({"/bin/sh", "-c",
+                                 "eval \"$(" + (programs / "perdure").string() +
+                                     " env)\" && exec " + (programs / "inference_stub").string()},
+                                "stub");
+  d.rig.bright = true;
+  constexpr InstanceId kStub = 0x57ab;
+  ASSERT_TRUE(d.rig.sendUntil(20, [&] { return d.rig.heard() == kStub; })) << stub->log();
+  d.rig.sendFrames(kSettled);
+  EXPECT_EQ(d.rig.heard(), kStub);
+  EXPECT_TRUE(d.rig.happened("stub instead of first; new classes: lamp"));
+  const auto hit = d.rig.next();
+  stub->signal(SIGKILL);
+  d.rig.sendFrames(2 * kSettled);
+  EXPECT_EQ(d.rig.heard(), d.owner_id);
+  EXPECT_EQ(d.rig.unanswered(hit, d.rig.next() - kSettled), 0);
+}
+
 class SwapAtFullRate : public ::testing::Test {
  protected:
   Drive d{1.0 / kRate};
@@ -107,12 +127,11 @@ TEST_F(SwapAtFullRate, TenTimesNoFrameIsLostAndNoObject) {
   const auto last = d.rig.next() - kSettled / 2;
   expectNothingLost(d.rig, first, last);
   EXPECT_EQ(d.rig.objectIds(), ids);
-  RecordProperty("frames", static_cast<int>(last - first));
-  RecordProperty("without_detections", d.rig.unanswered(first, last));
-  RecordProperty("repeated", d.rig.repeated(first, last));
-  std::printf("ten swaps: %d frames, %d without detections, %d messages repeated\n",
-              static_cast<int>(last - first), d.rig.unanswered(first, last),
-              d.rig.repeated(first, last));
+  std::printf(
+      "ten swaps: %d frames, %d without detections, the longest wait %d periods, "
+      "%d messages repeated\n",
+      static_cast<int>(last - first), d.rig.unanswered(first, last), d.rig.longestWait(first, last),
+      d.rig.repeated(first, last));
 }
 
 TEST_F(SwapAtFullRate, NonsenseFromTheStartIsNeverHeard) {
@@ -174,7 +193,8 @@ TEST_F(SwapAtFullRate, ANewcomerThatIsKilledOrStoppedOnProbationIsRolledBack) {
     d.rig.sendFrames(2 * kSettled);
     EXPECT_EQ(d.rig.heard(), d.owner_id);
     EXPECT_TRUE(d.rig.said(SwapStep::kRolledBack, "silent"));
-    EXPECT_LE(d.rig.unanswered(hit, d.rig.next() - kSettled), number == SIGKILL ? 4 : 6);
+    EXPECT_EQ(d.rig.unanswered(hit, d.rig.next() - kSettled), 0);
+    EXPECT_LE(d.rig.longestWait(hit, d.rig.next() - kSettled), number == SIGKILL ? 4 : 6);
     const auto woken = d.rig.next();
     newcomer->signal(SIGCONT);
     d.rig.sendFrames(2 * kSettled);
@@ -231,10 +251,12 @@ TEST_F(SwapAtFullRate, AWarmSpareAnswersTheFramesOfAnOwnerThatIsKilledOrHangs) {
     spare->signal(number);
     d.rig.sendFrames(2 * kSettled);
     EXPECT_EQ(d.rig.heard(), d.owner_id);
-    int longest = 0;
-    const int lost = d.rig.unanswered(hit, d.rig.next() - kSettled, &longest);
-    EXPECT_LE(lost, number == SIGKILL ? 4 : 6);
-    std::printf("signal %d: %d frames without detections\n", number, lost);
+    const auto settled = d.rig.next() - kSettled;
+    const int lost = d.rig.unanswered(hit, settled), wait = d.rig.longestWait(hit, settled);
+    EXPECT_EQ(lost, 0) << d.rig.story(hit, settled);
+    EXPECT_LE(wait, number == SIGKILL ? 4 : 6);
+    std::printf("signal %d: %d frames without detections, the longest wait %d periods\n", number,
+                lost, wait);
     const auto woken = d.rig.next();
     spare->signal(SIGCONT);
     d.rig.sendFrames(3 * kSettled);

@@ -38,8 +38,8 @@ class SwapRig {
       : period_(durationFromSeconds(1.0 / rate_hz)), period_s_(period_s) {
     loop_.on(detections_, [this](const Detections& d) {
       by_frame_[d.stamp.sequence].push_back(d.instance);
+      answered_at_.try_emplace(d.stamp.sequence, next_);
       last_heard_ = d.instance;
-      newest_ = std::max(newest_, d.stamp.sequence);
     });
     loop_.on(objects_, [this](const Objects& m) {
       ++object_messages_[m.stamp.sequence];
@@ -149,16 +149,19 @@ class SwapRig {
 
   std::uint64_t next() const { return next_; }
   InstanceId heard() const { return last_heard_; }
-  /// Frames in [first, last) that nobody answered; their longest run goes to `longest`.
-  int unanswered(std::uint64_t first, std::uint64_t last, int* longest = nullptr) const {
-    int count = 0, run = 0, most = 0;
-    for (std::uint64_t i = first; i < last; ++i) {
-      run = by_frame_.contains(i) ? 0 : run + 1;
-      most = std::max(most, run);
-      count += run > 0;
-    }
-    if (longest) *longest = most;
+  /// Frames in [first, last) that nobody answered.
+  int unanswered(std::uint64_t first, std::uint64_t last) const {
+    int count = 0;
+    for (std::uint64_t i = first; i < last; ++i) count += !by_frame_.contains(i);
     return count;
+  }
+  /// The longest that a frame waited for its first answer, in periods.
+  int longestWait(std::uint64_t first, std::uint64_t last) const {
+    std::uint64_t longest = 0;
+    for (const auto& [frame, next] : answered_at_) {
+      if (frame >= first && frame < last) longest = std::max(longest, next - frame - 1);
+    }
+    return static_cast<int>(longest);
   }
   /// Frames that nobody answered and what was said at which frame, for a person who looks for why.
   std::string story(std::uint64_t first, std::uint64_t last) const {
@@ -231,9 +234,10 @@ class SwapRig {
   bus::Reader<SwapNotice> notices_{participant_, bus::topics::kSwap};
   bus::Reader<Health> health_{participant_, bus::topics::kHealth};
   bus::WaitLoop loop_{participant_};
-  std::uint64_t next_ = 0, newest_ = 0;
+  std::uint64_t next_ = 0;
   InstanceId last_heard_ = 0;
   std::map<std::uint64_t, std::vector<InstanceId>> by_frame_;
+  std::map<std::uint64_t, std::uint64_t> answered_at_;  ///< the next frame at that time
   std::map<std::uint64_t, int> object_messages_;
   Objects last_objects_;
   std::vector<SwapNotice> said_;
