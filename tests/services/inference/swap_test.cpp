@@ -92,12 +92,14 @@ struct Bus {
     }
     return best;
   }
+  /// Stopped or dead, it hears nothing either.
+  bool lives(const Process& p) const { return !p.ended && p.answer(frame); }
   void deliver(const Detections& d) {
     processes.at(d.instance).wrote = now;
     if (owner() != d.instance) return;
     heard.push_back(d);
     for (auto& [id, p] : processes) {
-      if (p.ended) continue;
+      if (!lives(p)) continue;
       p.swap.heard(d, now);
       obey(id);
     }
@@ -111,7 +113,7 @@ struct Bus {
     for (const SwapNotice& n : actions.notices) {
       notices.push_back(n);
       for (auto& [other, q] : processes) {
-        if (other == id || q.ended) continue;
+        if (other == id || !lives(q)) continue;
         q.swap.told(n, now);
         obey(other);
       }

@@ -108,10 +108,9 @@ TEST_F(Takeover, StandbyTakesOverWithinFourFramesOfTheOwnersDeath) {
   first->signal(SIGKILL);
   sendFrames(15);
   EXPECT_NE(owner(), owner_id);
-  EXPECT_LE(unusedFrom(killed_at), 4);
-  RecordProperty("frames_without_detections", unusedFrom(killed_at));
+  EXPECT_EQ(unusedFrom(killed_at), 0) << "the spare says again what nobody answered";
   EXPECT_EQ(used_.size() + static_cast<std::size_t>(unusedFrom(0)), next_);
-  EXPECT_LE(once_.repeated(), 1u) << "what comes twice is dropped by readers, and is rare";
+  EXPECT_LE(once_.repeated(), 10u) << "what comes twice is dropped by readers, and is rare";
   EXPECT_EQ(known_models_[owner()].classes, (std::vector<std::string>{"car", "person"}));
   second->signal(SIGTERM);
   EXPECT_EQ(second->wait(5s), 0) << second->log();
