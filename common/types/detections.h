@@ -33,7 +33,11 @@ struct Detection {
   /// Standard deviation of x1, y1, x2, y2 in pixels, where the network says it of each box; 0 where
   /// it does not: then ModelInfo::box_sigma holds.
   std::array<double, 4> side_sigma{};
-  bool primed = false;  ///< found only because a prediction asked for it
+  /// The answer to a prediction that no box of its own met (inference README, "Top-down"): the
+  /// activations are then log-likelihood ratios of "it is here, and no box was reported" against
+  /// "nothing is here". It is evidence about this object alone, and never begins one.
+  bool primed = false;
+  ObjectId primed_for = 0;  ///< id in Predictions; 0 where not primed
 };
 
 struct Detections {

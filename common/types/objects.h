@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -103,6 +104,10 @@ struct Prediction {
   std::string class_name;
   Box box;
   double probability = 0.0;  ///< r·π·v
+  /// Of the box's sides x1, y1, x2, y2, in pixels a second: where it will be a frame later.
+  std::array<double, 4> velocity{};
+  /// Standard deviation of each side in pixels; 0 where the writer does not say it.
+  std::array<double, 4> side_sigma{};
 };
 struct Predictions {
   FrameStamp stamp;

@@ -143,6 +143,7 @@ void describe(A& a, D& d, W& w) {
   a.number("sigma_y1", d.side_sigma[1], w.side_sigma[1], kNotNegative);
   a.number("sigma_x2", d.side_sigma[2], w.side_sigma[2], kNotNegative);
   a.number("sigma_y2", d.side_sigma[3], w.side_sigma[3], kNotNegative);
+  a.value("primed_for", d.primed_for, w.primed_for);
 }
 
 template <class A, Is<Detections> D, class W>

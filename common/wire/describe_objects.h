@@ -128,6 +128,14 @@ void describe(A& a, D& d, W& w) {
   a.text("class_name", d.class_name, w.class_name, kNameLength);
   describeBox(a, d.box, w.corners);
   a.probability("probability", d.probability, w.probability);
+  a.number("velocity_x1", d.velocity[0], w.velocity[0], kPixel);
+  a.number("velocity_y1", d.velocity[1], w.velocity[1], kPixel);
+  a.number("velocity_x2", d.velocity[2], w.velocity[2], kPixel);
+  a.number("velocity_y2", d.velocity[3], w.velocity[3], kPixel);
+  a.number("sigma_x1", d.side_sigma[0], w.side_sigma[0], kNotNegative);
+  a.number("sigma_y1", d.side_sigma[1], w.side_sigma[1], kNotNegative);
+  a.number("sigma_x2", d.side_sigma[2], w.side_sigma[2], kNotNegative);
+  a.number("sigma_y2", d.side_sigma[3], w.side_sigma[3], kNotNegative);
 }
 
 template <class A, Is<Predictions> D, class W>

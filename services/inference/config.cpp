@@ -25,6 +25,9 @@ void describe(Config& config, config::Fields& fields) {
                  {"most detections of one frame; those of most evidence are kept"});
   fields.texts("detection.classes", config.detection.classes,
                {"classes to report, by the network's names; empty: all"});
+  fields.boolean("detection.prime", config.detection.prime,
+                 {"report the best activation where semantic_filter expects an object and no box "
+                  "is; needs calibration.primed in model.json"});
   fields.integer("ownership.strength", config.ownership.strength, between(2, 1000000),
                  {"of several living inference processes the strongest is heard"});
   fields.boolean("ownership.standby", config.ownership.standby,

@@ -27,6 +27,7 @@ void run(service::Context& context, const inference::Config& config) {
   context.on(bus::topics::kSwap, [&](const SwapNotice& notice) { worker->told(notice); });
   context.on(bus::topics::frame(config.detection.camera),
              [&](const Frame& frame) { worker->offer(frame); });
+  context.on(bus::topics::kPredictions, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
   context.countReasons([&](ReasonCounts& counts) { worker->report(counts); });
   context.onHealth([&] {

@@ -33,24 +33,6 @@ std::string listOf(const std::vector<fs::path>& paths) {
   return text;
 }
 
-fs::path findDescription(const fs::path& model, const std::vector<std::string>& folders) {
-  std::vector<fs::path> candidates = {model.string() + ".model.json",
-                                      model.parent_path() / "model.json"};
-  for (const std::string& folder : folders) {
-    candidates.push_back(fs::path(folder) / (model.stem().string() + ".json"));
-  }
-  std::error_code error;
-  for (const fs::path& candidate : candidates) {
-    if (fs::is_regular_file(candidate, error)) return candidate;
-  }
-  throw StartupError(ExitCode::kUnavailable,
-                     "Nothing describes the network " + model.string() + ": looked for " +
-                         listOf(candidates) +
-                         "; let `perdure model import` make one, write it "
-                         "(services/inference/README.md, \"model.json\") or name it with "
-                         "--set model.description=FILE.");
-}
-
 }  // namespace
 
 std::vector<std::string> standardModelFolders() {
@@ -64,6 +46,25 @@ std::vector<std::string> standardModelFolders() {
     }
   }
   return folders;
+}
+
+std::string findDescription(const std::string& path, const std::vector<std::string>& folders) {
+  const fs::path model = path;
+  std::vector<fs::path> candidates = {model.string() + ".model.json",
+                                      model.parent_path() / "model.json"};
+  for (const std::string& folder : folders) {
+    candidates.push_back(fs::path(folder) / (model.stem().string() + ".json"));
+  }
+  std::error_code error;
+  for (const fs::path& candidate : candidates) {
+    if (fs::is_regular_file(candidate, error)) return candidate.string();
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     "Nothing describes the network " + model.string() + ": looked for " +
+                         listOf(candidates) +
+                         "; let `perdure model import` make one, write it "
+                         "(services/inference/README.md, \"model.json\") or name it with "
+                         "--set model.description=FILE.");
 }
 
 ModelFile readModelFile(const std::string& path, const std::string& description,
@@ -80,8 +81,7 @@ ModelFile readModelFile(const std::string& path, const std::string& description,
     file.darknet_weights = readBytes(fs::path(model).replace_extension(".weights"), "The weights",
                                      "put them beside their .cfg file.");
   }
-  const fs::path described =
-      description.empty() ? findDescription(model, folders) : fs::path(description);
+  const fs::path described = description.empty() ? findDescription(path, folders) : description;
   const std::string text =
       readBytes(described, "The description", "set model.description to a model.json.");
   file.description = parseModelDescription(text, described.string());

@@ -23,6 +23,9 @@ struct ModelFile {
 ModelFile readModelFile(const std::string& path, const std::string& description,
                         const std::vector<std::string>& folders);
 
+/// The description that readModelFile() takes for `path`. Throws StartupError (69).
+std::string findDescription(const std::string& path, const std::vector<std::string>& folders);
+
 /// config/models of the source tree or share/perdure/models of an installation, seen from the
 /// running program, and config/models under the current folder.
 std::vector<std::string> standardModelFolders();

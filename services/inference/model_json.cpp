@@ -93,6 +93,24 @@ void readInsets(const Json& json, JsonReader& reader, ModelDescription& model) {
   }
 }
 
+void readPrimed(const Json& json, JsonReader& parent, PrimedCalibration& primed) {
+  JsonReader reader(json, "calibration.primed.", parent.problems());
+  reader.number("floor", primed.floor, 1e-6, 0.5);
+  reader.number("slope", primed.slope, 0, 10);
+  reader.number("offset", primed.offset, -20, 20);
+  reader.number("nothing", primed.nothing, -20, 0);
+  reader.rejectUnknown();
+}
+
+void readCalibration(const Json& json, JsonReader& parent, Calibration& calibration) {
+  JsonReader reader(json, "calibration.", parent.problems());
+  reader.number("temperature", calibration.temperature, 0.01, 100);
+  reader.number("bias", calibration.bias, -20, 20);
+  reader.number("clutter_rate", calibration.clutter_rate, 1e-6, 1 - 1e-6);
+  if (const Json* primed = reader.find("primed")) readPrimed(*primed, reader, calibration.primed);
+  reader.rejectUnknown();
+}
+
 void readAll(JsonReader& reader, const std::string& file, ModelDescription& model) {
   model.name = reader.text("name", false);
   reader.choice<Family>("family", model.family,
@@ -112,10 +130,7 @@ void readAll(JsonReader& reader, const std::string& file, ModelDescription& mode
   reader.number("box_sigma", model.box_sigma, 0, 1);
   if (const Json* insets = reader.find("side_insets")) readInsets(*insets, reader, model);
   if (const Json* calibration = reader.find("calibration")) {
-    JsonReader inner(*calibration, "calibration.", reader.problems());
-    inner.number("temperature", model.calibration.temperature, 0.01, 100);
-    inner.number("clutter_rate", model.calibration.clutter_rate, 1e-6, 1 - 1e-6);
-    inner.rejectUnknown();
+    readCalibration(*calibration, reader, model.calibration);
   }
   reader.find("comment");
   reader.rejectUnknown();

@@ -37,6 +37,27 @@ Frame testImage(const Input& input) {
   return frame;
 }
 
+Detection inImage(const Candidate& candidate, const ImageFit& fit) {
+  Detection detection;
+  detection.box = fit.toImage(candidate.box);
+  detection.side_sigma = fit.toImage(candidate.side_sigma);
+  detection.activations = candidate.activations;
+  detection.azimuth = candidate.azimuth;
+  detection.azimuth_sigma = candidate.azimuth_sigma;
+  return detection;
+}
+
+/// The part of a box that lies in the image; nothing where that is under a quarter of it, or too
+/// small to be told from nothing.
+std::optional<Box> partInside(const Box& box, const ImageFit& fit) {
+  constexpr double kLeastSide = 3.0, kLeastShare = 0.25;
+  const double left = fit.offset_x, top = fit.offset_y;
+  const Box part{std::max(box.x1, left), std::max(box.y1, top), std::min(box.x2, left + fit.width),
+                 std::min(box.y2, top + fit.height)};
+  const bool seen = part.width() >= kLeastSide && part.height() >= kLeastSide;
+  return seen && part.area() >= kLeastShare * box.area() ? std::optional(part) : std::nullopt;
+}
+
 }  // namespace
 
 Node::Node(const Config& config, InstanceId instance)
@@ -87,7 +108,7 @@ void Node::chooseClasses() {
 void Node::testItself() {
   const Frame image = testImage(description_.input);
   for (int round = 0; round < 2; ++round) {  // the first one allocates
-    if (const auto result = candidatesIn(image); !result) {
+    if (const auto result = candidatesIn(image, options_.score_threshold); !result) {
       throw StartupError(
           ExitCode::kConfiguration,
           config_.model.path + " fails its test at the start: " + result.error().detail + " (" +
@@ -96,23 +117,41 @@ void Node::testItself() {
   }
 }
 
-Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame) {
+Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double floor) {
   const auto blob = makeBlob(description_.input, frame);
   if (!blob) return tl::unexpected(blob.error());
   const auto tensors = network_.forward(*blob);
   if (!tensors) return tl::unexpected(tensors.error());
-  auto candidates = decode(description_, options_, *tensors);
+  DecodeOptions options = options_;
+  options.score_threshold = floor;
+  auto candidates = decode(description_, options, *tensors);
   if (!candidates) return candidates;
   std::erase_if(*candidates, [](const Candidate& c) {
     return c.box.width() < 1.0 || c.box.height() < 1.0;  // less than a pixel of input
   });
-  return suppress(std::move(*candidates), config_.detection.merge_iou,
-                  static_cast<std::size_t>(config_.detection.limit));
+  return candidates;
 }
 
-Result<Detections> Node::infer(const Frame& frame) {
-  auto candidates = candidatesIn(frame);
+bool Node::primes(const Predictions& expected, const Frame& frame) const {
+  return config_.detection.prime && description_.calibration.primed.floor > 0.0 &&
+         !expected.predictions.empty() && fitsFrame(expected, frame);
+}
+
+Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) {
+  const bool priming = primes(expected, frame);
+  const double lax = options_.score_threshold;
+  auto candidates =
+      candidatesIn(frame, priming ? std::min(lax, description_.calibration.primed.floor) : lax);
   if (!candidates) return tl::unexpected(candidates.error());
+  std::vector<Candidate> passing;
+  if (priming) {
+    std::copy_if(candidates->begin(), candidates->end(), std::back_inserter(passing),
+                 [&](const Candidate& c) { return c.score >= lax; });
+  } else {
+    passing = *std::move(candidates);
+  }
+  const auto reported = suppress(std::move(passing), config_.detection.merge_iou,
+                                 static_cast<std::size_t>(config_.detection.limit));
   const ImageFit fit =
       fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
   Detections out;
@@ -120,16 +159,58 @@ Result<Detections> Node::infer(const Frame& frame) {
   out.camera = frame.camera;
   out.instance = info_.instance;
   out.model_hash = info_.hash;
-  for (Candidate& candidate : *candidates) {
+  for (const Candidate& candidate : reported) out.detections.push_back(inImage(candidate, fit));
+  if (priming) addPrimed(expected, frame, reported, *candidates, out);
+  return out;
+}
+
+/// In the order of the predictions. What lies outside the image, is smaller than the network can
+/// tell, or is of a class that it does not report is not asked for: its activation is 0.
+std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
+                                              const Frame& frame) const {
+  const ImageFit fit =
+      fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+  const double after = toSeconds(frame.stamp.time - expected.stamp.time);
+  std::vector<Expectation> expectations;
+  for (const Prediction& prediction : expected.predictions) {
+    const auto box = partInside(fit.toInput(movedOn(prediction, after)), fit);
+    const auto& names = info_.classes;
+    const auto name = std::find(names.begin(), names.end(), prediction.class_name);
+    const bool asked = box && name != names.end() && prediction.object_id != 0;
+    const auto k = static_cast<std::size_t>(name - names.begin()) + 1;
+    const auto& s = prediction.side_sigma;
+    expectations.push_back(
+        {box.value_or(Box{}),
+         asked ? k : 0,
+         {s[0] * fit.scale_x, s[1] * fit.scale_y, s[2] * fit.scale_x, s[3] * fit.scale_y}});
+  }
+  return expectations;
+}
+
+void Node::addPrimed(const Predictions& expected, const Frame& frame,
+                     const std::vector<Candidate>& reported,
+                     const std::vector<Candidate>& candidates, Detections& out) const {
+  const ImageFit fit =
+      fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+  const auto expectations = expectationsOf(expected, frame);
+  for (const PrimedAnswer& answer :
+       prime(description_.calibration, expectations, reported, candidates)) {
+    const Expectation& expectation = expectations[answer.expectation];
+    if (expectation.activation == 0) continue;
+    Candidate place;
+    place.box = expectation.box;
+    if (answer.candidate) place = fused(expectation, candidates[*answer.candidate]);
     Detection detection;
-    detection.box = fit.toImage(candidate.box);
-    detection.side_sigma = fit.toImage(candidate.side_sigma);
-    detection.activations = std::move(candidate.activations);
-    detection.azimuth = candidate.azimuth;
-    detection.azimuth_sigma = candidate.azimuth_sigma;
+    detection.box = fit.toImage(place.box);
+    detection.side_sigma = fit.toImage(place.side_sigma);
+    // Evidence for the object, whatever its class: the same for all.
+    const double nats = primedLogRatio(description_.calibration.primed, answer);
+    detection.activations.assign(info_.classes.size() + 1, static_cast<float>(nats));
+    detection.activations[0] = 0.0F;
+    detection.primed = true;
+    detection.primed_for = expected.predictions[answer.expectation].object_id;
     out.detections.push_back(std::move(detection));
   }
-  return out;
 }
 
 }  // namespace perdure::inference

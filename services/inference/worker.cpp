@@ -41,6 +41,23 @@ void Worker::offer(const Frame& frame) {
   health_.setDropped(queue_.dropped());
 }
 
+void Worker::expect(const Predictions& predictions) {
+  const std::lock_guard lock(mutex_);
+  expected_ = predictions;
+}
+
+Result<Detections> Worker::look(const Frame& frame) {
+  Predictions expected;
+  {
+    const std::lock_guard lock(mutex_);
+    expected = expected_;
+    if (!expected.predictions.empty() && !fitsFrame(expected, frame)) {
+      reasons_.add("predictions_stale");
+    }
+  }
+  return node_.infer(frame, expected);
+}
+
 void Worker::assertAlive() {
   const auto now = Clock::now();
   noteLapse(now);
@@ -79,7 +96,7 @@ void Worker::noteLapse(Clock::time_point now) {
 void Worker::run() {
   while (const auto job = queue_.pop()) {
     busy_since_ = Clock::now();
-    const auto result = node_.infer(job->frame);
+    const auto result = look(job->frame);
     if (result) {
       publish(*result, Clock::now() - job->since);
     } else {

@@ -40,6 +40,8 @@ class Worker {
 
   /// A frame to look at; one that still waits is dropped and counted.
   void offer(const Frame& frame);
+  /// Where objects should be seen, for the frames that follow.
+  void expect(const Predictions& predictions);
   /// To be called several times in a lease: says "I live", unless the network is stuck.
   void assertAlive();
   void heard(const Detections& detections);
@@ -59,6 +61,7 @@ class Worker {
     Clock::time_point since;
   };
   void run();
+  Result<Detections> look(const Frame& frame);
   void publish(const Detections& detections, Duration age);
   void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
@@ -82,6 +85,7 @@ class Worker {
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
+  Predictions expected_;
   std::thread thread_;
 };
 

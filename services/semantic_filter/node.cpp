@@ -5,13 +5,13 @@
 #include "common/base/check.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/context.h"
+#include "services/semantic_filter/core/expect.h"
 
 namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kMaxEarly = 16;
 constexpr std::chrono::seconds kFuture{10};  // further ahead of odometry nothing waits for it
-constexpr double kPredictionFloor = 0.05;    // r·π·v below which inference is not primed
 
 }  // namespace
 
@@ -177,6 +177,12 @@ bool Node::attach(Entry& entry, const Detections& detections) {
   }
   entry.input.boxes.emplace();
   for (const auto& detection : detections.detections) {
+    if (detection.primed) {
+      auto ratios = primedRatios(detection, entry.input.model, config_.filter.clutter);
+      if (ratios) entry.input.primed[detection.primed_for] = *std::move(ratios);
+      if (!ratios) reasons_.add("primed_malformed");
+      continue;
+    }
     auto evidence =
         makeEvidence(detection, entry.input.model, entry.camera->width(), entry.camera->height(),
                      config_.filter.box, config_.filter.clutter);
@@ -278,23 +284,30 @@ void Node::publish(const Entry& entry) {
   publishPredictions(entry);
 }
 
+/// The frame after this one, if body and clock go on as since the frame before it.
+std::optional<ComingFrame> Node::comingFrame(const Entry& entry) const {
+  for (std::size_t i = 1; i < history_.size(); ++i) {
+    if (&history_[i] != &entry) continue;
+    const FrameInput& before = history_[i - 1].input;
+    const double seconds = toSeconds(entry.input.stamp.time - before.stamp.time);
+    if (seconds <= 0.0 || history_[i - 1].world != entry.world) return std::nullopt;
+    ComingFrame coming{entry.input.view, seconds};
+    coming.view.T_WB = entry.input.view.T_WB * (before.view.T_WB.inverse() * entry.input.view.T_WB);
+    return coming;
+  }
+  return std::nullopt;
+}
+
 void Node::publishPredictions(const Entry& entry) {
   if (!outputs_.predictions) return;
   Predictions predictions;
   predictions.stamp = entry.input.stamp;
   predictions.instance = instance_;
   predictions.camera = camera_name_;
+  const auto coming = comingFrame(entry);
   for (const auto& object : belief_.objects) {
-    const auto& best = object.best();
-    const double probability =
-        object.existence * classProbability(object, best.class_name) * object.visible_fraction;
-    if (probability < kPredictionFloor) continue;
-    const State x = stateAt(best, toSeconds(entry.input.stamp.time - object.as_of));
-    const auto box = projectCuboid(x, entry.input.view);
-    if (!box) continue;
-    const auto& s = box->sides;
-    predictions.predictions.push_back(
-        {object.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability});
+    auto prediction = predictionOf(object, entry.input, coming);
+    if (prediction) predictions.predictions.push_back(*std::move(prediction));
   }
   outputs_.predictions(predictions);
 }

@@ -15,6 +15,7 @@
 #include "common/base/sink.h"
 #include "common/types/map.h"
 #include "services/semantic_filter/config.h"
+#include "services/semantic_filter/core/expect.h"
 #include "services/semantic_filter/core/long_term.h"
 #include "services/semantic_filter/core/semantic_filter.h"
 #include "services/semantic_filter/events.h"
@@ -69,6 +70,7 @@ class Node {
   void stepEntry(Entry& entry);
   void stepAgainFrom(std::size_t index);
   void publish(const Entry& entry);
+  std::optional<ComingFrame> comingFrame(const Entry& entry) const;
   void publishPredictions(const Entry& entry);
   // In node_memory.cpp.
   void insertRecalled(const Recalled& recalled);

@@ -64,22 +64,6 @@ fs::path cacheFolder() {
   return own;
 }
 
-fs::path sceneFolder(const Setting& setting) {
-  tools::SimulateOptions options;
-  options.scene = setting.scene;
-  options.seed = setting.seed;
-  options.images = setting.images;
-  options.format = tools::ImageFormat::kJpeg;
-  options.world.rate_hz = setting.rate_hz;
-  if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
-  options.out = cacheFolder() / (setting.scene + "-" + std::to_string(setting.seed) + "-" +
-                                 std::to_string(static_cast<int>(setting.seconds)) + "-" +
-                                 std::to_string(static_cast<int>(setting.rate_hz)) +
-                                 (setting.images ? "-images" : ""));
-  tools::simulate(options, {});
-  return options.out;
-}
-
 void runPipeline(const Setting& setting, const fs::path& folder, const fs::path& out) {
   tools::PipelineOptions options;
   options.data = folder.string();
@@ -175,6 +159,22 @@ std::vector<sim::TruthObject> Outcome::standing(const std::string& class_name) c
     if (stands && object.class_name == class_name) result.push_back(object);
   }
   return result;
+}
+
+fs::path sceneFolder(const Setting& setting) {
+  tools::SimulateOptions options;
+  options.scene = setting.scene;
+  options.seed = setting.seed;
+  options.images = setting.images;
+  options.format = tools::ImageFormat::kJpeg;
+  options.world.rate_hz = setting.rate_hz;
+  if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
+  options.out = cacheFolder() / (setting.scene + "-" + std::to_string(setting.seed) + "-" +
+                                 std::to_string(static_cast<int>(setting.seconds)) + "-" +
+                                 std::to_string(static_cast<int>(setting.rate_hz)) +
+                                 (setting.images ? "-images" : ""));
+  tools::simulate(options, {});
+  return options.out;
 }
 
 Outcome runScene(const Setting& setting) {

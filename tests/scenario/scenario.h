@@ -6,6 +6,7 @@
 // when it begins to pass, so that the table stays true.
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -61,6 +62,10 @@ struct Outcome {
   /// True objects of a class that stand all the time.
   std::vector<sim::TruthObject> standing(const std::string& class_name) const;
 };
+
+/// The folder of a setting's scene: generated once, and kept in the build folder while the
+/// simulator's sources stay as they are.
+std::filesystem::path sceneFolder(const Setting& setting);
 
 /// Generates the scene (once: it is kept in the build folder while the simulator's sources stay as
 /// they are) and runs the pipeline over it.

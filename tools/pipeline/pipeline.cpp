@@ -65,6 +65,7 @@ void Pipeline::openFilter() {
     map_->onEvent(event);
   };
   sinks.queries = [this](const MapQuery& query) { map_->onQuery(query); };
+  sinks.predictions = [this](const Predictions& predictions) { expected_ = predictions; };
   filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors, kFilter,
                                                     std::move(sinks));
   map_ =
@@ -218,7 +219,7 @@ void Pipeline::handleFrame(const Frame& frame) {
 
 void Pipeline::detect(const Frame& frame) {
   if (inference_) {
-    auto detections = timer_.time("inference", [&] { return inference_->infer(frame); });
+    auto detections = timer_.time("inference", [&] { return inference_->infer(frame, expected_); });
     if (detections)
       offer(*std::move(detections));
     else

@@ -88,6 +88,7 @@ class Pipeline {
   std::set<std::uint64_t> waits_for_detections_;  // frames whose odometry has come
   std::map<std::uint64_t, double> started_ms_;    // wall clock, by frame
   ReasonCounts reasons_;
+  Predictions expected_;  // where objects should be seen in the next frame
   PipelineCounts counts_;
 };
 

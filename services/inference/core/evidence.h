@@ -1,7 +1,8 @@
 // Scores as log-likelihood ratios (eq. 7: activations before the soft-max, one of them clutter).
 // Clutter is the reference: activations[0] = 0, and for a score p of class k
-//   activations[k] = logit(p) / T + logit(c),
-// T the temperature and c the share of clutter among the emitted boxes; README, "Clutter".
+//   activations[k] = logit(p) / T + b + logit(c),
+// T the temperature, b the bias, and c the share of clutter among the emitted boxes; README,
+// "Clutter".
 #pragma once
 
 #include <algorithm>
@@ -34,10 +35,21 @@ inline double logScore(const ModelDescription& model, double log_objectness, dou
   return model.objectness_exponent * log_objectness + model.class_exponent * log_class;
 }
 
-/// The calibrated log-likelihood ratio of "class k is here" against clutter.
-inline float activation(const Calibration& calibration, double log_score) {
-  return static_cast<float>(logitFromLog(log_score) / calibration.temperature +
+/// The calibrated log-likelihood ratio of "class k is here" against clutter, from the network's own
+/// log-odds.
+inline float evidenceOf(const Calibration& calibration, double log_odds) {
+  return static_cast<float>(log_odds / calibration.temperature + calibration.bias +
                             logit(calibration.clutter_rate));
+}
+
+/// The network's own log-odds, from the evidence: the way back.
+inline double oddsOf(const Calibration& calibration, double evidence) {
+  return (evidence - calibration.bias - logit(calibration.clutter_rate)) * calibration.temperature;
+}
+
+/// The same from a score.
+inline float activation(const Calibration& calibration, double log_score) {
+  return evidenceOf(calibration, logitFromLog(log_score));
 }
 
 }  // namespace perdure::inference

@@ -20,6 +20,10 @@ struct ImageFit {
     return {(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y, (b.x2 - offset_x) / scale_x,
             (b.y2 - offset_y) / scale_y};
   }
+  Box toInput(const Box& b) const {
+    return {b.x1 * scale_x + offset_x, b.y1 * scale_y + offset_y, b.x2 * scale_x + offset_x,
+            b.y2 * scale_y + offset_y};
+  }
   std::array<double, 4> toImage(const std::array<double, 4>& sides) const {
     return {sides[0] / scale_x, sides[1] / scale_y, sides[2] / scale_x, sides[3] / scale_y};
   }

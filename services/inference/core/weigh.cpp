@@ -81,8 +81,7 @@ std::optional<std::size_t> weighAlone(const ModelDescription& model, const Decod
 }
 
 float evidence(const Calibration& calibration, double log_odds) {
-  const double tempered = std::clamp(log_odds, -kMaxLogit, kMaxLogit) / calibration.temperature;
-  return static_cast<float>(tempered + logit(calibration.clutter_rate));
+  return evidenceOf(calibration, std::clamp(log_odds, -kMaxLogit, kMaxLogit));
 }
 
 /// A soft-max over classes and background.

@@ -76,6 +76,18 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
   return e;
 }
 
+std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
+                                                const ClutterParameters& clutter) {
+  if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < model.classes.size(); ++k) {
+    const double ratio = detection.activations[k + 1] - detection.activations[0];
+    if (std::isnan(ratio)) return std::nullopt;
+    ratios.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
+  }
+  return ratios;
+}
+
 double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name) {
   const auto it = model.index.find(class_name);
   return it == model.index.end() ? evidence.log_ratio_other : evidence.log_ratio[it->second];

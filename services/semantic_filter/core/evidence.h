@@ -61,6 +61,12 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
                                      double height, const BoxParameters& box,
                                      const ClutterParameters& clutter);
 
+/// What primed answers say: log-likelihood ratios by the model's class, by the object asked for.
+using PrimedAnswers = std::map<ObjectId, std::vector<double>>;
+/// Of one answer, clamped; nothing where it is not usable.
+std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
+                                                const ClutterParameters& clutter);
+
 /// log g_k; classes that the model does not know are seen as "other".
 double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name);
 

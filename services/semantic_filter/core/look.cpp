@@ -33,8 +33,10 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const 
   h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
   const double size =
       std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
-  h.detection = sight.fraction * (1.0 - object.screened) *
-                detectionProbability(frame.priors->of(hypothesis.class_name), size, frame);
+  const double v = sight.fraction * (1.0 - object.screened);
+  h.detection = v * detectionProbability(frame.priors->of(hypothesis.class_name), size, frame);
+  h.missed = v - h.detection;
+  h.silent = 1.0 - h.detection;
   return h;
 }
 
@@ -92,7 +94,7 @@ double associationWeight(const Object& object, const ObjectLook& look, std::size
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
     const HypothesisLook& h = look.hypotheses[i];
     made += object.hypotheses[i].weight * h.detection * h.likelihood[box];
-    silent += object.hypotheses[i].weight * (1.0 - h.detection);
+    silent += object.hypotheses[i].weight * h.silent;
   }
   const double r = object.existence;
   return r * made / std::max(1.0 - r + r * silent, 1e-12);

@@ -19,6 +19,8 @@ struct HypothesisLook {
   std::optional<ProjectedBox> box;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
   double detection = 0.0;          ///< v P_D: probability that the network reports it
+  double missed = 0.0;             ///< v (1 - P_D): that it is in sight and not reported
+  double silent = 1.0;             ///< A without a box: 1 - v P_D, and what a primed answer says
   std::vector<double> likelihood;  ///< L(z) for each box of the look, 0 outside the gate
   std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
   double hit_looks = 0.0;          ///< earlier looks that share this view, if it is true
@@ -26,6 +28,7 @@ struct HypothesisLook {
 
 struct ObjectLook {
   Sight sight;
+  bool primed = false;             ///< the network was asked about it (core/primed.h)
   std::vector<std::size_t> boxes;  ///< of the frame, those that lie near one of the hypotheses
   std::vector<HypothesisLook> hypotheses;
 };

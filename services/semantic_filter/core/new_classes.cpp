@@ -13,10 +13,10 @@ const Evidence* boxOf(const ObjectLook& look, const std::vector<Evidence>& boxes
   const HypothesisLook& best = look.hypotheses.front();
   const Evidence* found = nullptr;
   double least = 0.0;
-  for (std::size_t z = 0; z < boxes.size(); ++z) {
-    if (best.likelihood[z] <= 0.0 || (found && best.nis[z] >= least)) continue;
-    found = &boxes[z];
-    least = best.nis[z];
+  for (std::size_t i = 0; i < look.boxes.size(); ++i) {
+    if (best.likelihood[i] <= 0.0 || (found && best.nis[i] >= least)) continue;
+    found = &boxes[look.boxes[i]];
+    least = best.nis[i];
   }
   return found;
 }
@@ -45,7 +45,10 @@ std::vector<ClassPrior> candidatesOf(const std::vector<std::string>& names, cons
   std::sort(kept.begin(), kept.end());
   kept.resize(std::min(kept.size(), static_cast<std::size_t>(birth.max_classes)));
   std::vector<ClassPrior> priors;
-  for (const auto& [w, name] : kept) priors.push_back(frame.priors->of(name));
+  for (const auto& [w, name] : kept) {
+    priors.push_back(frame.priors->of(name));
+    priors.back().name = name;
+  }
   return priors;
 }
 

@@ -60,6 +60,7 @@ struct Object {
   double screened = 0.0;     ///< probability that something not on the map hides it, if it exists
   std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
   double support = 1.0;                     ///< share of late visible looks that showed it
+  double seen_existence = 0.0;              ///< existence after the last look that showed it
   Visibility visibility = Visibility::kVisible;
   double visible_fraction = 1.0;
   ObjectId blocked_by = 0;

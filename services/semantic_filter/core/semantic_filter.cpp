@@ -6,6 +6,7 @@
 #include "services/semantic_filter/core/association.h"
 #include "services/semantic_filter/core/context.h"
 #include "services/semantic_filter/core/new_classes.h"
+#include "services/semantic_filter/core/primed.h"
 #include "services/semantic_filter/core/smoother.h"
 #include "services/semantic_filter/core/update.h"
 
@@ -133,6 +134,10 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
     seen.push_back({j, look(belief.objects[j], sights[j], *input.boxes, frame)});
     if (admitNewClasses(belief.objects[j], seen.back().look, *input.boxes, frame)) {
       seen.back().look = look(belief.objects[j], sights[j], *input.boxes, frame);
+    }
+    const auto primed = input.primed.find(belief.objects[j].id);
+    if (primed != input.primed.end()) {
+      hearPrimed(seen.back().look, belief.objects[j], primed->second, frame);
     }
   }
   return seen;

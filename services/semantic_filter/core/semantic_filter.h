@@ -20,7 +20,8 @@ struct FrameInput {
   PoseError pose_error;
   std::vector<SightPoint> points;  ///< landmarks seen in this image
   std::optional<std::vector<Evidence>> boxes;
-  Model model;  ///< that the boxes' classes refer to
+  PrimedAnswers primed = {};  ///< where predictions were asked for and no box met them
+  Model model;                ///< that the boxes' classes refer to
 };
 
 struct Belief {

@@ -91,7 +91,7 @@ Hypothesis mix(const Hypothesis& none, double share_none,
 Shares sharesOf(const HypothesisLook& h, const std::vector<std::size_t>& looked_at,
                 const Eigen::VectorXd& eta) {
   Shares shares;
-  shares.A = 1.0 - h.detection;
+  shares.A = h.silent;
   shares.box.reserve(looked_at.size());
   for (std::size_t i = 0; i < looked_at.size(); ++i) {
     const double free = eta[static_cast<Eigen::Index>(looked_at[i])];
@@ -99,7 +99,7 @@ Shares sharesOf(const HypothesisLook& h, const std::vector<std::size_t>& looked_
     shares.A += shares.box.back();
   }
   for (auto& b : shares.box) b /= shares.A;
-  shares.none = (1.0 - h.detection) / shares.A;
+  shares.none = h.silent / shares.A;
   return shares;
 }
 
@@ -364,9 +364,13 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
       reasonsOf(object, shares, seen, hit.worth, exponent, look.boxes, boxes, frame);
   const double mean_A = weigh(object, shares, exponent);
   const double r = object.existence;
-  bookExistence(object,
-                std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain),
-                reasons);
+  double next = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
+  if (seen >= 0.5) {
+    object.seen_existence = next;
+  } else if (look.primed) {
+    next = std::min(next, std::max(r, object.seen_existence));
+  }
+  bookExistence(object, next, reasons);
   updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
   if (sound(object)) bookClasses(object, reasons);

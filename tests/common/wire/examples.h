@@ -126,6 +126,7 @@ class Examples {
                 {},    uniform(0.1, 1),
                 {},    coin()};
     for (double& sigma : d.side_sigma) sigma = uniform(0, 9);
+    d.primed_for = bits();
     if (coin()) d.azimuth = uniform(-3, 3);
     return d;
   }
@@ -189,7 +190,10 @@ class Examples {
   }
   void fill(Predictions& m) {
     m = {stamp(), bits(), word(), several([&] {
-           return Prediction{bits(), word(), box(), uniform(0, 1)};
+           Prediction p{bits(), word(), box(), uniform(0, 1)};
+           for (double& v : p.velocity) v = uniform(-99, 99);
+           for (double& sigma : p.side_sigma) sigma = uniform(0, 9);
+           return p;
          })};
   }
   MapObject mapObject() {

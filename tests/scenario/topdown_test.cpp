@@ -1,0 +1,118 @@
+// What top-down scoring finds, and that it keeps no ghost alive.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "tests/scenario/scenario.h"
+#include "tests/scenario/topdown_run.h"
+
+namespace perdure::test {
+namespace {
+
+constexpr double kInputScale = 0.5;  // 640×480 in 320×240
+
+TopDownSetting street() {
+  TopDownSetting setting;
+  setting.data = sceneFolder(
+      {.scene = "street", .seed = 11, .seconds = 40.0, .rate_hz = 10.0, .images = true});
+  const char* source = std::getenv("PERDURE_SOURCE");
+  setting.inference.model.path =
+      (std::filesystem::path(source ? source : ".") / "models" / "perdure_320x240.onnx").string();
+  return setting;
+}
+
+/// At the threshold of a detector that decides, and at the lax one.
+TEST(LongTopDown, FindsMoreOfWhatIsSmallOrHalfHiddenAtTheSameRateOfFalseAlarms) {
+  TopDownSetting setting = street();
+  struct Point {
+    double threshold, without, gain;
+  };
+  for (const Point& point : {Point{0.3, 0.295, 0.10}, Point{0.05, 0.049, 0.0}}) {
+    setting.inference.detection.prime = true;
+    setting.inference.detection.score_threshold = point.threshold;
+    const TopDownRun asked = driveThrough(setting);
+    setting.inference.detection.prime = false;
+    setting.inference.detection.score_threshold = point.without;  // as many false alarms, or more
+    const TopDownRun unasked = driveThrough(setting);
+    const HardRecall with = hardRecall(asked, asked, kInputScale, 0.0);
+    const HardRecall without = hardRecall(unasked, asked, kInputScale, 0.0);
+    std::printf(
+        "threshold %.3f: small %zu of %zu, half-hidden %zu of %zu, %.3f; %.2f false alarms a "
+        "frame, %zu primed\n",
+        point.threshold, with.small_found, with.small, with.hidden_found, with.hidden,
+        with.recall(), with.falseAlarms(), with.false_primed);
+    std::printf(
+        "bottom up, %.3f: small %zu of %zu, half-hidden %zu of %zu, %.3f; %.2f false alarms "
+        "a frame\n",
+        point.without, without.small_found, without.small, without.hidden_found, without.hidden,
+        without.recall(), without.falseAlarms());
+    ASSERT_GT(with.small, 100U);
+    ASSERT_GT(with.hidden, 100U);
+    EXPECT_LE(with.falseAlarms(), without.falseAlarms());
+    EXPECT_GE(with.recall(), without.recall() + point.gain);
+  }
+}
+
+ObjectBelief ghost(ObjectId id, const std::string& name, const Eigen::Vector3d& centre,
+                   const Eigen::Vector3d& size, TimePoint now) {
+  ObjectBelief belief;
+  belief.id = id;
+  belief.existence = 0.98;
+  belief.confirmed = true;
+  ClassBelief in_class;
+  in_class.name = name;
+  in_class.probability = 1.0;
+  in_class.mean << centre, 0.0, size.array().log().matrix();
+  in_class.covariance = 0.01 * Matrix7d::Identity();
+  belief.classes = {in_class};
+  belief.first_seen = belief.last_seen = belief.as_of = now;
+  belief.hits = 20;
+  return belief;
+}
+
+/// Whether the object is still believed in after the frame.
+bool believed(const LookedAt& look, ObjectId id) {
+  for (const ObjectBelief& belief : look.before.objects) {
+    if (belief.id == id) return belief.existence > 0.5;
+  }
+  return false;
+}
+
+/// Things that are not there, planted on free ground ahead of the camera, where it looks at them.
+TEST(LongTopDown, AGhostThatIsPlantedInTheMapStillDies) {
+  constexpr std::uint64_t kAt = 30;
+  TopDownSetting setting = street();
+  const tools::SimulatedTruth truth = tools::readSimulatedTruth(setting.data);
+  const RigidTransform T_WB = truth.body.at(kAt, truth.frames[kAt]).value();
+  std::vector<std::pair<std::string, Eigen::Vector3d>> kinds = {
+      {"car", {4.2, 1.8, 1.5}}, {"person", {0.5, 0.6, 1.75}}, {"van", {5.0, 2.0, 2.1}}};
+  ObjectId id = 900001;
+  for (const double ahead : {9.0, 14.0, 20.0, 28.0}) {
+    const auto& [name, size] = kinds[id % kinds.size()];
+    Eigen::Vector3d centre = T_WB * Eigen::Vector3d(ahead, id % 2 == 0 ? 1.0 : -1.0, 0.0);
+    centre.z() = 0.5 * size.z();
+    setting.planted.push_back(ghost(id++, name, centre, size, truth.frames[kAt]));
+  }
+  setting.plant_at = kAt;
+  for (const bool prime : {true, false}) {
+    setting.inference.detection.prime = prime;
+    const TopDownRun run = driveThrough(setting);
+    for (const ObjectBelief& planted : setting.planted) {
+      std::size_t frames = 0, asked = 0;
+      for (const LookedAt& look : run.frames) {
+        frames += believed(look, planted.id);
+        for (const Detection& d : look.detections.detections) asked += d.primed_for == planted.id;
+      }
+      std::printf("%s: a ghost of class %s was believed for %zu frames, asked about %zu times\n",
+                  prime ? "top down" : "bottom up", planted.classes[0].name.c_str(), frames, asked);
+      EXPECT_GE(frames, 1U) << "it was never in the map";
+      EXPECT_LE(frames, 60U);
+      EXPECT_FALSE(believed(run.frames.back(), planted.id));
+      EXPECT_EQ(asked > 0, prime) << "what was not asked was not tested";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace perdure::test

@@ -1,0 +1,137 @@
+// Primed answers: what they may do to an object, and what they may not.
+#include "services/semantic_filter/core/primed.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/update.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeModelInfo;
+using testing::makePriors;
+using testing::makeState;
+
+class Primed : public ::testing::Test {
+ protected:
+  Primed() {
+    frame.view.camera = &camera;
+    frame.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.2));
+    frame.model = &model;
+    frame.priors = &priors;
+    frame.parameters = &parameters;
+  }
+  Object object(double existence) const {
+    Object o;
+    o.id = 1;
+    o.existence = {existence, ExistenceEvidence::kPrior, o.as_of};
+    Hypothesis h;
+    h.class_name = "car";
+    h.weight = 1.0;
+    h.x = makeState(15.0, 2.0, 0.75, 0.5, 4.2, 1.75, 1.5);
+    h.P.setZero();
+    h.P.diagonal().head<7>() << 0.3, 0.3, 0.02, 0.03, 0.01, 0.01, 0.01;
+    o.hypotheses = {h};
+    return o;
+  }
+  /// A look that reported no box; `nats` of the primed answer, if there was one.
+  void lookWithoutBox(Object& o, std::optional<double> nats) const {
+    Sight sight;
+    sight.fraction = 1.0;
+    ObjectLook seen = look(o, sight, {}, frame);
+    if (nats) hearPrimed(seen, o, std::vector<double>(model.classes.size(), *nats), frame);
+    update(o, seen, Eigen::VectorXd(0), {}, frame);
+  }
+
+  CameraModel camera{makeCamera()};
+  Model model = makeModel(makeModelInfo());
+  ClassPriors priors = makePriors();
+  Parameters parameters;
+  FrameContext frame;
+};
+
+TEST_F(Primed, EvidenceOfNoughtIsAPlainMiss) {
+  Object plain = object(0.9), asked = object(0.9);
+  lookWithoutBox(plain, {});
+  lookWithoutBox(asked, 0.0);
+  EXPECT_NEAR(plain.existence, asked.existence, 1e-12);
+}
+
+TEST_F(Primed, FollowsTheLikelihoodOfTheMissAndTheAnswerTogether) {
+  Object o = object(0.9);
+  o.seen_existence = 0.99;
+  Sight sight;
+  sight.fraction = 1.0;
+  const double D = look(o, sight, {}, frame).hypotheses[0].detection;
+  lookWithoutBox(o, std::log(3.0));
+  const double A = (1.0 - D) * 3.0;  // v = 1: (1 - P_D) rho
+  EXPECT_NEAR(o.existence, 0.9 * A / (0.1 + 0.9 * A), 1e-9);
+}
+
+TEST_F(Primed, AGhostDiesSoonerThanOfItsMissesAlone) {
+  Object plain = object(0.95), asked = object(0.95);
+  plain.screened = asked.screened = 0.2;
+  for (int i = 0; i < 4; ++i) {
+    lookWithoutBox(plain, {});
+    lookWithoutBox(asked, -0.3);
+    EXPECT_LT(asked.existence, plain.existence);
+  }
+}
+
+TEST_F(Primed, NeverRaisesExistenceOverWhatTheLastHitLeft) {
+  Object o = object(0.7);
+  for (int i = 0; i < 30; ++i) lookWithoutBox(o, 5.0);
+  EXPECT_NEAR(o.existence, 0.7, 1e-9) << "it was never seen by itself";
+  o = object(0.7);
+  o.seen_existence = 0.8;
+  for (int i = 0; i < 30; ++i) lookWithoutBox(o, 5.0);
+  EXPECT_LE(o.existence, 0.8 + 1e-9);
+  EXPECT_GT(o.existence, 0.7) << "it gives back what misses took";
+}
+
+TEST_F(Primed, IsNoHitConfirmsNothingAndMovesNothing) {
+  Object o = object(0.94);
+  o.seen_existence = 0.98;
+  const Hypothesis before = o.best();
+  std::vector<Object> all;
+  for (int i = 0; i < 20; ++i) lookWithoutBox(o, 5.0);
+  EXPECT_GT(o.existence, parameters.tend.confirm);
+  EXPECT_EQ(o.hits, 0U);
+  EXPECT_EQ(o.visible_misses, 20U);
+  EXPECT_TRUE(o.best().x == before.x);
+  EXPECT_TRUE(o.best().P == before.P);
+  all.push_back(o);
+  confirmAndBury(all, frame);
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_FALSE(all[0].confirmed);
+}
+
+TEST_F(Primed, OfAClassThatTheModelDoesNotKnowSaysNothing) {
+  Object plain = object(0.9), asked = object(0.9);
+  plain.hypotheses[0].class_name = asked.hypotheses[0].class_name = "zeppelin";
+  lookWithoutBox(plain, {});
+  lookWithoutBox(asked, 5.0);
+  EXPECT_EQ(static_cast<double>(plain.existence), static_cast<double>(asked.existence));
+}
+
+TEST_F(Primed, AnswersOfAWrongLengthOrNotANumberAreRefused) {
+  Detection d;
+  d.primed = true;
+  d.activations = {0.0F, 1.0F};
+  EXPECT_FALSE(primedRatios(d, model, parameters.clutter));
+  d.activations.assign(model.classes.size() + 1, NAN);
+  EXPECT_FALSE(primedRatios(d, model, parameters.clutter));
+  d.activations.assign(model.classes.size() + 1, 99.0F);
+  d.activations[0] = 0.0F;
+  const auto ratios = primedRatios(d, model, parameters.clutter);
+  ASSERT_TRUE(ratios);
+  EXPECT_LE(ratios->front(), parameters.clutter.max_log_ratio);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
