@@ -191,13 +191,15 @@ void addModelCommand(CLI::App& app) {
   model->require_subcommand(1);
   model->footer(
       "\nA network is an ONNX file and a model.json that says what its numbers mean. `import` "
-      "writes\nboth from the file that a training framework exports; `look` shows what one sees.\n"
+      "writes\nboth from the file that a training framework exports; `look` shows what one sees; "
+      "`calibrate`\nfits what it says to labelled frames.\n"
       "\n  perdure model import yolov8n.onnx --image street.jpg\n"
       "  perdure model look yolov8n.perdure.onnx --image other.jpg --out other.png\n"
       "\nperdure model import --help tells the options; services/inference/README.md the "
       "families.");
   addImport(*model, std::make_shared<Request>());
   addLook(*model, std::make_shared<Request>());
+  addCalibrate(*model);
 }
 
 }  // namespace perdure::tools

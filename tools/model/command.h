@@ -6,5 +6,7 @@
 namespace perdure::tools {
 
 void addModelCommand(CLI::App& app);
+/// Its part `calibrate`.
+void addCalibrate(CLI::App& model);
 
 }  // namespace perdure::tools

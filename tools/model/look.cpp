@@ -22,8 +22,7 @@ Sight sightOf(const Detection& detection, const ModelInfo& model,
               const inference::Calibration& calibration) {
   const auto& a = detection.activations;
   const auto best = std::max_element(a.begin() + 1, a.end());
-  const double log_odds =
-      (double{*best} - inference::logit(calibration.clutter_rate)) * calibration.temperature;
+  const double log_odds = inference::oddsOf(calibration, *best);
   const auto k = static_cast<std::size_t>(best - a.begin()) - 1;
   return {detection.box, model.classes.at(k), inference::sigmoid(log_odds)};
 }

@@ -1,0 +1,139 @@
+#include "tools/model/labelled_frames.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/base/errors.h"
+#include "common/math/so3.h"
+#include "common/replay/kitti_labels.h"
+#include "tools/evaluate/simulated_truth.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kNothingSeen = 0.05, kEnoughSeen = 0.25, kWhollySeen = 0.95;
+
+Box cutAt(const Box& box, double w, double h) {
+  return {std::clamp(box.x1, 0.0, w), std::clamp(box.y1, 0.0, h), std::clamp(box.x2, 0.0, w),
+          std::clamp(box.y2, 0.0, h)};
+}
+
+/// Box around the eight corners' images, where all of them are in the image.
+std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& key,
+                          const RigidTransform& T_CW, const CameraModel& camera) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                               corner & 4 ? 0.5 : -0.5);
+    const Eigen::Vector3d p_W =
+        key.centre_W + rotationAboutZ(key.yaw) * half.cwiseProduct(object.size);
+    const auto pixel = camera.project(T_CW * p_W);
+    if (!pixel || !camera.inImage(*pixel)) return std::nullopt;
+    box.x1 = std::min(box.x1, pixel->x()), box.x2 = std::max(box.x2, pixel->x());
+    box.y1 = std::min(box.y1, pixel->y()), box.y2 = std::max(box.y2, pixel->y());
+  }
+  return box;
+}
+
+/// A view of a simulated object as a label; nothing where too little of it is seen.
+std::optional<TrueBox> labelOf(const sim::TruthView& view, const CameraModel& camera,
+                               double least_px) {
+  const Box box = cutAt(view.box, camera.width(), camera.height());
+  if (box.width() < 1.0 || box.height() < 1.0 || view.visible_fraction < 0.01) return std::nullopt;
+  const double seen = std::min(1.0, view.visible_fraction * view.box.area() / box.area());
+  if (seen < kNothingSeen) return std::nullopt;
+  TrueBox label;
+  label.box = box;
+  label.ignored = seen < kEnoughSeen || std::max(box.width(), box.height()) < least_px;
+  return label;
+}
+
+LabelledData readSimulated(const LabelRequest& request, const replay::ClassAliases& aliases,
+                           double least_px) {
+  const SimulatedTruth truth = readSimulatedTruth(request.data);
+  LabelledData data;
+  data.dataset = replay::Dataset::open({.path = request.data});
+  for (std::uint64_t i = 0; i < truth.frames.size(); i += request.every) {
+    LabelledFrame frame{i, {}};
+    const auto body = truth.body.at(i, truth.frames[i]);
+    const auto views = truth.truth.views.find(i);
+    if (views == truth.truth.views.end()) {
+      data.frames.push_back(frame);
+      continue;
+    }
+    for (const auto& view : views->second) {
+      const auto& all = truth.truth.objects;
+      const auto object = std::find_if(all.begin(), all.end(),
+                                       [&](const auto& o) { return o.id == view.object_id; });
+      auto label = labelOf(view, truth.camera, least_px);
+      if (object == all.end() || !label) continue;
+      label->class_name = aliases.canonical(object->looks_like);
+      if (body && view.visible_fraction >= kWhollySeen) {
+        label->hull = hullOf(*object, object->at(truth.frames[i]),
+                             (*body * truth.camera.T_BC()).inverse(), truth.camera);
+      }
+      frame.boxes.push_back(*std::move(label));
+    }
+    data.frames.push_back(std::move(frame));
+  }
+  return data;
+}
+
+fs::path labelFile(const LabelRequest& request, replay::DatasetKind kind) {
+  if (!request.labels.empty()) return request.labels;
+  if (kind == replay::DatasetKind::kKittiTracking) {
+    return request.data / "label_02" / (request.sequence + ".txt");
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     request.data.string() +
+                         " has no labels of its own; give --labels label_02/SEQUENCE.txt, or a "
+                         "folder that `perdure simulate --out` made");
+}
+
+TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& aliases,
+                double least_px) {
+  TrueBox box;
+  box.box = label.box;
+  if (label.dontCare()) {
+    box.ignored = true;
+    return box;
+  }
+  box.class_name = aliases.canonical(label.type);
+  box.ignored = label.occluded > 1 || label.truncated > 0 ||
+                std::max(label.box.width(), label.box.height()) < least_px;
+  return box;
+}
+
+LabelledData readKitti(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
+                       const replay::ClassAliases& aliases, double least_px) {
+  LabelledData data;
+  // A cyclist is a person and a bicycle to most networks: of these KITTI labels only some.
+  data.judged = {"car", "truck", "van"};
+  const auto labels = replay::readKittiLabels(labelFile(request, dataset->kind()));
+  for (std::uint64_t i = 0; i < dataset->frameCount(); i += request.every) {
+    data.frames.push_back({i, {}});
+  }
+  for (const auto& label : labels) {
+    if (label.frame % request.every != 0) continue;
+    const std::uint64_t row = label.frame / request.every;
+    if (row >= data.frames.size()) continue;
+    data.frames[row].boxes.push_back(labelOf(label, aliases, least_px));
+  }
+  data.dataset = std::move(dataset);
+  return data;
+}
+
+}  // namespace
+
+LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
+                          double least_px) {
+  if (isSimulated(request.data)) return readSimulated(request, aliases, least_px);
+  auto dataset = replay::Dataset::open({.path = request.data, .sequence = request.sequence});
+  return readKitti(request, std::move(dataset), aliases, least_px);
+}
+
+}  // namespace perdure::tools
