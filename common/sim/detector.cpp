@@ -49,8 +49,9 @@ void checkModel(const DetectorModel& m) {
   }
 }
 
-/// Directions of the classes' means: at right angles, but for pairs that are confused.
-Eigen::MatrixXd meansOf(const DetectorModel& model) {
+}  // namespace
+
+Eigen::MatrixXd classDirections(const DetectorModel& model) {
   const auto count = static_cast<Eigen::Index>(model.classes.size());
   Eigen::MatrixXd cosines = Eigen::MatrixXd::Identity(count, count);
   const auto indexOf = [&](const std::string& name) {
@@ -71,8 +72,6 @@ Eigen::MatrixXd meansOf(const DetectorModel& model) {
   }
   return llt.matrixL();
 }
-
-}  // namespace
 
 /// A thing in the image, as the truth has it.
 struct SimulatedDetector::Sight {
@@ -123,7 +122,7 @@ SimulatedDetector::SimulatedDetector(DetectorModel model, Truth truth,
       height_(camera.height),
       T_BC_(camera.T_BC) {
   checkModel(model_);
-  means_ = meansOf(model_);
+  means_ = classDirections(model_);
   info_.name = "simulated";
   info_.classes = model_.classes;
   info_.input_width = camera.width;

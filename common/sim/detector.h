@@ -55,6 +55,10 @@ struct DetectorModel {
   double latency_s = 0.0;         ///< from the frame to its detections; for who delivers them
 };
 
+/// A row of unit length for each class: the direction of its mean from clutter's in the space of
+/// features. At right angles, but for pairs that are confused. Throws StartupError(kConfiguration).
+Eigen::MatrixXd classDirections(const DetectorModel& model);
+
 class SimulatedDetector {
  public:
   /// Throws StartupError(kConfiguration) for numbers that make no sense. `camera` is the one whose

@@ -181,6 +181,30 @@ std::pair<double, double> Anees::band() const {
   return {chi2Quantile(0.025, n) / n, chi2Quantile(0.975, n) / n};
 }
 
+void RunAnees::add(const Anees& run) {
+  if (!run.nees.empty()) means.push_back(run.mean());
+}
+
+double RunAnees::mean() const {
+  double sum = 0.0;
+  for (const double value : means) sum += value;
+  return means.empty() ? 0.0 : sum / static_cast<double>(means.size());
+}
+
+double RunAnees::standardError() const {
+  if (means.size() < 2) return 0.0;
+  double sum = 0.0;
+  for (const double value : means) sum += (value - mean()) * (value - mean());
+  const auto n = static_cast<double>(means.size());
+  return std::sqrt(sum / (n - 1.0) / n);
+}
+
+std::pair<double, double> RunAnees::band() const {
+  const int n = dof * static_cast<int>(means.size());
+  if (n == 0) return {0.0, 0.0};
+  return {chi2Quantile(0.025, n) / n, chi2Quantile(0.975, n) / n};
+}
+
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within) {
   std::map<std::size_t, std::pair<double, const MapBelief*>> nearest;  // by true object

@@ -42,6 +42,19 @@ struct Anees {
   std::pair<double, double> band() const;  ///< of mean() at 95 %, independent objects
 };
 
+/// The same over seeded runs. What one run has in common, its poses' errors, makes its objects err
+/// alike: a run counts as one.
+struct RunAnees {
+  std::string what;
+  int dof = 1;
+  std::vector<double> means;  ///< of each run, per degree of freedom
+
+  void add(const Anees& run);  ///< nothing of a run without objects
+  double mean() const;
+  double standardError() const;            ///< of mean(), by the spread of the runs
+  std::pair<double, double> band() const;  ///< of mean() at 95 %, one object a run
+};
+
 /// A line of odometry.csv.
 struct OdometryRow {
   TimePoint time;

@@ -59,6 +59,18 @@ TEST(Consistency, HonestCovariancesHaveAneesOneAndStayInTheBand) {
               4.0 * score.position.mean(), 1e-9);
 }
 
+TEST(Consistency, RunsCountAsOneEach) {
+  RunAnees runs{"position", 3, {}};
+  runs.add({"position", 3, {1.5, 1.5, 1.5}});  // 0.5 per degree
+  runs.add({"position", 3, {4.5}});
+  runs.add({"position", 3, {}});
+  ASSERT_EQ(runs.means.size(), 2U) << "a run without objects says nothing";
+  EXPECT_DOUBLE_EQ(runs.mean(), 1.0);
+  EXPECT_DOUBLE_EQ(runs.standardError(), 0.5);
+  EXPECT_LT(runs.band().first, 0.25) << "two runs of three degrees";
+  EXPECT_GT(runs.band().second, 2.0);
+}
+
 TEST(Consistency, TheTruthIsTakenIntoTheMapsWorld) {
   const RigidTransform T_WT(rotationAboutZ(1.2), Eigen::Vector3d(5, -3, 1));
   sim::Truth truth;

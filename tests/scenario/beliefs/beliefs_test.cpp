@@ -1,0 +1,44 @@
+// The bars of the filter's honesty, over fifty worlds that are as it is told.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "tests/scenario/beliefs/picture.h"
+#include "tests/scenario/scenario.h"
+
+namespace perdure::test {
+namespace {
+
+std::vector<Bar> inBand(const tools::RunAnees& runs, const std::string& too_sure = "") {
+  const auto [low, high] = runs.band();
+  return {atLeast(low, "ANEES of " + runs.what + ", lower end of the 95 % band", runs.mean()),
+          atMost(high, "ANEES of " + runs.what + ", upper end", runs.mean(), too_sure)};
+}
+
+TEST(Beliefs, AreAsSureAsTheyAreRight) {
+  const BeliefScores scores = runWorlds({}, readTold(), 50);
+  print(scores);
+  if (const char* bin = std::getenv("PERDURE_BIN")) {
+    drawBeliefs(scores, std::filesystem::path(bin).parent_path() / "tests" / "beliefs.png");
+  }
+  std::vector<Bar> bars{
+      atLeast(1500, "objects asked whether they exist", double(scores.existence.claims.size())),
+      atMost(0.05, "expected calibration error of existence", scores.existence.calibrationError()),
+      atLeast(0.5, "Brier skill of existence", scores.existence.skill(),
+              "0.48: see what the filter does not know, services/semantic_filter/README.md"),
+      atMost(0.05, "expected calibration error of the most probable class",
+             scores.classes.best().calibrationError()),
+      atLeast(0.5, "Brier skill of all classes", scores.classes.skill())};
+  for (const auto& more :
+       {inBand(scores.position,
+               "20: one thing that is believed to drive, far from where it stands"),
+        inBand(scores.half_yaw, "13.8: persons, whose yaw is one Gaussian that closes anywhere"),
+        inBand(scores.size, "1.67: persons, whose length and width change places with it")}) {
+    bars.insert(bars.end(), more.begin(), more.end());
+  }
+  hold(bars);
+}
+
+}  // namespace
+}  // namespace perdure::test

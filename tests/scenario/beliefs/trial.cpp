@@ -1,0 +1,261 @@
+#include "tests/scenario/beliefs/trial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/node.h"
+
+namespace perdure::test {
+namespace {
+
+using namespace semantic_filter;  // NOLINT
+
+// An object's image is a thing's where no side is further off than
+constexpr double kOfExtent = 0.25, kPixels = 3.0;
+constexpr std::uint64_t kForgotten =
+    5;  // frames in view without it, until it is no longer that thing
+constexpr double kLeastExistence = 0.05;  // of an object that is asked
+constexpr double kOldestAge = 60.0;       // frames
+constexpr std::uint32_t kLeastVisible = 20;
+
+/// Below 1: could be boxes of one thing.
+double apartness(const Box& a, const Box& b) {
+  const double x = kPixels + kOfExtent * b.width(), y = kPixels + kOfExtent * b.height();
+  return std::max({std::abs(a.x1 - b.x1) / x, std::abs(a.x2 - b.x2) / x, std::abs(a.y1 - b.y1) / y,
+                   std::abs(a.y2 - b.y2) / y});
+}
+
+/// What is known of an object besides what it believes.
+struct Followed {
+  std::optional<std::size_t> thing;
+  std::uint64_t frames_without = 0;
+  std::uint64_t asked_at = 0;  ///< frame
+  bool asked = false;
+};
+
+class Trial {
+ public:
+  Trial(const WorldOptions& options, const Told& told)
+      : options_(options),
+        world_(options, told),
+        dice_(sim::seedOf("ages", {options.seed})),
+        visible_(world_.things().size(), 0),
+        node_(told.config, told.priors, 9, {[this](const Objects& m) { last_ = m; }, {}, {}}) {
+    Calibration calibration;
+    calibration.cameras.push_back(world_.camera().calibration());
+    node_.onCalibration(calibration);
+    node_.onModel(world_.model());
+  }
+
+  BeliefScores run() {
+    for (std::uint64_t k = 0; k < options_.frames; ++k) {
+      const WorldFrame frame = world_.next();
+      countBoxes(frame);
+      node_.onOdometry(frame.odometry);
+      node_.onDetections(frame.detections);
+      node_.flush();
+      for (std::size_t i = 0; i < visible_.size(); ++i) visible_[i] += frame.sights[i].fraction > 0;
+      follow(frame);
+      ask(k, frame.t_s);
+    }
+    compareGaussians();
+    scores_.things = world_.things().size();
+    for (const auto n : visible_) scores_.seen_things += n > 0;
+    return std::move(scores_);
+  }
+
+ private:
+  /// For `birth.odds`: boxes of things that no object follows, and those of nothing.
+  void countBoxes(const WorldFrame& frame) {
+    std::vector<bool> known(visible_.size(), false);
+    for (const auto& o : last_.objects) {
+      const auto& thing = followed_[o.id].thing;
+      if (thing) known[*thing] = true;
+    }
+    for (const int origin : frame.origins) {
+      if (origin < 0) {
+        ++scores_.false_boxes;
+      } else if (!known[static_cast<std::size_t>(origin)]) {
+        ++scores_.new_boxes;
+      }
+    }
+  }
+
+  /// Which thing an object is: that whose outline its image has most in common with, one to one.
+  void follow(const WorldFrame& frame) {
+    struct Pair {
+      double apart;
+      ObjectId id;
+      std::size_t thing;
+    };
+    std::vector<Pair> pairs;
+    View view = frame.true_view;
+    view.T_WB = frame.odometry.T_WB;
+    for (const auto& o : last_.objects) {
+      auto [it, fresh] = followed_.try_emplace(o.id);
+      if (fresh) {
+        const double age = std::floor(std::exp(dice_.uniform(0.0, std::log(kOldestAge))) - 1.0);
+        it->second.asked_at = frame.odometry.stamp.sequence + static_cast<std::uint64_t>(age);
+      }
+      if (o.visible_fraction <= 0.0) continue;
+      ++it->second.frames_without;
+      const auto image = imageOf(o, view);
+      if (!image) continue;
+      for (std::size_t i = 0; i < frame.outlines.size(); ++i) {
+        if (!frame.outlines[i]) continue;
+        const double apart = apartness(*image, *frame.outlines[i]);
+        if (apart < 1.0) pairs.push_back({apart, o.id, i});
+      }
+    }
+    std::sort(pairs.begin(), pairs.end(),
+              [](const Pair& a, const Pair& b) { return a.apart < b.apart; });
+    std::map<ObjectId, bool> taken;
+    std::vector<bool> used(frame.outlines.size(), false);
+    for (const Pair& pair : pairs) {
+      if (taken[pair.id] || used[pair.thing]) continue;
+      taken[pair.id] = used[pair.thing] = true;
+      followed_[pair.id].thing = pair.thing;
+      followed_[pair.id].frames_without = 0;
+    }
+    for (auto& [id, f] : followed_) {
+      if (f.frames_without > kForgotten) f.thing.reset();
+    }
+  }
+
+  static std::optional<Box> imageOf(const ObjectBelief& o, const View& view) {
+    State x = State::Zero();
+    x.head<7>() = o.best().mean;
+    const auto p = projectCuboid(x, view);
+    if (!p) return std::nullopt;
+    const double W = view.camera->width(), H = view.camera->height();
+    return Box{std::clamp(p->sides[0], 0.0, W), std::clamp(p->sides[1], 0.0, H),
+               std::clamp(p->sides[2], 0.0, W), std::clamp(p->sides[3], 0.0, H)};
+  }
+
+  void ask(std::uint64_t frame, double t_s) {
+    for (const auto& o : last_.objects) {
+      Followed& f = followed_[o.id];
+      if (f.asked || frame < f.asked_at) continue;
+      f.asked = true;
+      if (o.existence <= kLeastExistence) continue;
+      const bool there = f.thing && world_.present(*f.thing, t_s);
+      scores_.existence.claims.push_back({o.existence, there});
+      if (!there) continue;
+      tools::ClassClaim claim;
+      for (const auto& c : o.classes) claim.believed[c.name] = c.probability;
+      claim.is = world_.things()[*f.thing].class_name;
+      scores_.classes.claims.push_back(std::move(claim));
+    }
+  }
+
+  void compareGaussians() {
+    BeliefScores& s = scores_;
+    for (const auto& o : last_.objects) {
+      const Followed& f = followed_[o.id];
+      if (!o.confirmed || !f.thing || visible_[*f.thing] < kLeastVisible) continue;
+      const Thing& thing = world_.things()[*f.thing];
+      if (thing.moves()) continue;
+      ++s.objects;
+      if (o.best().name != thing.class_name) {
+        ++s.wrong_class;
+        continue;
+      }
+      Vector7d e = o.best().mean - thing.x.head<7>();
+      e[3] = 0.5 * wrapAngle(2.0 * e[3]);
+      const Matrix7d& P = o.best().covariance;
+      const auto nees = [&](Eigen::Index at) {
+        const Eigen::Vector3d part = e.segment<3>(at);
+        return squaredMahalanobis(part, P.block<3, 3>(at, at));
+      };
+      s.all_position.nees.push_back(nees(0));
+      s.all_half_yaw.nees.push_back(e[3] * e[3] / P(3, 3));
+      s.all_size.nees.push_back(nees(4));
+    }
+    s.position.add(s.all_position);
+    s.half_yaw.add(s.all_half_yaw);
+    s.size.add(s.all_size);
+  }
+
+  WorldOptions options_;
+  World world_;
+  sim::Dice dice_;
+  std::vector<std::uint32_t> visible_;
+  Objects last_;
+  Node node_;
+  std::map<ObjectId, Followed> followed_;
+  BeliefScores scores_;
+};
+
+template <class List>
+void append(List& to, const List& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+void print(const tools::RunAnees& runs, const tools::Anees& all) {
+  const auto [low, high] = runs.band();
+  std::printf("%-18s %6zu %6.2f ± %.2f   %.2f .. %.2f %9.2f %10.3f\n", runs.what.c_str(),
+              all.nees.size(), runs.mean(), runs.standardError(), low, high, all.median(),
+              all.within3Sigma());
+}
+
+void print(const tools::Reliability& r) {
+  std::printf("\n%s: %zu asked, calibration error %.3f, Brier %.3f, skill %.2f\n", r.what.c_str(),
+              r.claims.size(), r.calibrationError(), r.brier(), r.skill());
+  for (const auto& bin : r.bins()) {
+    std::printf("  %6zu  believed %.3f  so %.3f\n", bin.count, bin.believed, bin.observed);
+  }
+}
+
+}  // namespace
+
+void BeliefScores::add(const BeliefScores& world) {
+  append(position.means, world.position.means);
+  append(half_yaw.means, world.half_yaw.means);
+  append(size.means, world.size.means);
+  append(all_position.nees, world.all_position.nees);
+  append(all_half_yaw.nees, world.all_half_yaw.nees);
+  append(all_size.nees, world.all_size.nees);
+  append(existence.claims, world.existence.claims);
+  append(classes.claims, world.classes.claims);
+  things += world.things;
+  seen_things += world.seen_things;
+  objects += world.objects;
+  wrong_class += world.wrong_class;
+  new_boxes += world.new_boxes;
+  false_boxes += world.false_boxes;
+}
+
+BeliefScores runWorld(const WorldOptions& options, const Told& told) {
+  return Trial(options, told).run();
+}
+
+BeliefScores runWorlds(WorldOptions options, const Told& told, std::size_t runs,
+                       const std::function<void(std::size_t)>& progress) {
+  BeliefScores all;
+  for (std::size_t i = 0; i < runs; ++i, ++options.seed) {
+    all.add(runWorld(options, told));
+    if (progress) progress(i);
+  }
+  return all;
+}
+
+void print(const BeliefScores& s) {
+  std::printf("%zu things, %zu seen; a new box for %.1f false ones\n", s.things, s.seen_things,
+              double(s.false_boxes) / double(std::max<std::size_t>(s.new_boxes, 1)));
+  std::printf("%zu confirmed with 20 visible frames, %zu of a wrong class\n\n", s.objects,
+              s.wrong_class);
+  std::printf("%-18s %6s %13s %14s %9s %10s\n", "", "number", "NEES per dof", "95 % band", "median",
+              "in 3 sigma");
+  print(s.position, s.all_position);
+  print(s.half_yaw, s.all_half_yaw);
+  print(s.size, s.all_size);
+  print(s.existence);
+  print(s.classes.best());
+  std::printf("all classes: Brier %.3f, skill %.2f\n", s.classes.brier(), s.classes.skill());
+}
+
+}  // namespace perdure::test
