@@ -37,13 +37,23 @@ StageTimer::Span::Span(StageTimer& timer, const std::string& stage, bool whole)
     : timer_(timer),
       stage_(stage),
       whole_(whole),
+      outer_(timer.innermost_),
       cpu_start_ms_(nowMs(CLOCK_PROCESS_CPUTIME_ID)),
-      wall_start_ms_(nowMs(CLOCK_MONOTONIC)) {}
+      wall_start_ms_(nowMs(CLOCK_MONOTONIC)) {
+  timer_.innermost_ = this;
+}
 
 StageTimer::Span::~Span() {
+  const double cpu = nowMs(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_ms_;
+  const double wall = nowMs(CLOCK_MONOTONIC) - wall_start_ms_;
+  timer_.innermost_ = outer_;
+  if (outer_) {
+    outer_->cpu_within_ms_ += cpu;
+    outer_->wall_within_ms_ += wall;
+  }
   Samples& samples = timer_.stages_[stage_];
-  samples.cpu_begun_ms += nowMs(CLOCK_PROCESS_CPUTIME_ID) - cpu_start_ms_;
-  samples.wall_begun_ms += nowMs(CLOCK_MONOTONIC) - wall_start_ms_;
+  samples.cpu_begun_ms += cpu - cpu_within_ms_;
+  samples.wall_begun_ms += wall - wall_within_ms_;
   if (!whole_) return;
   samples.cpu_ms.push_back(samples.cpu_begun_ms);
   samples.wall_ms.push_back(samples.wall_begun_ms);

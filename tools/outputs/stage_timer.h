@@ -11,6 +11,7 @@ namespace perdure::tools {
 /// Middle and upper quantile of a sample by linear interpolation; q in [0, 1]; 0 when empty.
 double quantile(std::vector<double> values, double q);
 
+/// A stage that is timed within another is none of the outer one's time.
 class StageTimer {
  public:
   /// Runs `work` and adds its CPU time (of all threads of the process) and wall time to `stage` as
@@ -40,13 +41,16 @@ class StageTimer {
     StageTimer& timer_;
     std::string stage_;
     bool whole_;
+    Span* outer_;
     double cpu_start_ms_, wall_start_ms_;
+    double cpu_within_ms_ = 0.0, wall_within_ms_ = 0.0;  ///< of stages inside this one
   };
   struct Samples {
     std::vector<double> cpu_ms, wall_ms;
     double cpu_begun_ms = 0.0, wall_begun_ms = 0.0;
   };
   std::map<std::string, Samples> stages_;
+  Span* innermost_ = nullptr;
 };
 
 }  // namespace perdure::tools

@@ -52,19 +52,21 @@ void Pipeline::openFilter() {
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
-    outputs_->onObjects(objects);
-    map_->onObjects(objects);
-    if (vio_) vio_->onObjects(objects);
+    timer_.timeTowardsNext("outputs", [&] { outputs_->onObjects(objects); });
+    timer_.timeTowardsNext("map_store", [&] { map_->onObjects(objects); });
+    if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->onObjects(objects); });
     const auto started = started_ms_.find(objects.stamp.sequence);
     if (started == started_ms_.end()) return;
     counts_.latency_ms.push_back(wallMs() - started->second);
     started_ms_.erase(started);
   };
   sinks.events = [this](const Event& event) {
-    outputs_->onEvent(event);
-    map_->onEvent(event);
+    timer_.timeTowardsNext("outputs", [&] { outputs_->onEvent(event); });
+    timer_.timeTowardsNext("map_store", [&] { map_->onEvent(event); });
   };
-  sinks.queries = [this](const MapQuery& query) { map_->onQuery(query); };
+  sinks.queries = [this](const MapQuery& query) {
+    timer_.timeTowardsNext("map_store", [&] { map_->onQuery(query); });
+  };
   sinks.predictions = [this](const Predictions& predictions) { expected_ = predictions; };
   filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors, kFilter,
                                                     std::move(sinks));
@@ -215,6 +217,7 @@ void Pipeline::handleFrame(const Frame& frame) {
   deliver();
   timer_.time("semantic_filter", [] {});
   timer_.time("map_store", [] {});
+  timer_.time("outputs", [] {});
 }
 
 void Pipeline::detect(const Frame& frame) {

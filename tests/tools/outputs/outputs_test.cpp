@@ -269,6 +269,19 @@ TEST(StageTimer, QuantilesInterpolateBetweenSamples) {
   EXPECT_DOUBLE_EQ(quantile({}, 0.5), 0.0);
 }
 
+TEST(StageTimer, AStageWithinAnotherIsNotTimedTwice) {
+  StageTimer timer;
+  const auto work = [] {
+    double sum = 0.0;
+    for (int i = 1; i < 20'000'000; ++i) sum += 1.0 / i;
+    EXPECT_GT(sum, 1.0);
+  };
+  timer.time("outer", [&] { timer.time("inner", work); });
+  const auto stages = timer.toJson()["stages"];
+  EXPECT_LT(stages["outer"]["cpu_ms"]["total"],
+            0.1 * stages["inner"]["cpu_ms"]["total"].get<double>());
+}
+
 TEST(StageTimer, CountsCallsByStageAndHandsTheResultThrough) {
   StageTimer timer;
   EXPECT_EQ(timer.time("vio", [] { return 7; }), 7);
