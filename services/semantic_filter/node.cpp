@@ -270,8 +270,10 @@ void Node::publish(const Entry& entry) {
     addContext(objects.objects.back(), object);
     if (objects.objects.back().moving <= 0.5) continue;
     const double dt = toSeconds(entry.input.stamp.time - object.as_of);
+    const Eigen::Matrix3d grown = placeGrowth(object.best(), dt, config_.filter.motion);
     for (auto& c : objects.objects.back().classes) {
       c.mean.head<3>() += dt * objects.objects.back().velocity;
+      c.covariance.topLeftCorner<3, 3>() += grown;
     }
   }
   late_merges_.insert(late_merges_.end(), entry.merges.begin(), entry.merges.end());

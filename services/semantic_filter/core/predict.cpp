@@ -150,6 +150,13 @@ State stateAt(const Hypothesis& h, double dt) {
   return x;
 }
 
+Eigen::Matrix3d placeGrowth(const Hypothesis& h, double dt, const MotionParameters& parameters) {
+  if (!h.moving) return Eigen::Matrix3d::Zero();
+  Hypothesis later = h;
+  predictHypothesis(later, dt, parameters);
+  return (later.P - h.P).topLeftCorner<3, 3>();
+}
+
 void predict(Object& object, TimePoint now, const PoseError& pose_error,
              const MotionParameters& parameters, const ViewWalk& walk) {
   const double dt = toSeconds(now - object.as_of);

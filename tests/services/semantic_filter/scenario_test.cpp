@@ -103,7 +103,7 @@ TEST(Scenario, PositionsAreAsUncertainAsTheirCovarianceSays) {
   std::printf("mean NEES of position per degree of freedom: %.2f\n", sum / (3 * kRuns));
 }
 
-TEST(Scenario, AMovingCarIsFlaggedAndAParkedOneBesideItIsNot) {
+TEST(Scenario, AMovingCarIsFlaggedAndLessSurelyPlacedUnseenAndAParkedOneIsNot) {
   const TrueObject parked{makeState(25, 4.5, 0.75, 0.0, 4.2, 1.75, 1.5), "car"};
   Config config;
   ClassPriors priors = testing::makePriors();
@@ -128,14 +128,24 @@ TEST(Scenario, AMovingCarIsFlaggedAndAParkedOneBesideItIsNot) {
     node.onOdometry(odometryAt(k, view.T_WB));
     node.onDetections(detectionsAt(k, list));
   }
-  double p_moving = -1.0, p_parked = -1.0;
-  for (const auto& o : last.objects) {
-    if (o.existence < 0.5) continue;
-    (o.best().mean[1] < 0 ? p_moving : p_parked) = o.moving;
-  }
-  EXPECT_GT(p_moving, 0.9);
-  EXPECT_LT(p_parked, 0.1);
-  EXPECT_GE(p_parked, 0.0);
+  const auto at = [&](bool right) {
+    for (const auto& o : last.objects) {
+      if (o.existence >= 0.5 && (o.best().mean[1] < 0) == right) return o;
+    }
+    ADD_FAILURE() << "one of the two is not believed";
+    return last.objects.front();
+  };
+  const ObjectBelief driving = at(true), standing = at(false);
+  EXPECT_GT(driving.moving, 0.9);
+  EXPECT_LT(standing.moving, 0.1);
+  // Two seconds without a look: it is published where it must be by now, and less surely.
+  for (std::uint64_t k = 30; k < 50; ++k) node.onOdometry(odometryAt(k, driveTo(k, 0.5)));
+  node.flush();
+  const double seconds = 2.0, sigma_v = 0.3;
+  EXPECT_NEAR(at(true).best().mean[0] - driving.best().mean[0], 9.0 * seconds, 4.0);
+  EXPECT_GT(at(true).best().covariance(0, 0),
+            driving.best().covariance(0, 0) + std::pow(sigma_v * seconds, 2));
+  EXPECT_EQ(at(false).best().covariance, standing.best().covariance);
 }
 
 }  // namespace
