@@ -36,7 +36,8 @@ int run(int argc, char** argv) {
   for (const auto& name : without) {
     const auto part = parts.find(name);
     if (part == parts.end())
-      throw StartupError(ExitCode::kUsage, "--without " + name + ": unknown");
+      throw StartupError(ExitCode::kUsage,
+                         "--without " + name + ": is none of the parts that --help names");
     *part->second = false;
   }
   const auto scores = test::runWorlds(options, test::readTold(assignments), runs);

@@ -16,8 +16,8 @@ using namespace semantic_filter;  // NOLINT
 
 // An object's image is a thing's where no side is further off than
 constexpr double kOfExtent = 0.25, kPixels = 3.0;
-constexpr std::uint64_t kForgotten =
-    5;  // frames in view without it, until it is no longer that thing
+// Frames in view without a thing's image, after which an object is no longer that thing.
+constexpr std::uint64_t kForgotten = 5;
 constexpr double kLeastExistence = 0.05;  // of an object that is asked
 constexpr double kOldestAge = 60.0;       // frames
 constexpr std::uint32_t kLeastVisible = 20;
@@ -233,13 +233,9 @@ BeliefScores runWorld(const WorldOptions& options, const Told& told) {
   return Trial(options, told).run();
 }
 
-BeliefScores runWorlds(WorldOptions options, const Told& told, std::size_t runs,
-                       const std::function<void(std::size_t)>& progress) {
+BeliefScores runWorlds(WorldOptions options, const Told& told, std::size_t runs) {
   BeliefScores all;
-  for (std::size_t i = 0; i < runs; ++i, ++options.seed) {
-    all.add(runWorld(options, told));
-    if (progress) progress(i);
-  }
+  for (std::size_t i = 0; i < runs; ++i, ++options.seed) all.add(runWorld(options, told));
   return all;
 }
 

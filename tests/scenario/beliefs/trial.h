@@ -1,8 +1,6 @@
 // The filter in worlds that are as it is told (world.h), and whether its beliefs are true there.
 #pragma once
 
-#include <functional>
-
 #include "tests/scenario/beliefs/world.h"
 #include "tools/evaluate/consistency_score.h"
 #include "tools/evaluate/reliability.h"
@@ -27,11 +25,10 @@ struct BeliefScores {
   void add(const BeliefScores& world);
 };
 
-/// Runs the filter through one world with `believes` as its configuration (usually the world's).
+/// Runs the filter through one world.
 BeliefScores runWorld(const WorldOptions& options, const Told& told);
 /// Over `runs` seeds from options.seed on.
-BeliefScores runWorlds(WorldOptions options, const Told& told, std::size_t runs,
-                       const std::function<void(std::size_t)>& progress = {});
+BeliefScores runWorlds(WorldOptions options, const Told& told, std::size_t runs);
 
 void print(const BeliefScores& scores);
 
