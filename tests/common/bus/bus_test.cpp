@@ -92,10 +92,34 @@ class RawDetections {
     message.items = {1, 1, &item, false};
     ASSERT_EQ(dds_write(writer_.handle(), &message), DDS_RETCODE_OK);
   }
+  void writeMany(std::size_t boxes) {
+    perdure_msg_Detection item{};
+    item.corners[2] = item.corners[3] = 1;
+    std::vector<perdure_msg_Detection> items(boxes, item);
+    perdure_msg_Detections message{};
+    char camera[] = "cam0";
+    message.camera = camera;
+    const auto n = static_cast<std::uint32_t>(boxes);
+    message.items = {n, n, items.data(), false};
+    ASSERT_EQ(dds_write(writer_.handle(), &message), DDS_RETCODE_OK);
+  }
 
  private:
   Entity topic_, writer_;
 };
+
+TEST_F(Bus, TooManyBoxesAreCountedAndWhatFollowsIsHeard) {
+  Reader<Detections> reader(here, topics::kDetections);
+  int sound = 0;
+  loop.on(reader, [&](const Detections&) { ++sound; });
+  RawDetections stranger(there);
+  ASSERT_TRUE(runUntil(loop, [&] { return reader.matched() == 1; }));
+  stranger.writeMany(50'000);
+  EXPECT_TRUE(
+      runUntil(loop, [&] { return reportOf(reader).of("detections_malformed_over_bound") == 1; }));
+  stranger.write(1.0, "cam0");
+  EXPECT_TRUE(runUntil(loop, [&] { return sound == 1; }));
+}
 
 TEST_F(Bus, CountsMalformedDetectionsOfAStrangerAndHearsItsSoundOnes) {
   Reader<Detections> reader(here, topics::kDetections);

@@ -155,6 +155,13 @@ class SwapRig {
     for (std::uint64_t i = first; i < last; ++i) count += !by_frame_.contains(i);
     return count;
   }
+  /// Frames that came while a network was still at work on another one: its own rate, no loss of
+  /// the swap. As of a second ago.
+  int droppedByNetworks() const {
+    std::uint64_t dropped = 0;
+    for (const auto& [instance, h] : healths_) dropped += h.process == "inference" ? h.dropped : 0;
+    return static_cast<int>(dropped);
+  }
   /// The longest that a frame waited for its first answer, in periods.
   int longestWait(std::uint64_t first, std::uint64_t last) const {
     std::uint64_t longest = 0;
