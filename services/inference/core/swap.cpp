@@ -1,6 +1,7 @@
 #include "services/inference/core/swap.h"
 
 #include <algorithm>
+#include <set>
 
 namespace perdure::inference {
 namespace {
@@ -85,6 +86,8 @@ void Swap::heard(const Detections& detections, Time now) {
   other_ = detections.instance;
   other_at_ = now;
   if (watch_ && watch_->newcomer == other_) watch_->silent_results = 0;
+  const auto before = findFrame(others_, detections.stamp, [](const auto& d) { return d.stamp; });
+  if (before != others_.rend() && before->instance == other_) return;  // said again
   keep(others_, detections, kRemembered);
   const auto own = findFrame(own_, detections.stamp,
                              [](const Made& m) -> const FrameStamp& { return m.detections.stamp; });
@@ -133,10 +136,18 @@ void Swap::pass(Time) {
 
 void Swap::giveUp(const Reason& reason, bool tell) {
   role_ = Role::kGone;
+  watch_.reset();
   actions_.yield = actions_.end = true;
   actions_.failure = message_ = "rolled back, " + reason.code + ": " + reason.detail;
-  reasons_.add("swap_rolled_back_" + reason.code);
+  countRollBack(reason.code);
   if (tell) notify(SwapStep::kRolledBack, 0, reason);
+}
+
+/// Words from outside are not counted by their own name.
+void Swap::countRollBack(const std::string& reason) {
+  static const std::set<std::string> known = {
+      "fails", "late", "slow", "silent", "empty", "flood", "elsewhere", "outbid", "unknown_model"};
+  reasons_.add("swap_rolled_back_" + (known.contains(reason) ? reason : std::string("other")));
 }
 
 void Swap::told(const SwapNotice& notice, Time now) {
@@ -149,7 +160,7 @@ void Swap::told(const SwapNotice& notice, Time now) {
   if (watch_ && notice.instance == watch_->newcomer) {  // it gave up by itself
     watch_.reset();
     message_ = notice.model + " was rolled back, " + notice.reason + ": " + notice.detail;
-    reasons_.add("swap_rolled_back_" + notice.reason);
+    countRollBack(notice.reason);
   }
 }
 
@@ -173,7 +184,7 @@ void Swap::takeBack(const Reason& reason, Time now) {
   notice.detail = reason.detail;
   actions_.notices.push_back(notice);
   message_ = newcomer.model + " was rolled back, " + reason.code + ": " + reason.detail;
-  reasons_.add("swap_rolled_back_" + reason.code);
+  countRollBack(reason.code);
   sayAgain(now);
 }
 
@@ -181,6 +192,7 @@ void Swap::retire(const SwapNotice& notice, Time now) {
   if (other_ != notice.instance || alone(now)) return reasons_.add("swap_passed_unheard");
   notify(SwapStep::kRetired, notice.instance, {"", judge_.summary()});
   message_ = "retires; " + notice.model + " has passed";
+  watch_.reset();
   role_ = Role::kGone;
   actions_.end = true;
 }

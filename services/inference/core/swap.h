@@ -9,7 +9,6 @@
 #include <chrono>
 #include <deque>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -87,6 +86,7 @@ class Swap {
   void compare(const Detections& own, const Detections& other);
   void judgeNow(Time now);
   void sayAgain(Time now);
+  void countRollBack(const std::string& reason);
   void notify(SwapStep step, InstanceId about, const Reason& reason = {});
 
   SwapOptions options_;

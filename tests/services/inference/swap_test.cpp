@@ -309,6 +309,35 @@ TEST(Swap, APassOfOneThatIsNotHeardRetiresNobody) {
   EXPECT_EQ(bus.elder().swap.reasons().of("swap_passed_unheard"), 1u);
 }
 
+TEST(Swap, AFrameThatIsSaidAgainIsJudgedOnce) {
+  Bus bus;
+  bus.runUntilTakenOver();
+  bus.run(3);
+  const Detections empty = listOf(kNew, bus.frame - 1, {});
+  for (std::size_t i = 0; i < 2 * Judge::kEnough; ++i) {
+    bus.elder().swap.heard(empty, bus.now);
+    bus.obey(kOld);
+  }
+  EXPECT_EQ(bus.owner(), kNew);
+}
+
+TEST(Swap, ReasonsFromOutsideAreCountedTogether) {
+  Bus bus;
+  for (int i = 0; i < 100; ++i) {
+    SwapNotice notice;
+    notice.instance = 99;
+    notice.about = kOld;
+    notice.step = SwapStep::kTookOver;
+    bus.elder().swap.told(notice, bus.now);
+    notice.step = SwapStep::kRolledBack;
+    notice.about = 0;
+    notice.reason = "word" + std::to_string(i);
+    bus.elder().swap.told(notice, bus.now);
+  }
+  EXPECT_EQ(bus.elder().swap.reasons().all().size(), 1u);
+  EXPECT_EQ(bus.elder().swap.reasons().of("swap_rolled_back_other"), 100u);
+}
+
 TEST(Swap, OtherClassesAreNoNonsense) {
   Bus bus;
   bus.setClasses({"car", "person"}, {"bench", "hydrant"});
