@@ -79,7 +79,7 @@ void Swap::heard(const Detections& detections, Time now) {
   keep(frames_heard_, detections.stamp, kHeard);
   if (detections.instance == options_.self) {
     self_at_ = now;
-    if (!std::exchange(hearing_self_, true)) sayAgain(now);
+    if (!std::exchange(hearing_self_, true) && other_ != 0) sayAgain(now);
     return;
   }
   hearing_self_ = false;
@@ -121,7 +121,7 @@ void Swap::takeOver(Time now) {
   follows_ = now - other_at_ > kNobody ? 0 : other_;
   actions_.lead = true;
   role_ = Role::kProbation;
-  since_ = self_at_ = now;
+  since_ = self_at_ = again_from_ = now;
   again_at_ = now + options_.lease / 2;
   notify(SwapStep::kTookOver, follows_, {"", judge_.summary()});
   message_ = "is heard, on probation";
@@ -206,6 +206,7 @@ void Swap::sayAgain(Time now) {
     again_.push_back(made.detections);
   }
   actions_.again = again_;
+  again_from_ = own_.empty() ? now : own_.back().at;  // what we hear, others may not hear yet
   again_at_ = now + options_.lease / 2;
 }
 
@@ -214,10 +215,8 @@ void Swap::tick(Time now) {
   // once more.
   if (again_at_ != Time{} && now >= again_at_) {
     again_at_ = Time{};
-    if (role_ == Role::kProbation) {
-      for (const Made& made : own_) {
-        if (made.at >= since_) again_.push_back(made.detections);
-      }
+    for (const Made& made : own_) {
+      if (made.at >= again_from_) again_.push_back(made.detections);
     }
     actions_.again.insert(actions_.again.end(), again_.begin(), again_.end());
     again_.clear();

@@ -107,7 +107,7 @@ class Swap {
   InstanceId follows_ = 0;  ///< whose topic a newcomer took
   std::optional<Watch> watch_;
   std::vector<Detections> again_;
-  Time again_at_{};
+  Time again_at_{}, again_from_{};  ///< when; and results since when besides
 };
 
 }  // namespace perdure::inference

@@ -309,6 +309,27 @@ TEST(Swap, APassOfOneThatIsNotHeardRetiresNobody) {
   EXPECT_EQ(bus.elder().swap.reasons().of("swap_passed_unheard"), 1u);
 }
 
+TEST(Swap, WhatASpareSaysWhileReadersLearnOfItIsSaidAgain) {
+  Swap spare({kNew, "spare", 0.0, kLease});
+  Swap::Time now{std::chrono::hours(1)};
+  const auto sequences = [&] {
+    std::vector<std::uint64_t> all;
+    for (const Detections& d : spare.take().again) all.push_back(d.stamp.sequence);
+    return all;
+  };
+  for (std::uint64_t k = 0; k < 6; ++k, now += kPeriod) {
+    spare.ownResult(listOf(kNew, k, kStreet), true, now);
+    if (k < 2) spare.heard(listOf(kOld, k, kStreet), now);
+    if (k >= 4) spare.heard(listOf(kNew, k, kStreet), now);  // the owner died after frame 1
+    const std::vector<std::uint64_t> missed = {2, 3};
+    EXPECT_EQ(sequences(), k == 4 ? missed : std::vector<std::uint64_t>{}) << k;
+  }
+  spare.tick(now);
+  EXPECT_THAT(sequences(), ElementsAre(2, 3, 4, 5)) << "other readers may have heard none of them";
+  spare.tick(now + kLease);
+  EXPECT_THAT(sequences(), ElementsAre());
+}
+
 TEST(Swap, AFrameThatIsSaidAgainIsJudgedOnce) {
   Bus bus;
   bus.runUntilTakenOver();
