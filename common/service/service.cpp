@@ -166,6 +166,15 @@ int runService(int argc, char** argv, const Program& program) {
   CLI::App app(program.summary, executableOf(program));
   CommandLine line;
   addOptions(app, line);
+  for (const Shorthand& shorthand : program.shorthands) {
+    app.add_option_function<std::string>(
+           shorthand.option,
+           [&line, &shorthand](const std::string& value) {
+             line.assignments.push_back(shorthand.key + "=" + value);
+           },
+           "the same as --set " + shorthand.key + "=" + shorthand.type)
+        ->type_name(shorthand.type);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "common/base/sink.h"
 #include "common/bus/once.h"
@@ -89,6 +90,11 @@ class Context {
   std::function<void()> on_health_;
 };
 
+/// An option of the command line that stands for --set key=value.
+struct Shorthand {
+  std::string option, key, type;
+};
+
 struct Program {
   std::string process;  ///< "capture", "vio", …: the name in Health and in the log
   std::string summary;  ///< one sentence for --help
@@ -98,6 +104,7 @@ struct Program {
   std::function<void(Context&)> body;
   /// Checks between fields, after reading; may throw StartupError. Part of --check-config.
   std::function<void()> verify = {};
+  std::vector<Shorthand> shorthands = {};
 };
 
 /// The whole main of a service; returns its exit status.

@@ -46,6 +46,9 @@ struct Detections {
   InstanceId instance = 0;       ///< of the inference process
   std::uint64_t model_hash = 0;  ///< refers to ModelInfo
   std::vector<Detection> detections;
+  /// Width of the network's input over ModelInfo::input_width, where a time budget made it smaller;
+  /// 0: not known, hence 1.
+  double input_scale = 0.0;
 };
 
 /// What the activations mean. Latched on the topic `model`, keyed by hash.

@@ -13,6 +13,10 @@ void describe(Config& config, config::Fields& fields) {
                "config/models/<stem>.json"});
   fields.integer("model.threads", config.model.threads, between(1, 64),
                  {"threads of OpenCV for one image", "", "use at most the cores of the machine"});
+  fields.number("model.budget_ms", config.model.budget_ms, between(0.0, 10000.0),
+                {"most time of a frame, picture to detections: where it is not kept the input is "
+                 "made smaller, and larger again; 0: always the network's own size",
+                 "ms"});
   fields.text("detection.camera", config.detection.camera,
               {"the camera whose frames are looked at"});
   fields.number("detection.score_threshold", config.detection.score_threshold,

@@ -19,7 +19,8 @@ void run(service::Context& context, const inference::Config& config) {
   inference::Worker* worker = nullptr;  // handlers run when it is there: in context.run()
   const auto& rivals =
       context.on(bus::topics::kDetections, [&](const Detections& heard) { worker->heard(heard); });
-  inference::Worker the_worker(node, ownership, {detections, rivals, notices}, context.health(),
+  inference::Worker the_worker(node, ownership, config.model.budget_ms,
+                               {detections, rivals, notices}, context.health(),
                                [&] { context.stop(); });
   worker = &the_worker;
 
@@ -49,5 +50,6 @@ int main(int argc, char** argv) {
       {.process = "inference",
        .summary = "Looks at frames with a network and publishes evidence for classes in boxes.",
        .describe = [&](config::Fields& fields) { inference::describe(config, fields); },
-       .body = [&](service::Context& context) { run(context, config); }});
+       .body = [&](service::Context& context) { run(context, config); },
+       .shorthands = {{"--budget-ms", "model.budget_ms", "MS"}}});
 }

@@ -1,8 +1,10 @@
 #include "services/inference/node.h"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core/utility.hpp>
 
+#include "common/base/check.h"
 #include "common/base/errors.h"
 #include "services/inference/core/image_fit.h"
 #include "services/inference/core/suppress.h"
@@ -65,7 +67,8 @@ Node::Node(const Config& config, InstanceId instance)
            readModelFile(config.model.path, config.model.description, standardModelFolders())) {}
 
 Node::Node(const Config& config, InstanceId instance, ModelFile file)
-    : config_(config), description_(file.description), network_(loadNetwork(config, file)) {
+    : config_(config), description_(file.description) {
+  sizes_.push_back({description_, loadNetwork(config, file)});
   cv::setNumThreads(static_cast<int>(config.model.threads));
   options_.score_threshold = config.detection.score_threshold;
   info_.instance = instance;
@@ -86,7 +89,51 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   for (const std::string& name : info_.classes) identity += "\n" + name;
   info_.hash = digest(identity);
   testItself();
+  if (config_.model.budget_ms > 0.0) addSmallerSizes(file);
 }
+
+/// Each has a network of its own, because OpenCV sets one up anew when its input changes. A size that
+/// the network does not take is left out.
+void Node::addSmallerSizes(const ModelFile& file) {
+  constexpr int kMultiple = 32;  // of all strides there are
+  const Input& full = description_.input;
+  for (const double scale : {0.85, 0.7, 0.6, 0.5}) {
+    Size size{description_, loadNetwork(config_, file)};
+    Input& input = size.description.input;
+    const auto rounded = [&](int side) {
+      return std::max(kMultiple,
+                      static_cast<int>(std::lround(scale * side / kMultiple)) * kMultiple);
+    };
+    input.width = rounded(full.width), input.height = rounded(full.height);
+    const Input& last = sizes_.back().description.input;
+    if (input.width * input.height >= last.width * last.height) continue;
+    sizes_.push_back(std::move(size));
+    size_ = sizes_.size() - 1;
+    const Frame image = testImage(input);
+    bool works = true;
+    for (int round = 0; round < 2 && works; ++round) {  // the first one allocates
+      works = candidatesIn(image, options_.score_threshold).has_value();
+    }
+    size_ = 0;
+    if (!works) sizes_.pop_back();
+  }
+}
+
+std::vector<double> Node::sizeShares() const {
+  std::vector<double> shares;
+  const auto pixels = [](const Input& input) { return 1.0 * input.width * input.height; };
+  for (const Size& size : sizes_) {
+    shares.push_back(pixels(size.description.input) / pixels(description_.input));
+  }
+  return shares;
+}
+
+void Node::useSize(std::size_t size) {
+  check(size < sizes_.size(), "a size of the network's input that there is");
+  size_ = size;
+}
+
+double Node::inputScale() const { return 1.0 * at().input.width / description_.input.width; }
 
 void Node::chooseClasses() {
   const auto& known = description_.classes;
@@ -118,13 +165,13 @@ void Node::testItself() {
 }
 
 Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double floor) {
-  const auto blob = makeBlob(description_.input, frame);
+  const auto blob = makeBlob(at().input, frame);
   if (!blob) return tl::unexpected(blob.error());
-  const auto tensors = network_.forward(*blob);
+  const auto tensors = sizes_[size_].network.forward(*blob);
   if (!tensors) return tl::unexpected(tensors.error());
   DecodeOptions options = options_;
   options.score_threshold = floor;
-  auto candidates = decode(description_, options, *tensors);
+  auto candidates = decode(at(), options, *tensors);
   if (!candidates) return candidates;
   std::erase_if(*candidates, [](const Candidate& c) {
     return c.box.width() < 1.0 || c.box.height() < 1.0;  // less than a pixel of input
@@ -153,12 +200,13 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   const auto reported = suppress(std::move(passing), config_.detection.merge_iou,
                                  static_cast<std::size_t>(config_.detection.limit));
   const ImageFit fit =
-      fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+      fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height));
   Detections out;
   out.stamp = frame.stamp;
   out.camera = frame.camera;
   out.instance = info_.instance;
   out.model_hash = info_.hash;
+  out.input_scale = inputScale();
   for (const Candidate& candidate : reported) out.detections.push_back(inImage(candidate, fit));
   if (priming) addPrimed(expected, frame, reported, *candidates, out);
   return out;
@@ -169,7 +217,7 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
 std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
                                               const Frame& frame) const {
   const ImageFit fit =
-      fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+      fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height));
   const double after = toSeconds(frame.stamp.time - expected.stamp.time);
   std::vector<Expectation> expectations;
   for (const Prediction& prediction : expected.predictions) {
@@ -191,7 +239,7 @@ void Node::addPrimed(const Predictions& expected, const Frame& frame,
                      const std::vector<Candidate>& reported,
                      const std::vector<Candidate>& candidates, Detections& out) const {
   const ImageFit fit =
-      fitOf(description_.input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+      fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height));
   const auto expectations = expectationsOf(expected, frame);
   for (const PrimedAnswer& answer :
        prime(description_.calibration, expectations, reported, candidates)) {

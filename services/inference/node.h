@@ -31,6 +31,14 @@ class Node {
   /// "model_output_shape", "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
 
+  /// Pixels of each input size that the network takes over those of its own, falling from 1. More
+  /// than one where there is a time budget.
+  std::vector<double> sizeShares() const;
+  /// Which of them to look with from now on.
+  void useSize(std::size_t size);
+  /// Input width over the network's own.
+  double inputScale() const;
+
   /// Every box whose best reported class scores `floor` or more, in pixels of the network's input,
   /// before overlaps are merged. Reasons as of infer().
   Result<std::vector<Candidate>> candidatesIn(const Frame& frame, double floor);
@@ -45,9 +53,18 @@ class Node {
                  const std::vector<Candidate>& reported, const std::vector<Candidate>& candidates,
                  Detections& out) const;
 
+  /// The network at one size of its input.
+  struct Size {
+    ModelDescription description;
+    Network network;
+  };
+  void addSmallerSizes(const ModelFile& file);
+  const ModelDescription& at() const { return sizes_[size_].description; }
+
   Config config_;
-  ModelDescription description_;
-  Network network_;
+  ModelDescription description_;  ///< at its own size
+  std::vector<Size> sizes_;       ///< its own first, smaller ones where there is a budget
+  std::size_t size_ = 0;
   DecodeOptions options_;
   ModelInfo info_;
 };

@@ -1,5 +1,7 @@
 #include "services/inference/worker.h"
 
+#include <fmt/format.h>
+
 namespace perdure::inference {
 namespace {
 
@@ -13,9 +15,11 @@ Ownership firstOwnership(const OwnershipConfig& config, Duration lease) {
 
 }  // namespace
 
-Worker::Worker(Node& node, const OwnershipConfig& ownership, WorkerBus bus,
+Worker::Worker(Node& node, const OwnershipConfig& ownership, double budget_ms, WorkerBus bus,
                service::HealthMeter& health, std::function<void()> end)
     : node_(node),
+      budget_ms_(budget_ms),
+      budget_(budget_ms, node.sizeShares()),
       lease_(durationFromSeconds(leaseSeconds(ownership))),
       bus_(bus),
       health_(health),
@@ -97,13 +101,28 @@ void Worker::run() {
   while (const auto job = queue_.pop()) {
     busy_since_ = Clock::now();
     const auto result = look(job->frame);
+    const Clock::time_point now = Clock::now();
+    {
+      const std::lock_guard lock(mutex_);
+      age_ms_ = std::chrono::duration<double, std::milli>(now - job->since).count();
+    }
+    keepBudget(std::chrono::duration<double, std::milli>(now - busy_since_.load()).count());
     if (result) {
-      publish(*result, Clock::now() - job->since);
+      publish(*result, now - job->since);
     } else {
       noteFailure(result.error());
     }
     busy_since_ = Clock::time_point::max();
   }
+}
+
+void Worker::keepBudget(double ms) {
+  const std::size_t before = budget_.size();
+  if (!budget_.took(ms)) return;
+  node_.useSize(budget_.size());
+  const std::lock_guard lock(mutex_);
+  reasons_.add(budget_.size() > before ? "input_smaller" : "input_larger");
+  scale_ = node_.inputScale();
 }
 
 void Worker::noteFailure(const Reason& reason) {
@@ -179,6 +198,15 @@ void Worker::report(ReasonCounts& counts) const {
   for (const auto& [reason, n] : swap_.reasons().all()) counts.add(reason, n);
 }
 
+/// What the time budget has made of the input; empty where nothing.
+std::string Worker::reducedInput() const {
+  if (scale_ == 1.0) return "";
+  return fmt::format(
+      "the input is {:.0f} % of its width, for the budget of {:.0f} ms; the last result was "
+      "{:.0f} ms old",
+      100.0 * scale_, budget_ms_, age_ms_);
+}
+
 std::pair<HealthState, std::string> Worker::state() const {
   const std::lock_guard lock(mutex_);
   if (!failure_.empty()) return {HealthState::kFailed, failure_};
@@ -191,7 +219,8 @@ std::pair<HealthState, std::string> Worker::state() const {
   }
   if (ownership_.spare())
     return {HealthState::kOk, "stands by: another one took over and is heard"};
-  return {HealthState::kOk, swap_.message().empty() ? last_problem_ : swap_.message()};
+  if (!swap_.message().empty()) return {HealthState::kOk, swap_.message()};
+  return {HealthState::kOk, last_problem_.empty() ? reducedInput() : last_problem_};
 }
 
 std::string Worker::failure() const {

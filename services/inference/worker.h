@@ -11,6 +11,7 @@
 #include "common/base/bounded_queue.h"
 #include "common/bus/endpoint.h"
 #include "common/service/health.h"
+#include "services/inference/core/budget.h"
 #include "services/inference/core/ownership.h"
 #include "services/inference/core/swap.h"
 #include "services/inference/node.h"
@@ -27,9 +28,9 @@ struct WorkerBus {
 
 class Worker {
  public:
-  /// `end` ends the process; it is called from any thread.
-  Worker(Node& node, const OwnershipConfig& ownership, WorkerBus bus, service::HealthMeter& health,
-         std::function<void()> end);
+  /// `end` ends the process; it is called from any thread. `budget_ms` of a frame, 0: none.
+  Worker(Node& node, const OwnershipConfig& ownership, double budget_ms, WorkerBus bus,
+         service::HealthMeter& health, std::function<void()> end);
   /// Ends within the time of one frame.
   ~Worker();
   Worker(const Worker&) = delete;
@@ -62,14 +63,18 @@ class Worker {
   };
   void run();
   Result<Detections> look(const Frame& frame);
+  void keepBudget(double ms);
   void publish(const Detections& detections, Duration age);
   void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
   void adoptStrength(Clock::time_point now);
   /// Does what the swap asks for.
   void obey();
+  std::string reducedInput() const;
 
   Node& node_;
+  const double budget_ms_;
+  Budget budget_;  ///< of the worker's thread
   const Duration lease_;
   WorkerBus bus_;
   service::HealthMeter& health_;
@@ -86,6 +91,8 @@ class Worker {
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
+  double scale_ = 1.0;   ///< of the input
+  double age_ms_ = 0.0;  ///< of the last result when it was ready
   std::thread thread_;
 };
 

@@ -175,6 +175,7 @@ bool Node::attach(Entry& entry, const Detections& detections) {
   if (const auto change = models_.use(detections.model_hash, entry.input.stamp.time)) {
     tellModelChange(entry.input.stamp, *change);
   }
+  if (detections.input_scale > 0.0) entry.input.model.input_width *= detections.input_scale;
   entry.input.boxes.emplace();
   for (const auto& detection : detections.detections) {
     if (detection.primed) {

@@ -66,6 +66,7 @@ void DriveLog::add(const Detections& message) {
   FrameGlance& frame = frameOf(message.stamp);
   frame.detections.clear();
   for (const Detection& one : message.detections) {
+    if (one.primed) continue;  // the answer to a question, no box of its own
     frame.detections.push_back({one.box, bestProbability(one.activations)});
   }
 }

@@ -55,6 +55,21 @@ double logObjectness(const ModelDescription& model, const RawScores& raw) {
   return std::log(std::clamp(value, kLeastProbability, 1 - kLeastProbability));
 }
 
+float evidence(const Calibration& calibration, double log_odds) {
+  return evidenceOf(calibration, std::clamp(log_odds, -kMaxLogit, kMaxLogit));
+}
+
+/// σ(o)·σ(c_k): most networks.
+bool isPlainProduct(const ModelDescription& model) {
+  return !model.class_softmax && model.objectness_exponent == 1.0 && model.class_exponent == 1.0;
+}
+
+/// logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o: one logarithm for
+/// each of the K classes of a box, and exact, as all terms are positive.
+double logitOfProduct(double u, double c) {
+  return u == 0.0 ? c : -std::log(u + std::exp(-c) * (1.0 + u));
+}
+
 /// Objectness and classes, or classes alone.
 std::optional<std::size_t> weighAlone(const ModelDescription& model, const DecodeOptions& options,
                                       const RawScores& raw, Candidate& candidate) {
@@ -73,15 +88,20 @@ std::optional<std::size_t> weighAlone(const ModelDescription& model, const Decod
   const double highest = score(*best);
   if (highest < log_threshold) return std::nullopt;
   candidate.score = std::exp(highest);
+  candidate.activations.reserve(options.wanted.size() + 1);
   candidate.activations.assign(1, 0.0F);
+  if (isPlainProduct(model)) {
+    const double odds_against = std::expm1(-log_objectness);
+    for (const std::size_t k : options.wanted) {
+      candidate.activations.push_back(
+          evidence(model.calibration, logitOfProduct(odds_against, columns.ofClass(k))));
+    }
+    return best;
+  }
   for (const std::size_t k : options.wanted) {
     candidate.activations.push_back(activation(model.calibration, score(k)));
   }
   return best;
-}
-
-float evidence(const Calibration& calibration, double log_odds) {
-  return evidenceOf(calibration, std::clamp(log_odds, -kMaxLogit, kMaxLogit));
 }
 
 /// A soft-max over classes and background.

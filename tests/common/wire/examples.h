@@ -131,7 +131,7 @@ class Examples {
     return d;
   }
   void fill(Detections& m) {
-    m = {stamp(), word(), bits(), bits(), several([&] { return detection(); })};
+    m = {stamp(), word(), bits(), bits(), several([&] { return detection(); }), uniform(0, 1)};
   }
   void fill(ModelInfo& m) {
     m = {bits(),     bits(),     word(),        several([&] { return word(); }),

@@ -63,5 +63,53 @@ TEST(CommittedNetwork, IsSureOfNothingOnAFlatPictureOfAnySize) {
   }
 }
 
+TEST(CommittedNetwork, TakesSmallerInputsWhereThereIsABudgetAndSaysWhich) {
+  Config config = committed();
+  config.model.budget_ms = 10.0;
+  Node node(config, 1);
+  const auto shares = node.sizeShares();
+  ASSERT_GE(shares.size(), 3u);
+  EXPECT_TRUE(std::is_sorted(shares.rbegin(), shares.rend()));
+  EXPECT_LT(shares.back(), 0.4);
+  Frame frame;
+  frame.width = 640, frame.height = 480;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{120});
+  for (std::size_t size = 0; size < shares.size(); ++size) {
+    node.useSize(size);
+    const auto out = node.infer(frame);
+    ASSERT_TRUE(out) << out.error().detail;
+    EXPECT_NEAR(out->input_scale * out->input_scale, shares[size], 0.12);
+    EXPECT_EQ(out->model_hash, node.model().hash) << "the same model";
+  }
+}
+
+TEST(CommittedNetwork, AnswersWhatItIsAskedAboutAndOnlyThat) {
+  Node node(committed(), 1);
+  Frame frame;
+  frame.camera = "cam0";
+  frame.width = 640, frame.height = 480;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{120});
+  Predictions expected;
+  expected.camera = "cam0";
+  expected.predictions = {{7, "car", {200, 200, 300, 260}, 0.9, {}, {3, 3, 3, 3}},
+                          {8, "zeppelin", {200, 100, 300, 160}, 0.9, {}, {}},
+                          {9, "car", {900, 100, 990, 160}, 0.9, {}, {}}};
+  const auto out = node.infer(frame, expected);
+  ASSERT_TRUE(out);
+  std::vector<ObjectId> asked;
+  for (const Detection& d : out->detections) {
+    if (!d.primed) continue;
+    asked.push_back(d.primed_for);
+    EXPECT_LT(d.activations.at(1), 0.0F) << "there is nothing on a grey picture";
+  }
+  EXPECT_EQ(asked, std::vector<ObjectId>{7}) << "not of an unknown class, nor outside the picture";
+  Config off = committed();
+  off.detection.prime = false;
+  Node deaf(off, 1);
+  const auto unasked = deaf.infer(frame, expected);
+  ASSERT_TRUE(unasked);
+  for (const Detection& d : unasked->detections) EXPECT_FALSE(d.primed);
+}
+
 }  // namespace
 }  // namespace perdure::inference
