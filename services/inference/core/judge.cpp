@@ -24,8 +24,14 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 bool hasBoxAt(const Detections& list, const Box& box) {
   return std::any_of(list.detections.begin(), list.detections.end(), [&](const Detection& d) {
-    return intersectionOverUnion(d.box, box) >= kSameThing;
+    return !d.primed && intersectionOverUnion(d.box, box) >= kSameThing;
   });
+}
+
+/// Boxes that it found by itself: an answer to a prediction shows little of how it sees.
+std::size_t boxesOf(const Detections& list) {
+  return static_cast<std::size_t>(std::count_if(list.detections.begin(), list.detections.end(),
+                                                [](const Detection& d) { return !d.primed; }));
 }
 
 }  // namespace
@@ -40,13 +46,14 @@ void Judge::reset() {
 }
 
 void Judge::compare(const Detections& elder, const Detections& newcomer) {
-  Row row{elder.detections.size(), newcomer.detections.size()};
+  Row row{boxesOf(elder), boxesOf(newcomer)};
   const auto its = classes_.find(newcomer.model_hash), ours = classes_.find(elder.model_hash);
   row.told = its != classes_.end();
   for (const Detection& d : elder.detections) {
     if (!row.told || ours == classes_.end()) break;
     const auto k = sureClass(d);
-    if (!k || *k >= ours->second.size() || !contains(its->second, ours->second[*k])) continue;
+    if (d.primed || !k || *k >= ours->second.size() || !contains(its->second, ours->second[*k]))
+      continue;
     ++row.sure;
     row.found += hasBoxAt(newcomer, d.box);
   }

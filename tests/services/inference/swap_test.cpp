@@ -394,6 +394,19 @@ TEST(Judge, AsksForNonsenseOnlyWhereThereIsEnoughToCompare) {
   EXPECT_EQ(judge.summary(), "50 frames; 50 % of 100 sure things found");
 }
 
+TEST(Judge, AnswersToPredictionsAreNoSight) {
+  Judge judge;
+  judge.learn(modelOf(kOld, {"car", "person"}));
+  judge.learn(modelOf(kNew, {"car", "person"}));
+  std::vector<Detection> answers = kStreet;
+  for (Detection& d : answers) d.primed = true;
+  for (std::size_t i = 0; i < Judge::kEnough; ++i) {
+    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, answers));
+  }
+  ASSERT_TRUE(judge.complaint());
+  EXPECT_EQ(judge.complaint()->code, "empty");
+}
+
 TEST(Judge, ComplainsOfDetectionsWhoseModelNobodyPublished) {
   Judge judge;
   judge.learn(modelOf(kOld, {"car", "person"}));
