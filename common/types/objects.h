@@ -45,11 +45,11 @@ struct ObjectBelief {
   bool confirmed = false;
   std::vector<ClassBelief> classes;  ///< not empty; the most probable first
   Visibility visibility = Visibility::kVisible;
-  double visible_fraction = 0.0;  ///< v in [0, 1]
-  ObjectId blocked_by = 0;        ///< 0: nothing, or not an object
+  double visible_fraction = 0.0;           ///< v in [0, 1]
+  ObjectId blocked_by = 0;                 ///< 0: nothing, or not an object
   TimePoint first_seen, last_seen, as_of;  ///< as_of: up to when process noise was applied
   std::uint32_t hits = 0, visible_misses = 0;
-  double moving = 0.0;  ///< probability that it moves
+  double moving = 0.0;                                 ///< probability that it moves
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s in W, zero while static
   Memory memory = Memory::kWorking;
   bool recalled = false;  ///< came back from the map and not yet seen again
@@ -80,8 +80,21 @@ struct ObjectState {
 };
 
 enum class EventKind : std::uint8_t {
-  kBorn = 0, kConfirmed, kClassResolved, kOccluded, kLeftView, kReappeared, kMerged, kArchived,
-  kRecalled, kMissing, kGone, kMoved, kPredictedReturn, kModelChanged, kRestored,
+  kBorn = 0,
+  kConfirmed,
+  kClassResolved,
+  kOccluded,
+  kLeftView,
+  kReappeared,
+  kMerged,
+  kArchived,
+  kRecalled,
+  kMissing,
+  kGone,
+  kMoved,
+  kPredictedReturn,
+  kModelChanged,
+  kRestored,
 };
 const char* nameOf(EventKind kind);    ///< "born", "class_resolved", …
 const char* nameOf(Visibility value);  ///< "visible", "out_of_view", …
@@ -92,8 +105,8 @@ struct Event {
   WorldId world;
   EventKind kind = EventKind::kBorn;
   ObjectId object_id = 0;
-  ObjectId other_id = 0;   ///< the blocker, or the id that was merged away
-  std::string class_name;  ///< of the object at that time
+  ObjectId other_id = 0;     ///< the blocker, or the id that was merged away
+  std::string class_name;    ///< of the object at that time
   double probability = 0.0;  ///< what the event is about: r, or π of the class
   std::string detail;
 };

@@ -19,7 +19,7 @@ inline constexpr Limits kSpeed{-1e5, 1e5};          ///< m/s
 inline constexpr Limits kMatrixEntry{-1e12, 1e12};  ///< covariances, transitions
 inline constexpr Limits kLogit{-1e6, 1e6};
 inline constexpr Limits kInputScale{0.0, 1.0};  ///< 0: not known
-inline constexpr Limits kNats{-1e9, 1e9};  ///< sums of evidence
+inline constexpr Limits kNats{-1e9, 1e9};       ///< sums of evidence
 inline constexpr Limits kNotNegative{0.0, 1e18};
 inline constexpr Limits kInset{-0.45, 0.45};  // of a box, per side
 inline constexpr Limits kPositive{1e-12, 1e12};

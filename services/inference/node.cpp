@@ -92,8 +92,8 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   if (config_.model.budget_ms > 0.0) addSmallerSizes(file);
 }
 
-/// Each has a network of its own, because OpenCV sets one up anew when its input changes. A size that
-/// the network does not take is left out.
+/// Each has a network of its own, because OpenCV sets one up anew when its input changes. A size
+/// that the network does not take is left out.
 void Node::addSmallerSizes(const ModelFile& file) {
   constexpr int kMultiple = 32;  // of all strides there are
   const Input& full = description_.input;

@@ -80,8 +80,8 @@ struct BoxForm {
 enum class Background { kNone, kFirst, kLast };
 
 /// What the best candidate near a predicted place says where no box was reported (core/prime.h):
-/// posterior log-odds s of its class give `offset` + `slope`·s nats for the object, and no candidate
-/// of score `floor` or more gives `nothing`.
+/// posterior log-odds s of its class give `offset` + `slope`·s nats for the object, and no
+/// candidate of score `floor` or more gives `nothing`.
 struct PrimedCalibration {
   double floor = 0.0;  ///< in (0, 1), below the lax threshold; 0: not fitted, nothing is primed
   double slope = 0.0, offset = 0.0, nothing = 0.0;

@@ -100,6 +100,18 @@ TEST(Node, MapsAStreetOfParkedCars) {
   EXPECT_EQ(confirmed, 3);
 }
 
+TEST(Node, PrimedAnswersAloneBeginNoObject) {
+  Harness h;
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    auto boxes = boxesAt(kStreet, k, 0.4);
+    for (auto& d : boxes) d.primed = true, d.primed_for = 77;
+    ASSERT_FALSE(boxes.empty());
+    h.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
+    h.node.onDetections(detectionsAt(k, boxes));
+  }
+  EXPECT_TRUE(h.node.belief().objects.empty());
+}
+
 TEST(Node, LateAndDisorderedDetectionsGiveThePosteriorOfThoseOnTime) {
   Harness on_time, late;
   drive(on_time, 0, 30);
