@@ -97,8 +97,10 @@ TEST(Scene, Row) {
 
 TEST(Scene, Roll) {
   const Outcome run = runScene({.scene = "roll"});
-  hold(commonBars(run) + Bars{atMost(0.5, "mean position error of what is found under 1 m",
-                                     run.final.cells[1][2].positionError())});
+  hold(commonBars(run, {.recall = "0.79 (to 0.83 by small changes): what smoothing finds little to "
+                                  "mend at waits for three times as many new looks"}) +
+       Bars{atMost(0.5, "mean position error of what is found under 1 m",
+                   run.final.cells[1][2].positionError())});
 }
 
 TEST(Scene, Traffic) {
@@ -147,9 +149,8 @@ double keptIds(const Outcome& run) {
 }
 
 constexpr char kLosesIds[] =
-    ".94 (.92 to .98 over six seeds, with recall as without): taken for moving on the first lap "
-    "and "
-    "given up out of view, or two beliefs in one thing";
+    ".94 to .96 (.92 to .98 over six seeds, with recall as without): taken for moving on the first "
+    "lap and given up out of view, or two beliefs in one thing";
 
 TEST(Scene, StreetTwice) {
   const Outcome run = runScene({.scene = "street"});
