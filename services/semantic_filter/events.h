@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/types/objects.h"
-#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/merge.h"
 
 namespace perdure::semantic_filter {
 

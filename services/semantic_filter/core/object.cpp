@@ -121,6 +121,13 @@ void mergeInto(Hypothesis& a, const Hypothesis& b) {
   a.weight = weight;
 }
 
+Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
+  Vector7d d = (a.x - b.x).head<kGeometry>();
+  d[kYaw] = wrapAngle(d[kYaw]);
+  if (std::abs(d[kYaw]) > M_PI / 2) d[kYaw] = wrapAngle(d[kYaw] + M_PI);
+  return d;
+}
+
 ObjectBelief toBelief(const Object& object, double min_speed) {
   ObjectBelief belief;
   belief.id = object.id;

@@ -97,6 +97,8 @@ std::vector<ClassNumber> classShares(const Object& object);
 void book(Object& object, ClassEvidence why);
 /// Divides the weights by their sum, puts the heaviest first (stable), and books them.
 void normalise(Object& object, ClassEvidence why);
+/// a - b of the cuboids, yaw modulo 180°: a cuboid is the same turned by that.
+Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b);
 /// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.
 void mergeInto(Hypothesis& a, const Hypothesis& b);
 /// The published belief: per class its hypotheses as one Gaussian around the heaviest one.

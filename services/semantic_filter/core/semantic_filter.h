@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/birth.h"
+#include "services/semantic_filter/core/merge.h"
 #include "services/semantic_filter/core/tend.h"
 
 namespace perdure::semantic_filter {

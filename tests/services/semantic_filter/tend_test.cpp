@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 
 #include "services/semantic_filter/core/birth.h"
+#include "services/semantic_filter/core/merge.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,0 +1,213 @@
+#include "services/semantic_filter/core/merge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/keyframe.h"
+#include "services/semantic_filter/core/polygon.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
+
+bool isOther(const Object& o) { return o.best().class_name == kOtherClass; }
+
+/// "other" is no class of its own: it may turn out to be the known thing in the same place.
+bool sameKind(const Object& a, const Object& b) {
+  if (a.best().moving != b.best().moving) return false;
+  return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
+}
+
+/// Weights of a's hypotheses once b's PMF is taken in as well.
+void multiplyPmf(Object& a, const Object& b) {
+  for (auto& h : a.hypotheses) {
+    h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
+  }
+  normalise(a, ClassEvidence::kMerge);
+}
+
+void absorb(Object& a, const Object& b, const FrameContext& frame) {
+  if (isOther(a) != isOther(b)) {
+    if (isOther(a)) {
+      a.hypotheses = b.hypotheses;
+      a.classes = b.classes;
+    }
+  } else {
+    const ClassPrior& prior = frame.priors->of(a.best().class_name);
+    const double weight = a.best().weight;
+    if (!a.best().moving) {  // velocities are not fused: a moving one keeps its own state
+      a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
+    }
+    a.hypotheses.front().weight = weight;
+    multiplyPmf(a, b);
+  }
+  a.existence.become(
+      std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), frame.parameters->tend.certain),
+      ExistenceEvidence::kMerge, a.as_of);
+  a.hits += b.hits;
+  a.confirmed = a.confirmed || b.confirmed;
+  a.once_confirmed = a.once_confirmed || b.once_confirmed;
+  a.last_seen = std::max(a.last_seen, b.last_seen);
+  a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
+  a.support = std::max(a.support, b.support);
+  a.remembers_all = a.remembers_all && b.remembers_all;
+  const auto& box = frame.parameters->box;
+  joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
+                frame.parameters->smooth);
+}
+
+/// Two things that the image shows side by side are two, however near their estimated depths are.
+bool sameInImage(const State& a, const State& b, const View& view) {
+  const auto box_a = projectCuboid(a, view), box_b = projectCuboid(b, view);
+  if (!box_a || !box_b) return true;
+  const auto toBox = [](const Eigen::Vector4d& s) { return Box{s[0], s[1], s[2], s[3]}; };
+  return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
+}
+
+bool bothSeen(const Object& a, const Object& b) {
+  return a.visible_fraction > 0.0 && b.visible_fraction > 0.0;
+}
+
+/// Whether b is hidden by a, which is seen: two solid things cannot share their space, so that a
+/// copy behind its original is no thing of its own.
+bool hides(const Object& a, const Object& b) {
+  return a.visible_fraction > 0.0 && b.visibility == Visibility::kOccluded && b.blocked_by == a.id;
+}
+
+/// A hidden one waits at the time when it was last seen; what is merged is of one time.
+void bringUpToDate(Object& a, Object& b, const FrameContext& frame) {
+  const TimePoint now = std::max(a.as_of, b.as_of);
+  for (Object* o : {&a, &b}) {
+    if (o->visible_fraction > 0.0) continue;
+    predict(*o, now, frame.pose_error, frame.parameters->motion, viewWalkOf(frame));
+  }
+}
+
+/// Whose id survives: that which was claimed, whatever guesses at it are older.
+bool older(const Object& a, const Object& b) {
+  if (a.once_confirmed != b.once_confirmed) return a.once_confirmed;
+  return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
+}
+
+struct Shared {
+  double of_joint = 0.0, of_lesser = 0.0;  ///< volume in common over that of both, of the lesser
+};
+
+Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+  const Eigen::Vector3d size_a = a.segment<3>(kSize).array().exp();
+  const Eigen::Vector3d size_b = b.segment<3>(kSize).array().exp();
+  const Eigen::Vector3d offset =
+      uprightRotation(a[kYaw], up_W).transpose() * (b.head<3>() - a.head<3>());
+  const double turn = b[kYaw] - a[kYaw];
+  const Eigen::Matrix2d R = rotationAboutZ(turn).topLeftCorner<2, 2>();
+  Polygon footprint;
+  constexpr double kSigns[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+  for (const auto& s : kSigns) {
+    footprint.push_back(offset.head<2>() +
+                        R * Eigen::Vector2d(0.5 * s[0] * size_b.x(), 0.5 * s[1] * size_b.y()));
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    footprint = clip(footprint, axis, -0.5 * size_a[axis], true);
+    footprint = clip(footprint, axis, 0.5 * size_a[axis], false);
+  }
+  const double top = std::min(0.5 * size_a.z(), offset.z() + 0.5 * size_b.z());
+  const double bottom = std::max(-0.5 * size_a.z(), offset.z() - 0.5 * size_b.z());
+  const double shared = polygonArea(footprint) * std::max(top - bottom, 0.0);
+  return {shared / (size_a.prod() + size_b.prod() - shared),
+          shared / std::min(size_a.prod(), size_b.prod())};
+}
+
+/// Two beliefs about one thing: they overlap in space and in the image; or one is of no known class
+/// and lies in the other, since two solid things cannot share their space.
+bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
+  const State &x = a.best().x, &y = b.best().x;
+  const TendParameters& tend = frame.parameters->tend;
+  const Shared shared = sharedVolume(x, y, frame.view.up_W);
+  if (isOther(a) != isOther(b) && shared.of_lesser > tend.merge_inside) return true;
+  return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.view);
+}
+
+/// Half the diagonal of the best hypothesis' cuboid.
+double reachOf(const Object& object) {
+  return 0.5 * object.best().x.segment<3>(kSize).array().exp().matrix().norm();
+}
+
+bool touch(const Object& a, const Object& b, double reach) {
+  return (a.best().x - b.best().x).head<3>().squaredNorm() <= reach * reach;
+}
+
+bool oneHasBeenSeen(const Object& a, const Object& b) {
+  return bothSeen(a, b) || hides(a, b) || hides(b, a);
+}
+
+}  // namespace
+
+double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+  return sharedVolume(a, b, up_W).of_joint;
+}
+
+Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
+                const Matrix6d& P_pose) {
+  // Given the pose error g the beliefs are x | g ~ N(x̂ + B g, P - B P_g Bᵀ) with B = C P_g⁻¹.
+  const Eigen::Matrix<double, 7, 6> B_a = regressOn(P_pose, a.C.topRows<7>());
+  const Eigen::Matrix<double, 7, 6> B_b = regressOn(P_pose, b.C.topRows<7>());
+  const Matrix7d P_a = a.P.topLeftCorner<7, 7>() - B_a * P_pose * B_a.transpose();
+  const Matrix7d P_b = b.P.topLeftCorner<7, 7>() - B_b * P_pose * B_b.transpose();
+  if (!isCovariance(P_a) || !isCovariance(P_b)) return a;
+  const Matrix7d J_a = inverseSymmetric(P_a);
+  const Matrix7d J_b = inverseSymmetric(P_b);
+  Matrix7d J_prior = Matrix7d::Zero();
+  J_prior.block<3, 3>(kSize, kSize) = inverseSymmetric(prior.log_size_covariance);
+  Matrix7d J_new = J_b - J_prior;  // what b knows beyond the prior that a has used already
+  if (eigenvalues(J_new).minCoeff() < 0.0) {
+    J_new = 0.5 * J_b;  // its own information is not separable: count half of it
+    J_prior = 0.5 * J_b;
+  }
+  const Matrix7d P = inverseSymmetric(J_a + J_new);
+  Vector7d prior_mean = Vector7d::Zero();  // relative to a
+  prior_mean.segment<3>(kSize) = prior.log_size - a.x.segment<3>(kSize);
+  const Vector7d d = geometryDifference(b, a);
+  const Vector7d pull =
+      J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d) : Vector7d(J_b * d - J_prior * prior_mean);
+  Hypothesis fused = a;
+  fused.x.head<7>() += P * pull;
+  fused.x[kYaw] = wrapAngle(fused.x[kYaw]);
+  const Eigen::Matrix<double, 7, 6> B = P * (J_a * B_a + J_new * B_b);
+  const Eigen::Matrix4d bias = a.P.block<4, 4>(kBias, kBias);
+  fused.P.setZero();
+  fused.P.block<4, 4>(kBias, kBias) = bias;
+  fused.C.middleRows<4>(kBias).setZero();
+  fused.P.topLeftCorner<7, 7>() = P + B * P_pose * B.transpose();
+  fused.C.topRows<7>() = B * P_pose;
+  makeSymmetric(fused.P);
+  return isCovariance(fused.P.topLeftCorner<7, 7>()) && fused.x.allFinite() ? fused : a;
+}
+
+std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
+  std::vector<MergeRecord> merges;
+  std::vector<double> reach;
+  for (const Object& o : objects) reach.push_back(reachOf(o));
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    for (std::size_t j = i + 1; j < objects.size();) {
+      Object &a = objects[i], &b = objects[j];
+      if (!touch(a, b, reach[i] + reach[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
+          !sameSpace(a, b, frame)) {
+        ++j;
+        continue;
+      }
+      bringUpToDate(a, b, frame);
+      if (older(b, a)) std::swap(a, b);
+      absorb(a, b, frame);
+      merges.push_back({a.id, b.id});
+      objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+      reach.erase(reach.begin() + static_cast<std::ptrdiff_t>(j));
+      reach[i] = reachOf(objects[i]);
+    }
+  }
+  return merges;
+}
+
+}  // namespace perdure::semantic_filter
