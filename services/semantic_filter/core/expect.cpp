@@ -11,6 +11,7 @@ namespace {
 constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not primed
 constexpr double kFastest = 1e5;           // pixels a second; what is faster passes the lens
 constexpr double kLeastSigma = 1;          // pixels
+constexpr double kFarthest = 1e5;          // pixels; a side beyond is of a thing beside the camera
 
 }  // namespace
 
@@ -23,7 +24,7 @@ std::optional<Prediction> predictionOf(const Object& object, const FrameInput& n
   const double since = toSeconds(now.stamp.time - object.as_of);
   const Eigen::Vector4d inset = now.model.insets->of(best.class_name);
   const auto box = projectObserved(stateAt(best, since), now.view, inset);
-  if (!box || !box->sides.allFinite()) return std::nullopt;
+  if (!box || !(box->sides.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
   if (box->sides[0] >= box->sides[2] || box->sides[1] >= box->sides[3]) return std::nullopt;
   const Eigen::Vector4d& s = box->sides;
   Prediction prediction{object.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability};

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
+#include "services/semantic_filter/core/expect.h"
 #include "services/semantic_filter/core/tend.h"
 #include "services/semantic_filter/core/update.h"
 #include "tests/services/semantic_filter/scene.h"
@@ -109,6 +111,31 @@ TEST_F(Primed, IsNoHitConfirmsNothingAndMovesNothing) {
   confirmAndBury(all, frame);
   ASSERT_EQ(all.size(), 1U);
   EXPECT_FALSE(all[0].confirmed);
+}
+
+TEST_F(Primed, WhatIsExpectedIsFitToBeSentWhereverTheThingIs) {
+  constexpr double kWire =
+      1e6;  // pixels: farther sides are refused, and the whole message with them
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  FrameInput now;
+  now.view = frame.view;
+  now.model = model;
+  ComingFrame coming{frame.view, 0.1};
+  int sent = 0;
+  for (int i = 0; i < 5000; ++i) {
+    Object o = object(0.9);
+    o.hypotheses[0].x.head<3>() << 3.0 * u(random), 3.0 * u(random), 1.2 + u(random);
+    coming.view.T_WB.p.x() = u(random);
+    const auto prediction = predictionOf(o, now, coming);
+    if (!prediction) continue;
+    ++sent;
+    const Box& b = prediction->box;
+    for (const double side : {b.x1, b.y1, b.x2, b.y2}) ASSERT_LT(std::abs(side), kWire);
+    for (const double speed : prediction->velocity) ASSERT_LT(std::abs(speed), kWire);
+    for (const double sigma : prediction->side_sigma) ASSERT_TRUE(std::isfinite(sigma));
+  }
+  EXPECT_GT(sent, 500);
 }
 
 TEST_F(Primed, OfAClassThatTheModelDoesNotKnowSaysNothing) {
