@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/math/gaussian.h"
+#include "services/semantic_filter/core/tend.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -68,11 +69,6 @@ Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   h.C = (h.C - K * h.C.middleRows<3>(kSize)).eval();
   makeSymmetric(h.P);
   return h;
-}
-
-bool misshapen(const Hypothesis& h, const ClassPrior& prior, double gate) {
-  const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
-  return squaredMahalanobis(d, prior.log_size_covariance) >= gate * gate;
 }
 
 /// Frequencies of the classes that the object has.

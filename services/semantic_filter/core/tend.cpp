@@ -89,9 +89,7 @@ bool scaleIsOpen(const Object& object, const TendParameters& tend) {
 void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
-    const ClassPrior& prior = priors.of(h.class_name);
-    const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
-    if (deviation2<3>(d, prior.log_size_covariance) < size_gate * size_gate) return false;
+    if (!misshapen(h, priors.of(h.class_name), size_gate)) return false;
     lost += h.weight;
     return true;
   });
@@ -140,6 +138,11 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
 }
 
 }  // namespace
+
+bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate) {
+  const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
+  return !(deviation2<3>(d, prior.log_size_covariance) < size_gate * size_gate);
+}
 
 double distance2(const Hypothesis& a, const Hypothesis& b) {
   const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();

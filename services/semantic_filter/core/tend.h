@@ -18,6 +18,9 @@ void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters&
 /// velocity where a moves.
 double distance2(const Hypothesis& a, const Hypothesis& b);
 
+/// Whether its size is `size_gate` deviations of the class's from that of the class, or further.
+bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate);
+
 /// Standard deviation of the place relative to the body, metres: what the pose error does not
 /// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);

@@ -9,39 +9,16 @@
 #include <map>
 #include <set>
 
+#include "tests/services/inference/swap_messages.h"
+
 namespace perdure::inference {
 namespace {
 
 using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-constexpr InstanceId kOld = 1, kNew = 2;
 constexpr Duration kLease = milliseconds(100);
 constexpr auto kPeriod = milliseconds(33);
-
-ModelInfo modelOf(std::uint64_t hash, std::vector<std::string> classes) {
-  ModelInfo model;
-  model.hash = hash;
-  model.name = hash == kOld ? "old" : "new";
-  model.classes = std::move(classes);
-  return model;
-}
-
-Detection boxAt(double x, float nats) {
-  Detection d;
-  d.box = {x, 10, x + 40, 60};
-  d.activations = {0.0F, nats, -3.0F};
-  return d;
-}
-
-Detections listOf(InstanceId who, std::uint64_t frame, std::vector<Detection> boxes) {
-  Detections d;
-  d.instance = d.model_hash = who;
-  d.stamp.source = 7;
-  d.stamp.sequence = frame;
-  d.detections = std::move(boxes);
-  return d;
-}
 
 /// What a process answers to a frame; nothing: it is stopped, or dead.
 using Answer = std::function<std::optional<Result<Detections>>(std::uint64_t frame)>;
@@ -49,8 +26,6 @@ using Answer = std::function<std::optional<Result<Detections>>(std::uint64_t fra
 Answer sees(InstanceId who, std::vector<Detection> boxes) {
   return [=](std::uint64_t frame) { return listOf(who, frame, boxes); };
 }
-
-const std::vector<Detection> kStreet = {boxAt(20, 4), boxAt(200, 3), boxAt(300, -2)};
 
 /// The topic, with the ownership of DDS: the strongest that was heard within a lease.
 struct Bus {
@@ -373,48 +348,6 @@ TEST(Swap, ABlindOldOneIsNoMeasure) {
   bus.elder().answer = sees(kOld, {});
   bus.run(200);
   EXPECT_EQ(bus.owner(), kNew) << "boxes where the old one sees none are no flood";
-}
-
-TEST(Judge, AsksForNonsenseOnlyWhereThereIsEnoughToCompare) {
-  Judge judge;
-  judge.learn(modelOf(kOld, {"car", "person"}));
-  judge.learn(modelOf(kNew, {"car", "person"}));
-  for (std::size_t i = 0; i < Judge::kEnough; ++i) {
-    EXPECT_FALSE(judge.complaint()) << i;
-    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, {}));
-  }
-  ASSERT_TRUE(judge.complaint());
-  EXPECT_EQ(judge.complaint()->code, "empty");
-  judge.reset();
-  EXPECT_FALSE(judge.complaint());
-  for (std::size_t i = 0; i < 50; ++i) {  // half of what the old one sees is enough
-    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, {boxAt(21, 0.1F)}));
-    EXPECT_FALSE(judge.complaint());
-  }
-  EXPECT_EQ(judge.summary(), "50 frames; 50 % of 100 sure things found");
-}
-
-TEST(Judge, AnswersToPredictionsAreNoSight) {
-  Judge judge;
-  judge.learn(modelOf(kOld, {"car", "person"}));
-  judge.learn(modelOf(kNew, {"car", "person"}));
-  std::vector<Detection> answers = kStreet;
-  for (Detection& d : answers) d.primed = true;
-  for (std::size_t i = 0; i < Judge::kEnough; ++i) {
-    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, answers));
-  }
-  ASSERT_TRUE(judge.complaint());
-  EXPECT_EQ(judge.complaint()->code, "empty");
-}
-
-TEST(Judge, ComplainsOfDetectionsWhoseModelNobodyPublished) {
-  Judge judge;
-  judge.learn(modelOf(kOld, {"car", "person"}));
-  for (std::size_t i = 0; i < Judge::kEnough; ++i) {
-    judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, kStreet));
-  }
-  ASSERT_TRUE(judge.complaint());
-  EXPECT_EQ(judge.complaint()->code, "unknown_model");
 }
 
 }  // namespace
