@@ -122,6 +122,8 @@ void describeSmooth(SmoothParameters& p, Fields& fields) {
   fields.integer("smooth.keyframes", p.keyframes, between(0, 100),
                  {"looks that are remembered of an object; 0: nothing is estimated from them"});
   fields.integer("smooth.least", p.least, between(3, 100), {"fewer are not estimated from"});
+  fields.number("smooth.fresh", p.fresh, positive(),
+                {"share of the looks that is new when an object is smoothed again"});
   fields.integer(
       "smooth.per_frame", p.per_frame, between(1, 10000),
       {"objects that are smoothed in one frame at most, those in most need; the others wait"});

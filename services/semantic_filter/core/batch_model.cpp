@@ -158,14 +158,45 @@ Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw,
 
 double BatchModel::priorCost(const State& x) const {
   const Eigen::Vector3d d = prior_.log_size - x.segment<3>(kSize);
-  const double yaw = wrapAngle(yaw_ - x[kYaw]) / kYawSpread;
-  double cost = d.dot(size_information_ * d) + yaw * yaw;
+  double cost = d.dot(size_information_ * d) + yawPriorCost(x);
   if (moving()) cost += x.tail<3>().dot(speed_information_ * x.tail<3>());
   return cost;
 }
 
+double BatchModel::yawPriorCost(const State& x) const {
+  const double yaw = wrapAngle(yaw_ - x[kYaw]) / kYawSpread;
+  return yaw * yaw;
+}
+
+double BatchModel::logAzimuths(const State& x) const {
+  double sum = 0.0;
+  for (const auto& look : azimuths(x)) sum += std::log(look.likelihood);
+  return sum * azimuthWorth();
+}
+
+double BatchModel::logHead(const State& x) const {
+  double sum = 0.0;
+  for (const auto& look : azimuths(x)) sum += headOdds(look);
+  return sum * azimuthWorth();
+}
+
 double BatchModel::logSpeedPrior() const {
   return moving() ? std::log(speed_information_.determinant()) - 3.0 * std::log(2.0 * M_PI) : 0.0;
+}
+
+double BatchModel::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    const Keyframe& k = *looks_.keyframes()[i];
+    for (int a = 0; a < 4; ++a) {
+      const bool cut = !k.z.measured[a] || k.hidden[a];
+      if (!cut && s.counts[i][a]) continue;
+      const double own = k.z.variance[a] + k.z.lasting[a];
+      sum += std::log(s.counts[i][a] ? own : kNoInformation);
+      sum += cut ? std::log(doubts[static_cast<Eigen::Index>(i)]) : -std::log(own);
+    }
+  }
+  return sum;
 }
 
 Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
@@ -225,19 +256,36 @@ Eigen::Matrix4d BatchModel::ownShare(const Stack& s, std::size_t i, std::size_t 
   return block;
 }
 
-void BatchModel::addAzimuths(const State& x, Quadratic& q) const {
-  if (!prior_.has_yaw) return;
+std::vector<AzimuthLook> BatchModel::azimuths(const State& x) const {
+  std::vector<AzimuthLook> looks;
+  for (const auto& k : looks_.keyframes()) {
+    if (!prior_.has_yaw || !k->azimuth) continue;
+    const double sigma = azimuthSigma(*k);
+    looks.push_back(azimuthLook(*k->azimuth, x, k->from->view, sigma * sigma));
+  }
+  return looks;
+}
+
+double BatchModel::azimuthSigma(const Keyframe& k) const {
+  return std::max(k.azimuth_sigma, prior_.azimuth_sigma);
+}
+
+/// What each azimuth counts, since their errors are alike.
+double BatchModel::azimuthWorth() const {
   const auto looks =
       static_cast<double>(std::count_if(looks_.keyframes().begin(), looks_.keyframes().end(),
                                         [](const auto& k) { return k->azimuth.has_value(); }));
+  return 1.0 / (1.0 + std::max(looks - 1.0, 0.0) * kAzimuthCorrelation);
+}
+
+void BatchModel::addAzimuths(const State& x, Quadratic& q) const {
+  const double worth = azimuthWorth();
   for (const auto& k : looks_.keyframes()) {
-    if (!k->azimuth) continue;
-    const double sigma = std::max(k->azimuth_sigma, prior_.azimuth_sigma);
-    double residual = wrapAngle(yawFromAzimuth(*k->azimuth, x.head<3>(), k->from->view) - x[kYaw]);
-    if (std::abs(residual) > M_PI / 2) residual = wrapAngle(residual + M_PI);
-    const double nis = residual * residual / (sigma * sigma);
-    const double information = (kAzimuthTail + 1.0) / (kAzimuthTail + nis) /
-                               (sigma * sigma * (1.0 + (looks - 1.0) * kAzimuthCorrelation));
+    if (!prior_.has_yaw || !k->azimuth) continue;
+    const double variance = std::pow(azimuthSigma(*k), 2);
+    const double residual = azimuthLook(*k->azimuth, x, k->from->view, variance).residual;
+    const double nis = residual * residual / variance;
+    const double information = worth * (kAzimuthTail + 1.0) / (kAzimuthTail + nis) / variance;
     q.G(kYaw, kYaw) += information;
     q.g[kYaw] += information * residual;
   }

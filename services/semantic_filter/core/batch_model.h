@@ -2,11 +2,13 @@
 // full covariance, and the priors. What Smoothed maximises; see smoother.h for the model.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/math/gaussian.h"
+#include "services/semantic_filter/core/azimuth.h"
 #include "services/semantic_filter/core/keyframe.h"
 
 namespace perdure::semantic_filter {
@@ -82,8 +84,17 @@ class BatchModel {
   Quadratic quadratic(const State& x, const Eigen::MatrixXd& Jw, const Eigen::VectorXd& rw) const;
   /// Twice the negative logarithm of the priors, but for a constant and the azimuths.
   double priorCost(const State& x) const;
+  /// The part of it that holds yaw to where it started.
+  double yawPriorCost(const State& x) const;
+  /// log p(azimuths | yaw modulo 180°), up to a constant.
+  double logAzimuths(const State& x) const;
+  /// Log-odds that the azimuths mean the yaw of x and not the one turned by 180°.
+  double logHead(const State& x) const;
   /// log |Λ / 2π| of the velocity's prior, which only what moves has.
   double logSpeedPrior() const;
+  /// The part of log |R| that is of no density: a side that is cut has a probability (of lying
+  /// beyond the cut), and whether it counts depends on the state.
+  double logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts) const;
   /// Covariance of the present b, in units of a box whose b has deviations `sigma`, with all rows.
   Eigen::MatrixXd biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
                           const Eigen::VectorXd& doubts) const;
@@ -93,6 +104,9 @@ class BatchModel {
  private:
   double age(std::size_t look) const;
   Eigen::Matrix4d ownShare(const Stack& s, std::size_t i, std::size_t j, double alike) const;
+  std::vector<AzimuthLook> azimuths(const State& x) const;
+  double azimuthSigma(const Keyframe& k) const;
+  double azimuthWorth() const;
   void addAzimuths(const State& x, Quadratic& q) const;
 
   const Looks& looks_;

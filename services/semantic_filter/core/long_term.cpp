@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "services/semantic_filter/core/predict.h"
+
 namespace perdure::semantic_filter {
 namespace {
 

@@ -24,18 +24,28 @@ State nearestTurn(const State& x, const State& reference) {
   return y;
 }
 
+/// The Gaussian of the heaviest hypothesis, its covariance widened to what the others of the class
+/// say: second moments about its mean.
 ClassBelief classBelief(const Object& object, const std::string& name) {
   ClassBelief belief;
   belief.name = name;
-  Hypothesis merged;
-  for (const auto& h : object.hypotheses) {  // heaviest first: its mode is the reference
+  const Hypothesis* heaviest = nullptr;
+  Matrix7d moments = Matrix7d::Zero();
+  Eigen::Matrix<double, 7, 6> cross = Eigen::Matrix<double, 7, 6>::Zero();
+  double weight = 0.0;
+  for (const auto& h : object.hypotheses) {
     if (h.class_name != name) continue;
     belief.probability += h.weight;
-    if (merged.class_name.empty()) merged = h;
+    if (!heaviest) heaviest = &h;
+    if (h.moving != heaviest->moving) continue;
+    const Vector7d d = geometryDifference(h, *heaviest);
+    moments += h.weight * (h.P.topLeftCorner<7, 7>() + d * d.transpose());
+    cross += h.weight * h.C.topRows<7>();
+    weight += h.weight;
   }
-  belief.mean = merged.x.head<7>();
-  belief.covariance = merged.P.topLeftCorner<7, 7>();
-  belief.cross_pose = merged.C.topRows<7>();
+  belief.mean = heaviest->x.head<7>();
+  belief.covariance = moments / weight;
+  belief.cross_pose = cross / weight;
   return belief;
 }
 

@@ -7,7 +7,7 @@
 #include "services/semantic_filter/core/context.h"
 #include "services/semantic_filter/core/new_classes.h"
 #include "services/semantic_filter/core/primed.h"
-#include "services/semantic_filter/core/smoother.h"
+#include "services/semantic_filter/core/smooth.h"
 #include "services/semantic_filter/core/update.h"
 
 namespace perdure::semantic_filter {
@@ -177,8 +177,9 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
 
 /// As many as a frame has time for; the others wait.
 void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame) {
-  std::stable_sort(objects.begin(), objects.end(), [](const Object* a, const Object* b) {
-    return smoothingNeed(*a) > smoothingNeed(*b);
+  const double fresh = frame.parameters->smooth.fresh;
+  std::stable_sort(objects.begin(), objects.end(), [fresh](const Object* a, const Object* b) {
+    return smoothingNeed(*a, fresh) > smoothingNeed(*b, fresh);
   });
   const auto most = static_cast<std::size_t>(frame.parameters->smooth.per_frame);
   if (objects.size() > most) objects.resize(most);

@@ -13,8 +13,11 @@ namespace {
 
 constexpr int kRounds = 12;
 constexpr double kContradicted = 25.0;  // of about four degrees of freedom
+constexpr double kEnough = 0.02;        // squared deviations that a further step is worth
 
-struct Fit {
+}  // namespace
+
+struct Smoothed::Fit {
   State x;
   Stack stack;
   SideCovariance covariance;
@@ -24,10 +27,14 @@ struct Fit {
   Cholesky R;
 };
 
+namespace {
+
+using Fit = Smoothed::Fit;
+
 /// Weights of a t distribution for whole looks, and which of them contradict x. Whether the weights
 /// changed enough to matter.
 bool doubtLooks(Fit& fit, double tail) {
-  constexpr double kMatters = 0.05;
+  constexpr double kMatters = 0.1;
   const Eigen::VectorXd residual = fit.covariance.withoutPose(fit.stack.residual, fit.R);
   fit.contradicted.resize(fit.doubts.size());
   bool matters = false;
@@ -45,11 +52,9 @@ bool doubtLooks(Fit& fit, double tail) {
 
 /// The covariance changes little with x: it is taken anew where the thing has moved in the view.
 bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
-  constexpr double kLittle = 0.02, kLittleTurn = 0.05;  // of the distance; rad
+  constexpr double kLittle = 0.02;  // of the distance
   const double distance = (fit.x.head<3>() - from).norm();
-  return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance ||
-         std::abs(wrapAngle(fit.x[kYaw] - fit.covariance_at[kYaw])) > kLittleTurn ||
-         (fit.x - fit.covariance_at).segment<3>(kSize).cwiseAbs().maxCoeff() > kLittleTurn;
+  return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance;
 }
 
 bool factorise(const BatchModel& model, Fit& fit, bool anew) {
@@ -61,8 +66,9 @@ bool factorise(const BatchModel& model, Fit& fit, bool anew) {
   return fit.R.positive();
 }
 
-/// One step of Levenberg and Marquardt's. False where none lowers the cost.
-bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) {
+/// One step of Levenberg and Marquardt's, and what it was to gain (squared deviations). False where
+/// none lowers the cost.
+bool descend(const BatchModel& model, Fit& fit, double& damping, double& gained) {
   const Eigen::MatrixXd Jw = fit.R.whiten(fit.stack.J);
   const Eigen::VectorXd rw = fit.R.whiten(fit.stack.residual);
   const Quadratic q = model.quadratic(fit.x, Jw, rw);
@@ -76,7 +82,7 @@ bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) 
     if (stack) {
       const Eigen::VectorXd w = fit.R.whiten(stack->residual);
       if (w.squaredNorm() + model.priorCost(next) <= cost * (1.0 + 1e-3) + 1e-6) {
-        moved = step.head<3>().norm();
+        gained = q.g.dot(step);
         fit.x = next;
         fit.stack = std::move(*stack);
         damping = std::max(0.1 * damping, 1e-6);
@@ -88,24 +94,32 @@ bool descend(const BatchModel& model, Fit& fit, double& damping, double& moved) 
   return false;
 }
 
+/// `like` has the covariance and the doubts to begin with: those of another mode of the same looks.
 std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const Looks& looks,
-                            double tail) {
+                            double tail, const Fit* like) {
   Fit fit;
   fit.x = start;
   fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
   auto stack = model.linearise(fit.x);
   if (!stack) return std::nullopt;
   fit.stack = std::move(*stack);
-  if (!factorise(model, fit, true)) return std::nullopt;
+  if (like && like->stack.counts == fit.stack.counts) {
+    fit.covariance = like->covariance;
+    fit.covariance_at = like->covariance_at;
+    fit.doubts = like->doubts;
+    fit.R = like->R;
+  } else if (!factorise(model, fit, true)) {
+    return std::nullopt;
+  }
   const Eigen::Vector3d from = looks.keyframes().back()->from->T_WC.p;
   double damping = 1e-4;
   for (int round = 0; round < kRounds; ++round) {
-    double moved = 0.0;
-    const bool better = descend(model, fit, damping, moved);
+    double gained = 0.0;
+    const bool better = descend(model, fit, damping, gained);
     const bool doubted = doubtLooks(fit, tail);
     const bool elsewhere = movedInView(fit, from);
     if ((doubted || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
-    if (round > 0 && (!better || moved < 0.005)) break;
+    if (round > 0 && (!better || gained < kEnough)) break;
   }
   return fit;
 }
@@ -168,166 +182,49 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
 }  // namespace
 
 std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& looks,
-                                       const FrameContext& frame) {
+                                       const FrameContext& frame, const Smoothed* like) {
   const BatchModel model(looks, start.moving, start.class_name, start.x[kYaw], frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
-  const auto fit = fitLooks(model, x, looks, frame.parameters->box.tail);
+  auto fit =
+      fitLooks(model, x, looks, frame.parameters->box.tail, like ? like->fit_.get() : nullptr);
   if (!fit) return std::nullopt;
   const auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
   Smoothed result(looks, frame);
   result.hypothesis_ = *h;
-  result.doubts_ = fit->doubts;
-  result.contradicted_ = fit->contradicted;
   result.start_yaw_ = start.x[kYaw];
+  result.fit_ = std::make_shared<const Fit>(std::move(*fit));
   return result;
 }
 
-double Smoothed::logEvidence(const Eigen::VectorXd& doubts) const {
+BatchModel Smoothed::modelOf() const {
+  return {*looks_, hypothesis_.moving, hypothesis_.class_name, start_yaw_, *frame_};
+}
+
+const Eigen::VectorXd& Smoothed::doubts() const { return fit_->doubts; }
+
+const Eigen::ArrayXi& Smoothed::contradictions() const { return fit_->contradicted; }
+
+double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }
+
+double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
   constexpr double kImpossible = -1e6;
-  const BatchModel model(*looks_, hypothesis_.moving, hypothesis_.class_name, start_yaw_, *frame_);
-  State x = hypothesis_.x;
-  x.segment<4>(kBias).setZero();
-  const auto s = model.linearise(x);
-  if (!s) return kImpossible;
-  const Cholesky R(model.covariance(x, *s).with(doubts));
+  const BatchModel model = modelOf();
+  const Stack& stack = fit_->stack;
+  // At this very state: a determinant of a hundred dimensions forgives no other.
+  const Cholesky R(model.covariance(fit_->x, stack).with(doubts));
   if (!R.positive()) return kImpossible;
-  const Eigen::MatrixXd Jw = R.whiten(s->J);
-  const Eigen::VectorXd rw = R.whiten(s->residual);
-  const Quadratic q = model.quadratic(x, Jw, rw);
+  const Eigen::MatrixXd Jw = R.whiten(stack.J);
+  const Eigen::VectorXd rw = R.whiten(stack.residual);
+  const Quadratic q = model.quadratic(fit_->x, Jw, rw);
   const Cholesky G(q.G);
   if (!G.positive()) return kImpossible;
-  const double cost = rw.squaredNorm() + model.priorCost(x) - G.whiten(q.g).squaredNorm();
+  const double cost = rw.squaredNorm() + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
-  return 0.5 * (free + model.logSpeedPrior() - cost - R.logDeterminant() - G.logDeterminant());
-}
-
-namespace {
-
-/// The thing at rest where the looks say, when the filter has come to believe that it moves.
-Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
-  Hypothesis h = moving;
-  const double age =
-      toSeconds(keyframes.back()->from->time - keyframes[keyframes.size() / 2]->from->time);
-  h.x.head<3>() -= age * h.x.tail<3>();
-  h.x.tail<3>().setZero();
-  h.moving = false;
-  h.head = moving.head;
-  h.weight = 0.0;
-  return h;
-}
-
-/// Of one class: whether it moves, by what all looks say.
-void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smoothed& still,
-                 const Smoothed& moving, const FrameContext& frame) {
-  constexpr double kSurest = 15.0;  // nats
-  const ClassPrior& prior = frame.priors->of(name);
-  const auto& motion = frame.parameters->motion;
-  const Eigen::VectorXd doubts = still.doubts().cwiseMin(moving.doubts());
-  const double pace =
-      motion.creeping + (1.0 - motion.creeping) *
-                            fasterThan(moving.hypothesis(), motion.slow_share * prior.speed_sigma);
-  const double log_odds = std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) +
-                                         std::log((1.0 - prior.moving) / prior.moving / pace),
-                                     -kSurest, kSurest);
-  const double rests = 1.0 / (1.0 + std::exp(-log_odds));
-  double weight[2] = {0.0, 0.0};
-  for (const auto& h : hs) {
-    if (h.class_name == name) weight[h.moving] += h.weight;
-  }
-  const double all = weight[0] + weight[1];
-  for (auto& h : hs) {
-    if (h.class_name != name || weight[h.moving] <= 0.0) continue;
-    h.weight *= all * (h.moving ? 1.0 - rests : rests) / weight[h.moving];
-    if (h.moving) h.pace = pace;
-  }
-}
-
-/// What the fits that were taken say of each look.
-struct Verdicts {
-  int fits = 0;
-  Eigen::ArrayXi against;
-  void add(const Eigen::ArrayXi& contradictions) {
-    against = fits++ == 0 ? contradictions : Eigen::ArrayXi(against + contradictions);
-  }
-};
-
-/// A look that contradicts every fit showed something else.
-void forgetContradicted(Object& object, const Verdicts& verdicts, std::size_t least) {
-  if (verdicts.fits == 0) return;
-  std::vector<std::shared_ptr<const Keyframe>> kept;
-  for (std::size_t i = 0; i < object.keyframes.size(); ++i) {
-    if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) {
-      kept.push_back(object.keyframes[i]);
-    }
-  }
-  if (kept.size() >= least) object.keyframes = std::move(kept);
-}
-
-void smoothClass(Object& object, const std::string& name, const Looks& looks,
-                 const FrameContext& frame, Verdicts& verdicts) {
-  const auto& p = frame.parameters->smooth;
-  std::optional<Smoothed> best[2];  // at rest, moving
-  double weight[2] = {0.0, 0.0};
-  for (auto& h : object.hypotheses) {
-    if (h.class_name != name || h.weight < p.least_weight) continue;
-    auto smoothed = Smoothed::make(h, looks, frame);
-    if (!smoothed || smoothed->contradicted() > p.contradicted) continue;
-    const double old = h.weight;
-    h = smoothed->hypothesis();
-    verdicts.add(smoothed->contradictions());
-    if (old > weight[h.moving]) weight[h.moving] = old, best[h.moving] = std::move(smoothed);
-  }
-  if (!best[1]) return;
-  if (!best[0]) {
-    auto smoothed = Smoothed::make(atRest(best[1]->hypothesis(), object.keyframes), looks, frame);
-    if (!smoothed || smoothed->contradicted() > p.contradicted) return;
-    object.hypotheses.push_back(smoothed->hypothesis());
-    object.hypotheses.back().weight = 1e-3 * weight[1];
-    best[0] = std::move(smoothed);
-  }
-  weighMotion(object.hypotheses, name, *best[0], *best[1], frame);
-}
-
-}  // namespace
-
-bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
-                  const FrameContext& frame) {
-  const auto& p = *frame.parameters;
-  if (p.smooth.keyframes == 0 || !frame.key_view || !object.remembers_all) return false;
-  const ViewScales scales{p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle};
-  Keyframe keyframe{frame.key_view, box.z, hidden, box.azimuth, box.azimuth_sigma};
-  if (!remember(object, std::move(keyframe), scales, p.smooth)) return false;
-  if (object.keyframes.size() < static_cast<std::size_t>(p.smooth.least)) return false;
-  ++object.fresh_keyframes;
-  return smoothingNeed(object) >= 1.0;
-}
-
-double smoothingNeed(const Object& object) {
-  // One look more among many changes little: an eighth of them is waited for, and more where the
-  // last fits had little to mend.
-  return 8.0 * object.fresh_keyframes /
-         (static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
-}
-
-void smooth(Object& object, const FrameContext& frame) {
-  const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smooth.patience);
-  constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
-  const auto& p = *frame.parameters;
-  object.fresh_keyframes = 0;
-  const Hypothesis before = object.best();
-  const Looks looks(object.keyframes);
-  std::set<std::string> names;
-  for (const auto& h : object.hypotheses) names.insert(h.class_name);
-  Verdicts verdicts;
-  for (const auto& name : names) smoothClass(object, name, looks, frame, verdicts);
-  forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
-  normalise(object, ClassEvidence::kMotion);
-  const bool same =
-      before.class_name == object.best().class_name && before.moving == object.best().moving;
-  const bool settled = same && distance2(before, object.best()) < kLittle;
-  object.smoothing_patience = settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
+  const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
+  const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);
+  return yaw + 0.5 * (free + model.logSpeedPrior() - cost - volume - G.logDeterminant());
 }
 
 }  // namespace perdure::semantic_filter

@@ -8,6 +8,7 @@
 // that the covariance of the sides of all looks is one full matrix.
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "services/semantic_filter/core/batch_model.h"
@@ -17,39 +18,37 @@ namespace perdure::semantic_filter {
 /// A hypothesis as the looks have it. The looks and the frame outlive it.
 class Smoothed {
  public:
-  /// Nothing where the looks do not see `start`, or do not fix its place.
+  struct Fit;
+
+  /// Nothing where the looks do not see `start`, or do not fix its place. `like`: another mode of
+  /// the same looks, at rest or moving as `start`, to begin with what it found of the boxes'
+  /// errors.
   static std::optional<Smoothed> make(const Hypothesis& start, const Looks& looks,
-                                      const FrameContext& frame);
+                                      const FrameContext& frame, const Smoothed* like = nullptr);
 
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// By how much each look's noise is widened (t distribution), >= 1.
-  const Eigen::VectorXd& doubts() const { return doubts_; }
+  const Eigen::VectorXd& doubts() const;
   /// Share of the looks that contradict it.
-  double contradicted() const { return contradicted_.cast<double>().mean(); }
+  double contradicted() const { return contradictions().cast<double>().mean(); }
   /// 1 for each look that does.
-  const Eigen::ArrayXi& contradictions() const { return contradicted_; }
+  const Eigen::ArrayXi& contradictions() const;
   /// log p(looks | this class, and that it moves or not), by Laplace's method. To compare two, both
-  /// are asked with the same doubts.
-  double logEvidence(const Eigen::VectorXd& doubts) const;
+  /// are asked with the same doubts. `of_yaw`: to compare modes of yaw, with what azimuths say and
+  /// without the prior around the start.
+  double logEvidence(const Eigen::VectorXd& doubts, bool of_yaw = false) const;
+  /// Log-odds that the azimuths mean its yaw and not the one turned by 180°.
+  double logHead() const;
 
  private:
   Smoothed(const Looks& looks, const FrameContext& frame) : looks_(&looks), frame_(&frame) {}
+  BatchModel modelOf() const;
 
   Hypothesis hypothesis_;
-  Eigen::VectorXd doubts_;
-  Eigen::ArrayXi contradicted_;
+  std::shared_ptr<const Fit> fit_;
   const Looks* looks_;
   const FrameContext* frame_;
   double start_yaw_ = 0.0;
 };
-
-/// Remembers this box of the object's where it shows something new. Whether the object is then to
-/// be smoothed.
-bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
-                  const FrameContext& frame);
-/// How much there is to gain: 1 and more is worth it.
-double smoothingNeed(const Object& object);
-/// Smooths the object's hypotheses and weighs within each class whether it moves.
-void smooth(Object& object, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

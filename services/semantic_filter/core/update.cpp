@@ -7,14 +7,13 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/azimuth.h"
 
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kNegligible = 0.01;     // share of a box in an update
-constexpr double kAzimuthOutlier = 0.2;  // share of azimuths that say nothing
-constexpr double kAzimuthFlip = 0.1;     // share of azimuths that are turned by 180°
-constexpr double kMaxHead = 6.0;         // nats
+constexpr double kNegligible = 0.01;  // share of a box in an update
+constexpr double kMaxHead = 6.0;      // nats
 
 using SideRows = Eigen::Matrix<double, 4, kVelocity>;  // no side depends on the velocity
 using Gains = Eigen::Matrix<double, kStateDim, 4>;
@@ -318,22 +317,12 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
 
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame) {
-  const double measured = yawFromAzimuth(azimuth, h.x.head<3>(), frame.view);
-  const double full = wrapAngle(measured - h.x[kYaw]);
-  const bool same_head = std::abs(full) <= M_PI / 2;
-  const double residual = same_head ? full : wrapAngle(full + M_PI);
-  const double variance = sigma * sigma + h.P(kYaw, kYaw);
-  const double density =
-      std::exp(-0.5 * residual * residual / variance) / std::sqrt(2.0 * M_PI * variance);
-  const double uniform = 1.0 / M_PI;
-  const double likelihood = (1.0 - kAzimuthOutlier) * density + kAzimuthOutlier * uniform;
-  const double inlier = (1.0 - kAzimuthOutlier) * density / likelihood;
-  const double head = std::log((1.0 - kAzimuthFlip) / kAzimuthFlip) * weight * inlier;
-  h.head = std::clamp(h.head + (same_head ? head : -head), -kMaxHead, kMaxHead);
-  const double R = sigma * sigma / std::max(weight * inlier, 1e-9);
+  const AzimuthLook look = azimuthLook(azimuth, h.x, frame.view, sigma * sigma + h.P(kYaw, kYaw));
+  h.head = std::clamp(h.head + weight * headOdds(look), -kMaxHead, kMaxHead);
+  const double R = sigma * sigma / std::max(weight * look.inlier, 1e-9);
   const double S = h.P(kYaw, kYaw) + R;
   const State K = h.P.col(kYaw) / S;
-  h.x += K * residual;
+  h.x += K * look.residual;
   h.P = (h.P - S * K * K.transpose()).eval();
   h.C = (h.C - K * h.C.row(kYaw)).eval();
   if (h.head < 0.0) {
@@ -342,7 +331,7 @@ double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double wei
   }
   h.x[kYaw] = wrapAngle(h.x[kYaw]);
   makeSymmetric(h.P);
-  return likelihood;
+  return look.likelihood;
 }
 
 std::optional<std::size_t> update(Object& object, const ObjectLook& look,

@@ -83,7 +83,7 @@ TEST(Node, PublishesOneMessageForEachFrameInOrder) {
 
 TEST(Node, MapsAStreetOfParkedCars) {
   Harness h;
-  drive(h, 0, 30);
+  drive(h, 0, 36);
   for (const auto& truth : kStreet) {
     const ObjectBelief* o = nearest(h.objects.back(), truth.x);
     ASSERT_TRUE(o) << "no object near x = " << truth.x[0];

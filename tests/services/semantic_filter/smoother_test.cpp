@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/smooth.h"
 #include "services/semantic_filter/core/tend.h"
 #include "tests/services/semantic_filter/scene.h"
 
@@ -184,6 +186,69 @@ TEST(Smoother, TakesNoPlaceThatTheLooksDoNotFix) {
   const FrameContext frame = scene.frame();
   const Looks looks(scene.keyframes());
   EXPECT_FALSE(Smoothed::make(scene.start(false), looks, frame));
+}
+
+/// One that took the wrong one of the starts of yaw, for which the boxes speak less.
+Object turnedBy(double angle, const Passing& scene) {
+  Hypothesis h = scene.start(false);
+  h.x[kYaw] = wrapAngle(h.x[kYaw] + angle);
+  Object object;
+  object.hypotheses = {h};
+  object.keyframes = scene.keyframes();
+  object.remembered = static_cast<std::uint32_t>(object.keyframes.size());
+  return object;
+}
+
+TEST(Smooth, SeeksTheYawThatTheFilterGaveUp) {
+  int found = 0;
+  constexpr int kRuns = 20;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    const Passing scene(seed);
+    Object object = turnedBy(M_PI / 2, scene);
+    smooth(object, scene.frame());
+    const double error = std::remainder(object.best().x[kYaw] - scene.truth()[kYaw], M_PI);
+    found += std::abs(error) < 0.2 ? 1 : 0;
+    // It is not sought again before as many looks have come.
+    EXPECT_EQ(object.seek_modes_at, 2 * scene.keyframes().size());
+  }
+  EXPECT_GE(found, 17) << "of " << kRuns;
+}
+
+TEST(Smooth, ModesThatTheLooksDoNotTellApartAreKeptAndPublishedAsOneWideGaussian) {
+  const Passing scene(4);
+  Object object = turnedBy(0.0, scene);
+  Hypothesis turned = object.hypotheses.front();
+  object.hypotheses.front().weight = 0.6;
+  turned.weight = 0.4;
+  turned.x[kYaw] += 1.0;
+  turned.P(kYaw, kYaw) = object.hypotheses.front().P(kYaw, kYaw) = 0.01;
+  object.hypotheses.push_back(turned);
+  const ObjectBelief belief = toBelief(object, 0.7);
+  EXPECT_NEAR(belief.best().mean[3], object.best().x[kYaw], 1e-12);
+  EXPECT_NEAR(belief.best().covariance(3, 3), 0.01 + 0.4 * 1.0, 1e-9);
+}
+
+TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
+  Passing scene(6);
+  const FrameContext frame = scene.frame();
+  const auto volume = [&](double cut_at) {
+    Keyframe cut = *scene.keyframes()[9];
+    const auto box = projectCuboid(scene.truth(), cut.from->view);
+    cut.z.measured[2] = false;
+    cut.z.sides[2] = box->sides[2] + cut_at;
+    Keyframes keyframes = scene.keyframes();
+    keyframes[9] = std::make_shared<const Keyframe>(cut);
+    const Looks looks(keyframes);
+    const BatchModel model(looks, false, "car", scene.truth()[kYaw], frame);
+    const auto stack = model.linearise(scene.truth());
+    const Eigen::VectorXd doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
+    const Cholesky R(model.covariance(scene.truth(), *stack).with(doubts));
+    EXPECT_EQ(stack->counts[9][2], cut_at > 0.0);
+    return std::pair(R.logDeterminant(), model.logVolumeOfCuts(*stack, doubts));
+  };
+  const auto beyond = volume(-1.0), inside = volume(1.0);
+  EXPECT_GT(std::abs(beyond.first - inside.first), 10.0);
+  EXPECT_NEAR(beyond.first - beyond.second, inside.first - inside.second, 1.0);
 }
 
 TEST(Insets, MoveTheBoxInwardsAndAreAMeanForWhatTheyDoNotName) {

@@ -1,0 +1,227 @@
+#include "services/semantic_filter/core/smooth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/smoother.h"
+#include "services/semantic_filter/core/tend.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+/// The thing at rest where the looks say, when the filter has come to believe that it moves.
+Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
+  Hypothesis h = moving;
+  const double age =
+      toSeconds(keyframes.back()->from->time - keyframes[keyframes.size() / 2]->from->time);
+  h.x.head<3>() -= age * h.x.tail<3>();
+  h.x.tail<3>().setZero();
+  h.moving = false;
+  h.head = moving.head;
+  h.weight = 0.0;
+  return h;
+}
+
+/// Of one class: whether it moves, by what all looks say.
+void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smoothed& still,
+                 const Smoothed& moving, const FrameContext& frame) {
+  constexpr double kSurest = 15.0;  // nats
+  const ClassPrior& prior = frame.priors->of(name);
+  const auto& motion = frame.parameters->motion;
+  const Eigen::VectorXd doubts = still.doubts().cwiseMin(moving.doubts());
+  const double pace =
+      motion.creeping + (1.0 - motion.creeping) *
+                            fasterThan(moving.hypothesis(), motion.slow_share * prior.speed_sigma);
+  const double log_odds = std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) +
+                                         std::log((1.0 - prior.moving) / prior.moving / pace),
+                                     -kSurest, kSurest);
+  const double rests = 1.0 / (1.0 + std::exp(-log_odds));
+  double weight[2] = {0.0, 0.0};
+  for (const auto& h : hs) {
+    if (h.class_name == name) weight[h.moving] += h.weight;
+  }
+  const double all = weight[0] + weight[1];
+  for (auto& h : hs) {
+    if (h.class_name != name || weight[h.moving] <= 0.0) continue;
+    h.weight *= all * (h.moving ? 1.0 - rests : rests) / weight[h.moving];
+    if (h.moving) h.pace = pace;
+  }
+}
+
+/// Fits of an object's hypotheses of one class, at rest or moving, by their index.
+struct Fitted {
+  std::size_t index;
+  Smoothed smoothed;
+};
+using Fits = std::vector<Fitted>;
+
+bool oneMode(const Hypothesis& a, const Hypothesis& b) {
+  constexpr double kTwins = 1.0;  // squared deviations
+  return std::min(distance2(a, b), distance2(b, a)) < kTwins;
+}
+
+/// What all looks say of each mode. One that was reached twice counts once; those that say less
+/// than `least` of the best go.
+void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
+  if (fits.size() < 2) return;
+  Eigen::VectorXd doubts = fits.front().smoothed.doubts();
+  for (const auto& f : fits) doubts = doubts.cwiseMin(f.smoothed.doubts());
+  constexpr double kNone = -1e9;
+  std::vector<double> evidence;
+  double most = kNone, all = 0.0, sum = 0.0;
+  for (auto f = fits.begin(); f != fits.end(); ++f) {
+    all += hs[f->index].weight;
+    const bool twin = std::any_of(
+        fits.begin(), f, [&](const Fitted& g) { return oneMode(hs[g.index], hs[f->index]); });
+    evidence.push_back(twin ? kNone : f->smoothed.logEvidence(doubts, true));
+    most = std::max(most, evidence.back());
+  }
+  for (auto& e : evidence) {
+    e = std::exp(e - most);
+    if (e < least) e = 0.0;
+    sum += e;
+  }
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    hs[fits[i].index].weight = all * evidence[i] / sum;
+  }
+}
+
+/// The fit whose hypothesis weighs most.
+std::optional<Smoothed> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits) {
+  const auto best = std::max_element(fits.begin(), fits.end(), [&](const auto& a, const auto& b) {
+    return hs[a.index].weight < hs[b.index].weight;
+  });
+  return best == fits.end() ? std::nullopt : std::optional(std::move(best->smoothed));
+}
+
+/// A thing at rest as none of its hypotheses may have it: turned, and of usual size.
+std::vector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
+  std::vector<Hypothesis> starts;
+  if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
+  for (int k = 1; k < 4; ++k) {
+    starts.push_back(best);
+    Hypothesis& h = starts.back();
+    h.x[kYaw] = wrapAngle(h.x[kYaw] + k * M_PI / 4);
+    h.x.segment<3>(kSize) = prior.log_size;
+    h.weight = 0.0;
+  }
+  return starts;
+}
+
+/// What the fits that were taken say of each look.
+struct Verdicts {
+  int fits = 0;
+  Eigen::ArrayXi against;
+  void add(const Eigen::ArrayXi& contradictions) {
+    against = fits++ == 0 ? contradictions : Eigen::ArrayXi(against + contradictions);
+  }
+};
+
+/// A look that contradicts every fit showed something else.
+void forgetContradicted(Object& object, const Verdicts& verdicts, std::size_t least) {
+  if (verdicts.fits == 0) return;
+  std::vector<std::shared_ptr<const Keyframe>> kept;
+  for (std::size_t i = 0; i < object.keyframes.size(); ++i) {
+    if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) {
+      kept.push_back(object.keyframes[i]);
+    }
+  }
+  if (kept.size() >= least) object.keyframes = std::move(kept);
+}
+
+/// Nothing where too many looks contradict.
+std::optional<Smoothed> fit(const Hypothesis& start, const Looks& looks, const FrameContext& frame,
+                            const Smoothed* like = nullptr) {
+  auto smoothed = Smoothed::make(start, looks, frame, like);
+  const bool taken = smoothed && smoothed->contradicted() <= frame.parameters->smooth.contradicted;
+  return taken ? std::move(smoothed) : std::nullopt;
+}
+
+void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fits& fits) {
+  const Hypothesis best = object.hypotheses[fits.front().index];
+  for (const auto& start : otherStarts(best, frame.priors->of(best.class_name))) {
+    auto smoothed = fit(start, looks, frame, &fits.front().smoothed);
+    if (!smoothed) continue;
+    Hypothesis h = smoothed->hypothesis();
+    h.head = smoothed->logHead();
+    if (h.head < 0.0) h.head = -h.head, h.x[kYaw] = wrapAngle(h.x[kYaw] + M_PI);
+    object.hypotheses.push_back(h);
+    fits.push_back({object.hypotheses.size() - 1, std::move(*smoothed)});
+  }
+}
+
+void smoothClass(Object& object, const std::string& name, const Looks& looks,
+                 const FrameContext& frame, bool seek, Verdicts& verdicts) {
+  const auto& p = frame.parameters->smooth;
+  Fits still, moving;
+  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
+    auto& h = object.hypotheses[i];
+    if (h.class_name != name || h.weight < p.least_weight) continue;
+    auto smoothed = fit(h, looks, frame);
+    if (!smoothed) continue;
+    h = smoothed->hypothesis();
+    verdicts.add(smoothed->contradictions());
+    (h.moving ? moving : still).push_back({i, std::move(*smoothed)});
+  }
+  if (seek && !still.empty() && name == object.best().class_name) {
+    seekModes(object, looks, frame, still);
+  }
+  weighModes(object.hypotheses, still, p.least_weight);
+  weighModes(object.hypotheses, moving, p.least_weight);
+  auto at_rest = heaviest(object.hypotheses, std::move(still));
+  const auto driving = heaviest(object.hypotheses, std::move(moving));
+  if (!driving) return;
+  if (!at_rest) {
+    at_rest = fit(atRest(driving->hypothesis(), object.keyframes), looks, frame);
+    if (!at_rest) return;
+    object.hypotheses.push_back(at_rest->hypothesis());
+    object.hypotheses.back().weight = 1e-3 * driving->hypothesis().weight;
+  }
+  weighMotion(object.hypotheses, name, *at_rest, *driving, frame);
+}
+
+}  // namespace
+
+bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
+                  const FrameContext& frame) {
+  const auto& p = *frame.parameters;
+  if (p.smooth.keyframes == 0 || !frame.key_view || !object.remembers_all) return false;
+  const ViewScales scales{p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle};
+  Keyframe keyframe{frame.key_view, box.z, hidden, box.azimuth, box.azimuth_sigma};
+  if (!remember(object, std::move(keyframe), scales, p.smooth)) return false;
+  if (object.keyframes.size() < static_cast<std::size_t>(p.smooth.least)) return false;
+  ++object.fresh_keyframes;
+  ++object.remembered;
+  return smoothingNeed(object, p.smooth.fresh) >= 1.0;
+}
+
+double smoothingNeed(const Object& object, double share) {
+  return object.fresh_keyframes /
+         (share * static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
+}
+
+void smooth(Object& object, const FrameContext& frame) {
+  const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smooth.patience);
+  constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
+  const auto& p = *frame.parameters;
+  object.fresh_keyframes = 0;
+  const Hypothesis before = object.best();
+  const Looks looks(object.keyframes);
+  std::set<std::string> names;
+  for (const auto& h : object.hypotheses) names.insert(h.class_name);
+  const bool seek = object.remembered >= object.seek_modes_at;
+  if (seek) object.seek_modes_at = 2 * object.remembered;
+  Verdicts verdicts;
+  for (const auto& name : names) smoothClass(object, name, looks, frame, seek, verdicts);
+  std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight <= 0.0; });
+  forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
+  normalise(object, ClassEvidence::kMotion);
+  const bool same =
+      before.class_name == object.best().class_name && before.moving == object.best().moving;
+  const bool settled = same && distance2(before, object.best()) < kLittle;
+  object.smoothing_patience = settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
+}
+
+}  // namespace perdure::semantic_filter

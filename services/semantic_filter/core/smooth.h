@@ -1,0 +1,20 @@
+// The verb "smooth": an object's hypotheses again from all its remembered looks; which mode of yaw
+// it is, and whether it moves.
+#pragma once
+
+#include "services/semantic_filter/core/evidence.h"
+#include "services/semantic_filter/core/keyframe.h"
+
+namespace perdure::semantic_filter {
+
+/// Remembers this box of the object's where it shows something new. Whether the object is then to
+/// be smoothed.
+bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
+                  const FrameContext& frame);
+/// How much there is to gain, where `fresh` is the share of new looks that is waited for: 1 and
+/// more is worth it.
+double smoothingNeed(const Object& object, double fresh);
+/// Smooths the object's hypotheses and weighs within each class whether it moves.
+void smooth(Object& object, const FrameContext& frame);
+
+}  // namespace perdure::semantic_filter
