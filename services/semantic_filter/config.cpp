@@ -62,6 +62,8 @@ void describeBirth(BirthParameters& p, Fields& fields) {
                 {"weaker boxes support objects that are there, and give no birth", "nats"});
   fields.number("birth.claimed", p.claimed, between(0, 1),
                 {"a box claimed with more than this gives no birth"});
+  fields.number("birth.part", p.part, between(0, 1),
+                {"share of boxes that show a part of a thing alone, of whatever shape"});
   fields.integer("birth.max_classes", p.max_classes, between(1, 1000),
                  {"classes of the network kept for an object, \"other\" beside them"});
   fields.number("birth.class_ratio", p.class_ratio, between(0, 1),

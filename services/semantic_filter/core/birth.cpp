@@ -164,7 +164,34 @@ void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
 }
 
-void addClass(Object& object, const ClassPrior& prior, double probability, const Evidence& evidence,
+/// How much better the box's shape (its aspect) fits what was assumed than clutter, whose extents
+/// are log-uniform. Where sides are cut it has none.
+double logShapeRatio(const Fit& fit, const ClassPrior& prior, double yaw_sigma,
+                     const Evidence& evidence, const FrameContext& frame) {
+  const auto& z = evidence.z;
+  const auto box =
+      projectObserved(fit.hypothesis.x, frame.view, frame.offsetOf(fit.hypothesis.class_name));
+  const bool whole = z.count() == 4 && box &&
+                     std::all_of(box->exact.begin(), box->exact.end(), [](bool e) { return e; });
+  if (!whole) return -fit.cost;
+  using Row = Eigen::Matrix<double, 1, kFree>;
+  const Row by_state = (box->H.row(2) - box->H.row(0)).head<kFree>() / z.width() -
+                       (box->H.row(3) - box->H.row(1)).head<kFree>() / z.height();
+  Eigen::Matrix<double, kFree, kFree> P = Eigen::Matrix<double, kFree, kFree>::Zero();
+  P(kYaw, kYaw) = yaw_sigma * yaw_sigma;
+  P.block<3, 3>(kSize, kSize) = prior.log_size_covariance;
+  P.bottomRightCorner<4, 4>().diagonal() =
+      biasSigma(viewWalkOf(frame).lasting, z.width(), z.height()).cwiseAbs2();
+  const double noise = (z.variance[0] + z.variance[2]) / std::pow(z.width(), 2) +
+                       (z.variance[1] + z.variance[3]) / std::pow(z.height(), 2);
+  const double variance = (by_state * P).dot(by_state) + noise;
+  const CameraModel& camera = *frame.view.camera;
+  const double range =
+      std::log(std::max(camera.width(), camera.height()) / frame.parameters->clutter.min_size_px);
+  return -fit.cost - 0.5 * std::log(2.0 * M_PI * variance) + std::log(range);
+}
+
+void addClass(Object& object, const ClassPrior& prior, double ratio, const Evidence& evidence,
               const std::vector<YawStart>& starts, const std::optional<RangeHint>& range,
               const FrameContext& frame) {
   std::vector<Hypothesis> fits;
@@ -172,27 +199,27 @@ void addClass(Object& object, const ClassPrior& prior, double probability, const
     const auto fit = fitCuboid(evidence, prior, start.yaw, start.sigma, range, frame);
     if (!fit) continue;
     fits.push_back(fit->hypothesis);
-    fits.back().weight = probability * start.weight * std::exp(-fit->cost);
+    const double part = frame.parameters->birth.part;
+    const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, evidence, frame));
+    fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape);
   }
   weighByAzimuth(fits, evidence, prior, frame);
   for (const auto& h : fits) {
-    if (h.weight < 1e-12) continue;
+    if (h.weight < 1e-15) continue;
     object.hypotheses.push_back(h);
     addMovingTwin(object, h, prior);
   }
 }
 
 /// "other" has three starts of size, so that each Gaussian is narrow enough to be linear in depth.
-void addOther(Object& object, double probability, const Evidence& evidence,
-              const Eigen::Vector3d& ray, const std::optional<RangeHint>& range,
-              const FrameContext& frame) {
+void addOther(Object& object, double ratio, const Evidence& evidence, const Eigen::Vector3d& ray,
+              const std::optional<RangeHint>& range, const FrameContext& frame) {
   constexpr double kScales[3] = {-1.2, 0.0, 1.2};
   ClassPrior prior = frame.priors->other;
   const Eigen::Vector3d middle = prior.log_size;
   for (const double scale : kScales) {
     prior.log_size = middle.array() + scale;
-    addClass(object, prior, probability / 3.0, evidence, yawStarts(prior, frame, ray), range,
-             frame);
+    addClass(object, prior, ratio / 3.0, evidence, yawStarts(prior, frame, ray), range, frame);
   }
 }
 
@@ -218,23 +245,37 @@ std::vector<Candidate> candidates(const Evidence& evidence, const FrameContext& 
   return all;
 }
 
-/// Normalises the weights, sets existence, and books both: what was expected before the box, what
-/// the network says, and for the classes what the fits make of that.
-void bookBirth(Object& object, const std::vector<Candidate>& kept, double ratio,
+/// Sum of the classes' frequencies. A network with K classes spreads the prior over those that it
+/// reports at all: bounded below by one class's share in ten.
+double frequencies(const FrameContext& frame) {
+  double sum = 0.0;
+  for (const auto& name : frame.model->classes) sum += frame.priors->of(name).frequency;
+  return std::max(std::min(sum, 10.0), 1e-9);
+}
+
+/// Sets existence by the weights, normalises them, and books both: what was expected before the
+/// box, what the network says, and for the classes what the fits make of that.
+void bookBirth(Object& object, const std::vector<Candidate>& kept, const Evidence& evidence,
                const FrameContext& frame) {
   const double odds = frame.parameters->birth.odds;
+  double ratio = 0.0;
+  for (const auto& h : object.hypotheses) ratio += h.weight;
+  ratio *= odds;
   object.existence = {odds / (1.0 + odds), ExistenceEvidence::kPrior, object.as_of};
   object.existence.become(ratio / (1.0 + ratio), ExistenceEvidence::kHit, object.as_of);
   const double other = frame.parameters->clutter.other_prior;
-  double frequency = 0.0, total = 0.0;
-  for (const auto& c : kept) frequency += c.prior.frequency, total += std::exp(c.log_weight);
-  std::vector<ClassNumber> prior = {{kOtherClass, std::log(other)}}, said;
+  double frequency = 0.0, said_of_all = 0.0;
+  for (const auto& c : kept) frequency += c.prior.frequency;
+  std::vector<ClassNumber> prior = {{kOtherClass, std::log(other)}};
+  std::vector<ClassNumber> said = {{kOtherClass, evidence.log_ratio_other}};
   for (const auto& c : kept) {
-    const double expected = std::log((1.0 - other) * c.prior.frequency / frequency);
-    prior.push_back({c.prior.name, expected});
-    said.push_back(
-        {c.prior.name, std::log(1.0 - other) + c.log_weight - std::log(total) - expected});
+    prior.push_back({c.prior.name, std::log((1.0 - other) * c.prior.frequency / frequency)});
+    said.push_back({c.prior.name, c.log_weight - std::log(c.prior.frequency)});
   }
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    said_of_all += std::exp(prior[i].value + said[i].value);
+  }
+  for (auto& s : said) s.value -= std::log(said_of_all);
   normalise(object, ClassEvidence::kGeometry);
   object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kPrior, prior);
   object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, said);
@@ -267,15 +308,11 @@ std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
 
 double logBirthRatio(const Evidence& evidence, const FrameContext& frame) {
   const auto& p = *frame.parameters;
-  double frequency = 0.0, sum = 0.0;
+  double sum = 0.0;
   for (const auto& name : frame.model->classes) {
-    const double f = frame.priors->of(name).frequency;
-    frequency += f;
-    sum += f * std::exp(logRatio(evidence, *frame.model, name));
+    sum += frame.priors->of(name).frequency * std::exp(logRatio(evidence, *frame.model, name));
   }
-  // A network with K classes spreads the prior over those it reports at all: the mean is taken over
-  // the classes' frequencies, bounded below by one class's share in ten.
-  const double named = sum / std::max(std::min(frequency, 10.0), 1e-9);
+  const double named = sum / frequencies(frame);
   return std::log(p.birth.odds) +
          std::log((1.0 - p.clutter.other_prior) * named +
                   p.clutter.other_prior * std::exp(evidence.log_ratio_other));
@@ -320,20 +357,19 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   if (!ray) return std::nullopt;
   const auto kept = candidates(evidence, frame);
   Object object;
-  double total = 0.0;
-  for (const auto& c : kept) total += std::exp(c.log_weight);
   const double other = frame.parameters->clutter.other_prior;
+  const double named = (1.0 - other) / frequencies(frame);
   for (const auto& c : kept) {
-    addClass(object, c.prior, (1.0 - other) * std::exp(c.log_weight) / total, evidence,
+    addClass(object, c.prior, named * std::exp(c.log_weight), evidence,
              yawStarts(c.prior, frame, *ray), range, frame);
   }
-  addOther(object, other, evidence, *ray, range, frame);
+  addOther(object, other * std::exp(evidence.log_ratio_other), evidence, *ray, range, frame);
   if (object.hypotheses.empty()) return std::nullopt;
   object.first_seen = object.last_seen = object.as_of = now;
   object.pose_product = frame.pose_error.product;
   object.hits = 1;
   object.asked = frame.model->names;
-  bookBirth(object, kept, std::exp(logBirthRatio(evidence, frame)), frame);
+  bookBirth(object, kept, evidence, frame);
   object.hit_view = {frame.view.T_WC(), 1.0};
   object.last_view = frame.view.T_WC();
   return object;

@@ -83,15 +83,16 @@ Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double heig
 }
 
 double logClutter(const BoxMeasurement& z, double width, double height,
-                  const ClutterParameters& parameters) {
+                  const ClutterParameters& parameters, const std::array<bool, 4>& ignored) {
   const double size[2] = {std::max(z.width(), 1.0), std::max(z.height(), 1.0)};
   const double extent[2] = {width, height};
   double log_measure = std::log(parameters.per_frame);
   for (int axis = 0; axis < 2; ++axis) {
     const int censored = !z.measured[axis] + !z.measured[axis + 2];
     const double log_uniform = std::log(std::log(extent[axis] / parameters.min_size_px));
-    if (censored < 2) log_measure -= std::log(extent[axis]);
-    if (censored == 0) log_measure -= std::log(size[axis]) + log_uniform;
+    const int told = 2 - censored - ignored[axis] - ignored[axis + 2];
+    if (told > 0) log_measure -= std::log(extent[axis]);
+    if (told == 2) log_measure -= std::log(size[axis]) + log_uniform;
     log_measure += censored * std::log(parameters.censored_probability);
   }
   return log_measure;
@@ -131,24 +132,32 @@ std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox&
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,
                                  const std::array<bool, 4>& hidden, double gate, double tail) {
-  const auto use = comparableSides(z, predicted, hidden);
+  auto use = comparableSides(z, predicted, hidden);
+  // The true side lies at or beyond the observed end: left and top to smaller coordinates.
+  const auto beyond = [&](int i) {
+    return i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
+  };
+  BoxScore score;
+  for (int i = 0; i < 4; ++i) {
+    if (!z.measured[i] || use[i]) continue;
+    // What passes behind the camera reaches at least as far as it is predicted to.
+    use[i] = !hidden[i] && beyond(i) < 0.0;
+    score.ignored[i] = !use[i];
+  }
   const int n = static_cast<int>(std::count(use.begin(), use.end(), true));
   if (n == 0) return std::nullopt;
   // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
   Eigen::Vector4d nu = Eigen::Vector4d::Zero();
   Eigen::Matrix4d S = covariance;
   S.diagonal() += z.variance;
-  BoxScore score;
   for (int i = 0; i < 4; ++i) {
     if (!use[i]) {
       S.row(i).setZero();
       S.col(i).setZero();
       S(i, i) = 1.0;
-      // The true side lies at or beyond the observed end: left and top to smaller coordinates.
-      const double beyond =
-          i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
       if (predicted.exact[i]) {
-        score.log_density += logBelowZero(beyond, std::max(covariance(i, i), 0.0) + z.variance[i]);
+        const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
+        score.log_density += logBelowZero(beyond(i), variance);
       }
       continue;
     }

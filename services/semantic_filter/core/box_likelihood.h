@@ -56,9 +56,9 @@ BoxMeasurement measure(const Box& box, double width, double height, const BoxPar
 Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double height_px);
 
 /// log of the clutter measure of the box: expected false boxes times the density (measured sides)
-/// or probability (censored ones) of one of them being this one.
+/// or probability (censored ones) of one of them being this one, wherever its `ignored` sides are.
 double logClutter(const BoxMeasurement& z, double width, double height,
-                  const ClutterParameters& parameters);
+                  const ClutterParameters& parameters, const std::array<bool, 4>& ignored = {});
 
 /// Covariance of the four predicted sides: S without R of DESIGN 5, item 2.
 Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
@@ -69,8 +69,9 @@ bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& predicted,
                 const Eigen::Matrix4d& covariance);
 
 struct BoxScore {
-  double log_density = 0.0;  ///< of measured sides, with the probability of the censored ones
-  double nis = 0.0;          ///< squared Mahalanobis distance of the measured sides
+  double log_density = 0.0;       ///< of measured sides, with the probability of the censored ones
+  std::array<bool, 4> ignored{};  ///< measured sides of which nothing is predicted
+  double nis = 0.0;               ///< squared Mahalanobis distance of the measured sides
   int dof = 0;
 };
 

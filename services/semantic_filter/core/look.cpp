@@ -9,6 +9,14 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kNever = 1e9;              // a change of view that never counts
 
+/// Of the sides that were compared: a density of fewer is of other units.
+double logClutterOf(const Evidence& e, const BoxScore& score, const FrameContext& frame) {
+  const auto& ignored = score.ignored;
+  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) return e.log_clutter;
+  const CameraModel& camera = *frame.view.camera;
+  return logClutter(e.z, camera.width(), camera.height(), frame.parameters->clutter, ignored);
+}
+
 void scoreBoxes(HypothesisLook& h, const std::string& class_name, const ObjectLook& look,
                 const std::vector<Evidence>& boxes, const FrameContext& frame) {
   for (std::size_t i = 0; i < look.boxes.size(); ++i) {
@@ -17,7 +25,8 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, const ObjectLo
     const auto score = scoreBox(e.z, *h.box, h.covariance, look.sight.hidden,
                                 frame.parameters->box.gate, frame.parameters->box.tail);
     if (!score) continue;
-    const double log_l = logRatio(e, *frame.model, class_name) + score->log_density - e.log_clutter;
+    const double log_l =
+        logRatio(e, *frame.model, class_name) + score->log_density - logClutterOf(e, *score, frame);
     h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
     h.nis[i] = score->nis / score->dof;
   }

@@ -38,6 +38,7 @@ struct BirthParameters {
   double odds = 0.2;             ///< expected new objects in a box against false alarms
   double min_log_ratio = 0.5;    ///< weaker boxes only support objects that are there
   double claimed = 0.5;          ///< a box claimed with more than this gives no birth
+  double part = 0.1;             ///< share of boxes that show a part alone, of any shape
   std::int64_t max_classes = 4;  ///< kept of the network's list, "other" beside them
   double class_ratio = 0.01;     ///< classes below this share of the best are not kept
   double landmark_decay = 0.3;   ///< e-folding distance of a landmark's weight, in half boxes

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 namespace perdure::semantic_filter {
 namespace {
@@ -141,6 +142,47 @@ TEST(BoxLikelihood, ClutterOfMeasuredSidesIntegratesToItsExpectedNumber) {
     }
   }
   EXPECT_NEAR(total * kWidth * kHeight, clutter.per_frame, 1e-3 * clutter.per_frame);
+}
+
+/// Mean likelihood ratio, over an image's false boxes, of their being this object's.
+double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
+                          const std::array<bool, 4>& hidden) {
+  const Eigen::Matrix4d covariance = sigma * sigma * Eigen::Matrix4d::Identity();
+  const ClutterParameters clutter;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit;
+  constexpr int kBoxes = 400000;
+  double sum = 0.0;
+  for (int n = 0; n < kBoxes; ++n) {
+    Box box;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double extent = axis == 0 ? kWidth : kHeight;
+      const double size =
+          clutter.min_size_px * std::pow(extent / clutter.min_size_px, unit(random));
+      const double centre = extent * unit(random);
+      (axis == 0 ? box.x1 : box.y1) = centre - 0.5 * size;
+      (axis == 0 ? box.x2 : box.y2) = centre + 0.5 * size;
+    }
+    if (box.x1 < 10 || box.y1 < 10 || box.x2 > kWidth - 10 || box.y2 > kHeight - 10) continue;
+    const auto z = measure(box, kWidth, kHeight, {});
+    const auto score = scoreBox(z, predicted, covariance, hidden, 0.9999, kTail);
+    if (!score) continue;
+    sum += std::exp(score->log_density - logClutter(z, kWidth, kHeight, clutter, score->ignored));
+  }
+  return clutter.per_frame * sum / kBoxes;
+}
+
+// Were it more, chance would make things certain that are not there.
+TEST(BoxLikelihood, OverAllChanceBoxesTheRatioAveragesToOneAtMost) {
+  EXPECT_NEAR(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {}), 1.0, 0.2);
+  EXPECT_LT(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {false, false, true, false}),
+            1.2);
+  ProjectedBox near = predictedBox(-1280, -700, 60, 290);  // it passes behind the camera
+  near.exact = {false, false, true, true};
+  EXPECT_LT(ratioOfChanceBoxes(near, 25.0, {}), 0.05) << "its left side must be out of the picture";
+  near = predictedBox(600, 100, 2600, 290);
+  near.exact = {true, true, false, true};
+  EXPECT_LT(ratioOfChanceBoxes(near, 25.0, {}), 1.2);
 }
 
 }  // namespace
