@@ -52,6 +52,7 @@ void Pipeline::openFilter() {
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
+    if (listener_) listener_(objects);
     timer_.timeTowardsNext("outputs", [&] { outputs_->onObjects(objects); });
     timer_.timeTowardsNext("map_store", [&] { map_->onObjects(objects); });
     if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->onObjects(objects); });

@@ -3,6 +3,7 @@
 // bytes.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -34,6 +35,8 @@ class Pipeline {
   explicit Pipeline(const PipelineOptions& options);
   ~Pipeline();
 
+  /// Is told each `objects` as it is published, beside what is written.
+  void listen(std::function<void(const Objects&)> listener) { listener_ = std::move(listener); }
   /// Until the data or --seconds end; `progress` is called after each frame of cam0.
   void run(const std::function<void(const PipelineCounts&)>& progress);
   /// Writes every file but report.json.
@@ -90,6 +93,7 @@ class Pipeline {
   ReasonCounts reasons_;
   Predictions expected_;  // where objects should be seen in the next frame
   PipelineCounts counts_;
+  std::function<void(const Objects&)> listener_;
 };
 
 }  // namespace perdure::tools

@@ -1,5 +1,5 @@
-// A street with traffic: a car ahead, cars that come the other way and across, one that drives off
-// from where it was parked, one that arrives and parks, and people who walk.
+// A street with traffic: a car ahead, cars that come the other way and across, two that drive off
+// from where they were parked, one that arrives and parks, and people who walk.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -80,13 +80,19 @@ Drive startingAt(double start_s, Drive driven) {
   return driven;
 }
 
-/// From the kerb on the left into the lane that comes towards the body.
+/// From the kerb on the left into the lane that comes towards the body, long before it is there;
+/// from the kerb on the right into its own lane, about fifteen metres ahead of it.
 void addParkingManoeuvres(Traffic& traffic, double seconds) {
   const SpeedLimits limits{7.0, 1.5, 1.5, 1.5};
   const double infinity = std::numeric_limits<double>::infinity();
   const GroundPath off(
       {{{84, kParked}}, {{76, kParked}, 14}, {{64, kLane}, 14}, {{kNearEnd, kLane}}}, false, 2.0);
   traffic.add("car", off, startingAt(0.0, drive(off, limits, 0.0, infinity, 4.5, seconds + 5.0)));
+  const SpeedLimits hasty{8.5, 2.5, 1.5, 2.5};
+  const GroundPath out(
+      {{{205, -kParked}}, {{213, -kParked}, 14}, {{225, -kLane}, 14}, {{kFarEnd, -kLane}}}, false,
+      2.0);
+  traffic.add("car", out, drive(out, hasty, 0.0, infinity, 30.0, seconds + 5.0));
   const GroundPath in({{{300, kLane}}, {{192, kLane}, 14}, {{180, kParked}, 14}, {{172, kParked}}},
                       false, 2.0);
   traffic.add("car", in,

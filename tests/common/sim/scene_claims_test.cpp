@@ -257,7 +257,7 @@ TEST(Straight, IsDrivenEvenlyForAMinute) {
 TEST(Traffic, HasCarsThatPassCrossDriveOffAndArrive) {
   for (const auto seed : kSeeds) {
     const Scene scene = makeScene("traffic", seed, {});
-    int moving = 0, towards = 0, across = 0, off = 0, arrived = 0, walkers = 0;
+    int moving = 0, towards = 0, across = 0, off = 0, out = 0, arrived = 0, walkers = 0;
     for (const SceneObject& object : scene.objects) {
       if (!object.moves) continue;
       ++moving;
@@ -266,6 +266,7 @@ TEST(Traffic, HasCarsThatPassCrossDriveOffAndArrive) {
       towards += early.velocity_W.x() < -6.0 && late.velocity_W.x() < -6.0;
       across += std::abs(middle.velocity_W.y()) > 6.0;
       off += early.velocity_W.norm() < 1e-6 && late.velocity_W.x() < -5.0;
+      out += early.velocity_W.norm() < 1e-6 && late.velocity_W.x() > 5.0;
       arrived += early.velocity_W.norm() > 3.0 && late.velocity_W.norm() < 1e-3;
       walkers += object.class_name == "person";
       // It looks where it goes.
@@ -273,10 +274,11 @@ TEST(Traffic, HasCarsThatPassCrossDriveOffAndArrive) {
         EXPECT_GT(middle.velocity_W.normalized().dot(middle.T_WB.R().col(0)), 0.99) << object.id;
       }
     }
-    EXPECT_GE(moving, 8);
+    EXPECT_GE(moving, 9);
     EXPECT_GE(towards, 3);
     EXPECT_EQ(across, 1);
     EXPECT_EQ(off, 1) << seed;
+    EXPECT_GE(out, 1) << seed;
     EXPECT_EQ(arrived, 1) << seed;
     EXPECT_EQ(walkers, 2);
     EXPECT_GT(ofClass(scene, "car").size(), 40u);

@@ -1,0 +1,77 @@
+// `scenes`: the table of what each scene must show, as measured; and one true object's history.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "common/base/errors.h"
+#include "tests/scenario/bars.h"
+
+namespace {
+
+using namespace perdure;  // NOLINT
+
+/// What was published near a true object, frame by frame.
+void trace(const test::Outcome& run, std::uint64_t truth_id, double within) {
+  for (const auto& object : run.truth.truth.objects) {
+    if (object.id != truth_id) continue;
+    for (const auto& f : run.journal.frames) {
+      const auto truth = object.at(f.time);
+      const auto* view = run.viewOf(object, f.frame);
+      for (const auto& g : f.objects) {
+        const double apart = (g.centre - truth.centre_W).norm();
+        if (apart > within) continue;
+        fmt::print(
+            "{:4} id {:4} {:12} pi {:.3f} r {:.3f} {} {} moving {:.2f} apart {:.2f} at {:.1f} "
+            "{:.1f} "
+            "{:.1f} hits {} misses {} seen {:.2f}\n",
+            f.frame, g.id, g.className(), g.pmf.front().second, g.existence,
+            g.confirmed ? "confirmed" : "-", nameOf(g.visibility), g.moving, apart, g.centre.x(),
+            g.centre.y(), g.centre.z(), g.hits, g.visible_misses,
+            view != nullptr ? view->visible_fraction : 0.0);
+      }
+    }
+  }
+}
+
+int run(int argc, char** argv) {
+  test::Setting setting;
+  std::size_t seeds = 3;
+  std::uint64_t first = 1, truth = 0;
+  double within = 3.0;
+  std::vector<std::string> scenes = test::scenesWithBars();
+  CLI::App app("What each scene must show, and what the filter makes of it");
+  app.add_option("--scene", scenes, "One or more; all without it");
+  app.add_option("--seeds", seeds, "Of each scene")->capture_default_str();
+  app.add_option("--seed", first, "The first")->capture_default_str();
+  app.add_flag("--vio", setting.images, "Rendered, with vio in place of true poses");
+  app.add_option("--rate", setting.rate_hz, "Frames a second")->capture_default_str();
+  app.add_option("--set", setting.assignments, "semantic_filter.KEY=VALUE or detector.KEY=VALUE");
+  app.add_option("--truth", truth, "Print what is believed near this true object, by frame");
+  app.add_option("--within", within, "Metres from it")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  std::vector<std::uint64_t> numbers;
+  for (std::size_t i = 0; i < seeds; ++i) numbers.push_back(first + i);
+  for (const auto& scene : scenes) {
+    if (truth != 0) {
+      setting.scene = scene;
+      setting.seed = first;
+      trace(test::runScene(setting), truth, within);
+      continue;
+    }
+    fmt::print("{}\n", scene);
+    print(test::judge(test::barsOf(scene, numbers, setting)));
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const perdure::StartupError& error) {
+    std::cerr << error.what() << std::endl;
+    return static_cast<int>(error.code());
+  }
+}
