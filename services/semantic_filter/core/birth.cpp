@@ -370,7 +370,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.hits = 1;
   object.asked = frame.model->names;
   bookBirth(object, kept, evidence, frame);
-  object.hit_view = {frame.view.T_WC(), 1.0};
+  object.hit_view = object.late_view = {frame.view.T_WC(), 1.0};
   object.last_view = frame.view.T_WC();
   return object;
 }

@@ -36,8 +36,8 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const 
                       const FrameContext& frame) {
   HypothesisLook h;
   h.box = projectObserved(hypothesis.x, frame.view, frame.offsetOf(hypothesis.class_name));
-  h.hit_looks =
-      sharedLooks(hypothesis.x.head<3>(), object.hit_view, frame.view, frame.parameters->looks);
+  h.late_looks =
+      sharedLooks(hypothesis.x.head<3>(), object.late_view, frame.view, frame.parameters->looks);
   if (!h.box) return h;
   h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
   const double size =

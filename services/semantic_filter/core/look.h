@@ -23,7 +23,7 @@ struct HypothesisLook {
   double silent = 1.0;             ///< A without a box: 1 - v P_D, and what a primed answer says
   std::vector<double> likelihood;  ///< L(z) for each box of the look, 0 outside the gate
   std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
-  double hit_looks = 0.0;          ///< earlier looks that share this view, if it is true
+  double late_looks = 0.0;         ///< earlier looks that share this view, if it is true
 };
 
 struct ObjectLook {

@@ -52,6 +52,7 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.once_confirmed = a.once_confirmed || b.once_confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);
   a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
+  a.late_view.looks += b.late_view.looks;
   a.support = std::max(a.support, b.support);
   a.remembers_all = a.remembers_all && b.remembers_all;
   const auto& box = frame.parameters->box;

@@ -54,10 +54,14 @@ struct Object {
   bool once_confirmed = false;  ///< it was; hence the map knows it
   TimePoint first_seen, last_seen, as_of;
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
+  TimePoint came_back;                           ///< when it last came back into the picture
   std::uint32_t hits = 0, visible_misses = 0;
   double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
   ViewPoint hit_view;        ///< of the last look that showed it
-  double screened = 0.0;     ///< probability that something not on the map hides it, if it exists
+  ViewPoint late_view;       ///< of the last look, whatever it showed
+  /// Log-odds by which "it is a real thing" is above "it is there still" (core/update.h).
+  double lead = 0.0;
+  double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
   std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
   double support = 1.0;                     ///< share of late visible looks that showed it
   double seen_existence = 0.0;              ///< existence after the last look that showed it

@@ -5,6 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
+#include "services/semantic_filter/core/keyframe.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -55,13 +56,26 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
+/// That something which stands, and is not on the map, hides it from here. When it comes back into
+/// the picture, each look that is remembered from before vouches by itself for the views about its
+/// own: what is not found where it was found then is gone rather than screened.
+double screenedFromHere(const Object& object, const Eigen::Vector3d& place, const ViewWalk& walk) {
+  double screened = walk.screened;
+  for (const auto& k : object.keyframes) {
+    if (k->from->time >= object.came_back) break;  // they are in order of time
+    screened *= 1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.screen));
+  }
+  return screened;
+}
+
 /// What may hide it from elsewhere is not known until it is seen from there.
 void predictScreen(Object& object, const ViewWalk& walk) {
   const Eigen::Vector3d place = object.best().x.head<3>();
   const double keep = object.last_view
                           ? std::exp(-viewChange(place, *object.last_view, walk.T_WC, walk.screen))
                           : 0.0;
-  object.screened = walk.screened + keep * (object.screened - walk.screened);
+  const double here = screenedFromHere(object, place, walk);
+  object.screened = here + keep * (object.screened - here);
 }
 
 /// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see.
@@ -174,6 +188,8 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
     object.existence.become(object.existence * std::exp(-dt / parameters.survival_s),
                             ExistenceEvidence::kTime, now);
   }
+  constexpr double kAway_s = 1.0;  // out of the picture, not behind something
+  if (dt > kAway_s && object.away.count > 0 && object.hidden.count == 0) object.came_back = now;
   object.existence.note(ExistenceEvidence::kHidden, std::exchange(object.hidden, {}));
   object.existence.note(ExistenceEvidence::kAway, std::exchange(object.away, {}));
   object.as_of = now;

@@ -13,7 +13,7 @@ void hearPrimed(ObjectLook& look, const Object& object, const std::vector<double
   // their worth. What speaks against it is held off by `screened`, as misses are.
   double nats = log_ratio[k->second];
   if (nats > 0.0) {
-    nats *= worthOfLook(look.hypotheses.front().hit_looks, frame.parameters->looks.correlation);
+    nats *= worthOfLook(look.hypotheses.front().late_looks, frame.parameters->looks.correlation);
   }
   for (HypothesisLook& h : look.hypotheses) {
     h.silent = std::max(1.0 - h.detection + h.missed * (std::exp(nats) - 1.0), 1e-6);

@@ -228,15 +228,20 @@ Worth worthOf(const Object& object, const ObjectLook& look, const std::vector<Sh
   for (std::size_t i = 1; i < shares.size(); ++i) {
     if (posterior(i) > posterior(best)) best = i;
   }
-  const double looks = look.hypotheses[best].hit_looks;
+  const double looks = look.hypotheses[best].late_looks;
   return {worthOfLook(looks, correlation), looks};
 }
 
+/// Of A over the hypotheses, by a look's worth and in full.
+struct MeanA {
+  double tempered = 0.0, full = 0.0;
+};
+
 /// π ∝ π A. Within a class the hypotheses differ by geometry alone, whose shared errors are in the
 /// state: A counts in full there. Between classes, and for existence, looks share what the network
-/// mistakes: A counts by the look's worth. Returns the mean of A over the prior, by that exponent.
+/// mistakes: A counts by the look's worth. Returns the mean of A over the prior.
 /// A frame that does not show the object says that it is screened, too: P(frame | screened) is 1.
-double weigh(Object& object, const std::vector<Shares>& shares, double worth) {
+MeanA weigh(Object& object, const std::vector<Shares>& shares, double worth) {
   std::map<std::string, std::pair<double, double>> classes;  // weight, Σ w A
   double mean_A = 0.0, tempered_A = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -256,7 +261,20 @@ double weigh(Object& object, const std::vector<Shares>& shares, double worth) {
     }
   }
   object.screened = std::min(1.0, object.screened / mean_A);
-  return tempered_A;
+  return {tempered_A, mean_A};
+}
+
+/// Existence has two accounts. "It is a real thing": looks from one place share the network's
+/// mistakes, hits and misses alike, so that A counts by the look's worth. "It is there still": a
+/// patch of wall that passes for a chair does not go away, so that A counts in full, and one hit
+/// tells that the misses before it were the network's. The lower of the two is believed.
+double existenceAfter(Object& object, const MeanA& mean_A, double certain) {
+  const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
+  const double most = logOdds(certain), now = logOdds(std::min<double>(object.existence, certain));
+  const double real = std::min(now + std::max(object.lead, 0.0) + std::log(mean_A.tempered), most);
+  const double still = std::min(now - std::min(object.lead, 0.0) + std::log(mean_A.full), most);
+  object.lead = real - still;
+  return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 
 }  // namespace
@@ -348,12 +366,11 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   for (std::size_t i = 0; i < shares.size(); ++i) {
     updateState(object.hypotheses[i], shares[i], look, look.hypotheses[i], boxes, repeated, frame);
   }
-  const double exponent = seen * hit.worth + 1.0 - seen;
   const LookReasons reasons =
-      reasonsOf(object, shares, seen, hit.worth, exponent, look.boxes, boxes, frame);
-  const double mean_A = weigh(object, shares, exponent);
+      reasonsOf(object, shares, seen, hit.worth, hit.worth, look.boxes, boxes, frame);
   const double r = object.existence;
-  double next = std::min(r * mean_A / (1.0 - r + r * mean_A), frame.parameters->tend.certain);
+  double next =
+      existenceAfter(object, weigh(object, shares, hit.worth), frame.parameters->tend.certain);
   if (seen >= 0.5) {
     object.seen_existence = next;
   } else if (look.primed) {
@@ -362,6 +379,9 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   bookExistence(object, next, reasons);
   updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
+  if (seen >= 0.5 || !look.primed) {  // to be asked again is no look of its own
+    object.late_view = {frame.view.T_WC(), hit.looks + std::min(1.0, look.sight.fraction)};
+  }
   if (sound(object)) bookClasses(object, reasons);
   return own ? std::optional(look.boxes[*own]) : std::nullopt;
 }

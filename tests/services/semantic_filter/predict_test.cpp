@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "services/semantic_filter/core/keyframe.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -78,6 +79,33 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNone) {
   const Hypothesis h = afterDriving({}, 20.0);
   EXPECT_TRUE(h.x.allFinite());
   EXPECT_EQ((h.P.block<4, 4>(kBias, kBias).norm()), 0.0);
+}
+
+/// From where it was seen on an earlier visit nothing that stands can hide it.
+TEST(Predict, LooksOfAnEarlierVisitVouchThatNothingHidesWhatIsBackInThePicture) {
+  ViewWalk walk = walkWith({});
+  walk.screened = 0.2;
+  walk.screen = {0.15, 0.3, 1e9};
+  const CameraModel camera{testing::makeCamera()};
+  View view;
+  view.camera = &camera;
+  const auto screenedAt = [&](double metres_aside) {
+    Object object = biasedCar(walk);
+    Keyframe seen;
+    seen.from = std::make_shared<const KeyView>(view, PoseError{}, fromNanoseconds(1), nullptr);
+    object.keyframes.assign(3, std::make_shared<const Keyframe>(seen));
+    object.as_of = fromNanoseconds(2);
+    object.away.count = 20;  // frames in which it was out of the picture
+    object.last_view.reset();
+    ViewWalk now = walk;
+    now.T_WC = seen.from->T_WC;
+    now.T_WC.p += now.T_WC.R() * Eigen::Vector3d(metres_aside, 0, 0);
+    predict(object, object.as_of + std::chrono::seconds(5), PoseError{}, MotionParameters{}, now);
+    return object.screened;
+  };
+  EXPECT_LT(screenedAt(0.0), 1e-6);
+  EXPECT_LT(screenedAt(0.5), 0.01);
+  EXPECT_GT(screenedAt(40.0), 0.19);
 }
 
 }  // namespace

@@ -141,6 +141,31 @@ TEST_F(Update, ASightOfItSaysThatItIsNotScreened) {
   EXPECT_LT(object.screened, 0.01);
 }
 
+/// One look in five does not show it, from a place where the camera stands.
+TEST_F(Update, WhatIsFoundAgainFromOnePlaceWasMissedByTheNetwork) {
+  const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
+  for (int i = 0; i < 100; ++i) {
+    const auto& boxes = i % 5 == 4 ? nothing : box;
+    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  }
+  EXPECT_GT(object.existence, 0.9);
+  EXPECT_GT(classProbability(object, "car"), 0.6);
+}
+
+TEST_F(Update, WhatIsNoLongerFoundFromWhereItWasFoundIsMissingAtOnce) {
+  const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
+  for (int i = 0; i < 30; ++i) {
+    update(object, lookAt(box, 1.0), Eigen::VectorXd::Ones(1), box, frame);
+  }
+  ASSERT_GT(object.existence, 0.9);
+  object.screened = 0.0;  // nothing can be in the way
+  for (int i = 0; i < 4; ++i) {
+    update(object, lookAt(nothing, 1.0), Eigen::VectorXd::Ones(0), nothing, frame);
+    object.screened = 0.0;
+  }
+  EXPECT_LT(object.existence, 0.2);
+}
+
 TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
   Hypothesis astray = object.hypotheses[0];  // of the same class, where the box is not
   astray.moving = true;
@@ -148,14 +173,13 @@ TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
   object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
   object.hypotheses[0].weight = object.hypotheses[1].weight = 0.35;
   const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  object.late_view = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
   const ObjectLook l = lookAt(boxes, 1.0);
   double A[3];
   for (int i = 0; i < 3; ++i) {
     A[i] = 1.0 - l.hypotheses[i].detection * (1.0 - l.hypotheses[i].likelihood[0]);
   }
-  object.hit_view = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
-  const ObjectLook repeated = lookAt(boxes, 1.0);
-  update(object, repeated, Eigen::VectorXd::Ones(1), boxes, frame);
+  update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
   double still = 0.0, moving = 0.0;
   for (const auto& h : object.hypotheses) {
     if (h.class_name == "car") (h.moving ? moving : still) = h.weight;
