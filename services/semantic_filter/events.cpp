@@ -89,6 +89,12 @@ std::vector<Event> EventTracker::update(const Objects& objects,
     e.class_name = it->second.class_name;
     e.probability = 1.0;
     events.push_back(e);
+    if (m.moved) {
+      e.kind = EventKind::kMoved;
+      e.other_id = 0;
+      events.push_back(e);
+      known_[m.survivor].moving = true;  // it is not said again of one that drives
+    }
     known_.erase(it);
   }
   std::set<ObjectId> present;

@@ -202,7 +202,7 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
       bringUpToDate(a, b, frame);
       if (older(b, a)) std::swap(a, b);
       absorb(a, b, frame);
-      merges.push_back({a.id, b.id});
+      merges.push_back({a.id, b.id, false});
       objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
       reach.erase(reach.begin() + static_cast<std::ptrdiff_t>(j));
       reach[i] = reachOf(objects[i]);

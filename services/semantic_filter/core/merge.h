@@ -9,6 +9,7 @@ namespace perdure::semantic_filter {
 
 struct MergeRecord {
   ObjectId survivor = 0, absorbed = 0;
+  bool moved = false;  ///< the one was found again as the other, elsewhere (core/moved.h)
 };
 
 /// Shared volume over joint volume of two upright cuboids.

@@ -5,6 +5,7 @@
 
 #include "services/semantic_filter/core/association.h"
 #include "services/semantic_filter/core/context.h"
+#include "services/semantic_filter/core/moved.h"
 #include "services/semantic_filter/core/new_classes.h"
 #include "services/semantic_filter/core/primed.h"
 #include "services/semantic_filter/core/smooth.h"
@@ -282,6 +283,8 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
   report.merges = mergeObjects(belief.objects, frame);
+  const auto moved = reuniteMoved(belief.objects, priors_);
+  report.merges.insert(report.merges.end(), moved.begin(), moved.end());
   confirmAndBury(belief.objects, frame);
   contextualise(belief.objects, priors_.context);
   return report;

@@ -1,0 +1,89 @@
+#include "services/semantic_filter/core/moved.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "services/semantic_filter/core/keyframe.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kMissing = 0.5;    // existence of what was claimed
+constexpr double kOverlap_s = 0.5;  // both may have been seen for so long
+constexpr double kDriven_s = 2.0;   // and for so long nobody knows it
+constexpr double kCarried_m = 2.5;  // by which things are carried without leaving
+constexpr int kLooks = 3;           // at the empty place
+constexpr double kTooFar = std::numeric_limits<double>::infinity();
+
+bool isMissing(const Object& o) {
+  return o.once_confirmed && o.existence < kMissing && o.best().class_name != kOtherClass;
+}
+
+/// Whether most looks that showed the one had the other's place in the picture, and nothing was
+/// there: what is new only because nobody looked there before has not moved.
+bool wasLookedAt(const Eigen::Vector3d& place, const Object& missing) {
+  const auto& looks = missing.keyframes;
+  const auto count = std::count_if(looks.begin(), looks.end(), [&](const auto& k) {
+    const CameraModel& camera = k->from->camera;
+    const auto pixel = camera.project(k->from->T_WC.inverse() * place);
+    return pixel && camera.inImage(*pixel);
+  });
+  return count >= kLooks && 2 * count >= static_cast<std::ptrdiff_t>(looks.size());
+}
+
+/// Metres between where the one stood and where the other must have been then; infinite where they
+/// cannot be one.
+double apart(const Object& missing, const Object& found, const ClassPriors& priors) {
+  if (!found.confirmed || found.best().class_name != missing.best().class_name) return kTooFar;
+  const double since = toSeconds(found.first_seen - missing.last_seen);
+  if (since < -kOverlap_s) return kTooFar;
+  const Hypothesis& h = found.best();
+  const bool carried = priors.of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
+  if (h.moving ? since > kDriven_s : !carried) return kTooFar;
+  const State then = stateAt(h, toSeconds(missing.last_seen - found.as_of));
+  const double metres = (then - missing.best().x).head<3>().norm();
+  // A belief at rest follows what drives off a little before it loses it.
+  const double length = h.x.segment<3>(kSize).array().exp().maxCoeff();
+  return metres < (h.moving ? 0.75 * length : kCarried_m) ? metres : kTooFar;
+}
+
+std::size_t nearest(const std::vector<Object>& objects, std::size_t of, bool among_missing,
+                    const ClassPriors& priors) {
+  std::size_t best = objects.size();
+  double least = kTooFar;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (i == of || isMissing(objects[i]) != among_missing) continue;
+    const double d = among_missing ? apart(objects[i], objects[of], priors)
+                                   : apart(objects[of], objects[i], priors);
+    if (d < least) least = d, best = i;
+  }
+  return best;
+}
+
+/// What is known of the thing is what the newcomer shows.
+void takeUp(Object& past, Object&& now) {
+  now.id = past.id;
+  now.first_seen = past.first_seen;
+  now.hits += past.hits;
+  now.visible_misses += past.visible_misses;
+  now.once_confirmed = true;
+  past = std::move(now);
+}
+
+}  // namespace
+
+std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const ClassPriors& priors) {
+  std::vector<MergeRecord> merges;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (!isMissing(objects[i])) continue;
+    const std::size_t j = nearest(objects, i, false, priors);
+    if (j == objects.size() || nearest(objects, j, true, priors) != i) continue;
+    merges.push_back({objects[i].id, objects[j].id, true});
+    takeUp(objects[i], std::move(objects[j]));
+    objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+    if (j < i) --i;
+  }
+  return merges;
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,119 @@
+#include "services/semantic_filter/core/moved.h"
+
+#include <gtest/gtest.h>
+
+#include "services/semantic_filter/core/keyframe.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makePriors;
+using testing::makeState;
+
+TimePoint at(double seconds) { return fromNanoseconds(static_cast<std::int64_t>(1e9 * seconds)); }
+
+class Moved : public ::testing::Test {
+ protected:
+  /// Claimed, with five looks in the last half second, from the origin along x.
+  Object thing(ObjectId id, const std::string& name, const State& x, double first, double last) {
+    Object o;
+    o.id = id;
+    o.existence = {0.95, ExistenceEvidence::kPrior, at(last)};
+    o.confirmed = o.once_confirmed = true;
+    o.first_seen = at(first);
+    o.last_seen = o.as_of = at(last);
+    o.hits = 6;
+    Hypothesis h;
+    h.class_name = name;
+    h.weight = 1.0;
+    h.x = x;
+    h.P.diagonal().setConstant(0.01);
+    o.hypotheses = {h};
+    View view;
+    view.camera = &camera;
+    for (int i = 0; i < 5; ++i) {
+      Keyframe k;
+      k.from = std::make_shared<const KeyView>(view, PoseError{}, at(last - 0.1 * i), nullptr);
+      o.keyframes.push_back(std::make_shared<const Keyframe>(k));
+    }
+    return o;
+  }
+  Object missing(ObjectId id, const std::string& name, const State& x, double last) {
+    Object o = thing(id, name, x, 1.0, last);
+    o.existence = {0.2, ExistenceEvidence::kPrior, at(last)};
+    o.confirmed = false;
+    return o;
+  }
+
+  CameraModel camera{makeCamera()};
+  ClassPriors priors = makePriors();
+  const State here = makeState(5, 0, 0.4, 0, 0.5, 0.5, 0.9);
+  const State beside = makeState(5, 1.4, 0.4, 0, 0.5, 0.5, 0.9);
+};
+
+TEST_F(Moved, AChairThatIsMissingAndOneThatIsNewBesideItAreOneThatWasMoved) {
+  std::vector<Object> objects = {missing(3, "chair", here, 8.0),
+                                 thing(9, "chair", beside, 18.0, 19.0)};
+  const auto merges = reuniteMoved(objects, priors);
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].survivor, 3u);
+  EXPECT_EQ(merges[0].absorbed, 9u);
+  EXPECT_TRUE(merges[0].moved);
+  ASSERT_EQ(objects.size(), 1u);
+  EXPECT_EQ(objects[0].id, 3u);
+  EXPECT_EQ(objects[0].first_seen, at(1.0));
+  EXPECT_EQ(objects[0].hits, 12u);
+  EXPECT_TRUE(objects[0].confirmed);
+  EXPECT_NEAR(objects[0].existence, 0.95, 1e-9);
+  EXPECT_NEAR(objects[0].best().x[1], 1.4, 1e-9);
+}
+
+TEST_F(Moved, WhatIsThereStillOrOfAnotherClassOrWasSeenBeforeStaysTwo) {
+  for (const auto& pair : std::vector<std::vector<Object>>{
+           {thing(3, "chair", here, 1.0, 8.0), thing(9, "chair", beside, 18.0, 19.0)},
+           {missing(3, "chair", here, 8.0), thing(9, "couch", beside, 18.0, 19.0)},
+           {missing(3, "chair", here, 8.0), thing(9, "chair", beside, 6.0, 19.0)},
+           {missing(3, "chair", here, 8.0),
+            thing(9, "chair", makeState(5, 4.0, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)}}) {
+    auto objects = pair;
+    EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+    EXPECT_EQ(objects.size(), 2u);
+  }
+}
+
+TEST_F(Moved, WhatIsNewWhereNobodyLookedBeforeHasNotMoved) {
+  std::vector<Object> objects = {
+      missing(3, "chair", makeState(1.2, 0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
+      thing(9, "chair", makeState(-0.6, 0.5, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)};
+  EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+}
+
+TEST_F(Moved, OfTwoMissingOnesTheNearestIsTheOneThatWasMoved) {
+  std::vector<Object> objects = {
+      missing(2, "chair", makeState(5, -1.0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
+      missing(3, "chair", here, 8.0), thing(9, "chair", beside, 18.0, 19.0)};
+  const auto merges = reuniteMoved(objects, priors);
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].survivor, 3u);
+  EXPECT_EQ(objects.size(), 2u);
+}
+
+TEST_F(Moved, ACarThatDrivesFromWhereOneWasMissedIsThatCar) {
+  const State parked = makeState(20, 3, 0.75, 0, 4.2, 1.75, 1.5);
+  State driving = makeState(24, 3, 0.75, 0, 4.2, 1.75, 1.5);
+  driving[kVelocity] = 4.0;
+  Object newcomer = thing(9, "car", driving, 8.2, 9.0);
+  newcomer.hypotheses[0].moving = true;
+  std::vector<Object> objects = {missing(3, "car", parked, 8.0), newcomer};
+  EXPECT_EQ(reuniteMoved(objects, priors).size(), 1u);
+  objects = {missing(3, "car", parked, 8.0), newcomer};
+  objects[1].hypotheses[0].x[kVelocity] = -4.0;  // it comes from elsewhere
+  EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+  objects = {missing(3, "car", parked, 4.0), newcomer};  // it has been missed for long
+  EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
