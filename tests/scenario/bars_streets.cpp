@@ -113,12 +113,12 @@ const sim::TruthObject* whatDrivesOff(const Outcome& run) {
   return nullptr;
 }
 
-/// `moved` events of what was claimed where the thing stood.
+/// `moved` events of what was claimed where the thing stood, or had just begun to drive.
 double movedEvents(const Outcome& run, const sim::TruthObject& object) {
   std::set<std::uint64_t> ids;
   for (const auto& row : run.inst_rows) {
     const auto truth = object.at(row.time).centre_W;
-    const bool stood = (truth - object.keys[0].centre_W).norm() < 0.05;
+    const bool stood = (truth - object.keys[0].centre_W).norm() < 1.0;
     if (stood && (row.centre_W - truth).norm() < 2.0) ids.insert(row.id);
   }
   return number(run.countEvents("moved", ids));

@@ -9,112 +9,162 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0, 0.974, 0.798: a hit from a place where the camera has been says little and a miss "
-            "there all: what is found in some looks dies"},
-           {"P(car, exists) of the real cars at the end",
-            "0, 0.99, 0.99: a hit from a place where the camera has been says little and a miss "
-            "there all: what is found in some looks dies"},
-           {"share of the far ones that is accepted at the end",
-            "0.5, 1, 1: a hit from a place where the camera has been says little and a miss there "
-            "all: what is found in some looks dies"},
-       }},
-      {"still",
-       {
-           {"P(car, exists), the least of the cars and the toy: nobody is rejected",
-            "0.0722, 0, 0: a hit from a place where the camera has been says little and a miss "
-            "there all: what is found in some looks dies"},
-           {"relative deviation of the distance that is said, the least",
-            "0.0833, 0, 0: a hit from a place where the camera has been says little and a miss "
-            "there all: what is found in some looks dies"},
-           {"deviations between true distance and belief, the most (the toy's as other)",
-            "1.98, none, none: not yet looked into"},
+            "0.986, 0.98, 0.903: the car at 40 m is 16 px high and found in six looks of ten; it "
+            "is believed a little later"},
        }},
       {"occlusion",
        {
-           {"objects for each one found", "1, 1, 1.23: chairs close together change their ids"},
+           {"ids of the hidden chair",
+            "1, 2, 1: it is given up while something that is not on the map still hides most of "
+            "it"},
+           {"objects for each one found", "1, 1, 1.15: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 0, 3: a look that the thing only may have made, or a hypothesis of odd size given "
+            "2, 2, 5: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"vanish",
        {
-           {"visible frames until the one that was taken is `missing`",
-            "35, 35, 35: misses say that something off the map hides it, though it was seen from "
-            "there"},
-           {"visible frames until it is `gone`", "none, none, none: the same"},
-           {"`moved` events of the one that was moved",
-            "0, 0, 0: what is found elsewhere is always new"},
            {"it is on the map where it stands now, with its id",
-            "0, 0, 0: what is found elsewhere is always new"},
-           {"second objects there", "1, 1, 0: what is found elsewhere is always new"},
+            "1, 1, 0: its old belief is lost before the new one is confirmed, or the new one is "
+            "not placed"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 2, 1: a look that the thing only may have made, or a hypothesis of odd size given "
+            "1, 1, 4: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"room",
        {
            {"objects for each one found",
-            "1.07, 1.11, 1.18: chairs close together change their ids"},
+            "1.04, 1.07, 1.09: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "4, 2, 1: a look that the thing only may have made, or a hypothesis of odd size given "
+            "1, 4, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"row",
        {
            {"cars that are on the map twice at the end",
-            "0, 1, 0: cars of unusual size stand where the usual would"},
+            "0, 1, 1: cars of unusual size stand where the usual would"},
            {"cars of the row that are on the map within 0.5 m",
-            "4, 4, 7: placed along the line of sight to a metre"},
+            "6, 6, 4: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
-            "0, 3, 2: a look that the thing only may have made, or a hypothesis of odd size given "
+            "1, 0, 0: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "2.88, 11.4, 5.63: not by the roll alone: the estimate is still settling"},
+            "4.21, 13.9, 3.08: not by the roll alone: the estimate still settles as the camera "
+            "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.148, 0.136, 0.14: not by the roll alone: the estimate is still settling"},
+            "0.103, 0.137, 0.138: not by the roll alone: the estimate still settles as the camera "
+            "comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.277, 0.226, 0.285: not by the roll alone: the estimate is still settling"},
-           {"recall under 1 m",
-            "0.791, 0.807, 0.7: what smoothing finds little to mend at waits for three times as "
-            "many new looks"},
+            "0.27, 0.249, 0.257: not by the roll alone: the estimate still settles as the camera "
+            "comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 1, 1: a look that the thing only may have made, or a hypothesis of odd size given "
+            "2, 0, 2: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "2, 4, 2: what a moving car leaves behind where it was first believed to stand"},
+            "4, 2, 3: what a moving car leaves behind where it was first believed to stand"},
            {"`moved` events of the parked car that drives off",
-            "0, 0, 0: the belief at rest follows it a little, is lost, and another is born"},
+            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does not "
+            "come from its place"},
            {"standing things on the map where nothing is",
-            "2, 4, 2: what a moving car leaves behind where it was first believed to stand"},
+            "4, 2, 3: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "4, 4, 4: a look that the thing only may have made, or a hypothesis of odd size given "
+            "3, 5, 4: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"street",
        {
            {"second lap: share that keeps the id of the first",
-            "0.962, 0.923, 0.945: taken for moving on the first lap and given up out of view, or "
+            "0.922, 0.923, 0.962: taken for moving on the first lap and given up out of view, or "
             "two beliefs in one thing"},
            {"flicker: claims in full sight that ceased and came back",
-            "5, 7, 5: existence or place lost for a few frames"},
+            "7, 12, 14: some misses in a row, or a place lost for a few frames"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 1, 5: a look that the thing only may have made, or a hypothesis of odd size given "
+            "2, 1, 3: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
-           {"merges that lost existence", "0, 0, 1: not yet looked into"},
        }},
       {"street recalled",
        {
            {"second lap: share that keeps the id of the first",
-            "0.942: taken for moving on the first lap and given up out of view, or two beliefs in "
+            "0.902: taken for moving on the first lap and given up out of view, or two beliefs in "
+            "one thing"},
+           {"objects of the map for each one found", "1.02: two beliefs in one thing"},
+           {"switches of id, FINAL", "1: two beliefs in one thing"},
+           {"flicker: claims in full sight that ceased and came back",
+            "2: some misses in a row, or a place lost for a few frames"},
+       }},
+      {"toy vio",
+       {
+           {"P(car, exists) of the real cars, 40 frames after first sight",
+            "0.368: the car at 40 m is 16 px high and found in six looks of ten; it is believed a "
+            "little later"},
+           {"P(car, exists) of the toy at the end",
+            "0.99: not yet looked into; with true poses it passes"},
+       }},
+      {"still vio",
+       {
+           {"deviations between true distance and belief, the most (the toy's as other)",
+            "3.84: no other is left of the toy"},
+       }},
+      {"occlusion vio",
+       {
+           {"ids of the hidden chair",
+            "8: it is given up while something that is not on the map still hides most of it"},
+           {"that name something else", "1: not yet looked into; with true poses it passes"},
+           {"objects for each one found", "1.13: chairs close together change their ids"},
+           {"looks that showed a claimed thing and made it less sure",
+            "29: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"vanish vio",
+       {
+           {"looks that showed a claimed thing and made it less sure",
+            "3: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"room vio",
+       {
+           {"looks that showed a claimed thing and made it less sure",
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"row vio",
+       {
+           {"cars of the row that are on the map within 0.5 m",
+            "1: placed along the line of sight to a metre"},
+           {"looks that showed a claimed thing and made it less sure",
+            "2: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"roll vio",
+       {
+           {"change of a length, width or height, share, median",
+            "0.0924: not by the roll alone: the estimate still settles as the camera comes nearer"},
+           {"change of a length, width or height, share, nine in ten",
+            "0.266: not by the roll alone: the estimate still settles as the camera comes nearer"},
+           {"looks that showed a claimed thing and made it less sure",
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"traffic vio",
+       {
+           {"things in long-term memory where nothing stands",
+            "4: what a moving car leaves behind where it was first believed to stand"},
+           {"standing things on the map where nothing is",
+            "4: what a moving car leaves behind where it was first believed to stand"},
+           {"looks that showed a claimed thing and made it less sure",
+            "9: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"street vio",
+       {
+           {"second lap: share that keeps the id of the first",
+            "0.945: taken for moving on the first lap and given up out of view, or two beliefs in "
             "one thing"},
            {"flicker: claims in full sight that ceased and came back",
-            "3: existence or place lost for a few frames"},
+            "34: some misses in a row, or a place lost for a few frames"},
+           {"looks that showed a claimed thing and made it less sure",
+            "6: looks whose box another thing may have made, or a belief of odd size given up"},
+           {"merges that lost existence", "1: a miss in the same frame"},
        }},
   };
   const auto found = all.find(scene);
