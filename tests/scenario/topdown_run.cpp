@@ -105,6 +105,15 @@ TopDownRun driveThrough(const TopDownSetting& setting) {
   return run;
 }
 
+HardRecall& HardRecall::operator+=(const HardRecall& more) {
+  small += more.small, small_found += more.small_found;
+  hidden += more.hidden, hidden_found += more.hidden_found;
+  ordinary_found += more.ordinary_found;
+  false_alarms += more.false_alarms, false_primed += more.false_primed;
+  frames += more.frames;
+  return *this;
+}
+
 HardRecall hardRecall(const TopDownRun& run, const TopDownRun& known, double input_scale,
                       double least) {
   HardRecall result;

@@ -42,6 +42,7 @@ struct HardRecall {
   std::size_t false_alarms = 0;    ///< boxes, primed ones included, on no object
   std::size_t false_primed = 0;    ///< of these, primed
   std::size_t frames = 0;
+  HardRecall& operator+=(const HardRecall& more);
   double recall() const {
     return static_cast<double>(small_found + hidden_found) / static_cast<double>(small + hidden);
   }
