@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "common/config/fields.h"
@@ -25,38 +26,60 @@ struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
   std::string vehicle = "ego";
+  std::int64_t shared_memory_mb = 0;  ///< largest image that goes through it; 0: none does
 };
-/// bus.interface, bus.domain, bus.vehicle. The variable PERDURE_DOMAIN goes before bus.domain.
+/// bus.interface, bus.domain, bus.vehicle, bus.shared_memory_mb. The variable PERDURE_DOMAIN goes
+/// before bus.domain.
 void describe(Options& options, config::Fields& fields);
 
 /// The options with PERDURE_DOMAIN in force.
 Options withEnvironment(Options options);
 
-/// Cyclone's configuration for these options, as it may stand in CYCLONEDDS_URI.
-std::string configurationXml(const Options& options);
+/// Cyclone's configuration for these options, as it may stand in CYCLONEDDS_URI. `locator` is that
+/// of shared memory; empty: without.
+std::string configurationXml(const Options& options, const std::string& locator = {});
 
-/// One a process. Where CYCLONEDDS_URI is set it is used instead of bus.interface, as Cyclone does.
+/// Shared memory, as it was found at the start.
+struct SharedMemory {
+  std::string locator;         ///< empty: off
+  std::string why_not;         ///< where it is asked for and off, with the mend
+  std::size_t most_bytes = 0;  ///< of a message
+  bool on() const { return !locator.empty(); }
+};
+
+/// One a process. Where CYCLONEDDS_URI is set it is used instead of bus.interface and
+/// bus.shared_memory_mb, as Cyclone does.
 class Domain {
  public:
   /// Throws StartupError (69) where DDS cannot use the interface.
   explicit Domain(const Options& options);
   const Options& options() const { return options_; }
+  const SharedMemory& sharedMemory() const { return shared_memory_; }
+  /// What there is to say of shared memory now: empty where it was not asked for, or RouDi was
+  /// lost.
+  std::string sharedMemoryText() const;
+  const std::shared_ptr<const Entity>& entity() const { return domain_; }
 
  private:
   Options options_;
-  Entity domain_;
+  SharedMemory shared_memory_;
+  std::shared_ptr<const Entity> domain_;
 };
 
 class Participant {
  public:
   /// `process` is shown by `perdure topics` and `perdure doctor`.
   Participant(const Domain& domain, const std::string& process);
-  std::int32_t handle() const { return participant_.handle(); }
+  std::int32_t handle() const { return participant_->handle(); }
+  const SharedMemory& sharedMemory() const { return shared_memory_; }
+  /// An entity of this participant, which stays as long as that does.
+  std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
 
  private:
-  Entity participant_;
+  std::shared_ptr<const Entity> participant_;
+  SharedMemory shared_memory_;
   std::string prefix_;
 };
 

@@ -6,6 +6,8 @@
 #include "common/base/check.h"
 #include "common/base/errors.h"
 #include "common/bus/dds.h"
+#include "common/bus/sample.h"
+#include "common/bus/told_size.h"
 
 namespace perdure::bus {
 namespace {
@@ -16,7 +18,10 @@ dds_duration_t duration(double seconds) {
   return seconds > 0 ? static_cast<dds_duration_t>(seconds * 1e9) : DDS_INFINITY;
 }
 
-QosPtr commonQos(const Qos& qos) {
+/// `through`: whether this endpoint may use shared memory. Cyclone leaves endpoints that do not
+/// hear their own participant out of it. Exclusive writers are left out by their liveliness, and
+/// their readers may have to hear their own participant.
+QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
   constexpr double kMaxBlocking = 0.1;
   QosPtr result(dds_create_qos());
   dds_qset_reliability(result.get(),
@@ -26,14 +31,20 @@ QosPtr commonQos(const Qos& qos) {
   dds_qset_durability(result.get(),
                       qos.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   if (qos.exclusive) dds_qset_ownership(result.get(), DDS_OWNERSHIP_EXCLUSIVE);
+  if (memory.on() && !through && !qos.exclusive) {
+    dds_qset_ignorelocal(result.get(), DDS_IGNORELOCAL_PARTICIPANT);
+  }
   return result;
 }
 
 /// Readers ask for the weakest liveliness, so that every writer's suits them.
-QosPtr readerQos(const Qos& qos) { return commonQos(qos); }
+QosPtr readerQos(const Qos& qos, const SharedMemory& memory) {
+  return commonQos(qos, memory, qos.shared_memory);
+}
 
-QosPtr writerQos(const Qos& qos, const WriterOptions& options) {
-  QosPtr result = commonQos(qos);
+QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
+                 bool through) {
+  QosPtr result = commonQos(qos, memory, through);
   dds_qset_writer_data_lifecycle(result.get(), false);  // a death is not the end of its objects
   if (qos.latched) {
     dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth,
@@ -63,6 +74,17 @@ Entity created(dds_entity_t handle, const std::string& what) {
   return Entity(handle);
 }
 
+/// With keys or latching shared memory loses messages, or crashes (Cyclone 0.10.2).
+void checkSharing(const Entity& entity, const std::string& topic, const Qos& qos) {
+  if (qos.shared_memory || qos.exclusive || !dds_is_shared_memory_available(entity.handle())) {
+    return;
+  }
+  throw StartupError(ExitCode::kConfiguration,
+                     "CYCLONEDDS_URI turns shared memory on for all topics, which " + topic +
+                         " does not bear; take <SharedMemory> out of it, or unset it and use "
+                         "bus.shared_memory_mb");
+}
+
 /// The topic entity may go at once: readers and writers keep what they need of it.
 Entity createTopic(const Participant& participant, const std::string& topic) {
   return created(dds_create_topic(participant.handle(), infoOf(topic).type,
@@ -70,19 +92,32 @@ Entity createTopic(const Participant& participant, const std::string& topic) {
                  "the topic " + topic);
 }
 
-Entity createReader(const Participant& participant, const std::string& topic) {
+std::shared_ptr<const Entity> createReader(const Participant& participant,
+                                           const std::string& topic) {
   const Entity entity = createTopic(participant, topic);
-  const QosPtr qos = readerQos(infoOf(topic).qos);
-  return created(dds_create_reader(participant.handle(), entity.handle(), qos.get(), nullptr),
-                 "a reader of " + topic);
+  const Qos& row = infoOf(topic).qos;
+  const QosPtr qos = readerQos(row, participant.sharedMemory());
+  Entity reader =
+      created(dds_create_reader(participant.handle(), entity.handle(), qos.get(), nullptr),
+              "a reader of " + topic);
+  checkSharing(reader, topic, row);
+  return participant.keep(std::move(reader));
 }
 
-Entity createWriter(const Participant& participant, const std::string& topic,
-                    const WriterOptions& options) {
+std::shared_ptr<const Entity> createWriter(const Participant& participant, const std::string& topic,
+                                           const WriterOptions& options,
+                                           bool through_shared_memory) {
   const Entity entity = createTopic(participant, topic);
-  const QosPtr qos = writerQos(infoOf(topic).qos, options);
-  return created(dds_create_writer(participant.handle(), entity.handle(), qos.get(), nullptr),
-                 "a writer of " + topic);
+  const Qos& row = infoOf(topic).qos;
+  const QosPtr qos = writerQos(row, options, participant.sharedMemory(), through_shared_memory);
+  if (participant.sharedMemory().on() && through_shared_memory) {
+    tellSizesOfFrames(participant.handle(), entity.handle());
+  }
+  Entity writer =
+      created(dds_create_writer(participant.handle(), entity.handle(), qos.get(), nullptr),
+              "a writer of " + topic);
+  checkSharing(writer, topic, row);
+  return participant.keep(std::move(writer));
 }
 
 std::string errorWord(dds_return_t code) {
@@ -98,9 +133,17 @@ std::string errorWord(dds_return_t code) {
 
 }  // namespace
 
-Endpoint::Endpoint(std::string topic, Entity entity)
-    : topic_(std::move(topic)), count_prefix_(topic_), entity_(std::move(entity)) {
+Endpoint::Endpoint(std::string topic, std::shared_ptr<const Entity> entity)
+    : topic_(std::move(topic)),
+      count_prefix_(topic_),
+      entity_(std::move(entity)),
+      handle_(entity_->handle()) {
   std::replace(count_prefix_.begin(), count_prefix_.end(), '/', '_');
+}
+
+void Endpoint::replace(std::shared_ptr<const Entity> entity) {
+  handle_ = entity->handle();
+  entity_ = std::move(entity);
 }
 
 void Endpoint::count(const char* what, const Reason& reason) {
@@ -163,6 +206,7 @@ void RawReader::report(ReasonCounts& counts) const {
   dds_sample_rejected_status_t rejected{};
   dds_get_sample_rejected_status(handle(), &rejected);
   add(counts, "sample_rejected", rejected.total_count);
+  add(counts, "in_shared_memory", in_shared_memory_);
   dds_liveliness_changed_status_t liveliness{};
   dds_get_liveliness_changed_status(handle(), &liveliness);
   add(counts, "writers_silent", liveliness.not_alive_count);
@@ -188,9 +232,22 @@ bool RawReader::takeBatch(const std::function<void(const void*)>& on_value,
   return static_cast<std::size_t>(n) == kBatch;
 }
 
+bool RawReader::takeBatchInPlace(const InPlace& on_value) {
+  const auto samples = takeInPlace(entity(), kBatch);
+  for (const RawSample& sample : samples) {
+    in_shared_memory_ += sample.in_shared_memory;
+    on_value(sample.cdr, sample.keeper);
+  }
+  return samples.size() == kBatch;
+}
+
 RawWriter::RawWriter(const Participant& participant, const std::string& topic,
                      const WriterOptions& options)
-    : Endpoint(topic, createWriter(participant, topic, options)), strength_(options.strength) {}
+    : Endpoint(topic, createWriter(participant, topic, options, infoOf(topic).qos.shared_memory)),
+      participant_(participant),
+      options_(options),
+      strength_(options.strength),
+      in_shared_memory_(dds_is_shared_memory_available(handle())) {}
 
 std::size_t RawWriter::matched() const {
   dds_publication_matched_status_t status{};
@@ -226,8 +283,32 @@ void RawWriter::report(ReasonCounts& counts) const {
   add(counts, "liveliness_lost", livelinessLost());
 }
 
-Result<void> RawWriter::writeWire(const void* wire) {
-  const dds_return_t code = dds_write(handle(), wire);
+/// Its readers hear the same topic over the network interface from now on.
+void RawWriter::leaveSharedMemory(const Reason& reason) {
+  constexpr dds_duration_t kPatience = DDS_MSECS(500), kPause = DDS_MSECS(5);
+  const std::size_t readers = matched();
+  replace(createWriter(participant_, topic(), options_, false));
+  in_shared_memory_ = false;
+  count("left_shared_memory", reason);
+  for (dds_duration_t waited = 0; matched() < readers && waited < kPatience; waited += kPause) {
+    dds_sleepfor(kPause);
+  }
+}
+
+Result<void> RawWriter::writeWire(const void* wire, std::size_t bytes) {
+  // iceoryx aborts the process where no chunk is large enough.
+  if (in_shared_memory_ && bytes > participant_.sharedMemory().most_bytes) {
+    leaveSharedMemory({"too_large", "an image of " + std::to_string(bytes) +
+                                        " bytes; raise bus.shared_memory_mb, and the chunks in "
+                                        "RouDi's configuration"});
+  }
+  dds_return_t code = dds_write(handle(), wire);
+  if (code == DDS_RETCODE_OUT_OF_RESOURCES && in_shared_memory_) {
+    leaveSharedMemory({"used_up", "no chunk of " + std::to_string(bytes) +
+                                      " bytes is free; give RouDi more of them, or start it and "
+                                      "the services again where processes were killed often"});
+    code = dds_write(handle(), wire);
+  }
   if (code == DDS_RETCODE_OK) return {};
   const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
   count("write", reason);

@@ -2,10 +2,13 @@
 // A writer may be used by any one thread at a time; counts may be asked for from any thread.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "common/base/result.h"
@@ -24,12 +27,14 @@ struct WriterOptions {
 class Endpoint {
  public:
   const std::string& topic() const { return topic_; }
-  std::int32_t handle() const { return entity_.handle(); }
+  std::int32_t handle() const { return handle_; }
   /// What a person needs to mend each refusal: the detail of its first one, by its count's name.
   std::map<std::string, std::string> firstDetails() const;
 
  protected:
-  Endpoint(std::string topic, Entity entity);
+  Endpoint(std::string topic, std::shared_ptr<const Entity> entity);
+  const std::shared_ptr<const Entity>& entity() const { return entity_; }
+  void replace(std::shared_ptr<const Entity> entity);
   void count(const char* what, const Reason& reason);
   /// Adds "<topic>_<what>" where it is not 0.
   void add(ReasonCounts& counts, const char* what, std::uint64_t n) const;
@@ -37,7 +42,8 @@ class Endpoint {
 
  private:
   std::string topic_, count_prefix_;
-  Entity entity_;
+  std::shared_ptr<const Entity> entity_;
+  std::atomic<std::int32_t> handle_;
   mutable std::mutex mutex_;
   ReasonCounts refusals_;
   std::map<std::string, std::string> first_details_;
@@ -53,7 +59,7 @@ class RawReader : public Endpoint {
   /// there are no others.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
   /// Adds what DDS and the checks counted since the start: <topic>_malformed_<reason>,
-  /// _incompatible_qos, _sample_lost, _writers_silent (how many are now).
+  /// _incompatible_qos, _sample_lost, _in_shared_memory, _writers_silent (how many are now).
   void report(ReasonCounts& counts) const;
 
  protected:
@@ -61,6 +67,12 @@ class RawReader : public Endpoint {
   /// Takes what is there, at most one batch; true where there may be more.
   bool takeBatch(const std::function<void(const void* wire)>& on_value,
                  const std::function<void(const void* wire)>& on_gone);
+  using InPlace = std::function<void(std::span<const std::uint8_t>, std::shared_ptr<const void>)>;
+  /// The same of messages as they lie, which stay as long as their keeper.
+  bool takeBatchInPlace(const InPlace& on_value);
+
+ private:
+  std::atomic<std::uint64_t> in_shared_memory_{0};
 };
 
 template <class T>
@@ -79,18 +91,27 @@ class Reader : public RawReader {
   }
   /// The same for at most one batch; true where there may be more.
   bool drainBatch(const Handler& handler, const Handler& on_gone = {}) {
-    using Wire = typename wire::Type<T>::Wire;
-    const auto on_value = [&](const void* sample) {
-      if (auto value = wire::decode<T>(*static_cast<const Wire*>(sample))) {
+    const auto offer = [&](const Result<T>& value) {
+      if (value) {
         handler(*value);
       } else {
         count("malformed", value.error());
       }
     };
-    const auto on_key = [&](const void* sample) {
-      if (on_gone) on_gone(wire::decodeKey<T>(*static_cast<const Wire*>(sample)));
-    };
-    return takeBatch(on_value, on_key);
+    if constexpr (wire::kDecodedInPlace<T>) {
+      return takeBatchInPlace(
+          [&](std::span<const std::uint8_t> cdr, std::shared_ptr<const void> keeper) {
+            offer(wire::decodeInPlace<T>(cdr, std::move(keeper)));
+          });
+    } else {
+      using Wire = typename wire::Type<T>::Wire;
+      const auto on_key = [&](const void* sample) {
+        if (on_gone) on_gone(wire::decodeKey<T>(*static_cast<const Wire*>(sample)));
+      };
+      return takeBatch(
+          [&](const void* sample) { offer(wire::decode<T>(*static_cast<const Wire*>(sample))); },
+          on_key);
+    }
   }
 };
 
@@ -108,17 +129,23 @@ class RawWriter : public Endpoint {
   /// Waits until every matched reader has acknowledged everything; false after the time.
   bool waitForAcknowledgement(double seconds);
   /// Adds <topic>_refused_<reason> (values this process should not have made), _write_<error>,
-  /// _incompatible_qos, _liveliness_lost.
+  /// _incompatible_qos, _liveliness_lost, _left_shared_memory_<reason>.
   void report(ReasonCounts& counts) const;
 
  protected:
   RawWriter(const Participant& participant, const std::string& topic, const WriterOptions& options);
-  Result<void> writeWire(const void* wire);
+  /// `bytes` of its pixels: what is too large for shared memory takes this writer out of it.
+  Result<void> writeWire(const void* wire, std::size_t bytes = 0);
   Result<void> disposeWire(const void* wire);
   void unregisterWire(const void* wire);
 
  private:
+  void leaveSharedMemory(const Reason& reason);
+
+  const Participant participant_;
+  const WriterOptions options_;
   std::int32_t strength_;
+  bool in_shared_memory_;
 };
 
 template <class T>
@@ -134,6 +161,7 @@ class Writer : public RawWriter {
       count("refused", encoded.error());
       return encoded;
     }
+    if constexpr (wire::kDecodedInPlace<T>) return writeWire(&sample, sample.pixels._length);
     return writeWire(&sample);
   }
   /// Of an exclusive topic without a key: until the next write readers hear the next strongest.

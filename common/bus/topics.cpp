@@ -17,6 +17,7 @@ TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded) {
 }
 
 constexpr Qos reliable(int depth) { return {.depth = depth}; }
+constexpr Qos shared(int depth) { return {.depth = depth, .shared_memory = true}; }
 constexpr Qos bestEffort(int depth) { return {.reliable = false, .depth = depth}; }
 constexpr Qos latched(int depth, double lease_s = 0.0) {
   return {.depth = depth, .latched = true, .lease_s = lease_s};
@@ -31,7 +32,7 @@ Table makeTable() {
   using namespace topics;
   constexpr bool kRecorded = true, kNotRecorded = false;
   return {
-      TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), reliable(4), kCameraHz, kRecorded},
+      TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), shared(4), kCameraHz, kRecorded},
       row(kImu, latched(512), kImuHz, kRecorded),
       row(kSpeed, latched(512), kImuHz, kRecorded),
       row(kCalibration, latched(1), 0, kRecorded),

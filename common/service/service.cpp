@@ -112,6 +112,7 @@ Context::Context(const std::string& process, const bus::Options& options,
       loop_(participant_) {
   countReasons([this](ReasonCounts& counts) { health_writer_.report(counts); });
   every(std::chrono::seconds(1), [this] { publishHealth(); });
+  noteSharedMemory();
   publishHealth();
 }
 
@@ -153,10 +154,20 @@ void Context::logNewRefusals() {
   }
 }
 
+/// Logged where it changes: RouDi may go and come while the services run.
+void Context::noteSharedMemory() {
+  const std::string text = domain_.sharedMemoryText();
+  if (text == shared_memory_) return;
+  shared_memory_ = text;
+  log_->log(domain_.sharedMemory().on() ? spdlog::level::info : spdlog::level::warn, "{}", text);
+}
+
 void Context::publishHealth() {
   logNewRefusals();
+  noteSharedMemory();
   if (on_health_) on_health_();
   Health health = health_.sample(std::chrono::steady_clock::now());
+  if (health.message.empty()) health.message = shared_memory_;
   health.reasons = reasons().all();
   (void)health_writer_.write(health);
   notifyWatchdog();

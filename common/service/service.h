@@ -75,6 +75,7 @@ class Context {
  private:
   void publishHealth();
   void logNewRefusals();
+  void noteSharedMemory();
   ReasonCounts reasons() const;
 
   const InstanceId instance_;
@@ -86,6 +87,7 @@ class Context {
   std::list<std::function<void(ReasonCounts&)>> reason_sources_;
   std::list<std::shared_ptr<const bus::Endpoint>> endpoints_;
   std::set<std::string> logged_refusals_;
+  std::string shared_memory_;  ///< what was said of it last
   bus::WaitLoop loop_;
   std::function<void()> on_health_;
 };

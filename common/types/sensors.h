@@ -3,12 +3,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/ids.h"
+#include "common/base/shared_bytes.h"
 #include "common/base/time.h"
 #include "common/math/rigid_transform.h"
 
@@ -25,7 +25,7 @@ struct Frame {
   std::string camera;  ///< "cam0", "cam1"
   std::uint32_t width = 0, height = 0;
   ImageEncoding encoding = ImageEncoding::kMono8;
-  std::shared_ptr<const std::vector<std::uint8_t>> data;  ///< shared, never changed
+  SharedBytes data;  ///< of a received frame: in the memory in which it came
 };
 
 struct ImuSample {
@@ -58,17 +58,17 @@ struct CameraCalibration {
   DistortionModel distortion = DistortionModel::kNone;
   std::vector<double> distortion_coefficients;  ///< 0 or 4
   RigidTransform T_BC;                          ///< camera in body
-  double time_offset_s = 0.0;  ///< t_imu = t_image + time_offset_s
-  double readout_s = 0.0;      ///< rolling shutter, first to last row; 0 = global
-  double rate_hz = 0.0;        ///< nominal
+  double time_offset_s = 0.0;                   ///< t_imu = t_image + time_offset_s
+  double readout_s = 0.0;                       ///< rolling shutter, first to last row; 0 = global
+  double rate_hz = 0.0;                         ///< nominal
 };
 
 struct ImuCalibration {
-  double gyro_noise = 0.0;         ///< rad/s/√Hz
-  double gyro_bias_walk = 0.0;     ///< rad/s²/√Hz
-  double accel_noise = 0.0;        ///< m/s²/√Hz
-  double accel_bias_walk = 0.0;    ///< m/s³/√Hz
-  double rate_hz = 0.0;            ///< nominal
+  double gyro_noise = 0.0;       ///< rad/s/√Hz
+  double gyro_bias_walk = 0.0;   ///< rad/s²/√Hz
+  double accel_noise = 0.0;      ///< m/s²/√Hz
+  double accel_bias_walk = 0.0;  ///< m/s³/√Hz
+  double rate_hz = 0.0;          ///< nominal
 };
 
 /// Where the body stood on Earth at a sensor time.

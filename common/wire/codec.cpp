@@ -2,6 +2,7 @@
 
 #include "common/wire/decoder.h"
 #include "common/wire/encoder.h"
+#include "common/wire/frame_in_place.h"
 
 namespace perdure::wire {
 
@@ -27,6 +28,17 @@ template <class T>
 Result<T> decode(const typename Type<T>::Wire& wire) {
   Decoder decoder;
   T value;
+  describe(decoder, value, wire);
+  if (decoder.failed()) return tl::unexpected(decoder.reason());
+  return value;
+}
+
+template <>
+Result<Frame> decodeInPlace(std::span<const std::uint8_t> cdr, std::shared_ptr<const void> keeper) {
+  perdure_msg_Frame wire{};
+  if (!frameInPlace(cdr, wire)) return fail("cut_off", "the message");
+  Decoder decoder(std::move(keeper));
+  Frame value;
   describe(decoder, value, wire);
   if (decoder.failed()) return tl::unexpected(decoder.reason());
   return value;

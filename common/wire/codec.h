@@ -4,6 +4,9 @@
 // the field, as "items[3].classes[0].covariance".
 #pragma once
 
+#include <memory>
+#include <span>
+
 #include "common/base/result.h"
 #include "common/wire/arena.h"
 #include "common/wire/types.h"
@@ -18,6 +21,15 @@ Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena);
 /// Copies everything out of `wire`, which may hold anything that Cyclone delivers.
 template <class T>
 Result<T> decode(const typename Type<T>::Wire& wire);
+
+/// The same of what lies as CDR in memory that `keeper` keeps (native byte order, no header, as
+/// Cyclone hands it over): sequences of bytes stay there. For types that say so below.
+template <class T>
+Result<T> decodeInPlace(std::span<const std::uint8_t> cdr, std::shared_ptr<const void> keeper);
+template <class T>
+inline constexpr bool kDecodedInPlace = false;
+template <>
+inline constexpr bool kDecodedInPlace<Frame> = true;
 
 /// The same without checks, for a dispose: only the key's fields will be read.
 template <class T>

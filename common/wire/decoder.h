@@ -10,6 +10,10 @@ namespace perdure::wire {
 
 class Decoder : public Checked {
  public:
+  Decoder() = default;
+  /// Pixels stay where they are, in memory that `keeper` keeps.
+  explicit Decoder(std::shared_ptr<const void> keeper) : keeper_(std::move(keeper)) {}
+
   template <class X>
   void value(const char*, X& d, const X& w) {
     d = w;
@@ -116,8 +120,12 @@ class Decoder : public Checked {
     const std::size_t expected = std::size_t{d.width} * d.height * channelsOf(d.encoding);
     if (w.pixels._length != expected) return refuse(name, "size_mismatch");
     if (failed() || !checkBuffer(name, w.pixels, kImageBytes)) return;
-    d.data = std::make_shared<const std::vector<std::uint8_t>>(w.pixels._buffer,
-                                                               w.pixels._buffer + w.pixels._length);
+    const std::span<const std::uint8_t> bytes(w.pixels._buffer, w.pixels._length);
+    if (keeper_) {
+      d.data = {keeper_, bytes};
+    } else {
+      d.data = std::make_shared<const std::vector<std::uint8_t>>(bytes.begin(), bytes.end());
+    }
   }
   template <class Predicate>
   void ensureWire(const char* name, const char* code, Predicate holds) {
@@ -146,6 +154,8 @@ class Decoder : public Checked {
       for (int c = r; c < n; ++c) d(r, c) = d(c, r) = *next++;
     }
   }
+
+  std::shared_ptr<const void> keeper_;
 };
 
 }  // namespace perdure::wire

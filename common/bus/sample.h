@@ -1,0 +1,23 @@
+// Messages as they came, where they lie: in shared memory, or whole from the network. Internal to
+// common/bus.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/bus/domain.h"
+
+namespace perdure::bus {
+
+struct RawSample {
+  std::span<const std::uint8_t> cdr;  ///< without header, native byte order
+  bool in_shared_memory = false;
+  std::shared_ptr<const void> keeper;  ///< of `cdr`; of its reader, too
+};
+
+/// At most `most`; empty where nothing is there.
+std::vector<RawSample> takeInPlace(const std::shared_ptr<const Entity>& reader, std::size_t most);
+
+}  // namespace perdure::bus
