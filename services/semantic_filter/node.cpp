@@ -36,23 +36,6 @@ void Node::onModel(const ModelInfo& model) {
   if (const auto added = models_.add(model); !added) reasons_.add(added.error());
 }
 
-/// Who looks at the frames is inference's business; that a newcomer failed is told as an event.
-void Node::onSwap(const SwapNotice& notice) {
-  if (notice.step != SwapStep::kRolledBack || history_.empty()) return;
-  tellModelChange(history_.back().input.stamp, notice.model + " was rolled back, " +
-                                                   notice.reason + ": " + notice.detail);
-}
-
-void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
-  Event event;
-  event.stamp = stamp;
-  event.instance = instance_;
-  event.world = *world_;
-  event.kind = EventKind::kModelChanged;
-  event.detail = detail;
-  if (outputs_.events) outputs_.events(event);
-}
-
 void Node::advancePoseError(const Odometry& odometry) {
   const PoseParameters& pose = config_.filter.pose;
   const bool walks = !odometry.has_increment ||
@@ -167,6 +150,11 @@ bool Node::attach(Entry& entry, const Detections& detections) {
     reasons_.add(refusal);
     return false;
   }
+  if (doubts(entry, detections)) return true;  // the frame stays without evidence
+  return use(entry, detections);
+}
+
+bool Node::use(Entry& entry, const Detections& detections) {
   if (entry.input.boxes) {
     reasons_.add("detections_repeated");
     return false;

@@ -20,6 +20,7 @@
 #include "services/semantic_filter/core/semantic_filter.h"
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/model_book.h"
+#include "services/semantic_filter/probation.h"
 
 namespace perdure::semantic_filter {
 
@@ -64,7 +65,7 @@ class Node {
   void beginWorld(const WorldId& world);
   const char* refusalOf(const Detections& detections) const;
   bool attach(Entry& entry, const Detections& detections);
-  void tellModelChange(const FrameStamp& stamp, const std::string& detail);
+  bool use(Entry& entry, const Detections& detections);
   void keepEarly(const Detections& detections);
   void forgetEarlyBefore(TimePoint time);
   void stepEntry(Entry& entry);
@@ -72,6 +73,10 @@ class Node {
   void publish(const Entry& entry);
   std::optional<ComingFrame> comingFrame(const Entry& entry) const;
   void publishPredictions(const Entry& entry);
+  // In node_swap.cpp.
+  void tellModelChange(const FrameStamp& stamp, const std::string& detail);
+  bool doubts(const Entry& entry, const Detections& detections);
+  void settleDoubts(bool believed);
   // In node_memory.cpp.
   void insertRecalled(const Recalled& recalled);
   void insert(const Object& object);
@@ -87,6 +92,7 @@ class Node {
   std::shared_ptr<const CameraModel> camera_;  // shared with the entries that were made with it
   std::string camera_name_;
   ModelBook models_;
+  Probation probation_;
   std::optional<WorldId> world_;
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;

@@ -1,0 +1,73 @@
+// What a swap of inference means to the filter.
+#include "services/semantic_filter/node.h"
+
+namespace perdure::semantic_filter {
+
+/// Who looks at the frames is inference's business; a newcomer is heard with care until it has
+/// passed, and that it failed is told as an event.
+void Node::onSwap(const SwapNotice& notice) {
+  if (notice.step == SwapStep::kTookOver && notice.about != 0) {
+    settleDoubts(true);
+    probation_.begin(notice.instance);
+  }
+  if (notice.step == SwapStep::kPassed && probation_.isOf(notice.instance)) {
+    probation_.end();
+    settleDoubts(true);
+  }
+  if (notice.step != SwapStep::kRolledBack) return;
+  if (probation_.isOf(notice.about != 0 ? notice.about : notice.instance)) {
+    probation_.end();
+    settleDoubts(false);
+  }
+  if (history_.empty()) return;
+  tellModelChange(history_.back().input.stamp,
+                  notice.model + " was rolled back, " + notice.reason + ": " + notice.detail);
+}
+
+void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
+  Event event;
+  event.stamp = stamp;
+  event.instance = instance_;
+  event.world = *world_;
+  event.kind = EventKind::kModelChanged;
+  event.detail = detail;
+  if (outputs_.events) outputs_.events(event);
+}
+
+/// Whether these detections of a newcomer are kept back. What was kept before is used as soon as it
+/// sees one of the things again, or has been in doubt for so long that the old one would have said.
+bool Node::doubts(const Entry& entry, const Detections& detections) {
+  if (!probation_.isOf(detections.instance)) return false;
+  const Model* model = models_.find(detections.model_hash);
+  std::vector<Prediction> expected;
+  for (const Object& object : (entry.stepped ? entry.before : belief_).objects) {
+    if (!object.confirmed || !model->names->contains(object.best().class_name)) continue;
+    if (auto prediction = predictionOf(object, entry.input, {})) expected.push_back(*prediction);
+  }
+  const bool blind = missesAll(expected, detections);
+  if (blind && !probation_.full()) {
+    probation_.keep(detections);
+    reasons_.add("detections_in_doubt");
+    return true;
+  }
+  if (blind) probation_.end();
+  settleDoubts(true);
+  return false;
+}
+
+/// Late detections where they are believed; no evidence where not.
+void Node::settleDoubts(bool believed) {
+  const auto kept = probation_.take();
+  if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());
+  if (!believed) return;
+  std::size_t first = history_.size();
+  for (const Detections& detections : kept) {
+    for (std::size_t i = 0; i < history_.size(); ++i) {
+      if (!history_[i].input.stamp.sameFrame(detections.stamp)) continue;
+      if (use(history_[i], detections)) first = std::min(first, i);
+    }
+  }
+  if (first < history_.size()) stepAgainFrom(first);
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,160 @@
+// A swap of inference on the way: a newcomer that goes blind on probation makes
+// nothing doubtful, and one that rightly sees nothing is believed in the end.
+#include <gtest/gtest.h>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::detect;
+using testing::detectionsAt;
+using testing::driveTo;
+using testing::Harness;
+using testing::makeState;
+using testing::odometryAt;
+using testing::TrueObject;
+
+constexpr InstanceId kOld = 3, kNew = 4;
+constexpr std::uint64_t kSwapAt = 20;
+constexpr double kSure = 0.95, kDoubtful = 0.75;  // existence
+
+const std::vector<TrueObject> kStreet = {{makeState(14, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
+                                         {makeState(16, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
+                                         {makeState(24, 5.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
+
+/// Slower from the swap on, so that everything stays in view.
+RigidTransform bodyAt(std::uint64_t k) {
+  const auto fast = static_cast<double>(std::min(k, kSwapAt));
+  return driveTo(1, 0.3 * fast + 0.1 * (static_cast<double>(k) - fast));
+}
+
+Detections look(std::uint64_t k, const std::vector<TrueObject>& objects, InstanceId who) {
+  static const CameraModel camera{testing::makeCamera()};
+  std::mt19937 random(static_cast<std::uint32_t>(1000 + k));
+  View view;
+  view.camera = &camera;
+  view.T_WB = bodyAt(k);
+  std::vector<Detection> list;
+  for (const auto& o : objects) {
+    if (auto d = detect(o, view, BoxParameters{}, 0.5, 3.0, random)) list.push_back(*d);
+  }
+  Detections detections = detectionsAt(k, std::move(list));
+  detections.instance = who;
+  return detections;
+}
+
+SwapNotice notice(SwapStep step, InstanceId who, InstanceId about) {
+  SwapNotice n;
+  n.instance = who;
+  n.about = about;
+  n.step = step;
+  n.probation_s = 30.0;
+  n.model = "newcomer";
+  n.reason = "empty";
+  return n;
+}
+
+struct Watch : Harness {
+  std::uint64_t next = 0;
+
+  void frames(std::uint64_t n, const std::vector<TrueObject>& seen, InstanceId who) {
+    for (std::uint64_t i = 0; i < n; ++i, ++next) {
+      node.onOdometry(odometryAt(next, bodyAt(next)));
+      node.onDetections(look(next, seen, who));
+    }
+  }
+  /// Twenty frames by the old one, and the newcomer takes over.
+  explicit Watch(bool told = true) {
+    frames(kSwapAt, kStreet, kOld);
+    if (told) node.onSwap(notice(SwapStep::kTookOver, kNew, kOld));
+  }
+  /// Existence of what is confirmed, by id.
+  std::map<ObjectId, double> confirmed() const {
+    std::map<ObjectId, double> all;
+    for (const Object& o : node.belief().objects) {
+      if (o.confirmed) all[o.id] = o.existence;
+    }
+    return all;
+  }
+};
+
+TEST(Probation, ABlindNewcomerThatIsRolledBackCostsNothing) {
+  Watch w;
+  const auto before = w.confirmed();
+  ASSERT_EQ(before.size(), 3U);
+  w.frames(12, {}, kNew);
+  EXPECT_EQ(w.objects.back().stamp.sequence, w.next - 1) << "frames are published on time";
+  for (const auto& [id, existence] : before) {
+    ASSERT_TRUE(w.confirmed().contains(id));
+    EXPECT_GT(existence, kSure);
+    EXPECT_NEAR(w.confirmed().at(id), existence, 0.02);
+  }
+  w.node.onSwap(notice(SwapStep::kRolledBack, kOld, kNew));
+  EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), 12U);
+  EXPECT_EQ(w.node.reasons().of("detections_rolled_back"), 12U);
+  w.frames(3, kStreet, kOld);
+  for (const auto& [id, existence] : before) EXPECT_TRUE(w.confirmed().contains(id));
+  EXPECT_EQ(w.confirmed().size(), before.size()) << "nothing was born a second time";
+}
+
+/// What the others of these tests would see if nothing were kept back.
+TEST(Probation, WithoutASwapAsManyEmptyFramesMakeWhatIsInSightDoubtful) {
+  Watch w(false);
+  ASSERT_EQ(w.confirmed().size(), 3U);
+  w.frames(12, {}, kNew);
+  for (const auto& [id, existence] : w.confirmed()) EXPECT_LT(existence, kDoubtful);
+}
+
+TEST(Probation, BoxesElsewhereAreKeptBackAndNothingIsBornOfThem) {
+  Watch w;
+  const std::vector<TrueObject> elsewhere = {
+      {makeState(12, 0.2, 0.75, 0.1, 4.3, 1.75, 1.5), "car"}};
+  w.frames(12, elsewhere, kNew);
+  w.node.onSwap(notice(SwapStep::kRolledBack, kNew, 0));  // it gave up by itself
+  EXPECT_EQ(w.confirmed().size(), 3U);
+  EXPECT_EQ(w.node.belief().objects.size(), 3U);
+}
+
+TEST(Probation, WhatIsGoneIsBelievedGoneWhenTheNewcomerHasPassed) {
+  Watch w, plain(false);
+  w.frames(12, {}, kNew), plain.frames(12, {}, kNew);
+  w.node.onSwap(notice(SwapStep::kPassed, kNew, kOld));
+  ASSERT_EQ(w.node.belief().objects.size(), plain.node.belief().objects.size());
+  for (std::size_t i = 0; i < w.node.belief().objects.size(); ++i) {
+    EXPECT_DOUBLE_EQ(w.node.belief().objects[i].existence,
+                     plain.node.belief().objects[i].existence);
+  }
+  EXPECT_EQ(w.node.reasons().of("detections_rolled_back"), 0U);
+}
+
+TEST(Probation, WhatIsGoneIsBelievedGoneWhenTheOldOneHasHadItsTimeToObject) {
+  Watch w;
+  w.frames(Probation::kLongest, {}, kNew);
+  EXPECT_EQ(w.confirmed().size(), 3U);
+  w.frames(1, {}, kNew);
+  for (const auto& [id, existence] : w.confirmed()) EXPECT_LT(existence, kDoubtful);
+  w.frames(5, {}, kNew);
+  EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), Probation::kLongest) << "no second doubt";
+}
+
+TEST(Probation, WhoSeesTheOthersIsBelievedAboutTheOneThatIsMissing) {
+  Watch w, plain(false);
+  const std::vector<TrueObject> rest(kStreet.begin() + 1, kStreet.end());
+  w.frames(10, rest, kNew), plain.frames(10, rest, kNew);
+  EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), 0U);
+  ASSERT_EQ(w.node.belief().objects.size(), plain.node.belief().objects.size());
+  EXPECT_LT(w.confirmed().begin()->second, kDoubtful);
+}
+
+TEST(Probation, BlindFramesBetweenOthersAreUsedWhenItSeesAgain) {
+  Watch w, plain(false);
+  w.frames(4, {}, kNew), plain.frames(4, {}, kNew);
+  w.frames(1, kStreet, kNew), plain.frames(1, kStreet, kNew);
+  const auto a = w.confirmed(), b = plain.confirmed();
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [id, existence] : a) EXPECT_DOUBLE_EQ(existence, b.at(id));
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
