@@ -295,6 +295,15 @@ void RawWriter::leaveSharedMemory(const Reason& reason) {
   }
 }
 
+/// RouDi joins writer and readers up to 100 ms after DDS has matched them; what is written before
+/// is lost. The first message with readers waits, so that a drive begins with its first frame.
+void RawWriter::awaitJoin() {
+  constexpr dds_duration_t kJoin = DDS_MSECS(200);
+  if (!in_shared_memory_ || joined_ || matched() == 0) return;
+  dds_sleepfor(kJoin);
+  joined_ = true;
+}
+
 Result<void> RawWriter::writeWire(const void* wire, std::size_t bytes) {
   // iceoryx aborts the process where no chunk is large enough.
   if (in_shared_memory_ && bytes > participant_.sharedMemory().most_bytes) {
@@ -302,6 +311,7 @@ Result<void> RawWriter::writeWire(const void* wire, std::size_t bytes) {
                                         " bytes; raise bus.shared_memory_mb, and the chunks in "
                                         "RouDi's configuration"});
   }
+  awaitJoin();
   dds_return_t code = dds_write(handle(), wire);
   if (code == DDS_RETCODE_OUT_OF_RESOURCES && in_shared_memory_) {
     leaveSharedMemory({"used_up", "no chunk of " + std::to_string(bytes) +

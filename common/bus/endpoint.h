@@ -141,11 +141,13 @@ class RawWriter : public Endpoint {
 
  private:
   void leaveSharedMemory(const Reason& reason);
+  void awaitJoin();
 
   const Participant participant_;
   const WriterOptions options_;
   std::int32_t strength_;
   bool in_shared_memory_;
+  bool joined_ = false;
 };
 
 template <class T>

@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/mount.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -63,6 +64,14 @@ std::string environment(const char* name) {
 const bus::Options& ownNetwork() {
   static const bus::Options options = makeNetwork();
   return options;
+}
+
+bool ownFiles() {
+  static const bool own =
+      unshare(CLONE_NEWNS) == 0 && mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+      mount("own", "/tmp", "tmpfs", 0, nullptr) == 0 &&
+      mount("own", "/dev/shm", "tmpfs", 0, nullptr) == 0 && fs::exists(programs());
+  return own;
 }
 
 fs::path programs() { return environment("PERDURE_BIN"); }

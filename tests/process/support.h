@@ -17,6 +17,10 @@ namespace perdure::test {
 /// leases a DDS domain that no other test of this machine uses. Once a process; later calls agree.
 const bus::Options& ownNetwork();
 
+/// Gives this process (and its children) an empty /tmp and /dev/shm of their own, where that is
+/// allowed: what speaks through files there, as iceoryx does, meets no other test.
+bool ownFiles();
+
 /// The folder of the built programs and the root of the sources, as ctest says.
 std::filesystem::path programs();
 std::filesystem::path sources();

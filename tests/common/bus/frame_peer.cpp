@@ -106,7 +106,6 @@ int write(const Participant& participant, int count, std::uint32_t side) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   std::cout << "ready" << std::endl;
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // shared memory is joined later
   std::uint64_t copied = 0, failed = 0;
   for (int i = 0; i < count; ++i) {
     Frame frame = makeFrame(static_cast<std::uint64_t>(i), side);

@@ -4,9 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
 #include <signal.h>
-#include <sys/mount.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -21,15 +19,6 @@ namespace {
 using namespace std::chrono_literals;
 using test::Child;
 using test::eventually;
-
-/// RouDi, and what else stands in /tmp and /dev/shm, are this test's own from now on.
-bool ownFiles() {
-  static const bool own = unshare(CLONE_NEWNS) == 0 &&
-                          mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
-                          mount("own", "/tmp", "tmpfs", 0, nullptr) == 0 &&
-                          mount("own", "/dev/shm", "tmpfs", 0, nullptr) == 0;
-  return own;
-}
 
 /// "got 60 wrong 0 …": the number after a word in what a peer said.
 double said(const Child& peer, const std::string& word) {
@@ -53,7 +42,7 @@ class SharedMemory : public testing::Test {
       GTEST_SKIP() << "iox-roudi is not installed: deploy/install --runtime";
     }
     test::ownNetwork();
-    if (!ownFiles() || !std::filesystem::exists(std::getenv("PERDURE_FRAME_PEER"))) {
+    if (!test::ownFiles()) {
       GTEST_SKIP() << "no /tmp of one's own: mount is not allowed here";
     }
     folder_ = std::make_unique<test::Folder>();

@@ -1,0 +1,62 @@
+// One real inference process: under a time budget, and with more frames than it can look at.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/services/inference/service_rig.h"
+
+namespace perdure::inference {
+namespace {
+
+using ::testing::HasSubstr;
+using Rig = testing::ServiceRig;
+
+std::vector<std::string> committedModel() {
+  return {"--set", "model.path=" + (test::sources() / "models/perdure_320x240.onnx").string()};
+}
+
+std::vector<std::string> operator+(std::vector<std::string> a, const std::vector<std::string>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+TEST(InferenceService, ABudgetThatCannotBeKeptMakesTheInputSmallerAndHealthSaysSo) {
+  Rig rig(test::ownNetwork(), committedModel() + std::vector<std::string>{"--budget-ms", "0.5"});
+  for (int i = 0; i < 20; ++i) {
+    rig.send();
+    ASSERT_TRUE(rig.answered(rig.sent - 1)) << rig.service->log();
+  }
+  EXPECT_DOUBLE_EQ(rig.answers.front().input_scale, 1.0);
+  EXPECT_LT(rig.answers.back().input_scale, 0.65);
+  EXPECT_TRUE(rig.until([&] { return rig.health.reasons.contains("input_smaller"); }));
+  EXPECT_THAT(rig.health.message, HasSubstr("% of its width, for the budget of 0 ms"));
+  EXPECT_THAT(rig.health.message, HasSubstr("ms old"));
+}
+
+TEST(InferenceService, ABudgetThatIsKeptLeavesTheInputAlone) {
+  Rig rig(test::ownNetwork(), committedModel() + std::vector<std::string>{"--budget-ms", "10000"});
+  for (int i = 0; i < 12; ++i) {
+    rig.send();
+    ASSERT_TRUE(rig.answered(rig.sent - 1)) << rig.service->log();
+  }
+  for (const Detections& d : rig.answers) EXPECT_DOUBLE_EQ(d.input_scale, 1.0);
+  EXPECT_FALSE(rig.health.reasons.contains("input_smaller"));
+}
+
+TEST(InferenceService, LooksAtTheNewestFrameAndItsAnswersKnowWhenTheyWereTaken) {
+  Rig rig(test::ownNetwork(), committedModel());
+  constexpr std::uint64_t kBurst = 40;
+  for (std::uint64_t i = 0; i < kBurst; ++i) rig.send();
+  ASSERT_TRUE(rig.answered(kBurst - 1)) << "the newest one is looked at";
+  ASSERT_TRUE(rig.until([&] { return rig.health.frames_out == rig.answers.size(); }));
+  EXPECT_LT(rig.answers.size(), kBurst) << "it looked at frames that were old already";
+  for (std::size_t i = 0; i < rig.answers.size(); ++i) {
+    const FrameStamp& stamp = rig.answers[i].stamp;
+    EXPECT_EQ(stamp.captured_ns, 1'000'001 + static_cast<std::int64_t>(stamp.sequence));
+    EXPECT_TRUE(i == 0 || stamp.sequence > rig.answers[i - 1].stamp.sequence);
+  }
+  EXPECT_EQ(rig.health.frames_in, rig.health.frames_out + rig.health.dropped)
+      << "each frame is answered or counted";
+}
+
+}  // namespace
+}  // namespace perdure::inference

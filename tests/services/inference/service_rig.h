@@ -1,0 +1,61 @@
+// One real inference process, frames for it, and what comes back.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "tests/process/support.h"
+#include "tests/services/run_until.h"
+
+namespace perdure::inference::testing {
+
+class ServiceRig {
+ public:
+  ServiceRig(const bus::Options& options, const std::vector<std::string>& arguments)
+      : domain_(options), participant_(domain_, "test") {
+    std::vector<std::string> command = {(test::programs() / "perdure-inference").string()};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    service = std::make_unique<test::Child>(command, folder.file("inference.log"));
+    loop_.on(detections_, [this](const Detections& d) { answers.push_back(d); });
+    loop_.on(health_, [this](const Health& h) {
+      if (h.process == "inference") health = h;
+    });
+    EXPECT_TRUE(until([&] { return frames_.matched() == 1 && detections_.matched() == 1; }))
+        << service->log();
+  }
+
+  void send(std::uint32_t width = 640, std::uint32_t height = 480) {
+    Frame frame;
+    frame.stamp.source = 77;
+    frame.stamp.sequence = sent++;
+    frame.stamp.time = fromNanoseconds(static_cast<std::int64_t>(sent) * 100'000'000);
+    frame.stamp.captured_ns = 1'000'000 + static_cast<std::int64_t>(sent);
+    frame.camera = "cam0";
+    frame.width = width;
+    frame.height = height;
+    frame.data = std::make_shared<const std::vector<std::uint8_t>>(
+        std::size_t{width} * height, static_cast<std::uint8_t>(40 + 10 * (sent % 20)));
+    ASSERT_TRUE(frames_.write(frame));
+  }
+  bool until(const std::function<bool()>& so) { return test::runUntil(loop_, so); }
+  bool answered(std::uint64_t sequence) {
+    return until([&] { return !answers.empty() && answers.back().stamp.sequence == sequence; });
+  }
+
+  test::Folder folder;
+  std::unique_ptr<test::Child> service;
+  std::vector<Detections> answers;
+  Health health;
+  std::uint64_t sent = 0;
+
+ private:
+  bus::Domain domain_;
+  bus::Participant participant_;
+  bus::Writer<Frame> frames_{participant_, bus::topics::frame("cam0")};
+  bus::Reader<Detections> detections_{participant_, bus::topics::kDetections};
+  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
+  bus::WaitLoop loop_{participant_};
+};
+
+}  // namespace perdure::inference::testing
