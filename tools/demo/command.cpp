@@ -104,6 +104,9 @@ void addDemoCommand(CLI::App& app) {
       ->capture_default_str();
   demo->add_option("--out", options->out, "folder for what comes out")->capture_default_str();
   demo->add_flag("--headless", options->headless, "open no window (this version has none to open)");
+  demo->add_option("--shared-memory-mb", options->shared_memory_mb,
+                   "images up to this size go through shared memory, where iox-roudi runs")
+      ->check(CLI::Range(0, 256));
   demo->add_option("--truth", options->truth, "root of KITTI tracking with label_02 and calib");
   demo->add_option("--truth-sequence", options->truth_sequence, "in --truth, for example 0000");
   demo->add_option("--root", options->root, "folder that has config/")->capture_default_str();

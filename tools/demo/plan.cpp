@@ -118,7 +118,11 @@ std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFold
     ServicePlan plan{name, {program.string()}, (folders.run / (name + ".log")).string()};
     const fs::path config = root / "config" / (name + ".yaml");
     if (fs::exists(config)) plan.command.insert(plan.command.end(), {"--config", config.string()});
-    for (const std::string& setting : settingsOf(name, options, folders)) {
+    auto settings = settingsOf(name, options, folders);
+    if (options.shared_memory_mb > 0) {
+      settings.push_back(fmt::format("bus.shared_memory_mb={}", options.shared_memory_mb));
+    }
+    for (const std::string& setting : settings) {
       plan.command.insert(plan.command.end(), {"--set", setting});
     }
     plans.push_back(std::move(plan));

@@ -17,7 +17,8 @@ struct DemoOptions {
   std::string programs;    ///< folder of the services; empty: that of this program
   std::string truth;       ///< root of KITTI tracking; empty: looked for beside the data
   std::string truth_sequence;
-  double seconds = 0.0;  ///< of the drive; 0: all of it
+  double seconds = 0.0;      ///< of the drive; 0: all of it
+  int shared_memory_mb = 0;  ///< of images; 0: none
   bool headless = false;
 };
 

@@ -67,8 +67,40 @@ TEST(Swap, OnCommandTakesOverWithoutLosingAFrameAndTheOldOneRetires) {
   EXPECT_TRUE(d.rig.happened("second instead of first"));
 }
 
+/// The probability of each class of an object, by name.
+std::map<std::string, double> pmfOf(const ObjectBelief& object) {
+  std::map<std::string, double> pmf;
+  for (const ClassBelief& c : object.classes) pmf[c.name] = c.probability;
+  return pmf;
+}
+
+TEST(Swap, ToANetworkOfOtherClassesObjectsKeepIdsAndClassesByName) {
+  Drive d(0.1);
+  const auto before = d.rig.objects();
+  ASSERT_GE(before.objects.size(), 2U);
+  testing::TinyOnnx other = swapNetwork("other");  // its car is the third class, a lamp is new
+  other.classes_json = R"(["person", "lamp", "car"])";
+  other.logits = {0.0F, -2.0F, -1.0F, 5.0F};
+  const auto command = d.rig.swap(d.rig.model(other), 1.0, "swap");
+  ASSERT_TRUE(d.rig.sendUntil(30, [&] { return command->wait(0ms) >= 0; })) << command->log();
+  EXPECT_EQ(command->wait(0ms), 0) << command->log();
+  d.rig.sendFrames(kSettled);
+  EXPECT_NE(d.rig.heard(), d.owner_id);
+  EXPECT_TRUE(d.rig.happened("other instead of first; new classes: lamp"));
+  for (const ObjectBelief& old : before.objects) {
+    const auto& now = d.rig.objects().objects;
+    const auto same =
+        std::find_if(now.begin(), now.end(), [&](const auto& o) { return o.id == old.id; });
+    ASSERT_NE(same, now.end()) << "object " << old.id << " is gone";
+    EXPECT_EQ(same->best().name, old.best().name);
+    EXPECT_NEAR(pmfOf(*same)["car"], pmfOf(old)["car"], 0.1);
+    EXPECT_LT(pmfOf(*same)["lamp"], 0.1) << "it enters at its prior, and the network denies it";
+  }
+}
+
 TEST(Swap, ANewcomerThatGoesBlindOnProbationIsRolledBack) {
   Drive d(0.1);
+  const auto ids = d.rig.objectIds();
   const auto first = d.rig.next();
   const auto command = d.rig.swap(d.rig.model(swapNetwork("blind", "empty")), 20.0, "swap");
   ASSERT_TRUE(d.rig.sendUntil(20, [&] { return d.rig.heard() != d.owner_id; })) << command->log();
@@ -85,6 +117,8 @@ TEST(Swap, ANewcomerThatGoesBlindOnProbationIsRolledBack) {
   EXPECT_THAT(health.message, HasSubstr("blind was rolled back, empty"));
   EXPECT_EQ(health.reasons.count("swap_rolled_back_empty"), 1u);
   expectNothingLost(d.rig, first, d.rig.next() - kSettled / 2);
+  EXPECT_EQ(d.rig.objectIds(), ids) << "what the blind one missed was not taken for gone";
+  EXPECT_GT(d.rig.healthOf("semantic_filter").reasons.count("detections_rolled_back"), 0U);
 }
 
 TEST(Swap, AStrangersServiceIsHeardAndWhenItDiesTheOldOneIs) {

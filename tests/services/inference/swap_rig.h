@@ -217,6 +217,14 @@ class SwapRig {
     for (const auto& o : last_objects_.objects) ids.insert(o.id);
     return ids;
   }
+  const Objects& objects() const { return last_objects_; }
+  /// What the process of this name said last of itself.
+  Health healthOf(const std::string& process) const {
+    for (const auto& [instance, h] : healths_) {
+      if (h.process == process) return h;
+    }
+    return {};
+  }
   const std::map<std::uint64_t, int>& objectMessages() const { return object_messages_; }
   const std::map<InstanceId, Health>& healths() const { return healths_; }
   void forgetNotices() { said_.clear(), happened_.clear(); }
