@@ -61,6 +61,17 @@ TEST_F(DemoPlan, GivesEachServiceWhatItNeeds) {
   EXPECT_THAT(commandOf("map_store"), Contains(HasSubstr("out/run/state/map.sqlite")));
 }
 
+TEST_F(DemoPlan, TellsAllServicesOfSharedMemoryWhereItIsAskedFor) {
+  const auto services = {"capture", "inference", "vio", "semantic_filter", "map_store"};
+  for (const char* service : services) {
+    EXPECT_THAT(commandOf(service), Not(Contains(HasSubstr("shared_memory"))));
+  }
+  options_.shared_memory_mb = 8;
+  for (const char* service : services) {
+    EXPECT_THAT(commandOf(service), Contains("bus.shared_memory_mb=8")) << service;
+  }
+}
+
 TEST_F(DemoPlan, TellsVioThatASimulatedCarDoesNotSlide) {
   EXPECT_THAT(commandOf("vio"), Not(Contains("speed.planar=true")));
   fs::create_directories(folder_ / "drive" / "mav0" / "speed0");
