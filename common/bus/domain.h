@@ -55,8 +55,8 @@ class Domain {
   explicit Domain(const Options& options);
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// What there is to say of shared memory now: empty where it was not asked for, or RouDi was
-  /// lost.
+  /// What there is to say of shared memory now, for people, with the mend; empty where it was not
+  /// asked for.
   std::string sharedMemoryText() const;
   const std::shared_ptr<const Entity>& entity() const { return domain_; }
 

@@ -62,9 +62,10 @@ void Node::settleDoubts(bool believed) {
   if (!believed) return;
   std::size_t first = history_.size();
   for (const Detections& detections : kept) {
+    if (refusalOf(detections) != nullptr) continue;  // its model was forgotten meanwhile
     for (std::size_t i = 0; i < history_.size(); ++i) {
       if (!history_[i].input.stamp.sameFrame(detections.stamp)) continue;
-      if (use(history_[i], detections)) first = std::min(first, i);
+      if (use(history_[i], detections) && history_[i].stepped) first = std::min(first, i);
     }
   }
   if (first < history_.size()) stepAgainFrom(first);

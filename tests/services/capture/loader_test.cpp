@@ -54,7 +54,7 @@ class LoaderTest : public ::testing::Test {
       if (!message) continue;
       if (auto* frame = std::get_if<Frame>(&*message)) {
         EXPECT_EQ(frame->stamp.source, 9u);
-        EXPECT_EQ(frame->data->at(0), frame->stamp.sequence) << "the pixels are of another frame";
+        EXPECT_EQ(frame->data->front(), frame->stamp.sequence) << "the pixels are of another frame";
         out.frames.emplace_back(frame->stamp.sequence, frame->camera);
       } else if (auto* imu = std::get_if<ImuSample>(&*message)) {
         out.samples_ns.push_back(toNanoseconds(imu->time));
