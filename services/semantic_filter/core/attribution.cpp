@@ -45,7 +45,7 @@ double saidByNetwork(const Object& object, const std::vector<Shares>& shares,
                      const std::vector<Evidence>& boxes, const FrameContext& frame) {
   std::vector<double> unsaid;  // 1 / g_k, of each box
   for (const std::size_t z : looked_at) {
-    unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name)));
+    unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name, object.alike)));
   }
   double with = 0.0, without = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {

@@ -370,6 +370,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.hits = 1;
   object.asked = frame.model->names;
   bookBirth(object, kept, evidence, frame);
+  object.alike = evidence.log_ratio_best;
   object.hit_view = object.late_view = {frame.view.T_WC(), 1.0};
   object.last_view = frame.view.T_WC();
   return object;

@@ -48,6 +48,16 @@ const char* flawOf(const Detection& detection, const Model& model) {
   return detection.azimuth_sigma > 0.0 ? nullptr : "detections_azimuth_without_sigma";
 }
 
+namespace {
+
+/// A thing of no known class looks to the network like clutter, or like one of its classes.
+double logRatioOfOther(const Evidence& e, double alike) {
+  const double share = alikeProbability(e.lookalike, alike);
+  return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
+}
+
+}  // namespace
+
 std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
                                      double height, const BoxParameters& box,
                                      const ClutterParameters& clutter) {
@@ -68,9 +78,9 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
   e.z = measure(b, width, height, box, noise);
   if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
   e.log_clutter = logClutter(e.z, width, height, clutter);
-  // A thing of no known class looks to the network like clutter, or like one of its classes.
-  e.log_ratio_other =
-      std::log(1.0 - clutter.other_lookalike + clutter.other_lookalike * std::exp(best));
+  e.log_ratio_best = best;
+  e.lookalike = clutter.other_lookalike;
+  e.log_ratio_other = logRatioOfOther(e, 0.0);
   e.azimuth = detection.azimuth;
   e.azimuth_sigma = detection.azimuth_sigma;
   return e;
@@ -88,9 +98,16 @@ std::optional<std::vector<double>> primedRatios(const Detection& detection, cons
   return ratios;
 }
 
-double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name) {
+double alikeProbability(double prior, double alike) {
+  const double looks_alike = prior * std::exp(std::min(alike, 100.0));
+  return looks_alike / (1.0 - prior + looks_alike);
+}
+
+double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name,
+                double alike) {
   const auto it = model.index.find(class_name);
-  return it == model.index.end() ? evidence.log_ratio_other : evidence.log_ratio[it->second];
+  if (it != model.index.end()) return evidence.log_ratio[it->second];
+  return alike == 0.0 ? evidence.log_ratio_other : logRatioOfOther(evidence, alike);
 }
 
 }  // namespace perdure::semantic_filter

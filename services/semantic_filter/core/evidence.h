@@ -46,7 +46,9 @@ struct Evidence {
   BoxMeasurement z;
   double log_clutter = 0.0;
   std::vector<double> log_ratio;  ///< by the model's class, clamped
-  double log_ratio_other = 0.0;   ///< of a real thing of no known class
+  double log_ratio_best = 0.0;    ///< the most of them
+  double log_ratio_other = 0.0;   ///< of a real thing of no known class, at first sight
+  double lookalike = 0.0;         ///< share of such things that look like one of a known class
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
 };
@@ -67,7 +69,14 @@ using PrimedAnswers = std::map<ObjectId, std::vector<double>>;
 std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
                                                 const ClutterParameters& clutter);
 
-/// log g_k; classes that the model does not know are seen as "other".
-double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name);
+/// That a thing of no known class looks like one of a known class: `prior` is the share of such
+/// things, `alike` the nats by which its looks resembled one.
+double alikeProbability(double prior, double alike);
+
+/// log g_k; classes that the model does not know are seen as "other". `alike`: nats by which its
+/// earlier looks resembled a known class, if it is of none (a toy looks like a car whenever it is
+/// looked at).
+double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name,
+                double alike = 0.0);
 
 }  // namespace perdure::semantic_filter

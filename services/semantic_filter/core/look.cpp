@@ -17,19 +17,33 @@ double logClutterOf(const Evidence& e, const BoxScore& score, const FrameContext
   return logClutter(e.z, camera.width(), camera.height(), frame.parameters->clutter, ignored);
 }
 
-void scoreBoxes(HypothesisLook& h, const std::string& class_name, const ObjectLook& look,
-                const std::vector<Evidence>& boxes, const FrameContext& frame) {
+void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
+                const ObjectLook& look, const std::vector<Evidence>& boxes,
+                const FrameContext& frame) {
   for (std::size_t i = 0; i < look.boxes.size(); ++i) {
     const Evidence& e = boxes[look.boxes[i]];
     if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
     const auto score = scoreBox(e.z, *h.box, h.covariance, look.sight.hidden,
                                 frame.parameters->box.gate, frame.parameters->box.tail);
     if (!score) continue;
-    const double log_l =
-        logRatio(e, *frame.model, class_name) + score->log_density - logClutterOf(e, *score, frame);
+    const double log_l = logRatio(e, *frame.model, class_name, alike) + score->log_density -
+                         logClutterOf(e, *score, frame);
     h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
     h.nis[i] = score->nis / score->dof;
   }
+}
+
+/// What is of no known class and looks like one is found as often as those of that class.
+double foundAs(const Hypothesis& hypothesis, const Object& object, double size_px,
+               const FrameContext& frame) {
+  const double own = detectionProbability(frame.priors->of(hypothesis.class_name), size_px, frame);
+  if (hypothesis.class_name != kOtherClass) return own;
+  const auto named = std::find_if(object.hypotheses.begin(), object.hypotheses.end(),
+                                  [](const auto& h) { return h.class_name != kOtherClass; });
+  if (named == object.hypotheses.end()) return own;
+  const double alike = alikeProbability(frame.parameters->clutter.other_lookalike, object.alike);
+  const ClassPrior& like = frame.priors->of(named->class_name);
+  return (1.0 - alike) * own + alike * detectionProbability(like, size_px, frame);
 }
 
 HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const Sight& sight,
@@ -43,7 +57,7 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const 
   const double size =
       std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
   const double v = sight.fraction * (1.0 - object.screened);
-  h.detection = v * detectionProbability(frame.priors->of(hypothesis.class_name), size, frame);
+  h.detection = v * foundAs(hypothesis, object, size, frame);
   h.missed = v - h.detection;
   h.silent = 1.0 - h.detection;
   return h;
@@ -93,7 +107,7 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
     HypothesisLook& h = result.hypotheses[i];
     h.likelihood.assign(result.boxes.size(), 0.0);
     h.nis.assign(result.boxes.size(), 0.0);
-    if (h.box) scoreBoxes(h, object.hypotheses[i].class_name, result, boxes, frame);
+    if (h.box) scoreBoxes(h, object.hypotheses[i].class_name, object.alike, result, boxes, frame);
   }
   return result;
 }

@@ -61,6 +61,7 @@ struct Object {
   ViewPoint late_view;       ///< of the last look, whatever it showed
   /// Log-odds by which "it is a real thing" is above "it is there still" (core/update.h).
   double lead = 0.0;
+  double alike = 0.0;     ///< nats for "looks like a known class", if it is of none (logRatio)
   double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
   std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
   double support = 1.0;                     ///< share of late visible looks that showed it

@@ -378,6 +378,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   }
   bookExistence(object, next, reasons);
   updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
+  if (own) object.alike += hit.worth * boxes[look.boxes[*own]].log_ratio_best;
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
   if (seen >= 0.5 || !look.primed) {  // to be asked again is no look of its own
     object.late_view = {frame.view.T_WC(), hit.looks + std::min(1.0, look.sight.fraction)};
