@@ -9,17 +9,13 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.986, 0.98, 0.903: the car at 40 m is 16 px high and found in six looks of ten; it "
-            "is believed a little later"},
+            "0.985, 0.978, 0.9: the car at 40 m is 16 px high and found in six looks of ten; it is "
+            "believed a little later"},
        }},
       {"occlusion",
        {
-           {"ids of the hidden chair",
-            "1, 2, 1: it is given up while something that is not on the map still hides most of "
-            "it"},
-           {"objects for each one found", "1, 1, 1.15: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 2, 5: looks whose box another thing may have made, or a belief of odd size given "
+            "4, 3, 2: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"vanish",
@@ -28,75 +24,77 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
             "1, 1, 0: its old belief is lost before the new one is confirmed, or the new one is "
             "not placed"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 1, 4: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 0, 3: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"room",
        {
            {"objects for each one found",
-            "1.04, 1.07, 1.09: chairs close together change their ids"},
+            "1.11, 1.04, 1.09: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 4, 1: looks whose box another thing may have made, or a belief of odd size given "
+            "6, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"row",
        {
            {"cars that are on the map twice at the end",
-            "0, 1, 1: cars of unusual size stand where the usual would"},
+            "0, 3, 1: cars of unusual size stand where the usual would"},
            {"cars of the row that are on the map within 0.5 m",
-            "6, 6, 4: placed along the line of sight to a metre"},
+            "3, 5, 8: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 0, 0: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 2, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "4.21, 13.9, 3.08: not by the roll alone: the estimate still settles as the camera "
+            "4.05, 15.1, 3.48: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.103, 0.137, 0.138: not by the roll alone: the estimate still settles as the camera "
+            "0.209, 0.108, 0.0879: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.27, 0.249, 0.257: not by the roll alone: the estimate still settles as the camera "
+            "0.37, 0.218, 0.211: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 0, 2: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
+           {"merges that lost existence", "0, 1, 0: a miss in the same frame"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "4, 2, 3: what a moving car leaves behind where it was first believed to stand"},
+            "3, 2, 2: what a moving car leaves behind where it was first believed to stand"},
            {"`moved` events of the parked car that drives off",
-            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does not "
+            "0, 0, 0: the belief at rest follows it for some metres, so that the new one does not "
             "come from its place"},
            {"standing things on the map where nothing is",
-            "4, 2, 3: what a moving car leaves behind where it was first believed to stand"},
+            "3, 2, 2: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 5, 4: looks whose box another thing may have made, or a belief of odd size given "
+            "4, 6, 4: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"street",
        {
            {"second lap: share that keeps the id of the first",
-            "0.922, 0.923, 0.962: taken for moving on the first lap and given up out of view, or "
+            "0.904, 0.897, 0.964: taken for moving on the first lap and given up out of view, or "
             "two beliefs in one thing"},
+           {"objects of the map for each one found", "1.02, 1.02, 1.02: two beliefs in one thing"},
+           {"switches of id, FINAL", "1, 1, 1: two beliefs in one thing"},
            {"flicker: claims in full sight that ceased and came back",
-            "7, 12, 14: some misses in a row, or a place lost for a few frames"},
+            "9, 9, 13: some misses in a row, or a place lost for a few frames"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 1, 3: looks whose box another thing may have made, or a belief of odd size given "
+            "5, 1, 3: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
+           {"merges that lost existence", "2, 1, 0: a miss in the same frame"},
        }},
       {"street recalled",
        {
            {"second lap: share that keeps the id of the first",
-            "0.902: taken for moving on the first lap and given up out of view, or two beliefs in "
+            "0.925: taken for moving on the first lap and given up out of view, or two beliefs in "
             "one thing"},
-           {"objects of the map for each one found", "1.02: two beliefs in one thing"},
-           {"switches of id, FINAL", "1: two beliefs in one thing"},
            {"flicker: claims in full sight that ceased and came back",
-            "2: some misses in a row, or a place lost for a few frames"},
+            "5: some misses in a row, or a place lost for a few frames"},
        }},
       {"toy vio",
        {

@@ -99,8 +99,9 @@ std::optional<std::vector<double>> primedRatios(const Detection& detection, cons
 }
 
 double alikeProbability(double prior, double alike) {
+  constexpr double kMost = 0.5;  // from another side it may look like nothing
   const double looks_alike = prior * std::exp(std::min(alike, 100.0));
-  return looks_alike / (1.0 - prior + looks_alike);
+  return std::min(looks_alike / (1.0 - prior + looks_alike), std::max(kMost, prior));
 }
 
 double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name,
