@@ -12,10 +12,11 @@ constexpr uint64_t kHash = 0x1a3b, kInstance = 0x57ab;  // of the model; of this
 
 /// An empty list is a statement, too: nothing is there.
 void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
-  const uint32_t pixels = frame.width * frame.height, channels = frame.pixels._length / pixels;
+  const uint32_t pixels = frame.width * frame.height, bytes = frame.pixels._length;
+  if (pixels == 0 || bytes < pixels) return;
   double x1 = frame.width, y1 = frame.height, x2 = 0, y2 = 0;
   for (uint32_t i = 0; i < pixels; ++i) {
-    if (frame.pixels._buffer[i * channels] < 200) continue;
+    if (frame.pixels._buffer[i * (bytes / pixels)] < 200) continue;
     const double x = i % frame.width, y = i / frame.width;
     x1 = std::min(x1, x), y1 = std::min(y1, y), x2 = std::max(x2, x + 1), y2 = std::max(y2, y + 1);
   }
@@ -55,13 +56,10 @@ int main() {
             &model);
   for (;; dds_sleepfor(DDS_MSECS(5))) {
     dds_assert_liveliness(detections);  // also where no frame comes
-    void* sample = nullptr;
     dds_sample_info_t info;
-    while (dds_take(frames, &sample, &info, 1, 1) > 0) {
-      const auto& frame = *static_cast<const perdure_msg_Frame*>(sample);
-      if (info.valid_data && frame.pixels._length > 0) look(frame, detections);
+    for (void* sample = nullptr; dds_take(frames, &sample, &info, 1, 1) > 0; sample = nullptr) {
+      if (info.valid_data) look(*static_cast<const perdure_msg_Frame*>(sample), detections);
       dds_return_loan(frames, &sample, 1);
-      sample = nullptr;
     }
   }
 }
