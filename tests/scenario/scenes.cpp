@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <filesystem>
 #include <iostream>
 
 #include "common/base/errors.h"
@@ -34,6 +36,18 @@ void trace(const test::Outcome& run, std::uint64_t truth_id, double within) {
   }
 }
 
+/// What ctest tells the tests.
+void findSources() {
+  namespace fs = std::filesystem;
+  const fs::path source = fs::current_path();
+  if (!fs::exists(source / "config" / "semantic_filter.yaml")) {
+    throw StartupError(ExitCode::kUsage, "scenes: run it from the root of the sources");
+  }
+  const fs::path build = fs::read_symlink("/proc/self/exe").parent_path().parent_path();
+  setenv("PERDURE_SOURCE", source.c_str(), 0);
+  setenv("PERDURE_BIN", (build / "bin").c_str(), 0);
+}
+
 int run(int argc, char** argv) {
   test::Setting setting;
   std::size_t seeds = 3;
@@ -50,6 +64,7 @@ int run(int argc, char** argv) {
   app.add_option("--truth", truth, "Print what is believed near this true object, by frame");
   app.add_option("--within", within, "Metres from it")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  findSources();
   std::vector<std::uint64_t> numbers;
   for (std::size_t i = 0; i < seeds; ++i) numbers.push_back(first + i);
   for (const auto& scene : scenes) {
@@ -73,5 +88,8 @@ int main(int argc, char** argv) {
   } catch (const perdure::StartupError& error) {
     std::cerr << error.what() << std::endl;
     return static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    std::cerr << "scenes: " << error.what() << std::endl;
+    return 1;
   }
 }

@@ -76,7 +76,7 @@ struct Object {
   /// an estimate from the looks since then would lose it.
   bool remembers_all = true;
   std::uint32_t fresh_keyframes = 0;     ///< that came since the state was last smoothed
-  std::uint32_t remembered = 0;          ///< looks, in all
+  std::uint32_t remembered = 0;          ///< since there were enough to smooth
   std::uint32_t seek_modes_at = 0;       ///< so many, other modes are sought
   std::uint32_t smoothing_patience = 1;  ///< grows while smoothing finds little to mend
   /// Classes that the models which saw it could name; none of one that came back.

@@ -197,9 +197,9 @@ bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>
   return smoothingNeed(object, p.smooth.fresh) >= 1.0;
 }
 
-double smoothingNeed(const Object& object, double share) {
+double smoothingNeed(const Object& object, double fresh) {
   return object.fresh_keyframes /
-         (share * static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
+         (fresh * static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
 }
 
 void smooth(Object& object, const FrameContext& frame) {
