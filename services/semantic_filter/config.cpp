@@ -20,6 +20,13 @@ void describeBox(BoxParameters& p, Fields& fields) {
                 {"a side this near to the image border is cut by it", "px"});
   fields.number("box.gate", p.gate, between(0.5, 1.0 - 1e-12),
                 {"probability inside the gate of the normalised innovation"});
+  fields.number(
+      "box.amodal", p.amodal, between(0.01, 0.99),
+      {"share of boxes that span the whole thing where something on the map hides a side"});
+  fields.number(
+      "box.part", p.part, between(0, 1),
+      {"share of boxes that show a part of a thing alone: of whatever shape, or ending at "
+       "one side where something hides the rest"});
   fields.number("box.tail", p.tail, atLeast(1),
                 {"degrees of freedom of the innovation's t distribution: outliers count less"});
   fields.number("box.min_size_px", p.min_size_px, positive(),
@@ -62,8 +69,6 @@ void describeBirth(BirthParameters& p, Fields& fields) {
                 {"weaker boxes support objects that are there, and give no birth", "nats"});
   fields.number("birth.claimed", p.claimed, between(0, 1),
                 {"a box claimed with more than this gives no birth"});
-  fields.number("birth.part", p.part, between(0, 1),
-                {"share of boxes that show a part of a thing alone, of whatever shape"});
   fields.integer("birth.max_classes", p.max_classes, between(1, 1000),
                  {"classes of the network kept for an object, \"other\" beside them"});
   fields.number("birth.class_ratio", p.class_ratio, between(0, 1),
@@ -85,6 +90,8 @@ void describeMotion(Parameters& p, Fields& fields) {
                 {"white acceleration of a moving object", "m/s²/√Hz"});
   fields.number("motion.survival_s", m.survival_s, positive(),
                 {"mean time for which a thing stays where it is", "s"});
+  fields.number("motion.mover_survival_s", m.mover_survival_s, positive(),
+                {"mean time for which an unseen mover goes on as it did", "s"});
   fields.number("motion.min_speed", m.min_speed, positive(),
                 {"slower objects count as static", "m/s"});
   fields.number("motion.slow_share", p.motion.slow_share, atLeast(0),

@@ -199,7 +199,7 @@ void addClass(Object& object, const ClassPrior& prior, double ratio, const Evide
     const auto fit = fitCuboid(evidence, prior, start.yaw, start.sigma, range, frame);
     if (!fit) continue;
     fits.push_back(fit->hypothesis);
-    const double part = frame.parameters->birth.part;
+    const double part = frame.parameters->box.part;
     const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, evidence, frame));
     fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape);
   }

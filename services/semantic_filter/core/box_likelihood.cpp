@@ -129,47 +129,107 @@ std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox&
   return use;
 }
 
-std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
-                                 const Eigen::Matrix4d& covariance,
-                                 const std::array<bool, 4>& hidden, double gate, double tail) {
-  auto use = comparableSides(z, predicted, hidden);
-  // The true side lies at or beyond the observed end: left and top to smaller coordinates.
-  const auto beyond = [&](int i) {
-    return i < 2 ? predicted.sides[i] - z.sides[i] : z.sides[i] - predicted.sides[i];
-  };
+namespace {
+
+/// How far the predicted side lies within the observed one: the true one, where that is cut, lies
+/// at or beyond it, left and top to smaller coordinates.
+double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
+  const double d = predicted.sides[side] - z.sides[side];
+  return side < 2 ? d : -d;
+}
+
+using Sides = std::array<bool, 4>;
+
+/// Of the sides in use; those that are not used have the probability that they lie beyond.
+std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                   const Eigen::Matrix4d& covariance, const Sides& use,
+                                   const BoxParameters& parameters) {
   BoxScore score;
-  for (int i = 0; i < 4; ++i) {
-    if (!z.measured[i] || use[i]) continue;
-    // What passes behind the camera reaches at least as far as it is predicted to.
-    use[i] = !hidden[i] && beyond(i) < 0.0;
-    score.ignored[i] = !use[i];
-  }
-  const int n = static_cast<int>(std::count(use.begin(), use.end(), true));
-  if (n == 0) return std::nullopt;
+  score.dof = static_cast<int>(std::count(use.begin(), use.end(), true));
+  if (score.dof == 0) return std::nullopt;
   // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
   Eigen::Vector4d nu = Eigen::Vector4d::Zero();
   Eigen::Matrix4d S = covariance;
   S.diagonal() += z.variance;
   for (int i = 0; i < 4; ++i) {
-    if (!use[i]) {
-      S.row(i).setZero();
-      S.col(i).setZero();
-      S(i, i) = 1.0;
-      if (predicted.exact[i]) {
-        const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
-        score.log_density += logBelowZero(beyond(i), variance);
-      }
+    if (use[i]) {
+      nu[i] = z.sides[i] - predicted.sides[i];
       continue;
     }
-    nu[i] = z.sides[i] - predicted.sides[i];
+    S.row(i).setZero();
+    S.col(i).setZero();
+    S(i, i) = 1.0;
+    if (!predicted.exact[i]) continue;
+    const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
+    score.log_density += logBelowZero(within(z, predicted, i), variance);
   }
   if (!choleskyInPlace(S)) return std::nullopt;
   whiten(S, nu);
   score.nis = nu.squaredNorm();
-  score.dof = n;
-  if (score.nis > gateThreshold(gate, n)) return std::nullopt;
-  score.log_density += logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), n, tail);
+  if (score.nis > gateThreshold(parameters.gate, score.dof)) return std::nullopt;
+  score.log_density +=
+      logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), score.dof, parameters.tail);
   return score;
+}
+
+/// A side that is hidden lies anywhere within the thing.
+double logAnywhere(const ProjectedBox& predicted, int side) {
+  const int axis = side % 2;
+  return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
+}
+
+void keepLikelier(std::optional<BoxScore>& best, const std::optional<BoxScore>& next,
+                  double log_share) {
+  if (!next || (best && best->log_density >= next->log_density + log_share)) return;
+  best = next;
+  best->log_density += log_share;
+}
+
+}  // namespace
+
+std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                 const Eigen::Matrix4d& covariance,
+                                 const std::array<bool, 4>& hidden,
+                                 const BoxParameters& parameters) {
+  constexpr double kFits = 9.0;  // squared deviations up to which no part is asked for
+  Sides use = comparableSides(z, predicted, hidden), whole = use, ignored{};
+  double log_shown = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    if (!z.measured[i] || use[i]) continue;
+    if (predicted.exact[i]) {
+      whole[i] = true;
+      log_shown += logAnywhere(predicted, i);
+      continue;
+    }
+    // What passes behind the camera reaches at least as far as it is predicted to.
+    use[i] = whole[i] = !hidden[i] && within(z, predicted, i) < 0.0;
+    ignored[i] = !use[i];
+  }
+  std::optional<BoxScore> best;
+  bool fits = false;
+  const auto consider = [&](const Sides& sides, double log_share, int part) {
+    auto score = scoreSides(z, predicted, covariance, sides, parameters);
+    if (!score) return;
+    fits = fits || score->nis < kFits;
+    score->part = part;
+    keepLikelier(best, score, log_share);
+  };
+  if (whole != use) {
+    consider(whole, std::log(parameters.amodal), -1);
+    log_shown += std::log(1.0 - parameters.amodal);
+  }
+  consider(use, log_shown, -1);
+  for (int i = 0; i < 4 && !fits && parameters.part > 0.0; ++i) {
+    if (!use[i] || within(z, predicted, i) >= 0.0) continue;
+    Sides others = use;
+    others[i] = false;
+    if (std::count(others.begin(), others.end(), true) < 2) continue;
+    // The four sides are as likely to be hidden by what is not on the map.
+    const double log_share = std::log(0.25 * parameters.part) + logAnywhere(predicted, i);
+    consider(others, log_shown + log_share, i);
+  }
+  if (best) best->ignored = ignored;
+  return best;
 }
 
 }  // namespace perdure::semantic_filter

@@ -73,13 +73,17 @@ struct BoxScore {
   std::array<bool, 4> ignored{};  ///< measured sides of which nothing is predicted
   double nis = 0.0;               ///< squared Mahalanobis distance of the measured sides
   int dof = 0;
+  int part = -1;  ///< side at which the box shows a part of the thing alone; -1: none
 };
 
 /// log t(z; h(x), S) with `tail` degrees of freedom and with censoring. `hidden` are sides that a
-/// nearer object hides. Nothing where no side can be compared, or outside the gate.
+/// nearer object hides: the box shows the whole thing all the same (`amodal`), or ends anywhere
+/// within it. It may do that at one side that nothing on the map hides, too (`part`). Nothing where
+/// no side can be compared, or outside the gate.
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,
-                                 const std::array<bool, 4>& hidden, double gate, double tail);
+                                 const std::array<bool, 4>& hidden,
+                                 const BoxParameters& parameters);
 
 /// Sides that can be compared: measured, not hidden, and exact in the projection.
 std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,

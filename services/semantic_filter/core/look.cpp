@@ -23,13 +23,14 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
   for (std::size_t i = 0; i < look.boxes.size(); ++i) {
     const Evidence& e = boxes[look.boxes[i]];
     if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
-    const auto score = scoreBox(e.z, *h.box, h.covariance, look.sight.hidden,
-                                frame.parameters->box.gate, frame.parameters->box.tail);
+    const auto score =
+        scoreBox(e.z, *h.box, h.covariance, look.sight.hidden, frame.parameters->box);
     if (!score) continue;
     const double log_l = logRatio(e, *frame.model, class_name, alike) + score->log_density -
                          logClutterOf(e, *score, frame);
     h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
     h.nis[i] = score->nis / score->dof;
+    h.part[i] = score->part;
   }
 }
 
@@ -107,9 +108,22 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
     HypothesisLook& h = result.hypotheses[i];
     h.likelihood.assign(result.boxes.size(), 0.0);
     h.nis.assign(result.boxes.size(), 0.0);
+    h.part.assign(result.boxes.size(), -1);
     if (h.box) scoreBoxes(h, object.hypotheses[i].class_name, object.alike, result, boxes, frame);
   }
   return result;
+}
+
+std::array<bool, 4> hiddenSides(const ObjectLook& look, std::size_t box) {
+  std::array<bool, 4> hidden = look.sight.hidden;
+  const auto at = std::find(look.boxes.begin(), look.boxes.end(), box) - look.boxes.begin();
+  const auto i = static_cast<std::size_t>(at);
+  if (i == look.boxes.size()) return hidden;
+  const auto best = std::max_element(
+      look.hypotheses.begin(), look.hypotheses.end(),
+      [i](const auto& a, const auto& b) { return a.likelihood[i] < b.likelihood[i]; });
+  if (best->part[i] >= 0) hidden[static_cast<std::size_t>(best->part[i])] = true;
+  return hidden;
 }
 
 double associationWeight(const Object& object, const ObjectLook& look, std::size_t box) {

@@ -23,6 +23,7 @@ struct HypothesisLook {
   double silent = 1.0;             ///< A without a box: 1 - v P_D, and what a primed answer says
   std::vector<double> likelihood;  ///< L(z) for each box of the look, 0 outside the gate
   std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
+  std::vector<int> part;           ///< BoxScore::part of each box
   double late_looks = 0.0;         ///< earlier looks that share this view, if it is true
 };
 
@@ -56,6 +57,10 @@ double detectionProbability(const ClassPrior& prior, double size_px, const Frame
 
 ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
                 const FrameContext& frame);
+
+/// The sides of one of the frame's boxes that something hides: by the hypothesis that explains it
+/// best.
+std::array<bool, 4> hiddenSides(const ObjectLook& look, std::size_t box);
 
 /// "Object made this box of the look" against "object made none, or is not there".
 double associationWeight(const Object& object, const ObjectLook& look, std::size_t box);

@@ -16,6 +16,8 @@ struct BoxParameters {
   double min_size_px = 14.0;      ///< √ of the area where detection is half as likely
   double min_network_px = 10.0;   ///< the same in the pixels of the network's input, where known
   double noise_view = 0.001;      ///< change of view, rad or of log distance, that renews the noise
+  double amodal = 0.5;            ///< share of boxes that span what something hides of the thing
+  double part = 0.1;              ///< share of boxes that show a part of a thing alone
   std::int64_t iterations = 3;    ///< of the iterated EKF
   /// The error of a side is noise and, for this share of its variance, the object's b, which stays
   /// while the view stays; b falls to 1/e after a change of
@@ -38,7 +40,6 @@ struct BirthParameters {
   double odds = 0.2;             ///< expected new objects in a box against false alarms
   double min_log_ratio = 0.5;    ///< weaker boxes only support objects that are there
   double claimed = 0.5;          ///< a box claimed with more than this gives no birth
-  double part = 0.1;             ///< share of boxes that show a part alone, of any shape
   std::int64_t max_classes = 4;  ///< kept of the network's list, "other" beside them
   double class_ratio = 0.01;     ///< classes below this share of the best are not kept
   double landmark_decay = 0.3;   ///< e-folding distance of a landmark's weight, in half boxes
@@ -51,6 +52,7 @@ struct MotionParameters {
   double yaw_walk = 0.01;           ///< rad/√s
   double acceleration = 1.0;        ///< m/s²/√Hz, of moving hypotheses
   double survival_s = 3600.0;       ///< mean time a thing stays where it is
+  double mover_survival_s = 1.0;    ///< mean time an unseen mover goes on as it did
   double min_speed = 0.7;           ///< m/s: slower ones count as static
   double slow_share = 0.25;         ///< of a class's deviation of speed: slower is creeping
   double creeping = 0.03;           ///< how likely that is against the Gaussian

@@ -124,6 +124,19 @@ void giveUpLostOnes(Object& object, TimePoint now, double lost_sigma_m) {
   normalise(object, ClassEvidence::kMotion);
 }
 
+/// What drives and is not seen turns off, parks or leaves.
+void loseMovers(Object& object, double dt, double survival_s) {
+  const double stays = std::exp(-dt / survival_s);
+  double kept = 0.0;
+  for (auto& h : object.hypotheses) {
+    if (h.moving) h.weight *= stays;
+    kept += h.weight;
+  }
+  if (kept >= 1.0 - 1e-9 || kept <= 0.0) return;
+  object.existence.become(object.existence * kept, ExistenceEvidence::kLost, object.as_of);
+  normalise(object, ClassEvidence::kMotion);
+}
+
 }  // namespace
 
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later) {
@@ -183,6 +196,9 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
     h.C = h.C.lazyProduct(transition.transpose()).eval();
     keepConsistent(h, pose_error.covariance);
   }
+  const bool unseen =
+      object.last_seen < object.as_of || object.hidden.count + object.away.count > 0;
+  if (unseen && dt > 0.0) loseMovers(object, dt, parameters.mover_survival_s);
   giveUpLostOnes(object, now, parameters.lost_sigma_m);
   if (dt > 0.0) {
     object.existence.become(object.existence * std::exp(-dt / parameters.survival_s),

@@ -55,7 +55,7 @@ class Expected {
   bool matches(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
     const Entry& e = entryOf(j);
     return e.box && mayOverlap(box.z, *e.box, e.covariance) &&
-           scoreBox(box.z, *e.box, e.covariance, hidden, parameters_.gate, parameters_.tail);
+           scoreBox(box.z, *e.box, e.covariance, hidden, parameters_);
   }
 
  private:
@@ -168,7 +168,8 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
     const Seen& s = seen[static_cast<std::size_t>(j)];
     Object& object = belief.objects[s.object];
     const auto own = update(object, s.look, association.eta.row(j), boxes, frame);
-    if (own && sound(object) && rememberLook(object, boxes[*own], s.look.sight.hidden, frame)) {
+    if (own && sound(object) &&
+        rememberLook(object, boxes[*own], hiddenSides(s.look, *own), frame)) {
       to_smooth.push_back(&object);
     }
   }

@@ -110,8 +110,9 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
-    parts.emplace_back(shares.box[i],
-                       updateWithBox(h, z, look.sight.hidden, repeated, frame, at_prior));
+    auto hidden = look.sight.hidden;
+    if (seen.part[i] >= 0) hidden[static_cast<std::size_t>(seen.part[i])] = true;
+    parts.emplace_back(shares.box[i], updateWithBox(h, z, hidden, repeated, frame, at_prior));
   }
   if (parts.empty()) return;
   const double weight = h.weight;

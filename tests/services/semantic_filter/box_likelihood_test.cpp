@@ -9,7 +9,14 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kWidth = 1242, kHeight = 375;
-constexpr double kTail = 5.0;
+
+BoxParameters gatedAt(double gate, double tail = 5.0) {
+  BoxParameters parameters;
+  parameters.gate = gate;
+  parameters.tail = tail;
+  parameters.part = 0.0;
+  return parameters;
+}
 
 ProjectedBox predictedBox(double x1, double y1, double x2, double y2) {
   ProjectedBox p;
@@ -32,8 +39,8 @@ TEST(BoxLikelihood, ABoxThatLeavesTheImageIsCutThere) {
 
 TEST(BoxLikelihood, WithAThinTailTheDensityOfAllSidesIsTheGaussian) {
   const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
-  const auto score =
-      scoreBox(z, predictedBox(102, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999, 1e6);
+  const auto score = scoreBox(z, predictedBox(102, 100, 200, 180), Eigen::Matrix4d::Zero(), {},
+                              gatedAt(0.9999, 1e6));
   ASSERT_TRUE(score);
   double expected = 0.0;
   for (int i = 0; i < 4; ++i) expected -= 0.5 * std::log(2.0 * M_PI * z.variance[i]);
@@ -47,12 +54,12 @@ TEST(BoxLikelihood, AnOutlierCostsLessThanAGaussianWouldTake) {
   const double sigma = std::sqrt(z.variance[0]);
   const auto at = [&](double deviations, double tail) {
     return scoreBox(z, predictedBox(100 + deviations * sigma, 100, 200, 180),
-                    Eigen::Matrix4d::Zero(), {}, 0.999999, tail)
+                    Eigen::Matrix4d::Zero(), {}, gatedAt(0.999999, tail))
         ->log_density;
   };
   EXPECT_NEAR(at(4, 1e6) - at(0, 1e6), -8.0, 1e-3);
-  EXPECT_GT(at(4, kTail) - at(0, kTail), -7.0);
-  EXPECT_LT(at(4, kTail), at(2, kTail));
+  EXPECT_GT(at(4, 5.0) - at(0, 5.0), -7.0);
+  EXPECT_LT(at(4, 5.0), at(2, 5.0));
 }
 
 TEST(BoxLikelihood, ANetworkPlacesSidesToAPixelOfItsOwnInput) {
@@ -102,9 +109,9 @@ TEST(BoxLikelihood, ASideOfWhichTheNetworkSaysHowSureItIsHasThatDeviation) {
 TEST(BoxLikelihood, ACensoredSideCountsAsTheProbabilityThatItLiesBeyond) {
   const auto z = measure({0.0, 100, 200, 180}, kWidth, kHeight, {});
   const auto far =
-      scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999, kTail);
+      scoreBox(z, predictedBox(-300, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, gatedAt(0.9999));
   const auto edge =
-      scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, 0.9999, kTail);
+      scoreBox(z, predictedBox(0, 100, 200, 180), Eigen::Matrix4d::Zero(), {}, gatedAt(0.9999));
   ASSERT_TRUE(far && edge);
   EXPECT_EQ(far->dof, 3);
   EXPECT_NEAR(far->log_density - edge->log_density, std::log(2.0), 1e-9);
@@ -114,14 +121,63 @@ TEST(BoxLikelihood, AHiddenSideMayLieBeyondTheBlocker) {
   const auto z = measure({300, 100, 400, 180}, kWidth, kHeight, {});
   const std::array<bool, 4> left_hidden{true, false, false, false};
   const auto p = predictedBox(250, 100, 400, 180);
-  EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, 0.9999, kTail));
-  EXPECT_TRUE(scoreBox(z, p, Eigen::Matrix4d::Zero(), left_hidden, 0.9999, kTail));
+  EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, gatedAt(0.9999)));
+  EXPECT_TRUE(scoreBox(z, p, Eigen::Matrix4d::Zero(), left_hidden, gatedAt(0.9999)));
+}
+
+TEST(BoxLikelihood, ABoxThatSpansWhatIsHiddenIsLikelierThanOneThatEndsAnywhere) {
+  const std::array<bool, 4> hidden{false, false, true, true};
+  const auto p = predictedBox(250, 100, 400, 180);
+  const auto at = [&](double x2, double y2) {
+    const auto z = measure({250, 100, x2, y2}, kWidth, kHeight, {});
+    return scoreBox(z, p, Eigen::Matrix4d::Zero(), hidden, gatedAt(0.9999))->log_density;
+  };
+  EXPECT_GT(at(400, 180), at(340, 150) + 3.0);
+  EXPECT_NEAR(at(340, 150), at(320, 140), 1.0) << "an end within is as likely as another";
+  const auto z = measure({250, 100, 460, 180}, kWidth, kHeight, {});
+  const auto beyond = scoreBox(z, p, Eigen::Matrix4d::Zero(), hidden, gatedAt(0.9999));
+  EXPECT_TRUE(!beyond || beyond->log_density < at(340, 150) - 8.0) << "no end lies outside";
+}
+
+// What was lost behind a van has a wide prediction, of which the van hides half: the boxes of
+// parked cars that come into view beside it are not its.
+TEST(BoxLikelihood, WhatIsPredictedToAFewPixelsBeatsWhatMayBeAnywhere) {
+  const auto z = measure({899, 187, 1012, 245}, kWidth, kHeight, {});
+  const auto likelihood = [&](const ProjectedBox& p, double sigma,
+                              const std::array<bool, 4>& hidden) {
+    const Eigen::Matrix4d covariance = sigma * sigma * Eigen::Matrix4d::Identity();
+    const auto score = scoreBox(z, p, covariance, hidden, gatedAt(0.9999));
+    return score ? std::exp(score->log_density) : 0.0;
+  };
+  const double parked =
+      likelihood(predictedBox(899, 187, 1005, 241), 6.0, {false, true, true, true});
+  const double lost =
+      likelihood(predictedBox(899, 183, 1131, 268), 40.0, {false, false, true, true});
+  EXPECT_GT(parked, 100.0 * lost);
+}
+
+TEST(BoxLikelihood, ABoxMayEndWhereSomethingThatIsNotOnTheMapHidesTheRest) {
+  auto parameters = gatedAt(0.9999);
+  const auto z = measure({250, 100, 330, 180}, kWidth, kHeight, {});
+  const auto p = predictedBox(250, 100, 400, 180);
+  EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, parameters));
+  parameters.part = 0.1;
+  const auto part = scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, parameters);
+  ASSERT_TRUE(part);
+  EXPECT_EQ(part->part, 2) << "the right side";
+  const auto whole = scoreBox(measure({250, 100, 400, 180}, kWidth, kHeight, {}), p,
+                              Eigen::Matrix4d::Zero(), {}, parameters);
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(whole->part, -1);
+  EXPECT_GT(whole->log_density, part->log_density + 4.0);
+  const auto longer = measure({250, 100, 500, 180}, kWidth, kHeight, {});
+  EXPECT_FALSE(scoreBox(longer, p, Eigen::Matrix4d::Zero(), {}, parameters)) << "it is no part";
 }
 
 TEST(BoxLikelihood, OutsideTheGateThereIsNoScore) {
   const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
   EXPECT_FALSE(
-      scoreBox(z, predictedBox(200, 100, 300, 180), Eigen::Matrix4d::Zero(), {}, 0.999, kTail));
+      scoreBox(z, predictedBox(200, 100, 300, 180), Eigen::Matrix4d::Zero(), {}, gatedAt(0.999)));
 }
 
 TEST(BoxLikelihood, ClutterOfMeasuredSidesIntegratesToItsExpectedNumber) {
@@ -165,7 +221,9 @@ double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
     }
     if (box.x1 < 10 || box.y1 < 10 || box.x2 > kWidth - 10 || box.y2 > kHeight - 10) continue;
     const auto z = measure(box, kWidth, kHeight, {});
-    const auto score = scoreBox(z, predicted, covariance, hidden, 0.9999, kTail);
+    auto parameters = gatedAt(0.9999);
+    parameters.part = 0.1;
+    const auto score = scoreBox(z, predicted, covariance, hidden, parameters);
     if (!score) continue;
     sum += std::exp(score->log_density - logClutter(z, kWidth, kHeight, clutter, score->ignored));
   }
@@ -176,6 +234,8 @@ double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
 TEST(BoxLikelihood, OverAllChanceBoxesTheRatioAveragesToOneAtMost) {
   EXPECT_NEAR(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {}), 1.0, 0.2);
   EXPECT_LT(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {false, false, true, false}),
+            1.2);
+  EXPECT_LT(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {true, false, true, true}),
             1.2);
   ProjectedBox near = predictedBox(-1280, -700, 60, 290);  // it passes behind the camera
   near.exact = {false, false, true, true};

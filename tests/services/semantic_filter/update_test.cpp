@@ -101,7 +101,7 @@ TEST_F(Update, TwoClassesFollowEquationFourByHand) {
         (1.0 + std::exp(-(size - parameters.box.min_size_px) / (0.2 * parameters.box.min_size_px)));
     const auto score = scoreBox(boxes[0].z, *box,
                                 predictedCovariance(object.hypotheses[k], *box, Matrix6d::Zero()),
-                                {}, parameters.box.gate, parameters.box.tail);
+                                {}, parameters.box);
     ASSERT_TRUE(score);
     const double g = k == 0 ? 1.5 : 0.5;
     const double L = std::exp(g + score->log_density - boxes[0].log_clutter);
