@@ -176,6 +176,12 @@ std::size_t RawReader::matched() const {
   return status.current_count;
 }
 
+std::size_t RawReader::silent() const {
+  dds_liveliness_changed_status_t liveliness{};
+  dds_get_liveliness_changed_status(handle(), &liveliness);
+  return liveliness.not_alive_count;
+}
+
 std::optional<std::int32_t> RawReader::strongestBut(const RawWriter& own) const {
   constexpr std::size_t kMost = 64;
   std::array<dds_instance_handle_t, kMost> writers{};
@@ -207,9 +213,7 @@ void RawReader::report(ReasonCounts& counts) const {
   dds_get_sample_rejected_status(handle(), &rejected);
   add(counts, "sample_rejected", rejected.total_count);
   add(counts, "in_shared_memory", in_shared_memory_);
-  dds_liveliness_changed_status_t liveliness{};
-  dds_get_liveliness_changed_status(handle(), &liveliness);
-  add(counts, "writers_silent", liveliness.not_alive_count);
+  add(counts, "writers_silent", silent());
 }
 
 bool RawReader::takeBatch(const std::function<void(const void*)>& on_value,

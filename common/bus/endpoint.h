@@ -55,6 +55,8 @@ class RawReader : public Endpoint {
  public:
   /// How many writers are matched now.
   std::size_t matched() const;
+  /// Of them, those that missed their lease: killed, stopped, cut off.
+  std::size_t silent() const;
   /// The highest strength among the matched writers of an exclusive topic but `own`; nothing where
   /// there are no others.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;

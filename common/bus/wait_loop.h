@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "common/bus/cdr_reader.h"
 #include "common/bus/endpoint.h"
 
 namespace perdure::bus {
@@ -23,6 +24,10 @@ class WaitLoop {
                     on_gone = untilStopped<T>(std::move(on_gone))] {
       return reader.drainBatch(handler, on_gone);
     });
+  }
+  /// The same of messages as they came.
+  void on(CdrReader& reader, CdrReader::Handler handler) {
+    attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
   /// First after one period; a late tick is not made up for.
   void every(std::chrono::nanoseconds period, std::function<void()> tick);

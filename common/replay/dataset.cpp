@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/errors.h"
+#include "common/replay/recorded_messages.h"
 #include "common/replay/recording.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
@@ -22,17 +23,29 @@ Duration usualInterval(const std::vector<ImuSample>& samples) {
   return *middle;
 }
 
+std::string nameOf(const Recording::FrameFile& file) {
+  return file.path.empty() ? "frame " + std::to_string(file.index) : file.path;
+}
+
+/// A copy: the frame's own pixels lie in a chunk of the recording.
+Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
+                              std::optional<ImageEncoding> encoding) {
+  const auto frame = file.load();
+  if (!frame) return tl::unexpected(frame.error());
+  const auto wanted = encoding.value_or(frame->encoding);
+  const auto image =
+      wanted == ImageEncoding::kMono8 ? vision::monoOf(*frame) : vision::bgrOf(*frame);
+  if (!image) return image;
+  return image->clone();
+}
+
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
-  if (path.extension() == ".mcap") {
-    throw StartupError(ExitCode::kUsage,
-                       path.string() +
-                           " is a recording; this version plays dataset folders only "
-                           "(EuRoC, KITTI raw, KITTI tracking)");
-  }
+  if (RecordedMessages::looksLikeOne(path)) return readRecordedDrive(options);
   if (!std::filesystem::is_directory(path)) {
     throwMissing(path, "the dataset folder",
-                 "--data takes a folder in EuRoC, KITTI raw or KITTI tracking layout");
+                 "--data takes a folder in EuRoC, KITTI raw or KITTI tracking layout, or a "
+                 "recording (.mcap)");
   }
   if (looksLikeEuroc(path)) return readEuroc(options);
   if (looksLikeKittiTracking(path)) return readKittiTracking(options);
@@ -41,7 +54,7 @@ Recording readRecording(const DatasetOptions& options) {
                      path.string() +
                          " is no dataset folder that is known: give a folder with "
                          "mav0 (EuRoC), with image_02 and oxts (KITTI raw, *_sync), "
-                         "or with calib (KITTI tracking)");
+                         "with calib (KITTI tracking), or with recordings (.mcap)");
 }
 
 }  // namespace
@@ -113,20 +126,21 @@ std::optional<Frame> Dataset::decodeFrame(const Recording::FrameFile& file) {
   frame.camera = camera.name;
   frame.width = camera.width;
   frame.height = camera.height;
-  if (file.path.empty() || !options_.decode) return frame;
+  if ((file.path.empty() && !file.load) || !options_.decode) return frame;
   const auto encoding = file.camera == 0 ? options_.encoding : options_.second_encoding;
-  const auto image = vision::decodeImageFile(file.path, encoding);
+  const auto image =
+      file.load ? recordedImage(file, encoding) : vision::decodeImageFile(file.path, encoding);
   if (!image) {
     count(image.error());
     return std::nullopt;
   }
   const auto set = vision::setPixels(frame, *image);
   if (!set) {
-    count({"image_corrupt", file.path + ": " + set.error().detail});
+    count({"image_corrupt", nameOf(file) + ": " + set.error().detail});
     return std::nullopt;
   }
   if (frame.width != camera.width || frame.height != camera.height) {
-    count({"image_size", file.path + " is not of the calibration's size"});
+    count({"image_size", nameOf(file) + " is not of the calibration's size"});
     return std::nullopt;
   }
   return frame;

@@ -1,9 +1,11 @@
-// Dataset folders played as messages: EuRoC ASL, KITTI raw and KITTI tracking, known by looking.
-// Samples and frames are merged by time, always in the same order; images are decoded when asked.
+// Dataset folders and recordings (MCAP) played as messages: EuRoC ASL, KITTI raw, KITTI tracking
+// and what perdure record left, known by looking. Samples and frames are merged by time, always in
+// the same order; images are decoded when asked.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +33,7 @@ struct DatasetOptions {
   bool decode = true;  ///< false: frames carry stamp and size, but no pixels
 };
 
-enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking };
+enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking, kRecording };
 
 /// What a reader found in a folder.
 struct Recording {
@@ -39,7 +41,8 @@ struct Recording {
     TimePoint time;
     std::uint64_t index = 0;  ///< in the dataset, from 0; both cameras of a pair share it
     std::size_t camera = 0;   ///< index into calibration.cameras
-    std::string path;         ///< empty: a frame without pixels
+    std::string path;         ///< empty: a frame without pixels, or one that `load` gives
+    std::function<Result<Frame>()> load = {};  ///< of a recording; reasons image_…
   };
   DatasetKind kind = DatasetKind::kEuroc;
   Calibration calibration;
@@ -49,7 +52,7 @@ struct Recording {
   std::vector<SpeedSample> speed;
   /// Of the body, in a world whose z is up. Of a KITTI drive: by OXTS, east, north and up.
   std::optional<PoseFile> truth;
-  ReasonCounts reasons;           ///< what was left out while reading
+  ReasonCounts reasons;  ///< what was left out while reading
 };
 
 class Dataset {

@@ -15,6 +15,9 @@ namespace perdure::replay {
 bool looksLikeEuroc(const std::filesystem::path& folder);
 bool looksLikeKittiRaw(const std::filesystem::path& folder);
 bool looksLikeKittiTracking(const std::filesystem::path& folder);
+/// Frames are counted from 0 in the order of their times. A recording without images has the frames
+/// that its odometry is about, without pixels.
+Recording readRecordedDrive(const DatasetOptions& options);
 Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);

@@ -12,6 +12,7 @@
 #include "tools/map/command.h"
 #include "tools/model/command.h"
 #include "tools/pipeline/command.h"
+#include "tools/record/command.h"
 #include "tools/simulate/command.h"
 
 namespace {
@@ -48,6 +49,8 @@ int main(int argc, char** argv) {
   perdure::tools::addSimulateCommand(app);
   perdure::tools::addMapCommand(app);
   perdure::tools::addDemoCommand(app);
+  perdure::tools::addRecordCommand(app);
+  perdure::tools::addPlayCommand(app);
   perdure::tools::addBusCommands(app);
   return run(app, argc, argv);
 }

@@ -13,12 +13,14 @@ namespace {
 
 void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--data", options.data,
-                 "Dataset folder: EuRoC (simulated too), KITTI raw or tracking")
+                 "Dataset folder: EuRoC (simulated too), KITTI raw or tracking; or a recording: a "
+                 ".mcap file, or a folder of them")
       ->required();
   app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000");
-  app.add_option("--odometry", options.odometry, "vio, truth, or a pose file (TUM or KITTI lines)")
+  app.add_option("--odometry", options.odometry,
+                 "vio, truth, a pose file (TUM or KITTI lines), or recorded")
       ->required();
-  app.add_option("--detections", options.detections, "model, none, simulated, or a CSV")
+  app.add_option("--detections", options.detections, "model, none, simulated, a CSV, or recorded")
       ->required();
   app.add_option("--model", options.model, "Network for --detections model (.onnx, .cfg)");
   app.add_option("--class", options.class_name, "Class of a headerless CSV, for example Car");

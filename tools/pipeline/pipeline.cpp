@@ -33,7 +33,8 @@ std::string sequenceName(const PipelineOptions& options) {
 Pipeline::Pipeline(const PipelineOptions& options)
     : options_(options), configs_(readServiceConfigs(options)) {
   cv::setNumThreads(1);
-  if (options.odometry != "vio" && options.odometry != "truth") {
+  checkRecorded();
+  if (options.odometry != "vio" && options.odometry != "truth" && !recorded_) {
     pose_file_ = replay::PoseFile::read(options.odometry);
   }
   openData();
@@ -101,6 +102,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
 void Pipeline::openData() { dataset_ = replay::Dataset::open(dataOptions()); }
 
 void Pipeline::openOdometry(const PipelineOptions& options) {
+  if (recorded_) return;
   PoseAccuracy accuracy;
   if (options.odometry == "truth") {
     if (!dataset_->truth()) {
@@ -133,7 +135,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
 }
 
 void Pipeline::openDetections(const PipelineOptions& options) {
-  if (options.detections == "none") return;
+  if (options.detections == "none" || recorded_) return;
   if (options.detections == "simulated") {
     simulated_ = std::make_unique<SimulatedDetections>(configs_.detector, options.data, *dataset_,
                                                        kInference);
@@ -164,6 +166,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
 }
 
 void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
+  if (recorded_) return runRecorded(progress);
   while (auto message = timer_.timeTowardsNext("decode", [&] { return dataset_->next(); })) {
     const Frame* frame = std::get_if<Frame>(&*message);
     const bool first_camera =

@@ -9,8 +9,10 @@
 #include <optional>
 #include <set>
 
+#include "common/bus/once.h"
 #include "common/replay/dataset.h"
 #include "common/replay/detection_file.h"
+#include "common/replay/recorded_messages.h"
 #include "services/inference/node.h"
 #include "services/semantic_filter/node.h"
 #include "services/vio/node.h"
@@ -59,6 +61,10 @@ class Pipeline {
   void openDetections(const PipelineOptions& options);
   void openData();
   void openFilter();
+  // In pipeline_recorded.cpp.
+  void checkRecorded();
+  void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
+  void handleRecorded(const replay::RecordedMessage& message);
   void remember();
   replay::DatasetOptions dataOptions() const;
   void handle(const replay::Message& message);
@@ -83,8 +89,11 @@ class Pipeline {
   std::unique_ptr<semantic_filter::Node> filter_;
   std::unique_ptr<MapMemory> map_;
   bool uses_vio_ = false;
+  bool recorded_ = false;    // odometry and detections come from the recording
+  bus::Once odometry_once_;  // of the recording, as the service has it
   std::uint64_t model_hash_ = 0;
   std::optional<TimePoint> first_frame_;
+  double frames_seconds_ = 0.0;                   // of the recording, since its first frame
   std::vector<Odometry> new_odometry_;            // of vio, not yet handed on
   std::map<std::uint64_t, Landmarks> landmarks_;  // by frame, waiting for the filter
   std::map<std::uint64_t, Detections> waiting_;   // detections whose odometry has not come

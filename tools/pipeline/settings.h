@@ -17,8 +17,8 @@ namespace perdure::tools {
 
 struct PipelineOptions {
   std::string data, sequence, out;
-  std::string odometry;    ///< vio, truth, or a pose file
-  std::string detections;  ///< model, simulated, none, or a CSV
+  std::string odometry;    ///< vio, truth, recorded, or a pose file
+  std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
   double box_origin = 0.0;

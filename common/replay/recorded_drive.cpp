@@ -1,0 +1,160 @@
+// What perdure record left, as a dataset: sensors and calibration, and images where they were
+// recorded. Images are unpacked when they are asked for.
+#include <algorithm>
+#include <cstring>
+#include <tuple>
+#include <utility>
+
+#include "common/base/errors.h"
+#include "common/replay/recorded_messages.h"
+#include "common/replay/recording.h"
+
+namespace perdure::replay {
+namespace {
+
+constexpr std::string_view kFramePrefix = "frame/";
+
+/// One image in the recording: all that is kept of it until it is asked for.
+struct Seen {
+  FrameStamp stamp;
+  std::string camera;
+  std::uint64_t log_ns = 0;
+};
+
+/// Gives images in the order of the recording fast, and any other by going back.
+class Images {
+ public:
+  explicit Images(const std::filesystem::path& path) : messages_(path) { rewind(0); }
+
+  Result<Frame> at(const Seen& wanted) {
+    if (last_ && last_->log_ns > wanted.log_ns) rewind(wanted.log_ns);
+    while (true) {
+      if (!last_ || last_->log_ns < wanted.log_ns) last_ = messages_.next();
+      if (!last_ || last_->log_ns > wanted.log_ns) break;
+      if (last_->topic == std::string(kFramePrefix) + wanted.camera) {
+        auto frame = valueOf<Frame>(*last_);
+        if (frame && frame->stamp.sameFrame(wanted.stamp)) return frame;
+      }
+      last_ = messages_.next();
+    }
+    return fail("image_missing", wanted.camera + " has no frame " +
+                                     std::to_string(wanted.stamp.sequence) + " in the recording");
+  }
+
+ private:
+  void rewind(std::uint64_t from_ns) {
+    messages_.rewind([](const std::string& topic) { return topic.starts_with(kFramePrefix); },
+                     from_ns);
+    last_.reset();
+  }
+
+  RecordedMessages messages_;
+  std::optional<RecordedMessage> last_;
+};
+
+class DriveReader {
+ public:
+  explicit DriveReader(const std::filesystem::path& path) : path_(path), messages_(path) {}
+
+  Recording read() {
+    messages_.rewind([](const std::string& topic) {
+      return topic == "imu" || topic == "speed" || topic == "calibration" || topic == "odometry" ||
+             topic.starts_with(kFramePrefix);
+    });
+    while (const auto message = messages_.next()) take(*message);
+    for (const auto& [reason, n] : messages_.reasons().all()) recording_.reasons.add(reason, n);
+    if (recording_.calibration.cameras.empty()) {
+      throwMissing(path_, "the calibration in the recording",
+                   "record while capture runs: it gives one");
+    }
+    recording_.kind = DatasetKind::kRecording;
+    recording_.calibration.has_speed = !recording_.speed.empty();
+    if (images_.empty()) images_ = std::move(looks_);
+    addFrames();
+    return std::move(recording_);
+  }
+
+ private:
+  template <class T>
+  std::optional<T> valueIn(const RecordedMessage& message) {
+    auto value = valueOf<T>(message);
+    if (value) return *std::move(value);
+    recording_.reasons.add(message.topic + "_malformed");
+    return std::nullopt;
+  }
+
+  void take(const RecordedMessage& message) {
+    if (message.topic == "calibration") {
+      if (auto value = valueIn<Calibration>(message)) recording_.calibration = *std::move(value);
+    } else if (message.topic == "imu") {
+      if (const auto value = valueIn<ImuSample>(message)) appendImu(recording_, *value);
+    } else if (message.topic == "speed") {
+      if (const auto value = valueIn<SpeedSample>(message)) takeSpeed(*value);
+    } else if (message.topic == "odometry") {
+      if (const auto value = valueIn<Odometry>(message)) {
+        looks_.push_back({value->stamp, {}, message.log_ns});
+      }
+    } else if (const auto value = valueIn<Frame>(message)) {
+      images_.push_back({value->stamp, value->camera, message.log_ns});
+    }
+  }
+
+  void takeSpeed(SpeedSample sample) {
+    if (!recording_.speed.empty() && sample.time <= recording_.speed.back().time) {
+      return recording_.reasons.add("speed_not_increasing");
+    }
+    sample.sequence = recording_.speed.size();
+    recording_.speed.push_back(sample);
+  }
+
+  /// Cameras in their order; nothing where the calibration has none of the name.
+  std::optional<std::size_t> cameraOf(const Seen& seen) const {
+    const auto& cameras = recording_.calibration.cameras;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (cameras[i].name == seen.camera || (seen.camera.empty() && i == 0)) return i;
+    }
+    return std::nullopt;
+  }
+
+  void addFrames() {
+    std::map<std::pair<InstanceId, std::uint64_t>, Recording::FrameFile> first;
+    std::stable_sort(images_.begin(), images_.end(),
+                     [](const Seen& a, const Seen& b) { return a.stamp.time < b.stamp.time; });
+    const auto store = std::make_shared<Images>(path_);
+    for (const std::size_t wanted : {0u, 1u}) {
+      for (const Seen& seen : images_) {
+        if (cameraOf(seen) != wanted) continue;
+        Recording::FrameFile file{seen.stamp.time, recording_.frame_count, wanted, {}};
+        if (!seen.camera.empty()) file.load = [store, seen] { return store->at(seen); };
+        const std::pair identity(seen.stamp.source, seen.stamp.sequence);
+        if (wanted == 0) {
+          if (!first.emplace(identity, file).second) continue;  // came twice
+          ++recording_.frame_count;
+        } else {
+          const auto pair = first.find(identity);
+          if (pair == first.end()) {
+            recording_.reasons.add("stereo_unmatched");
+            continue;
+          }
+          file.index = pair->second.index;
+          file.time = pair->second.time;
+        }
+        recording_.frames.push_back(std::move(file));
+      }
+    }
+    sortFrames(recording_);
+  }
+
+  std::filesystem::path path_;
+  RecordedMessages messages_;
+  Recording recording_;
+  std::vector<Seen> images_, looks_;
+};
+
+}  // namespace
+
+Recording readRecordedDrive(const DatasetOptions& options) {
+  return DriveReader(options.path).read();
+}
+
+}  // namespace perdure::replay

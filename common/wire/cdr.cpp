@@ -1,0 +1,81 @@
+#include "common/wire/cdr.h"
+
+#include <dds/ddsi/ddsi_cdrstream.h>
+#include <dds/ddsi/ddsi_sertype.h>
+
+#include <bit>
+#include <cstring>
+
+namespace perdure::wire {
+namespace {
+
+constexpr std::size_t kHeader = 4;
+constexpr std::uint8_t kXcdr1 = 0x00, kXcdr2 = 0x06, kDelimitedXcdr2 = 0x08;  // + 1: little-endian
+constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // as Cyclone counts
+constexpr std::uint8_t kNative = std::endian::native == std::endian::little ? 1 : 0;
+
+bool isFinal(const dds_topic_descriptor_t& type) {
+  ddsi_sertype_extensibility kind{};
+  return dds_stream_extensibility(type.m_ops, &kind) && kind == DDSI_SERTYPE_EXT_FINAL;
+}
+
+/// The version of XCDR that an encapsulation means for a type; 0: none that suits it.
+std::uint32_t versionOf(std::uint8_t encapsulation, const dds_topic_descriptor_t& type) {
+  const auto form = static_cast<std::uint8_t>(encapsulation & ~1u);
+  if (!isFinal(type)) return form == kDelimitedXcdr2 ? kVersion2 : 0;
+  return form == kXcdr1 ? kVersion1 : form == kXcdr2 ? kVersion2 : 0;
+}
+
+}  // namespace
+
+void CdrSample::Free::operator()(void* sample) const {
+  dds_stream_free_sample(sample, type->m_ops);
+  dds_free(sample);
+}
+
+Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
+                                  const dds_topic_descriptor_t& type) {
+  const std::uint32_t version =
+      message.size() < kHeader || message[0] != 0 ? 0 : versionOf(message[1], type);
+  if (version == 0) {
+    return fail("bad_encapsulation", std::string("not how ") + type.m_typename + " is encoded");
+  }
+  // Cyclone checks and turns bytes in place, and wants them aligned.
+  const auto payload = message.subspan(kHeader);
+  std::vector<std::uint64_t> aligned(payload.size() / sizeof(std::uint64_t) + 1);
+  if (!payload.empty()) std::memcpy(aligned.data(), payload.data(), payload.size());
+  auto* const bytes = reinterpret_cast<char*>(aligned.data());
+  const auto size = static_cast<std::uint32_t>(payload.size());
+  std::uint32_t offset = 0;
+  const bool turned = (message[1] & 1u) != kNative;
+  if (payload.size() > UINT32_MAX / 2 ||
+      !dds_stream_normalize_data(bytes, &offset, size, turned, version, type.m_ops)) {
+    return fail("malformed_cdr", std::string("no ") + type.m_typename);
+  }
+  std::unique_ptr<void, Free> sample(dds_alloc(type.m_size), Free{&type});
+  std::memset(sample.get(), 0, type.m_size);  // what is read in would be freed otherwise
+  dds_istream_t stream;
+  dds_istream_init(&stream, size, bytes, version);
+  dds_stream_read(&stream, static_cast<char*>(sample.get()), type.m_ops);
+  return CdrSample(std::move(sample));
+}
+
+std::vector<std::uint8_t> writeCdr(const void* sample, const dds_topic_descriptor_t& type) {
+  const bool final = isFinal(type);
+  const std::uint8_t form = final ? kXcdr1 : kDelimitedXcdr2;
+  dds_ostream_t stream;
+  dds_ostream_init(&stream, 0, final ? kVersion1 : kVersion2);
+  dds_stream_write(&stream, static_cast<const char*>(sample), type.m_ops);
+  std::vector<std::uint8_t> message{0, static_cast<std::uint8_t>(form | kNative), 0, 0};
+  message.insert(message.end(), stream.m_buffer, stream.m_buffer + stream.m_index);
+  dds_ostream_fini(&stream);
+  return message;
+}
+
+std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> message) {
+  const bool plain =
+      message.size() > kHeader && message[0] == 0 && message[1] == (kXcdr1 | kNative);
+  return plain ? message.subspan(kHeader) : std::span<const std::uint8_t>();
+}
+
+}  // namespace perdure::wire

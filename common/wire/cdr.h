@@ -1,0 +1,68 @@
+// Messages as bytes, as they travel and as recordings hold them: four bytes of encapsulation
+// (RTPS 2.5, 10.5), then XCDR1 (final types) or delimited XCDR2 (appendable ones), which readers
+// that know more or fewer members read too. Without DDS: no participant, no network.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/wire/codec.h"
+
+namespace perdure::wire {
+
+/// Owns the generated C struct that some bytes held.
+class CdrSample {
+ public:
+  /// Any bytes: nothing is read outside them. Reasons: bad_encapsulation, malformed_cdr.
+  static Result<CdrSample> read(std::span<const std::uint8_t> message,
+                                const dds_topic_descriptor_t& type);
+  const void* get() const { return sample_.get(); }
+
+ private:
+  struct Free {
+    const dds_topic_descriptor_t* type;
+    void operator()(void* sample) const;
+  };
+  explicit CdrSample(std::unique_ptr<void, Free> sample) : sample_(std::move(sample)) {}
+  std::unique_ptr<void, Free> sample_;
+};
+
+/// A C struct as bytes, in the form that its type has on the wire.
+std::vector<std::uint8_t> writeCdr(const void* sample, const dds_topic_descriptor_t& type);
+/// The pixels' message without its encapsulation; empty where it is not what decodeInPlace reads.
+std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> message);
+
+/// A value with all checks, or why not. `keeper` keeps `message`, in which pixels stay.
+template <class T>
+Result<T> decodeCdr(std::span<const std::uint8_t> message, std::shared_ptr<const void> keeper) {
+  if constexpr (kDecodedInPlace<T>) {
+    const auto payload = payloadInPlace(message);
+    if (payload.empty()) return fail("bad_encapsulation", "an image that is not XCDR1");
+    return decodeInPlace<T>(payload, std::move(keeper));
+  } else {
+    const auto sample = CdrSample::read(message, Type<T>::descriptor());
+    if (!sample) return tl::unexpected(sample.error());
+    return decode<T>(*static_cast<const typename Type<T>::Wire*>(sample->get()));
+  }
+}
+
+/// The reverse; reasons as encode().
+template <class T>
+Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
+  Arena arena;
+  typename Type<T>::Wire sample;
+  if (auto encoded = encode(value, sample, arena); !encoded) {
+    return tl::unexpected(encoded.error());
+  }
+  return writeCdr(&sample, Type<T>::descriptor());
+}
+
+/// The IDL of "perdure::msg::Objects", …, with all that it needs, as one text without #include;
+/// empty where there is no such type.
+std::string idlOf(std::string_view type_name);
+
+}  // namespace perdure::wire

@@ -1,0 +1,170 @@
+// Recordings as datasets, and as messages in the order of their coming.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/replay/dataset.h"
+#include "common/replay/recorded_messages.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tests/common/replay/tiny_recording.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr std::uint64_t kLater = 1'000'000'000'000;  // of log times, against the sensor's
+
+std::uint64_t logOf(TimePoint time) {
+  return kLater + static_cast<std::uint64_t>(toNanoseconds(time));
+}
+
+/// Everything that a dataset gives, as capture would publish it.
+void record(Dataset& dataset, TinyRecording& recording, bool images) {
+  recording.add("calibration", dataset.calibration(), kLater);
+  int n = 0;
+  while (const auto message = dataset.next()) {
+    if (const auto* imu = std::get_if<ImuSample>(&*message)) {
+      recording.add("imu", *imu, logOf(imu->time));
+    } else if (const auto* frame = std::get_if<Frame>(&*message)) {
+      if (images) recording.add("frame/" + frame->camera, *frame, logOf(frame->stamp.time));
+      Odometry odometry;
+      odometry.stamp = frame->stamp;
+      if (!images && frame->camera == "cam0") {
+        recording.add("odometry", odometry, logOf(frame->stamp.time) + 1000);
+      }
+    }
+    if (++n % 7 == 0) recording.cut();
+  }
+}
+
+struct Read {
+  std::vector<std::string> order;  ///< kind, time, index
+  std::vector<std::vector<std::uint8_t>> pixels;
+};
+
+Read readAll(Dataset& dataset) {
+  Read read;
+  while (const auto message = dataset.next()) {
+    if (const auto* imu = std::get_if<ImuSample>(&*message)) {
+      read.order.push_back("imu " + std::to_string(toNanoseconds(imu->time)) + " " +
+                           std::to_string(imu->gyro.x()));
+    } else if (const auto* frame = std::get_if<Frame>(&*message)) {
+      read.order.push_back(frame->camera + " " + std::to_string(toNanoseconds(frame->stamp.time)) +
+                           " " + std::to_string(frame->stamp.sequence));
+      if (frame->data) read.pixels.emplace_back((*frame->data).begin(), (*frame->data).end());
+    }
+  }
+  return read;
+}
+
+TEST(RecordedDrive, GivesWhatTheDatasetGaveThatWasRecorded) {
+  const auto source = tinyEuroc("recorded_source", true);
+  const fs::path file = freshFolder("recorded") / "run.mcap";
+  TinyRecording recording(file);
+  record(*Dataset::open({.path = source}), recording, true);
+  recording.finish();
+  const auto original = Dataset::open({.path = source});
+  const auto again = Dataset::open({.path = file});
+  EXPECT_EQ(again->kind(), DatasetKind::kRecording);
+  EXPECT_EQ(again->frameCount(), 5u);
+  EXPECT_EQ(again->calibration().cameras.size(), 2u);
+  const Read a = readAll(*original), b = readAll(*again);
+  EXPECT_EQ(a.order, b.order);
+  ASSERT_EQ(a.pixels.size(), 10u);
+  EXPECT_EQ(a.pixels, b.pixels);
+  EXPECT_TRUE(again->reasons().all().empty());
+}
+
+TEST(RecordedDrive, GivesAnyImageOutOfTurn) {
+  const fs::path file = freshFolder("recorded_turns") / "run.mcap";
+  TinyRecording recording(file);
+  record(*Dataset::open({.path = tinyEuroc("recorded_turns_source")}), recording, true);
+  recording.finish();
+  const auto dataset = Dataset::open({.path = file, .encoding = ImageEncoding::kBgr8});
+  for (const std::uint64_t index : {3u, 0u, 4u, 1u}) {
+    const auto frame = dataset->frameAt(index);
+    ASSERT_TRUE(frame) << index;
+    EXPECT_EQ(frame->stamp.sequence, index);
+    EXPECT_EQ(frame->data->size(), 3u * frame->width * frame->height);
+  }
+  EXPECT_FALSE(dataset->frameAt(5));
+}
+
+TEST(RecordedDrive, WithoutImagesHasTheFramesOfItsOdometry) {
+  const fs::path file = freshFolder("recorded_blind") / "run.mcap";
+  TinyRecording recording(file);
+  record(*Dataset::open({.path = tinyEuroc("recorded_blind_source")}), recording, false);
+  recording.finish();
+  const auto dataset = Dataset::open({.path = file});
+  EXPECT_EQ(dataset->frameCount(), 5u);
+  EXPECT_TRUE(readAll(*dataset).pixels.empty());
+}
+
+TEST(RecordedDrive, WithoutCalibrationSaysWhatIsMissing) {
+  const fs::path file = freshFolder("recorded_bare") / "run.mcap";
+  TinyRecording recording(file);
+  recording.add("imu", ImuSample{}, 5);
+  recording.finish();
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = file}); }),
+              HasSubstr("record while capture runs"));
+}
+
+TEST(RecordedDrive, AFileWithoutMessagesIsRefused) {
+  const fs::path folder = freshFolder("recorded_empty");
+  writeText(folder / "none.mcap", "no recording");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = folder / "none.mcap"}); }),
+              HasSubstr("is no MCAP file"));
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = folder / "absent.mcap"}); }),
+              HasSubstr("No such file"));
+}
+
+TEST(RecordedMessages, JoinsTheSegmentsOfAFolderAndGivesLatchedOnesOnce) {
+  const fs::path folder = freshFolder("segments");
+  Calibration calibration;
+  calibration.source = 3;
+  for (int segment = 0; segment < 3; ++segment) {
+    TinyRecording recording(folder / ("perdure-00000" + std::to_string(segment) + ".mcap"));
+    const auto at = static_cast<std::uint64_t>(1000 * segment);
+    recording.add("calibration", calibration, at);
+    for (std::uint64_t i = 0; i < 4; ++i) {
+      ImuSample sample;
+      sample.sequence = 4 * static_cast<std::uint64_t>(segment) + i;
+      recording.add("imu", sample, at + i);
+    }
+    if (segment == 2) recording.cut();  // as a recorder that was killed leaves it
+    if (segment < 2) recording.finish();
+  }
+  RecordedMessages messages(folder);
+  EXPECT_EQ(messages.reasons().of("unfinished"), 1u);
+  EXPECT_EQ(messages.topics().at("imu").messages, 12u);
+  EXPECT_EQ(messages.topics().at("imu").type, "perdure::msg::ImuSample");
+  EXPECT_EQ(messages.startNs(), 0u);
+  EXPECT_EQ(messages.endNs(), 2003u);
+  std::vector<std::uint64_t> sequences;
+  int calibrations = 0;
+  while (const auto message = messages.next()) {
+    if (message->topic == "calibration") ++calibrations;
+    if (message->topic == "imu") sequences.push_back(valueOf<ImuSample>(*message)->sequence);
+  }
+  EXPECT_THAT(sequences, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
+  EXPECT_EQ(calibrations, 1);
+  messages.rewind([](const std::string& topic) { return topic == "calibration"; });
+  EXPECT_EQ(messages.next()->topic, "calibration");
+  EXPECT_FALSE(messages.next());
+}
+
+TEST(RecordedMessages, RefusesAValueOfAnotherType) {
+  const fs::path file = freshFolder("types") / "run.mcap";
+  TinyRecording recording(file);
+  recording.add("imu", SpeedSample{}, 1);
+  recording.finish();
+  RecordedMessages messages(file);
+  const auto value = valueOf<ImuSample>(*messages.next());
+  ASSERT_FALSE(value);
+  EXPECT_EQ(value.error().code, "other_type");
+}
+
+}  // namespace
+}  // namespace perdure::replay

@@ -1,0 +1,84 @@
+#include "common/wire/cdr.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/wire/json.h"
+#include "tests/common/wire/examples.h"
+
+namespace perdure::wire {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+template <class T>
+Result<T> decoded(std::vector<std::uint8_t> message) {
+  const auto kept = std::make_shared<const std::vector<std::uint8_t>>(std::move(message));
+  return decodeCdr<T>(*kept, kept);
+}
+
+template <class T>
+class Cdr : public testing::Test {};
+
+using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
+                                Detections, ModelInfo, SwapNotice, Objects, ObjectState, Recalled,
+                                Event, Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+TYPED_TEST_SUITE(Cdr, Messages);
+
+TYPED_TEST(Cdr, BringsEveryFieldThroughBytesAndBack) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    TypeParam message;
+    Examples(seed).fill(message);
+    const auto bytes = encodeCdr(message);
+    ASSERT_TRUE(bytes) << bytes.error().detail;
+    const auto back = decoded<TypeParam>(*bytes);
+    ASSERT_TRUE(back) << back.error().code << " " << back.error().detail;
+    ASSERT_EQ(toJson(*back), toJson(message));
+  }
+}
+
+TYPED_TEST(Cdr, TakesAnyBytesAndGivesAValueOrAReason) {
+  std::mt19937_64 random(11);
+  int refused = 0;
+  for (unsigned seed = 0; seed < 300; ++seed) {
+    TypeParam message;
+    Examples(seed).fill(message);
+    auto bytes = *encodeCdr(message);
+    for (std::uint64_t n = 1 + random() % 4; n > 0; --n) {
+      bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
+    }
+    if (random() % 2 == 0) bytes.resize(random() % (bytes.size() + 1));
+    if (!decoded<TypeParam>(bytes)) ++refused;
+  }
+  EXPECT_GT(refused, 100);
+}
+
+TYPED_TEST(Cdr, RefusesAnEncodingThatItsTypeHasNot) {
+  TypeParam message;
+  Examples(1).fill(message);
+  auto bytes = *encodeCdr(message);
+  bytes[1] = 0x03;  // a parameter list
+  const auto refused = decoded<TypeParam>(bytes);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "bad_encapsulation");
+}
+
+TYPED_TEST(Cdr, KnowsTheIdlOfEveryTypeWhole) {
+  const std::string name = Type<TypeParam>::descriptor().m_typename;
+  const std::string text = idlOf(name);
+  EXPECT_THAT(text, HasSubstr("struct " + name.substr(name.rfind(':') + 1) + " {"));
+  EXPECT_THAT(text, Not(HasSubstr("#include")));
+  if (text.find("FrameStamp stamp;") != std::string::npos) {
+    EXPECT_THAT(text, HasSubstr("struct FrameStamp {"));
+  }
+}
+
+TEST(IdlOf, KnowsNothingOfStrangers) {
+  EXPECT_EQ(idlOf("perdure::msg::Object"), "");
+  EXPECT_EQ(idlOf("std_msgs::msg::String"), "");
+  EXPECT_EQ(idlOf(""), "");
+}
+
+}  // namespace
+}  // namespace perdure::wire

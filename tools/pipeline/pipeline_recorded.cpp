@@ -1,0 +1,91 @@
+// The filter on what was recorded of odometry and detections: the same messages in the same order
+// as `perdure play` gives to the service.
+#include "common/base/errors.h"
+#include "tools/pipeline/pipeline.h"
+
+namespace perdure::tools {
+namespace {
+
+constexpr char kRecorded[] = "recorded";
+
+/// What semantic_filter listens to; what the map store answered then is answered by the map of now.
+bool isFiltersInput(const std::string& topic) {
+  return topic == "calibration" || topic == "model" || topic == "inference/swap" ||
+         topic == "odometry" || topic == "landmarks" || topic == "detections";
+}
+
+}  // namespace
+
+void Pipeline::checkRecorded() {
+  const bool odometry = options_.odometry == kRecorded,
+             detections = options_.detections == kRecorded;
+  recorded_ = odometry && detections;
+  if (odometry != detections) {
+    throw StartupError(ExitCode::kUsage,
+                       "recorded odometry and recorded detections go together, as the filter heard "
+                       "them; give both, or neither: vio and model run again on recorded images");
+  }
+  if (recorded_ && !replay::RecordedMessages::looksLikeOne(options_.data)) {
+    throw StartupError(ExitCode::kUsage,
+                       options_.data + " is no recording; `perdure record` makes one");
+  }
+}
+
+void Pipeline::runRecorded(const std::function<void(const PipelineCounts&)>& progress) {
+  replay::RecordedMessages messages(options_.data);
+  messages.rewind(isFiltersInput);
+  while (const auto message = timer_.timeTowardsNext("decode", [&] { return messages.next(); })) {
+    const std::uint64_t frames = counts_.frames;
+    handleRecorded(*message);
+    remember();
+    if (counts_.frames == frames) continue;
+    for (const char* stage : {"decode", "semantic_filter", "map_store", "outputs"}) {
+      timer_.time(stage, [] {});
+    }
+    progress(counts_);
+    if (options_.seconds && frames_seconds_ > *options_.seconds) break;
+  }
+  for (const auto& [reason, n] : messages.reasons().all()) reasons_.add(reason, n);
+  timer_.timeTowardsNext("semantic_filter", [&] { filter_->flush(); });
+  timer_.time("map_store", [&] { map_->finish(); });
+}
+
+void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
+  const auto give = [&]<class T>(const T&, auto use) {
+    const auto value = replay::valueOf<T>(message);
+    if (!value) return reasons_.add(message.topic + "_" + value.error().code);
+    use(*value);
+  };
+  const auto filter = [&](auto work) { timer_.timeTowardsNext("semantic_filter", work); };
+  if (message.topic == "calibration") {
+    give(Calibration(), [&](const auto& m) { filter([&] { filter_->onCalibration(m); }); });
+  } else if (message.topic == "model") {
+    give(ModelInfo(), [&](const auto& m) { filter([&] { filter_->onModel(m); }); });
+  } else if (message.topic == "inference/swap") {
+    give(SwapNotice(), [&](const auto& m) { filter([&] { filter_->onSwap(m); }); });
+  } else if (message.topic == "odometry") {
+    give(Odometry(), [&](const Odometry& m) {
+      if (!odometry_once_.first(m.stamp.source, m.stamp.sequence)) return;
+      if (!first_frame_) first_frame_ = m.stamp.time;
+      frames_seconds_ = toSeconds(m.stamp.time - *first_frame_);
+      ++counts_.frames;
+      if (m.state != OdometryState::kInitialising) ++counts_.odometry;
+      outputs_->onOdometry(m);
+      filter([&] { filter_->onOdometry(m); });
+    });
+  } else if (message.topic == "landmarks") {
+    give(Landmarks(), [&](const Landmarks& m) {
+      outputs_->onLandmarks(m);
+      filter([&] { filter_->onLandmarks(m); });
+    });
+  } else {
+    give(Detections(), [&](const Detections& m) {
+      outputs_->onDetections(m);
+      ++counts_.inferred;
+      counts_.detections += m.detections.size();
+      filter([&] { filter_->onDetections(m); });
+    });
+  }
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,37 @@
+#include "tools/record/black_box.h"
+
+#include <utility>
+
+namespace perdure::tools {
+
+BlackBox::BlackBox(double seconds, std::uint64_t most_bytes)
+    : longest_ns_(static_cast<std::int64_t>(seconds * 1e9)), most_bytes_(most_bytes) {}
+
+void BlackBox::add(PackedChunk chunk) {
+  bytes_ += chunk.chunk.bytes();
+  chunks_.push_back(std::move(chunk));
+  // The second one must be old enough too: what is left then still reaches back that far.
+  const std::int64_t newest = chunks_.back().steady_ns;
+  while (chunks_.size() > 2 && newest - chunks_[1].steady_ns >= longest_ns_) dropOldest();
+  while (chunks_.size() > 1 && bytes_ > most_bytes_) {
+    dropOldest();
+    ++cut_short_;
+  }
+}
+
+void BlackBox::dropOldest() {
+  bytes_ -= chunks_.front().chunk.bytes();
+  chunks_.pop_front();
+}
+
+std::deque<PackedChunk> BlackBox::take() {
+  bytes_ = 0;
+  return std::exchange(chunks_, {});
+}
+
+double BlackBox::seconds() const {
+  if (chunks_.empty()) return 0;
+  return 1e-9 * static_cast<double>(chunks_.back().steady_ns - chunks_.front().steady_ns);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,11 @@
+// `perdure record` (with info, repair, export) and `perdure play`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace perdure::tools {
+
+void addRecordCommand(CLI::App& app);
+void addPlayCommand(CLI::App& app);
+
+}  // namespace perdure::tools

@@ -1,0 +1,162 @@
+#include "tools/record/files.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <regex>
+
+#include "common/base/errors.h"
+#include "common/bus/topics.h"
+#include "common/replay/recorded_messages.h"
+#include "tools/record/plain_types.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+namespace mcap = replay::mcap;
+
+std::string dateOf(std::uint64_t ns) {
+  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
+                     fmt::gmtime(static_cast<std::time_t>(ns / 1'000'000'000)));
+}
+
+void printInfo(const std::string& path) {
+  const replay::RecordedMessages recording(path);
+  const double seconds = 1e-9 * static_cast<double>(recording.endNs() - recording.startNs());
+  fmt::print("{}: {:.3f} s from {}\n", path, seconds, dateOf(recording.startNs()));
+  for (const auto& [topic, counted] : recording.topics()) {
+    fmt::print("  {:20} {:9} {:8.2f} Hz  {}\n", topic, counted.messages,
+               seconds > 0 ? static_cast<double>(counted.messages) / seconds : 0.0, counted.type);
+  }
+  for (const auto& [reason, n] : recording.reasons().all()) fmt::print("  {}: {}\n", reason, n);
+  if (!recording.lastProblem().empty()) fmt::print("  {}\n", recording.lastProblem());
+}
+
+void repair(const fs::path& file) {
+  auto reader = mcap::Reader::open(file);
+  if (!reader) throw StartupError(ExitCode::kUnavailable, reader.error().detail);
+  if (reader->finished()) return fmt::print("{} is whole\n", file.string());
+  const auto cut = reader->cutBytes();
+  if (const auto finished = reader->finish(); !finished) {
+    throw StartupError(ExitCode::kUnavailable, finished.error().detail);
+  }
+  fmt::print("{} is whole again: {} chunks, {} messages; {} bytes at its end were no whole chunk\n",
+             file.string(), reader->chunks().size(), reader->statistics().messages, cut);
+}
+
+/// Every file of a folder, or the file itself.
+void repairAll(const fs::path& path) {
+  if (!fs::is_directory(path)) return repair(path);
+  for (const auto& entry : fs::directory_iterator(path)) {
+    if (entry.path().extension() == ".mcap") repair(entry.path());
+  }
+}
+
+const dds_topic_descriptor_t* typeNamed(const std::string& name) {
+  for (const bus::TopicInfo& info : bus::topicTable()) {
+    if (info.typeName() == name) return info.type;
+  }
+  return nullptr;
+}
+
+/// Chunks of one file that is written in the order of the messages.
+class PlainFile {
+ public:
+  explicit PlainFile(const fs::path& path) : file_(mcap::Writer::create(path)) {
+    if (!file_) throw StartupError(ExitCode::kUnavailable, file_.error().detail);
+  }
+
+  Result<void> add(const replay::RecordedMessage& message) {
+    const dds_topic_descriptor_t* type = typeNamed(message.type);
+    if (type == nullptr) return fail("unknown_type", message.type);
+    std::vector<std::uint8_t> plain(message.data.begin(), message.data.end());
+    if (const auto* twin = plainTwinOf(message.type)) {
+      const auto sample = wire::CdrSample::read(message.data, *type);
+      if (!sample) return tl::unexpected(sample.error());
+      plain = wire::writeCdr(sample->get(), *twin);
+    }
+    draft_.add({channelOf(message), ++sequence_, message.log_ns, message.log_ns, plain});
+    constexpr std::size_t kLargest = 4u << 20;
+    return draft_.bytes() < kLargest ? Result<void>() : writeDraft();
+  }
+  void finish() {
+    auto written = writeDraft();
+    if (written) written = file_->finish();
+    if (!written) throw StartupError(ExitCode::kUnavailable, written.error().detail);
+  }
+
+ private:
+  Result<void> writeDraft() {
+    if (draft_.empty()) return {};
+    const auto chunk = mcap::pack(std::exchange(draft_, {}));
+    return file_->append(chunk, catalogue_);
+  }
+  std::uint16_t channelOf(const replay::RecordedMessage& message) {
+    for (const auto& [id, channel] : catalogue_.channels) {
+      if (channel.topic == message.topic) return id;
+    }
+    const auto id = static_cast<std::uint16_t>(catalogue_.channels.size() + 1);
+    const std::string text =
+        std::regex_replace(wire::idlOf(message.type), std::regex("@appendable"), "@final");
+    catalogue_.schemas[id] = {id, message.type, "omgidl", text};
+    catalogue_.channels[id] = {id, id, message.topic, "cdr"};
+    return id;
+  }
+
+  Result<mcap::Writer> file_;
+  mcap::Catalogue catalogue_;
+  mcap::Draft draft_;
+  std::uint32_t sequence_ = 0;
+};
+
+}  // namespace
+
+ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
+  replay::RecordedMessages recording(from);
+  PlainFile file(to);
+  ReasonCounts reasons;
+  while (const auto message = recording.next()) {
+    const auto added = file.add(*message);
+    if (added) continue;
+    if (added.error().code == "disk_full" || added.error().code == "file") {
+      throw StartupError(ExitCode::kUnavailable, added.error().detail);
+    }
+    reasons.add(message->topic + "_" + added.error().code);
+  }
+  file.finish();
+  for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
+  return reasons;
+}
+
+void addFileCommands(CLI::App& record) {
+  struct Options {
+    std::vector<std::string> paths;
+    std::string from, to;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* info = record.add_subcommand("info", "what recordings hold");
+  info->add_option("paths", options->paths, "files, or folders of them")->required();
+  info->callback([options] {
+    for (const std::string& path : options->paths) printInfo(path);
+  });
+  CLI::App* mend = record.add_subcommand("repair", "finish files of a recorder that was killed");
+  mend->add_option("paths", options->paths, "files, or folders of them")->required();
+  mend->callback([options] {
+    for (const std::string& path : options->paths) repairAll(path);
+  });
+  CLI::App* plain = record.add_subcommand(
+      "export", "copy into one file that readers without XCDR2 understand too");
+  plain->add_option("from", options->from, "a file, or a folder of them")->required();
+  plain->add_option("to", options->to, "the new file")->required();
+  plain->callback([options] {
+    const ReasonCounts reasons = exportPlain(options->from, options->to);
+    for (const auto& [reason, n] : reasons.all()) {
+      fmt::print(stderr, "{}: {}\n", reason, n);
+    }
+  });
+}
+
+}  // namespace perdure::tools

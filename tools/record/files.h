@@ -1,0 +1,18 @@
+// What can be done with recordings that lie there: `perdure record info`, `repair`, `export`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "common/base/result.h"
+
+namespace perdure::tools {
+
+void addFileCommands(CLI::App& record);
+
+/// A copy of one recording or a folder of them in which every message is plain XCDR1 (its types
+/// final), for readers without delimited XCDR2. What cannot be read is counted. Throws
+/// StartupError.
+ReasonCounts exportPlain(const std::filesystem::path& from, const std::filesystem::path& to);
+
+}  // namespace perdure::tools

@@ -1,0 +1,155 @@
+#include "tools/record/player.h"
+
+#include <algorithm>
+
+#include "common/base/errors.h"
+#include "common/bus/discovery.h"
+#include "tools/bus_tools/common.h"
+
+namespace perdure::tools {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// What is said by one process to another one that is not there any more, and who was how.
+const std::set<std::string> kNotByItself{"health", "map/query", "map/reply", "recalled"};
+
+bool isHeardBy(const std::string& service, const std::string& topic) {
+  static const std::map<std::string, std::set<std::string>> kInputs{
+      {"vio", {"calibration", "imu", "speed", "frame/"}},
+      {"inference", {"calibration", "frame/", "predictions"}},
+      {"semantic_filter",
+       {"calibration", "odometry", "landmarks", "detections", "model", "inference/swap"}},
+      {"map_store", {"objects", "events"}}};
+  const auto inputs = kInputs.find(service);
+  if (inputs == kInputs.end()) {
+    throw StartupError(ExitCode::kUsage, "--for " + service +
+                                             ": is none of vio, inference, semantic_filter, "
+                                             "map_store");
+  }
+  return inputs->second.contains(topic.starts_with("frame/") ? "frame/" : topic);
+}
+
+std::string listOf(const std::set<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+}  // namespace
+
+Player::Player(const bus::Participant& participant, bus::WaitLoop& loop,
+               replay::RecordedMessages& recording, const PlayOptions& options)
+    : participant_(participant), loop_(loop), recording_(recording), options_(options) {
+  chooseTopics();
+  refuseContested();
+  for (const std::string& topic : topics_) addVoice(topic);
+}
+
+void Player::chooseTopics() {
+  for (const std::string& topic : options_.topics) {
+    if (bus::findTopic(topic) == nullptr) refuseTopic(topic);
+    topics_.insert(topic);
+  }
+  for (const auto& [topic, counted] : recording_.topics()) {
+    if (!options_.topics.empty() || bus::findTopic(topic) == nullptr) continue;
+    const bool wanted = options_.for_service.empty() ? !kNotByItself.contains(topic)
+                                                     : isHeardBy(options_.for_service, topic);
+    if (wanted) topics_.insert(topic);
+  }
+  std::set<std::string> absent;
+  for (const std::string& topic : topics_) {
+    if (!recording_.topics().contains(topic)) absent.insert(topic);
+  }
+  if (topics_.empty() || !absent.empty()) {
+    throw StartupError(ExitCode::kUsage, "the recording has no " +
+                                             (absent.empty() ? "such topic" : listOf(absent)) +
+                                             "; `perdure record info` tells what it has");
+  }
+}
+
+/// Two writers of one topic make nonsense of both.
+void Player::refuseContested() {
+  bus::Discovery discovery(participant_);
+  const auto until = std::chrono::steady_clock::now() + 1s;
+  while (!loop_.stopped() && std::chrono::steady_clock::now() < until) loop_.runOnce(100ms);
+  std::set<std::string> contested;
+  for (const bus::RemoteEndpoint& endpoint : discovery.endpoints()) {
+    const std::string topic = replay::topicOf(endpoint.wire_name);
+    if (!endpoint.writer || participant_.wireName(topic) != endpoint.wire_name) continue;
+    const std::string by = endpoint.process.empty() ? "somebody" : endpoint.process;
+    if (topics_.contains(topic)) contested.insert(topic + " (" + by + ")");
+  }
+  if (contested.empty() || options_.force) return;
+  throw StartupError(ExitCode::kUnavailable,
+                     "others write these topics now: " + listOf(contested) +
+                         "; stop them, choose by --topics or --for, or play over them by --force");
+}
+
+void Player::addVoice(const std::string& topic) {
+  (void)bus::withTopic(topic, [&]<class T>(const bus::Topic<T>& typed) {
+    auto writer = std::make_shared<bus::Writer<T>>(participant_, typed);
+    const bus::Qos& qos = bus::findTopic(topic)->qos;
+    voices_[topic] = {writer,
+                      [writer](const replay::RecordedMessage& message) -> Result<void> {
+                        const auto value = replay::valueOf<T>(message);
+                        if (!value) return tl::unexpected(value.error());
+                        return writer->write(*value);
+                      },
+                      qos.latched&& qos.depth == 1};
+  });
+}
+
+void Player::waitForReaders() {
+  const auto until = std::chrono::steady_clock::now() +
+                     std::chrono::nanoseconds(static_cast<std::int64_t>(options_.wait_s * 1e9));
+  const auto unheard = [&] {
+    return std::any_of(voices_.begin(), voices_.end(),
+                       [](const auto& voice) { return voice.second.writer->matched() == 0; });
+  };
+  while (!loop_.stopped() && unheard() && std::chrono::steady_clock::now() < until) {
+    loop_.runOnce(20ms);
+  }
+}
+
+/// False where the loop was stopped meanwhile.
+bool Player::waitUntil(std::uint64_t log_ns) {
+  const double later = static_cast<double>(log_ns - first_ns_) / options_.rate;
+  const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(later));
+  while (!loop_.stopped()) {
+    const auto wait = due - std::chrono::steady_clock::now();
+    if (wait <= 0ns) return true;
+    loop_.runOnce(wait);
+  }
+  return false;
+}
+
+void Player::say(const replay::RecordedMessage& message) {
+  const auto said = voices_.at(message.topic).say(message);
+  if (said) {
+    ++played_;
+  } else {
+    reasons_.add(message.topic + "_" + said.error().code);
+  }
+}
+
+void Player::play() {
+  recording_.rewind([this](const std::string& topic) { return topics_.contains(topic); });
+  waitForReaders();
+  first_ns_ = recording_.startNs() + static_cast<std::uint64_t>(options_.start_s * 1e9);
+  const auto length = static_cast<std::uint64_t>(options_.seconds * 1e9);
+  began_ = std::chrono::steady_clock::now();
+  while (const auto message = recording_.next()) {
+    if (message->log_ns < first_ns_) {
+      if (voices_.at(message->topic).latched) say(*message);
+      continue;
+    }
+    if (length > 0 && message->log_ns - first_ns_ > length) break;
+    if (!waitUntil(message->log_ns)) return;
+    say(*message);
+  }
+  constexpr double kLongest = 1.0;
+  for (const auto& [topic, voice] : voices_) (void)voice.writer->waitForAcknowledgement(kLongest);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,63 @@
+// A recording back onto the bus: the same messages, at the same distances in time.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/bus/wait_loop.h"
+#include "common/replay/recorded_messages.h"
+
+namespace perdure::tools {
+
+struct PlayOptions {
+  std::vector<std::string> topics;  ///< empty: all that is recorded but health and conversations
+  std::string for_service;          ///< instead of topics: what that service listens to
+  double rate = 1.0;                ///< seconds of the recording in one second
+  double start_s = 0.0, seconds = 0.0;  ///< from where, and how much of it; 0: to its end
+  double wait_s = 2.0;                  ///< at most, for a reader of each topic
+  bool loop = false, force = false;
+};
+
+class Player {
+ public:
+  /// Takes about a second to see who is on the bus. Throws StartupError: a topic that there is not,
+  /// or that is not in the recording, or that another process writes (unless `force`).
+  Player(const bus::Participant& participant, bus::WaitLoop& loop,
+         replay::RecordedMessages& recording, const PlayOptions& options);
+
+  /// Once to the end, or until the loop is stopped.
+  void play();
+  std::uint64_t played() const { return played_; }
+  /// What could not be played, by topic and reason.
+  const ReasonCounts& reasons() const { return reasons_; }
+  const std::set<std::string>& topics() const { return topics_; }
+
+ private:
+  struct Voice {
+    std::shared_ptr<bus::RawWriter> writer;
+    std::function<Result<void>(const replay::RecordedMessage&)> say;
+    bool latched = false;
+  };
+  void chooseTopics();
+  void refuseContested();
+  void addVoice(const std::string& topic);
+  void waitForReaders();
+  bool waitUntil(std::uint64_t log_ns);
+  void say(const replay::RecordedMessage& message);
+
+  const bus::Participant& participant_;
+  bus::WaitLoop& loop_;
+  replay::RecordedMessages& recording_;
+  const PlayOptions options_;
+  std::set<std::string> topics_;
+  std::map<std::string, Voice> voices_;
+  std::uint64_t first_ns_ = 0, played_ = 0;
+  std::chrono::steady_clock::time_point began_;
+  ReasonCounts reasons_;
+};
+
+}  // namespace perdure::tools

@@ -1,0 +1,78 @@
+// Topics as they pass by, into chunks: what `perdure record` does on the bus.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/bus/cdr_reader.h"
+#include "common/bus/discovery.h"
+#include "common/service/service.h"
+#include "tools/record/fault_watch.h"
+#include "tools/record/store.h"
+
+namespace perdure::tools {
+
+struct RecorderOptions {
+  std::vector<std::string> topics;  ///< empty: those that the table records
+  bool images = false;              ///< without `topics`: those of every camera that appears too
+  HealthState fault = HealthState::kFailed;  ///< the first state that is one
+};
+
+/// Log times: the system's clock at the start, and from then on the steady one, which no
+/// correction turns back.
+class LogClock {
+ public:
+  LogClock();
+  std::uint64_t nowNs() const;
+  static std::int64_t steadyNs();
+  /// How far the system's clock was set since the start, in nanoseconds; small ones are slewing.
+  std::int64_t setByNs() const;
+
+ private:
+  std::int64_t real_minus_steady_;
+};
+
+class Recorder {
+ public:
+  /// Throws StartupError: a topic that there is not.
+  Recorder(service::Context& context, const RecorderOptions& options, Store& store);
+
+  /// Hands over what has come, and where `fault` says so asks for what is held to be written.
+  void cut(bool fault = false);
+  std::uint64_t messages() const { return messages_; }
+
+ private:
+  struct Source {
+    bus::CdrReader reader;
+    std::uint16_t channel = 0;
+    std::uint32_t sequence = 0;
+    bool latched = false;
+  };
+
+  void listen(const std::string& topic);
+  std::uint16_t addChannel(const std::string& topic, const bus::TopicInfo& info);
+  void onMessage(Source& source, const bus::CdrMessage& message);
+  void keepLatched(const Source& source, std::span<const std::uint8_t> bytes);
+  void lookForCameras();
+  void onFault(const std::optional<std::string>& what);
+  void updateHealth();
+  void report(ReasonCounts& counts) const;
+
+  service::Context& context_;
+  const RecorderOptions options_;
+  Store& store_;
+  const LogClock clock_;
+  bus::Discovery discovery_;
+  std::map<std::string, std::unique_ptr<Source>> sources_;
+  CatalogueNow catalogue_;
+  LatchedNow latched_;
+  replay::mcap::Draft draft_;
+  std::int64_t draft_began_ns_ = 0;
+  FaultWatch watch_;
+  const bus::Reader<Health>* health_ = nullptr;
+  std::uint64_t messages_ = 0, faults_ = 0;
+};
+
+}  // namespace perdure::tools

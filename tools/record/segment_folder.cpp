@@ -1,0 +1,109 @@
+#include "tools/record/segment_folder.h"
+
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <charconv>
+
+#include "common/base/errors.h"
+#include "common/replay/mcap_reader.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPrefix = "perdure-";
+constexpr char kExtension[] = ".mcap";
+
+/// The number in a name of ours; 0: it is not one.
+std::uint64_t numberOf(const fs::path& file) {
+  const std::string name = file.filename().string();
+  if (!name.starts_with(kPrefix) || file.extension() != kExtension) return 0;
+  std::uint64_t number = 0;
+  std::from_chars(name.data() + kPrefix.size(), name.data() + name.size(), number);
+  return number;
+}
+
+}  // namespace
+
+SegmentFolder::SegmentFolder(const fs::path& folder, std::uint64_t quota, std::uint64_t keep_free)
+    : folder_(folder), quota_(quota), keep_free_(keep_free) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (!fs::is_directory(folder_)) {
+    throw StartupError(ExitCode::kUnavailable, folder_.string() + " cannot be made (" +
+                                                   error.message() +
+                                                   "); --out names a folder for recordings");
+  }
+  lock();
+  findFiles();
+}
+
+SegmentFolder::~SegmentFolder() {
+  if (lock_ >= 0) close(lock_);
+}
+
+void SegmentFolder::lock() {
+  lock_ = open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock_ >= 0 && flock(lock_, LOCK_EX | LOCK_NB) == 0 && access(folder_.c_str(), W_OK) == 0)
+    return;
+  const bool taken = lock_ >= 0 && access(folder_.c_str(), W_OK) == 0;
+  if (lock_ >= 0) close(lock_);
+  throw StartupError(ExitCode::kUnavailable,
+                     folder_.string() + (taken ? " is another recorder's; give each its own --out"
+                                               : " cannot be written; give --out another folder, "
+                                                 "or this user the right to write"));
+}
+
+void SegmentFolder::findFiles() {
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    const std::uint64_t number = numberOf(entry.path());
+    if (number == 0) continue;
+    next_number_ = std::max(next_number_, number + 1);
+    auto reader = replay::mcap::Reader::open(entry.path());
+    if (reader && !reader->finished() && reader->finish()) repaired_.push_back(entry.path());
+    std::error_code ignored;
+    sizes_[entry.path()] = fs::file_size(entry.path(), ignored);
+  }
+}
+
+fs::path SegmentFolder::nextFile(std::int64_t wall_ns, const std::string& word) {
+  const auto seconds = static_cast<std::time_t>(wall_ns / 1'000'000'000);
+  const fs::path file =
+      folder_ / fmt::format("{}{:06}-{:%Y%m%dT%H%M%SZ}{}{}", kPrefix, next_number_++,
+                            fmt::gmtime(seconds), word, kExtension);
+  sizes_[file] = 0;
+  return file;
+}
+
+std::uint64_t SegmentFolder::bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& [file, size] : sizes_) sum += size;
+  return sum;
+}
+
+void SegmentFolder::remove(const fs::path& file) {
+  std::error_code ignored;
+  fs::remove(file, ignored);
+  sizes_.erase(file);
+}
+
+void SegmentFolder::keepQuota() {
+  while (quota_ > 0 && sizes_.size() > 1 && bytes() > quota_) {
+    remove(fs::path(sizes_.begin()->first));
+    ++removed_;
+  }
+}
+
+bool SegmentFolder::hasRoomFor(std::uint64_t bytes) const {
+  struct statvfs disk {};
+  if (statvfs(folder_.c_str(), &disk) != 0) return true;  // the write will tell
+  return std::uint64_t{disk.f_bavail} * disk.f_frsize >= bytes + keep_free_;
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,102 @@
+#include "tools/record/segment_writer.h"
+
+#include "common/replay/mcap_reader.h"
+
+namespace perdure::tools {
+
+namespace mcap = replay::mcap;
+
+SegmentWriter::SegmentWriter(SegmentFolder& folder, double segment_s, std::string word)
+    : folder_(folder),
+      longest_ns_(static_cast<std::int64_t>(segment_s * 1e9)),
+      word_(std::move(word)) {}
+
+SegmentWriter::~SegmentWriter() { finish(); }
+
+bool SegmentWriter::note(const Result<void>& written) {
+  problem_.clear();
+  if (written) return true;
+  problem_ = written.error().detail;
+  if (written.error().code == "disk_full") {
+    problem_ += "; recording goes on as soon as there is room: free some, or lower --quota";
+  }
+  return false;
+}
+
+/// A file is over by its time, or where a quota would hold too few of its size.
+bool SegmentWriter::isOver(const PackedChunk& packed) const {
+  constexpr std::uint64_t kFilesOfQuota = 8;
+  const bool large = folder_.quota() > 0 && file_->size() > folder_.quota() / kFilesOfQuota;
+  return large || packed.steady_ns - began_ns_ >= longest_ns_;
+}
+
+bool SegmentWriter::begin(const PackedChunk& packed) {
+  if (!hasRoomFor(packed.chunk)) return false;
+  const auto path = folder_.nextFile(static_cast<std::int64_t>(packed.chunk.place.start_ns), word_);
+  auto file = mcap::Writer::create(path);
+  bool begun = note(file ? Result<void>() : tl::unexpected(file.error()));
+  if (begun) {
+    file_ = *std::move(file);
+    begun = addLatched(packed);
+  }
+  if (!begun) {
+    file_.reset();
+    folder_.remove(path);
+    return false;
+  }
+  began_ns_ = packed.steady_ns;
+  ++files_;
+  finishLeftOver();
+  return true;
+}
+
+bool SegmentWriter::addLatched(const PackedChunk& packed) {
+  if (packed.latched->empty()) return true;
+  mcap::Draft draft;
+  for (const Latched& message : *packed.latched) {
+    const std::uint64_t at = packed.chunk.place.start_ns;
+    draft.add({message.channel, message.sequence, at, at, message.data});
+  }
+  return append(mcap::pack(draft), *packed.catalogue);
+}
+
+bool SegmentWriter::hasRoomFor(const mcap::Chunk& chunk) {
+  return folder_.hasRoomFor(chunk.bytes()) || note(fail("disk_full", "the disk is full"));
+}
+
+bool SegmentWriter::append(const mcap::Chunk& chunk, const mcap::Catalogue& catalogue) {
+  if (!hasRoomFor(chunk)) return false;
+  const std::uint64_t before = file_->size();
+  if (!note(file_->append(chunk, catalogue))) return false;
+  file_->sync();
+  bytes_ += file_->size() - before;
+  folder_.sizeIs(file_->path(), file_->size());
+  folder_.keepQuota();
+  return true;
+}
+
+bool SegmentWriter::add(const PackedChunk& packed) {
+  if (file_ && isOver(packed)) finish();
+  if (!file_ && !begin(packed)) return false;
+  return append(packed.chunk, *packed.catalogue);
+}
+
+void SegmentWriter::finish() {
+  if (!file_) return;
+  if (file_->finish()) {
+    file_->sync();
+    folder_.sizeIs(file_->path(), file_->size());
+  } else {
+    left_over_.push_back(file_->path());
+  }
+  file_.reset();
+}
+
+void SegmentWriter::finishLeftOver() {
+  std::erase_if(left_over_, [](const auto& path) {
+    auto reader = mcap::Reader::open(path);
+    return !reader || reader->finish().has_value();
+  });
+}
+
+}  // namespace perdure::tools

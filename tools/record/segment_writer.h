@@ -1,0 +1,68 @@
+// Chunks into files of a bounded length, each of which can be read alone. A full disk is waited
+// out.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/replay/mcap_writer.h"
+#include "tools/record/segment_folder.h"
+
+namespace perdure::tools {
+
+using CatalogueNow = std::shared_ptr<const replay::mcap::Catalogue>;
+
+/// A message that each file begins with, so that it says what the others mean.
+struct Latched {
+  std::uint16_t channel = 0;
+  std::uint32_t sequence = 0;
+  std::vector<std::uint8_t> data;
+};
+using LatchedNow = std::shared_ptr<const std::vector<Latched>>;
+
+/// A packed chunk, and what one has to know to write it into any file.
+struct PackedChunk {
+  replay::mcap::Chunk chunk;
+  CatalogueNow catalogue;
+  LatchedNow latched;
+  std::int64_t steady_ns = 0;  ///< of its first message, by the steady clock
+};
+
+class SegmentWriter {
+ public:
+  /// `segment_s` seconds to a file; `word` as SegmentFolder has it.
+  SegmentWriter(SegmentFolder& folder, double segment_s, std::string word);
+  ~SegmentWriter();
+
+  /// False where it could not be written: it is lost, and problem() says why.
+  bool add(const PackedChunk& packed);
+  /// Ends the file that is being written.
+  void finish();
+
+  /// Empty where all is well.
+  const std::string& problem() const { return problem_; }
+  std::uint64_t bytes() const { return bytes_; }
+  std::uint64_t files() const { return files_; }
+
+ private:
+  bool begin(const PackedChunk& packed);
+  bool addLatched(const PackedChunk& packed);
+  bool hasRoomFor(const replay::mcap::Chunk& chunk);
+  bool append(const replay::mcap::Chunk& chunk, const replay::mcap::Catalogue& catalogue);
+  bool isOver(const PackedChunk& packed) const;
+  bool note(const Result<void>& written);
+  void finishLeftOver();
+
+  SegmentFolder& folder_;
+  const std::int64_t longest_ns_;
+  const std::string word_;
+  std::optional<replay::mcap::Writer> file_;
+  std::int64_t began_ns_ = 0;
+  std::vector<std::filesystem::path> left_over_;  // unfinished, because the disk was full
+  std::string problem_;
+  std::uint64_t bytes_ = 0, files_ = 0;
+};
+
+}  // namespace perdure::tools
