@@ -102,7 +102,9 @@ void SegmentFolder::keepQuota() {
 
 bool SegmentFolder::hasRoomFor(std::uint64_t bytes) const {
   struct statvfs disk {};
-  if (statvfs(folder_.c_str(), &disk) != 0) return true;  // the write will tell
+  if (keep_free_ == 0 || statvfs(folder_.c_str(), &disk) != 0) {
+    return true;  // the write will tell
+  }
   return std::uint64_t{disk.f_bavail} * disk.f_frsize >= bytes + keep_free_;
 }
 

@@ -39,6 +39,7 @@ StoreReport Store::report() const {
 
 void Store::run() {
   while (auto job = queue_.pop()) {
+    ++now_.chunks;
     handle(*std::move(job));
     publish();
   }

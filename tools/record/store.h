@@ -23,6 +23,7 @@ struct StoreOptions {
 
 /// What became of the messages, since the start.
 struct StoreReport {
+  std::uint64_t chunks = 0;    ///< that came
   std::uint64_t messages = 0;  ///< in files, or held for a fault
   std::uint64_t lost = 0;      ///< while the disk was full or failed
   std::uint64_t bytes = 0, files = 0, removed = 0, folder_bytes = 0, dumps = 0;

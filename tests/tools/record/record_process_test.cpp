@@ -1,0 +1,286 @@
+// `perdure record` and `perdure play` as they are run, against topics that this test publishes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include "common/bus/wait_loop.h"
+#include "common/replay/recorded_messages.h"
+#include "tests/common/replay/tiny_recording.h"
+#include "tests/process/support.h"
+#include "tests/services/semantic_filter/scene.h"
+#include "tools/pipeline/pipeline.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+namespace scene = semantic_filter::testing;
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+std::string perdure() { return (test::programs() / "perdure").string(); }
+
+std::vector<fs::path> filesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  if (!fs::exists(folder)) return files;
+  for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// What a file has: "finished", or why not.
+std::string stateOf(const fs::path& file) {
+  const auto reader = replay::mcap::Reader::open(file);
+  return !reader ? reader.error().code : reader->finished() ? "finished" : "unfinished";
+}
+
+/// Inertial samples at 200 Hz, odometry at 20 Hz and a calibration, as long as it lives.
+class Vehicle {
+ public:
+  Vehicle()
+      : domain_(test::ownNetwork()),
+        participant_(domain_, "vehicle"),
+        imu_(participant_, bus::topics::kImu),
+        odometry_(participant_, bus::topics::kOdometry),
+        calibration_(participant_, bus::topics::kCalibration),
+        health_(participant_, bus::topics::kHealth),
+        loop_(participant_) {
+    Calibration calibration = scene::calibrationOf(scene::makeCamera());
+    calibration.source = 77;
+    (void)calibration_.write(calibration);
+    loop_.every(5ms, [this] { publish(); });
+    loop_.every(1s, [this] { sayHealth(); });
+    thread_ = std::thread([this] { loop_.run(); });
+  }
+  ~Vehicle() {
+    loop_.stop();
+    thread_.join();
+  }
+  bool heard() const { return imu_.matched() > 0 && odometry_.matched() > 0; }
+  std::uint64_t published() const { return published_; }
+  void fail() { state_ = HealthState::kFailed; }
+
+ private:
+  void publish() {
+    ImuSample sample;
+    sample.sequence = published_;
+    (void)imu_.write(sample);
+    if (published_ % 10 == 0) {
+      (void)odometry_.write(scene::odometryAt(published_ / 10, RigidTransform()));
+    }
+    ++published_;
+  }
+  void sayHealth() {
+    Health health;
+    health.process = "vehicle";
+    health.state = state_;
+    (void)health_.write(health);
+  }
+
+  bus::Domain domain_;
+  bus::Participant participant_;
+  bus::Writer<ImuSample> imu_;
+  bus::Writer<Odometry> odometry_;
+  bus::Writer<Calibration> calibration_;
+  bus::Writer<Health> health_;
+  bus::WaitLoop loop_;
+  std::atomic<std::uint64_t> published_ = 0;
+  std::atomic<HealthState> state_ = HealthState::kOk;
+  std::thread thread_;
+};
+
+/// Sequence numbers of the inertial samples; they are without a gap, or -1 is among them.
+std::pair<std::int64_t, std::int64_t> imuSpan(const fs::path& path, std::uint64_t* calibrations) {
+  replay::RecordedMessages messages(path);
+  std::int64_t first = -1, last = -1;
+  while (const auto message = messages.next()) {
+    if (message->topic == "calibration") ++*calibrations;
+    if (message->topic != "imu") continue;
+    const auto number = static_cast<std::int64_t>(replay::valueOf<ImuSample>(*message)->sequence);
+    if (first >= 0 && number != last + 1) ADD_FAILURE() << last << " is followed by " << number;
+    if (first < 0) first = number;
+    last = number;
+  }
+  return {first, last};
+}
+
+TEST(RecordProcess, KilledLosesLessThanASecondAndTheNextOneMakesTheFileWhole) {
+  const test::Folder place;
+  const std::string out = place.file("rec");
+  (void)test::ownNetwork();
+  Vehicle vehicle;
+  std::uint64_t before = 0;
+  {
+    test::Child recorder({perdure(), "record", "--out", out}, place.file("record.log"));
+    ASSERT_TRUE(test::eventually(20s, [&] { return vehicle.heard(); })) << recorder.log();
+    const std::uint64_t start = vehicle.published();
+    ASSERT_TRUE(test::eventually(20s, [&] { return vehicle.published() > start + 500; }));
+    before = vehicle.published();
+    recorder.signal(SIGKILL);
+    recorder.wait(5s);
+  }
+  const auto files = filesIn(out);
+  ASSERT_EQ(files.size(), 1u);
+  EXPECT_EQ(stateOf(files[0]), "unfinished");
+  std::uint64_t calibrations = 0;
+  const auto [first, last] = imuSpan(out, &calibrations);
+  EXPECT_EQ(calibrations, 1u);
+  EXPECT_GT(last, static_cast<std::int64_t>(before) - 200);  // of a second
+  EXPECT_GT(last - first, 250);
+  test::Child next({perdure(), "record", "--out", out, "--seconds", "1"}, place.file("next.log"));
+  EXPECT_EQ(next.wait(20s), 0);
+  EXPECT_THAT(next.log(), HasSubstr("had been cut off and is whole again"));
+  EXPECT_EQ(stateOf(files[0]), "finished");
+  EXPECT_EQ(filesIn(out).size(), 2u);
+}
+
+TEST(LongRecordProcess, TheBlackBoxWritesTheTimeBeforeAFaultAndWhatIsLatched) {
+  const test::Folder place;
+  const std::string out = place.file("rec");
+  (void)test::ownNetwork();
+  Vehicle vehicle;
+  test::Child recorder({perdure(), "record", "--out", out, "--last", "2s", "--after", "0.5"},
+                       place.file("record.log"));
+  ASSERT_TRUE(test::eventually(20s, [&] { return vehicle.heard(); })) << recorder.log();
+  const std::uint64_t start = vehicle.published();
+  ASSERT_TRUE(test::eventually(20s, [&] { return vehicle.published() > start + 700; }));
+  EXPECT_TRUE(filesIn(out).empty());
+  vehicle.fail();
+  const auto finished = [&](std::size_t n) {
+    const auto files = filesIn(out);
+    return files.size() == n && stateOf(files.back()) == "finished";
+  };
+  ASSERT_TRUE(test::eventually(10s, [&] { return finished(1); })) << recorder.log();
+  EXPECT_THAT(recorder.log(), HasSubstr("fault: vehicle has failed"));
+  std::uint64_t calibrations = 0;
+  const auto [first, last] = imuSpan(out, &calibrations);
+  EXPECT_EQ(calibrations, 1u);
+  EXPECT_GT(first,
+            static_cast<std::int64_t>(start));  // it was there before the box reaches back to
+  EXPECT_GT(last - first, 2 * 150);             // two seconds, at 200 Hz on a busy machine
+  recorder.signal(SIGUSR1);
+  ASSERT_TRUE(test::eventually(10s, [&] { return finished(2); })) << recorder.log();
+  recorder.signal(SIGTERM);
+  EXPECT_EQ(recorder.wait(5s), 0);
+}
+
+TEST(PlayProcess, RefusesTopicsThatOthersWriteUnlessItIsForced) {
+  const test::Folder place;
+  replay::TinyRecording recording(place.file("run.mcap"));
+  recording.add("imu", ImuSample{}, 1000);
+  recording.finish();
+  (void)test::ownNetwork();
+  const Vehicle vehicle;
+  test::Child player({perdure(), "play", place.file("run.mcap")}, place.file("play.log"));
+  EXPECT_EQ(player.wait(20s), 69);
+  EXPECT_THAT(player.log(), HasSubstr("others write these topics now: imu (vehicle)"));
+  test::Child forced({perdure(), "play", place.file("run.mcap"), "--force", "--wait", "0"},
+                     place.file("forced.log"));
+  EXPECT_EQ(forced.wait(20s), 0);
+  EXPECT_THAT(forced.log(), HasSubstr("1 messages of 1 topics were played"));
+}
+
+TEST(PlayProcess, SaysWhatTheRecordingHasNot) {
+  const test::Folder place;
+  replay::TinyRecording recording(place.file("run.mcap"));
+  recording.add("imu", ImuSample{}, 1000);
+  recording.finish();
+  (void)test::ownNetwork();
+  test::Child player({perdure(), "play", place.file("run.mcap"), "--for", "semantic_filter"},
+                     place.file("play.log"));
+  EXPECT_EQ(player.wait(20s), 64);
+  EXPECT_THAT(player.log(), HasSubstr("the recording has no such topic"));
+}
+
+/// What vio and inference would say along a street with two cars: odometry, and its detections
+/// half a period later. Frames are .1 s apart for the filter, and .2 s on the wire.
+void recordStreet(const std::string& file) {
+  constexpr std::uint64_t kPeriod = 200'000'000, kFrames = 20;
+  const std::vector<scene::TrueObject> cars = {
+      {scene::makeState(25, 4, .7, .1, 4.1, 1.7, 1.5), "car"},
+      {scene::makeState(34, -4, .7, 3., 4.3, 1.8, 1.5), "car"}};
+  std::mt19937_64 random(3);
+  const auto camera = std::make_shared<CameraModel>(scene::makeCamera());
+  replay::TinyRecording recording(file);
+  recording.add("calibration", scene::calibrationOf(scene::makeCamera()), 0);
+  recording.add("model", scene::makeModelInfo(), 1);
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    const RigidTransform T_WB = scene::driveTo(k, 0.4);
+    semantic_filter::View view;
+    view.camera = camera.get();
+    view.T_WB = T_WB;
+    std::vector<Detection> boxes;
+    for (const auto& car : cars) {
+      const auto box = scene::detect(car, view, semantic_filter::BoxParameters(), 1.0, 4.0, random);
+      if (box) boxes.push_back(*box);
+    }
+    recording.add("odometry", scene::odometryAt(k, T_WB), (k + 1) * kPeriod);
+    recording.add("detections", scene::detectionsAt(k, boxes), (k + 1) * kPeriod + kPeriod / 2);
+    if (k % 5 == 4) recording.cut();
+  }
+  recording.finish();
+}
+
+/// The pipeline's `objects` of the same recording, in order.
+std::vector<Objects> runPipeline(const std::string& recording, const std::string& out) {
+  PipelineOptions options;
+  options.data = recording;
+  options.out = out;
+  options.odometry = options.detections = "recorded";
+  options.quiet = true;
+  Pipeline pipeline(options);
+  std::vector<Objects> objects;
+  pipeline.listen([&](const Objects& m) { objects.push_back(m); });
+  pipeline.run([](const PipelineCounts&) {});
+  return objects;
+}
+
+std::vector<Objects> objectsIn(const std::string& recording) {
+  replay::RecordedMessages messages(recording);
+  messages.rewind([](const std::string& topic) { return topic == "objects"; });
+  std::vector<Objects> objects;
+  while (const auto message = messages.next()) {
+    objects.push_back(*replay::valueOf<Objects>(*message));
+  }
+  return objects;
+}
+
+TEST(PlayProcess, GivesTheFilterServiceTheObjectsThatThePipelineHas) {
+  const test::Folder place;
+  recordStreet(place.file("run.mcap"));
+  const auto expected = runPipeline(place.file("run.mcap"), place.file("out"));
+  ASSERT_EQ(expected.size(), 20u);
+  ASSERT_GE(expected.back().objects.size(), 2u);
+  (void)test::ownNetwork();
+  test::Child filter({(test::programs() / "perdure-semantic-filter").string(), "--config",
+                      (test::sources() / "config/semantic_filter.yaml").string(), "--set",
+                      "restore.timeout_s=0.2"},
+                     place.file("filter.log"));
+  test::Child recorder({perdure(), "record", "--out", place.file("rec"), "--topics", "objects"},
+                       place.file("record.log"));
+  test::Child player({perdure(), "play", place.file("run.mcap"), "--wait", "20"},
+                     place.file("play.log"));
+  ASSERT_EQ(player.wait(60s), 0) << player.log();
+  std::this_thread::sleep_for(300ms);
+  recorder.signal(SIGTERM);
+  ASSERT_EQ(recorder.wait(5s), 0);
+  const auto heard = objectsIn(place.file("rec"));
+  ASSERT_EQ(heard.size(), expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    ASSERT_TRUE(heard[k].stamp.sameFrame(expected[k].stamp)) << k;
+    ASSERT_EQ(heard[k].objects.size(), expected[k].objects.size()) << k;
+    for (std::size_t j = 0; j < expected[k].objects.size(); ++j) {
+      const ObjectBelief &a = heard[k].objects[j], &b = expected[k].objects[j];
+      ASSERT_EQ(a.id, b.id);
+      ASSERT_NEAR(a.existence, b.existence, 1e-9);
+      ASSERT_EQ(a.best().name, b.best().name);
+      ASSERT_LT((a.best().mean - b.best().mean).cwiseAbs().maxCoeff(), 1e-6) << k << " " << a.id;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace perdure::tools
