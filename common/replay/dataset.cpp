@@ -41,7 +41,8 @@ Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
 
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
-  if (RecordedMessages::looksLikeOne(path)) return readRecordedDrive(options);
+  const bool recorded = RecordedMessages::looksLikeOne(path);
+  if (recorded && !std::filesystem::is_directory(path)) return readRecordedDrive(options);
   if (!std::filesystem::is_directory(path)) {
     throwMissing(path, "the dataset folder",
                  "--data takes a folder in EuRoC, KITTI raw or KITTI tracking layout, or a "
@@ -50,6 +51,7 @@ Recording readRecording(const DatasetOptions& options) {
   if (looksLikeEuroc(path)) return readEuroc(options);
   if (looksLikeKittiTracking(path)) return readKittiTracking(options);
   if (looksLikeKittiRaw(path)) return readKittiRaw(options);
+  if (recorded) return readRecordedDrive(options);
   throw StartupError(ExitCode::kUnavailable,
                      path.string() +
                          " is no dataset folder that is known: give a folder with "

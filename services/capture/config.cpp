@@ -7,7 +7,8 @@ namespace {
 
 void describeDataset(Config& c, config::Fields& fields) {
   fields.text("dataset.path", c.dataset.path,
-              {"folder of the drive: EuRoC, KITTI raw or KITTI tracking"});
+              {"folder of the drive: EuRoC, KITTI raw or KITTI tracking; or a recording of images "
+               "(.mcap)"});
   fields.text("dataset.sequence", c.dataset.sequence, {"of KITTI tracking: \"0001\""});
   fields.choice("dataset.cameras", c.dataset.cameras, {"mono", "stereo"},
                 {"mono: cam0 only; stereo: cam1 too, where the drive has one"});
@@ -55,7 +56,7 @@ void requireSource(const Config& config) {
   if (config.dataset.path.empty()) {
     throw StartupError(ExitCode::kConfiguration,
                        "No drive is configured; set dataset.path to a folder in EuRoC, KITTI raw "
-                       "or KITTI tracking layout.");
+                       "or KITTI tracking layout, or to a recording (.mcap).");
   }
 }
 

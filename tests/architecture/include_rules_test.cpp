@@ -35,6 +35,8 @@ TEST(IncludeRules, ForbidWhatCrossesLayers) {
               ElementsAre(HasSubstr("only those below it")));
   EXPECT_THAT(including("services/vio/main.cpp", "dds/dds.h"),
               ElementsAre(HasSubstr("only common/bus speaks DDS")));
+  EXPECT_THAT(including("common/wire/cdr.cpp", "dds/dds.h"),
+              ElementsAre(HasSubstr("only common/bus speaks DDS")));
   EXPECT_THAT(including("services/vio/main.cpp", "idl/objects.h"),
               ElementsAre(HasSubstr("only common/wire knows")));
   EXPECT_THAT(including("common/bus/a.h", "tools/map/command.h"),
@@ -50,6 +52,7 @@ TEST(IncludeRules, AllowWhatStaysInsideThem) {
   EXPECT_THAT(including("services/vio/main.cpp", "common/service/service.h"), IsEmpty());
   EXPECT_THAT(including("services/vio/main.cpp", "services/vio/node.h"), IsEmpty());
   EXPECT_THAT(including("common/bus/dds.h", "dds/dds.h"), IsEmpty());
+  EXPECT_THAT(including("common/wire/cdr.cpp", "dds/ddsi/ddsi_cdrstream.h"), IsEmpty());
   EXPECT_THAT(including("tools/pipeline/a.cpp", "services/vio/node.h"), IsEmpty());
 }
 

@@ -42,6 +42,10 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "detector, the simulated one")
       ->take_all();
   app.add_flag("--pictures", options.pictures, "Also overlay.mp4: the frames with the objects");
+  app.add_flag(
+      "--record", options.record,
+      "Also run.mcap: what the filter heard and said, for --odometry recorded, perdure play "
+      "and other readers");
   app.add_flag("--quiet", options.quiet, "No progress");
 }
 

@@ -41,11 +41,24 @@ Pipeline::Pipeline(const PipelineOptions& options)
   openOdometry(options);
   openDetections(options);
   outputs_ = std::make_unique<OutputWriter>(options.out, sequenceName(options));
+  if (options.record) openRun();
   openFilter();
   outputs_->onCalibration(dataset_->calibration());
   filter_->onCalibration(dataset_->calibration());
-  if (inference_) filter_->onModel(inference_->model());
-  if (simulated_) filter_->onModel(simulated_->info());
+  if (inference_) learn(inference_->model());
+  if (simulated_) learn(simulated_->info());
+}
+
+void Pipeline::openRun() {
+  const auto file = outputs_->folder() / "run.mcap";
+  std::filesystem::remove(file);  // of an earlier run
+  run_ = std::make_unique<replay::RecordingWriter>(file);
+  keep("calibration", dataset_->calibration(), TimePoint());
+}
+
+void Pipeline::learn(const ModelInfo& model) {
+  keep("model", model, TimePoint());
+  filter_->onModel(model);
 }
 
 void Pipeline::openFilter() {
@@ -53,6 +66,7 @@ void Pipeline::openFilter() {
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
+    keep("objects", objects, objects.stamp.time);
     if (listener_) listener_(objects);
     timer_.timeTowardsNext("outputs", [&] { outputs_->onObjects(objects); });
     timer_.timeTowardsNext("map_store", [&] { map_->onObjects(objects); });
@@ -63,6 +77,7 @@ void Pipeline::openFilter() {
     started_ms_.erase(started);
   };
   sinks.events = [this](const Event& event) {
+    keep("events", event, event.stamp.time);
     timer_.timeTowardsNext("outputs", [&] { outputs_->onEvent(event); });
     timer_.timeTowardsNext("map_store", [&] { map_->onEvent(event); });
   };
@@ -242,7 +257,7 @@ void Pipeline::detect(const Frame& frame) {
   const ModelInfo model = detection_file_->modelAt(frame.stamp.sequence);
   if (!found || model.classes.empty()) return;
   if (model.hash != model_hash_) {
-    filter_->onModel(model);
+    learn(model);
     model_hash_ = model.hash;
   }
   Detections detections;
@@ -270,10 +285,12 @@ void Pipeline::deliver() {
   for (const Odometry& odometry : std::exchange(new_odometry_, {})) {
     const std::uint64_t frame = odometry.stamp.sequence;
     outputs_->onOdometry(odometry);
+    keep("odometry", odometry, odometry.stamp.time);
     if (odometry.state != OdometryState::kInitialising) ++counts_.odometry;
     timer_.timeTowardsNext("semantic_filter", [&] { filter_->onOdometry(odometry); });
     const auto landmarks = landmarks_.find(frame);
     if (landmarks != landmarks_.end()) {
+      keep("landmarks", landmarks->second, odometry.stamp.time);
       timer_.timeTowardsNext("semantic_filter", [&] { filter_->onLandmarks(landmarks->second); });
     }
     waits_for_detections_.insert(frame);
@@ -293,6 +310,7 @@ void Pipeline::deliver() {
 void Pipeline::deliverDetections(std::uint64_t frame) {
   const auto found = waiting_.find(frame);
   if (found == waiting_.end()) return;
+  keep("detections", found->second, found->second.stamp.time);
   filter_->onDetections(found->second);
   waiting_.erase(found);
   waits_for_detections_.erase(frame);
@@ -302,6 +320,9 @@ void Pipeline::finish() {
   if (auto truth = pictureTruth(*dataset_, dataOptions(), outputs_->poses()))
     outputs_->setTruth(*std::move(truth));
   outputs_->finish();
+  if (run_) {
+    if (const auto kept = run_->finish(); !kept) reasons_.add("run_" + kept.error().code);
+  }
   outputs_->writeJson("timing.json", timer_.toJson());
 }
 

@@ -13,6 +13,7 @@
 #include "common/replay/dataset.h"
 #include "common/replay/detection_file.h"
 #include "common/replay/recorded_messages.h"
+#include "common/replay/recording_writer.h"
 #include "services/inference/node.h"
 #include "services/semantic_filter/node.h"
 #include "services/vio/node.h"
@@ -61,11 +62,21 @@ class Pipeline {
   void openDetections(const PipelineOptions& options);
   void openData();
   void openFilter();
+  void openRun();
+  void learn(const ModelInfo& model);
   // In pipeline_recorded.cpp.
   void checkRecorded();
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
   void handleRecorded(const replay::RecordedMessage& message);
   void remember();
+  /// Into OUT/run.mcap, where that is asked for. Log times are those of the sensors.
+  template <class T>
+  void keep(const std::string& topic, const T& value, TimePoint time) {
+    if (!run_) return;
+    run_ns_ = std::max(run_ns_, toNanoseconds(time));
+    const auto kept = run_->add(topic, value, static_cast<std::uint64_t>(run_ns_));
+    if (!kept) reasons_.add("run_" + topic + "_" + kept.error().code);
+  }
   replay::DatasetOptions dataOptions() const;
   void handle(const replay::Message& message);
   void handleFrame(const Frame& frame);
@@ -80,6 +91,8 @@ class Pipeline {
   StageTimer timer_;
   std::unique_ptr<replay::Dataset> dataset_;
   std::unique_ptr<OutputWriter> outputs_;
+  std::unique_ptr<replay::RecordingWriter> run_;
+  std::int64_t run_ns_ = 0;
   std::unique_ptr<PoseOdometry> poses_;
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;

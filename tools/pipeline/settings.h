@@ -27,6 +27,7 @@ struct PipelineOptions {
   std::vector<std::string> configs;      ///< service=FILE
   std::vector<std::string> assignments;  ///< service.key=value
   bool quiet = false;
+  bool record = false;    ///< run.mcap too
   bool pictures = false;  ///< overlay.mp4; map.png and evolution.png come always
 };
 

@@ -10,7 +10,8 @@
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
 #include "common/replay/recorded_messages.h"
-#include "tools/record/plain_types.h"
+#include "common/replay/recording_writer.h"
+#include "common/wire/plain_twin.h"
 
 namespace perdure::tools {
 namespace {
@@ -19,8 +20,9 @@ namespace fs = std::filesystem;
 namespace mcap = replay::mcap;
 
 std::string dateOf(std::uint64_t ns) {
-  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
-                     fmt::gmtime(static_cast<std::time_t>(ns / 1'000'000'000)));
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:03} UTC",
+                     fmt::gmtime(static_cast<std::time_t>(ns / 1'000'000'000)),
+                     ns / 1'000'000 % 1000);
 }
 
 void printInfo(const std::string& path) {
@@ -62,71 +64,37 @@ const dds_topic_descriptor_t* typeNamed(const std::string& name) {
   return nullptr;
 }
 
-/// Chunks of one file that is written in the order of the messages.
-class PlainFile {
- public:
-  explicit PlainFile(const fs::path& path) : file_(mcap::Writer::create(path)) {
-    if (!file_) throw StartupError(ExitCode::kUnavailable, file_.error().detail);
-  }
-
-  Result<void> add(const replay::RecordedMessage& message) {
-    const dds_topic_descriptor_t* type = typeNamed(message.type);
-    if (type == nullptr) return fail("unknown_type", message.type);
-    std::vector<std::uint8_t> plain(message.data.begin(), message.data.end());
-    if (const auto* twin = plainTwinOf(message.type)) {
-      const auto sample = wire::CdrSample::read(message.data, *type);
-      if (!sample) return tl::unexpected(sample.error());
-      plain = wire::writeCdr(sample->get(), *twin);
-    }
-    draft_.add({channelOf(message), ++sequence_, message.log_ns, message.log_ns, plain});
-    constexpr std::size_t kLargest = 4u << 20;
-    return draft_.bytes() < kLargest ? Result<void>() : writeDraft();
-  }
-  void finish() {
-    auto written = writeDraft();
-    if (written) written = file_->finish();
-    if (!written) throw StartupError(ExitCode::kUnavailable, written.error().detail);
-  }
-
- private:
-  Result<void> writeDraft() {
-    if (draft_.empty()) return {};
-    const auto chunk = mcap::pack(std::exchange(draft_, {}));
-    return file_->append(chunk, catalogue_);
-  }
-  std::uint16_t channelOf(const replay::RecordedMessage& message) {
-    for (const auto& [id, channel] : catalogue_.channels) {
-      if (channel.topic == message.topic) return id;
-    }
-    const auto id = static_cast<std::uint16_t>(catalogue_.channels.size() + 1);
-    const std::string text =
-        std::regex_replace(wire::idlOf(message.type), std::regex("@appendable"), "@final");
-    catalogue_.schemas[id] = {id, message.type, "omgidl", text};
-    catalogue_.channels[id] = {id, id, message.topic, "cdr"};
-    return id;
-  }
-
-  Result<mcap::Writer> file_;
-  mcap::Catalogue catalogue_;
-  mcap::Draft draft_;
-  std::uint32_t sequence_ = 0;
-};
+/// The message as XCDR1, with the IDL that says so.
+Result<void> addPlain(replay::RecordingWriter& file, const replay::RecordedMessage& message) {
+  const dds_topic_descriptor_t* type = typeNamed(message.type);
+  if (type == nullptr) return fail("unknown_type", message.type);
+  const std::string idl =
+      std::regex_replace(wire::idlOf(message.type), std::regex("@appendable"), "@final");
+  const replay::RecordingWriter::Kind kind{message.topic, message.type, idl};
+  const auto* twin = wire::plainTwinOf(message.type);
+  if (twin == nullptr) return file.addBytes(kind, message.data, message.log_ns);
+  const auto sample = wire::CdrSample::read(message.data, *type);
+  if (!sample) return tl::unexpected(sample.error());
+  return file.addBytes(kind, wire::writeCdr(sample->get(), *twin), message.log_ns);
+}
 
 }  // namespace
 
 ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
   replay::RecordedMessages recording(from);
-  PlainFile file(to);
+  replay::RecordingWriter file(to);
   ReasonCounts reasons;
   while (const auto message = recording.next()) {
-    const auto added = file.add(*message);
+    const auto added = addPlain(file, *message);
     if (added) continue;
     if (added.error().code == "disk_full" || added.error().code == "file") {
       throw StartupError(ExitCode::kUnavailable, added.error().detail);
     }
     reasons.add(message->topic + "_" + added.error().code);
   }
-  file.finish();
+  if (const auto finished = file.finish(); !finished) {
+    throw StartupError(ExitCode::kUnavailable, finished.error().detail);
+  }
   for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
   return reasons;
 }

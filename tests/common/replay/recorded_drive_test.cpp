@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "common/replay/dataset.h"
 #include "common/replay/recorded_messages.h"
+#include "common/replay/recording_writer.h"
 #include "tests/common/replay/tiny_datasets.h"
-#include "tests/common/replay/tiny_recording.h"
 
 namespace perdure::replay {
 namespace {
@@ -21,7 +23,7 @@ std::uint64_t logOf(TimePoint time) {
 }
 
 /// Everything that a dataset gives, as capture would publish it.
-void record(Dataset& dataset, TinyRecording& recording, bool images) {
+void record(Dataset& dataset, RecordingWriter& recording, bool images) {
   recording.add("calibration", dataset.calibration(), kLater);
   int n = 0;
   while (const auto message = dataset.next()) {
@@ -62,7 +64,7 @@ Read readAll(Dataset& dataset) {
 TEST(RecordedDrive, GivesWhatTheDatasetGaveThatWasRecorded) {
   const auto source = tinyEuroc("recorded_source", true);
   const fs::path file = freshFolder("recorded") / "run.mcap";
-  TinyRecording recording(file);
+  RecordingWriter recording(file);
   record(*Dataset::open({.path = source}), recording, true);
   recording.finish();
   const auto original = Dataset::open({.path = source});
@@ -79,7 +81,7 @@ TEST(RecordedDrive, GivesWhatTheDatasetGaveThatWasRecorded) {
 
 TEST(RecordedDrive, GivesAnyImageOutOfTurn) {
   const fs::path file = freshFolder("recorded_turns") / "run.mcap";
-  TinyRecording recording(file);
+  RecordingWriter recording(file);
   record(*Dataset::open({.path = tinyEuroc("recorded_turns_source")}), recording, true);
   recording.finish();
   const auto dataset = Dataset::open({.path = file, .encoding = ImageEncoding::kBgr8});
@@ -94,7 +96,7 @@ TEST(RecordedDrive, GivesAnyImageOutOfTurn) {
 
 TEST(RecordedDrive, WithoutImagesHasTheFramesOfItsOdometry) {
   const fs::path file = freshFolder("recorded_blind") / "run.mcap";
-  TinyRecording recording(file);
+  RecordingWriter recording(file);
   record(*Dataset::open({.path = tinyEuroc("recorded_blind_source")}), recording, false);
   recording.finish();
   const auto dataset = Dataset::open({.path = file});
@@ -104,7 +106,7 @@ TEST(RecordedDrive, WithoutImagesHasTheFramesOfItsOdometry) {
 
 TEST(RecordedDrive, WithoutCalibrationSaysWhatIsMissing) {
   const fs::path file = freshFolder("recorded_bare") / "run.mcap";
-  TinyRecording recording(file);
+  RecordingWriter recording(file);
   recording.add("imu", ImuSample{}, 5);
   recording.finish();
   EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = file}); }),
@@ -120,12 +122,39 @@ TEST(RecordedDrive, AFileWithoutMessagesIsRefused) {
               HasSubstr("No such file"));
 }
 
+TEST(RecordedDrive, TakesAnyBytesAndGivesMessagesOrARefusal) {
+  const fs::path folder = freshFolder("recorded_fuzz");
+  {
+    RecordingWriter recording(folder / "whole.mcap");
+    record(*Dataset::open({.path = tinyEuroc("recorded_fuzz_source")}), recording, true);
+    recording.finish();
+  }
+  const std::string whole = readText(folder / "whole.mcap");
+  std::mt19937_64 random(9);
+  int read = 0, refused = 0;
+  for (int i = 0; i < 150; ++i) {
+    std::string bytes = whole;
+    for (std::uint64_t n = 1 + random() % 8; n > 0; --n) {
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+    }
+    if (random() % 3 == 0) bytes.resize(random() % bytes.size());
+    writeText(folder / "hurt.mcap", bytes);
+    const std::string refusal = startupErrorOf([&] {
+      const auto dataset = Dataset::open({.path = folder / "hurt.mcap"});
+      read += readAll(*dataset).order.empty() ? 0 : 1;
+    });
+    refused += refusal.empty() ? 0 : 1;
+  }
+  EXPECT_GT(read, 40);
+  EXPECT_GT(refused, 10);
+}
+
 TEST(RecordedMessages, JoinsTheSegmentsOfAFolderAndGivesLatchedOnesOnce) {
   const fs::path folder = freshFolder("segments");
   Calibration calibration;
   calibration.source = 3;
   for (int segment = 0; segment < 3; ++segment) {
-    TinyRecording recording(folder / ("perdure-00000" + std::to_string(segment) + ".mcap"));
+    RecordingWriter recording(folder / ("perdure-00000" + std::to_string(segment) + ".mcap"));
     const auto at = static_cast<std::uint64_t>(1000 * segment);
     recording.add("calibration", calibration, at);
     for (std::uint64_t i = 0; i < 4; ++i) {
@@ -157,7 +186,7 @@ TEST(RecordedMessages, JoinsTheSegmentsOfAFolderAndGivesLatchedOnesOnce) {
 
 TEST(RecordedMessages, RefusesAValueOfAnotherType) {
   const fs::path file = freshFolder("types") / "run.mcap";
-  TinyRecording recording(file);
+  RecordingWriter recording(file);
   recording.add("imu", SpeedSample{}, 1);
   recording.finish();
   RecordedMessages messages(file);

@@ -253,5 +253,52 @@ TEST(Pipeline, ATruncatedImageCostsOneFrame) {
   EXPECT_EQ(report["services"]["capture"]["dropped"], 1);
 }
 
+TEST(Pipeline, RecordedOdometryAndDetectionsGoTogetherAndComeFromARecording) {
+  const fs::path street = makeStreet("recorded_refusals");
+  PipelineOptions options;
+  options.data = street;
+  options.sequence = "0000";
+  options.out = street / "out";
+  options.odometry = "recorded";
+  options.detections = "none";
+  EXPECT_THAT(startupErrorOf([&] { Pipeline pipeline(options); }), HasSubstr("go together"));
+  options.detections = "recorded";
+  EXPECT_THAT(startupErrorOf([&] { Pipeline pipeline(options); }), HasSubstr("is no recording"));
+}
+
+TEST(Pipeline, ARecordedRunGivesTheFilterTheSameAgain) {
+  const fs::path street = makeStreet("recorded_run");
+  PipelineOptions options;
+  options.data = street;
+  options.sequence = "0000";
+  options.out = street / "first";
+  options.odometry = street / "poses.txt";
+  options.detections = street / "boxes.csv";
+  options.image_size = {1242, 375};
+  options.record = options.quiet = true;
+  const auto run = [&] {
+    Pipeline pipeline(options);
+    pipeline.run([](const PipelineCounts&) {});
+    pipeline.finish();
+  };
+  run();
+  options.data = street / "first" / "run.mcap";
+  options.out = street / "second";
+  options.odometry = options.detections = "recorded";
+  options.record = false;
+  run();
+  // Rows begin with the name of the data, which is another one.
+  const auto rows = [&](const std::string& folder) {
+    std::vector<std::string> lines;
+    std::istringstream text(readText(street / folder / "objects_inst.csv"));
+    for (std::string line; std::getline(text, line);) lines.push_back(line.substr(line.find(',')));
+    return lines;
+  };
+  EXPECT_GT(rows("first").size(), 30u);
+  EXPECT_EQ(rows("first"), rows("second"));
+  EXPECT_EQ(readText(street / "first" / "events.jsonl"),
+            readText(street / "second" / "events.jsonl"));
+}
+
 }  // namespace
 }  // namespace perdure::tools

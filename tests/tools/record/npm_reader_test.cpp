@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/replay/mcap_reader.h"
-#include "tests/common/replay/tiny_recording.h"
+#include "common/replay/recording_writer.h"
 #include "tests/common/wire/examples.h"
 #include "tests/process/support.h"
 #include "tools/record/files.h"
@@ -20,7 +20,7 @@ using nlohmann::json;
 constexpr int kOfEach = 3;
 
 template <class T>
-void addExamples(replay::TinyRecording& recording, const std::string& topic) {
+void addExamples(replay::RecordingWriter& recording, const std::string& topic) {
   for (unsigned seed = 1; seed <= kOfEach; ++seed) {
     T message;
     wire::Examples(seed).fill(message);
@@ -29,7 +29,7 @@ void addExamples(replay::TinyRecording& recording, const std::string& topic) {
   recording.cut();
 }
 
-void addAll(replay::TinyRecording& recording) {
+void addAll(replay::RecordingWriter& recording) {
   addExamples<Frame>(recording, "frame/cam0");
   addExamples<ImuSample>(recording, "imu");
   addExamples<SpeedSample>(recording, "speed");
@@ -57,22 +57,35 @@ struct Read {
 
 class NpmReader : public testing::Test {
  protected:
-  void SetUp() override {
+  /// Once for all tests; says why there is none.
+  static std::string installed(const test::Folder& place) {
     const auto here = test::sources() / "tests/tools/record/npm";
     for (const char* name : {"package.json", "read.mjs"}) {
       std::filesystem::copy_file(here / name, place.file(name));
     }
     test::Child npm({"npm", "install", "--prefix", place.file(""), "--no-audit", "--no-fund",
-                     "--ignore-scripts", "--fetch-retries=0"},
+                     "--ignore-scripts", "--fetch-retries=0", "--fetch-timeout=10000"},
                     place.file("npm.log"));
-    if (npm.wait(60s) != 0) GTEST_SKIP() << "npm or its registry is absent: " << npm.log();
-    replay::TinyRecording recording(place.file("raw.mcap"));
+    return npm.wait(60s) == 0 ? "" : "npm or its registry is absent: " + npm.log();
+  }
+
+  static void SetUpTestSuite() {
+    place_ = std::make_unique<test::Folder>();
+    why_not_ = installed(*place_);
+  }
+  static void TearDownTestSuite() { place_.reset(); }
+
+  void SetUp() override {
+    if (!why_not_.empty()) GTEST_SKIP() << why_not_;
+    if (std::filesystem::exists(place_->file("raw.mcap"))) return;
+    replay::RecordingWriter recording(place_->file("raw.mcap"));
     addAll(recording);
     recording.finish();
   }
 
   Read readByNode(const std::string& name) {
-    test::Child node({"node", place.file("read.mjs"), place.file(name)}, place.file("node.log"));
+    test::Child node({"node", place_->file("read.mjs"), place_->file(name)},
+                     place_->file("node.log"));
     EXPECT_EQ(node.wait(60s), 0) << node.log();
     Read read;
     std::istringstream lines(node.log());
@@ -88,7 +101,8 @@ class NpmReader : public testing::Test {
     return read;
   }
 
-  test::Folder place;
+  static inline std::unique_ptr<test::Folder> place_;
+  static inline std::string why_not_;
 };
 
 double number(const json& text) { return std::stod(text.get<std::string>()); }
@@ -123,13 +137,13 @@ TEST_F(NpmReader, ReadsARecordingByItsIndexAndItsFinalTypesAsTheyAre) {
 }
 
 TEST_F(NpmReader, ReadsEveryMessageOfAnExportedRecording) {
-  EXPECT_TRUE(exportPlain(place.file("raw.mcap"), place.file("plain.mcap")).all().empty());
+  EXPECT_TRUE(exportPlain(place_->file("raw.mcap"), place_->file("plain.mcap")).all().empty());
   const Read read = readByNode("plain.mcap");
   EXPECT_EQ(read.messages.size(), kTopics * kOfEach);
   for (const auto& [topic, n] : read.errors) ADD_FAILURE() << topic << ": " << n;
   int objects = 0;
   for (const json& message : read.messages) {
-    if (message["topic"] != "objects") continue;
+    if (message["topic"] != "perdure/ego/objects") continue;
     Objects written;
     wire::Examples(static_cast<unsigned>(std::stoul(message["log"].get<std::string>())) - 1000)
         .fill(written);
@@ -140,8 +154,8 @@ TEST_F(NpmReader, ReadsEveryMessageOfAnExportedRecording) {
 }
 
 TEST_F(NpmReader, ReadsAFileThatWasCutAndRepaired) {
-  const auto cut = place.file("cut.mcap");
-  std::filesystem::copy_file(place.file("raw.mcap"), cut);
+  const auto cut = place_->file("cut.mcap");
+  std::filesystem::copy_file(place_->file("raw.mcap"), cut);
   std::filesystem::resize_file(cut, std::filesystem::file_size(cut) / 2);
   {
     auto reader = replay::mcap::Reader::open(cut);

@@ -1,4 +1,4 @@
-#include "tools/record/plain_types.h"
+#include "common/wire/plain_twin.h"
 
 #include <map>
 
@@ -7,13 +7,8 @@
 #include "final/map.h"
 #include "final/objects.h"
 #include "final/sensors.h"
-#include "idl/detections.h"
-#include "idl/health.h"
-#include "idl/map.h"
-#include "idl/objects.h"
-#include "idl/sensors.h"
 
-namespace perdure::tools {
+namespace perdure::wire {
 namespace {
 
 template <class Type, class Twin>
@@ -58,4 +53,4 @@ const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name) {
   return twin == kTwins.end() ? nullptr : twin->second;
 }
 
-}  // namespace perdure::tools
+}  // namespace perdure::wire
