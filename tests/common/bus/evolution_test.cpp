@@ -8,6 +8,7 @@
 
 #include "common/bus/dds.h"
 #include "common/bus/wait_loop.h"
+#include "common/wire/cdr.h"
 #include "tests/common/bus/first_objects.h"
 #include "tests/common/bus/isolation.h"
 #include "tests/common/wire/examples.h"
@@ -73,15 +74,22 @@ TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedger) {
   message.items = {2, 2, items.data(), false};
   ASSERT_EQ(dds_write(writer, &message), DDS_RETCODE_OK);
   ASSERT_TRUE(eventually(loop, [&] { return !got.empty(); }));
-  ASSERT_EQ(got[0].objects.size(), 2u);
-  EXPECT_EQ(got[0].client, 99u);
-  for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(got[0].objects[i].id, 10 + i);
-    EXPECT_EQ(got[0].objects[i].best().name, "car");
-    EXPECT_EQ(got[0].objects[i].hits, 7u);
-    EXPECT_TRUE(got[0].objects[i].recalled);
-    EXPECT_TRUE(got[0].objects[i].why.empty());
-    EXPECT_TRUE(got[0].objects[i].why.classes.empty());
+  // What a recording of that version holds.
+  const auto recorded =
+      wire::decodeCdr<Recalled>(wire::writeCdr(&message, perdure_first_Recalled_desc), nullptr);
+  ASSERT_TRUE(recorded) << recorded.error().detail;
+  got.push_back(*recorded);
+  for (const Recalled& read : got) {
+    ASSERT_EQ(read.objects.size(), 2u);
+    EXPECT_EQ(read.client, 99u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(read.objects[i].id, 10 + i);
+      EXPECT_EQ(read.objects[i].best().name, "car");
+      EXPECT_EQ(read.objects[i].hits, 7u);
+      EXPECT_TRUE(read.objects[i].recalled);
+      EXPECT_TRUE(read.objects[i].why.empty());
+      EXPECT_TRUE(read.objects[i].why.classes.empty());
+    }
   }
 }
 
