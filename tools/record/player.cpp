@@ -124,6 +124,16 @@ bool Player::waitUntil(std::uint64_t log_ns) {
   return false;
 }
 
+/// Between two runs in one folder, or by a time that is none, nobody wants to wait.
+void Player::leaveOutGap(std::uint64_t log_ns) {
+  constexpr std::uint64_t kLongest = 10'000'000'000;
+  const std::uint64_t gap = log_ns - last_ns_;
+  last_ns_ = log_ns;
+  if (gap <= kLongest) return;
+  first_ns_ += gap;
+  reasons_.add("gaps_left_out");
+}
+
 void Player::say(const replay::RecordedMessage& message) {
   const auto said = voices_.at(message.topic).say(message);
   if (said) {
@@ -137,6 +147,7 @@ void Player::play() {
   recording_.rewind([this](const std::string& topic) { return topics_.contains(topic); });
   waitForReaders();
   first_ns_ = recording_.startNs() + static_cast<std::uint64_t>(options_.start_s * 1e9);
+  last_ns_ = first_ns_;
   const auto length = static_cast<std::uint64_t>(options_.seconds * 1e9);
   began_ = std::chrono::steady_clock::now();
   while (const auto message = recording_.next()) {
@@ -144,6 +155,7 @@ void Player::play() {
       if (voices_.at(message->topic).latched) say(*message);
       continue;
     }
+    leaveOutGap(message->log_ns);
     if (length > 0 && message->log_ns - first_ns_ > length) break;
     if (!waitUntil(message->log_ns)) return;
     say(*message);

@@ -46,6 +46,7 @@ class Player {
   void refuseContested();
   void addVoice(const std::string& topic);
   void waitForReaders();
+  void leaveOutGap(std::uint64_t log_ns);
   bool waitUntil(std::uint64_t log_ns);
   void say(const replay::RecordedMessage& message);
 
@@ -55,7 +56,8 @@ class Player {
   const PlayOptions options_;
   std::set<std::string> topics_;
   std::map<std::string, Voice> voices_;
-  std::uint64_t first_ns_ = 0, played_ = 0;
+  std::uint64_t first_ns_ = 0;  ///< log time that was due when playing began, gaps left out
+  std::uint64_t last_ns_ = 0, played_ = 0;
   std::chrono::steady_clock::time_point began_;
   ReasonCounts reasons_;
 };

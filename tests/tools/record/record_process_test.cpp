@@ -204,6 +204,23 @@ TEST(PlayProcess, SaysWhatTheRecordingHasNot) {
   EXPECT_THAT(player.log(), HasSubstr("the recording has no such topic"));
 }
 
+TEST(PlayProcess, DoesNotWaitForHoursInWhichNothingWasRecorded) {
+  const test::Folder place;
+  constexpr std::uint64_t kHour = 3'600'000'000'000;
+  replay::RecordingWriter recording(place.file("run.mcap"));
+  for (const std::uint64_t at : {std::uint64_t{1000}, kHour, 2 * kHour, UINT64_MAX - 1}) {
+    recording.add("imu", ImuSample{}, at);
+    recording.cut();
+  }
+  recording.finish();
+  (void)test::ownNetwork();
+  test::Child player({perdure(), "play", place.file("run.mcap"), "--wait", "0"},
+                     place.file("play.log"));
+  EXPECT_EQ(player.wait(20s), 0);
+  EXPECT_THAT(player.log(), HasSubstr("4 messages of 1 topics were played"));
+  EXPECT_THAT(player.log(), HasSubstr("gaps_left_out: 3"));
+}
+
 /// What vio and inference would say along a street with two cars: odometry, and its detections
 /// half a period later. Frames are .1 s apart for the filter, and .2 s on the wire.
 void recordStreet(const std::string& file) {
