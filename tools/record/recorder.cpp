@@ -149,9 +149,13 @@ void Recorder::onFault(const std::optional<std::string>& what) {
 void Recorder::updateHealth() {
   const StoreReport stored = store_.report();
   std::string problem = stored.problem;
-  if (problem.empty() && stored.overrun > 0) {
-    problem = "the disk was too slow at times: " + std::to_string(stored.overrun) +
-              " chunks are lost; record without images, or on a faster disk";
+  constexpr std::int64_t kTold = 10'000'000'000;  // ns: how long that is said
+  const std::int64_t now = LogClock::steadyNs();
+  if (stored.overrun > overrun_) slow_until_ns_ = now + kTold;
+  overrun_ = stored.overrun;
+  if (problem.empty() && now < slow_until_ns_) {
+    problem = "the disk is too slow: " + std::to_string(stored.overrun) +
+              " chunks are lost so far; record without images, or on a faster disk";
   }
   context_.health().state(problem.empty() ? HealthState::kOk : HealthState::kDegraded, problem);
   context_.health().setDropped(stored.lost);

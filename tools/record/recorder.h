@@ -72,7 +72,8 @@ class Recorder {
   std::int64_t draft_began_ns_ = 0;
   FaultWatch watch_;
   const bus::Reader<Health>* health_ = nullptr;
-  std::uint64_t messages_ = 0, faults_ = 0;
+  std::uint64_t messages_ = 0, faults_ = 0, overrun_ = 0;
+  std::int64_t slow_until_ns_ = 0;
 };
 
 }  // namespace perdure::tools
