@@ -72,6 +72,11 @@ const TopicInfo* findTopic(std::string_view name) {
   return nullptr;
 }
 
+double expectedRate(const TopicInfo& info, double camera_hz, double imu_hz) {
+  if (info.rate_hz == kCameraHz) return camera_hz;
+  return info.rate_hz == kImuHz ? imu_hz : info.rate_hz;
+}
+
 double leaseFor(double rate_hz) {
   constexpr double kShortest = 0.1;  // under it a busy machine flaps (measured)
   return rate_hz > 0 ? std::max(kShortest, 3.0 / rate_hz) : kShortest;

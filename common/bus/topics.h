@@ -33,6 +33,9 @@ std::span<const TopicInfo> topicTable();
 /// The row of "imu", "frame/cam0", …; nullptr where there is none.
 const TopicInfo* findTopic(std::string_view name);
 
+/// The expected rate with a camera and an IMU of these rates; 0 = on change.
+double expectedRate(const TopicInfo& info, double camera_hz, double imu_hz);
+
 /// The shortest lease that does not flap: three periods, and never under 100 ms.
 double leaseFor(double rate_hz);
 

@@ -2,8 +2,10 @@
 
 #include <sys/resource.h>
 #include <systemd/sd-daemon.h>
+#include <time.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <fstream>
 
 namespace perdure::service {
@@ -12,6 +14,14 @@ namespace {
 double seconds(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
+
+std::int64_t nowNs(clockid_t clock) {
+  timespec t{};
+  clock_gettime(clock, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+std::int64_t wallOffsetNs() { return nowNs(CLOCK_REALTIME) - nowNs(CLOCK_BOOTTIME); }
 
 }  // namespace
 
@@ -28,8 +38,37 @@ std::uint64_t residentBytes() {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
+ClockSteps::ClockSteps() : offset_ns_(wallOffsetNs()) {}
+
+void ClockSteps::look() {
+  constexpr std::int64_t kStep = 100'000'000;  // ns; NTP slews at 0.5 ms a second
+  const std::int64_t offset = wallOffsetNs();
+  if (std::abs(offset - offset_ns_) > kStep) {
+    ++count_;
+    last_ = std::chrono::steady_clock::now();
+  }
+  offset_ns_ = offset;
+}
+
+bool ClockSteps::recent() const {
+  return count_ > 0 && std::chrono::steady_clock::now() - last_ < std::chrono::seconds(30);
+}
+
 void notifyReady() { sd_notify(0, "READY=1"); }
 void notifyStopping() { sd_notify(0, "STOPPING=1"); }
-void notifyWatchdog() { sd_notify(0, "WATCHDOG=1"); }
+
+Watchdog::Watchdog() {
+  constexpr std::uint64_t kShare = 4;
+  std::uint64_t watchdog_us = 0;
+  if (sd_watchdog_enabled(0, &watchdog_us) > 0) {
+    period_ = std::chrono::microseconds(watchdog_us / kShare);
+  }
+}
+
+void Watchdog::feed(Clock::time_point now) {
+  if (period_.count() == 0 || now < next_) return;
+  next_ = now + period_;
+  sd_notify(0, "WATCHDOG=1");
+}
 
 }  // namespace perdure::service

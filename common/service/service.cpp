@@ -110,7 +110,11 @@ Context::Context(const std::string& process, const bus::Options& options,
       health_(process, instance_),
       health_writer_(participant_, bus::topics::kHealth),
       loop_(participant_) {
-  countReasons([this](ReasonCounts& counts) { health_writer_.report(counts); });
+  countReasons([this](ReasonCounts& counts) {
+    health_writer_.report(counts);
+    if (clock_steps_.count() > 0) counts.add("wall_clock_stepped", clock_steps_.count());
+    if (clock_steps_.recent()) counts.add("wall_clock_stepped_just_now");
+  });
   every(std::chrono::seconds(1), [this] { publishHealth(); });
   noteSharedMemory();
   publishHealth();
@@ -134,9 +138,24 @@ void Context::run() {
   }
   notifyReady();
   publishHealth();
-  loop_.run();
+  runLoop();
   notifyStopping();
   publishHealth();
+}
+
+/// Each turn that was finished feeds the watchdog: a handler that hangs, or a stopped process, does
+/// not.
+void Context::runLoop() {
+  constexpr std::chrono::microseconds kLongest{1'000'000};
+  Watchdog watchdog;
+  const auto longest =
+      watchdog.period().count() > 0 ? std::min(kLongest, watchdog.period()) : kLongest;
+  while (!loop_.stopped()) {
+    loop_.runOnce(longest);
+    const bool lives = std::all_of(watched_.begin(), watched_.end(),
+                                   [](const auto& goes_on) { return goes_on(); });
+    if (lives) watchdog.feed(std::chrono::steady_clock::now());
+  }
 }
 
 ReasonCounts Context::reasons() const {
@@ -165,12 +184,12 @@ void Context::noteSharedMemory() {
 void Context::publishHealth() {
   logNewRefusals();
   noteSharedMemory();
+  clock_steps_.look();
   if (on_health_) on_health_();
   Health health = health_.sample(std::chrono::steady_clock::now());
   if (health.message.empty()) health.message = shared_memory_;
   health.reasons = reasons().all();
   (void)health_writer_.write(health);
-  notifyWatchdog();
 }
 
 int runService(int argc, char** argv, const Program& program) {

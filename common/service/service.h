@@ -15,6 +15,7 @@
 #include "common/bus/once.h"
 #include "common/bus/wait_loop.h"
 #include "common/service/health.h"
+#include "common/service/process.h"
 
 namespace perdure::service {
 
@@ -63,6 +64,10 @@ class Context {
   /// Called once a second before Health is published: to set its state.
   void onHealth(std::function<void()> update) { on_health_ = std::move(update); }
 
+  /// What must go on beside the loop, in a thread of its own, for the watchdog to be fed: false
+  /// where it hangs. Asked in the loop's thread.
+  void watch(std::function<bool()> goes_on) { watched_.push_back(std::move(goes_on)); }
+
   void every(std::chrono::nanoseconds period, std::function<void()> tick) {
     loop_.every(period, std::move(tick));
   }
@@ -74,6 +79,7 @@ class Context {
 
  private:
   void publishHealth();
+  void runLoop();
   void logNewRefusals();
   void noteSharedMemory();
   ReasonCounts reasons() const;
@@ -90,6 +96,8 @@ class Context {
   std::string shared_memory_;  ///< what was said of it last
   bus::WaitLoop loop_;
   std::function<void()> on_health_;
+  std::vector<std::function<bool()>> watched_;
+  ClockSteps clock_steps_;
 };
 
 /// An option of the command line that stands for --set key=value.

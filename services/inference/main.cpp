@@ -30,6 +30,8 @@ void run(service::Context& context, const inference::Config& config) {
              [&](const Frame& frame) { worker->offer(frame); });
   context.on(bus::topics::kPredictions, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
+  constexpr std::chrono::seconds kHangs{10};  // no network takes so long for a frame
+  context.watch([&] { return worker->goesOn(kHangs); });
   context.countReasons([&](ReasonCounts& counts) { worker->report(counts); });
   context.onHealth([&] {
     const auto [state, message] = worker->state();

@@ -75,6 +75,11 @@ void Worker::assertAlive() {
   obey();
 }
 
+bool Worker::goesOn(Duration longest) const {
+  const auto busy = busy_since_.load();
+  return busy == Clock::time_point::max() || Clock::now() - busy <= longest;
+}
+
 void Worker::heard(const Detections& detections) {
   const std::lock_guard lock(mutex_);
   swap_.heard(detections, Clock::now());

@@ -45,6 +45,8 @@ class Worker {
   void expect(const Predictions& predictions);
   /// To be called several times in a lease: says "I live", unless the network is stuck.
   void assertAlive();
+  /// No frame has kept the network for longer than `longest`.
+  bool goesOn(Duration longest) const;
   void heard(const Detections& detections);
   void told(const SwapNotice& notice);
   void learn(const ModelInfo& model);

@@ -1,4 +1,8 @@
-// A small service for the tests of runService: turns each IMU sample into a speed sample.
+// A small service for the tests of runService: turns each IMU sample into a speed sample. At
+// certain numbers it hangs, as a handler does or as a worker thread does.
+#include <chrono>
+#include <thread>
+
 #include "common/service/service.h"
 
 using namespace perdure;
@@ -14,11 +18,15 @@ int main(int argc, char** argv) {
   };
   const auto body = [&](service::Context& context) {
     ReasonCounts reasons;
+    bool worker_goes_on = true;
+    context.watch([&] { return worker_goes_on; });
     const Sink<SpeedSample> speed = context.sink(bus::topics::kSpeed);
     context.countReasons([&]() -> const ReasonCounts& { return reasons; });
     context.on(bus::topics::kImu, [&](const ImuSample& m) {
       context.health().frameIn();
       reasons.add("seen");
+      if (m.sequence == 1001) std::this_thread::sleep_for(std::chrono::seconds(60));
+      if (m.sequence == 1002) worker_goes_on = false;
       SpeedSample sample;
       sample.sequence = m.sequence;
       sample.speed = gain * m.accel.x();

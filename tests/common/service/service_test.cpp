@@ -163,8 +163,6 @@ class NotifySocket {
     address.sun_family = AF_UNIX;
     path_.copy(address.sun_path, sizeof(address.sun_path) - 1);
     EXPECT_EQ(bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
-    timeval patience{20, 0};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
     setenv("NOTIFY_SOCKET", path_.c_str(), 1);
   }
   ~NotifySocket() {
@@ -174,7 +172,9 @@ class NotifySocket {
   }
   NotifySocket(const NotifySocket&) = delete;
   NotifySocket& operator=(const NotifySocket&) = delete;
-  std::string next() const {
+  std::string next(std::chrono::milliseconds longest = std::chrono::seconds(20)) const {
+    const timeval patience{longest.count() / 1000, longest.count() % 1000 * 1000};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
     std::array<char, 256> buffer{};
     const auto n = recv(socket_, buffer.data(), buffer.size(), 0);
     return n > 0 ? std::string(buffer.data(), static_cast<std::size_t>(n)) : "";
@@ -187,14 +187,45 @@ class NotifySocket {
 
 TEST_F(Service, TellsSystemdThatItIsReadyAliveAndStopping) {
   const NotifySocket systemd;
+  setenv("WATCHDOG_USEC", "2000000", 1);
   Probe probe;
-  std::string message;
-  while ((message = systemd.next()) == "WATCHDOG=1") {
-  }
-  EXPECT_EQ(message, "READY=1");
+  unsetenv("WATCHDOG_USEC");
+  EXPECT_EQ(systemd.next(), "READY=1");
+  EXPECT_EQ(systemd.next(), "WATCHDOG=1");
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
   EXPECT_EQ(probe.end(SIGINT), 0);
 }
+
+TEST_F(Service, SaysNothingToAWatchdogThatDoesNotWatch) {
+  const NotifySocket systemd;
+  Probe probe;
+  EXPECT_EQ(systemd.next(), "READY=1");
+  EXPECT_EQ(systemd.next(std::chrono::milliseconds(1500)), "");  // Health went out meanwhile
+  EXPECT_EQ(probe.end(SIGINT), 0);
+}
+
+class Hangs : public Service, public testing::WithParamInterface<std::uint64_t> {};
+
+TEST_P(Hangs, AndTheWatchdogIsNotFed) {
+  const NotifySocket systemd;
+  setenv("WATCHDOG_USEC", "400000", 1);
+  Probe probe;
+  unsetenv("WATCHDOG_USEC");
+  const bus::Domain domain{bus::Options{}};
+  const bus::Participant participant(domain, "test");
+  bus::Writer<ImuSample> imu(participant, bus::topics::kImu);
+  EXPECT_EQ(systemd.next(), "READY=1");
+  EXPECT_EQ(systemd.next(), "WATCHDOG=1");
+  ImuSample sample;
+  sample.sequence = GetParam();
+  ASSERT_TRUE(imu.write(sample));  // latched: it arrives, whenever they meet
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (systemd.next(std::chrono::milliseconds(1500)) == "WATCHDOG=1") {
+    ASSERT_LT(std::chrono::steady_clock::now(), end) << "it is still fed";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(AHandlerOrAWorker, Hangs, testing::Values(1001, 1002));
 
 }  // namespace
 }  // namespace perdure::service
