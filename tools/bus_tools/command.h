@@ -1,5 +1,5 @@
-// `perdure topics`, `hz`, `echo`, `env`, `doctor`: what people expect of a DDS system's command
-// line.
+// `perdure topics`, `hz`, `echo`, `env`, `doctor`, `status`: what people expect of a DDS system's
+// command line.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,6 +11,7 @@ void addHzCommand(CLI::App& app);
 void addEchoCommand(CLI::App& app);
 void addEnvCommand(CLI::App& app);
 void addDoctorCommand(CLI::App& app);
+void addStatusCommand(CLI::App& app);
 
 /// All of them.
 void addBusCommands(CLI::App& app);

@@ -24,6 +24,10 @@ void runLoop(bus::WaitLoop& loop, double seconds) {
   loop.run();
 }
 
+double steadySeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 std::string knownTopics() {
   std::string names;
   for (const bus::TopicInfo& info : bus::topicTable()) {
@@ -44,6 +48,7 @@ void addBusCommands(CLI::App& app) {
   addEchoCommand(app);
   addEnvCommand(app);
   addDoctorCommand(app);
+  addStatusCommand(app);
 }
 
 }  // namespace perdure::tools

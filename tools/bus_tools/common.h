@@ -15,6 +15,13 @@ void addBusOptions(CLI::App& command, bus::Options& options);
 /// Runs the loop until it is stopped, a signal comes, or the seconds (0 = for ever) are over.
 void runLoop(bus::WaitLoop& loop, double seconds);
 
+/// CLOCK_MONOTONIC.
+double steadySeconds();
+
+/// The five, as their Health and their participants call them.
+inline constexpr const char* kUsualServices[] = {"capture", "vio", "inference", "semantic_filter",
+                                                 "map_store"};
+
 /// The names that exist, for the error message of an unknown one.
 std::string knownTopics();
 [[noreturn]] void refuseTopic(const std::string& topic);

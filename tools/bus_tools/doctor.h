@@ -16,11 +16,34 @@ struct Finding {
 };
 using Findings = std::vector<Finding>;
 
+/// "OK   vio is on the bus", a line each.
+std::string toText(const Findings& findings);
+
 /// Of the host: receive buffers, the interface, large datagrams over loopback, the clock.
 Findings checkHost(const bus::Options& options);
+/// Of RouDi, where images are to go through shared memory: it answers, and its largest chunk
+/// (`roudi_toml`, where it can be read) holds an image of bus.shared_memory_mb. Else nothing.
+Findings checkSharedMemory(const bus::Options& options, const std::string& roudi_toml);
 /// Of a folder that a service must write to.
 Finding checkWritable(const std::string& folder);
 /// Of the bus: who is there, what each says of itself, what does not fit together.
 Findings checkBus(const bus::Options& options, double seconds);
+
+/// The services' configuration files: of the installation (/etc/perdure) or of config/ here.
+/// Empty where there is none.
+std::string configurationFolder();
+/// The largest bus.shared_memory_mb in the folder's files; 0 where none is set.
+std::int64_t configuredSharedMemory(const std::string& folder);
+
+struct ReportOptions {
+  bus::Options bus;
+  double seconds = 5.0;  ///< how long Health is written down
+  std::string file;      ///< NAME.tar.gz
+  std::string configuration;
+  bool images = false;  ///< one of each camera
+};
+/// Packs what a maintainer asks for: versions, host, configuration, status, Health, journal.
+/// Throws StartupError where the file cannot be written.
+void writeReport(const ReportOptions& options, const Findings& findings);
 
 }  // namespace perdure::tools

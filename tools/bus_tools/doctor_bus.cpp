@@ -10,11 +10,9 @@
 namespace perdure::tools {
 namespace {
 
-constexpr const char* kServices[] = {"capture", "vio", "inference", "semantic_filter", "map_store"};
-
-Findings checkServices(const std::vector<std::string>& participants) {
+Findings checkUsualServices(const std::vector<std::string>& participants) {
   Findings findings;
-  for (const char* service : kServices) {
+  for (const char* service : kUsualServices) {
     const auto n = std::count(participants.begin(), participants.end(), service);
     if (n > 0) {
       findings.push_back({Verdict::kOk, std::string(service) + " is on the bus" +
@@ -107,7 +105,7 @@ Findings checkBus(const bus::Options& options, double seconds) {
     runLoop(loop, seconds);
     const std::vector<std::string> participants = discovery.participants();
     findings.push_back(checkCount(participants.size()));
-    append(findings, checkServices(participants));
+    append(findings, checkUsualServices(participants));
     append(findings, checkTypes(discovery.endpoints(), participant.wireName("")));
     for (const auto& [name, health] : processes) {
       findings.push_back(findingOf(health));

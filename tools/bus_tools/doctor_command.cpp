@@ -13,6 +13,9 @@ struct DoctorOptions {
   bus::Options bus;
   double seconds = 2.5;
   std::vector<std::string> folders;
+  std::string configuration = configurationFolder();
+  std::string report;
+  bool images = false;
 };
 
 const char* wordOf(Verdict verdict) {
@@ -27,13 +30,26 @@ const char* wordOf(Verdict verdict) {
   return "FAIL";
 }
 
-void runDoctor(const DoctorOptions& options) {
+void runDoctor(const DoctorOptions& given) {
+  DoctorOptions options = given;
+  options.bus.shared_memory_mb =
+      std::max(options.bus.shared_memory_mb, configuredSharedMemory(options.configuration));
   Findings findings = checkHost(options.bus);
+  const std::string roudi = options.configuration + "/roudi.toml";
+  const Findings shared = checkSharedMemory(options.bus, roudi);
+  findings.insert(findings.end(), shared.begin(), shared.end());
+  options.bus.shared_memory_mb = 0;  // what listens here needs none
   for (const std::string& folder : options.folders) findings.push_back(checkWritable(folder));
   const Findings bus = checkBus(options.bus, options.seconds);
   findings.insert(findings.end(), bus.begin(), bus.end());
-  for (const Finding& finding : findings) {
-    std::cout << wordOf(finding.verdict) << " " << finding.text << '\n';
+  std::cout << toText(findings);
+  if (!options.report.empty()) {
+    writeReport({.bus = options.bus,
+                 .file = options.report,
+                 .configuration = options.configuration,
+                 .images = options.images},
+                findings);
+    std::cout << "report: " << options.report << '\n';
   }
   const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
     return finding.verdict == Verdict::kFail;
@@ -43,6 +59,14 @@ void runDoctor(const DoctorOptions& options) {
 
 }  // namespace
 
+std::string toText(const Findings& findings) {
+  std::string text;
+  for (const Finding& finding : findings) {
+    text += std::string(wordOf(finding.verdict)) + " " + finding.text + "\n";
+  }
+  return text;
+}
+
 void addDoctorCommand(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the mend");
@@ -50,6 +74,18 @@ void addDoctorCommand(CLI::App& app) {
   command->add_option("--seconds", options->seconds, "how long to listen to the bus")
       ->capture_default_str();
   command->add_option("--data-dir", options->folders, "a folder that the services write to");
+  command
+      ->add_option("--config-dir", options->configuration,
+                   "folder of the services' configuration: /etc/perdure, else config")
+      ->capture_default_str();
+  command->add_option("--shared-memory-mb", options->bus.shared_memory_mb,
+                      "check RouDi as if bus.shared_memory_mb were this");
+  command
+      ->add_option("--report", options->report,
+                   "pack what a maintainer asks for: versions, host, configuration, status, "
+                   "five seconds of Health, journal")
+      ->type_name("FILE.tar.gz");
+  command->add_flag("--images", options->images, "with an image of each camera in the report");
   addBusOptions(*command, options->bus);
   command->callback([options] { runDoctor(*options); });
 }

@@ -14,10 +14,6 @@ struct HzOptions {
   double seconds = 0;
 };
 
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 void print(const std::string& topic, const RateSummary& s, std::size_t writers) {
   if (s.messages < 2) {
     std::printf("%s: %zu messages, %zu writers\n", topic.c_str(), s.messages, writers);
@@ -36,9 +32,9 @@ void measure(const HzOptions& options, const bus::Topic<T>& topic) {
   bus::WaitLoop loop(participant);
   bus::Reader<T> reader(participant, topic);
   RateMeter meter;
-  loop.on(reader, [&](const T&) { meter.arrived(now()); });
+  loop.on(reader, [&](const T&) { meter.arrived(steadySeconds()); });
   loop.every(std::chrono::seconds(1),
-             [&] { print(topic.name, meter.summary(now()), reader.matched()); });
+             [&] { print(topic.name, meter.summary(steadySeconds()), reader.matched()); });
   runLoop(loop, options.seconds);
 }
 

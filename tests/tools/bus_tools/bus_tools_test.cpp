@@ -147,6 +147,60 @@ TEST_F(BusTools, DoctorNamesWhoIsThereAndWhoIsNot) {
   EXPECT_THAT(outcome.output, HasSubstr("OK   65500-byte datagrams pass over loopback"));
 }
 
+TEST_F(BusTools, StatusNamesWhatIsNotThereAndEndsWithTheWorst) {
+  const Outcome outcome = shellWhilePublishing(perdure + " status");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.output, testing::ContainsRegex("vio +failed +is not heard"));
+  EXPECT_THAT(outcome.output, testing::ContainsRegex("objects +ok "));
+}
+
+TEST_F(BusTools, StatusWatchesAndSpeaksJson) {
+  const Outcome outcome =
+      shellWhilePublishing("timeout -s INT 5 " + perdure + " status --watch --json");
+  std::istringstream lines(outcome.output);
+  std::string line;
+  int count = 0;
+  for (; std::getline(lines, line); ++count) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json["level"], "failed");
+    EXPECT_EQ(json["children"][0]["name"], "services");
+  }
+  EXPECT_GE(count, 2);
+}
+
+TEST_F(BusTools, DoctorPacksAReportWithoutImages) {
+  const std::string folder = testing::TempDir() + "perdure_report_test";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const Outcome outcome =
+      shellWhilePublishing(perdure + " doctor --seconds 1 --report " + folder + "/r.tar.gz");
+  EXPECT_THAT(outcome.output, HasSubstr("report: "));
+  const Outcome list = shell("tar -tzf " + folder + "/r.tar.gz");
+  for (const char* file : {"versions.txt", "host.txt", "doctor.txt", "status.json", "status.txt",
+                           "health.jsonl", "journal.txt", "configuration/capture.yaml"}) {
+    EXPECT_THAT(list.output, HasSubstr(std::string("perdure-report/") + file));
+  }
+  EXPECT_THAT(list.output, Not(testing::ContainsRegex("p[gp]m")));
+  const Outcome status = shell("tar -xzOf " + folder + "/r.tar.gz perdure-report/status.json");
+  EXPECT_EQ(nlohmann::json::parse(status.output)["level"], "failed");
+  std::filesystem::remove_all(folder);
+}
+
+TEST_F(BusTools, DoctorMissesRouDiWhereTheConfigurationWantsSharedMemory) {
+  const std::string folder = testing::TempDir() + "perdure_doctor_test";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder + "/capture.yaml") << "bus:\n  shared_memory_mb: 8\n";
+  std::ofstream(folder + "/vio.yaml") << "bus: {shared_memory_mb: 2}\n";
+  EXPECT_EQ(configuredSharedMemory(folder), 8);
+  std::ofstream(folder + "/roudi.toml") << "[[segment.mempool]]\nsize = 2097152\ncount = 4\n";
+  const Findings findings = checkSharedMemory({.shared_memory_mb = 8}, folder + "/roudi.toml");
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings.back().verdict, Verdict::kFail);
+  EXPECT_THAT(findings.back().text, HasSubstr("largest chunk"));
+  EXPECT_TRUE(checkSharedMemory({.shared_memory_mb = 0}, "").empty());
+  std::filesystem::remove_all(folder);
+}
+
 TEST_F(BusTools, DoctorFindsAnInterfaceThatIsNotThere) {
   const Findings findings = checkHost({.interface = "nosuch0"});
   EXPECT_EQ(findings[1].verdict, Verdict::kFail);

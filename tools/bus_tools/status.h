@@ -1,0 +1,83 @@
+// `perdure status`: what was seen of services, topics and the host, judged as one tree in which the
+// worst state dominates.
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/topics.h"
+#include "common/types/health.h"
+#include "common/types/sensors.h"
+
+namespace perdure::tools {
+
+/// In order of gravity; as exit status 0, 1, 2.
+enum class Level { kOk = 0, kDegraded = 1, kFailed = 2 };
+
+struct StatusNode {
+  std::string name;
+  Level level = Level::kOk;
+  std::string text = {};  ///< for people: figures; what is wrong and the mend
+  nlohmann::ordered_json data =
+      nullptr;  ///< the same figures for programs; null where there are none
+  std::vector<StatusNode> children = {};
+
+  /// Takes it in; its level counts here too.
+  void add(StatusNode child);
+};
+
+/// What was heard of one process. Ages are since the last message arrived.
+struct ServiceSeen {
+  Health health;
+  double age_s = 0.0;
+  double frames_hz = 0.0;  ///< of frames_out, between its last two messages
+  double cpu = 0.0;        ///< of one core, likewise; below 0 where it is not known
+};
+
+struct TopicSeen {
+  std::size_t writers = 0, readers = 0;
+  std::size_t messages = 0;  ///< in the window of the rate
+  double rate_hz = 0.0;
+  std::optional<double> age_s;       ///< nothing where no message came
+  std::optional<double> latency_ms;  ///< median, from capture to here; of one host
+};
+
+struct DiskSeen {
+  std::string folder;
+  std::uint64_t free_bytes = 0, all_bytes = 0;
+};
+struct TemperatureSeen {
+  std::string where;
+  double celsius = 0.0;
+  std::optional<double> critical;
+};
+
+struct HostSeen {
+  std::vector<DiskSeen> disks;
+  std::vector<TemperatureSeen> temperatures;
+  bool clock_synchronised = false;
+  bool several_hosts = false;  ///< the topics are on a network
+};
+
+struct StatusSeen {
+  std::string vehicle;
+  std::map<std::string, ServiceSeen> services;  ///< by process
+  std::map<std::string, TopicSeen> topics;      ///< by name, "frame/cam0" among them
+  std::optional<Calibration> calibration;
+  HostSeen host;
+};
+
+StatusNode judge(const StatusSeen& seen);
+
+const char* levelWord(Level level);
+/// Lines with branches; `colour` for a terminal.
+std::string toText(const StatusNode& node, bool colour);
+nlohmann::ordered_json toJson(const StatusNode& node);
+
+/// Of the folders that exist.
+HostSeen lookAtHost(const std::vector<std::string>& folders, const std::string& interface);
+
+}  // namespace perdure::tools
