@@ -16,4 +16,6 @@ expect 64 "--model FILE.onnx" deploy/demo --headless --data=a-drive
 expect 0 "--data DIR" deploy/demo --help
 expect 64 "unknown option '--everything'" deploy/install --everything
 expect 0 "--runtime" deploy/install --help
-for script in deploy/demo deploy/install tests/run .ci/run; do bash -n "$script"; done
+expect 64 "unknown option '--everything'" deploy/package --everything
+expect 0 "perdure-{services,tools,models,dev}" deploy/package --help
+for script in deploy/demo deploy/install deploy/package tests/run .ci/run; do bash -n "$script"; done

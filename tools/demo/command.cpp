@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -32,10 +33,23 @@ void showRendering(const SimulateProgress& progress) {
             << std::flush;
 }
 
-/// Fills in what was not given: drive and network of the demo's own.
+fs::path folderOfPrograms() { return fs::read_symlink("/proc/self/exe").parent_path(); }
+
+/// Where rendered drives are kept: beside the sources, or in the user's cache.
+fs::path cacheFor(const fs::path& root) {
+  if (access(root.c_str(), W_OK) == 0) return root / "out";
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  if (cache != nullptr && *cache != '\0') return fs::path(cache) / "perdure";
+  return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "perdure";
+}
+
+/// Fills in what was not given: folders, drive and network of the demo's own.
 void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
-  if (options.programs.empty()) {
-    options.programs = fs::read_symlink("/proc/self/exe").parent_path().string();
+  if (options.programs.empty()) options.programs = folderOfPrograms().string();
+  if (options.root.empty()) {
+    const fs::path installed = folderOfPrograms().parent_path() / "share" / "perdure";
+    options.root = fs::exists("config") || !fs::exists(installed) ? "." : installed.string();
   }
   if (!options.data.empty()) {
     if (!options.model.empty()) return;
@@ -45,8 +59,7 @@ void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
         "one in models/ knows rendered drives only");
   }
   if (options.model.empty()) options.model = embeddedModel(options.root);
-  const fs::path cache =
-      options.cache.empty() ? fs::path(options.root) / "out" : fs::path(options.cache);
+  const fs::path cache = options.cache.empty() ? cacheFor(options.root) : fs::path(options.cache);
   options.data = embeddedDrive(cache, [&](const SimulateProgress& progress) {
                    showRendering(progress);
                    if (interrupted) throw CLI::RuntimeError(130);
@@ -90,6 +103,7 @@ void runDemo(DemoOptions options) {
 void addDemoCommand(CLI::App& app) {
   auto options = std::make_shared<DemoOptions>();
   options->out = "out/demo";
+  options->root.clear();
   CLI::App* demo = app.add_subcommand(
       "demo", "The five services under supervision over a drive; deploy/demo builds and calls it");
   demo->add_option("--data", options->data, "folder of the drive; default: one that is rendered")
@@ -109,9 +123,11 @@ void addDemoCommand(CLI::App& app) {
       ->check(CLI::Range(0, 256));
   demo->add_option("--truth", options->truth, "root of KITTI tracking with label_02 and calib");
   demo->add_option("--truth-sequence", options->truth_sequence, "in --truth, for example 0000");
-  demo->add_option("--root", options->root, "folder that has config/")->capture_default_str();
+  demo->add_option("--root", options->root,
+                   "folder that has config/ and models/; default: this one, else the installation");
   demo->add_option("--cache", options->cache,
-                   "folder where rendered drives are kept; default: ROOT/out");
+                   "folder where rendered drives are kept; default: ROOT/out, or ~/.cache/perdure "
+                   "where that cannot be written");
   demo->add_option("--programs", options->programs,
                    "folder of the services; default: that of this program");
   demo->callback([options] { runDemo(*options); });

@@ -12,8 +12,8 @@ struct DemoOptions {
   std::string data;   ///< empty: the drive that the demo renders for itself
   std::string model;  ///< empty: the one in ROOT/models, for that drive only
   std::string sequence, out, rate = "1";
-  std::string cache;       ///< where rendered drives are kept; empty: ROOT/out
-  std::string root = ".";  ///< where config/ is
+  std::string cache;       ///< where rendered drives are kept; empty: ROOT/out, or the user's cache
+  std::string root = ".";  ///< where config/ and models/ are
   std::string programs;    ///< folder of the services; empty: that of this program
   std::string truth;       ///< root of KITTI tracking; empty: looked for beside the data
   std::string truth_sequence;

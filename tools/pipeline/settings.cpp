@@ -79,7 +79,7 @@ fs::path configFolder() {
   std::error_code error;
   fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
   for (int up = 0; up < 5 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
-    for (const char* there : {"config", "share/perdure", "etc/perdure"}) {
+    for (const char* there : {"config", "share/perdure/config", "etc/perdure"}) {
       if (holds(folder / there)) return folder / there;
     }
   }

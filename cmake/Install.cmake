@@ -1,0 +1,86 @@
+# What is installed, in the four components that deploy/packages makes packages of. The folders are
+# those of GNUInstallDirs; PERDURE_SYSTEM_LIBDIR is where systemd and udev look, relative to the
+# prefix or absolute (Debian 12: /lib).
+include_guard()
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(PERDURE_SYSTEM_LIBDIR lib CACHE STRING "Folder of systemd's units and udev's rules")
+set(share ${CMAKE_INSTALL_DATADIR}/perdure)
+set(etc ${CMAKE_INSTALL_FULL_SYSCONFDIR}/perdure)
+set(state ${CMAKE_INSTALL_FULL_LOCALSTATEDIR}/lib/perdure)
+
+# perdure_installed_config(FILE [OLD NEW]…): config/FILE, with each line OLD replaced by NEW where
+# an installation has its files elsewhere than the source tree.
+function(perdure_installed_config file)
+  file(READ ${PROJECT_SOURCE_DIR}/config/${file} text)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/config/${file})
+  while(ARGN)
+    list(POP_FRONT ARGN old new)
+    string(FIND "${text}" "${old}" place)
+    if(place EQUAL -1)
+      message(FATAL_ERROR "config/${file} has no \"${old}\" any more; mend cmake/Install.cmake")
+    endif()
+    string(REPLACE "${old}" "${new}" text "${text}")
+  endwhile()
+  file(WRITE ${PROJECT_BINARY_DIR}/etc/${file}.new "${text}")
+  file(COPY_FILE ${PROJECT_BINARY_DIR}/etc/${file}.new ${PROJECT_BINARY_DIR}/etc/${file} ONLY_IF_DIFFERENT)
+  install(FILES ${PROJECT_BINARY_DIR}/etc/${file} DESTINATION ${etc} COMPONENT services)
+endfunction()
+
+# The services, their configuration, and what the system must know of them.
+install(TARGETS perdure-capture perdure-vio perdure-inference perdure-semantic-filter
+  perdure-map-store COMPONENT services)
+perdure_installed_config(capture.yaml "state: \"\"         #" "state: ${state}/capture.json #")
+perdure_installed_config(vio.yaml "directory: \"state\"" "directory: ${state}")
+perdure_installed_config(inference.yaml "path: \"\"          #"
+  "path: ${CMAKE_INSTALL_FULL_DATADIR}/perdure/models/perdure_320x240.onnx #")
+perdure_installed_config(semantic_filter.yaml
+  "class_priors: config/class_priors.yaml" "class_priors: ${etc}/class_priors.yaml")
+perdure_installed_config(map_store.yaml "\"state/map.sqlite\"" "${state}/map.sqlite")
+perdure_installed_config(class_priors.yaml)
+perdure_installed_config(class_aliases.yaml)
+install(FILES deploy/roudi.toml DESTINATION ${etc} COMPONENT services)
+# /usr/share/perdure looks like the root of the sources: config, models, perdure_model.
+install(CODE "
+  set(folder \"\$ENV{DESTDIR}${CMAKE_INSTALL_FULL_DATADIR}/perdure\")
+  file(MAKE_DIRECTORY \"\${folder}\")
+  file(CREATE_LINK ${etc} \"\${folder}/config\" SYMBOLIC)" COMPONENT services)
+install(DIRECTORY config/models/ DESTINATION ${share}/models COMPONENT services)
+install(DIRECTORY deploy/systemd/ DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system
+  COMPONENT services FILES_MATCHING PATTERN "*.service" PATTERN "*.target" PATTERN "*.conf")
+install(FILES deploy/packages/host/60-perdure.rules
+  DESTINATION ${PERDURE_SYSTEM_LIBDIR}/udev/rules.d COMPONENT services)
+foreach(kind sysctl sysusers tmpfiles)
+  install(FILES deploy/packages/host/${kind}.conf DESTINATION lib/${kind}.d RENAME perdure.conf
+    COMPONENT services)
+endforeach()
+
+# The command, with what model import runs.
+install(TARGETS perdure COMPONENT tools)
+install(DIRECTORY tools/model/perdure_model DESTINATION ${share} COMPONENT tools
+  FILES_MATCHING PATTERN "*.py")
+install(FILES config/simulated_detector.yaml DESTINATION ${etc} COMPONENT tools)
+
+install(DIRECTORY models/ DESTINATION ${share}/models COMPONENT models PATTERN README.md EXCLUDE)
+
+# For programs of other people: find_package(Perdure), Perdure::idl, #include "idl/objects.h".
+set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Perdure)
+set_target_properties(perdure_idl PROPERTIES EXPORT_NAME idl)
+target_include_directories(perdure_idl SYSTEM INTERFACE
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/perdure>)
+install(TARGETS perdure_idl EXPORT PerdureTargets COMPONENT dev)
+install(EXPORT PerdureTargets NAMESPACE Perdure:: DESTINATION ${package} COMPONENT dev)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/idl/idl DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/perdure
+  COMPONENT dev FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY idl/ DESTINATION ${share}/idl COMPONENT dev FILES_MATCHING PATTERN "*.idl")
+configure_package_config_file(cmake/PerdureConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/PerdureConfig.cmake INSTALL_DESTINATION ${package}
+  PATH_VARS share)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/PerdureConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/PerdureConfig.cmake
+  ${PROJECT_BINARY_DIR}/PerdureConfigVersion.cmake DESTINATION ${package} COMPONENT dev)
+install(FILES tools/examples/subscribe_objects.cpp tools/examples/inference_stub.cpp
+  tools/examples/installed/CMakeLists.txt
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/perdure-dev/examples COMPONENT dev)
