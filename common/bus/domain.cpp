@@ -149,6 +149,11 @@ std::string Domain::sharedMemoryText() const {
   return "images go through shared memory";
 }
 
+bool Domain::sharesMemory() const {
+  const auto now = sharedMemoryLocator();
+  return shared_memory_.on() && now && *now == shared_memory_.locator;
+}
+
 Participant::Participant(const Domain& domain, const std::string& process)
     : shared_memory_(domain.sharedMemory()), prefix_("perdure/" + domain.options().vehicle + "/") {
   const QosPtr qos(dds_create_qos());

@@ -58,6 +58,8 @@ class Domain {
   /// What there is to say of shared memory now, for people, with the mend; empty where it was not
   /// asked for.
   std::string sharedMemoryText() const;
+  /// Who starts now shares memory with this process.
+  bool sharesMemory() const;
   const std::shared_ptr<const Entity>& entity() const { return domain_; }
 
  private:

@@ -187,6 +187,8 @@ void Context::publishHealth() {
   clock_steps_.look();
   if (on_health_) on_health_();
   Health health = health_.sample(std::chrono::steady_clock::now());
+  const bool misses = !shared_memory_.empty() && !domain_.sharesMemory();
+  if (misses && health.state == HealthState::kOk) health.state = HealthState::kDegraded;
   if (health.message.empty()) health.message = shared_memory_;
   health.reasons = reasons().all();
   (void)health_writer_.write(health);

@@ -10,6 +10,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kSilentHealth = 1.5;  // s; it comes each second
+constexpr double kJustStarted = 5.0;   // s; a restart is worth knowing, though it is over
 constexpr double kSlow = 0.8;          // of the expected rate; below it is degraded
 constexpr double kLate = 200.0;        // ms from capture
 
@@ -66,6 +67,10 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
   if (seen->cpu >= 0) node.text += fmt::format("  {:.0f} % CPU", 100 * seen->cpu);
   if (node.level != Level::kOk) node.text = std::string(stateWord(h.state)) + "  " + node.text;
   addSentence(node.text, h.message);
+  if (seen->up_s && *seen->up_s < kJustStarted) {
+    node.level = std::max(node.level, Level::kDegraded);
+    addSentence(node.text, fmt::format("started {:.1f} s ago", *seen->up_s));
+  }
   return node;
 }
 
@@ -176,6 +181,7 @@ TopicSeen framesOf(const StatusSeen& seen, TopicSeen topic) {
   const auto capture = seen.services.find("capture");
   if (capture == seen.services.end() || capture->second.age_s > kSilentHealth) return topic;
   topic.rate_hz = capture->second.frames_hz;
+  topic.age_s.reset();
   if (topic.rate_hz > 0) topic.age_s = 0.0;
   return topic;
 }
@@ -197,6 +203,8 @@ StatusNode judgeSensors(const StatusSeen& seen, const Source& source) {
   }
   for (const auto& [name, topic] : seen.topics) {
     if (name.starts_with("frame/")) {
+      const bool somebody_has_it = expectedOf(seen, name) > 0 || topic.writers > 0;
+      if (!somebody_has_it) continue;
       node.add(judgeTopic(name, framesOf(seen, topic), expectedOf(seen, name), source));
     } else if (name == "imu") {
       node.add(judgeTopic(name, topic, expectedOf(seen, name), source));

@@ -33,8 +33,9 @@ struct StatusNode {
 struct ServiceSeen {
   Health health;
   double age_s = 0.0;
-  double frames_hz = 0.0;  ///< of frames_out, between its last two messages
-  double cpu = 0.0;        ///< of one core, likewise; below 0 where it is not known
+  double frames_hz = 0.0;      ///< of frames_out, between its last two messages
+  double cpu = 0.0;            ///< of one core, likewise; below 0 where it is not known
+  std::optional<double> up_s;  ///< since its start, where that is known
 };
 
 struct TopicSeen {

@@ -1,13 +1,17 @@
 #include "tools/bus_tools/status_watch.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <fstream>
+#include <sstream>
 
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
 namespace {
 
-constexpr double kSettle = 0.5;  // s, in which latched history comes: no measure of a rate
+constexpr double kSettle = 0.5;  // s, in which latched history comes
 
 /// From capture to now; below 0 where the message does not tell, or tells of another host's clock.
 template <class T>
@@ -18,6 +22,22 @@ double latencyOf(const T& message) {
     return message.stamp.captured_ns > 0 && ms < kLongest ? ms : -1.0;
   }
   return -1.0;
+}
+
+/// Since the start of one of our programs on this host, by /proc.
+std::optional<double> upSeconds(std::uint32_t pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat"), uptime("/proc/uptime");
+  std::string line;
+  double now = 0.0;
+  if (!std::getline(stat, line) || !(uptime >> now)) return std::nullopt;
+  const auto end = line.rfind(')');
+  if (end == std::string::npos || line.find("(perdure") == std::string::npos) return std::nullopt;
+  std::istringstream fields(line.substr(end + 1));
+  std::string skipped;
+  for (int i = 0; i < 19; ++i) fields >> skipped;
+  double ticks = 0.0;
+  if (!(fields >> ticks)) return std::nullopt;
+  return now - ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
 double median(std::deque<double> values) {
@@ -59,25 +79,30 @@ void StatusWatch::note(const Health& health) {
   Process& process = processes_[health.process];
   const double at = steadySeconds();
   const bool same = process.last.instance == health.instance && process.last_s > 0;
+  if (!same && settled(at)) process.began_s = at;
   process.before = same ? process.last : Health{};
-  // What was latched is older than its arrival.
-  process.before_s = same && process.last_s - start_s_ > kSettle ? process.last_s : -1.0;
+  process.before_s = same && settled(process.last_s) ? process.last_s : -1.0;
   process.last = health;
   process.last_s = at;
 }
 
+bool StatusWatch::settled(double now) const { return now - start_s_ > kSettle; }
+
 void StatusWatch::arrived(Heard& heard, double latency_ms) {
   constexpr std::size_t kMost = 100;
   const double at = steadySeconds();
+  if (!settled(at)) return;
   heard.last_s = at;
-  if (at - start_s_ > kSettle) heard.rate.arrived(at);
+  heard.rate.arrived(at);
   if (latency_ms < 0) return;
   heard.latency_ms.push_back(latency_ms);
   if (heard.latency_ms.size() > kMost) heard.latency_ms.pop_front();
 }
 
 ServiceSeen StatusWatch::seenOf(const Process& process, double at) const {
-  ServiceSeen seen{process.last, at - process.last_s, process.last.rate_hz, -1.0};
+  ServiceSeen seen{process.last, at - process.last_s, process.last.rate_hz, -1.0,
+                   upSeconds(process.last.pid)};
+  if (!seen.up_s && process.began_s > 0) seen.up_s = at - process.began_s;
   const double span = process.last_s - process.before_s;
   if (process.before_s < 0 || span <= 0) return seen;
   seen.frames_hz = static_cast<double>(process.last.frames_out - process.before.frames_out) / span;

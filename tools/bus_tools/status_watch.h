@@ -34,8 +34,11 @@ class StatusWatch {
   struct Process {
     Health before, last;
     double before_s = -1.0, last_s = -1.0;
+    double began_s = -1.0;  ///< where its start was seen
   };
 
+  /// What comes at first may be latched: older than its arrival.
+  bool settled(double now) const;
   template <class T>
   void listen(const bus::Topic<T>& topic);
   void note(const Health& health);

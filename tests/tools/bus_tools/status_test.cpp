@@ -83,6 +83,21 @@ TEST(Status, AServiceThatIsMissingOrSilentHasFailed) {
   EXPECT_THAT(find(judge(seen), "map_store").text, HasSubstr("says nothing for 1.6 s"));
 }
 
+TEST(Status, AServiceThatWasStartedJustNowIsWorthTelling) {
+  StatusSeen seen = sound();
+  seen.services["vio"].up_s = 4.0;
+  EXPECT_EQ(dominating(seen, "vio"), Level::kDegraded);
+  EXPECT_THAT(find(judge(seen), "vio").text, HasSubstr("started 4.0 s ago"));
+  seen.services["vio"].up_s = 6.0;
+  EXPECT_EQ(judge(seen).level, Level::kOk);
+}
+
+TEST(Status, ACameraThatNobodyHasIsNotMissed) {
+  StatusSeen seen = sound();
+  seen.topics["frame/cam1"] = {0, 1, 0, 0.0, {}, {}};
+  EXPECT_EQ(find(judge(seen), "frame/cam1").name, "none");
+}
+
 TEST(Status, TellsWhatAServiceSaysOfItself) {
   StatusSeen seen = sound();
   seen.services["map_store"].health.state = HealthState::kDegraded;
