@@ -2,7 +2,7 @@
 # The packages in a bare Debian root: installed, booted, started, killed, purged.
 . "$(dirname "$0")/vehicle.sh"
 
-deploy/package > "$work/package.log" 2>&1 || { tail -n 30 "$work/package.log"; fail "deploy/package"; exit 1; }
+build_packages
 errors=$(lintian --fail-on error "$packages"/perdure*.deb 2>&1) || fail "lintian: $errors"
 ok "lintian has no errors ($(grep -c ^W: <<< "$errors" || true) warnings)"
 make_base

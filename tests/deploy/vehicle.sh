@@ -28,6 +28,12 @@ if [ -z "${PERDURE_VEHICLE_NAMESPACE:-}" ]; then
 fi
 mkdir -p "$work/archives/partial"
 
+# PERDURE_KEEP_PACKAGES=yes takes those that are there.
+build_packages() {
+  [ "${PERDURE_KEEP_PACKAGES:-}" = yes ] && compgen -G "$packages/perdure-services_*.deb" > /dev/null && return
+  deploy/package > "$work/package.log" 2>&1 || { tail -n 30 "$work/package.log"; fail "deploy/package"; exit 1; }
+}
+
 make_base() {
   [ -e "$work/base/etc/debian_version" ] && return
   rm -rf "$work/base.new"
