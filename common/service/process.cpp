@@ -21,7 +21,13 @@ std::int64_t nowNs(clockid_t clock) {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-std::int64_t wallOffsetNs() { return nowNs(CLOCK_REALTIME) - nowNs(CLOCK_BOOTTIME); }
+/// Of the wall clock from the time since boot; `within_ns`: how far apart the two were read.
+std::int64_t wallOffsetNs(std::int64_t& within_ns) {
+  const std::int64_t before = nowNs(CLOCK_BOOTTIME);
+  const std::int64_t wall = nowNs(CLOCK_REALTIME);
+  within_ns = nowNs(CLOCK_BOOTTIME) - before;
+  return wall - before;
+}
 
 }  // namespace
 
@@ -38,11 +44,16 @@ std::uint64_t residentBytes() {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
-ClockSteps::ClockSteps() : offset_ns_(wallOffsetNs()) {}
+ClockSteps::ClockSteps() {
+  std::int64_t within = 0;
+  offset_ns_ = wallOffsetNs(within);
+}
 
 void ClockSteps::look() {
   constexpr std::int64_t kStep = 100'000'000;  // ns; NTP slews at 0.5 ms a second
-  const std::int64_t offset = wallOffsetNs();
+  std::int64_t within = 0;
+  const std::int64_t offset = wallOffsetNs(within);
+  if (within > kStep / 2) return;  // stopped in between: next time
   if (std::abs(offset - offset_ns_) > kStep) {
     ++count_;
     last_ = std::chrono::steady_clock::now();

@@ -19,7 +19,7 @@ class ClockSteps {
   bool recent() const;  ///< in the last 30 s
 
  private:
-  std::int64_t offset_ns_;
+  std::int64_t offset_ns_ = 0;
   std::uint64_t count_ = 0;
   std::chrono::steady_clock::time_point last_{};
 };

@@ -20,14 +20,18 @@ make_gaps() {
 }
 
 now_ms() { echo $(($(date +%s%N) / 1000000)); }
-# stamped: each line of the input behind the time at which it came.
-stamped() { while IFS= read -r line; do echo "$(now_ms) $line"; done; }
+# written_down NAME COMMAND: in the container, each line behind the time in ms at which it came.
+written_down() {
+  inside systemd-run --quiet --unit="$1" --property="StandardOutput=file:/var/log/$1" --property=StandardError=null \
+    bash -c "$2 | while IFS= read -r line; do echo \"\$((\$(date +%s%N) / 1000000)) \$line\"; done"
+}
+status_log=$root/var/log/status odometry_log=$root/var/log/odometry
 
 # seen_since MS PATTERN: waits up to six seconds for a status line after MS that has it; `took` says when.
 seen_since() {
   local end=$(($1 + 6000)) at
   while true; do
-    at=$(awk -v since="$1" '$1 >= since' "$work/status.log" | grep -E -m 1 "$2" | cut -d' ' -f1 || true)
+    at=$(awk -v since="$1" '$1 >= since' "$status_log" | grep -E -m 1 "$2" | cut -d' ' -f1 || true)
     if [ -n "$at" ]; then took=$((at - $1)); return; fi
     [ "$(now_ms)" -lt "$end" ] || return 1
     sleep .1
@@ -35,7 +39,7 @@ seen_since() {
 }
 must_be_seen() { # FAULT MS PATTERN
   if ! seen_since "$2" "$3"; then
-    fail "$1: not seen in status; last: $(tail -n 1 "$work/status.log" | cut -c1-3000)"
+    fail "$1: not seen in status; last: $(tail -n 1 "$status_log" | cut -c1-3000)"
   elif [ "$took" -le 2000 ]; then ok "$1: seen in status after $took ms"
   else fail "$1: seen in status only after $took ms"; fi
 }
@@ -82,7 +86,7 @@ inside sed -i 's|^  path: ""  *#|  path: /drive #|' /etc/perdure/capture.yaml
 # A disk of its own, which can be filled.
 inside mount -t tmpfs -o size=1500M,mode=0750 none /var/lib/perdure
 inside chown perdure:perdure /var/lib/perdure
-inside perdure status --watch --json 2> /dev/null | stamped > "$work/status.log" &
+written_down status "perdure status --watch --json"
 
 fresh /drive
 for service in vio inference semantic_filter map_store; do
@@ -136,7 +140,7 @@ inside systemctl kill --kill-who=main --signal=KILL iox-roudi
 must_be_seen "RouDi killed" "$at" '"level":"degraded"[^}]*RouDi'
 sleep 2
 inside systemctl is-active --quiet iox-roudi && ok "RouDi killed: it is back" || fail "RouDi stays away"
-awk -v since="$at" '$1 >= since' "$work/status.log" | grep -q '"name":"objects","level":"failed"' && fail "RouDi killed: objects stop" || ok "RouDi killed: objects go on"
+awk -v since="$at" '$1 >= since' "$status_log" | grep -q '"name":"objects","level":"failed"' && fail "RouDi killed: objects stop" || ok "RouDi killed: objects go on"
 must_keep "RouDi killed"
 for service in capture vio inference semantic_filter map_store; do
   inside sed -i '/^bus:$/,$d' "/etc/perdure/$service.yaml"
@@ -145,10 +149,10 @@ inside systemctl disable --quiet --now iox-roudi
 
 # Sensors that go and come back.
 fresh /gaps
-inside timeout 40 perdure echo odometry 2> /dev/null | stamped | cut -d' ' -f1 > "$work/odometry.log" &
+written_down odometry "perdure echo odometry"
 sleep 22
 # gap N: when odometry came last before its N-th silence of more than a second.
-gap() { awk -v n="$1" 'before && $1 - before > 1000 && ++k == n {print before; exit} {before = $1}' "$work/odometry.log"; }
+gap() { awk -v n="$1" '$1 ~ /^[0-9]+$/ && before && $1 - before > 1000 && ++k == n {print before; exit} {before = $1}' "$odometry_log"; }
 at=$(gap 1)
 if [ -n "$at" ]; then
   must_be_seen "camera gone" "$at" '"name":"(frame/cam0|odometry)","level":"failed"'

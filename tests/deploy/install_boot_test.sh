@@ -20,6 +20,10 @@ inside systemctl start perdure-capture > "$work/refused.log" 2>&1 && fail "captu
   fail "capture without a drive: $(show capture ExecMainStatus)"
 inside sed -i 's|^  path: ""  *#|  path: /drive #|' /etc/perdure/capture.yaml
 
+inside perdure pipeline --data /drive --odometry truth --detections simulated --seconds 3 --quiet \
+  --out /tmp/pipeline > "$work/pipeline.log" 2>&1 && inside test -s /tmp/pipeline/objects_final.csv &&
+  ok "perdure pipeline finds the installed configuration" || fail "perdure pipeline: $(cat "$work/pipeline.log")"
+
 # Objects within ten seconds of the start.
 inside systemctl reset-failed
 start=$(($(date +%s%N) / 1000000))

@@ -35,9 +35,8 @@ void showRendering(const SimulateProgress& progress) {
 
 fs::path folderOfPrograms() { return fs::read_symlink("/proc/self/exe").parent_path(); }
 
-/// Where rendered drives are kept: beside the sources, or in the user's cache.
-fs::path cacheFor(const fs::path& root) {
-  if (access(root.c_str(), W_OK) == 0) return root / "out";
+/// Where rendered drives of an installation are kept.
+fs::path userCache() {
   const char* cache = std::getenv("XDG_CACHE_HOME");
   const char* home = std::getenv("HOME");
   if (cache != nullptr && *cache != '\0') return fs::path(cache) / "perdure";
@@ -47,8 +46,8 @@ fs::path cacheFor(const fs::path& root) {
 /// Fills in what was not given: folders, drive and network of the demo's own.
 void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
   if (options.programs.empty()) options.programs = folderOfPrograms().string();
+  const fs::path installed = folderOfPrograms().parent_path() / "share" / "perdure";
   if (options.root.empty()) {
-    const fs::path installed = folderOfPrograms().parent_path() / "share" / "perdure";
     options.root = fs::exists("config") || !fs::exists(installed) ? "." : installed.string();
   }
   if (!options.data.empty()) {
@@ -59,7 +58,10 @@ void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
         "one in models/ knows rendered drives only");
   }
   if (options.model.empty()) options.model = embeddedModel(options.root);
-  const fs::path cache = options.cache.empty() ? cacheFor(options.root) : fs::path(options.cache);
+  fs::path cache = options.cache;
+  if (cache.empty()) {
+    cache = options.root == installed ? userCache() : fs::path(options.root) / "out";
+  }
   options.data = embeddedDrive(cache, [&](const SimulateProgress& progress) {
                    showRendering(progress);
                    if (interrupted) throw CLI::RuntimeError(130);
@@ -127,7 +129,7 @@ void addDemoCommand(CLI::App& app) {
                    "folder that has config/ and models/; default: this one, else the installation");
   demo->add_option("--cache", options->cache,
                    "folder where rendered drives are kept; default: ROOT/out, or ~/.cache/perdure "
-                   "where that cannot be written");
+                   "of an installation");
   demo->add_option("--programs", options->programs,
                    "folder of the services; default: that of this program");
   demo->callback([options] { runDemo(*options); });
