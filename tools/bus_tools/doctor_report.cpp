@@ -115,13 +115,13 @@ void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::
 StatusSeen writeBus(const ReportOptions& options, const fs::path& folder) {
   std::ofstream health(folder / "health.jsonl");
   StatusWatch watch(options.bus);
-  watch.onHealth([&](const Health& h) { health << wire::toJson(h).dump() << '\n'; });
+  watch.onHealth([&](const Health& h) { health << dumped(wire::toJson(h)) << '\n'; });
   runLoop(watch.loop(), options.seconds);
   StatusSeen seen = watch.seen();
   seen.host = lookAtHost({"/"}, options.bus.interface);
   const StatusNode status = judge(seen);
   std::ofstream(folder / "status.txt") << toText(status, false);
-  std::ofstream(folder / "status.json") << toJson(status).dump(2) << '\n';
+  std::ofstream(folder / "status.json") << dumped(toJson(status), 2) << '\n';
   return seen;
 }
 

@@ -44,17 +44,18 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
     return node;
   }
   const Health& h = seen->health;
-  node.data = {{"pid", h.pid},
-               {"state", stateWord(h.state)},
-               {"age_s", seen->age_s},
-               {"message", h.message},
-               {"frames_in", h.frames_in},
-               {"frames_out", h.frames_out},
-               {"dropped", h.dropped},
-               {"frames_hz", seen->frames_hz},
-               {"cpu", seen->cpu},
-               {"rss_bytes", h.rss_bytes},
-               {"reasons", h.reasons}};
+  node.data = {
+      {"pid", h.pid},
+      {"state", stateWord(h.state)},
+      {"age_s", seen->age_s},
+      {"message", h.message},
+      {"frames_in", h.frames_in},
+      {"frames_out", h.frames_out},
+      {"dropped", h.dropped},
+      {"frames_hz", seen->frames_hz},
+      {"cpu", seen->cpu < 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(seen->cpu)},
+      {"rss_bytes", h.rss_bytes},
+      {"reasons", h.reasons}};
   if (seen->age_s > kSilentHealth) {
     node.level = Level::kFailed;
     node.text = fmt::format("says nothing for {:.1f} s: it is stopped, hangs, or is gone (pid {})",

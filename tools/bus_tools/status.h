@@ -77,6 +77,9 @@ const char* levelWord(Level level);
 /// Lines with branches; `colour` for a terminal.
 std::string toText(const StatusNode& node, bool colour);
 nlohmann::ordered_json toJson(const StatusNode& node);
+/// On one line, or indented. What processes say of themselves may be any bytes: what is no UTF-8 is
+/// replaced.
+std::string dumped(const nlohmann::ordered_json& json, int indent = -1);
 
 /// Of the folders that exist.
 HostSeen lookAtHost(const std::vector<std::string>& folders, const std::string& interface);

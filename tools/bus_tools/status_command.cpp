@@ -31,7 +31,7 @@ StatusNode look(StatusWatch& watch, const StatusOptions& options) {
 void print(const StatusNode& node, const StatusOptions& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1;
   if (options.json) {
-    std::cout << toJson(node).dump(options.watch ? -1 : 2) << std::endl;
+    std::cout << dumped(toJson(node), options.watch ? -1 : 2) << std::endl;
     return;
   }
   if (options.watch && terminal) std::cout << "\033[H\033[2J";

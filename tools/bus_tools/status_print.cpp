@@ -48,6 +48,10 @@ std::string toText(const StatusNode& node, bool colour) {
   return out;
 }
 
+std::string dumped(const nlohmann::ordered_json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 nlohmann::ordered_json toJson(const StatusNode& node) {
   nlohmann::ordered_json json = {{"name", node.name}, {"level", levelWord(node.level)}};
   if (!node.text.empty()) json["text"] = node.text;

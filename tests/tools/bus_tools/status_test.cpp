@@ -206,5 +206,11 @@ TEST(Status, IsATreeForPeopleAndForPrograms) {
   EXPECT_EQ(json["children"][1]["children"][0]["expected_hz"], 20.0);
 }
 
+TEST(Status, SurvivesAMessageThatIsNoText) {
+  StatusSeen seen = sound();
+  seen.services["vio"].health.message = "broken \xff\xfe bytes";
+  EXPECT_THAT(dumped(toJson(judge(seen))), HasSubstr("broken"));
+}
+
 }  // namespace
 }  // namespace perdure::tools
