@@ -69,11 +69,16 @@ watchdogs=$(inside journalctl --no-pager -u 'perdure-*' | grep -c 'Watchdog time
 inside timeout 20 sh -c 'perdure echo objects | grep -m 1 "\"id\""' > "$work/objects.json" && ok "objects go on" || fail "no objects any more"
 inside perdure status || say "status: $?"
 
-# Purge leaves data alone.
-inside systemctl stop perdure.target
+# An upgrade restarts what runs.
+pid=$(pid_of vio)
+inside sh -c 'dpkg -i /packages/perdure-services_*.deb' > "$work/upgrade.log" 2>&1 || { tail "$work/upgrade.log"; fail "dpkg -i"; }
+within 10 active_with_other_pid vio "$pid" && ok "an upgrade restarts vio" || fail "after an upgrade vio is $(show vio ActiveState)"
+
+# Purge ends what runs and leaves data alone.
 inside rm -r /etc/systemd/system/perdure-vio.service.d
 inside sh -c 'DEBIAN_FRONTEND=noninteractive apt-get -q -y purge "perdure-*"' > "$work/purge.log" 2>&1 || { tail "$work/purge.log"; fail "purge"; }
 inside systemctl list-units --all 'perdure*' --no-legend | grep . && fail "units are left"
+inside sh -c 'cat /proc/[0-9]*/comm' | grep perdure && fail "processes are left"
 left=$(inside find / -xdev \( -path /proc -o -path /packages -o -path /drive -o -path '/var/cache/apt/*' -o -path /sys \) -prune -o -name '*perdure*' -print | sort)
 inside test -s /var/lib/perdure/map.sqlite || fail "the map is gone"
 expected="/var/lib/perdure"
