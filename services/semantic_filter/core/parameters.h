@@ -17,7 +17,7 @@ struct BoxParameters {
   double min_network_px = 10.0;   ///< the same in the pixels of the network's input, where known
   double noise_view = 0.001;      ///< change of view, rad or of log distance, that renews the noise
   double amodal = 0.5;            ///< share of boxes that span what something hides of the thing
-  double part = 0.1;              ///< share of boxes that show a part of a thing alone
+  double part = 0.05;             ///< share of boxes that show a part of a thing alone
   std::int64_t iterations = 3;    ///< of the iterated EKF
   /// The error of a side is noise and, for this share of its variance, the object's b, which stays
   /// while the view stays; b falls to 1/e after a change of

@@ -70,11 +70,13 @@ TEST(Scenario, WithoutParallaxNobodyIsRejectedAndTheCovarianceSaysSo) {
 }
 
 TEST(Scenario, PositionsAreAsUncertainAsTheirCovarianceSays) {
-  // Sizes are drawn from the prior, boxes are the true projection plus the declared noise, looks
-  // are independent: the mean of the squared normalised error must lie in the 95 % band of χ².
+  // Sizes are drawn from the prior, boxes are the true projection plus the declared noise of the
+  // whole car, looks are independent: the mean of the squared normalised error must lie in the 95 %
+  // band of χ².
   Config config;
   config.filter.looks.correlation = 0.0;
   config.filter.box.bias_share = 0.0;
+  config.filter.box.part = 0.0;
   std::mt19937 random(21);
   std::normal_distribution<double> normal;
   constexpr int kRuns = 50;
