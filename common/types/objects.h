@@ -109,6 +109,8 @@ struct Event {
   std::string class_name;    ///< of the object at that time
   double probability = 0.0;  ///< what the event is about: r, or π of the class
   std::string detail;
+  /// Of kPredictedReturn: seconds after the stamp, expected, and the ends of a 90 % interval.
+  std::array<double, 3> returns_in_s{};
 };
 
 /// Where objects should be seen at a coming frame, to prime inference (top-down).

@@ -120,6 +120,9 @@ void describe(A& a, D& d, W& w) {
   a.text("class_name", d.class_name, w.class_name, kNameLength);
   a.probability("probability", d.probability, w.probability);
   a.text("detail", d.detail, w.detail, kTextLength);
+  a.number("returns_in", d.returns_in_s[0], w.returns_in[0], kNotNegative);
+  a.number("returns_earliest", d.returns_in_s[1], w.returns_in[1], kNotNegative);
+  a.number("returns_latest", d.returns_in_s[2], w.returns_in[2], kNotNegative);
 }
 
 template <class A, Is<Prediction> D, class W>

@@ -79,6 +79,7 @@ void Node::beginWorld(const WorldId& world) {
   pose_error_ = {};
   last_T_WB_.reset();
   events_.clear();
+  returns_.clear();
   long_term_.clear();
   if (waiting_recalled_ && waiting_recalled_->world == world) insertRecalled(*waiting_recalled_);
   waiting_recalled_.reset();
@@ -266,13 +267,18 @@ void Node::publish(const Entry& entry) {
     }
   }
   late_merges_.insert(late_merges_.end(), entry.merges.begin(), entry.merges.end());
-  const auto events = events_.update(objects, late_merges_);
+  auto events = events_.update(objects, late_merges_);
   late_merges_.clear();
+  const auto coming = comingFrame(entry);
+  Event blank;
+  blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
+  const auto returns = returns_.update(belief_.objects, entry.input, coming, config_.filter, blank);
+  events.insert(events.end(), returns.begin(), returns.end());
   if (outputs_.objects) outputs_.objects(objects);
   for (const auto& event : events) {
     if (outputs_.events) outputs_.events(event);
   }
-  publishPredictions(entry);
+  publishPredictions(entry, coming);
 }
 
 /// The frame after this one, if body and clock go on as since the frame before it.
@@ -289,13 +295,12 @@ std::optional<ComingFrame> Node::comingFrame(const Entry& entry) const {
   return std::nullopt;
 }
 
-void Node::publishPredictions(const Entry& entry) {
+void Node::publishPredictions(const Entry& entry, const std::optional<ComingFrame>& coming) {
   if (!outputs_.predictions) return;
   Predictions predictions;
   predictions.stamp = entry.input.stamp;
   predictions.instance = instance_;
   predictions.camera = camera_name_;
-  const auto coming = comingFrame(entry);
   for (const auto& object : belief_.objects) {
     auto prediction = predictionOf(object, entry.input, coming);
     if (prediction) predictions.predictions.push_back(*std::move(prediction));

@@ -21,6 +21,7 @@
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/model_book.h"
 #include "services/semantic_filter/probation.h"
+#include "services/semantic_filter/returns.h"
 
 namespace perdure::semantic_filter {
 
@@ -72,7 +73,7 @@ class Node {
   void stepAgainFrom(std::size_t index);
   void publish(const Entry& entry);
   std::optional<ComingFrame> comingFrame(const Entry& entry) const;
-  void publishPredictions(const Entry& entry);
+  void publishPredictions(const Entry& entry, const std::optional<ComingFrame>& coming);
   // In node_swap.cpp.
   void tellModelChange(const FrameStamp& stamp, const std::string& detail);
   bool doubts(const Entry& entry, const Detections& detections);
@@ -103,6 +104,7 @@ class Node {
   std::vector<MergeRecord> late_merges_;
   std::optional<Recalled> waiting_recalled_;
   EventTracker events_;
+  ReturnWatch returns_;
   LongTerm long_term_;
   ReasonCounts reasons_;
 };

@@ -52,6 +52,46 @@ Hidden whileHidden(const Outcome& run, std::uint64_t id) {
 }
 
 /// What became of an object after the time from which it was not where it had been.
+double frameSeconds(const Outcome& run) {
+  const auto& frames = run.journal.frames;
+  return toSeconds(frames.back().time - frames.front().time) /
+         static_cast<double>(std::max<std::size_t>(frames.size() - 1, 1));
+}
+
+struct Returns {
+  double foreseen = 0.0, inside = 0.0;
+  double last_error = 0.0;  ///< frames, of the last prediction before a return, the worst
+};
+
+/// Predictions of its return, against when it was seen again.
+Returns returnsOf(const Outcome& run, std::uint64_t id) {
+  struct Said {
+    double at_s, expected, earliest, latest;
+  };
+  Returns result;
+  std::vector<Said> said;
+  for (const auto& event : run.events) {
+    if (event["object_id"] != id) continue;
+    const double now = 1e-9 * static_cast<double>(event["timestamp_ns"].get<std::int64_t>());
+    if (event["event"] == "predicted_return") {
+      said.push_back({now, now + event["returns_in_s"].get<double>(),
+                      now + event["interval_s"][0].get<double>(),
+                      now + event["interval_s"][1].get<double>()});
+    }
+    if (event["event"] != "reappeared") continue;
+    for (const Said& s : said) {
+      result.foreseen += 1.0;
+      result.inside += s.earliest <= now && now <= s.latest ? 1.0 : 0.0;
+    }
+    if (!said.empty()) {
+      const double error = std::abs(said.back().expected - now) / frameSeconds(run);
+      result.last_error = std::max(result.last_error, error);
+    }
+    said.clear();
+  }
+  return result;
+}
+
 struct Fading {
   double falls_hidden = 0.0;               ///< frames in which existence fell while it was hidden
   double to_missing = 1e3, to_gone = 1e3;  ///< frames in sight until the event
@@ -92,6 +132,7 @@ Bars occlusionBars(const Outcome& run) {
   const std::uint64_t id = mostClaimed(run.inst_rows, place, 0.4, "chair");
   const Hidden hidden = whileHidden(run, id);
   const Named named = blockersNamed(run, id, "monitor");
+  const Returns returns = returnsOf(run, id);
   return {atMost(1, "ids of the hidden chair", number(ids.size())),
           atLeast(1, "chairs at its place at the end", number(run.countNear(place, 0.4, "chair"))),
           atMost(0, "times that it was given up", number(run.countEvents("gone", ids))),
@@ -99,7 +140,11 @@ Bars occlusionBars(const Outcome& run) {
           atMost(0, "of them those that changed a bit of existence, PMF, mean, covariance",
                  hidden.changes),
           atLeast(2, "`occluded` events of it that name the monitor", named.right),
-          atMost(0, "that name something else", named.all - named.right)};
+          atMost(0, "that name something else", named.all - named.right),
+          atLeast(4, "predictions of its return", returns.foreseen),
+          atMost(1, "frames by which the last one before a return is wrong", returns.last_error),
+          atLeast(0.9, "share of the predictions whose interval holds the return",
+                  returns.inside / std::max(returns.foreseen, 1.0))};
 }
 
 Bars vanishBars(const Outcome& run) {

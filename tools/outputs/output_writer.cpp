@@ -72,6 +72,11 @@ Json toJson(const Event& event) {
   if (!event.class_name.empty()) json["class"] = event.class_name;
   json["probability"] = rounded(event.probability);
   if (!event.detail.empty()) json["detail"] = event.detail;
+  if (event.kind == EventKind::kPredictedReturn) {
+    const auto& [expected, earliest, latest] = event.returns_in_s;
+    json["returns_in_s"] = rounded(expected);
+    json["interval_s"] = {rounded(earliest), rounded(latest)};
+  }
   return json;
 }
 

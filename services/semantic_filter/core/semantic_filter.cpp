@@ -14,21 +14,6 @@
 namespace perdure::semantic_filter {
 namespace {
 
-Outline outlineOf(const Object& object, TimePoint now, const View& view) {
-  const Hypothesis& h = object.best();
-  const State x = stateAt(h, toSeconds(now - object.as_of));
-  const Eigen::Vector3d ray = x.head<3>() - view.T_WC().p;
-  Outline o;
-  o.id = object.id;
-  o.solidity = object.existence * object.support;
-  o.distance_m = ray.norm();
-  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
-  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
-  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-  o.box = projectCuboid(x, view);
-  return o;
-}
-
 /// A look that says nothing about the object, for its ledger.
 void noteUnused(Object& object, Visibility why, TimePoint now) {
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
@@ -106,7 +91,8 @@ FrameContext SemanticFilter::contextOf(const FrameInput& input) const {
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
   std::vector<Outline> outlines;
   for (const auto& o : belief.objects) {
-    outlines.push_back(outlineOf(o, input.stamp.time, input.view));
+    outlines.push_back(
+        outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), input.view));
   }
   const auto& camera = *input.view.camera;
   auto sights =

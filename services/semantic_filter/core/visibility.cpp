@@ -150,6 +150,20 @@ Sight classify(const Tally& tally, double in_image, double by_points,
 
 }  // namespace
 
+Outline outlineOf(const Object& object, const State& x, const View& view) {
+  const Hypothesis& h = object.best();
+  const Eigen::Vector3d ray = x.head<3>() - view.T_WC().p;
+  Outline o;
+  o.id = object.id;
+  o.solidity = object.existence * object.support;
+  o.distance_m = ray.norm();
+  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
+  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
+  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
+  o.box = projectCuboid(x, view);
+  return o;
+}
+
 std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
                        double width, double height, const VisibilityParameters& parameters) {
   std::vector<std::size_t> order(outlines.size());

@@ -58,6 +58,8 @@ template <class T>
 constexpr int kNamesBeyondMembers = 0;
 template <>
 constexpr int kNamesBeyondMembers<ObjectState> = 1;  // the key beside the object
+template <>
+constexpr int kNamesBeyondMembers<Event> = 2;  // three times of a return, in one array
 
 TYPED_TEST(Codec, DescribesAsManyFieldsAsTheTypeHas) {
   TypeParam message;

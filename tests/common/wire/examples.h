@@ -187,6 +187,7 @@ class Examples {
   void fill(Event& m) {
     m = {stamp(), bits(),        world(), static_cast<EventKind>(below(15)), bits(), bits(),
          word(),  uniform(0, 1), word()};
+    for (double& seconds : m.returns_in_s) seconds = uniform(0, 9);
   }
   void fill(Predictions& m) {
     m = {stamp(), bits(), word(), several([&] {

@@ -1,0 +1,100 @@
+#include "services/semantic_filter/returns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kRemembered_s = 8.0;
+constexpr double kLongestPause_s = 0.5;  // until it is asked anew
+constexpr double kNewShare = 0.2;        // of the time until then, by which it has changed
+
+TimePoint later(TimePoint time, double seconds) {
+  return time + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
+}
+
+bool waits(const Object& o, const Parameters& parameters) {
+  return o.confirmed && o.visibility == Visibility::kOccluded &&
+         movingProbability(o, parameters.motion.min_speed) < 0.5;
+}
+
+}  // namespace
+
+void ReturnWatch::clear() {
+  waiting_.clear();
+  velocities_.clear();
+}
+
+void ReturnWatch::remember(const FrameInput& now, const Way& way) {
+  velocities_.push_back({now.stamp.time, now.view.T_WB.R() * (way.step.p / way.seconds)});
+  while (toSeconds(now.stamp.time - velocities_.front().time) > kRemembered_s) {
+    velocities_.pop_front();
+  }
+}
+
+/// The largest that some lag shows: a body that sways wanders less in a second than by a random
+/// walk of its single steps, one that speeds up wanders more.
+double ReturnWatch::speedWalk() const {
+  double most = 0.0;
+  for (const double lag : {0.1, 0.5, 1.0, 2.0, 4.0}) {
+    double sum = 0.0, pairs = 0.0;
+    auto before = velocities_.begin();
+    for (const Velocity& v : velocities_) {
+      while (toSeconds(v.time - before->time) > lag) ++before;
+      const double seconds = toSeconds(v.time - before->time);
+      if (seconds < 0.5 * lag) continue;
+      sum += (v.v_W - before->v_W).squaredNorm() / seconds;
+      pairs += 1.0;
+    }
+    if (pairs > 0.0) most = std::max(most, sum / pairs);
+  }
+  return std::sqrt(most);
+}
+
+bool ReturnWatch::isNews(const Waiting& waiting, TimePoint expected, double seconds,
+                         double frame_s) {
+  if (!waiting.expected || seconds <= 0.5 * waiting.then_s) return true;
+  const double change = std::abs(toSeconds(expected - *waiting.expected));
+  return change > std::max(0.5 * frame_s, kNewShare * seconds);
+}
+
+std::vector<Event> ReturnWatch::update(const std::vector<Object>& objects, const FrameInput& now,
+                                       const std::optional<ComingFrame>& coming,
+                                       const Parameters& parameters, const Event& blank) {
+  if (!coming) return {};
+  Way way{now.view.T_WB.inverse() * coming->view.T_WB, coming->seconds};
+  remember(now, way);
+  std::set<ObjectId> hidden;
+  std::vector<Event> events;
+  for (const Object& o : objects) {
+    if (!waits(o, parameters)) continue;
+    hidden.insert(o.id);
+    Waiting& waiting = waiting_[o.id];
+    if (now.stamp.time < waiting.asked_again) continue;
+    const auto seconds = expectReturn(objects, o, now, way, parameters.visibility);
+    const double pause = std::min(0.25 * seconds.value_or(kRemembered_s), kLongestPause_s);
+    waiting.asked_again = later(now.stamp.time, pause);
+    if (!seconds) continue;
+    const TimePoint expected = later(now.stamp.time, *seconds);
+    if (!isNews(waiting, expected, *seconds, way.seconds)) continue;
+    way.speed_walk = speedWalk();
+    const auto foreseen = foreseeReturn(objects, o, now, way, parameters.visibility);
+    if (!foreseen) continue;
+    waiting.expected = expected;
+    waiting.then_s = *seconds;
+    Event e = blank;
+    e.kind = EventKind::kPredictedReturn;
+    e.object_id = o.id;
+    e.other_id = o.blocked_by;
+    e.class_name = o.best().class_name;
+    e.probability = o.existence;
+    e.returns_in_s = {foreseen->expected, foreseen->earliest, foreseen->latest};
+    events.push_back(e);
+  }
+  std::erase_if(waiting_, [&](const auto& entry) { return !hidden.contains(entry.first); });
+  return events;
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,136 @@
+#include "services/semantic_filter/core/foresee.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "services/semantic_filter/returns.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeState;
+
+constexpr double kFrame_s = 0.1;
+
+Object standing(ObjectId id, const State& x, double sigma_m) {
+  Object object;
+  object.id = id;
+  object.existence.become(0.99, ExistenceEvidence::kPrior, {});
+  object.confirmed = true;
+  Hypothesis h;
+  h.class_name = "car";
+  h.weight = 1.0;
+  h.x = x;
+  h.P = 1e-6 * StateCovariance::Identity();
+  h.P.topLeftCorner<2, 2>().diagonal().setConstant(sigma_m * sigma_m);
+  object.hypotheses.push_back(h);
+  return object;
+}
+
+/// A car behind a van, and a body that goes by to the left of both.
+class Foresight : public ::testing::Test {
+ protected:
+  explicit Foresight(double sigma_m = 0.0) {
+    objects = {standing(3, makeState(10, 0, 1.0, 0, 4.2, 1.8, 2.0), sigma_m),
+               standing(7, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5), sigma_m)};
+    objects[1].blocked_by = 3;
+    objects[1].visibility = Visibility::kOccluded;
+    now.view.camera = &camera;
+    now.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.0));
+    way.step.p = Eigen::Vector3d(0.0, 0.1, 0.0);
+    way.seconds = kFrame_s;
+  }
+  std::optional<Foreseen> foresee() const {
+    return foreseeReturn(objects, objects[1], now, way, VisibilityParameters{});
+  }
+  /// When the car is in sight of a body that does as foreseen, the things being where they are.
+  double seenAt(const std::vector<Object>& truth) const {
+    View view = now.view;
+    for (int n = 1; n < 100; ++n) {
+      view.T_WB = view.T_WB * way.step;
+      const auto sights = see({outlineOf(truth[1], truth[1].best().x, view),
+                               outlineOf(truth[0], truth[0].best().x, view)},
+                              {}, camera.width(), camera.height(), {});
+      if (sights[0].fraction > 0.0) return n * kFrame_s;
+    }
+    return 1e9;
+  }
+  CameraModel camera{makeCamera()};
+  std::vector<Object> objects;
+  FrameInput now;
+  Way way;
+};
+
+TEST_F(Foresight, WhatIsPlacedExactlyReturnsInTheFrameThatIsForeseen) {
+  const auto foreseen = foresee();
+  ASSERT_TRUE(foreseen);
+  EXPECT_NEAR(foreseen->expected, seenAt(objects), 1e-9);
+  EXPECT_GT(foreseen->expected, 0.3);
+  EXPECT_LT(foreseen->latest - foreseen->earliest, 4.0 * kFrame_s);
+}
+
+TEST_F(Foresight, BeforeAStandingBodyNothingReturns) {
+  way.step.p.setZero();
+  EXPECT_FALSE(foresee());
+}
+
+TEST_F(Foresight, OfABodyWhoseSpeedWandersLessIsKnown) {
+  const auto steady = foresee();
+  way.speed_walk = 0.5;
+  const auto wandering = foresee();
+  ASSERT_TRUE(steady && wandering);
+  EXPECT_EQ(steady->expected, wandering->expected);
+  EXPECT_GT(wandering->latest - wandering->earliest, 2.0 * (steady->latest - steady->earliest));
+}
+
+class DoubtfulPlaces : public Foresight {
+ protected:
+  DoubtfulPlaces() : Foresight(0.15) {}
+};
+
+TEST_F(DoubtfulPlaces, TheIntervalHoldsNineInTen) {
+  const auto foreseen = foresee();
+  ASSERT_TRUE(foreseen);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 200;
+  int inside = 0;
+  for (int n = 0; n < kDraws; ++n) {
+    auto truth = objects;
+    for (auto& o : truth) {
+      for (int i = 0; i < 2; ++i) o.hypotheses[0].x[i] += 0.15 * normal(random);
+    }
+    const double seen = seenAt(truth);
+    inside += foreseen->earliest <= seen && seen <= foreseen->latest;
+  }
+  EXPECT_GE(inside, 0.85 * kDraws);
+  EXPECT_LE(inside, 0.99 * kDraws) << "it says less than is known";
+}
+
+TEST_F(Foresight, AReturnIsSaidWhenTheThingIsHiddenAndAgainAsItComesNear) {
+  ReturnWatch watch;
+  std::vector<Event> said;
+  const double seen = seenAt(objects);
+  for (double t = 0.0; t < seen; t += kFrame_s) {
+    View next = now.view;
+    next.T_WB = next.T_WB * way.step;
+    const ComingFrame coming{next, kFrame_s};
+    for (const Event& e : watch.update(objects, now, coming, Parameters{}, Event{})) {
+      said.push_back(e);
+      EXPECT_NEAR(t + e.returns_in_s[0], seen, 1.01 * kFrame_s);
+    }
+    now.view = next;
+    now.stamp.time += std::chrono::milliseconds(100);
+  }
+  ASSERT_GE(said.size(), 2U);
+  EXPECT_LE(said.size(), 10U);
+  EXPECT_EQ(said[0].kind, EventKind::kPredictedReturn);
+  EXPECT_EQ(said[0].object_id, 7U);
+  EXPECT_EQ(said[0].other_id, 3U);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
