@@ -38,7 +38,7 @@ Table makeTable() {
       row(kCalibration, latched(1), 0, kRecorded),
       row(kOdometry, reliable(64), kCameraHz, kRecorded),
       row(kLandmarks, reliable(64), kCameraHz, kRecorded),
-      row(kDetections, exclusive(8, kCameraHz), kCameraHz, kRecorded),
+      row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded),
       row(kModel, latched(1), 0, kRecorded),
       row(kSwap, reliable(16), 0, kRecorded),
       row(kObjects, reliable(8), kCameraHz, kRecorded),

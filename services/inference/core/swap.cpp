@@ -31,6 +31,8 @@ std::string milliseconds(Duration d) {
 
 }  // namespace
 
+const FrameStamp& Swap::stampOfMade(const Made& made) { return made.detections.stamp; }
+
 Swap::Swap(SwapOptions options)
     : options_(std::move(options)),
       role_(options_.probation_s > 0 ? Role::kRehearsing : Role::kPlain) {}
@@ -79,8 +81,9 @@ void Swap::heard(const Detections& detections, Time now) {
   keep(frames_heard_, detections.stamp, kHeard);
   if (detections.instance == options_.self) {
     self_at_ = now;
-    if (!std::exchange(hearing_self_, true) && other_ != 0) sayAgain(now);
-    return;
+    if (std::exchange(hearing_self_, true) || other_ == 0) return;
+    const auto own = findFrame(own_, detections.stamp, stampOfMade);
+    return sayAgain(own == own_.rend() ? now : own->at, now);
   }
   hearing_self_ = false;
   other_ = detections.instance;
@@ -89,8 +92,7 @@ void Swap::heard(const Detections& detections, Time now) {
   const auto before = findFrame(others_, detections.stamp, [](const auto& d) { return d.stamp; });
   if (before != others_.rend() && before->instance == other_) return;  // said again
   keep(others_, detections, kRemembered);
-  const auto own = findFrame(own_, detections.stamp,
-                             [](const Made& m) -> const FrameStamp& { return m.detections.stamp; });
+  const auto own = findFrame(own_, detections.stamp, stampOfMade);
   if (own != own_.rend()) compare(own->detections, detections);
   judgeNow(now);
   // The frame has been heard from the other: from the next one on it may be ours.
@@ -185,7 +187,7 @@ void Swap::takeBack(const Reason& reason, Time now) {
   actions_.notices.push_back(notice);
   message_ = newcomer.model + " was rolled back, " + reason.code + ": " + reason.detail;
   countRollBack(reason.code);
-  sayAgain(now);
+  sayAgain(own_.empty() ? now : own_.back().at, now);
 }
 
 void Swap::retire(const SwapNotice& notice, Time now) {
@@ -197,7 +199,8 @@ void Swap::retire(const SwapNotice& notice, Time now) {
   actions_.end = true;
 }
 
-void Swap::sayAgain(Time now) {
+/// Results since `from` may reach us and not yet others: the tick says them once more.
+void Swap::sayAgain(Time from, Time now) {
   again_.clear();
   for (const Made& made : own_) {
     const auto is_same = [&](const FrameStamp& f) { return f.sameFrame(made.detections.stamp); };
@@ -206,7 +209,7 @@ void Swap::sayAgain(Time now) {
     again_.push_back(made.detections);
   }
   actions_.again = again_;
-  again_from_ = own_.empty() ? now : own_.back().at;  // what we hear, others may not hear yet
+  again_from_ = from;
   again_at_ = now + options_.lease / 2;
 }
 

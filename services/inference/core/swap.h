@@ -85,7 +85,8 @@ class Swap {
   void retire(const SwapNotice& notice, Time now);
   void compare(const Detections& own, const Detections& other);
   void judgeNow(Time now);
-  void sayAgain(Time now);
+  void sayAgain(Time from, Time now);
+  static const FrameStamp& stampOfMade(const Made& made);
   void countRollBack(const std::string& reason);
   void notify(SwapStep step, InstanceId about, const Reason& reason = {});
 

@@ -138,7 +138,8 @@ TEST(Swap, AStrangersServiceIsHeardAndWhenItDiesTheOldOneIs) {
   stub->signal(SIGKILL);
   d.rig.sendFrames(2 * kSettled);
   EXPECT_EQ(d.rig.heard(), d.owner_id);
-  EXPECT_EQ(d.rig.unanswered(hit, d.rig.next() - kSettled), 0);
+  const auto settled = d.rig.next() - kSettled;
+  EXPECT_EQ(d.rig.unanswered(hit, settled), 0) << d.rig.story(hit, settled);
 }
 
 class SwapAtFullRate : public ::testing::Test {

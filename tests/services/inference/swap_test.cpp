@@ -305,6 +305,23 @@ TEST(Swap, WhatASpareSaysWhileReadersLearnOfItIsSaidAgain) {
   EXPECT_THAT(sequences(), ElementsAre());
 }
 
+TEST(Swap, WhatASpareMadeBeforeItHeardItselfIsSaidAgainToo) {
+  Swap spare({kNew, "spare", 0.0, kLease});
+  Swap::Time now{std::chrono::hours(1)};
+  spare.ownResult(listOf(kNew, 0, kStreet), true, now);
+  spare.heard(listOf(kOld, 0, kStreet), now);
+  for (std::uint64_t k = 1; k < 4; ++k) {
+    spare.ownResult(listOf(kNew, k, kStreet), true, now += kPeriod);
+  }
+  spare.heard(listOf(kNew, 2, kStreet), now);  // it comes back after frame 3 was written
+  (void)spare.take();
+  spare.tick(now + kLease);
+  const auto said = spare.take().again;
+  EXPECT_TRUE(std::any_of(said.begin(), said.end(), [](const Detections& d) {
+    return d.stamp.sequence == 2;
+  })) << "others may have heard it from nobody";
+}
+
 TEST(Swap, AFrameThatIsSaidAgainIsJudgedOnce) {
   Bus bus;
   bus.runUntilTakenOver();
