@@ -43,12 +43,13 @@ void print(const char* what, double threshold, const HardRecall& r) {
       r.falseAlarms(), r.false_primed);
 }
 
-/// At the threshold of a detector that decides, and at the lax one; over three streets.
+/// At thresholds of detectors that decide, and at the lax one; over three streets.
 TEST(LongTopDown, FindsMoreOfWhatIsSmallOrHalfHiddenAtTheSameRateOfFalseAlarms) {
   struct Point {
     double threshold, without, gain;
   };
-  for (const Point& point : {Point{0.3, 0.29, 0.05}, Point{0.05, 0.049, 0.01}}) {
+  for (const Point& point : {Point{0.7, 0.63, 0.1}, Point{0.5, 0.475, 0.1}, Point{0.3, 0.29, 0.05},
+                             Point{0.05, 0.049, 0.01}}) {
     HardRecall with, without;
     for (const std::uint64_t seed : {11, 12, 13}) {
       HardRecall with_here, without_here;

@@ -1,6 +1,5 @@
-// A stranger's inference service: it reports the box around what is bright as a lamp. Needs Cyclone
-// DDS and idl/{sensors,detections}.idl. Run it so, heard in place of perdure-inference:
-//   eval "$(perdure env)" && inference_stub
+// A stranger's inference service, heard in place of perdure-inference: what is bright is a lamp.
+// Needs Cyclone DDS and idl/{sensors,detections}.idl. eval "$(perdure env)" && inference_stub
 #include <dds/dds.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 
 constexpr uint64_t kHash = 0x1a3b, kInstance = 0x57ab;  // of the model; of this process
 
-/// An empty list is a statement, too: nothing is there.
 void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
   const uint32_t pixels = frame.width * frame.height, bytes = frame.pixels._length;
   if (pixels == 0 || bytes < pixels) return;
@@ -26,7 +24,7 @@ void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
                                 .camera = frame.camera,
                                 .source = kInstance,
                                 .model_hash = kHash,
-                                .items = {1, x2 > x1 ? 1U : 0U, &lamp}};
+                                .items = {1, x2 > x1 ? 1U : 0U, &lamp}};  // none: nothing is there
   dds_write(writer, &answer);
 }
 
@@ -46,17 +44,14 @@ int main() {
   const auto detections = dds_create_writer(
       bus, topic(perdure_msg_Detections_desc, "perdure/ego/detections"), qos, nullptr);
   // The model says what activations[1], [2], … mean; it waits for whoever comes later.
-  dds_qos_t* latched = dds_create_qos();
-  dds_qset_durability(latched, DDS_DURABILITY_TRANSIENT_LOCAL);
+  dds_qset_durability(qos = dds_create_qos(), DDS_DURABILITY_TRANSIENT_LOCAL);
   char name[] = "stub", lamp[] = "lamp", *classes[] = {lamp};
   perdure_msg_ModelInfo model{
       .model_hash = kHash, .source = kInstance, .name = name, .classes = {1, 1, classes}};
-  dds_write(dds_create_writer(bus, topic(perdure_msg_ModelInfo_desc, "perdure/ego/model"), latched,
-                              nullptr),
-            &model);
-  for (;; dds_sleepfor(DDS_MSECS(5))) {
+  const auto models = topic(perdure_msg_ModelInfo_desc, "perdure/ego/model");
+  dds_write(dds_create_writer(bus, models, qos, nullptr), &model);
+  for (dds_sample_info_t info;; dds_sleepfor(DDS_MSECS(5))) {
     dds_assert_liveliness(detections);  // also where no frame comes
-    dds_sample_info_t info;
     for (void* sample = nullptr; dds_take(frames, &sample, &info, 1, 1) > 0; sample = nullptr) {
       if (info.valid_data) look(*static_cast<const perdure_msg_Frame*>(sample), detections);
       dds_return_loan(frames, &sample, 1);
