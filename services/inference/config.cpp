@@ -11,8 +11,11 @@ void describe(Config& config, config::Fields& fields) {
   fields.text("model.description", config.model.description,
               {"its model.json; empty: PATH.model.json, model.json beside it, or "
                "config/models/<stem>.json"});
+  fields.choice("model.backend", config.model.backend, {"auto", "opencv", "onnxruntime"},
+                {"what computes it; auto: OpenCV, and ONNX Runtime for a file that OpenCV does not "
+                 "take, where the program was built with it"});
   fields.integer("model.threads", config.model.threads, between(1, 64),
-                 {"threads of OpenCV for one image", "", "use at most the cores of the machine"});
+                 {"threads for one image", "", "use at most the cores of the machine"});
   fields.number("model.budget_ms", config.model.budget_ms, between(0.0, 10000.0),
                 {"most time of a frame, picture to detections: where it is not kept the input is "
                  "made smaller, and larger again; 0: always the network's own size",

@@ -12,6 +12,7 @@ namespace perdure::inference {
 struct ModelConfig {
   std::string path;         ///< .onnx, or .cfg with its .weights
   std::string description;  ///< "" = look for it
+  std::string backend = "auto";
   std::int64_t threads = 1;
   double budget_ms = 0.0;  ///< of a frame; 0 = none, always the network's own input size
 };

@@ -8,8 +8,8 @@ using namespace perdure;
 
 void run(service::Context& context, const inference::Config& config) {
   inference::Node node(config, context.instance());  // first: frames must not pile up meanwhile
-  context.log().info("network {} with {} classes, hash {}", node.model().name,
-                     node.model().classes.size(), toHex(node.model().hash));
+  context.log().info("network {} with {} classes, hash {}, by {}", node.model().name,
+                     node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;
   const double lease_s = inference::leaseSeconds(ownership);
   auto& detections = context.writer(bus::topics::kDetections,

@@ -12,16 +12,23 @@
 namespace perdure::inference {
 namespace {
 
-Network loadNetwork(const Config& config, const ModelFile& file) {
-  auto network = Network::load(file.network, file.darknet_weights, tensorNames(file.description));
+std::unique_ptr<Network> networkOf(const Config& config, const ModelFile& file) {
+  auto network =
+      loadNetwork({file.network, file.darknet_weights}, tensorNames(file.description),
+                  backendOf(config.model.backend), static_cast<int>(config.model.threads));
   if (network) return std::move(*network);
-  const bool tensor = network.error().code == "model_without_tensor";
+  const auto& [code, detail] = network.error();
+  if (code == "backend_absent") {
+    throw StartupError(ExitCode::kConfiguration,
+                       "model.backend is onnxruntime, and " + detail +
+                           ": take opencv or auto, or build again where libonnxruntime-dev is.");
+  }
+  const bool tensor = code == "model_without_tensor";
   throw StartupError(
       ExitCode::kConfiguration,
       config.model.path +
-          (tensor ? " does not fit its description: "
-                  : " is not a network that OpenCV can load: ") +
-          network.error().detail +
+          (tensor ? " does not fit its description: " : " is not a network that can be loaded: ") +
+          detail +
           (tensor ? "; correct the names in its model.json."
                   : "; give a whole .onnx file (opset 11 or so) or a Darknet .cfg with its "
                     ".weights."));
@@ -68,7 +75,7 @@ Node::Node(const Config& config, InstanceId instance)
 
 Node::Node(const Config& config, InstanceId instance, ModelFile file)
     : config_(config), description_(file.description) {
-  sizes_.push_back({description_, loadNetwork(config, file)});
+  sizes_.push_back({description_, networkOf(config, file)});
   cv::setNumThreads(static_cast<int>(config.model.threads));
   options_.score_threshold = config.detection.score_threshold;
   info_.instance = instance;
@@ -98,7 +105,7 @@ void Node::addSmallerSizes(const ModelFile& file) {
   constexpr int kMultiple = 32;  // of all strides there are
   const Input& full = description_.input;
   for (const double scale : {0.85, 0.7, 0.6, 0.5}) {
-    Size size{description_, loadNetwork(config_, file)};
+    Size size{description_, networkOf(config_, file)};
     Input& input = size.description.input;
     const auto rounded = [&](int side) {
       return std::max(kMultiple,
@@ -132,6 +139,8 @@ void Node::useSize(std::size_t size) {
   check(size < sizes_.size(), "a size of the network's input that there is");
   size_ = size;
 }
+
+std::string Node::backend() const { return sizes_.front().network->backend(); }
 
 double Node::inputScale() const { return 1.0 * at().input.width / description_.input.width; }
 
@@ -167,7 +176,7 @@ void Node::testItself() {
 Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double floor) {
   const auto blob = makeBlob(at().input, frame);
   if (!blob) return tl::unexpected(blob.error());
-  const auto tensors = sizes_[size_].network.forward(*blob);
+  const auto tensors = sizes_[size_].network->forward(*blob);
   if (!tensors) return tl::unexpected(tensors.error());
   DecodeOptions options = options_;
   options.score_threshold = floor;

@@ -1,7 +1,9 @@
-// Frames in, evidence out: the likelihood of eq. 6 and 7, by a network that OpenCV runs.
+// Frames in, evidence out: the likelihood of eq. 6 and 7, by a network.
 #pragma once
 
 #include <cstddef>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -23,6 +25,8 @@ class Node {
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
+  /// What computes the network, for people.
+  std::string backend() const;
 
   /// Boxes in pixels of the frame, as the network extrapolates them (not clipped to the image).
   /// An empty list is a result: nothing is there. `expected` says where objects should be: each
@@ -56,7 +60,7 @@ class Node {
   /// The network at one size of its input.
   struct Size {
     ModelDescription description;
-    Network network;
+    std::unique_ptr<Network> network;
   };
   void addSmallerSizes(const ModelFile& file);
   const ModelDescription& at() const { return sizes_[size_].description; }

@@ -21,7 +21,8 @@ std::vector<float> floatsIn(const fs::path& file, std::size_t count) {
           static_cast<std::streamsize>(count * sizeof(float)));
   if (!in || in.peek() != std::ifstream::traits_type::eof()) {
     throw StartupError(ExitCode::kConfiguration,
-                       file.string() + " is missing or not of the tensor's size: OpenCV gives a " +
+                       file.string() +
+                           " is missing or not of the tensor's size: the network gives a " +
                            "tensor of " + std::to_string(count) + " values");
   }
   return values;
@@ -49,14 +50,14 @@ double differenceOf(const inference::Tensor& tensor, const std::vector<float>& e
 Answers checkAnswers(const fs::path& path, const fs::path& reference) {
   const auto file = inference::readModelFile(path.string(), path.string() + ".model.json", {});
   const auto names = inference::tensorNames(file.description);
-  auto network = inference::Network::load(file.network, "", names);
+  auto network = inference::loadNetwork({file.network, ""}, names);
   if (!network) throw notLoaded(path, network.error());
   const auto& input = file.description.input;
   const int sizes[] = {1, 3, input.height, input.width};
   const auto noise =
       floatsIn(reference / "input.f32", static_cast<std::size_t>(3 * input.height * input.width));
   const cv::Mat blob(4, sizes, CV_32F, const_cast<float*>(noise.data()));
-  const auto tensors = network->forward(blob);
+  const auto tensors = (*network)->forward(blob);
   if (!tensors) throw notLoaded(path, tensors.error());
   Answers answers;
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -1,106 +1,37 @@
 #include "services/inference/core/network.h"
 
-#include <algorithm>
-#include <opencv2/core/utils/logger.hpp>
+#include "common/base/check.h"
 
 namespace perdure::inference {
-namespace {
 
-/// OpenCV prints what it also throws; while one of these lives it only throws.
-class QuietOpenCv {
- public:
-  QuietOpenCv() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
-  ~QuietOpenCv() { cv::utils::logging::setLogLevel(before_); }
-  QuietOpenCv(const QuietOpenCv&) = delete;
-  QuietOpenCv& operator=(const QuietOpenCv&) = delete;
-
- private:
-  cv::utils::logging::LogLevel before_;
-};
-
-/// What OpenCV throws, in one line: the operator that it does not take where it names one
-/// ("> Node [Where@ai.onnx]:(onnx_node!Where_2) parse error …"), else its first line.
-std::string gist(const std::string& text) {
-  const std::size_t begin = text.find("Node ["), end = text.find_first_of("@]", begin);
-  if (begin != std::string::npos && end != std::string::npos) {
-    return "OpenCV does not take its operator " + text.substr(begin + 6, end - begin - 6);
-  }
-  return text.substr(0, text.find('\n'));
+Backend backendOf(const std::string& name) {
+  if (name == "opencv") return Backend::kOpenCv;
+  if (name == "onnxruntime") return Backend::kOnnxRuntime;
+  check(name == "auto", "a backend that there is");
+  return Backend::kAuto;
 }
 
-std::string lastOf(const std::vector<std::string>& names, std::size_t count) {
-  std::string text;
-  for (std::size_t i = names.size() - std::min(count, names.size()); i < names.size(); ++i) {
-    text += (text.empty() ? "" : ", ") + names[i];
-  }
-  return text;
+#ifdef PERDURE_ONNX_RUNTIME
+bool hasOnnxRuntime() { return true; }
+#else
+bool hasOnnxRuntime() { return false; }
+
+Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile&,
+                                                     const std::vector<std::string>&, int) {
+  return fail("backend_absent", "this program was built where ONNX Runtime was not installed");
 }
+#endif
 
-/// OpenCV reads on past the end of a short .weights file without a word: count what it needs.
-Result<void> checkWeights(cv::dnn::Net& net, std::size_t bytes) {
-  std::size_t needed = 0;
-  for (const std::string& name : net.getLayerNames()) {
-    const auto layer = net.getLayer(net.getLayerId(name));
-    if (layer->type == "Region") continue;  // its anchors come from the .cfg
-    for (const cv::Mat& blob : layer->blobs) needed += blob.total() * sizeof(float);
-  }
-  constexpr std::size_t kHeader = 16;  // 20 since Darknet 0.2
-  if (bytes >= needed + kHeader) return {};
-  return fail("model_unreadable", "its .weights has " + std::to_string(bytes) + " bytes and the " +
-                                      ".cfg needs " + std::to_string(needed + kHeader));
-}
-
-}  // namespace
-
-Network::Network(cv::dnn::Net net, std::vector<std::string> tensors)
-    : net_(std::move(net)), names_(std::move(tensors)) {}
-
-Result<Network> Network::load(const std::string& file, const std::string& darknet_weights,
-                              std::vector<std::string> tensors) {
-  const QuietOpenCv quiet;
-  cv::dnn::Net net;
-  try {
-    net = darknet_weights.empty()
-              ? cv::dnn::readNetFromONNX(file.data(), file.size())
-              : cv::dnn::readNetFromDarknet(file.data(), file.size(), darknet_weights.data(),
-                                            darknet_weights.size());
-  } catch (const std::exception& e) {  // cv::Exception, and what protobuf and std throw
-    return fail("model_unreadable", gist(e.what()));
-  }
-  if (net.empty()) return fail("model_unreadable", "it has no layers");
-  if (!darknet_weights.empty()) {
-    if (const auto whole = checkWeights(net, darknet_weights.size()); !whole) {
-      return tl::unexpected(whole.error());
-    }
-  }
-  const std::vector<std::string> layers = net.getLayerNames();
-  for (const std::string& name : tensors) {
-    if (std::find(layers.begin(), layers.end(), name) == layers.end()) {
-      return fail("model_without_tensor",
-                  "it has no layer named " + name + "; its last layers are " + lastOf(layers, 8));
-    }
-  }
-  net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-  net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
-  return Network(std::move(net), std::move(tensors));
-}
-
-Result<std::vector<Tensor>> Network::forward(const cv::Mat& blob) {
-  const QuietOpenCv quiet;
-  try {
-    net_.setInput(blob);
-    net_.forward(outputs_, names_);
-  } catch (const std::exception& e) {
-    return fail("model_failed", gist(e.what()));
-  }
-  std::vector<Tensor> tensors;
-  for (cv::Mat& output : outputs_) {
-    if (output.type() != CV_32F) return fail("model_output_shape", "an output is not float32");
-    if (!output.isContinuous()) output = output.clone();
-    tensors.push_back(
-        {{output.size.p, output.size.p + output.dims}, {output.ptr<float>(), output.total()}});
-  }
-  return tensors;
+Result<std::unique_ptr<Network>> loadNetwork(const NetworkFile& file,
+                                             const std::vector<std::string>& tensors,
+                                             Backend backend, int threads) {
+  if (backend == Backend::kOnnxRuntime) return loadWithOnnxRuntime(file, tensors, threads);
+  auto by_opencv = loadWithOpenCv(file, tensors);
+  const bool other = backend == Backend::kAuto && hasOnnxRuntime() && file.darknet_weights.empty();
+  if (by_opencv || !other) return by_opencv;
+  auto by_runtime = loadWithOnnxRuntime(file, tensors, threads);
+  if (by_runtime) return by_runtime;
+  return fail(by_runtime.error().code, by_opencv.error().detail + "; " + by_runtime.error().detail);
 }
 
 }  // namespace perdure::inference

@@ -186,9 +186,9 @@ TEST(RawTensors, AgreeWithTheActivatedOutputOfYolox) {
       readModelFile(model.string(), (source() / "config/models/yolox_nano_416.json").string(), {});
   const Frame frame = frameOf(60);
   const cv::Mat rows = activatedRows(model, file.description.input, frame);
-  auto network = Network::load(file.network, "", tensorNames(file.description));
+  auto network = loadNetwork({file.network, ""}, tensorNames(file.description));
   ASSERT_TRUE(network);
-  const auto tensors = network->forward(*makeBlob(file.description.input, frame));
+  const auto tensors = (*network)->forward(*makeBlob(file.description.input, frame));
   ASSERT_TRUE(tensors);
   int row = 0;
   double worst = 0;

@@ -167,7 +167,7 @@ TEST(InferenceProgram, SaysTheMendAndTheStatusWhereItCannotStart) {
   Child garbage({program, "--set", "model.path=" + folder.file("not.onnx")},
                 folder.file("garbage"));
   EXPECT_EQ(garbage.wait(10s), 78);
-  EXPECT_THAT(garbage.log(), ::testing::HasSubstr("not a network that OpenCV can load"));
+  EXPECT_THAT(garbage.log(), ::testing::HasSubstr("not a network that can be loaded"));
   Child missing({program, "--set", "model.path=/nowhere.onnx"}, folder.file("missing"));
   EXPECT_EQ(missing.wait(10s), 69);
   EXPECT_THAT(missing.log(), ::testing::HasSubstr("/nowhere.onnx is missing"));

@@ -42,6 +42,9 @@ struct TinyOnnx {
   std::vector<float> azimuth = {0, 6, 0, 0, 0, 0.5F, 0, 0};  ///< bins, residuals
   /// Added to each of the outputs for each unit of brightness of the cell's corner; none: 0.
   std::vector<float> box_by_light, logits_by_light;
+  /// Hands the boxes on through Compress, all of whose conditions hold: OpenCV has no such
+  /// operator.
+  bool for_other_runtimes = false;
   std::string name = "tiny", classes_json = R"(["car", "person"])";
   std::string azimuth_json = R"("azimuth": {"bins": 4, "sigma": 0.2, "classes": ["car"]},)";
 
@@ -96,10 +99,22 @@ struct TinyOnnx {
     graph.message(5, tensor(name + ".b", {n}, bias));
     graph.message(12, value(name, {1, n, 2, 2}));
   }
+  /// Adds an operator that changes nothing: it reverses four sequences, each of one.
+  static void addReverseSequence(Protobuf& graph, const std::string& from, const std::string& to) {
+    Protobuf node, lengths;
+    node.bytes(1, from).bytes(1, to + ".lengths").bytes(2, to).bytes(3, "node_" + to);
+    graph.message(1, node.bytes(4, "ReverseSequence"));
+    lengths.number(1, 4).number(2, 7).bytes(8, to + ".lengths");  // int64
+    std::string ones;
+    for (int i = 0; i < 4; ++i) ones += '\1' + std::string(7, '\0');
+    graph.message(5, lengths.bytes(9, ones));
+    graph.message(12, value(to, {1, 4, 2, 2}));
+  }
   std::string onnx() const {
     Protobuf graph;
     graph.bytes(2, "tiny");
-    addHead(graph, "box32", box, box_by_light);
+    addHead(graph, for_other_runtimes ? "box" : "box32", box, box_by_light);
+    if (for_other_runtimes) addReverseSequence(graph, "box", "box32");
     addHead(graph, "logits32", logits, logits_by_light);
     addHead(graph, "azimuth32", azimuth);
     graph.message(11, value("images", {1, 3, 48, 64}));

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "services/inference/core/decode.h"
 #include "services/inference/core/image_fit.h"
 #include "services/inference/core/network.h"
 #include "services/inference/model_file.h"
@@ -56,10 +57,10 @@ std::vector<inference::Candidate> candidatesOf(const fs::path& network, const fs
   auto file = inference::readModelFile(network.string(), "", {});
   file.description.calibration = {1.0, 0.5};
   auto loaded =
-      inference::Network::load(file.network, "", inference::tensorNames(file.description));
+      inference::loadWithOpenCv({file.network, ""}, inference::tensorNames(file.description));
   EXPECT_TRUE(loaded) << loaded.error().detail;
   const auto blob = inference::makeBlob(file.description.input, readPicture(picture));
-  const auto tensors = loaded->forward(*blob);
+  const auto tensors = (*loaded)->forward(*blob);
   EXPECT_TRUE(tensors) << tensors.error().detail;
   std::vector<std::size_t> wanted(file.description.classes.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = i;

@@ -98,7 +98,7 @@ TEST(Check, TellsAnswersThatDifferAndTensorsOfAnotherSize) {
   EXPECT_GT(checkAnswers(network, folder.path_).difference, kMostDifference);
   writeFloats(folder.path_ / "box32.f32", {1.0F});
   EXPECT_THAT(messageOf([&] { checkAnswers(network, folder.path_); }),
-              HasSubstr("OpenCV gives a tensor of 16 values"));
+              HasSubstr("the network gives a tensor of 16 values"));
 }
 
 TEST(Import, NamesItsFilesByTheNetwork) {
