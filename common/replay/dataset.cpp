@@ -5,6 +5,7 @@
 #include "common/base/errors.h"
 #include "common/replay/recorded_messages.h"
 #include "common/replay/recording.h"
+#include "common/replay/rig_file.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
 
@@ -62,7 +63,11 @@ Recording readRecording(const DatasetOptions& options) {
 }  // namespace
 
 std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
-  return std::make_unique<Dataset>(options, readRecording(options));
+  Recording recording = readRecording(options);
+  if (!options.rig.empty()) {
+    applyRig(readRig(options.rig), options.rig.string(), recording.calibration);
+  }
+  return std::make_unique<Dataset>(options, std::move(recording));
 }
 
 Dataset::Dataset(const DatasetOptions& options, Recording recording)

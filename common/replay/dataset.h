@@ -30,7 +30,8 @@ struct DatasetOptions {
   InstanceId source = 1;                        ///< of the messages
   std::optional<ImageEncoding> encoding = {};   ///< of cam0; as the files are where not given
   std::optional<ImageEncoding> second_encoding = {};  ///< of cam1
-  bool decode = true;  ///< false: frames carry stamp and size, but no pixels
+  std::filesystem::path rig = {};  ///< rig file instead of the drive's own calibration
+  bool decode = true;              ///< false: frames carry stamp and size, but no pixels
 };
 
 enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking, kRecording };

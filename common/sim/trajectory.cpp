@@ -1,69 +1,14 @@
 #include "common/sim/trajectory.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/math/b_spline.h"
 #include "common/math/so3.h"
 
 namespace perdure::sim {
 namespace {
-
-constexpr double binomial(int n, int k) {
-  double value = 1.0;
-  for (int i = 1; i <= k; ++i) value = value * (n - k + i) / i;
-  return value;
-}
-
-constexpr double power(double base, int exponent) {
-  double value = 1.0;
-  for (int i = 0; i < exponent; ++i) value *= base;
-  return value;
-}
-
-/// Weights of `Order` neighbouring controls as polynomials in s: [control][power of s].
-/// Source: Sommer et al. 2020, eq. 14 (Qin's general matrix of uniform B-splines).
-template <int Order>
-constexpr std::array<std::array<double, Order>, Order> blendingMatrix() {
-  std::array<std::array<double, Order>, Order> m{};
-  double factorial = 1.0;
-  for (int i = 2; i < Order; ++i) factorial *= i;
-  for (int control = 0; control < Order; ++control) {
-    for (int n = 0; n < Order; ++n) {
-      double sum = 0.0;
-      for (int l = control; l < Order; ++l) {
-        const double sign = (l - control) % 2 == 0 ? 1.0 : -1.0;
-        sum += sign * binomial(Order, l - control) * power(Order - 1 - l, Order - 1 - n);
-      }
-      m[static_cast<std::size_t>(control)][static_cast<std::size_t>(n)] =
-          binomial(Order - 1, n) / factorial * sum;
-    }
-  }
-  return m;
-}
-
-/// Weights that multiply differences of neighbours instead (eq. 16): sums of the rows below.
-template <int Order>
-constexpr std::array<std::array<double, Order>, Order> cumulativeMatrix() {
-  auto m = blendingMatrix<Order>();
-  for (std::size_t row = Order - 1; row-- > 0;) {
-    for (std::size_t n = 0; n < Order; ++n) m[row][n] += m[row + 1][n];
-  }
-  return m;
-}
-
-/// A polynomial's value and first two derivatives at s.
-template <std::size_t N>
-std::array<double, 3> evaluate(const std::array<double, N>& coefficients, double s) {
-  std::array<double, 3> v{};
-  for (std::size_t i = N; i-- > 0;) {
-    v[2] = v[2] * s + 2.0 * v[1];
-    v[1] = v[1] * s + v[0];
-    v[0] = v[0] * s + coefficients[i];
-  }
-  return v;
-}
 
 constexpr int kPositionOrder = 6, kRotationOrder = 5;
 constexpr auto kPositionWeights = blendingMatrix<kPositionOrder>();
@@ -89,7 +34,7 @@ void evaluatePosition(const Controls& controls, double s, double interval, Motio
   const Eigen::Vector3d base = controls[2].p;
   state.T_WB.p = base;
   for (std::size_t i = 0; i < kPositionOrder; ++i) {
-    const auto w = evaluate(kPositionWeights[i], s);
+    const auto w = evaluatePolynomial(kPositionWeights[i], s);
     const Eigen::Vector3d offset = controls[i].p - base;
     state.T_WB.p += w[0] * offset;
     state.velocity_W += w[1] / interval * offset;
@@ -100,7 +45,7 @@ void evaluatePosition(const Controls& controls, double s, double interval, Motio
 void evaluateRotation(const Controls& controls, double s, double interval, MotionState& state) {
   Eigen::Quaterniond q = controls[0].q;
   for (std::size_t i = 1; i < kRotationOrder; ++i) {
-    const auto w = evaluate(kRotationWeights[i], s);
+    const auto w = evaluatePolynomial(kRotationWeights[i], s);
     const Eigen::Vector3d d = logSo3(controls[i - 1].q.conjugate() * controls[i].q);
     const Eigen::Quaterniond step = expQuaternion(w[0] * d);
     const double rate = w[1] / interval;

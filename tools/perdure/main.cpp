@@ -5,6 +5,7 @@
 
 #include "common/base/errors.h"
 #include "tools/bus_tools/command.h"
+#include "tools/calibrate/command.h"
 #include "tools/demo/command.h"
 #include "tools/detect/command.h"
 #include "tools/evaluate/command.h"
@@ -47,6 +48,7 @@ int main(int argc, char** argv) {
   perdure::tools::addModelCommand(app);
   perdure::tools::addInferenceCommand(app);
   perdure::tools::addSimulateCommand(app);
+  perdure::tools::addCalibrateCommand(app);
   perdure::tools::addMapCommand(app);
   perdure::tools::addDemoCommand(app);
   perdure::tools::addRecordCommand(app);

@@ -1,0 +1,23 @@
+// The rig file: cameras and IMU of a vehicle, as `perdure calibrate` writes them and as capture,
+// pipeline and calibrate read them. Sections cam0, cam1 and imu0 with the keys of EuRoC's
+// sensor.yaml; T_BS is the sensor in the body, and the body is the IMU.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/types/sensors.h"
+
+namespace perdure::replay {
+
+/// Throws StartupError with the key and the mend.
+Calibration readRig(const std::filesystem::path& file);
+
+/// All digits; `comment` may have several lines.
+std::string rigText(const Calibration& rig, const std::string& comment);
+
+/// Puts the rig's cameras and IMU in place of those of `calibration`, camera by camera of the same
+/// name. Throws StartupError where one is missing in the rig or has another size of image.
+void applyRig(const Calibration& rig, const std::string& file, Calibration& calibration);
+
+}  // namespace perdure::replay

@@ -1,0 +1,91 @@
+#include "tools/calibrate/calibrate.h"
+
+#include <fmt/format.h>
+
+#include "common/base/errors.h"
+#include "common/replay/rig_file.h"
+#include "tools/simulate/writer.h"
+
+namespace perdure::calibrate {
+namespace {
+
+DistortionModel modelOf(const CalibrateOptions& options, const CameraCalibration& prior) {
+  const bool tells = prior.fx > 0.0 && prior.distortion != DistortionModel::kNone;
+  return options.lens.value_or(tells ? prior.distortion : DistortionModel::kRadialTangential);
+}
+
+/// Throws where `result` has failed.
+template <class T>
+T must(Result<T> result, const std::string& camera) {
+  if (!result) {
+    throw StartupError(ExitCode::kUnavailable,
+                       camera + ": " + result.error().detail + " (" + result.error().code + ")");
+  }
+  return *std::move(result);
+}
+
+CalibratedCamera calibrateCamera(const CalibrationDrive& drive, const Sightseeing& seen,
+                                 const CalibrateOptions& options) {
+  CalibratedCamera camera;
+  camera.seen = seen;
+  camera.lens = must(
+      estimateIntrinsics(options.board, seen.views, seen.prior, {modelOf(options, seen.prior), 60}),
+      seen.prior.name);
+  camera.judgements = judgeLens(camera.lens, seen);
+  if (options.intrinsics_only) {
+    camera.judgements.push_back(judgeCoverage(camera.lens.camera, camera.lens.residuals));
+    return camera;
+  }
+  CameraImuInput input;
+  input.board = options.board, input.views = seen.views, input.samples = drive.samples;
+  input.camera = camera.result();
+  input.imu = drive.imu.value_or(ImuCalibration{});
+  input.sigma_px = camera.lens.sigma_px;
+  camera.place = must(estimateCameraImu(input, options.place), seen.prior.name);
+  camera.judgements.push_back(judgeCoverage(camera.place->camera, camera.place->residuals));
+  const Judgements more = judgePlace(*camera.place, seen.prior);
+  camera.judgements.insert(camera.judgements.end(), more.begin(), more.end());
+  return camera;
+}
+
+}  // namespace
+
+CameraCalibration CalibratedCamera::result() const {
+  CameraCalibration camera = seen.prior;
+  const CameraCalibration& from = place ? place->camera : lens.camera;
+  camera.distortion = from.distortion;
+  setLens(lensOf(from), camera);
+  if (place) camera.T_BC = from.T_BC, camera.time_offset_s = from.time_offset_s;
+  return camera;
+}
+
+Judgements Calibrated::all() const {
+  Judgements together;
+  for (const auto& camera : cameras) {
+    together.insert(together.end(), camera.judgements.begin(), camera.judgements.end());
+  }
+  return together;
+}
+
+Calibrated calibrate(const CalibrationDrive& drive, const CalibrateOptions& options) {
+  Calibrated calibrated{options.board, {}, {}};
+  for (const Sightseeing& seen : drive.cameras) {
+    calibrated.cameras.push_back(calibrateCamera(drive, seen, options));
+    calibrated.rig.cameras.push_back(calibrated.cameras.back().result());
+  }
+  calibrated.rig.imu = drive.imu;
+  return calibrated;
+}
+
+void writeCalibrated(const Calibrated& calibrated, const std::filesystem::path& folder) {
+  const std::string comment = fmt::format(
+      "Calibrated with {}: {}.\ncalibration.json beside it has covariances and residuals.",
+      calibrated.board.text(), summaryOf(calibrated.all()));
+  tools::writeWhole(folder / "rig.yaml", replay::rigText(calibrated.rig, comment));
+  tools::writeWhole(folder / "calibration.json", reportText(calibrated));
+  for (const auto& camera : calibrated.cameras) {
+    drawResiduals(camera, folder / ("residuals_" + camera.seen.prior.name + ".png"));
+  }
+}
+
+}  // namespace perdure::calibrate

@@ -1,0 +1,252 @@
+#include "tools/calibrate/camera_imu_problem.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+
+#include "tools/calibrate/camera_imu_costs.h"
+
+namespace perdure::calibrate {
+namespace {
+
+constexpr double kBiasInterval = 2.0;                          // s
+constexpr double kGyroBiasPrior = 0.5, kAccelBiasPrior = 2.0;  // rad/s, m/s²
+
+double* turnOf(Spline& spline, std::size_t i) { return spline.controls[i].q.coeffs().data(); }
+double* placeOf(Spline& spline, std::size_t i) { return spline.controls[i].p.data(); }
+
+/// The controls of segment k: five turns, then five places.
+std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places) {
+  std::vector<double*> blocks;
+  for (std::size_t i = 0; i < kOrder; ++i) blocks.push_back(turnOf(spline, k + i));
+  for (std::size_t i = 0; with_places && i < kOrder; ++i) blocks.push_back(placeOf(spline, k + i));
+  return blocks;
+}
+
+/// Row-major Jacobian of Ceres as Eigen's.
+Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
+  using Rows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+  return Eigen::Map<const Rows>(m.num_rows, m.num_cols, static_cast<Eigen::Index>(m.values.size()),
+                                m.rows.data(), m.cols.data(), m.values.data());
+}
+
+}  // namespace
+
+CameraImuProblem::CameraImuProblem(const Board& board, DistortionModel model, double readout_s,
+                                   double height, const CameraImuOptions& options)
+    : board_(board), model_(model), readout_s_(readout_s), height_(height), options_(options) {}
+
+void CameraImuProblem::setBiases(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+  const double length = x.spline.end_s() - x.spline.start_s;
+  const auto count = static_cast<std::size_t>(std::ceil(length / kBiasInterval)) + 1;
+  x.gyro_bias.assign(count, gyro);
+  x.accel_bias.assign(count, accel);
+}
+
+std::size_t CameraImuProblem::biasAt(double t, double& share) const {
+  const double at = (t - x.spline.start_s) / kBiasInterval;
+  const auto i = std::min(static_cast<std::size_t>(std::max(0.0, at)), x.gyro_bias.size() - 2);
+  share = at - static_cast<double>(i);
+  return i;
+}
+
+double CameraImuProblem::delayOf(const Corner& corner) const {
+  return readout_s_ * (corner.pixel.y() / (height_ - 1.0) - 0.5);
+}
+
+void CameraImuProblem::addFrames(ceres::Problem& problem) {
+  using Cost = ceres::AutoDiffCostFunction<FrameCost, ceres::DYNAMIC, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3,
+                                           4, 3, 1, 4, 4>;
+  for (const Sighting& sighting : sightings) {
+    const std::size_t k = x.spline.segmentAt(sighting.time_s + x.time_offset_s);
+    FrameCost cost{model_,
+                   x.spline.withinOf(k, sighting.time_s),
+                   x.spline.interval_s,
+                   1 / sigma.px,
+                   readout_s_ > 0.0,
+                   {}};
+    for (std::size_t i = 0; i < sighting.good.size(); ++i) {
+      const Corner& corner = sighting.view.corners[i];
+      if (!sighting.good[i]) continue;
+      cost.sights.push_back({board_.corner(corner.id), corner.pixel, delayOf(corner)});
+    }
+    if (cost.sights.empty()) continue;
+    const int rows = 2 * static_cast<int>(cost.sights.size());
+    auto blocks = controlsOf(x.spline, k, true);
+    blocks.insert(blocks.end(), {x.q_BC.coeffs().data(), x.p_BC.data(), &x.time_offset_s,
+                                 x.lens.data(), x.lens.data() + 4});
+    problem.AddResidualBlock(new Cost(new FrameCost(std::move(cost)), rows), nullptr, blocks);
+  }
+}
+
+void CameraImuProblem::addSamples(ceres::Problem& problem) {
+  using Gyro = ceres::AutoDiffCostFunction<GyroCost, 3, 4, 4, 4, 4, 4, 3, 3>;
+  using Accel = ceres::AutoDiffCostFunction<AccelCost, 3, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3, 3, 3, 3>;
+  for (const ImuReading& reading : readings) {
+    const std::size_t k = x.spline.segmentAt(reading.time_s);
+    const double u = x.spline.withinOf(k, reading.time_s), dt = x.spline.interval_s;
+    double share = 0.0;
+    const std::size_t b = biasAt(reading.time_s, share);
+    auto turns = controlsOf(x.spline, k, false);
+    turns.insert(turns.end(), {x.gyro_bias[b].data(), x.gyro_bias[b + 1].data()});
+    problem.AddResidualBlock(new Gyro(new GyroCost{u, dt, share, 1 / sigma.gyro, reading.gyro}),
+                             nullptr, turns);
+    auto all = controlsOf(x.spline, k, true);
+    all.insert(all.end(), {x.accel_bias[b].data(), x.accel_bias[b + 1].data(), x.down_T.data()});
+    problem.AddResidualBlock(
+        new Accel(new AccelCost{u, dt, share, 1 / sigma.accel, options_.gravity, reading.accel}),
+        nullptr, all);
+  }
+}
+
+void CameraImuProblem::addBiases(ceres::Problem& problem) {
+  using Walk = ceres::AutoDiffCostFunction<WalkCost, 3, 3, 3>;
+  using Prior = ceres::AutoDiffCostFunction<BiasPrior, 3, 3>;
+  const auto add = [&](std::vector<Eigen::Vector3d>& bias, double walk, double prior) {
+    const double weight = 1.0 / (std::max(walk, 1e-7) * std::sqrt(kBiasInterval));
+    for (std::size_t i = 0; i + 1 < bias.size(); ++i) {
+      problem.AddResidualBlock(new Walk(new WalkCost{weight}), nullptr, bias[i].data(),
+                               bias[i + 1].data());
+    }
+    problem.AddResidualBlock(new Prior(new BiasPrior{1.0 / prior}), nullptr, bias[0].data());
+  };
+  add(x.gyro_bias, sigma.gyro_walk, kGyroBiasPrior);
+  add(x.accel_bias, sigma.accel_walk, kAccelBiasPrior);
+}
+
+void CameraImuProblem::build(ceres::Problem& problem) {
+  addFrames(problem);
+  addSamples(problem);
+  addBiases(problem);
+  for (std::size_t i = 0; i < x.spline.controls.size(); ++i) {
+    problem.AddParameterBlock(turnOf(x.spline, i), 4, new RightRotation);
+    problem.AddParameterBlock(placeOf(x.spline, i), 3);
+  }
+  problem.AddParameterBlock(x.q_BC.coeffs().data(), 4, new RightRotation);
+  problem.SetManifold(x.down_T.data(), new ceres::SphereManifold<3>);
+  if (options_.hold_lens) problem.SetParameterBlockConstant(x.lens.data());
+  if (options_.hold_lens || !hasDistortion()) problem.SetParameterBlockConstant(x.lens.data() + 4);
+}
+
+bool CameraImuProblem::solve(int iterations) {
+  ceres::Problem problem;
+  build(problem);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = iterations;
+  options.function_tolerance = 1e-7;
+  options.num_threads = 2;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return summary.IsSolutionUsable() && std::isfinite(summary.final_cost);
+}
+
+Eigen::Vector2d CameraImuProblem::residualOf(const Sighting& sighting, std::size_t i) const {
+  const Corner& corner = sighting.view.corners[i];
+  const double t = sighting.time_s + x.time_offset_s + delayOf(corner);
+  const RigidTransform T_TC = x.spline.poseAt(t) * RigidTransform(x.q_BC, x.p_BC);
+  const Eigen::Vector3d point = T_TC.inverse() * board_.corner(corner.id);
+  if (point.z() < 1e-3) return Eigen::Vector2d::Constant(1e6);
+  return corner.pixel - projectPoint<double>(model_, x.lens.data(), x.lens.data() + 4, point);
+}
+
+std::vector<CornerResidual> CameraImuProblem::cornerResiduals() const {
+  std::vector<CornerResidual> all;
+  for (const Sighting& sighting : sightings) {
+    for (std::size_t i = 0; i < sighting.good.size(); ++i) {
+      if (!sighting.good[i]) continue;
+      all.push_back({sighting.view.frame, sighting.time_s, sighting.view.corners[i].pixel,
+                     residualOf(sighting, i)});
+    }
+  }
+  return all;
+}
+
+void CameraImuProblem::gateCorners(double limit_px) {
+  for (Sighting& sighting : sightings) {
+    for (std::size_t i = 0; i < sighting.good.size(); ++i) {
+      sighting.good[i] = residualOf(sighting, i).norm() < limit_px;
+    }
+  }
+}
+
+std::vector<ImuResidual> CameraImuProblem::imuResiduals() const {
+  std::vector<ImuResidual> all;
+  Spline& spline = const_cast<Spline&>(x.spline);
+  for (const ImuReading& reading : readings) {
+    const std::size_t k = x.spline.segmentAt(reading.time_s);
+    const double u = x.spline.withinOf(k, reading.time_s), dt = x.spline.interval_s;
+    double share = 0.0;
+    const std::size_t b = biasAt(reading.time_s, share);
+    const auto c = controlsOf(spline, k, true);
+    ImuResidual r{reading.time_s, {}, {}};
+    GyroCost{u, dt, share, 1.0, reading.gyro}(c[0], c[1], c[2], c[3], c[4], x.gyro_bias[b].data(),
+                                              x.gyro_bias[b + 1].data(), r.gyro.data());
+    AccelCost{u, dt, share, 1.0, options_.gravity, reading.accel}(
+        c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], x.accel_bias[b].data(),
+        x.accel_bias[b + 1].data(), x.down_T.data(), r.accel.data());
+    all.push_back(r);
+  }
+  return all;
+}
+
+Eigen::Vector3d CameraImuProblem::biasMean(const std::vector<Eigen::Vector3d>& bias) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& b : bias) sum += b;
+  return sum / static_cast<double>(bias.size());
+}
+
+// By the normal equations rather than ceres::Covariance: a QR of the whole Jacobian takes minutes.
+Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
+  ceres::Problem problem;
+  build(problem);
+  std::vector<double*> wanted = {x.q_BC.coeffs().data(), x.p_BC.data(), &x.time_offset_s};
+  Eigen::Index calibrated = 7;
+  if (!options_.hold_lens) {
+    wanted.push_back(x.lens.data()), calibrated += 4;
+    if (hasDistortion()) wanted.push_back(x.lens.data() + 4), calibrated += 4;
+  }
+  const std::size_t middle = x.gyro_bias.size() / 2;
+  wanted.push_back(x.gyro_bias[middle].data());
+  wanted.push_back(x.accel_bias[middle].data());
+  ceres::Problem::EvaluateOptions options;
+  options.num_threads = 2;
+  std::vector<double*> blocks;
+  problem.GetParameterBlocks(&blocks);
+  for (double* block : blocks) {
+    const bool is_wanted = std::find(wanted.begin(), wanted.end(), block) != wanted.end();
+    if (!is_wanted && !problem.IsParameterBlockConstant(block)) {
+      options.parameter_blocks.push_back(block);
+    }
+  }
+  options.parameter_blocks.insert(options.parameter_blocks.end(), wanted.begin(), wanted.end());
+  ceres::CRSMatrix crs;
+  problem.Evaluate(options, nullptr, nullptr, nullptr, &crs);
+  const Eigen::SparseMatrix<double> J = toEigen(crs);
+  const Eigen::SparseMatrix<double> information = J.transpose() * J;
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(information);
+  const Eigen::Index size = calibrated + 6, first = information.cols() - size;
+  const char* blind =
+      "the recording does not tell where the camera sits on the IMU; turn it to and fro about all "
+      "three axes, and shake it, while the board is in view";
+  if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0.0) {
+    return fail("calibrate_not_observable", blind);
+  }
+  Eigen::MatrixXd units = Eigen::MatrixXd::Zero(information.cols(), size);
+  units.bottomRows(size).setIdentity();
+  const Eigen::MatrixXd columns = solver.solve(units);
+  const Eigen::MatrixXd covariance = columns.middleRows(first, size);
+  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0) {
+    return fail("calibrate_not_observable", blind);
+  }
+  Certainty out;
+  out.calibration.topLeftCorner(calibrated, calibrated) =
+      covariance.topLeftCorner(calibrated, calibrated);
+  out.gyro_bias = covariance.diagonal().segment<3>(calibrated).cwiseSqrt();
+  out.accel_bias = covariance.diagonal().tail<3>().cwiseSqrt();
+  return out;
+}
+
+}  // namespace perdure::calibrate
