@@ -1,6 +1,7 @@
 // A queue between two threads with a bound, a named policy when it is full, and a count of drops.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -44,21 +45,20 @@ class BoundedQueue {
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);
     not_empty_.wait(lock, [&] { return closed_ || !queue_.empty(); });
-    if (queue_.empty()) return std::nullopt;
-    T value = std::move(queue_.front());
-    queue_.pop_front();
-    not_full_.notify_one();
-    return value;
+    return takeFront();
+  }
+
+  /// Waits for an element so long at most.
+  std::optional<T> popWithin(std::chrono::nanoseconds longest) {
+    std::unique_lock lock(mutex_);
+    not_empty_.wait_for(lock, longest, [&] { return closed_ || !queue_.empty(); });
+    return takeFront();
   }
 
   /// An element if there is one, without waiting.
   std::optional<T> tryPop() {
     const std::lock_guard lock(mutex_);
-    if (queue_.empty()) return std::nullopt;
-    T value = std::move(queue_.front());
-    queue_.pop_front();
-    not_full_.notify_one();
-    return value;
+    return takeFront();
   }
 
   void close() {
@@ -74,6 +74,14 @@ class BoundedQueue {
   }
 
  private:
+  std::optional<T> takeFront() {
+    if (queue_.empty()) return std::nullopt;
+    T value = std::move(queue_.front());
+    queue_.pop_front();
+    not_full_.notify_one();
+    return value;
+  }
+
   const std::size_t capacity_;
   const Overflow policy_;
   mutable std::mutex mutex_;

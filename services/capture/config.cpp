@@ -22,12 +22,43 @@ void describeDataset(Config& c, config::Fields& fields) {
   fields.choice("image.cam1", c.image.cam1, encodings, {"encoding of cam1; only vio looks at it"});
 }
 
+void describeLive(Config& c, config::Fields& fields) {
+  fields.text("rig", c.rig,
+              {"live: file with cameras and IMU of the vehicle, as `perdure calibrate` writes it; "
+               "the camera is asked for images of its size"});
+  fields.text("camera.id", c.camera.id,
+              {"live: libcamera's id of the camera, or a part of it; empty: the first there is"});
+  fields.text(
+      "camera.format", c.camera.format,
+      {"live: libcamera's name of a pixel format, as YUYV or MJPEG; auto: the best it has"});
+  fields.number("camera.rate_hz", c.camera.rate_hz, config::between(1, 240),
+                {"live: images a second, by limits of the frame's duration", "Hz"});
+  fields.number("camera.exposure_ms", c.camera.exposure_ms, config::between(0, 1000),
+                {"live: of an image; 0: automatic", "ms"});
+  fields.number("camera.gain", c.camera.gain, config::between(0, 100),
+                {"live: analogue gain; 0: automatic"});
+  fields.text("imu.uri", c.imu.uri,
+              {"live: libiio's context of the IMU: local:, or ip:HOST of an iiod"});
+  fields.text("imu.gyro", c.imu.gyro,
+              {"live: name or id of the gyroscope's device; empty: the first there is"});
+  fields.text("imu.accel", c.imu.accel, {"live: of the accelerometer's; empty: the same device"});
+  fields.number("imu.rate_hz", c.imu.rate_hz, config::between(10, 8000),
+                {"live: samples a second that are asked for; the device says what it gives", "Hz"});
+  fields.text("imu.trigger", c.imu.trigger,
+              {"live: name or id of the trigger of its buffer; empty: as it is set"});
+  fields.numbers("imu.mount", c.imu.mount, config::between(-1, 1),
+                 {"live: rows of the rotation from the device's axes to the body's; empty: the "
+                  "device's own mount matrix"});
+}
+
 }  // namespace
 
 void describe(Config& c, config::Fields& fields) {
-  fields.choice("source", c.source, {"dataset", "libcamera", "mcap"},
-                {"where images and samples come from; this version has dataset only"});
+  fields.choice("source", c.source, {"dataset", "libcamera"},
+                {"where images and samples come from: a drive in files, or a camera of libcamera "
+                 "and an IMU of IIO"});
   describeDataset(c, fields);
+  describeLive(c, fields);
   fields.choice("pace.mode", c.pace.mode, {"clock", "follow"},
                 {"clock: the drive's own times; follow: as fast as the readers answer"});
   fields.number("pace.rate", c.pace.rate, config::between(0.01, 100),
@@ -48,12 +79,18 @@ void describe(Config& c, config::Fields& fields) {
 }
 
 void requireSource(const Config& config) {
-  if (config.source != "dataset") {
+  const bool live = config.source == "libcamera";
+  if (live && config.rig.empty()) {
     throw StartupError(ExitCode::kConfiguration,
-                       "source: " + config.source +
-                           " is not in this version; set source: dataset and dataset.path.");
+                       "source: libcamera needs rig: a file with the lens of the camera, its place "
+                       "on the IMU and the IMU's noise; `perdure calibrate` writes it.");
   }
-  if (config.dataset.path.empty()) {
+  if (live && !config.imu.mount.empty() && config.imu.mount.size() != 9) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "imu.mount has " + std::to_string(config.imu.mount.size()) +
+                           " numbers; give the 9 of a rotation, row by row, or none.");
+  }
+  if (!live && config.dataset.path.empty()) {
     throw StartupError(ExitCode::kConfiguration,
                        "No drive is configured; set dataset.path to a folder in EuRoC, KITTI raw "
                        "or KITTI tracking layout, or to a recording (.mcap).");

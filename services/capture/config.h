@@ -37,8 +37,23 @@ struct RunConfig {
   std::string on_end = "stay";
 };
 
+struct CameraConfig {
+  std::string id, format = "auto";
+  double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
+};
+
+struct ImuConfig {
+  std::string uri = "local:";
+  std::string gyro, accel, trigger;
+  double rate_hz = 200.0;
+  std::vector<double> mount;  ///< empty, or 9: rows of R in v_B = R v_device
+};
+
 struct Config {
   std::string source = "dataset";
+  std::string rig;
+  CameraConfig camera;
+  ImuConfig imu;
   DatasetConfig dataset;
   ImageConfig image;
   PaceConfig pace;
@@ -48,7 +63,7 @@ struct Config {
 
 void describe(Config& config, config::Fields& fields);
 
-/// Throws StartupError where a source is asked for that this version has not, or none is given.
+/// Throws StartupError where what the source needs is not given.
 void requireSource(const Config& config);
 
 }  // namespace perdure::capture

@@ -1,4 +1,5 @@
-// perdure-capture: a drive as frames, inertial samples, speed and calibration.
+// perdure-capture: a drive, or live sensors, as frames, inertial samples, speed and calibration.
+#include "services/capture/live/live.h"
 #include "services/capture/playback.h"
 
 int main(int argc, char** argv) {
@@ -7,10 +8,14 @@ int main(int argc, char** argv) {
   return service::runService(
       argc, argv,
       {.process = "capture",
-       .summary = "Publishes images, inertial samples and speed of a drive, and its calibration.",
+       .summary = "Publishes images, inertial samples and speed, and their calibration.",
        .describe = [&](config::Fields& fields) { capture::describe(config, fields); },
        .body =
            [&](service::Context& context) {
+             if (config.source == "libcamera") {
+               capture::Live live(context, config);
+               return context.run();
+             }
              capture::Playback playback(context, config);
              context.run();
            }});

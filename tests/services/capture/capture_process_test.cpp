@@ -206,7 +206,7 @@ TEST(CaptureProgram, SaysTheMendAndTheStatusWhereItCannotStart) {
   EXPECT_THAT(uncalibrated.log(), HasSubstr("sensor.yaml"));
   Child live({program, "--set", "source=libcamera"}, folder.file("live"));
   EXPECT_EQ(live.wait(10s), 78);
-  EXPECT_THAT(live.log(), HasSubstr("libcamera is not in this version"));
+  EXPECT_THAT(live.log(), HasSubstr("source: libcamera needs rig"));
 }
 
 }  // namespace

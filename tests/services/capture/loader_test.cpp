@@ -132,7 +132,7 @@ TEST_F(LoaderTest, SaysWhatIsMissing) {
   EXPECT_THAT(error().second, HasSubstr("sensor.yaml"));
   config_.source = "libcamera";
   EXPECT_EQ(error().first, ExitCode::kConfiguration);
-  EXPECT_THAT(error().second, HasSubstr("libcamera is not in this version"));
+  EXPECT_THAT(error().second, HasSubstr("source: libcamera needs rig"));
 }
 
 TEST_F(LoaderTest, RefusesADriveWithoutReadableImages) {

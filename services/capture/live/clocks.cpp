@@ -1,0 +1,80 @@
+#include "services/capture/live/clocks.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace perdure::capture {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kSettles_ns = kSecond / 2;
+constexpr std::size_t kRemembered_s = 8;
+constexpr double kDrift = 5e-4;          // of quartz against quartz, with a margin
+constexpr double kJump_ns = 20'000'000;  // no delay and no drift explains more
+
+std::int64_t read(clockid_t clock) {
+  timespec t{};
+  clock_gettime(clock, &t);
+  return std::int64_t{t.tv_sec} * kSecond + t.tv_nsec;
+}
+
+/// to − from, read between two readings of `from`.
+std::int64_t difference(clockid_t from, clockid_t to) {
+  const std::int64_t before = read(from), there = read(to), after = read(from);
+  return there - (before + (after - before) / 2);
+}
+
+}  // namespace
+
+HostClock::HostClock() : to_wall_ns_(difference(CLOCK_BOOTTIME, CLOCK_REALTIME)) {}
+
+std::int64_t HostClock::nowNs() { return read(CLOCK_BOOTTIME); }
+
+std::int64_t HostClock::monotonicToBootNs() { return difference(CLOCK_MONOTONIC, CLOCK_BOOTTIME); }
+
+std::int64_t HostClock::realtimeToBootNs() { return difference(CLOCK_REALTIME, CLOCK_BOOTTIME); }
+
+void ClockMap::begin(std::int64_t ours_ns) {
+  buckets_.clear();
+  first_ns_ = ours_ns;
+  settled_ = false;
+}
+
+void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
+  const std::int64_t lateness = ours_ns - theirs_ns;
+  if (buckets_.empty()) begin(ours_ns);
+  const bool early = static_cast<double>(lateness) < offset_ - kJump_ns;
+  if (settled_ && early) {  // sooner than it was made: their clock was set forward
+    ++jumps_;
+    begin(ours_ns);
+  }
+  if (buckets_.empty() || ours_ns - buckets_.back().since_ns >= kSecond) {
+    buckets_.push_back({ours_ns, lateness});
+    if (buckets_.size() > kRemembered_s) buckets_.pop_front();
+  }
+  buckets_.back().least = std::min(buckets_.back().least, lateness);
+  const auto least = std::min_element(buckets_.begin(), buckets_.end(), [](auto& a, auto& b) {
+                       return a.least < b.least;
+                     })->least;
+  const double target = static_cast<double>(least);
+  if (!settled_) {
+    offset_ = target;
+    settled_ = ours_ns - first_ns_ >= kSettles_ns;
+  } else if (target - offset_ > kJump_ns) {  // for all remembered seconds: it was set back
+    ++jumps_;
+    offset_ = target;
+  } else {
+    const double most = kDrift * static_cast<double>(std::max<std::int64_t>(ours_ns - last_ns_, 0));
+    offset_ += std::clamp(target - offset_, -most, most);
+  }
+  last_ns_ = ours_ns;
+}
+
+std::optional<std::int64_t> ClockMap::toOurs(std::int64_t theirs_ns) const {
+  if (!settled_) return std::nullopt;
+  return theirs_ns + std::llround(offset_);
+}
+
+}  // namespace perdure::capture

@@ -1,0 +1,53 @@
+// The clock of live stamps, and other clocks seen in it.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "common/base/time.h"
+
+namespace perdure::capture {
+
+/// CLOCK_BOOTTIME, which nobody sets, laid on the wall clock as that was at the start: a wall clock
+/// that is set later does not move the stamps.
+class HostClock {
+ public:
+  HostClock();
+  /// `boot_ns`: CLOCK_BOOTTIME.
+  TimePoint at(std::int64_t boot_ns) const { return fromNanoseconds(boot_ns + to_wall_ns_); }
+  static std::int64_t nowNs();
+  /// From these to CLOCK_BOOTTIME, as they stand now.
+  static std::int64_t monotonicToBootNs();
+  static std::int64_t realtimeToBootNs();
+
+ private:
+  std::int64_t to_wall_ns_;
+};
+
+/// A clock elsewhere, of which only messages with its stamps are seen: they come late by a varying
+/// time, and the least of the last seconds stands for none. What is left is that least delay, a
+/// constant, which vio estimates as part of the camera's time offset.
+class ClockMap {
+ public:
+  /// A message with the stamp `theirs_ns` was there at `ours_ns`.
+  void observe(std::int64_t theirs_ns, std::int64_t ours_ns);
+  /// Nothing in the first half second.
+  std::optional<std::int64_t> toOurs(std::int64_t theirs_ns) const;
+  /// Times that the clocks were found to have moved against each other by more than drift.
+  std::uint64_t jumps() const { return jumps_; }
+
+ private:
+  struct Bucket {
+    std::int64_t since_ns, least;
+  };
+  void begin(std::int64_t ours_ns);
+
+  std::deque<Bucket> buckets_;  ///< least of ours − theirs, by second
+  std::int64_t first_ns_ = 0, last_ns_ = 0;
+  double offset_ = 0.0;
+  bool settled_ = false;
+  std::uint64_t jumps_ = 0;
+};
+
+}  // namespace perdure::capture

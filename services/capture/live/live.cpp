@@ -1,0 +1,143 @@
+#include "services/capture/live/live.h"
+
+#include "common/replay/rig_file.h"
+
+namespace perdure::capture {
+namespace {
+
+constexpr const char* kCamera = "cam0";
+
+Calibration rigOf(const Config& config, InstanceId source) {
+  requireSource(config);
+  Calibration rig = replay::readRig(config.rig);
+  rig.source = source;
+  std::erase_if(rig.cameras, [](const CameraCalibration& c) { return c.name != kCamera; });
+  rig.cameras.front().rate_hz = config.camera.rate_hz;
+  return rig;
+}
+
+CameraSettings cameraSettings(const Config& config, const CameraCalibration& camera) {
+  CameraSettings settings;
+  settings.id = config.camera.id;
+  settings.width = camera.width;
+  settings.height = camera.height;
+  settings.format = config.camera.format;
+  settings.rate_hz = config.camera.rate_hz;
+  settings.exposure_ms = config.camera.exposure_ms;
+  settings.gain = config.camera.gain;
+  settings.readout_s = camera.readout_s;
+  settings.encoding = config.image.cam0;
+  return settings;
+}
+
+void join(std::string& text, const std::string& more, const char* between) {
+  if (!more.empty()) text += (text.empty() ? "" : between) + more;
+}
+
+}  // namespace
+
+Live::Live(service::Context& context, const Config& config)
+    : context_(context),
+      frames_(context.writer(bus::topics::frame(kCamera))),
+      imu_(context.sink(bus::topics::kImu)) {
+  const Calibration rig = rigOf(config, context.instance());
+  (void)context_.writer(bus::topics::kCalibration).write(rig);
+  context_.countReasons([this](ReasonCounts& counts) { report(counts); });
+  context_.onHealth([this] { updateHealth(); });
+  context_.loop().onWake([this] { pump(); });
+  if (rig.imu) openImu(config.imu);
+  camera_ =
+      std::make_unique<LiveCamera>(cameraSettings(config, rig.cameras.front()),
+                                   [this](CameraImage image) { offer(Message(std::move(image))); });
+}
+
+void Live::openImu(const ImuConfig& config) {
+  IioSettings settings;
+  settings.uri = config.uri;
+  settings.device = config.gyro;
+  settings.rate_hz = config.rate_hz;
+  settings.trigger = config.trigger;
+  settings.mount = config.mount;
+  const auto open = [this](const IioSettings& of) {
+    imus_.push_back(
+        std::make_unique<IioStream>(of, [this](const IioScan& scan) { scanned(scan); }));
+  };
+  if (config.accel.empty() || config.accel == config.gyro) return open(settings);
+  settings.accel = false;
+  open(settings);
+  settings.device = config.accel;
+  settings.accel = true;
+  settings.gyro = false;
+  open(settings);
+}
+
+/// On a stream's thread.
+void Live::scanned(const IioScan& scan) {
+  const std::lock_guard lock(pairing_mutex_);
+  // Of one device both are of one time: the acceleration first, and the pair is complete.
+  if (scan.accel) {
+    for (const auto& pair : pairing_.accel({scan.time_ns, *scan.accel})) offer(pair);
+  }
+  if (scan.gyro) {
+    for (const auto& pair : pairing_.gyro({scan.time_ns, *scan.gyro})) offer(pair);
+  }
+}
+
+void Live::offer(Message message) {
+  if (std::holds_alternative<CameraImage>(message)) context_.health().frameIn();
+  queue_.push(std::move(message));
+  context_.loop().wake();
+}
+
+void Live::pump() {
+  while (auto message = queue_.tryPop()) {
+    std::visit([this](auto& m) { publish(std::move(m)); }, *message);
+  }
+  context_.health().setDropped(queue_.dropped());
+}
+
+void Live::publish(CameraImage image) {
+  Frame& frame = image.frame;
+  frame.stamp.source = context_.instance();
+  frame.stamp.sequence = image.number;
+  frame.stamp.time = clock_.at(image.time_ns);
+  frame.stamp.captured_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+  frame.camera = kCamera;
+  if (frames_.write(frame)) context_.health().frameOut();
+}
+
+void Live::publish(const InertialPair& sample) {
+  if (sample.time_ns <= last_ns_) return reasons_.add("imu_out_of_order");
+  last_ns_ = sample.time_ns;
+  ImuSample out;
+  out.source = context_.instance();
+  out.sequence = samples_++;
+  out.time = clock_.at(sample.time_ns);
+  out.gyro = sample.gyro;
+  out.accel = sample.accel;
+  imu_(out);
+}
+
+void Live::updateHealth() {
+  std::string problem = camera_->problem(), names = camera_->name();
+  for (const auto& imu : imus_) {
+    join(problem, imu->problem(), " ");
+    join(names, imu->name(), "; ");
+  }
+  if (names != said_ && !names.empty()) context_.log().info("gives {}", names);
+  said_ = names;
+  context_.health().state(problem.empty() ? HealthState::kOk : HealthState::kDegraded, problem);
+}
+
+void Live::report(ReasonCounts& counts) const {
+  const auto add = [&](const ReasonCounts& more) {
+    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
+  };
+  add(reasons_);
+  add(camera_->reasons());
+  for (const auto& imu : imus_) add(imu->reasons());
+  const std::lock_guard lock(pairing_mutex_);
+  add(pairing_.reasons());
+}
+
+}  // namespace perdure::capture

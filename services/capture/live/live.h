@@ -1,0 +1,54 @@
+// Live sensors on the bus: a camera, an IMU, and the rig's calibration.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/bounded_queue.h"
+#include "common/service/service.h"
+#include "services/capture/config.h"
+#include "services/capture/live/clocks.h"
+#include "services/capture/live/iio_stream.h"
+#include "services/capture/live/imu_pairing.h"
+#include "services/capture/live/live_camera.h"
+
+namespace perdure::capture {
+
+class Live {
+ public:
+  /// Reads the rig and publishes it; opens the sensors beside, and again whenever they are gone.
+  /// Throws StartupError where the rig is not given or cannot be read.
+  Live(service::Context& context, const Config& config);
+
+ private:
+  using Message = std::variant<CameraImage, InertialPair>;
+
+  void openImu(const ImuConfig& config);
+  void scanned(const IioScan& scan);
+  void offer(Message message);
+  void pump();
+  void publish(CameraImage image);
+  void publish(const InertialPair& sample);
+  void updateHealth();
+  void report(ReasonCounts& counts) const;
+
+  service::Context& context_;
+  const HostClock clock_;
+  bus::Writer<Frame>& frames_;
+  Sink<ImuSample> imu_;
+  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of an IMU
+  std::uint64_t samples_ = 0;
+  std::int64_t last_ns_ = 0;  ///< of the last inertial sample
+  ReasonCounts reasons_;
+  std::string said_;  ///< names of the sensors, as logged last
+  mutable std::mutex pairing_mutex_;
+  ImuPairing pairing_;
+  // The threads of these use all of the above: they go first.
+  std::vector<std::unique_ptr<IioStream>> imus_;
+  std::unique_ptr<LiveCamera> camera_;
+};
+
+}  // namespace perdure::capture

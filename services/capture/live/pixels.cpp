@@ -1,0 +1,154 @@
+#include "services/capture/live/pixels.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace perdure::capture {
+namespace {
+
+bool isHalved(PixelLayout layout) {
+  return layout == PixelLayout::kNv12 || layout == PixelLayout::kNv21 ||
+         layout == PixelLayout::kYuv420;
+}
+
+std::size_t bytesPerPixel(PixelLayout layout) {
+  switch (layout) {
+    case PixelLayout::kBgr:
+    case PixelLayout::kRgb:
+      return 3;
+    case PixelLayout::kBgrx:
+    case PixelLayout::kRgbx:
+      return 4;
+    case PixelLayout::kYuyv:
+    case PixelLayout::kUyvy:
+      return 2;
+    default:
+      return 1;
+  }
+}
+
+/// OpenCV takes bytes that it does not change as bytes that it may change.
+cv::Mat view(const ImagePlane& plane, int rows, int columns, int channels) {
+  return {rows, columns, CV_8UC(channels), const_cast<std::uint8_t*>(plane.bytes.data()),
+          plane.stride};
+}
+
+bool holds(const ImagePlane& plane, std::size_t rows, std::size_t row_bytes) {
+  return plane.stride >= row_bytes && rows > 0 &&
+         plane.bytes.size() >= (rows - 1) * plane.stride + row_bytes;
+}
+
+bool suffices(PixelLayout layout, std::size_t width, std::size_t height,
+              const std::vector<ImagePlane>& planes) {
+  if (!isHalved(layout)) {
+    return planes.size() == 1 && holds(planes[0], height, width * bytesPerPixel(layout));
+  }
+  const bool apart = layout == PixelLayout::kYuv420;
+  bool enough = planes.size() == (apart ? 3U : 2U) && holds(planes[0], height, width);
+  for (std::size_t i = 1; enough && i < planes.size(); ++i) {
+    enough = holds(planes[i], height / 2, apart ? width / 2 : width);
+  }
+  return enough;
+}
+
+cv::Mat fromThreePlanes(int width, int height, const std::vector<ImagePlane>& planes, bool grey) {
+  cv::Mat y = view(planes[0], height, width, 1);
+  if (grey) return y.clone();
+  const cv::Mat halves[] = {view(planes[1], height / 2, width / 2, 1),
+                            view(planes[2], height / 2, width / 2, 1)};
+  cv::Mat uv, colour;
+  cv::merge(halves, 2, uv);
+  cv::cvtColorTwoPlane(y, uv, colour, cv::COLOR_YUV2BGR_NV12);
+  return colour;
+}
+
+cv::Mat fromTwoPlanes(PixelLayout layout, int width, int height,
+                      const std::vector<ImagePlane>& planes, bool grey) {
+  const cv::Mat y = view(planes[0], height, width, 1);
+  if (grey) return y.clone();
+  cv::Mat colour;
+  cv::cvtColorTwoPlane(
+      y, view(planes[1], height / 2, width / 2, 2), colour,
+      layout == PixelLayout::kNv12 ? cv::COLOR_YUV2BGR_NV12 : cv::COLOR_YUV2BGR_NV21);
+  return colour;
+}
+
+cv::Mat fromOnePlane(PixelLayout layout, int width, int height, const ImagePlane& plane,
+                     bool grey) {
+  const cv::Mat image = view(plane, height, width, static_cast<int>(bytesPerPixel(layout)));
+  int code = -1;
+  switch (layout) {
+    case PixelLayout::kGrey:
+      code = grey ? -1 : cv::COLOR_GRAY2BGR;
+      break;
+    case PixelLayout::kBgr:
+      code = grey ? cv::COLOR_BGR2GRAY : -1;
+      break;
+    case PixelLayout::kRgb:
+      code = grey ? cv::COLOR_RGB2GRAY : cv::COLOR_RGB2BGR;
+      break;
+    case PixelLayout::kBgrx:
+      code = grey ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGRA2BGR;
+      break;
+    case PixelLayout::kRgbx:
+      code = grey ? cv::COLOR_RGBA2GRAY : cv::COLOR_RGBA2BGR;
+      break;
+    case PixelLayout::kYuyv:
+      code = grey ? cv::COLOR_YUV2GRAY_YUY2 : cv::COLOR_YUV2BGR_YUY2;
+      break;
+    case PixelLayout::kUyvy:
+      code = grey ? cv::COLOR_YUV2GRAY_UYVY : cv::COLOR_YUV2BGR_UYVY;
+      break;
+    default:
+      break;
+  }
+  if (code < 0) return image.clone();
+  cv::Mat converted;
+  cv::cvtColor(image, converted, code);
+  return converted;
+}
+
+Result<cv::Mat> decodeJpeg(const std::vector<ImagePlane>& planes, cv::Size size, bool grey) {
+  if (planes.size() != 1 || planes[0].bytes.empty()) return fail("image_truncated", "no bytes");
+  const auto& bytes = planes[0].bytes;
+  const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8U,
+                      const_cast<std::uint8_t*>(bytes.data()));
+  cv::Mat image = cv::imdecode(coded, grey ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR);
+  if (image.empty()) return fail("image_corrupt", "a JPEG that cannot be decoded");
+  if (image.size() != size) return fail("image_size", "a JPEG of another size than agreed");
+  return image;
+}
+
+}  // namespace
+
+Result<Frame> packed(PixelLayout layout, std::uint32_t width, std::uint32_t height,
+                     const std::vector<ImagePlane>& planes, const std::string& wanted) {
+  const bool grey = wanted == "mono8" || (wanted == "as_is" && layout == PixelLayout::kGrey);
+  const int w = static_cast<int>(width), h = static_cast<int>(height);
+  cv::Mat image;
+  if (layout == PixelLayout::kJpeg) {
+    auto decoded = decodeJpeg(planes, {w, h}, grey);
+    if (!decoded) return tl::unexpected(decoded.error());
+    image = *decoded;
+  } else {
+    const bool even = width % 2 == 0 && (height % 2 == 0 || !isHalved(layout));
+    if ((isHalved(layout) || bytesPerPixel(layout) == 2) && !even) {
+      return fail("image_size", "an odd size of a format with halved colours");
+    }
+    if (!suffices(layout, width, height, planes)) {
+      return fail("image_truncated", "a buffer is shorter than its image");
+    }
+    image = layout == PixelLayout::kYuv420 ? fromThreePlanes(w, h, planes, grey)
+            : isHalved(layout)             ? fromTwoPlanes(layout, w, h, planes, grey)
+                                           : fromOnePlane(layout, w, h, planes[0], grey);
+  }
+  Frame frame;
+  frame.width = width;
+  frame.height = height;
+  frame.encoding = grey ? ImageEncoding::kMono8 : ImageEncoding::kBgr8;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(
+      image.data, image.data + image.total() * image.elemSize());
+  return frame;
+}
+
+}  // namespace perdure::capture

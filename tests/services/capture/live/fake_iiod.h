@@ -1,0 +1,62 @@
+// An iiod of the test's own: enough of its text protocol for the real libiio to find an IMU in the
+// network and to stream it. What it measures is known; it can go away and come back.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <list>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace perdure::capture::testing {
+
+struct FakeImu {
+  std::string id = "iio:device0", name = "imu";
+  bool gyro = true, accel = true, stamps = true;
+  double rate_hz = 200.0;
+  std::int64_t clock_ns = 0;  ///< its clock less CLOCK_BOOTTIME
+  std::string mount = {};     ///< matrix, in IIO's text; empty: it has none
+  bool needs_trigger = false;
+};
+
+/// Raw values of scan i: gyro x, y, z = i % 1000, −7, 3 (scale .001), accel 5, −6, 981 (scale .01).
+class FakeIiod {
+ public:
+  /// Listens on port 30431 of a loopback address, as "127.0.7.1".
+  FakeIiod(std::string address, std::vector<FakeImu> devices);
+  ~FakeIiod();
+  FakeIiod(const FakeIiod&) = delete;
+  FakeIiod& operator=(const FakeIiod&) = delete;
+
+  const std::string& address() const { return address_; }
+  /// From now on it answers nothing, as behind a cable that was cut.
+  void fallSilent() { silent_ = true; }
+  void stepClock(std::int64_t ns) { step_ns_ += ns; }
+  double rateAskedFor() const { return rate_asked_; }
+  std::string triggerSet() const;
+
+ private:
+  void serve();
+  void talk(int socket);
+  bool answer(int socket, const std::string& line, std::vector<std::int64_t>& next);
+  bool sendScans(int socket, const FakeImu& device, std::size_t bytes, std::int64_t& next);
+  const FakeImu* find(const std::string& id) const;
+  std::string xml() const;
+
+  const std::string address_;
+  const std::vector<FakeImu> devices_;
+  const std::int64_t start_ns_;
+  int listener_ = -1;
+  std::atomic<bool> stopping_{false}, silent_{false};
+  std::atomic<std::int64_t> step_ns_{0};
+  std::atomic<double> rate_asked_{0.0};
+  mutable std::mutex mutex_;
+  std::string trigger_;
+  std::list<int> sockets_;
+  std::list<std::thread> talks_;
+  std::thread thread_;
+};
+
+}  // namespace perdure::capture::testing

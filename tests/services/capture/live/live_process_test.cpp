@@ -1,0 +1,132 @@
+// perdure-capture with live sensors: an IMU behind an iiod, and no camera at all.
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <memory>
+
+#include "common/replay/rig_file.h"
+#include "tests/process/support.h"
+#include "tests/services/capture/live/fake_iiod.h"
+#include "tests/services/run_until.h"
+
+namespace perdure::capture {
+namespace {
+
+using namespace std::chrono_literals;
+using test::Child;
+using test::runUntil;
+using testing::FakeIiod;
+using testing::FakeImu;
+using ::testing::HasSubstr;
+
+class LiveProcess : public ::testing::Test {
+ protected:
+  LiveProcess() {
+    loop_.on(calibrations_, [this](const Calibration& c) { calibration_ = c; });
+    loop_.on(imu_, [this](const ImuSample& s) {
+      if (!samples_.empty() && s.source == samples_.back().source) {
+        EXPECT_EQ(s.sequence, samples_.back().sequence + 1);
+        EXPECT_GT(s.time, samples_.back().time);
+      }
+      samples_.push_back(s);
+    });
+    loop_.on(health_, [this](const Health& h) { last_health_ = h; });
+  }
+  static Calibration rig(bool with_camera = true) {
+    Calibration rig;
+    CameraCalibration camera;
+    camera.name = with_camera ? "cam0" : "cam1";
+    camera.width = 640;
+    camera.height = 480;
+    camera.fx = camera.fy = 500.0;
+    camera.cx = 320.0;
+    camera.cy = 240.0;
+    camera.rate_hz = 20.0;
+    rig.cameras = {camera};
+    rig.imu = ImuCalibration{1e-3, 1e-5, 1e-2, 1e-4, 200.0};
+    return rig;
+  }
+  std::vector<std::string> command(std::vector<std::string> more, const Calibration& of = rig()) {
+    const std::string file = folder_.file("rig.yaml");
+    std::ofstream(file) << replay::rigText(of, "of a test");
+    std::vector<std::string> words = {(test::programs() / "perdure-capture").string(), "--set",
+                                      "source=libcamera"};
+    more.push_back("rig=" + file);
+    for (auto& assignment : more) words.insert(words.end(), {"--set", std::move(assignment)});
+    return words;
+  }
+
+  const std::string address_ =
+      "127.99." + std::to_string(getpid() / 250 % 250) + "." + std::to_string(1 + getpid() % 250);
+  test::Folder folder_;
+  bus::Domain domain_{test::ownNetwork()};
+  bus::Participant participant_{domain_, "vio"};
+  bus::Reader<ImuSample> imu_{participant_, bus::topics::kImu};
+  bus::Reader<Calibration> calibrations_{participant_, bus::topics::kCalibration};
+  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
+  bus::WaitLoop loop_{participant_};
+  Calibration calibration_;
+  std::vector<ImuSample> samples_;
+  Health last_health_;
+};
+
+/// Two devices that tick apart; the camera is missing all the time.
+TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
+  const std::vector<FakeImu> imus = {
+      {.id = "iio:device0", .name = "gyro", .accel = false, .rate_hz = 200.0},
+      {.id = "iio:device1", .name = "accel", .gyro = false, .rate_hz = 125.0}};
+  auto iiod = std::make_unique<FakeIiod>(address_, imus);
+  const Child capture(command({"imu.uri=ip:" + address_, "imu.gyro=gyro", "imu.accel=accel"}),
+                      folder_.file("log"));
+  ASSERT_TRUE(runUntil(loop_, [&] { return samples_.size() >= 200; })) << capture.log();
+  EXPECT_TRUE(samples_.back().accel.isApprox(Eigen::Vector3d(0.05, -0.06, 9.81), 1e-9));
+  EXPECT_NEAR(samples_.back().gyro.z(), 0.003, 1e-12);
+  const double age =
+      1e-9 * static_cast<double>(std::chrono::system_clock::now().time_since_epoch().count() -
+                                 toNanoseconds(samples_.back().time));
+  EXPECT_LT(std::abs(age), 1.0) << "stamps are on the wall clock";
+  EXPECT_EQ(calibration_.cameras.size(), 1U);
+  EXPECT_TRUE(calibration_.imu);
+  ASSERT_TRUE(runUntil(loop_, [&] { return last_health_.state == HealthState::kDegraded; }));
+  EXPECT_THAT(last_health_.message, HasSubstr("libcamera sees no camera"));
+  EXPECT_GT(last_health_.reasons["camera_absent"], 0U);
+  EXPECT_EQ(last_health_.reasons["imu_absent"], 0U);
+
+  iiod.reset();
+  ASSERT_TRUE(runUntil(loop_, [&] { return last_health_.reasons["imu_lost"] == 2; }))
+      << last_health_.message;
+  EXPECT_THAT(last_health_.message, HasSubstr("IMU"));
+  const std::size_t before = samples_.size();
+  iiod = std::make_unique<FakeIiod>(address_, imus);
+  ASSERT_TRUE(runUntil(loop_, [&] { return samples_.size() >= before + 100; })) << capture.log();
+  ASSERT_TRUE(runUntil(loop_, [&] {
+    return last_health_.message.find("IMU") == std::string::npos;
+  })) << last_health_.message;
+}
+
+TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
+  const auto messageOf = [&](const std::vector<std::string>& words, int status) {
+    Child capture(words, folder_.file("log"));
+    EXPECT_EQ(capture.wait(10s), status) << capture.log();
+    return capture.log();
+  };
+  EXPECT_THAT(messageOf(command({}, rig(false)), 69), HasSubstr("cam0 is missing"));
+  EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0]"}), 78),
+              HasSubstr("imu.mount has 3 numbers"));
+  auto without = command({});
+  without.resize(without.size() - 2);
+  EXPECT_THAT(messageOf(without, 78), HasSubstr("perdure calibrate"));
+}
+
+TEST_F(LiveProcess, EndsInTimeWhenItIsTold) {
+  const FakeIiod iiod(address_, {{}});
+  Child capture(command({"imu.uri=ip:" + address_}), folder_.file("log"));
+  ASSERT_TRUE(runUntil(loop_, [&] { return samples_.size() >= 10; })) << capture.log();
+  capture.signal(SIGTERM);
+  EXPECT_EQ(capture.wait(3s), 0) << capture.log();
+}
+
+}  // namespace
+}  // namespace perdure::capture
