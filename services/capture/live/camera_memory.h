@@ -1,0 +1,42 @@
+// The memory of a libcamera frame buffer, as planes of an image.
+#pragma once
+
+#include <libcamera/libcamera.h>
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "services/capture/live/pixels.h"
+
+namespace perdure::capture {
+
+/// Mapped for reading as long as it lives.
+class MappedBuffer {
+ public:
+  explicit MappedBuffer(const libcamera::FrameBuffer& buffer);
+  ~MappedBuffer();
+  MappedBuffer(const MappedBuffer&) = delete;
+  MappedBuffer& operator=(const MappedBuffer&) = delete;
+
+  const std::vector<std::span<const std::uint8_t>>& planes() const { return planes_; }
+  /// Makes visible what the device wrote; before and after reading. Memory that is no DMA buffer
+  /// needs none, and says so.
+  void sync(bool begin) const;
+
+ private:
+  struct Mapping {
+    void* at = nullptr;
+    std::size_t length = 0;
+  };
+  std::map<int, Mapping> mappings_;  ///< by file descriptor
+  std::vector<std::span<const std::uint8_t>> planes_;
+};
+
+/// Planes as packed() wants them, also where a driver gives all of them as one.
+std::vector<ImagePlane> imagePlanes(const libcamera::StreamConfiguration& stream,
+                                    PixelLayout layout, const MappedBuffer& memory,
+                                    const libcamera::FrameMetadata& metadata);
+
+}  // namespace perdure::capture
