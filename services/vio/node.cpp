@@ -275,7 +275,13 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   rest_motion = cameras_->tracker.motionSince(static_cast<std::size_t>(frames));
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
   Result<Start> start = fail("start_waits");
-  if (rest_motion && *rest_motion < options.start.rest_disparity_px && slow) {
+  // Older samples would say where the body was, and the next frame would end it again.
+  constexpr std::chrono::milliseconds kFresh{300};
+  const bool fresh =
+      !imu_.empty() && seconds(imu_.longestGap(now - kFresh, now)) <= config_.core.imu.gap_from_s;
+  if (!fresh) {
+    start = fail("start_without_samples");
+  } else if (rest_motion && *rest_motion < options.start.rest_disparity_px && slow) {
     start = startAtRest(imu_, now, options);
   } else if (input.speed && !slow) {
     start = startWithSpeed(imu_, now, *input.speed, speeds_.samples(), options);

@@ -51,9 +51,9 @@ Calibration calibration() {
   return c;
 }
 
-test::DriveOptions restThenDrive() {
+test::DriveOptions restThenDrive(double rest_s = 1.0) {
   test::DriveOptions options;
-  options.rest_s = 1.0;
+  options.rest_s = rest_s;
   options.points = 400;
   return options;
 }
@@ -61,7 +61,8 @@ test::DriveOptions restThenDrive() {
 /// Plays the drive from `from` to `until`; edit may change or drop (return false) a message.
 class Player {
  public:
-  explicit Player(double until) : drive_(restThenDrive()), readings_(drive_.imu(until + 0.1)) {}
+  explicit Player(double until, double rest_s = 1.0)
+      : drive_(restThenDrive(rest_s)), readings_(drive_.imu(until + 0.1)) {}
 
   using EditImu = std::function<bool(ImuSample&, double)>;
   using EditFrame = std::function<bool(Frame&, double)>;
@@ -198,6 +199,18 @@ TEST(VioNode, AnInertialGapThatIsTooLongBeginsANewEpoch) {
   EXPECT_EQ(node.reasons().of("imu_gap_too_long"), 1u);
   EXPECT_EQ(r.odometry.back().world.epoch, 1u);
   EXPECT_EQ(r.odometry.front().world.epoch, 0u);
+  expectFinite(r);
+}
+
+TEST(VioNode, AnImuThatIsGoneForSecondsAtRestBeginsOneNewEpochAndNoMore) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player(7.0, 7.0).play(node, 0.0, 7.0, [](ImuSample&, double t) { return t < 2.0 || t > 4.5; });
+  node.flush();
+  EXPECT_EQ(r.odometry.size(), 141u);
+  EXPECT_EQ(r.odometry.back().world.epoch, 1u);
+  EXPECT_EQ(r.odometry.back().state, OdometryState::kTracking);
   expectFinite(r);
 }
 
