@@ -10,6 +10,8 @@ void describeDataset(Config& c, config::Fields& fields) {
               {"folder of the drive: EuRoC, KITTI raw or KITTI tracking; or a recording of images "
                "(.mcap)"});
   fields.text("dataset.sequence", c.dataset.sequence, {"of KITTI tracking: \"0001\""});
+  fields.text("dataset.rig", c.dataset.rig,
+              {"rig file of `perdure calibrate`, instead of the drive's own calibration"});
   fields.choice("dataset.cameras", c.dataset.cameras, {"mono", "stereo"},
                 {"mono: cam0 only; stereo: cam1 too, where the drive has one"});
   fields.number("dataset.lead_s", c.dataset.lead_s, config::atLeast(0),

@@ -58,6 +58,7 @@ void Node::onCalibration(const Calibration& calibration) {
     options.imu.accel_walk = std::max(calibration.imu->accel_bias_walk, 1e-6);
   }
   cameras_ = std::make_unique<Cameras>(config_, options, models);
+  if (outputs_.innovations) cameras_->estimator.keepInnovations();
   motion_initialiser_ = MotionInitialiser(options);
 }
 
@@ -239,6 +240,7 @@ void Node::process(const FramePair& frames) {
   imu_.dropBefore(cameras_->estimator.state().time - std::chrono::seconds(1));
   publish(stamp, *estimate);
   publishLandmarks(stamp, *first);
+  if (outputs_.innovations) outputs_.innovations(estimate->innovations);
 }
 
 bool Node::resume(TimePoint now) {

@@ -26,6 +26,8 @@ namespace perdure::vio {
 struct Outputs {
   Sink<Odometry> odometry;    ///< one for each frame of the first camera, in order
   Sink<Landmarks> landmarks;  ///< after its odometry, once there is a start
+  /// After its odometry: how the image met the predictions. For who judges a calibration.
+  Sink<std::vector<Innovation>> innovations = {};
 };
 
 class Node {

@@ -29,6 +29,9 @@ Finding checkWritable(const std::string& folder);
 /// Of the bus: who is there, what each says of itself, what does not fit together.
 Findings checkBus(const bus::Options& options, double seconds);
 
+/// Of a rig file (empty: the recording's own) by the innovations of vio over a recording.
+Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds);
+
 /// The services' configuration files: of the installation (/etc/perdure) or of config/ here.
 /// Empty where there is none.
 std::string configurationFolder();

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 
+#include "common/base/errors.h"
 #include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/doctor.h"
@@ -16,6 +17,8 @@ struct DoctorOptions {
   std::string configuration = configurationFolder();
   std::string report;
   bool images = false;
+  std::string recording, rig;
+  double rig_seconds = 60.0;
 };
 
 const char* wordOf(Verdict verdict) {
@@ -30,7 +33,22 @@ const char* wordOf(Verdict verdict) {
   return "FAIL";
 }
 
+void tell(const Findings& findings) {
+  std::cout << toText(findings);
+  const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.verdict == Verdict::kFail;
+  });
+  if (failed) throw CLI::RuntimeError(1);
+}
+
 void runDoctor(const DoctorOptions& given) {
+  if (!given.rig.empty() && given.recording.empty()) {
+    throw StartupError(ExitCode::kUsage,
+                       "--rig is judged by a recording; give --data DRIVE (with images) as well");
+  }
+  if (!given.recording.empty()) {
+    return tell(checkRigBy(given.recording, given.rig, given.rig_seconds));
+  }
   DoctorOptions options = given;
   options.bus.shared_memory_mb =
       std::max(options.bus.shared_memory_mb, configuredSharedMemory(options.configuration));
@@ -42,7 +60,6 @@ void runDoctor(const DoctorOptions& given) {
   for (const std::string& folder : options.folders) findings.push_back(checkWritable(folder));
   const Findings bus = checkBus(options.bus, options.seconds);
   findings.insert(findings.end(), bus.begin(), bus.end());
-  std::cout << toText(findings);
   if (!options.report.empty()) {
     writeReport({.bus = options.bus,
                  .file = options.report,
@@ -51,10 +68,7 @@ void runDoctor(const DoctorOptions& given) {
                 findings);
     std::cout << "report: " << options.report << '\n';
   }
-  const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.verdict == Verdict::kFail;
-  });
-  if (failed) throw CLI::RuntimeError(1);
+  tell(findings);
 }
 
 }  // namespace
@@ -85,6 +99,16 @@ void addDoctorCommand(CLI::App& app) {
                    "pack what a maintainer asks for: versions, host, configuration, status, "
                    "five seconds of Health, journal")
       ->type_name("FILE.tar.gz");
+  command
+      ->add_option("--data", options->recording,
+                   "judge a rig by this recording instead (dataset folder or .mcap with images): "
+                   "vio runs over it, and its innovations tell")
+      ->type_name("DRIVE");
+  command->add_option("--rig", options->rig,
+                      "the rig file to judge; the recording's own calibration where not given");
+  command->add_option("--rig-seconds", options->rig_seconds, "of the recording, at most")
+      ->check(CLI::Range(5.0, 3600.0))
+      ->capture_default_str();
   command->add_flag("--images", options->images, "with an image of each camera in the report");
   addBusOptions(*command, options->bus);
   command->callback([options] { runDoctor(*options); });

@@ -14,6 +14,13 @@ DistortionModel modelOf(const CalibrateOptions& options, const CameraCalibration
   return options.lens.value_or(tells ? prior.distortion : DistortionModel::kRadialTangential);
 }
 
+/// A recording that says nothing of its IMU's noise has that of vio's configuration.
+ImuCalibration noiseOf(const CalibrationDrive& drive) {
+  constexpr ImuCalibration kUsual{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
+  const bool tells = drive.imu && drive.imu->gyro_noise > 0.0 && drive.imu->accel_noise > 0.0;
+  return tells ? *drive.imu : kUsual;
+}
+
 /// Throws where `result` has failed.
 template <class T>
 T must(Result<T> result, const std::string& camera) {
@@ -24,7 +31,7 @@ T must(Result<T> result, const std::string& camera) {
   return *std::move(result);
 }
 
-CalibratedCamera calibrateCamera(const CalibrationDrive& drive, const Sightseeing& seen,
+CalibratedCamera calibrateCamera(const CalibrationDrive& drive, const CameraViews& seen,
                                  const CalibrateOptions& options) {
   CalibratedCamera camera;
   camera.seen = seen;
@@ -39,7 +46,7 @@ CalibratedCamera calibrateCamera(const CalibrationDrive& drive, const Sightseein
   CameraImuInput input;
   input.board = options.board, input.views = seen.views, input.samples = drive.samples;
   input.camera = camera.result();
-  input.imu = drive.imu.value_or(ImuCalibration{});
+  input.imu = noiseOf(drive);
   input.sigma_px = camera.lens.sigma_px;
   camera.place = must(estimateCameraImu(input, options.place), seen.prior.name);
   camera.judgements.push_back(judgeCoverage(camera.place->camera, camera.place->residuals));
@@ -69,7 +76,7 @@ Judgements Calibrated::all() const {
 
 Calibrated calibrate(const CalibrationDrive& drive, const CalibrateOptions& options) {
   Calibrated calibrated{options.board, {}, {}};
-  for (const Sightseeing& seen : drive.cameras) {
+  for (const CameraViews& seen : drive.cameras) {
     calibrated.cameras.push_back(calibrateCamera(drive, seen, options));
     calibrated.rig.cameras.push_back(calibrated.cameras.back().result());
   }

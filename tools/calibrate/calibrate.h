@@ -19,7 +19,7 @@ struct CalibrateOptions {
 };
 
 struct CalibratedCamera {
-  Sightseeing seen;
+  CameraViews seen;
   Intrinsics lens;
   std::optional<CameraImu> place;
   Judgements judgements;

@@ -10,7 +10,7 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr double kBiasInterval = 2.0;                          // s
+constexpr double kBiasInterval = 0.5;                          // s
 constexpr double kGyroBiasPrior = 0.5, kAccelBiasPrior = 2.0;  // rad/s, m/s²
 
 double* turnOf(Spline& spline, std::size_t i) { return spline.controls[i].q.coeffs().data(); }

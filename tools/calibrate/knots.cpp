@@ -11,7 +11,7 @@ namespace {
 
 /// Spacings in seconds, and what more noise than with the narrowest one is too much.
 constexpr std::array kIntervals = {0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025};
-constexpr double kMostExcess = 1.03;
+constexpr double kMostExcess = 1.02;
 constexpr double kLeastSamples = 4.0;  ///< in an interval
 
 using Signals = Eigen::Matrix<double, Eigen::Dynamic, 3>;

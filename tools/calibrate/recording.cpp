@@ -43,7 +43,7 @@ class Finder {
       }
     });
     for (Picture& picture : waiting_) {
-      Sightseeing& camera = drive_.cameras[picture.camera];
+      CameraViews& camera = drive_.cameras[picture.camera];
       ++camera.images;
       if (!picture.view.corners.empty()) camera.views.push_back(std::move(picture.view));
     }
@@ -143,8 +143,15 @@ CalibrationDrive readDrive(const Board& board, const ReadOptions& options,
   } else {
     readPictures(files, board, options, drive, progress);
   }
-  for (const Sightseeing& camera : drive.cameras) {
+  for (const CameraViews& camera : drive.cameras) {
     if (!camera.views.empty()) continue;
+    if (camera.images == 0) {
+      throw StartupError(ExitCode::kUnavailable,
+                         fmt::format("{} has no images of {} that can be read; record them too "
+                                     "(perdure record --images){}",
+                                     options.data.string(), camera.prior.name,
+                                     drive.problem.empty() ? "" : " (" + drive.problem + ")"));
+    }
     throw StartupError(
         ExitCode::kUnavailable,
         fmt::format("{}: {} found in none of {} images of {}; compare its numbers with the printed "

@@ -11,7 +11,7 @@
 namespace perdure::calibrate {
 
 /// What one camera saw.
-struct Sightseeing {
+struct CameraViews {
   CameraCalibration
       prior;               ///< as the drive (or the rig file) says; of pictures: name and size only
   std::size_t images = 0;  ///< looked at
@@ -19,7 +19,7 @@ struct Sightseeing {
 };
 
 struct CalibrationDrive {
-  std::vector<Sightseeing> cameras;
+  std::vector<CameraViews> cameras;
   std::vector<ImuSample> samples;
   std::optional<ImuCalibration> imu;
   std::string problem;  ///< the last thing that could not be read

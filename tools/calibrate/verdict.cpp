@@ -104,7 +104,7 @@ Judgement judgeOutliers(std::size_t outliers, std::size_t corners) {
                 "they lie far off: is something in front of the board, or does it shine?");
 }
 
-const std::array kAxes = {"x (forward)", "y (left)", "z (up)"};
+const std::array kAxes = {"x", "y", "z"};  // of the body, which is the IMU
 
 void judgeMotion(const CameraImu& place, Judgements& all) {
   for (int i = 0; i < 3; ++i) {
@@ -112,14 +112,14 @@ void judgeMotion(const CameraImu& place, Judgements& all) {
     const char* axis = kAxes[static_cast<std::size_t>(i)];
     const Grade turned = rate >= 0.25 ? Grade::kGood : rate >= 0.1 ? Grade::kDoubtful : Grade::kBad;
     if (turned != Grade::kGood) {
-      all.push_back({turned, fmt::format("the body turned about its {} axis by {:.2f} rad/s only; "
+      all.push_back({turned, fmt::format("the IMU turned about its {} axis by {:.2f} rad/s only; "
                                          "turn it to and fro about that axis, 20 degrees and about "
                                          "once a second",
                                          axis, rate)});
     }
     if (accel < 0.7) {
       all.push_back({accel < 0.2 ? Grade::kBad : Grade::kDoubtful,
-                     fmt::format("the body was accelerated along its {} axis by {:.2f} m/s² only; "
+                     fmt::format("the IMU was accelerated along its {} axis by {:.2f} m/s² only; "
                                  "shake it to and fro along that axis, by a hand's breadth",
                                  axis, accel)});
     }
@@ -155,7 +155,7 @@ void judgeCertainty(const CameraImu& place, Judgements& all) {
                          axisOf(turn_axis, {"x (right)", "y (down)", "z (forward)"}))));
   all.push_back(judged(
       gradeOf(1e3 * shift, 1.0, 3.0), fmt::format("position known to {:.2f} mm", 1e3 * shift),
-      fmt::format("least so along the body's {} axis: turn faster about the other two, for longer",
+      fmt::format("least so along the IMU's {} axis: turn faster about the other two, for longer",
                   axisOf(shift_axis, kAxes))));
   all.push_back(judged(gradeOf(1e3 * offset, 0.1, 0.3),
                        fmt::format("time offset known to {:.4f} ms", 1e3 * offset),
@@ -231,7 +231,7 @@ Judgement judgeCoverage(const CameraCalibration& camera,
   return coverageOf(cellsOf(camera, residuals));
 }
 
-Judgements judgeLens(const Intrinsics& lens, const Sightseeing& seen) {
+Judgements judgeLens(const Intrinsics& lens, const CameraViews& seen) {
   Judgements all;
   const auto cells = cellsOf(lens.camera, lens.residuals);
   all.push_back(

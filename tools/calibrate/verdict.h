@@ -33,7 +33,7 @@ struct Cell {
 std::vector<Cell> cellsOf(const CameraCalibration& camera,
                           const std::vector<CornerResidual>& residuals);
 
-Judgements judgeLens(const Intrinsics& lens, const Sightseeing& seen);
+Judgements judgeLens(const Intrinsics& lens, const CameraViews& seen);
 /// Which part of the image had the board in it; `residuals` of all views that were used.
 Judgement judgeCoverage(const CameraCalibration& camera,
                         const std::vector<CornerResidual>& residuals);

@@ -16,6 +16,8 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "Dataset folder: EuRoC (simulated too), KITTI raw or tracking; or a recording: a "
                  ".mcap file, or a folder of them")
       ->required();
+  app.add_option("--rig", options.rig,
+                 "Rig file of perdure calibrate, instead of the drive's own calibration");
   app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000");
   app.add_option("--odometry", options.odometry,
                  "vio, truth, a pose file (TUM or KITTI lines), or recorded")

@@ -104,6 +104,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
   replay::DatasetOptions data;
   data.path = options.data;
   data.sequence = options.sequence;
+  data.rig = options.rig;
   if (!options.image_size.empty()) data.image_size = {options.image_size[0], options.image_size[1]};
   if (pose_file_ && pose_file_->format() == replay::PoseFormat::kKitti) {
     data.frame_count = pose_file_->poses().size();

@@ -16,7 +16,7 @@
 namespace perdure::tools {
 
 struct PipelineOptions {
-  std::string data, sequence, out;
+  std::string data, sequence, rig, out;
   std::string odometry;    ///< vio, truth, recorded, or a pose file
   std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;

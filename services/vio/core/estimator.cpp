@@ -215,7 +215,8 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
 Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out) {
   const bool full = asInt(state_->clones.size()) > options_.window.clones;
   dropLostPoints(input.frame);
-  const auto slam = updateSlam(*state_, database_, options_.vision, reasons_);
+  const auto slam = updateSlam(*state_, database_, options_.vision, reasons_,
+                               keeps_innovations_ ? &out.innovations : nullptr);
   if (!slam) return tl::unexpected(slam.error());
   for (const PointState& point : state_->points) database_.erase(point.id);
   if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;

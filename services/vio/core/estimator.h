@@ -14,6 +14,7 @@
 #include "services/vio/core/saved_state.h"
 #include "services/vio/core/state.h"
 #include "services/vio/core/tracks.h"
+#include "services/vio/core/updater_slam.h"
 
 namespace perdure::vio {
 
@@ -43,7 +44,8 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
-  int points_used = 0;  ///< of this image, by all updates
+  int points_used = 0;                  ///< of this image, by all updates
+  std::vector<Innovation> innovations;  ///< where they are kept
 };
 
 struct LandmarkEstimate {
@@ -67,6 +69,8 @@ class Estimator {
   SavedState save() const;
   bool started() const { return state_.has_value(); }
   void stop() { state_.reset(); }
+  /// From now on estimates carry the innovations of the state's points.
+  void keepInnovations() { keeps_innovations_ = true; }
 
   /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state",
   /// "imu_missing", or, where the numbers have gone bad, with "numbers_…": then the estimator has
@@ -101,6 +105,7 @@ class Estimator {
   Options options_;
   std::vector<RigidTransform> T_BC_;
   double time_offset_s_;
+  bool keeps_innovations_ = false;
   std::optional<State> state_;
   FeatureDatabase database_;
   TrackedFrame newest_;

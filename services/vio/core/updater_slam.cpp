@@ -57,10 +57,22 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   return rows;
 }
 
+/// The first two rows are the first camera's: it always sees.
+Innovation innovationOf(const State& state, const PointRows& rows, const ImagePoint& seen,
+                        double sigma_px, bool used) {
+  const Measurement m = rows.measurement();
+  Eigen::MatrixXd S = state.project(m.H, m.blocks);
+  S.diagonal().array() += 1.0;
+  const Eigen::VectorXd r = m.r;
+  return {seen.pixel, sigma_px * r.head<2>(), r.dot(S.llt().solve(r)), static_cast<int>(r.size()),
+          used};
+}
+
 }  // namespace
 
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
-                                const VisionOptions& options, ReasonCounts& reasons) {
+                                const VisionOptions& options, ReasonCounts& reasons,
+                                std::vector<Innovation>* innovations) {
   check(!state.clones.empty(), "the newest pose is cloned");
   UpdateCounts counts;
   std::vector<PointRows> used;
@@ -71,7 +83,12 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
     if (!track || !track->seenAt(state.clones.back().frame)) continue;
     const auto rows = rowsOf(state, point, track->observations.back(), options.sigma_px);
     const auto of_views = [&] { return state.project(rows->H, rows->measurement().blocks); };
-    if (rows && passesGateWith(rows->r, of_views, options.gate_probability)) {
+    const bool passes = rows && passesGateWith(rows->r, of_views, options.gate_probability);
+    if (rows && innovations) {
+      innovations->push_back(innovationOf(state, *rows, *track->observations.back().seen[0],
+                                          options.sigma_px, passes));
+    }
+    if (passes) {
       point.failed_gates = 0;
       used.push_back(*rows);
       ++counts.used;

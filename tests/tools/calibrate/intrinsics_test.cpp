@@ -41,8 +41,6 @@ void expectTruth(const char* board, DistortionModel lens) {
                                                                      << error.transpose() << "\n"
                                                                      << sigma.transpose();
     nees += error.dot(found->covariance.inverse() * error) / 3.0;
-    printf("seed %d err %.3f %.3f %.3f %.3f sigma %.3f %.3f\n", (int)seed, error[0], error[1],
-           error[2], error[3], sigma[0], sigma[2]);
   }
   EXPECT_GT(nees, 2.5);  // of 24 degrees of freedom in three runs: 0.5 % … 99.9 %
   EXPECT_LT(nees, 17.1);

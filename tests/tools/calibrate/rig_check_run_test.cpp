@@ -1,0 +1,71 @@
+// A rig that is right and rigs that are wrong, over one drawn walk.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/math/so3.h"
+#include "common/replay/dataset.h"
+#include "common/replay/rig_file.h"
+#include "tools/calibrate/rig_check.h"
+#include "tools/simulate/simulate.h"
+
+namespace perdure::calibrate {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RigCheckRun : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::path(testing::TempDir()) / "perdure_rig_check";
+    fs::remove_all(folder_);
+    tools::SimulateOptions options;
+    options.scene = "room";
+    options.seed = 3;
+    options.world.seconds = 15.0;
+    options.world.mono8 = true;
+    options.world.width = 480, options.world.height = 360;
+    options.out = folder_ / "drive";
+    tools::simulate(options, {});
+    rig_ = replay::Dataset::open({.path = folder_ / "drive"})->calibration();
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static RigCheck checkOf(const Calibration& rig) {
+    std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
+    return checkRig({folder_ / "drive", folder_ / "rig.yaml", 60.0, {}});
+  }
+
+  inline static fs::path folder_;
+  inline static Calibration rig_;
+};
+
+TEST_F(RigCheckRun, ARightRigIsGood) {
+  for (const Judgement& j : judgeRig(checkOf(rig_))) EXPECT_EQ(j.grade, Grade::kGood) << j.text;
+}
+
+TEST_F(RigCheckRun, ATurnedCameraIsFoundByHowFar) {
+  Calibration rig = rig_;
+  rig.cameras[0].T_BC.q = rig.cameras[0].T_BC.q * expQuaternion({0.035, 0, 0});
+  const RigCheck check = checkOf(rig);
+  EXPECT_NEAR(check.turned.norm(), 0.035, 0.005);
+  EXPECT_EQ(worstOf(judgeRig(check)), Grade::kBad);
+}
+
+TEST_F(RigCheckRun, ATimeOffsetIsFound) {
+  Calibration rig = rig_;
+  rig.cameras[0].time_offset_s = 0.012;
+  const RigCheck check = checkOf(rig);
+  EXPECT_NEAR(check.later_s, -0.012, 0.001);
+  EXPECT_EQ(worstOf(judgeRig(check)), Grade::kBad);
+}
+
+TEST_F(RigCheckRun, AWrongLensIsNotGood) {
+  Calibration rig = rig_;
+  rig.cameras[0].distortion_coefficients.assign(4, 0.0);
+  EXPECT_NE(worstOf(judgeRig(checkOf(rig))), Grade::kGood);
+}
+
+}  // namespace
+}  // namespace perdure::calibrate

@@ -1,0 +1,95 @@
+#include "tools/calibrate/rig_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "common/sim/dice.h"
+
+namespace perdure::calibrate {
+namespace {
+
+using testing::HasSubstr;
+
+/// What vio says of a rig that is right: innovations by the χ² distribution, no pattern.
+RigCheck goodCheck(double pattern = 0.0) {
+  RigCheck check;
+  check.camera.width = 640, check.camera.height = 480;
+  check.frames = 500, check.tracked = 490, check.believed = true;
+  check.sigma << 5e-4, 5e-4, 5e-4, 2e-3, 2e-3, 2e-3, 1e-4;
+  sim::Dice dice(9);
+  for (int i = 0; i < 8000; ++i) {
+    const Eigen::Vector2d noise(dice.normal(), dice.normal());
+    vio::Innovation one;
+    one.pixel = {dice.uniform(0, 640), dice.uniform(0, 480)};
+    one.residual = 0.4 * noise + pattern * (one.pixel - Eigen::Vector2d(320, 240)) / 300.0;
+    one.nis = noise.squaredNorm();
+    one.rows = 2;
+    one.used = one.nis < 5.99;
+    check.innovations.push_back(one);
+  }
+  return check;
+}
+
+Judgement worst(const RigCheck& check) {
+  const auto all = judgeRig(check);
+  return *std::max_element(all.begin(), all.end(),
+                           [](const auto& a, const auto& b) { return a.grade < b.grade; });
+}
+
+TEST(RigCheck, InnovationsAsBelievedHaveARatioOfOne) {
+  EXPECT_NEAR(innovationRatio(goodCheck().innovations), 1.0, 0.05);
+  RigCheck check = goodCheck();
+  for (auto& i : check.innovations) i.nis *= 5.0;
+  EXPECT_NEAR(innovationRatio(check.innovations), 5.0, 0.25);
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("calibrate again"));
+}
+
+TEST(RigCheck, AGoodRigIsGood) {
+  EXPECT_EQ(worst(goodCheck()).grade, Grade::kGood) << worst(goodCheck()).text;
+}
+
+TEST(RigCheck, APatternBelowTheNoiseNamesTheLens) {
+  EXPECT_THAT(worst(goodCheck(0.15)).text, HasSubstr("focal length or distortion"));
+}
+
+TEST(RigCheck, ACameraThatMovedIsToldOnlyWhereVioIsSure) {
+  RigCheck check = goodCheck();
+  check.turned = {0.0, 0.03, 0.0};
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("1.72°"));
+  check.sigma.head<3>().setConstant(0.02);
+  EXPECT_EQ(worst(check).grade, Grade::kGood) << worst(check).text;
+}
+
+TEST(RigCheck, ATimeOffsetComesWithTheValueToSet) {
+  RigCheck check = goodCheck();
+  check.camera.time_offset_s = 0.004;
+  check.later_s = 0.012;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("set time_offset_s to 0.0160"));
+}
+
+TEST(RigCheck, ABiasThatWandersIsNotGravity) {
+  RigCheck check = goodCheck();
+  check.accel_bias_change = 0.8;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("gravity"));
+}
+
+TEST(RigCheck, TooLittleToJudgeBySaysWhatToRecord) {
+  RigCheck check = goodCheck();
+  check.innovations.resize(100);
+  EXPECT_EQ(worst(check).grade, Grade::kDoubtful);
+  EXPECT_THAT(worst(check).text, HasSubstr("record a minute of motion"));
+  check.believed = false;
+  check.tracked = 0;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  check.resets = 3;
+  EXPECT_THAT(judgeRig(check)[1].text, HasSubstr("lost its way 3 times"));
+}
+
+}  // namespace
+}  // namespace perdure::calibrate

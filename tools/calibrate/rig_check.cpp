@@ -1,0 +1,242 @@
+#include "tools/calibrate/rig_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/errors.h"
+#include "common/math/chi2.h"
+#include "common/math/so3.h"
+#include "common/replay/dataset.h"
+#include "services/vio/core/saved_state.h"
+#include "services/vio/node.h"
+
+namespace perdure::calibrate {
+namespace {
+
+constexpr double kDegrees = 180.0 / M_PI;
+
+/// Vio over the drive, in one thread.
+class Watch {
+ public:
+  Watch(const RigCheckOptions& options, const replay::Dataset& dataset) {
+    vio::Outputs outputs;
+    outputs.odometry = [this](const Odometry& odometry) { take(odometry); };
+    outputs.innovations = [this](const std::vector<vio::Innovation>& all) {
+      check.innovations.insert(check.innovations.end(), all.begin(), all.end());
+    };
+    node_ = std::make_unique<vio::Node>(options.vio, 1, std::move(outputs));
+    node_->setWorld({1, 0});
+    node_->onCalibration(dataset.calibration());
+    check.camera = dataset.calibration().cameras[0];
+  }
+
+  void run(replay::Dataset& dataset, double seconds) {
+    std::optional<TimePoint> first;
+    while (const auto message = dataset.next()) {
+      if (const auto* imu = std::get_if<ImuSample>(&*message)) node_->onImu(*imu), ++samples_;
+      if (const auto* speed = std::get_if<SpeedSample>(&*message)) node_->onSpeed(*speed);
+      const auto* frame = std::get_if<Frame>(&*message);
+      if (!frame || !frame->data) continue;
+      if (!first) first = frame->stamp.time;
+      if (toSeconds(frame->stamp.time - *first) > seconds) break;
+      node_->onFrame(*frame);
+      remember();
+    }
+    node_->flush();
+    remember();
+    check.resets = node_->reasons().of("reset");
+    believe();
+  }
+  std::size_t samples() const { return samples_; }
+
+  RigCheck check;
+
+ private:
+  void take(const Odometry& odometry) {
+    ++check.frames;
+    if (odometry.state == OdometryState::kInitialising) return;
+    ++check.tracked;
+    gyro_.push_back(odometry.gyro_bias);
+    accel_.push_back(odometry.accel_bias);
+  }
+  /// A filter that resets forgets: the last belief before counts.
+  void remember() {
+    if (node_->started()) saved_ = node_->saveState();
+  }
+  void believe() {
+    const auto saved = vio::fromText(saved_);
+    if (!saved || gyro_.empty()) return;
+    check.believed = true;
+    const RigidTransform& T_BC = saved->T_BC[0];
+    check.turned = logSo3(Eigen::Quaterniond(check.camera.T_BC.q.conjugate() * T_BC.q));
+    check.shifted = T_BC.p - check.camera.T_BC.p;
+    check.later_s = saved->time_offset_s - check.camera.time_offset_s;
+    const auto variances = saved->covariance.diagonal().eval();
+    check.sigma << variances.segment<6>(vio::kNavSize).cwiseSqrt(),
+        std::sqrt(variances[variances.size() - 1]);
+    check.gyro_bias = gyro_.back(), check.accel_bias = accel_.back();
+    check.gyro_bias_change = (gyro_.back() - gyro_[gyro_.size() / 2]).norm();
+    check.accel_bias_change = (accel_.back() - accel_[accel_.size() / 2]).norm();
+  }
+
+  std::unique_ptr<vio::Node> node_;
+  std::string saved_;
+  std::vector<Eigen::Vector3d> gyro_, accel_;
+  std::size_t samples_ = 0;
+};
+
+Grade gradeOf(double value, double good, double bad) {
+  return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
+}
+
+Judgement judged(Grade grade, std::string text, const std::string& mend) {
+  if (grade != Grade::kGood) text += "; " + mend;
+  return {grade, std::move(text)};
+}
+
+/// Innovations that passed, as residuals of corners over the image.
+std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& innovations) {
+  std::vector<CornerResidual> all;
+  for (const auto& i : innovations) {
+    if (i.used) all.push_back({0, 0.0, i.pixel, i.residual});
+  }
+  return all;
+}
+
+/// What stays of the residuals over the image, px.
+double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
+  constexpr std::size_t kEnough = 40;
+  double square = 0.0, sum = 0.0, expected = 0.0;
+  for (const auto& r : residuals) square += r.residual.squaredNorm();
+  const double variance = square / static_cast<double>(std::max<std::size_t>(1, residuals.size()));
+  std::size_t cells = 0;
+  for (const Cell& cell : cellsOf(camera, residuals)) {
+    if (cell.corners < kEnough) continue;
+    sum += cell.mean.squaredNorm();
+    expected += variance / static_cast<double>(cell.corners);
+    ++cells;
+  }
+  return std::sqrt(std::max(0.0, sum - expected) /
+                   static_cast<double>(std::max<std::size_t>(1, cells)));
+}
+
+/// How far vio moved a quantity, in deviations that a well calibrated rig has.
+Judgement judgeMove(const char* what, double moved, double sigma, double good, double bad,
+                    const std::string& shown, const std::string& mend) {
+  // A move that vio itself is not sure of says nothing.
+  const bool sure = moved > 3.0 * sigma;
+  return judged(sure ? gradeOf(moved, good, bad) : Grade::kGood,
+                fmt::format("vio sees the {} {} off the rig", what, shown), mend);
+}
+
+void judgePlaceOf(const RigCheck& check, bool lens_fits, Judgements& all) {
+  const char* again =
+      lens_fits ? "calibrate again (perdure calibrate), or see whether the camera has moved"
+                : "the lens, which does not fit either, may be why: calibrate both (perdure "
+                  "calibrate)";
+  const double turned = check.turned.norm(), shifted = check.shifted.norm();
+  all.push_back(judgeMove(
+      "camera's rotation", turned, check.sigma.head<3>().norm(), 0.4 / kDegrees, 1.0 / kDegrees,
+      fmt::format("{:.2f}° (± {:.2f})", kDegrees * turned, kDegrees * check.sigma.head<3>().norm()),
+      again));
+  all.push_back(judgeMove(
+      "camera's position", shifted, check.sigma.segment<3>(3).norm(), 0.015, 0.04,
+      fmt::format("{:.1f} mm (± {:.1f})", 1e3 * shifted, 1e3 * check.sigma.segment<3>(3).norm()),
+      again));
+  all.push_back(
+      judgeMove("time offset", std::abs(check.later_s), check.sigma[6], 2e-3, 8e-3,
+                fmt::format("{:.2f} ms (± {:.2f})", 1e3 * check.later_s, 1e3 * check.sigma[6]),
+                fmt::format("set time_offset_s to {:.4f}, or calibrate again",
+                            check.camera.time_offset_s + check.later_s)));
+}
+
+}  // namespace
+
+double innovationRatio(const std::vector<vio::Innovation>& innovations) {
+  std::vector<double> values;
+  for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+RigCheck checkRig(const RigCheckOptions& options) {
+  replay::DatasetOptions wanted;
+  wanted.path = options.data, wanted.rig = options.rig;
+  wanted.encoding = wanted.second_encoding = ImageEncoding::kMono8;
+  const auto dataset = replay::Dataset::open(wanted);
+  if (!dataset->calibration().imu) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options.data.string() +
+                           " has no inertial samples, by which alone a rig can "
+                           "be judged; record imu along with the images");
+  }
+  Watch watch(options, *dataset);
+  watch.run(*dataset, options.seconds);
+  if (watch.check.frames == 0 || watch.samples() == 0) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options.data.string() +
+                           " has no images (or no inertial samples) that can be "
+                           "read; record with --images");
+  }
+  return std::move(watch.check);
+}
+
+Judgements judgeRig(const RigCheck& check) {
+  Judgements all;
+  const double share = static_cast<double>(check.tracked) / static_cast<double>(check.frames);
+  all.push_back(judged(share > 0.7   ? Grade::kGood
+                       : share > 0.2 ? Grade::kDoubtful
+                                     : Grade::kBad,
+                       fmt::format("vio tracked {} of {} images", check.tracked, check.frames),
+                       "move with the camera on things that stand, or calibrate anew"));
+  if (check.resets > 0) {
+    all.push_back({Grade::kBad, fmt::format("vio lost its way {} times; calibrate anew, or record "
+                                            "with the camera on things that stand",
+                                            check.resets)});
+  }
+  if (!check.believed || check.innovations.size() < 500) {
+    all.push_back({Grade::kDoubtful,
+                   fmt::format("there are {} innovations only, too few to judge the rig by; record "
+                               "a minute of motion in a place with texture",
+                               check.innovations.size())});
+    return all;
+  }
+  const double ratio = innovationRatio(check.innovations);
+  all.push_back(judged(gradeOf(ratio, 1.6, 3.0),
+                       fmt::format("images meet vio's predictions: median of the innovations "
+                                   "{:.2f} of the expected",
+                                   ratio),
+                       "the rig contradicts the recording: calibrate again"));
+  const auto gated = std::count_if(check.innovations.begin(), check.innovations.end(),
+                                   [](const auto& i) { return !i.used; });
+  const double left_out =
+      static_cast<double>(gated) / static_cast<double>(check.innovations.size());
+  all.push_back(judged(gradeOf(left_out, 0.15, 0.35),
+                       fmt::format("{:.1f} % of the points were refused by vio", 100 * left_out),
+                       "much moves before the camera, images are blurred, or the rig is wrong"));
+  const double pattern = patternOf(check.camera, residualsOf(check.innovations));
+  const Grade lens = gradeOf(pattern, 0.06, 0.2);
+  all.push_back(judged(lens, fmt::format("residuals that stay over the image: {:.3f} px", pattern),
+                       "focal length or distortion are wrong: calibrate the lens again"));
+  judgePlaceOf(check, lens == Grade::kGood, all);
+  all.push_back(judged(gradeOf(check.gyro_bias.norm(), 0.1, 0.3),
+                       fmt::format("gyroscope bias {:.4f} rad/s, changed by {:.4f} in the second "
+                                   "half",
+                                   check.gyro_bias.norm(), check.gyro_bias_change),
+                       "that is much: does the IMU speak radians, and is it warm?"));
+  all.push_back(
+      judged(std::max(gradeOf(check.accel_bias.norm(), 0.5, 1.5),
+                      gradeOf(check.accel_bias_change, 0.2, 0.6)),
+             fmt::format("accelerometer bias {:.3f} m/s², changed by {:.3f} in the second "
+                         "half",
+                         check.accel_bias.norm(), check.accel_bias_change),
+             "gravity is not explained: the camera's rotation on the IMU, `gravity` in "
+             "vio.yaml or the IMU's scale is wrong"));
+  return all;
+}
+
+}  // namespace perdure::calibrate

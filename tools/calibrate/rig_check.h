@@ -1,0 +1,41 @@
+// Judges a rig file by a recording of any place: vio runs with it, and how images meet its
+// predictions says what the rig is worth.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "services/vio/config.h"
+#include "services/vio/core/updater_slam.h"
+#include "tools/calibrate/verdict.h"
+
+namespace perdure::calibrate {
+
+struct RigCheckOptions {
+  std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
+  double seconds = 60.0;            ///< of the drive, at most
+  vio::Config vio;
+};
+
+/// What vio came to believe of the first camera's place, against the rig; and how it fared.
+struct RigCheck {
+  CameraCalibration camera;
+  std::size_t frames = 0, tracked = 0, resets = 0;
+  std::vector<vio::Innovation> innovations;
+  bool believed = false;  ///< vio had a start and the following four say something
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();   ///< rad, right of R_BC
+  Eigen::Vector3d shifted = Eigen::Vector3d::Zero();  ///< m, in B
+  double later_s = 0.0;                               ///< time offset less the rig's
+  Eigen::Matrix<double, 7, 1> sigma = Eigen::Matrix<double, 7, 1>::Zero();  ///< of these
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;
+  double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< over the second half of the drive
+};
+
+/// Throws StartupError where the recording or the rig cannot be read, or has no images or samples.
+RigCheck checkRig(const RigCheckOptions& options);
+
+/// Median of the normalised innovations squared over what it is to be (1 where all is as believed).
+double innovationRatio(const std::vector<vio::Innovation>& innovations);
+Judgements judgeRig(const RigCheck& check);
+
+}  // namespace perdure::calibrate
