@@ -42,7 +42,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   std::vector<cv::Point2f> found;
   const cv::Size size(board.columns, board.rows);
   if (!cv::findChessboardCornersSB(grey, size, found,
-                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY)) {
+                                   cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return {};
   }
   // Refined by the edges beside each corner: what the detector gives is biased by some hundredths.

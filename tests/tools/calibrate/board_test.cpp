@@ -71,7 +71,7 @@ void expectExactCorners(const Board& board, DistortionModel model, double rms_px
   tools::Picture picture;
   std::size_t images = 0, corners = 0, expected = 0;
   double sum = 0.0;
-  for (std::size_t i = 3; i < truth.size(); i += truth.size() / 12) {
+  for (std::size_t i = 3; i < truth.size(); i += truth.size() / 8) {
     const double t_s =
         toSeconds(truth[i].time - tools::kSceneEpoch) + simulated.truth().time_offset_s;
     drawBoard(simulated, lens, t_s, workers, picture);
@@ -90,7 +90,7 @@ void expectExactCorners(const Board& board, DistortionModel model, double rms_px
       }
     }
   }
-  EXPECT_GE(images, 12u);
+  EXPECT_GE(images, 8u);
   EXPECT_GT(corners, expected * 6 / 10);
   EXPECT_LT(std::sqrt(sum / static_cast<double>(corners)), rms_px);
 }

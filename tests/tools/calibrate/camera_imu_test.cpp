@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/math/so3.h"
 #include "tools/calibrate/simulated.h"
+#include "tools/calibrate/verdict.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -18,7 +21,7 @@ Case caseOf(const char* board, std::uint64_t seed, double readout_s = 0.0) {
   SimulatedOptions options;
   options.board = Board::parse(board);
   options.seed = seed;
-  options.seconds = 16.0;
+  options.seconds = readout_s > 0.0 ? 10.0 : 16.0;
   options.readout_s = readout_s;
   Case c{simulateCalibration(options), {}};
   CameraCalibration camera = c.simulated.truth();
@@ -91,7 +94,7 @@ TEST(CameraImu, CornersThatAreElsewhereAreLeftOut) {
               static_cast<double>(count) / 600.0);
 }
 
-TEST(CameraImu, AMinuteWithoutTheBoardLeavesTheLongerStretch) {
+TEST(CameraImu, AGapWithoutTheBoardLeavesTheLongerStretch) {
   Case c = caseOf(kSmallGrid, 12);
   const TimePoint begin = c.input.views.front().time;
   std::erase_if(c.input.views, [&](const View& view) {
@@ -133,6 +136,26 @@ TEST(CameraImu, SaysWhatIsMissingAndTheMend) {
     sample.gyro = sample.gyro.cwiseMin(1.1).cwiseMax(-1.1);
   }
   expectRefusal(c.input, "calibrate_imu_saturated", "wider range");
+}
+
+TEST(CameraImu, SlowMotionIsToldByItsStatedErrorsAndByTheVerdict) {
+  SimulatedOptions options;
+  options.board = Board::parse(kSmallGrid);
+  options.seed = 16;
+  options.seconds = 16.0;
+  options.shake = false;
+  const auto simulated = simulateCalibration(options);
+  const CameraImuInput input{
+      options.board,     simulateViews(simulated, 0.1),        simulateSamples(simulated),
+      simulated.truth(), *simulated.scene.rig.calibration.imu, 0.1};
+  const auto found = estimateCameraImu(input, {});
+  ASSERT_TRUE(found) << found.error().detail;
+  EXPECT_GT(found->covariance.diagonal().segment<3>(kPositionAt).maxCoeff(), 1e-6);
+  const auto all = judgePlace(*found, simulated.truth());
+  EXPECT_EQ(worstOf(all), Grade::kBad);
+  EXPECT_TRUE(std::any_of(all.begin(), all.end(), [](const Judgement& j) {
+    return j.text.find("shake it to and fro") != std::string::npos;
+  }));
 }
 
 TEST(CameraImu, AnImuThatIsNotOnTheCameraIsNotBelieved) {
