@@ -73,12 +73,12 @@ void runOne(const SimulatedOptions& options, const Settings& settings, Worst& wo
   fmt::print(
       "  seed {:<2} {:4} views {:.3f} px | fx {:+.4f} ({:.4f}) fy {:+.4f} ({:.4f}) cx {:+.4f} "
       "({:.4f}) cy {:+.4f} ({:.4f}) % | {:.4f} ({:.4f})° {:.3f} ({:.3f}) mm {:+.4f} ({:.4f}) ms | "
-      "NEES {:.1f} | {:.1f} s\n",
+      "widened {:.2f} NEES {:.1f} | {:.1f} s\n",
       options.seed, found->views, found->sigma_px, focal * error[7], focal * sigma[7],
       focal * error[8], focal * sigma[8], focal * error[9], focal * sigma[9], focal * error[10],
       focal * sigma[10], kDegrees * error.head<3>().norm(), kDegrees * sigma.head<3>().norm(),
       1e3 * error.segment<3>(3).norm(), 1e3 * sigma.segment<3>(3).norm(), 1e3 * error[6],
-      1e3 * sigma[6], nees, took);
+      1e3 * sigma[6], found->widened, nees, took);
   std::fflush(stdout);
   const auto raise = [](double& most, double value) { most = std::max(most, std::abs(value)); };
   raise(worst.focal_percent, focal * error.segment<2>(7).cwiseAbs().maxCoeff());

@@ -60,19 +60,33 @@ class GyroMean {
   std::vector<Eigen::Vector3d> sums_;
 };
 
+/// Rates of the body and of the camera.
+using Pairs = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
+
+/// Without the tenth whose speeds of turning differ most: whatever the rotation between body and
+/// camera, these are alike.
+void dropUnlike(Pairs& pairs) {
+  const auto unlike = [](const auto& pair) {
+    return std::abs(pair.first.norm() - pair.second.norm());
+  };
+  std::sort(pairs.begin(), pairs.end(),
+            [&](const auto& a, const auto& b) { return unlike(a) < unlike(b); });
+  pairs.resize(pairs.size() - pairs.size() / 10);
+}
+
 /// The rotation that takes the camera's rates into the body's, less a constant bias (Kabsch;
 /// Wahba's problem).
 std::optional<Alignment> alignAt(const std::vector<Turn>& turns, const GyroMean& gyro,
                                  double offset) {
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> pairs;
-  Eigen::Vector3d mean_B = Eigen::Vector3d::Zero(), mean_C = mean_B;
+  Pairs pairs;
   for (const Turn& turn : turns) {
     const auto rate_B = gyro.over(turn.from_s + offset, turn.to_s + offset);
-    if (!rate_B) continue;
-    pairs.emplace_back(*rate_B, turn.rate_C);
-    mean_B += *rate_B, mean_C += turn.rate_C;
+    if (rate_B) pairs.emplace_back(*rate_B, turn.rate_C);
   }
   if (pairs.size() < turns.size() / 2 || pairs.size() < 20) return std::nullopt;
+  dropUnlike(pairs);
+  Eigen::Vector3d mean_B = Eigen::Vector3d::Zero(), mean_C = mean_B;
+  for (const auto& [b, c] : pairs) mean_B += b, mean_C += c;
   const auto count = static_cast<double>(pairs.size());
   mean_B /= count, mean_C /= count;
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
@@ -130,6 +144,35 @@ Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                             widest_s));
   }
   return *best;
+}
+
+std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
+                           const std::vector<ImuReading>& readings, const Alignment& alignment) {
+  constexpr std::ptrdiff_t kNeighbours = 4;  // to each side
+  constexpr double kMost = 0.3;              // rad
+  const GyroMean gyro(readings);
+  std::vector<bool> good;
+  const auto count = static_cast<std::ptrdiff_t>(poses.size());
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    int for_it = 0, against = 0;
+    const CameraPose& here = poses[static_cast<std::size_t>(i)];
+    for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(0, i - kNeighbours);
+         k <= std::min(count - 1, i + kNeighbours); ++k) {
+      const CameraPose& there = poses[static_cast<std::size_t>(k)];
+      const double dt = there.time_s - here.time_s, offset = alignment.time_offset_s;
+      if (k == i || std::abs(dt) > kLongestPair) continue;
+      const auto rate_B = gyro.over(std::min(here.time_s, there.time_s) + offset,
+                                    std::max(here.time_s, there.time_s) + offset);
+      if (!rate_B) continue;
+      const Eigen::Vector3d turned_C =
+          dt * (alignment.q_BC.conjugate() * (*rate_B - alignment.gyro_bias));
+      const Eigen::Quaterniond seen = here.T_TC.q.conjugate() * there.T_TC.q;
+      const double error = logSo3(expQuaternion(turned_C).conjugate() * seen).norm();
+      ++(error < kMost ? for_it : against);
+    }
+    good.push_back(for_it >= against);
+  }
+  return good;
 }
 
 }  // namespace perdure::calibrate

@@ -37,4 +37,9 @@ struct Alignment {
 Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                              const std::vector<ImuReading>& readings, double widest_s);
 
+/// Whether each pose turned against most of its neighbours in time as the gyroscope did: a board
+/// that was found upside down, or a view that has two explanations, did not.
+std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
+                           const std::vector<ImuReading>& readings, const Alignment& alignment);
+
 }  // namespace perdure::calibrate

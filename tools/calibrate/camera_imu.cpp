@@ -144,7 +144,7 @@ class CameraImuRun {
   Result<void> start() {
     const auto aligned = alignRates(poses_, near_, options_.widest_offset_s);
     if (!aligned) return tl::unexpected(aligned.error());
-    alignment_ = *aligned;
+    dropDisagreeing(*aligned);
     auto& x = problem_.x;
     x.q_BC = aligned->q_BC, x.p_BC = input_.camera.T_BC.p;
     x.time_offset_s = aligned->time_offset_s;
@@ -165,6 +165,19 @@ class CameraImuRun {
     }
     x.down_T = -force.normalized();
     return {};
+  }
+
+  /// Views whose pose is not where the gyroscope turned it: all of their corners would be wrong.
+  void dropDisagreeing(const Alignment& alignment) {
+    const auto good = agreeing(poses_, near_, alignment);
+    std::vector<CameraPose> poses;
+    std::vector<Sighting> sightings;
+    for (std::size_t i = 0; i < good.size(); ++i) {
+      if (!good[i]) continue;
+      poses.push_back(poses_[i]);
+      sightings.push_back(std::move(problem_.sightings[i]));
+    }
+    poses_ = std::move(poses), problem_.sightings = std::move(sightings);
   }
 
   /// A spline over the views whose controls are the camera's poses.
@@ -259,6 +272,7 @@ class CameraImuRun {
     out.camera.time_offset_s = x.time_offset_s;
     setLens(x.lens, out.camera);
     out.covariance = certainty->calibration;
+    out.widened = certainty->widened;
     out.gyro_bias = problem_.biasMean(x.gyro_bias),
     out.accel_bias = problem_.biasMean(x.accel_bias);
     out.gyro_bias_sigma = certainty->gyro_bias, out.accel_bias_sigma = certainty->accel_bias;
@@ -307,7 +321,6 @@ class CameraImuRun {
   CameraImuOptions options_;
   CameraImuProblem problem_;
   Deviations declared_;
-  Alignment alignment_;
   std::vector<CameraPose> poses_;
   std::vector<ImuReading> near_;
 };

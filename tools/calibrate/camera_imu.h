@@ -49,6 +49,9 @@ struct ImuResidual {
 struct CameraImu {
   CameraCalibration camera;  ///< with T_BC and time offset
   Matrix15d covariance = Matrix15d::Zero();
+  /// Residuals that are near in time go together (a corner errs with its neighbours): by so much
+  /// the covariance is wider than that of independent ones.
+  double widened = 1.0;
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< means
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;
   Eigen::Vector3d gravity_T = gyro_bias;  ///< m/s², in the board's frame

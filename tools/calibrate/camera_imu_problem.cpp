@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 
@@ -10,7 +11,8 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr double kBiasInterval = 0.5;                          // s
+constexpr double kCluster = 0.25;      // s in which residuals may go together
+constexpr double kBiasInterval = 0.5;  // s
 constexpr double kGyroBiasPrior = 0.5, kAccelBiasPrior = 2.0;  // rad/s, m/s²
 
 double* turnOf(Spline& spline, std::size_t i) { return spline.controls[i].q.coeffs().data(); }
@@ -22,6 +24,23 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
   for (std::size_t i = 0; i < kOrder; ++i) blocks.push_back(turnOf(spline, k + i));
   for (std::size_t i = 0; with_places && i < kOrder; ++i) blocks.push_back(placeOf(spline, k + i));
   return blocks;
+}
+
+/// How much wider an estimate's covariance is for residuals that go together within a cluster:
+/// the sandwich of the clusters' influences over that of single rows (Liang and Zeger, 1986).
+/// `influence`: of each row's unit residual on the estimate.
+double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
+                  const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
+  const int last = *std::max_element(clusters.begin(), clusters.end());
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(last + 1, influence.cols());
+  Eigen::MatrixXd single = Eigen::MatrixXd::Zero(influence.cols(), influence.cols());
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const Eigen::RowVectorXd part = residuals[i] * influence.row(static_cast<Eigen::Index>(i));
+    sums.row(clusters[i]) += part;
+    single += part.transpose() * part;
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> solver(covariance);
+  return solver.solve(sums.transpose() * sums).trace() / solver.solve(single).trace();
 }
 
 /// Row-major Jacobian of Ceres as Eigen's.
@@ -174,7 +193,7 @@ void CameraImuProblem::gateCorners(double limit_px) {
 
 std::vector<ImuResidual> CameraImuProblem::imuResiduals() const {
   std::vector<ImuResidual> all;
-  Spline& spline = const_cast<Spline&>(x.spline);
+  Spline spline = x.spline;  // Ceres' way with pointers is not const
   for (const ImuReading& reading : readings) {
     const std::size_t k = x.spline.segmentAt(reading.time_s);
     const double u = x.spline.withinOf(k, reading.time_s), dt = x.spline.interval_s;
@@ -196,6 +215,21 @@ Eigen::Vector3d CameraImuProblem::biasMean(const std::vector<Eigen::Vector3d>& b
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const auto& b : bias) sum += b;
   return sum / static_cast<double>(bias.size());
+}
+
+/// The stretch of kCluster to which each row of the Jacobian belongs, in the order of build().
+std::vector<int> CameraImuProblem::clusterOfRows() const {
+  std::vector<int> clusters;
+  const auto add = [&](double t, std::size_t rows) {
+    const int cluster = static_cast<int>(std::max(0.0, t - x.spline.start_s) / kCluster);
+    clusters.insert(clusters.end(), rows, cluster);
+  };
+  for (const Sighting& sighting : sightings) {
+    const auto good = std::count(sighting.good.begin(), sighting.good.end(), true);
+    add(sighting.time_s + x.time_offset_s, 2 * static_cast<std::size_t>(good));
+  }
+  for (const ImuReading& reading : readings) add(reading.time_s, 6);
+  return clusters;
 }
 
 // By the normal equations rather than ceres::Covariance: a QR of the whole Jacobian takes minutes.
@@ -223,7 +257,8 @@ Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
   }
   options.parameter_blocks.insert(options.parameter_blocks.end(), wanted.begin(), wanted.end());
   ceres::CRSMatrix crs;
-  problem.Evaluate(options, nullptr, nullptr, nullptr, &crs);
+  std::vector<double> residuals;
+  problem.Evaluate(options, nullptr, &residuals, nullptr, &crs);
   const Eigen::SparseMatrix<double> J = toEigen(crs);
   const Eigen::SparseMatrix<double> information = J.transpose() * J;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(information);
@@ -242,10 +277,13 @@ Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
     return fail("calibrate_not_observable", blind);
   }
   Certainty out;
-  out.calibration.topLeftCorner(calibrated, calibrated) =
-      covariance.topLeftCorner(calibrated, calibrated);
-  out.gyro_bias = covariance.diagonal().segment<3>(calibrated).cwiseSqrt();
-  out.accel_bias = covariance.diagonal().tail<3>().cwiseSqrt();
+  const Eigen::MatrixXd own = covariance.topLeftCorner(calibrated, calibrated);
+  out.widened =
+      std::max(1.0, wideningOf(J * columns.leftCols(calibrated), residuals, clusterOfRows(), own));
+  out.calibration.topLeftCorner(calibrated, calibrated) = out.widened * own;
+  const Eigen::VectorXd deviations = (out.widened * covariance.diagonal()).cwiseSqrt();
+  out.gyro_bias = deviations.segment<3>(calibrated);
+  out.accel_bias = deviations.tail<3>();
   return out;
 }
 

@@ -54,6 +54,7 @@ class CameraImuProblem {
 
   struct Certainty {
     Matrix15d calibration = Matrix15d::Zero();
+    double widened = 1.0;                   ///< see CameraImu::widened
     Eigen::Vector3d gyro_bias, accel_bias;  ///< deviations in the middle of the time
   };
   /// Fails with calibrate_not_observable.
@@ -67,6 +68,7 @@ class CameraImuProblem {
   std::size_t biasAt(double t, double& share) const;
   bool hasDistortion() const { return model_ != DistortionModel::kNone; }
   double delayOf(const Corner& corner) const;
+  std::vector<int> clusterOfRows() const;
   Eigen::Vector2d residualOf(const Sighting& sighting, std::size_t i) const;
 
   const Board& board_;

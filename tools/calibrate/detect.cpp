@@ -38,11 +38,42 @@ bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv:
   return difference > 0.0;
 }
 
+/// How black and white lie around a corner, alike across and unlike beside: 1 where the steps' own
+/// quarter and the one across are black, -1 where they are white, 0 where it is no crossing.
+int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f& a,
+               const cv::Point2f& b) {
+  const double one = brightness(grey, corner + a + b), across = brightness(grey, corner - a - b);
+  const double beside = brightness(grey, corner + a - b), other = brightness(grey, corner - a + b);
+  const double low = std::min({one, across, beside, other});
+  const double range = std::max({one, across, beside, other}) - low;
+  const double darker = std::min(beside, other) - std::max(one, across);
+  const double lighter = std::min(one, across) - std::max(beside, other);
+  if (range < 20.0 || std::max(darker, lighter) < 0.3 * range) return 0;
+  return darker > lighter ? 1 : -1;
+}
+
+/// Whether every corner is a crossing of squares: a board that is found a square beside its place
+/// has a row of corners that are none.
+bool areCrossings(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
+  constexpr float kStep = 0.3F;  // of a square
+  const auto at = [&](int column, int row) {
+    return found[static_cast<std::size_t>(row * board.columns + column)];
+  };
+  for (int row = 0; row < board.rows; ++row) {
+    for (int column = 0; column < board.columns; ++column) {
+      const int right = std::min(column, board.columns - 2), below = std::min(row, board.rows - 2);
+      const cv::Point2f a = kStep * (at(right + 1, row) - at(right, row));
+      const cv::Point2f b = kStep * (at(column, below + 1) - at(column, below));
+      if (crossingAt(grey, at(column, row), a, b) == 0) return false;
+    }
+  }
+  return true;
+}
+
 std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   std::vector<cv::Point2f> found;
   const cv::Size size(board.columns, board.rows);
-  if (!cv::findChessboardCornersSB(grey, size, found,
-                                   cv::CALIB_CB_NORMALIZE_IMAGE)) {
+  if (!cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return {};
   }
   // Refined by the edges beside each corner: what the detector gives is biased by some hundredths.
@@ -52,6 +83,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   }
   const int half = std::clamp(static_cast<int>(0.3 * side), 2, 6);
   cv::cornerSubPix(grey, found, {half, half}, {-1, -1}, kRefinement);
+  if (!areCrossings(board, grey, found)) return {};
   if (isUpsideDown(board, grey, found)) std::reverse(found.begin(), found.end());
   std::vector<Corner> corners;
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -60,24 +92,12 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   return corners;
 }
 
-/// Whether black and white lie around the corner as they do on the board: the tag and the square
-/// beside it are black, the strips between tags white.
-bool isCrossing(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f& next,
-                const cv::Point2f& previous) {
-  constexpr float kStep = 0.09F;  // of the tag's side, within its border
-  const cv::Point2f a = kStep * (next - corner), b = kStep * (previous - corner);
-  const double tag = brightness(grey, corner + a + b), square = brightness(grey, corner - a - b);
-  const double one = brightness(grey, corner + a - b), other = brightness(grey, corner - a + b);
-  const double black = std::max(tag, square), white = std::min(one, other);
-  const double range = std::max(one, other) - std::min(tag, square);
-  return range > 20.0 && white - black > 0.3 * range;
-}
-
 /// Refines the corners of a tag, clockwise, each as the crossing of edges that it is. What moves
 /// far, lies at the image's border or is no crossing is left out.
 std::vector<bool> refineCrossings(const cv::Mat& grey, double side_px,
                                   std::vector<cv::Point2f>& pixels) {
   constexpr double kFarthest = 2.0;
+  constexpr float kStep = 0.09F;  // of the tag's side, within its border
   const int half = std::clamp(static_cast<int>(0.12 * side_px), 2, 6);
   const std::vector<cv::Point2f> before = pixels;
   cv::cornerSubPix(grey, pixels, {half, half}, {-1, -1}, kRefinement);
@@ -87,7 +107,8 @@ std::vector<bool> refineCrossings(const cv::Mat& grey, double side_px,
     const bool inside = p.x > half + 1 && p.y > half + 1 && p.x < grey.cols - half - 2 &&
                         p.y < grey.rows - half - 2;
     good.push_back(inside && cv::norm(p - before[i]) < kFarthest &&
-                   isCrossing(grey, p, before[(i + 1) % 4], before[(i + 3) % 4]));
+                   crossingAt(grey, p, kStep * (before[(i + 1) % 4] - p),
+                              kStep * (before[(i + 3) % 4] - p)) == 1);
   }
   return good;
 }

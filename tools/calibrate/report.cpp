@@ -40,6 +40,7 @@ json placeJson(const CameraImu& place) {
            "rotation (rad, right of R_BC), p_BC (m), time offset (s), fx fy cx cy, "
            "distortion coefficients"},
           {"covariance", matrixOf(place.covariance)},
+          {"covariance_widened_by", place.widened},
           {"gyro_bias", listOf(place.gyro_bias)},
           {"gyro_bias_sigma", listOf(place.gyro_bias_sigma)},
           {"accel_bias", listOf(place.accel_bias)},

@@ -94,6 +94,17 @@ TEST(CameraImu, CornersThatAreElsewhereAreLeftOut) {
               static_cast<double>(count) / 600.0);
 }
 
+TEST(CameraImu, ViewsThatWereReadUpsideDownAreLeftOut) {
+  Case c = caseOf("chessboard:7x6:0.06", 11);
+  const std::size_t last = c.input.board.cornerCount() - 1;
+  for (std::size_t i = 20; i < c.input.views.size(); i += 30) {
+    for (Corner& corner : c.input.views[i].corners) corner.id = last - corner.id;
+  }
+  const auto found = estimateCameraImu(c.input, {});
+  ASSERT_TRUE(found) << found.error().detail;
+  expectTruth(c, *found);
+}
+
 TEST(CameraImu, AGapWithoutTheBoardLeavesTheLongerStretch) {
   Case c = caseOf(kSmallGrid, 12);
   const TimePoint begin = c.input.views.front().time;
