@@ -38,6 +38,7 @@ perdure_installed_config(inference.yaml "path: \"\"          #"
 perdure_installed_config(semantic_filter.yaml
   "class_priors: config/class_priors.yaml" "class_priors: ${etc}/class_priors.yaml")
 perdure_installed_config(map_store.yaml "\"state/map.sqlite\"" "${state}/map.sqlite")
+perdure_installed_config(bus.yaml)
 perdure_installed_config(class_priors.yaml)
 perdure_installed_config(class_aliases.yaml)
 install(FILES deploy/roudi.toml DESTINATION ${etc} COMPONENT services)

@@ -1,10 +1,16 @@
 #include "common/bus/domain.h"
 
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+
 #include <cstdlib>
+#include <filesystem>
 #include <utility>
 
 #include "common/base/errors.h"
 #include "common/bus/dds.h"
+#include "common/bus/roles.h"
+#include "common/bus/security_log.h"
 #include "common/bus/shared_memory.h"
 
 namespace perdure::bus {
@@ -26,11 +32,57 @@ std::string loopbackXml() {
          "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>";
 }
 
-std::string networkXml(const std::string& interface) {
-  return "<General><Interfaces><NetworkInterface name=\"" + interface +
-         "\"/></Interfaces></General>"
+/// The IPv4 address of an interface, or its name where it has none: Cyclone says then what is
+/// wrong.
+std::string addressOf(const std::string& interface) {
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return interface;
+  const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owned(all, &freeifaddrs);
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (interface != one->ifa_name || one->ifa_addr == nullptr) continue;
+    if (one->ifa_addr->sa_family != AF_INET) continue;
+    char text[INET_ADDRSTRLEN] = "";
+    const auto* address = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
+    if (inet_ntop(AF_INET, &address->sin_addr, text, sizeof text) != nullptr) return text;
+  }
+  return interface;
+}
+
+/// Hosts that multicast does not reach are spoken to by unicast alone; those on this one too.
+std::string peersXml(const std::string& interface, const std::vector<std::string>& peers) {
+  if (peers.empty()) return {};
+  std::string xml = "<Peers><Peer Address=\"" + addressOf(interface) + "\"/>";
+  for (const std::string& peer : peers) xml += "<Peer Address=\"" + peer + "\"/>";
+  return xml + "</Peers>";
+}
+
+std::string networkXml(const Options& options) {
+  return "<General><Interfaces><NetworkInterface name=\"" + options.interface +
+         "\"/></Interfaces><AllowMulticast>" + (options.peers.empty() ? "true" : "false") +
+         "</AllowMulticast></General>"
          "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>" +
-         std::to_string(kMaxParticipantIndex) + "</MaxAutoParticipantIndex></Discovery>";
+         std::to_string(kMaxParticipantIndex) + "</MaxAutoParticipantIndex>" +
+         peersXml(options.interface, options.peers) + "</Discovery>";
+}
+
+std::string domainXml(const Options& options, const std::string& locator,
+                      const std::string& beside) {
+  const bool loopback = options.interface == "lo";
+  const std::string id = options.domain == 0 ? "any" : std::to_string(options.domain);
+  return "<CycloneDDS><Domain Id=\"" + id + "\">" +
+         (loopback ? loopbackXml() : networkXml(options)) +
+         "<Internal><SocketReceiveBufferSize max=\"10MB\"/>"
+         "<Watermarks><WhcHigh>32MB</WhcHigh></Watermarks></Internal>"
+         "<SharedMemory><Enable>" +
+         (locator.empty()
+              ? "false</Enable>"
+              : "true</Enable><Locator>" + locator + "</Locator><LogLevel>error</LogLevel>") +
+         "</SharedMemory>" + beside + "</Domain></CycloneDDS>";
+}
+
+std::string identityFolder(const Options& options, const std::string& process) {
+  return options.security + "/" +
+         (options.identity.empty() ? identityOf(process) : options.identity);
 }
 
 /// CYCLONEDDS_URI, where it says something.
@@ -39,8 +91,21 @@ const char* givenConfiguration() {
   return uri != nullptr && *uri != '\0' ? uri : nullptr;
 }
 
-bool isInterfaceName(const std::string& name) {
+/// Of an interface, or of a host.
+bool isPlainName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
+}
+
+void requireNames(const Options& options) {
+  if (!isPlainName(options.interface)) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "bus.interface: \"" + options.interface + "\" is not an interface's name");
+  }
+  for (const std::string& peer : options.peers) {
+    if (isPlainName(peer)) continue;
+    throw StartupError(ExitCode::kConfiguration,
+                       "bus.peers: \"" + peer + "\" is no address and no host's name");
+  }
 }
 
 /// Deleted before its parent is.
@@ -53,7 +118,16 @@ std::shared_ptr<const Entity> keptBy(std::shared_ptr<const Entity> parent, Entit
   return {kept, &kept->entity};
 }
 
+/// What goes through shared memory is neither encrypted nor granted to some only.
+void refuseOpenMemory(const Options& options) {
+  if (options.security.empty() || options.shared_memory_mb == 0) return;
+  throw StartupError(ExitCode::kConfiguration,
+                     "bus.security and bus.shared_memory_mb are both set, but what goes through "
+                     "shared memory is open to all who reach RouDi; set one of them only");
+}
+
 SharedMemory findSharedMemory(const Options& options) {
+  refuseOpenMemory(options);
   if (options.shared_memory_mb == 0) return {};
   if (givenConfiguration() != nullptr) {
     return {{}, "CYCLONEDDS_URI, which is set, goes before bus.shared_memory_mb"};
@@ -65,11 +139,9 @@ SharedMemory findSharedMemory(const Options& options) {
 }
 
 std::int32_t createDomain(const Options& options, const std::string& locator) {
-  if (!isInterfaceName(options.interface)) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "bus.interface: \"" + options.interface + "\" is not an interface's name");
-  }
+  requireNames(options);
   const char* given = givenConfiguration();
+  if (!options.security.empty()) (void)securityLog(given == nullptr);
   const std::string configuration = given != nullptr ? given : configurationXml(options, locator);
   const auto id = static_cast<dds_domainid_t>(options.domain);
   const dds_entity_t domain = dds_create_domain(id, configuration.c_str());
@@ -82,6 +154,35 @@ std::int32_t createDomain(const Options& options, const std::string& locator) {
             (given != nullptr ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
   }
   return domain;
+}
+
+/// Gives a participant the identity in this folder. Its properties go before what CYCLONEDDS_URI
+/// says of security.
+Identity secure(dds_qos_t& qos, const std::string& folder) {
+  const auto identity = readIdentity(folder);
+  if (!identity) {
+    throw StartupError(ExitCode::kUnavailable, "bus.security: " + identity.error().detail);
+  }
+  for (const auto& [name, value] : securityProperties(folder)) {
+    dds_qset_prop(&qos, name.c_str(), value.c_str());
+  }
+  return *identity;
+}
+
+[[noreturn]] void refuseParticipant(dds_return_t code, const std::optional<Identity>& identity) {
+  const std::string refused =
+      std::string("DDS cannot create a participant (") + dds_strretcode(-code) + ")";
+  if (identity && code != DDS_RETCODE_OUT_OF_RESOURCES) {
+    throw StartupError(
+        ExitCode::kUnavailable,
+        refused + "; " + securityLog().own() + "; is the identity " + identity->name +
+            " for this bus.domain? `perdure security renew` makes it anew; Cyclone's "
+            "plugins are in Debian's libddsc0debian");
+  }
+  throw StartupError(ExitCode::kUnavailable, refused + "; are more than " +
+                                                 std::to_string(kMaxParticipantIndex) +
+                                                 " processes running in this domain? Another "
+                                                 "bus.domain is free");
 }
 
 }  // namespace
@@ -99,6 +200,9 @@ void describe(Options& options, config::Fields& fields) {
   constexpr double kMaxDomain = 230;  // ports end there
   fields.text("bus.interface", options.interface,
               {"network interface of the topics: lo, or one that other hosts are on"});
+  fields.texts(
+      "bus.peers", options.peers,
+      {"addresses of the other hosts, where multicast does not reach them; none: multicast"});
   fields.integer("bus.domain", options.domain, config::between(0, kMaxDomain),
                  {"DDS domain; the variable PERDURE_DOMAIN goes before it"});
   fields.text("bus.vehicle", options.vehicle, {"the vehicle's name in the topics' names"});
@@ -107,6 +211,25 @@ void describe(Options& options, config::Fields& fields) {
                  {"largest image that goes through shared memory, where iox-roudi runs with chunks "
                   "of that size; 0: none does",
                   "MB"});
+  fields.text("bus.security", options.security,
+              {"folder of the identities that `perdure security` makes; who has none is shut out; "
+               "empty: the bus is open"});
+  fields.text("bus.identity", options.identity,
+              {"the identity, a folder in bus.security; empty: the one named as the service"});
+}
+
+Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems) {
+  Options options;
+  const char* given = std::getenv("PERDURE_BUS");
+  const std::string beside = folder.empty() ? "" : folder + "/bus.yaml";
+  const std::string file = given != nullptr ? given : beside;
+  std::error_code ignored;
+  if (file.empty() || (given == nullptr && !std::filesystem::exists(file, ignored))) return options;
+  config::Fields fields;
+  describe(options, fields);
+  const auto found = config::readFile(fields, file);
+  problems.insert(problems.end(), found.begin(), found.end());
+  return options;
 }
 
 Options withEnvironment(Options options) {
@@ -117,18 +240,16 @@ Options withEnvironment(Options options) {
 }
 
 std::string configurationXml(const Options& options, const std::string& locator) {
-  const bool loopback = options.interface == "lo";
-  const std::string id = options.domain == 0 ? "any" : std::to_string(options.domain);
-  return "<CycloneDDS><Domain Id=\"" + id + "\">" +
-         (loopback ? loopbackXml() : networkXml(options.interface)) +
-         "<Internal><SocketReceiveBufferSize max=\"10MB\"/>"
-         "<Watermarks><WhcHigh>32MB</WhcHigh></Watermarks></Internal>"
-         "<SharedMemory><Enable>" +
-         (locator.empty()
-              ? "false</Enable>"
-              : "true</Enable><Locator>" + locator + "</Locator><LogLevel>error</LogLevel>") +
-         "</SharedMemory>"
-         "</Domain></CycloneDDS>";
+  // The trace goes to securityLog(), and to no file.
+  return domainXml(options, locator,
+                   options.security.empty() ? ""
+                                            : "<Tracing><Category>discovery</Category>"
+                                              "<OutputFile>stderr</OutputFile></Tracing>");
+}
+
+std::string foreignXml(const Options& options) {
+  const bool secure = !options.security.empty() && !options.identity.empty();
+  return domainXml(options, {}, secure ? securityXml(identityFolder(options, {})) : std::string());
 }
 
 Domain::Domain(const Options& options)
@@ -156,17 +277,15 @@ bool Domain::sharesMemory() const {
 
 Participant::Participant(const Domain& domain, const std::string& process)
     : shared_memory_(domain.sharedMemory()), prefix_("perdure/" + domain.options().vehicle + "/") {
+  const Options& options = domain.options();
   const QosPtr qos(dds_create_qos());
   dds_qset_entity_name(qos.get(), process.c_str());
-  const auto id = static_cast<dds_domainid_t>(domain.options().domain);
-  const dds_entity_t participant = dds_create_participant(id, qos.get(), nullptr);
-  if (participant < 0) {
-    throw StartupError(ExitCode::kUnavailable,
-                       std::string("DDS cannot create a participant (") +
-                           dds_strretcode(-participant) + "); are more than " +
-                           std::to_string(kMaxParticipantIndex) +
-                           " processes running in this domain? Another bus.domain is free");
+  if (!options.security.empty()) {
+    identity_ = secure(*qos, identityFolder(options, process));
   }
+  const auto id = static_cast<dds_domainid_t>(options.domain);
+  const dds_entity_t participant = dds_create_participant(id, qos.get(), nullptr);
+  if (participant < 0) refuseParticipant(participant, identity_);
   participant_ = keptBy(domain.entity(), Entity(participant));
 }
 

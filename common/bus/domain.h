@@ -3,8 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "common/bus/identity.h"
 #include "common/config/fields.h"
 
 namespace perdure::bus {
@@ -26,18 +29,28 @@ struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
   std::string vehicle = "ego";
-  std::int64_t shared_memory_mb = 0;  ///< largest image that goes through it; 0: none does
+  std::int64_t shared_memory_mb = 0;    ///< largest image that goes through it; 0: none does
+  std::string security = {};            ///< folder of the identities; empty: open to all
+  std::string identity = {};            ///< name of a folder in it; empty: by the process
+  std::vector<std::string> peers = {};  ///< the other hosts; empty: by multicast
 };
-/// bus.interface, bus.domain, bus.vehicle, bus.shared_memory_mb. The variable PERDURE_DOMAIN goes
-/// before bus.domain.
+/// bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security,
+/// bus.identity. The variable PERDURE_DOMAIN goes before bus.domain.
 void describe(Options& options, config::Fields& fields);
+
+/// What all processes of a host have in common: the file that the variable PERDURE_BUS names
+/// (empty: none), else bus.yaml in `folder`, where there is one. Adds what is wrong in it to
+/// `problems`.
+Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems);
 
 /// The options with PERDURE_DOMAIN in force.
 Options withEnvironment(Options options);
 
 /// Cyclone's configuration for these options, as it may stand in CYCLONEDDS_URI. `locator` is that
-/// of shared memory; empty: without.
+/// of shared memory; empty: without. Security is the participant's, and not in it.
 std::string configurationXml(const Options& options, const std::string& locator = {});
+/// The same for programs that are not ours, with the identity that the options name, if they do.
+std::string foreignXml(const Options& options);
 
 /// Shared memory, as it was found at the start.
 struct SharedMemory {
@@ -70,7 +83,8 @@ class Domain {
 
 class Participant {
  public:
-  /// `process` is shown by `perdure topics` and `perdure doctor`.
+  /// `process` is shown by `perdure topics` and `perdure doctor`. Throws StartupError where the
+  /// identity is not fit for bus.security (69), or DDS refuses.
   Participant(const Domain& domain, const std::string& process);
   std::int32_t handle() const { return participant_->handle(); }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
@@ -78,11 +92,14 @@ class Participant {
   std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
+  /// Nothing where bus.security is off.
+  const std::optional<Identity>& identity() const { return identity_; }
 
  private:
   std::shared_ptr<const Entity> participant_;
   SharedMemory shared_memory_;
   std::string prefix_;
+  std::optional<Identity> identity_;
 };
 
 }  // namespace perdure::bus

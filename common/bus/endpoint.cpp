@@ -67,6 +67,12 @@ const TopicInfo& infoOf(const std::string& topic) {
 }
 
 Entity created(dds_entity_t handle, const std::string& what) {
+  if (handle == DDS_RETCODE_NOT_ALLOWED_BY_SECURITY) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "the identity of this process may not make " + what +
+                           "; bus.identity names it, and `perdure security` says what each role "
+                           "may do");
+  }
   if (handle < 0) {
     throw StartupError(ExitCode::kUnavailable,
                        "DDS cannot create " + what + ": " + dds_strretcode(-handle));
@@ -121,7 +127,7 @@ std::shared_ptr<const Entity> createWriter(const Participant& participant, const
 }
 
 std::string errorWord(dds_return_t code) {
-  switch (-code) {
+  switch (code) {
     case DDS_RETCODE_TIMEOUT:
       return "timeout";
     case DDS_RETCODE_OUT_OF_RESOURCES:

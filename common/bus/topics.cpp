@@ -9,11 +9,19 @@ namespace {
 constexpr double kCameraHz = 10.0;
 constexpr double kImuHz = 100.0;
 constexpr std::string_view kFramePrefix = "frame/";
+constexpr Roles kWatchers = Role::kRecord | Role::kOperator;  // they read everything
 
 template <class T>
-TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded) {
+TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded, Roles writers,
+              Roles readers) {
   // The table outlives the call: names are those of the constants in topics.h.
-  return {topic.name, &wire::Type<T>::descriptor(), qos, rate_hz, recorded};
+  return {topic.name,
+          &wire::Type<T>::descriptor(),
+          qos,
+          rate_hz,
+          recorded,
+          writers | Role::kPlayer,
+          readers | kWatchers};
 }
 
 constexpr Qos reliable(int depth) { return {.depth = depth}; }
@@ -28,29 +36,38 @@ Qos exclusive(int depth, double rate_hz) {
 
 using Table = std::array<TopicInfo, 19>;
 
+/// After the rate: who writes, and who reads besides those that record and watch.
 Table makeTable() {
   using namespace topics;
+  using enum Role;
   constexpr bool kRecorded = true, kNotRecorded = false;
+  constexpr Roles kServices = kCapture | kVio | kInference | kSemanticFilter | kMapStore;
   return {
-      TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), shared(4), kCameraHz, kRecorded},
-      row(kImu, latched(512), kImuHz, kRecorded),
-      row(kSpeed, latched(512), kImuHz, kRecorded),
-      row(kCalibration, latched(1), 0, kRecorded),
-      row(kOdometry, reliable(64), kCameraHz, kRecorded),
-      row(kLandmarks, reliable(64), kCameraHz, kRecorded),
-      row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded),
-      row(kModel, latched(1), 0, kRecorded),
-      row(kSwap, reliable(16), 0, kRecorded),
-      row(kObjects, reliable(8), kCameraHz, kRecorded),
-      row(kObjectState, latched(1), 0, kNotRecorded),
-      row(kRecalled, reliable(8), 0, kRecorded),
-      row(kEvents, latched(256), 0, kRecorded),
-      row(kPredictions, bestEffort(1), kCameraHz, kRecorded),
-      row(kMap, latched(1), 0, kNotRecorded),
-      row(kMapHeader, latched(1), 0, kNotRecorded),
-      row(kMapQuery, reliable(16), 0, kRecorded),
-      row(kMapReply, reliable(16), 0, kRecorded),
-      row(kHealth, latched(1, 1.0), 1.0, kRecorded),
+      TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), shared(4), kCameraHz, kRecorded,
+                kCapture | kPlayer, kVio | kInference | kWatchers},
+      row(kImu, latched(512), kImuHz, kRecorded, kCapture, kVio),
+      row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
+      row(kCalibration, latched(1), 0, kRecorded, kCapture, kVio | kSemanticFilter | kSubscriber),
+      row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio,
+          kSemanticFilter | kCapture | kSubscriber),  // capture follows it (pace.mode)
+      row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio, kSemanticFilter | kSubscriber),
+      row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded, kInference,
+          kInference | kSemanticFilter | kCapture | kSubscriber),
+      row(kModel, latched(1), 0, kRecorded, kInference, kInference | kSemanticFilter | kSubscriber),
+      row(kSwap, reliable(16), 0, kRecorded, kInference, kInference | kSemanticFilter),
+      row(kObjects, reliable(8), kCameraHz, kRecorded, kSemanticFilter,
+          kMapStore | kVio | kSubscriber),  // vio masks what moves (input.moving_mask)
+      row(kObjectState, latched(1), 0, kNotRecorded, kSemanticFilter, kSubscriber),
+      row(kRecalled, reliable(8), 0, kRecorded, kMapStore, kSemanticFilter),
+      row(kEvents, latched(256), 0, kRecorded, kSemanticFilter, kMapStore | kSubscriber),
+      row(kPredictions, bestEffort(1), kCameraHz, kRecorded, kSemanticFilter,
+          kInference | kSubscriber),
+      row(kMap, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
+      row(kMapHeader, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
+      row(kMapQuery, reliable(16), 0, kRecorded, kSemanticFilter | kOperator | kSubscriber,
+          kMapStore),
+      row(kMapReply, reliable(16), 0, kRecorded, kMapStore, kSubscriber),
+      row(kHealth, latched(1, 1.0), 1.0, kRecorded, kServices | kRecord, kSubscriber),
   };
 }
 

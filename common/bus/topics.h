@@ -1,4 +1,5 @@
-// Every topic of the system in one table: type, quality of service, expected rate, recorded or not.
+// Every topic of the system in one table: type, quality of service, expected rate, recorded or not,
+// who writes and who reads it.
 // Names on the wire are perdure/<vehicle>/<name>.
 #pragma once
 
@@ -6,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/bus/roles.h"
 #include "common/wire/types.h"
 
 namespace perdure::bus {
@@ -25,6 +27,7 @@ struct TopicInfo {
   Qos qos;
   double rate_hz = 0.0;  ///< nominal, of a 10 Hz camera and a 100 Hz IMU; 0 = on change
   bool recorded = true;
+  Roles writers = {}, readers = {};  ///< what DDS-Security grants, where it is on
 
   std::string typeName() const;
 };

@@ -5,9 +5,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 
 #include "common/base/errors.h"
+#include "common/bus/security_log.h"
 #include "common/service/process.h"
 #include "common/service/signals.h"
 
@@ -54,9 +56,16 @@ void addOptions(CLI::App& app, CommandLine& line) {
   app.set_version_flag("--version", std::string(PERDURE_VERSION));
 }
 
-/// Reads file and assignments; throws StartupError with everything that is wrong.
-void readConfiguration(config::Fields& fields, const CommandLine& line) {
-  std::vector<config::Problem> problems;
+/// What all services of this host share is beside the service's own file.
+bus::Options commonBus(const CommandLine& line, std::vector<config::Problem>& problems) {
+  const auto folder = std::filesystem::path(line.config_file).parent_path();
+  const bool beside = !line.config_file.empty();
+  return bus::commonOptions(beside ? (folder.empty() ? "." : folder.string()) : "", problems);
+}
+
+/// Reads file and assignments; throws StartupError with everything that is wrong, `problems` too.
+void readConfiguration(config::Fields& fields, const CommandLine& line,
+                       std::vector<config::Problem> problems) {
   const auto append = [&](std::vector<config::Problem> more) {
     problems.insert(problems.end(), more.begin(), more.end());
   };
@@ -86,7 +95,9 @@ void start(const Program& program, const CommandLine& line) {
     std::cout << config::toMarkdown(fields);
     return;
   }
-  readConfiguration(fields, line);
+  std::vector<config::Problem> problems;
+  common.bus = commonBus(line, problems);
+  readConfiguration(fields, line, std::move(problems));
   if (program.verify) program.verify();
   if (line.print_config) std::cout << config::toYaml(fields);
   if (line.check_config || line.print_config) return;
@@ -112,6 +123,7 @@ Context::Context(const std::string& process, const bus::Options& options,
       loop_(participant_) {
   countReasons([this](ReasonCounts& counts) {
     health_writer_.report(counts);
+    bus::securityLog().report(counts);
     if (clock_steps_.count() > 0) counts.add("wall_clock_stepped", clock_steps_.count());
     if (clock_steps_.recent()) counts.add("wall_clock_stepped_just_now");
   });
@@ -152,6 +164,7 @@ void Context::runLoop() {
       watchdog.period().count() > 0 ? std::min(kLongest, watchdog.period()) : kLongest;
   while (!loop_.stopped()) {
     loop_.runOnce(longest);
+    requireIdentity();
     const bool lives = std::all_of(watched_.begin(), watched_.end(),
                                    [](const auto& goes_on) { return goes_on(); });
     if (lives) watchdog.feed(std::chrono::steady_clock::now());
@@ -171,6 +184,10 @@ void Context::logNewRefusals() {
       if (logged_refusals_.insert(count).second) log_->warn("{}, first: {}", count, detail);
     }
   }
+  const auto shut_out = bus::securityLog().firstDetails();
+  for (const auto& [count, detail] : shut_out) {
+    if (logged_refusals_.insert(count).second) log_->warn("{}, first: {}", count, detail);
+  }
 }
 
 /// Logged where it changes: RouDi may go and come while the services run.
@@ -181,6 +198,23 @@ void Context::noteSharedMemory() {
   log_->log(domain_.sharedMemory().on() ? spdlog::level::info : spdlog::level::warn, "{}", text);
 }
 
+/// Cyclone cuts a process off when its identity ends; started again it takes the renewed one.
+void Context::requireIdentity() const {
+  const auto& identity = participant_.identity();
+  if (!identity || identity->until > std::chrono::system_clock::now()) return;
+  throw std::runtime_error("the identity " + identity->name +
+                           " has ended; `perdure security renew`, and its folder here");
+}
+
+/// What there is to say of an identity that is near its end; else nothing.
+std::string Context::identityEnds() const {
+  const auto& identity = participant_.identity();
+  if (!identity || identity->until - std::chrono::system_clock::now() > bus::kRenewBefore)
+    return {};
+  return "the identity " + identity->name + " ends " + bus::fromNow(identity->until) +
+         "; `perdure security renew`, then restart the service";
+}
+
 void Context::publishHealth() {
   logNewRefusals();
   noteSharedMemory();
@@ -188,8 +222,11 @@ void Context::publishHealth() {
   if (on_health_) on_health_();
   Health health = health_.sample(std::chrono::steady_clock::now());
   const bool misses = !shared_memory_.empty() && !domain_.sharesMemory();
-  if (misses && health.state == HealthState::kOk) health.state = HealthState::kDegraded;
-  if (health.message.empty()) health.message = shared_memory_;
+  const std::string ending = identityEnds();
+  if ((misses || !ending.empty()) && health.state == HealthState::kOk) {
+    health.state = HealthState::kDegraded;
+  }
+  if (health.message.empty()) health.message = ending.empty() ? shared_memory_ : ending;
   health.reasons = reasons().all();
   (void)health_writer_.write(health);
 }

@@ -82,6 +82,8 @@ class Context {
   void runLoop();
   void logNewRefusals();
   void noteSharedMemory();
+  std::string identityEnds() const;
+  void requireIdentity() const;
   ReasonCounts reasons() const;
 
   const InstanceId instance_;

@@ -3,15 +3,29 @@
 #include "common/base/errors.h"
 #include "common/service/signals.h"
 #include "tools/bus_tools/command.h"
+#include "tools/bus_tools/doctor.h"
 
 namespace perdure::tools {
 
 void addBusOptions(CLI::App& command, bus::Options& options) {
+  // Before the command line: options of it go before the file.
+  command.preparse_callback([&options](std::size_t) {
+    std::vector<config::Problem> problems;
+    const bus::Options common = bus::commonOptions(configurationFolder(), problems);
+    config::refuse(problems);
+    options = common;
+    options.shared_memory_mb = 0;  // what listens needs none
+    options.identity.clear();      // that of the services
+  });
   command.add_option("--interface", options.interface, "network interface of the topics")
       ->capture_default_str();
+  command.add_option("--peers", options.peers, "addresses of other hosts, without multicast");
   command.add_option("--domain", options.domain, "DDS domain (PERDURE_DOMAIN goes before it)")
       ->capture_default_str();
   command.add_option("--vehicle", options.vehicle, "the vehicle's name")->capture_default_str();
+  command.add_option("--security", options.security, "folder of the identities (bus.security)");
+  command.add_option("--identity", options.identity,
+                     "the identity, a folder in it; else operator, of play: player");
 }
 
 void runLoop(bus::WaitLoop& loop, double seconds) {

@@ -9,7 +9,8 @@
 
 namespace perdure::tools {
 
-/// --interface, --domain, --vehicle.
+/// --interface, --domain, --vehicle, --security, --identity; what they do not say is said by
+/// bus.yaml, where the services' configuration is.
 void addBusOptions(CLI::App& command, bus::Options& options);
 
 /// Runs the loop until it is stopped, a signal comes, or the seconds (0 = for ever) are over.

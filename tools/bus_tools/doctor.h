@@ -24,6 +24,8 @@ Findings checkHost(const bus::Options& options);
 /// Of RouDi, where images are to go through shared memory: it answers, and its largest chunk
 /// (`roudi_toml`, where it can be read) holds an image of bus.shared_memory_mb. Else nothing.
 Findings checkSharedMemory(const bus::Options& options, const std::string& roudi_toml);
+/// Of the identities in bus.security that this user can read, and of an authority beside them.
+Findings checkSecurity(const bus::Options& options);
 /// Of a folder that a service must write to.
 Finding checkWritable(const std::string& folder);
 /// Of the bus: who is there, what each says of itself, what does not fit together.

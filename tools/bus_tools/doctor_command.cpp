@@ -57,6 +57,8 @@ void runDoctor(const DoctorOptions& given) {
   const Findings shared = checkSharedMemory(options.bus, roudi);
   findings.insert(findings.end(), shared.begin(), shared.end());
   options.bus.shared_memory_mb = 0;  // what listens here needs none
+  const Findings security = checkSecurity(options.bus);
+  findings.insert(findings.end(), security.begin(), security.end());
   for (const std::string& folder : options.folders) findings.push_back(checkWritable(folder));
   const Findings bus = checkBus(options.bus, options.seconds);
   findings.insert(findings.end(), bus.begin(), bus.end());

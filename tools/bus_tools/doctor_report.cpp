@@ -76,9 +76,18 @@ void writeHost(const fs::path& folder) {
                 "journalctl --no-pager -o short-precise -n 5000 -u 'perdure-*' -u iox-roudi"});
 }
 
+/// Settings only: the keys of bus.security may be in the same folder.
 void copyConfiguration(const std::string& from, const fs::path& to) {
   std::error_code ignored;
-  if (!from.empty()) fs::copy(from, to, fs::copy_options::recursive, ignored);
+  if (from.empty()) return;
+  for (const auto& entry : fs::recursive_directory_iterator(
+           from, fs::directory_options::skip_permission_denied, ignored)) {
+    const auto kind = entry.path().extension();
+    if (kind != ".yaml" && kind != ".toml") continue;
+    const fs::path copy = to / fs::relative(entry.path(), from, ignored);
+    fs::create_directories(copy.parent_path(), ignored);
+    fs::copy_file(entry.path(), copy, ignored);
+  }
 }
 
 const char* const kPnmKind[] = {"P5", "P6"};
@@ -118,7 +127,7 @@ StatusSeen writeBus(const ReportOptions& options, const fs::path& folder) {
   watch.onHealth([&](const Health& h) { health << dumped(wire::toJson(h)) << '\n'; });
   runLoop(watch.loop(), options.seconds);
   StatusSeen seen = watch.seen();
-  seen.host = lookAtHost({"/"}, options.bus.interface);
+  seen.host = lookAtHost({"/"}, options.bus);
   const StatusNode status = judge(seen);
   std::ofstream(folder / "status.txt") << toText(status, false);
   std::ofstream(folder / "status.json") << dumped(toJson(status), 2) << '\n';

@@ -16,7 +16,7 @@ std::string singleQuoted(const std::string& text) {
 
 void printEnvironment(const bus::Options& given) {
   const bus::Options options = bus::withEnvironment(given);
-  std::cout << "export CYCLONEDDS_URI=" << singleQuoted(bus::configurationXml(options)) << '\n';
+  std::cout << "export CYCLONEDDS_URI=" << singleQuoted(bus::foreignXml(options)) << '\n';
   if (options.domain != 0) std::cout << "export PERDURE_DOMAIN=" << options.domain << '\n';
 }
 

@@ -266,10 +266,46 @@ StatusNode judgeClock(const StatusSeen& seen) {
   return node;
 }
 
+std::uint64_t refusals(const StatusSeen& seen) {
+  std::uint64_t n = 0;
+  for (const auto& [name, service] : seen.services) {
+    for (const auto& [reason, count] : service.health.reasons) {
+      if (reason.starts_with("security_refused_")) n += count;
+    }
+  }
+  return n;
+}
+
+/// Of the identities on this host: the worst, or the one that ends first.
+StatusNode judgeSecurity(const StatusSeen& seen) {
+  StatusNode node{"security"};
+  const IdentitySeen* first = nullptr;
+  for (const IdentitySeen& identity : seen.host.identities) {
+    if (!identity.until) {
+      node.level = Level::kFailed;
+      addSentence(node.text, identity.problem);
+    } else if (first == nullptr || identity.until < first->until) {
+      first = &identity;
+    }
+  }
+  if (first != nullptr) {
+    addSentence(node.text, fmt::format("{} ends {}", first->name, bus::fromNow(*first->until)));
+    if (endsSoon(*first)) {
+      node.level = std::max(node.level, Level::kDegraded);
+      addSentence(node.text, "`perdure security renew`, then restart the services");
+    }
+  }
+  const std::uint64_t refused = refusals(seen);
+  if (refused > 0) addSentence(node.text, fmt::format("strangers were refused {} times", refused));
+  node.data = {{"identities", seen.host.identities.size()}, {"refused", refused}};
+  return node;
+}
+
 StatusNode judgeHost(const StatusSeen& seen) {
   StatusNode node{"host"};
   for (const DiskSeen& disk : seen.host.disks) node.add(judgeDisk(disk));
   node.add(judgeClock(seen));
+  if (seen.host.closed) node.add(judgeSecurity(seen));
   for (const TemperatureSeen& t : seen.host.temperatures) node.add(judgeTemperature(t));
   return node;
 }

@@ -2,12 +2,14 @@
 // worst state dominates.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/bus/domain.h"
 #include "common/bus/topics.h"
 #include "common/types/health.h"
 #include "common/types/sensors.h"
@@ -56,11 +58,22 @@ struct TemperatureSeen {
   std::optional<double> critical;
 };
 
+struct IdentitySeen {
+  std::string name;
+  std::optional<std::chrono::system_clock::time_point> until;
+  std::string problem;  ///< with the mend, where it is not fit
+};
+/// Of bus.security, as far as this user can read it; sorted by name.
+std::vector<IdentitySeen> lookAtIdentities(const std::string& folder);
+bool endsSoon(const IdentitySeen& seen);
+
 struct HostSeen {
   std::vector<DiskSeen> disks;
   std::vector<TemperatureSeen> temperatures;
   bool clock_synchronised = false;
   bool several_hosts = false;  ///< the topics are on a network
+  bool closed = false;         ///< bus.security is on
+  std::vector<IdentitySeen> identities;
 };
 
 struct StatusSeen {
@@ -82,6 +95,6 @@ nlohmann::ordered_json toJson(const StatusNode& node);
 std::string dumped(const nlohmann::ordered_json& json, int indent = -1);
 
 /// Of the folders that exist.
-HostSeen lookAtHost(const std::vector<std::string>& folders, const std::string& interface);
+HostSeen lookAtHost(const std::vector<std::string>& folders, const bus::Options& options);
 
 }  // namespace perdure::tools

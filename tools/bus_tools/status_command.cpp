@@ -24,7 +24,7 @@ struct StatusOptions {
 
 StatusNode look(StatusWatch& watch, const StatusOptions& options) {
   StatusSeen seen = watch.seen();
-  seen.host = lookAtHost(options.folders, options.bus.interface);
+  seen.host = lookAtHost(options.folders, options.bus);
   return judge(seen);
 }
 

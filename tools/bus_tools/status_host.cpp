@@ -50,7 +50,7 @@ std::vector<TemperatureSeen> temperatures() {
 
 }  // namespace
 
-HostSeen lookAtHost(const std::vector<std::string>& folders, const std::string& interface) {
+HostSeen lookAtHost(const std::vector<std::string>& folders, const bus::Options& options) {
   HostSeen host;
   for (const std::string& folder : folders) {
     std::error_code error;
@@ -60,7 +60,9 @@ HostSeen lookAtHost(const std::vector<std::string>& folders, const std::string& 
   host.temperatures = temperatures();
   timex status{};
   host.clock_synchronised = adjtimex(&status) != TIME_ERROR && (status.status & STA_UNSYNC) == 0;
-  host.several_hosts = interface != "lo";
+  host.several_hosts = options.interface != "lo";
+  host.closed = !options.security.empty();
+  if (host.closed) host.identities = lookAtIdentities(options.security);
   return host;
 }
 

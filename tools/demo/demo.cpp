@@ -54,6 +54,16 @@ void leaseDomain() {
                      "PERDURE_DOMAIN to a free one");
 }
 
+/// As the services have it from the file beside their own.
+bus::Options busOptions(const fs::path& root) {
+  std::vector<config::Problem> problems;
+  bus::Options options = bus::commonOptions(root / "config", problems);
+  config::refuse(problems);
+  options.shared_memory_mb = 0;  // it reads no images
+  options.identity.clear();
+  return options;
+}
+
 std::string shellQuoted(const std::string& word) {
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
@@ -118,7 +128,7 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   leaseDomain();
   outputs_ = std::make_unique<OutputWriter>(
       folders_.out, truth_ ? truth_->sequence : fs::path(options_.data).filename().string());
-  domain_ = std::make_unique<bus::Domain>(bus::Options{});
+  domain_ = std::make_unique<bus::Domain>(busOptions(options_.root));
   participant_ = std::make_unique<bus::Participant>(*domain_, "demo");
   loop_ = std::make_unique<bus::WaitLoop>(*participant_);
   reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_);

@@ -53,6 +53,7 @@ std::vector<std::string> commandOf(const SwapRequest& request) {
   const bus::Options usual;
   if (request.bus.interface != usual.interface) set("bus.interface=" + request.bus.interface);
   if (request.bus.vehicle != usual.vehicle) set("bus.vehicle=" + request.bus.vehicle);
+  if (request.bus.security != usual.security) set("bus.security=" + request.bus.security);
   if (request.bus.domain != usual.domain) set(fmt::format("bus.domain={}", request.bus.domain));
   return command;
 }

@@ -10,6 +10,7 @@
 
 #include "common/base/errors.h"
 #include "services/semantic_filter/context_file.h"
+#include "tools/bus_tools/common.h"
 #include "tools/map/learn_context.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
@@ -39,20 +40,20 @@ MapReply askOverDds(const Request& request) {
   const bus::Options& bus = domain.options();
   throw StartupError(
       ExitCode::kUnavailable,
-      fmt::format("{} on domain {}, interface {}, vehicle {} within {} s; start perdure-map-store "
-                  "there, or read its file with --db",
-                  reply.error().code == "no_answer" ? "map_store does not answer"
-                                                    : "there is no map_store",
-                  bus.domain, bus.interface, bus.vehicle, request.patience_s));
+      fmt::format(
+          "{} on domain {}, interface {}, vehicle {} within {} s; start perdure-map-store "
+          "there, or read its file with --db",
+          reply.error().code == "no_answer" ? "map_store does not answer" : "there is no map_store",
+          bus.domain, bus.interface, bus.vehicle, request.patience_s));
 }
 
 MapReply ask(const Request& request) {
-  MapReply reply =
-      request.db.empty() ? askOverDds(request) : askMapFile(request.db, request.query);
+  MapReply reply = request.db.empty() ? askOverDds(request) : askMapFile(request.db, request.query);
   if (!reply.ok) throw StartupError(ExitCode::kUsage, reply.error);
   if (reply.truncated) {
-    std::cerr << "perdure map: there are more than these " << reply.objects.size()
-              << " objects; raise --limit and map_store's query.limit, or read the file with --db\n";
+    std::cerr
+        << "perdure map: there are more than these " << reply.objects.size()
+        << " objects; raise --limit and map_store's query.limit, or read the file with --db\n";
   }
   return reply;
 }
@@ -72,9 +73,9 @@ void list(const Request& request) {
 MapReply askForOne(const Request& request) {
   MapReply reply = ask(request);
   if (reply.objects.empty()) {
-    throw StartupError(ExitCode::kFailure,
-                       "the map has no object " + std::to_string(request.query.object_id) +
-                           "; `perdure map list` shows those it has");
+    throw StartupError(ExitCode::kFailure, "the map has no object " +
+                                               std::to_string(request.query.object_id) +
+                                               "; `perdure map list` shows those it has");
   }
   return reply;
 }
@@ -96,8 +97,8 @@ void why(const Request& request) {
 }
 
 void chooseKind(Request& request) {
-  const int given = !request.query.class_name.empty() + !request.radius.empty() +
-                    !request.box.empty();
+  const int given =
+      !request.query.class_name.empty() + !request.radius.empty() + !request.box.empty();
   if (given != 1) {
     throw StartupError(ExitCode::kUsage,
                        "give one of --class NAME, --radius X Y Z R, --box X1 Y1 Z1 X2 Y2 Z2");
@@ -164,9 +165,7 @@ void exportMap(const Request& request) {
 void addSource(CLI::App& command, Request& request) {
   command.add_option("--db", request.db, "read this file instead of asking the running map_store")
       ->type_name("FILE");
-  command.add_option("--interface", request.bus.interface, "network interface of the topics");
-  command.add_option("--domain", request.bus.domain, "DDS domain");
-  command.add_option("--vehicle", request.bus.vehicle, "the vehicle's name in the topics' names");
+  addBusOptions(command, request.bus);
   command.add_option("--wait", request.patience_s, "seconds until giving up")
       ->check(CLI::PositiveNumber);
   command.add_option("--limit", request.query.limit, "at most so many objects")
@@ -214,9 +213,10 @@ void addMapCommand(CLI::App& app) {
 
   CLI::App* exporting = map->add_subcommand("export", "The map as JSON or GeoJSON");
   exporting->add_flag("--geojson", request->geojson, "GeoJSON (RFC 7946)");
-  exporting->add_option("--anchor", request->anchor,
-                        "LATITUDE LONGITUDE HEIGHT YAW: where W's origin lies, degrees and metres; "
-                        "yaw of its x axis from east")
+  exporting
+      ->add_option("--anchor", request->anchor,
+                   "LATITUDE LONGITUDE HEIGHT YAW: where W's origin lies, degrees and metres; "
+                   "yaw of its x axis from east")
       ->expected(4);
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });

@@ -14,6 +14,7 @@
 #include "tools/model/command.h"
 #include "tools/pipeline/command.h"
 #include "tools/record/command.h"
+#include "tools/security/command.h"
 #include "tools/simulate/command.h"
 
 namespace {
@@ -53,6 +54,7 @@ int main(int argc, char** argv) {
   perdure::tools::addDemoCommand(app);
   perdure::tools::addRecordCommand(app);
   perdure::tools::addPlayCommand(app);
+  perdure::tools::addSecurityCommand(app);
   perdure::tools::addBusCommands(app);
   return run(app, argc, argv);
 }
