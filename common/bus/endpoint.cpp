@@ -80,8 +80,15 @@ Entity created(dds_entity_t handle, const std::string& what) {
   return Entity(handle);
 }
 
-/// With keys or latching shared memory loses messages, or crashes (Cyclone 0.10.2).
-void checkSharing(const Entity& entity, const std::string& topic, const Qos& qos) {
+/// With keys or latching shared memory loses messages, or crashes (Cyclone 0.10.2); what goes
+/// through it is closed to nobody.
+void checkSharing(const Participant& participant, const Entity& entity, const std::string& topic,
+                  const Qos& qos) {
+  if (participant.identity() && dds_is_shared_memory_available(entity.handle())) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "CYCLONEDDS_URI turns shared memory on, which is open to all, and "
+                       "bus.security is set; take <SharedMemory> out of it");
+  }
   if (qos.shared_memory || qos.exclusive || !dds_is_shared_memory_available(entity.handle())) {
     return;
   }
@@ -106,7 +113,7 @@ std::shared_ptr<const Entity> createReader(const Participant& participant,
   Entity reader =
       created(dds_create_reader(participant.handle(), entity.handle(), qos.get(), nullptr),
               "a reader of " + topic);
-  checkSharing(reader, topic, row);
+  checkSharing(participant, reader, topic, row);
   return participant.keep(std::move(reader));
 }
 
@@ -122,7 +129,7 @@ std::shared_ptr<const Entity> createWriter(const Participant& participant, const
   Entity writer =
       created(dds_create_writer(participant.handle(), entity.handle(), qos.get(), nullptr),
               "a writer of " + topic);
-  checkSharing(writer, topic, row);
+  checkSharing(participant, writer, topic, row);
   return participant.keep(std::move(writer));
 }
 

@@ -8,6 +8,7 @@
 #include "common/replay/rig_file.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
+#include "common/vision/jpeg.h"
 
 namespace perdure::replay {
 namespace {
@@ -31,7 +32,9 @@ std::string nameOf(const Recording::FrameFile& file) {
 /// A copy: the frame's own pixels lie in a chunk of the recording.
 Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
                               std::optional<ImageEncoding> encoding) {
-  const auto frame = file.load();
+  const auto loaded = file.load();
+  if (!loaded) return tl::unexpected(loaded.error());
+  const auto frame = vision::decompressed(*loaded);
   if (!frame) return tl::unexpected(frame.error());
   const auto wanted = encoding.value_or(frame->encoding);
   const auto image =

@@ -14,12 +14,18 @@
 
 namespace perdure {
 
-enum class ImageEncoding : std::uint8_t { kMono8 = 0, kBgr8 = 1 };
+/// JPEG on the way only: who looks at frames unpacks them first (common/vision/jpeg.h).
+enum class ImageEncoding : std::uint8_t { kMono8 = 0, kBgr8 = 1, kJpegMono8 = 2, kJpegBgr8 = 3 };
 
-/// Bytes per pixel of an encoding.
-constexpr std::uint32_t channelsOf(ImageEncoding e) { return e == ImageEncoding::kBgr8 ? 3 : 1; }
+/// Of the image, also where it is compressed: bytes per pixel when it is not.
+constexpr std::uint32_t channelsOf(ImageEncoding e) {
+  return e == ImageEncoding::kBgr8 || e == ImageEncoding::kJpegBgr8 ? 3 : 1;
+}
+constexpr bool isCompressed(ImageEncoding e) {
+  return e == ImageEncoding::kJpegMono8 || e == ImageEncoding::kJpegBgr8;
+}
 
-/// One image of one camera. Rows are packed: data has width·height·channels bytes.
+/// One image of one camera. Rows are packed: data has width·height·channels bytes, or is a JPEG.
 struct Frame {
   FrameStamp stamp;
   std::string camera;  ///< "cam0", "cam1"

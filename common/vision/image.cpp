@@ -7,6 +7,7 @@ namespace perdure::vision {
 
 Result<cv::Mat> viewOf(const Frame& frame) {
   if (frame.data == nullptr) return fail("image_missing", "the frame carries no pixels");
+  if (isCompressed(frame.encoding)) return fail("image_malformed", "the frame is compressed");
   const std::uint64_t channels = channelsOf(frame.encoding);
   const std::uint64_t bytes = std::uint64_t{frame.width} * frame.height * channels;
   if (bytes == 0 || frame.data->size() != bytes || frame.width > 65535 || frame.height > 65535) {

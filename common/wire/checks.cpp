@@ -61,6 +61,13 @@ bool inside(double value, const Limits& limits) {
   return value >= limits.low && value <= limits.high;  // false for NaN
 }
 
+bool isSizeOf(const Frame& frame, std::size_t bytes) {
+  constexpr std::size_t kFewest = 4, kHeaders = 4096;  // start and end mark; tables, comments
+  const std::size_t pixels = std::size_t{frame.width} * frame.height * channelsOf(frame.encoding);
+  if (!isCompressed(frame.encoding)) return bytes == pixels;
+  return bytes >= kFewest && bytes <= 2 * pixels + kHeaders;
+}
+
 bool isText(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto lead = static_cast<unsigned char>(text[i]);

@@ -117,8 +117,7 @@ class Decoder : public Checked {
     std::copy(w, w + N, d.begin());
   }
   void pixels(const char* name, Frame& d, const perdure_msg_Frame& w) {
-    const std::size_t expected = std::size_t{d.width} * d.height * channelsOf(d.encoding);
-    if (w.pixels._length != expected) return refuse(name, "size_mismatch");
+    if (!isSizeOf(d, w.pixels._length)) return refuse(name, "size_mismatch");
     if (failed() || !checkBuffer(name, w.pixels, kImageBytes)) return;
     const std::span<const std::uint8_t> bytes(w.pixels._buffer, w.pixels._length);
     if (keeper_) {

@@ -15,7 +15,7 @@ void describe(A& a, D& d, W& w) {
   a.name("camera", d.camera, w.camera);
   a.value("width", d.width, w.width);
   a.value("height", d.height, w.height);
-  a.choice("encoding", d.encoding, w.encoding, ImageEncoding::kBgr8);
+  a.choice("encoding", d.encoding, w.encoding, ImageEncoding::kJpegBgr8);
   a.ensure("width", "out_of_range", [&] { return d.width >= 1 && d.width <= kImageSide; });
   a.ensure("height", "out_of_range", [&] { return d.height >= 1 && d.height <= kImageSide; });
   a.pixels("pixels", d, w);

@@ -120,11 +120,10 @@ class Encoder : public Checked {
     std::copy(d.begin(), d.end(), w);
   }
   void pixels(const char* name, const Frame& d, perdure_msg_Frame& w) {
-    const std::size_t expected = std::size_t{d.width} * d.height * channelsOf(d.encoding);
-    if (!d.data || d.data->size() != expected) return refuse(name, "size_mismatch");
-    if (!checkCount(name, expected, kImageBytes)) return;
+    if (!d.data || !isSizeOf(d, d.data->size())) return refuse(name, "size_mismatch");
+    if (!checkCount(name, d.data->size(), kImageBytes)) return;
     w.pixels._buffer = const_cast<std::uint8_t*>(d.data->data());  // only read, as texts
-    w.pixels._length = w.pixels._maximum = static_cast<std::uint32_t>(expected);
+    w.pixels._length = w.pixels._maximum = static_cast<std::uint32_t>(d.data->size());
     w.pixels._release = false;
   }
   template <class Predicate>

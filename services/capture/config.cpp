@@ -22,6 +22,9 @@ void describeDataset(Config& c, config::Fields& fields) {
   fields.choice("image.cam0", c.image.cam0, encodings,
                 {"encoding of cam0; inference wants colour where there is any"});
   fields.choice("image.cam1", c.image.cam1, encodings, {"encoding of cam1; only vio looks at it"});
+  fields.choice("image.compress", c.image.compress, {"none", "jpeg"},
+                {"how images travel; jpeg for networks that raw ones are too wide for"});
+  fields.integer("image.quality", c.image.quality, config::between(1, 100), {"of jpeg"});
 }
 
 void describeLive(Config& c, config::Fields& fields) {

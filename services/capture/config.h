@@ -19,6 +19,8 @@ struct DatasetConfig {
 
 struct ImageConfig {
   std::string cam0 = "as_is", cam1 = "mono8";
+  std::string compress = "none";
+  std::int64_t quality = 90;
 };
 
 struct PaceConfig {

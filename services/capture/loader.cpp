@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/errors.h"
+#include "common/vision/jpeg.h"
 
 namespace perdure::capture {
 namespace {
@@ -69,6 +70,7 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
 Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
                std::function<void()> notify)
     : mono_(config.dataset.cameras == "mono"),
+      quality_(config.image.compress == "jpeg" ? static_cast<int>(config.image.quality) : 0),
       drive_(std::move(drive)),
       notify_(std::move(notify)) {
   const auto [begin, end] = spanOf(*drive_);
@@ -89,6 +91,19 @@ bool Loader::isWanted(const replay::Message& message) const {
   return timeOf(message) >= from_;
 }
 
+/// What cannot be compressed goes as it is, and is counted.
+void Loader::compress(replay::Message& message) {
+  auto* frame = std::get_if<Frame>(&message);
+  if (!frame || !frame->data) return;
+  auto small = vision::compressed(*frame, quality_);
+  if (small) {
+    *frame = *std::move(small);
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  uncompressed_.add(small.error());
+}
+
 void Loader::run() {
   bool open = true;
   while (open) {
@@ -100,6 +115,7 @@ void Loader::run() {
     }
     if (!message || timeOf(*message) > until_) break;
     if (!isWanted(*message)) continue;
+    if (quality_ > 0) compress(*message);
     open = queue_.push(*std::move(message));
     notify_();
   }
@@ -123,7 +139,9 @@ bool Loader::ended() const {
 
 ReasonCounts Loader::reasons() const {
   const std::lock_guard lock(mutex_);
-  return reasons_;
+  ReasonCounts all = reasons_;
+  for (const auto& [reason, n] : uncompressed_.all()) all.add(reason, n);
+  return all;
 }
 
 std::string Loader::lastProblem() const {

@@ -37,14 +37,16 @@ class Loader {
   void run();
   void finish();
   bool isWanted(const replay::Message& message) const;
+  void compress(replay::Message& message);
 
   const bool mono_;
+  const int quality_;  ///< of JPEG; 0: raw
   std::unique_ptr<replay::Dataset> drive_;
   TimePoint from_, until_;
   std::function<void()> notify_;
   BoundedQueue<replay::Message> queue_{16, Overflow::kBlock};
   mutable std::mutex mutex_;
-  ReasonCounts reasons_;
+  ReasonCounts reasons_, uncompressed_;
   std::string last_problem_;
   bool ended_ = false;
   std::thread thread_;

@@ -1,5 +1,6 @@
 // perdure-inference: frames to detections.
 #include "common/service/service.h"
+#include "common/vision/jpeg.h"
 #include "services/inference/worker.h"
 
 namespace {
@@ -24,10 +25,17 @@ void run(service::Context& context, const inference::Config& config) {
                                [&] { context.stop(); });
   worker = &the_worker;
 
+  ReasonCounts refused;
   context.on(bus::topics::kModel, [&](const ModelInfo& model) { worker->learn(model); });
   context.on(bus::topics::kSwap, [&](const SwapNotice& notice) { worker->told(notice); });
-  context.on(bus::topics::frame(config.detection.camera),
-             [&](const Frame& frame) { worker->offer(frame); });
+  context.on(bus::topics::frame(config.detection.camera), [&](const Frame& frame) {
+    if (const auto pixels = vision::decompressed(frame)) {
+      worker->offer(*pixels);
+    } else {
+      refused.add(pixels.error());
+    }
+  });
+  context.countReasons([&]() -> const ReasonCounts& { return refused; });
   context.on(bus::topics::kPredictions, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
   constexpr std::chrono::seconds kHangs{10};  // no network takes so long for a frame

@@ -4,6 +4,7 @@
 
 #include "common/bus/topics.h"
 #include "common/service/service.h"
+#include "common/vision/jpeg.h"
 #include "services/vio/node.h"
 #include "services/vio/state_file.h"
 
@@ -43,7 +44,11 @@ void serve(service::Context& context, const vio::Config& config) {
     context.on(topics::frame(config.cameras[i]), [&, i](const Frame& m) {
       if (!once[i].first(m.stamp.source, m.stamp.sequence)) return;
       if (i == 0) context.health().frameIn();
-      node.onFrame(m);
+      if (const auto pixels = vision::decompressed(m, ImageEncoding::kMono8)) {
+        node.onFrame(*pixels);
+      } else {
+        own.add(pixels.error());
+      }
     });
   }
   context.every(std::chrono::seconds(1), [&] {

@@ -15,3 +15,19 @@ for service in capture vio inference semantic-filter map-store; do
     grep -q -- "$place" <<< "$out" || { echo "perdure-$service does not name $place: $out"; exit 1; }
   done
 done
+# What all processes share is read beside a service's own file, which goes before it; a wrong one is
+# refused by services and commands.
+folder=$(mktemp -d)
+trap 'rm -r "$folder"' EXIT
+cp config/vio.yaml "$folder"
+printf 'bus:\n  vehicle: cart\n  domain: 7\n' > "$folder/bus.yaml"
+printed=$("$PERDURE_BIN/perdure-vio" --config "$folder/vio.yaml" --set bus.domain=8 --print-config)
+grep -q 'vehicle: "\?cart' <<< "$printed" || { echo "bus.yaml is not read: $printed"; exit 1; }
+grep -q 'domain: 8' <<< "$printed" || { echo "--set does not go before bus.yaml: $printed"; exit 1; }
+printf 'bus:\n  vehicel: cart\n' > "$folder/bus.yaml"
+for command in "perdure-vio --config $folder/vio.yaml --check-config" "perdure topics --seconds 0.1"; do
+  status=0
+  out=$(PERDURE_BUS="$folder/bus.yaml" "$PERDURE_BIN"/$command 2>&1) || status=$?
+  [ "$status" -eq 78 ] && grep -q 'bus.yaml:2:3' <<< "$out" ||
+    { echo "$command with a wrong bus.yaml: $status, $out"; exit 1; }
+done

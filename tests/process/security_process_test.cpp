@@ -216,7 +216,6 @@ class Strangers : public ::testing::Test {
   std::unique_ptr<Child> filter_ = bus_.filter();
 };
 
-
 using LongStrangers = Strangers;
 
 TEST_F(LongStrangers, WithTheRightIdentityAreNone) {

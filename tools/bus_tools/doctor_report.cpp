@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "common/vision/jpeg.h"
 #include "common/wire/json.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/doctor.h"
@@ -111,7 +112,10 @@ void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::
     const bus::Participant participant(domain, "perdure doctor");
     bus::WaitLoop loop(participant);
     bus::Reader<Frame> reader(participant, bus::topics::frame(camera.name));
-    loop.on(reader, [&](const Frame& frame) {
+    loop.on(reader, [&](const Frame& compressed) {
+      const auto pixels = vision::decompressed(compressed);
+      if (!pixels) return;
+      const Frame& frame = *pixels;
       writePnm(frame, folder / (camera.name +
                                 (frame.encoding == ImageEncoding::kMono8 ? ".pgm" : ".ppm")));
       loop.stop();

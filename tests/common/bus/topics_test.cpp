@@ -57,7 +57,13 @@ TEST(Configuration, OfLoopbackIsUnicastAndOfANetworkLeavesFragmentsAlone) {
   EXPECT_NE(lo.find("<Peer Address=\"127.0.0.1\"/>"), std::string::npos);
   EXPECT_NE(lo.find("<ParticipantIndex>auto"), std::string::npos);
   EXPECT_NE(lo.find("<FragmentSize>65000B"), std::string::npos);
+  EXPECT_EQ(lo.find("<NackDelay>"), std::string::npos);
   const std::string eth = configurationXml({.interface = "eth0"});
+  EXPECT_NE(eth.find("<AllowMulticast>true"), std::string::npos);
+  EXPECT_NE(eth.find("<NackDelay>5ms"), std::string::npos);
+  const std::string far = configurationXml({.interface = "lo0", .peers = {"10.0.0.2", "vehicle"}});
+  EXPECT_NE(far.find("<AllowMulticast>false"), std::string::npos);
+  EXPECT_NE(far.find("<Peer Address=\"10.0.0.2\"/><Peer Address=\"vehicle\"/>"), std::string::npos);
   EXPECT_NE(eth.find("name=\"eth0\""), std::string::npos);
   EXPECT_EQ(eth.find("FragmentSize"), std::string::npos);
 }

@@ -90,10 +90,24 @@ TEST(Refusals, OfImagesWhoseSizeIsNotThatOfTheirPixels) {
   EXPECT_EQ(of([](auto& w) { --w.pixels._length; }), "size_mismatch pixels");
   EXPECT_EQ(of([](auto& w) { w.pixels._length = 0; }), "size_mismatch pixels");
   EXPECT_EQ(of([](auto& w) { w.width = w.height = 0xffffffff; }), "out_of_range width");
-  EXPECT_EQ(of([](auto& w) { w.encoding = 2; }), "bad_enum encoding");
+  EXPECT_EQ(of([](auto& w) { w.encoding = 4; }), "bad_enum encoding");
   Frame no_pixels = example<Frame>();
   no_pixels.data = nullptr;
   EXPECT_EQ(refusal(no_pixels), "size_mismatch pixels");
+}
+
+TEST(Refusals, OfJpegsThatAreTooSmallOrTooLargeToBeTheImage) {
+  const auto of = [](auto change) { return decodeRefusal(example<Frame>(), change); };
+  EXPECT_EQ(of([](auto& w) { w.encoding = 3; }), "");
+  EXPECT_EQ(of([](auto& w) { w.encoding = 2, --w.pixels._length; }), "");
+  EXPECT_EQ(of([](auto& w) { w.encoding = 3, w.pixels._length = 3; }), "size_mismatch pixels");
+  Frame large = example<Frame>();
+  large.encoding = ImageEncoding::kJpegMono8;
+  const std::size_t pixels = std::size_t{large.width} * large.height;
+  large.data = std::make_shared<const std::vector<std::uint8_t>>(2 * pixels + 4096);
+  EXPECT_EQ(refusal(large), "");
+  large.data = std::make_shared<const std::vector<std::uint8_t>>(2 * pixels + 4097);
+  EXPECT_EQ(refusal(large), "size_mismatch pixels");
 }
 
 TEST(Refusals, OfCovariancesThatAreNone) {

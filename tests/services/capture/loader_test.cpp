@@ -7,6 +7,7 @@
 #include <condition_variable>
 
 #include "common/base/errors.h"
+#include "common/vision/jpeg.h"
 #include "services/capture/run_file.h"
 #include "tests/services/capture/tiny_drive.h"
 
@@ -31,6 +32,7 @@ class LoaderTest : public ::testing::Test {
     std::vector<std::int64_t> samples_ns;
     ReasonCounts reasons;
     std::string problem;
+    std::size_t compressed = 0;
   };
   Loaded load(const testing::TinyDrive& drive, std::uint64_t first = 0) {
     config_.dataset.path = drive.write(folder_);
@@ -54,7 +56,12 @@ class LoaderTest : public ::testing::Test {
       if (!message) continue;
       if (auto* frame = std::get_if<Frame>(&*message)) {
         EXPECT_EQ(frame->stamp.source, 9u);
-        EXPECT_EQ(frame->data->front(), frame->stamp.sequence) << "the pixels are of another frame";
+        out.compressed += isCompressed(frame->encoding);
+        const auto pixels = vision::decompressed(*frame);
+        EXPECT_TRUE(pixels);
+        const double rounding = isCompressed(frame->encoding) ? 1.0 : 0.0;
+        EXPECT_NEAR(pixels->data->front(), frame->stamp.sequence, rounding)
+            << "the pixels are of another frame";
         out.frames.emplace_back(frame->stamp.sequence, frame->camera);
       } else if (auto* imu = std::get_if<ImuSample>(&*message)) {
         out.samples_ns.push_back(toNanoseconds(imu->time));
@@ -95,6 +102,14 @@ TEST_F(LoaderTest, MonoLeavesTheSecondCameraOut) {
   EXPECT_EQ(load(drive).frames.size(), 40u);
   config_.dataset.cameras = "mono";
   EXPECT_EQ(load(drive).frames.size(), 20u);
+}
+
+TEST_F(LoaderTest, CompressesImagesWhereItIsTold) {
+  EXPECT_EQ(load({}).compressed, 0u);
+  config_.image.compress = "jpeg";
+  const Loaded out = load({});
+  EXPECT_EQ(out.frames.size(), 20u);
+  EXPECT_EQ(out.compressed, 20u);
 }
 
 TEST_F(LoaderTest, StartsAtTheFrameItIsToldTo) {

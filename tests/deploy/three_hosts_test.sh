@@ -1,0 +1,145 @@
+#!/usr/bin/env bash
+# Three hosts: capture and vio, inference, filter and map, in network namespaces of their own on one
+# bridge. The simulated drive at its own pace, compared with the same drive on one host: with 5 % of
+# all packets lost, with a link that is cut for 2 s, with a host that is gone for 12 s, and raw
+# images against JPEG, open and closed. Needs root; skips (77) without. PERDURE_OUT keeps what comes out.
+set -euo pipefail
+cd "$PERDURE_SOURCE"
+
+skip() { echo "$1: skipped"; exit 77; }
+[ "$(id -u)" -eq 0 ] || skip "not root, no network namespaces"
+for program in ip nsenter supervisord python3; do
+  command -v "$program" > /dev/null || skip "$program is not here"
+done
+if [ -z "${PERDURE_THREE_HOSTS:-}" ]; then
+  export PERDURE_THREE_HOSTS=yes
+  exec unshare --net --mount --propagation private "$0" "$@"
+fi
+
+out=${PERDURE_OUT:-$(mktemp -d)}
+mkdir -p "$out"
+began=$(date +%s%N)
+say() { printf '%7.1f  %s\n' "$((($(date +%s%N) - began) / 1000000))e-3" "$1"; }
+rm -f "$out/verdicts"
+# judge NAME [WHAT EXPRESSION]…: figures of a run, and what must hold of them; `one` is one host's.
+judge() {
+  say "$(python3 - "$out" "$@" << 'PY'
+import json, sys
+out, name, *claims = sys.argv[1:]
+def figures(run):
+    report = json.load(open(f"{out}/{run}/report.json"))
+    services = report["services"]
+    return {"sent": services["capture"]["frames_out"], "got": services["inference"]["frames_in"],
+            "recall": report["objects"]["recall"], **report["latency_ms"],
+            "mb": round(int(open(f"{out}/{run}.bytes").read()) / 1e6, 1)}
+known = figures(name)
+print(name, " ".join(f"{key} {value}" for key, value in known.items()))
+known["one"] = figures("one_host")["recall"]
+for what, holds in zip(claims[::2], claims[1::2]):
+    print(" " * 9 + ("ok: " if eval(holds, known) else "FAILED: ") + f"{what} ({holds})")
+PY
+)" | tee -a "$out/verdicts"
+}
+
+# --- the hosts ---
+mkdir -p /run/netns
+mount -t tmpfs none /run/netns
+ip link set lo up
+ip link add name br0 type bridge 2> /dev/null || skip "no bridges in this kernel"
+ip link set br0 up
+for host in 1 2 3; do
+  ip netns add "h$host"
+  ip link add name "to$host" type veth peer name eth0 netns "h$host"
+  ip link set "to$host" master br0 up
+  ip -n "h$host" link set lo up
+  ip -n "h$host" addr add "10.77.0.$host/24" dev eth0
+  ip -n "h$host" link set eth0 up
+done
+on() { nsenter --net="/run/netns/$1" "${@:2}"; }
+sent() { ip -n "$1" -s -j link show eth0 | python3 -c 'import json, sys; print(json.load(sys.stdin)[0]["stats64"]["tx"]["bytes"])'; }
+
+drive=${PERDURE_DRIVE:-$PERDURE_SOURCE/build/three_hosts/drive}
+[ -e "$drive/objects_truth.json" ] ||
+  "$PERDURE_BIN/perdure" simulate --scene street --seed 1 --seconds 30 --encoding jpeg --quiet --out "$drive"
+
+# hosts FOLDER [SETTING]: programs that are started on their hosts; capture gets the setting too.
+hosts() {
+  mkdir -p "$1"
+  local service host more
+  for service in capture:1 vio:1 inference:2 semantic-filter:3 map-store:3; do
+    host=${service#*:} service=perdure-${service%:*} more=
+    [ "$service" = perdure-capture ] && [ $# -gt 1 ] && more="--set $2"
+    printf '#!/bin/sh\nexec nsenter --net=/run/netns/h%s %s/%s "$@" %s\n' "$host" "$PERDURE_BIN" \
+      "$service" "$more" > "$1/$service"
+    chmod +x "$1/$service"
+  done
+}
+printf 'bus:\n  interface: eth0\n' > "$out/bus.yaml"
+: > "$out/one_host.yaml"
+hosts "$out/raw"
+hosts "$out/jpeg" image.compress=jpeg
+
+# drive NAME PROGRAMS [VARIABLE=VALUE …]: the demo on host 3, which listens and compares.
+drive() {
+  local before
+  before=$(sent h1)
+  on h3 env PERDURE_BUS="$out/bus.yaml" "${@:3}" "$PERDURE_BIN/perdure" demo --data "$drive" \
+    --model "$PERDURE_SOURCE/models/perdure_320x240.onnx" --root "$PERDURE_SOURCE" \
+    --programs "$2" --out "$out/$1" > "$out/$1.log" 2>&1 || { tail "$out/$1.log"; exit 1; }
+  echo $(($(sent h1) - before)) > "$out/$1.bytes"
+}
+# --- one host, three hosts ---
+on h3 env PERDURE_BUS="$out/one_host.yaml" "$PERDURE_BIN/perdure" demo --data "$drive" \
+  --model models/perdure_320x240.onnx --root . --out "$out/one_host" > "$out/one_host.log" 2>&1
+echo 0 > "$out/one_host.bytes"
+judge one_host
+
+frames=("99 % of the frames at inference" "got >= .99 * sent")
+objects=("objects as on one host" "recall >= one - .02")
+for kind in raw jpeg; do
+  drive "$kind" "$out/$kind"
+  judge "$kind" "${frames[@]}" "${objects[@]}"
+done
+
+# --- closed to strangers, and by unicast alone ---
+rm -rf "$out/security"
+"$PERDURE_BIN/perdure" security init --dir "$out/security" > /dev/null
+printf 'bus:\n  interface: eth0\n  peers: [10.77.0.1, 10.77.0.2, 10.77.0.3]\n  security: %s\n' \
+  "$out/security" > "$out/closed.yaml"
+drive closed "$out/jpeg" PERDURE_BUS="$out/closed.yaml"
+judge closed "${frames[@]}" "${objects[@]}"
+
+# --- 5 % of all packets, of each process ---
+lossy=$(on h1 env PERDURE_BUS="$out/bus.yaml" "$PERDURE_BIN/perdure" env |
+  sed -n "s/^export CYCLONEDDS_URI='\(.*\)'$/\1/p" |
+  sed 's|<Internal>|<Internal><Test><XmitLossiness>50</XmitLossiness></Test>|')
+[[ "$lossy" == *XmitLossiness* ]] || { say "FAILED: perdure env has no <Internal>"; exit 1; }
+for kind in raw jpeg; do
+  drive "lossy_$kind" "$out/$kind" CYCLONEDDS_URI="$lossy"
+  judge "lossy_$kind" "${frames[@]}" "${objects[@]}"
+done
+
+# --- inference's link is cut, its host is gone ---
+# absent NAME SECONDS: from 8 s after the start on; says when its detections are heard again.
+absent() {
+  { sleep 8
+    ip link set to2 down
+    sleep "$2"
+    ip link set to2 up
+    local up
+    up=$(date +%s%N)
+    for _ in $(seq 8); do
+      on h3 env PERDURE_BUS="$out/bus.yaml" PERDURE_DOMAIN=60 "$PERDURE_BIN/perdure" \
+        hz detections --seconds 1 2> /dev/null | grep -qE '^detections: [1-9]' || continue
+      say "$1: detections are heard again $((($(date +%s%N) - up) / 1000000)) ms after the link is back"
+      break
+    done
+  } &
+  drive "$1" "$out/raw" PERDURE_DOMAIN=60
+  wait $!
+}
+absent cut 2
+judge cut "no frames lost but those of 3 s" "got >= sent - 60"
+absent gone 12
+judge gone "no frames lost but those of 16 s" "got >= sent - 320"
+! grep -q FAILED "$out/verdicts"
