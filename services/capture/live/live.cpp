@@ -27,6 +27,8 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
   settings.gain = config.camera.gain;
   settings.readout_s = camera.readout_s;
   settings.encoding = config.image.cam0;
+  if (config.image.compress == "jpeg")
+    settings.jpeg_quality = static_cast<int>(config.image.quality);
   return settings;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/base/bounded_queue.h"
+#include "common/vision/jpeg.h"
 #include "services/capture/live/camera_memory.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/pixels.h"
@@ -237,6 +238,9 @@ class LiveCamera::Session {
     auto frame = packed(layout_, stream().size.width, stream().size.height,
                         imagePlanes(stream(), layout_, memory, metadata), settings_.encoding);
     memory.sync(false);
+    if (frame && settings_.jpeg_quality > 0) {
+      frame = vision::compressed(*frame, settings_.jpeg_quality);
+    }
     if (!frame) return tl::unexpected(frame.error());
     const auto exposure = request.metadata().get(controls::ExposureTime);
     const auto start = request.metadata().get(controls::SensorTimestamp);

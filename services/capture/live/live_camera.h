@@ -21,6 +21,7 @@ struct CameraSettings {
   double rate_hz = 20.0;
   double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
   double readout_s = 0.0;                ///< first to last row
+  int jpeg_quality = 0;                  ///< 1 … 100: images travel as JPEG; 0: raw
   std::string encoding = "as_is";        ///< as_is, mono8, bgr8
 };
 
