@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <ctime>
 #include <memory>
 
@@ -24,18 +25,18 @@ Result<void> requireFiles(const std::string& folder) {
   using namespace identity_files;
   for (const char* file : {kCa, kRevoked, kCertificate, kKey, kGovernance, kPermissions}) {
     const std::string path = pathOf(folder, file);
-    if (access(path.c_str(), F_OK) != 0) {
-      return fail("file_missing",
-                  fmt::format("{} is missing; `perdure security init` makes the identities of the "
-                              "services, `perdure security add` others; then copy the folder here",
-                              path));
+    if (access(path.c_str(), R_OK) == 0) continue;
+    if (errno == EACCES) {
+      return fail(
+          "file_unreadable",
+          fmt::format("{} cannot be read by this user; run as its owner (sudo), or give the "
+                      "identity to this one: chown -R USER {}",
+                      path, folder));
     }
-    if (access(path.c_str(), R_OK) != 0) {
-      return fail("file_missing",
-                  fmt::format("{} cannot be read by this user; give the identity to it: chown -R "
-                              "USER {}",
-                              path, folder));
-    }
+    return fail("file_missing",
+                fmt::format("{} is missing; `perdure security init` makes the identities of the "
+                            "services, `perdure security add` others; then copy the folder here",
+                            path));
   }
   struct stat key {};
   const std::string path = pathOf(folder, kKey);

@@ -28,8 +28,8 @@ struct Identity {
 
 /// Reads the folder and checks what DDS would check, but in words: files there and readable, key
 /// closed to others and of this certificate, certificate of this authority, not revoked, valid now.
-/// Codes: file_missing, key_open, key_wrong, authority_wrong, revoked, not_yet_valid, expired,
-/// file_malformed. The detail says the mend.
+/// Codes: file_missing, file_unreadable, key_open, key_wrong, authority_wrong, revoked,
+/// not_yet_valid, expired, file_malformed. The detail says the mend.
 Result<Identity> readIdentity(const std::string& folder);
 
 /// The same for a participant's QoS ("dds.sec.auth.private_key", …) and as XML for CYCLONEDDS_URI.

@@ -123,7 +123,7 @@ Context::Context(const std::string& process, const bus::Options& options,
       loop_(participant_) {
   countReasons([this](ReasonCounts& counts) {
     health_writer_.report(counts);
-    bus::securityLog().report(counts);
+    if (participant_.identity()) bus::securityLog().report(counts);
     if (clock_steps_.count() > 0) counts.add("wall_clock_stepped", clock_steps_.count());
     if (clock_steps_.recent()) counts.add("wall_clock_stepped_just_now");
   });
@@ -184,6 +184,7 @@ void Context::logNewRefusals() {
       if (logged_refusals_.insert(count).second) log_->warn("{}, first: {}", count, detail);
     }
   }
+  if (!participant_.identity()) return;
   const auto shut_out = bus::securityLog().firstDetails();
   for (const auto& [count, detail] : shut_out) {
     if (logged_refusals_.insert(count).second) log_->warn("{}, first: {}", count, detail);

@@ -21,7 +21,7 @@ mkdir -p "$out"
 began=$(date +%s%N)
 say() { printf '%7.1f  %s\n' "$((($(date +%s%N) - began) / 1000000))e-3" "$1"; }
 rm -f "$out/verdicts"
-# judge NAME [WHAT EXPRESSION]…: figures of a run, and what must hold of them; `one` is one host's.
+# judge NAME [WHAT EXPRESSION]…: figures of a run, and what must hold of them; `one` is the recall on one host.
 judge() {
   say "$(python3 - "$out" "$@" << 'PY'
 import json, sys
@@ -34,7 +34,7 @@ def figures(run):
             "mb": round(int(open(f"{out}/{run}.bytes").read()) / 1e6, 1)}
 known = figures(name)
 print(name, " ".join(f"{key} {value}" for key, value in known.items()))
-known["one"] = figures("one_host")["recall"]
+known["one"] = sum(figures(run)["recall"] for run in ("one_host", "one_host_again")) / 2
 for what, holds in zip(claims[::2], claims[1::2]):
     print(" " * 9 + ("ok: " if eval(holds, known) else "FAILED: ") + f"{what} ({holds})")
 PY
@@ -89,10 +89,14 @@ drive() {
   echo $(($(sent h1) - before)) > "$out/$1.bytes"
 }
 # --- one host, three hosts ---
-on h3 env PERDURE_BUS="$out/one_host.yaml" "$PERDURE_BIN/perdure" demo --data "$drive" \
-  --model models/perdure_320x240.onnx --root . --out "$out/one_host" > "$out/one_host.log" 2>&1
-echo 0 > "$out/one_host.bytes"
+# Twice: one object more or less, by the timing of a run, is .05 of recall here.
+for run in one_host one_host_again; do
+  on h3 env PERDURE_BUS="$out/one_host.yaml" "$PERDURE_BIN/perdure" demo --data "$drive" \
+    --model models/perdure_320x240.onnx --root . --out "$out/$run" > "$out/$run.log" 2>&1
+  echo 0 > "$out/$run.bytes"
+done
 judge one_host
+judge one_host_again
 
 frames=("99 % of the frames at inference" "got >= .99 * sent")
 objects=("objects as on one host" "recall >= one - .02")

@@ -1,6 +1,7 @@
 #include <iostream>
 #include <memory>
 
+#include "common/base/errors.h"
 #include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
 
@@ -16,6 +17,11 @@ std::string singleQuoted(const std::string& text) {
 
 void printEnvironment(const bus::Options& given) {
   const bus::Options options = bus::withEnvironment(given);
+  if (!options.security.empty() && options.identity.empty()) {
+    throw StartupError(ExitCode::kUsage,
+                       "bus.security is set: --identity NAME says whose identity other programs "
+                       "take; `perdure security list` shows those there are");
+  }
   std::cout << "export CYCLONEDDS_URI=" << singleQuoted(bus::foreignXml(options)) << '\n';
   if (options.domain != 0) std::cout << "export PERDURE_DOMAIN=" << options.domain << '\n';
 }

@@ -212,5 +212,25 @@ TEST(Status, SurvivesAMessageThatIsNoText) {
   EXPECT_THAT(dumped(toJson(judge(seen))), HasSubstr("broken"));
 }
 
+TEST(Status, TellsOfTheIdentityThatEndsFirstAndOfOneThatIsNotFit) {
+  using namespace std::chrono_literals;
+  const auto now = std::chrono::system_clock::now();
+  StatusSeen seen = sound();
+  EXPECT_EQ(find(judge(seen), "security").name, "none") << "an open bus has none";
+  seen.host.closed = true;
+  seen.host.identities = {{"capture", now + 24h * 100 + 1h, {}}, {"vio", now + 24h * 90 + 1h, {}}};
+  seen.services["vio"].health.reasons["security_refused_no_certificate"] = 3;
+  seen.services["vio"].health.reasons["security_refused_expired"] = 4;
+  EXPECT_EQ(dominating(seen, "security"), Level::kOk);
+  EXPECT_THAT(find(judge(seen), "security").text, HasSubstr("vio ends in 90 days"));
+  EXPECT_THAT(find(judge(seen), "security").text, HasSubstr("refused 7 times"));
+  seen.host.identities[0].until = now + 72h + 1h;
+  EXPECT_EQ(dominating(seen, "security"), Level::kDegraded);
+  EXPECT_THAT(find(judge(seen), "security").text, HasSubstr("capture ends in 3 days"));
+  seen.host.identities[1] = {"vio", {}, "the identity vio was revoked"};
+  EXPECT_EQ(dominating(seen, "security"), Level::kFailed);
+  EXPECT_THAT(find(judge(seen), "security").text, HasSubstr("was revoked"));
+}
+
 }  // namespace
 }  // namespace perdure::tools
