@@ -50,6 +50,25 @@ Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
                                 m.rows.data(), m.cols.data(), m.values.data());
 }
 
+/// The Jacobian by all unknowns, `last` at its end, and the residuals.
+Eigen::SparseMatrix<double> jacobianWithLast(ceres::Problem& problem,
+                                             const std::vector<double*>& last,
+                                             std::vector<double>& residuals) {
+  ceres::Problem::EvaluateOptions options;
+  options.num_threads = 2;
+  std::vector<double*> blocks;
+  problem.GetParameterBlocks(&blocks);
+  for (double* block : blocks) {
+    const bool is_last = std::find(last.begin(), last.end(), block) != last.end();
+    if (is_last || problem.IsParameterBlockConstant(block)) continue;
+    options.parameter_blocks.push_back(block);
+  }
+  options.parameter_blocks.insert(options.parameter_blocks.end(), last.begin(), last.end());
+  ceres::CRSMatrix crs;
+  problem.Evaluate(options, nullptr, &residuals, nullptr, &crs);
+  return toEigen(crs);
+}
+
 }  // namespace
 
 CameraImuProblem::CameraImuProblem(const Board& board, DistortionModel model, double readout_s,
@@ -232,50 +251,37 @@ std::vector<int> CameraImuProblem::clusterOfRows() const {
   return clusters;
 }
 
-// By the normal equations rather than ceres::Covariance: a QR of the whole Jacobian takes minutes.
+std::vector<double*> CameraImuProblem::calibrationBlocks() {
+  std::vector<double*> blocks = {x.q_BC.coeffs().data(), x.p_BC.data(), &x.time_offset_s};
+  if (!options_.hold_lens) blocks.push_back(x.lens.data());
+  if (!options_.hold_lens && hasDistortion()) blocks.push_back(x.lens.data() + 4);
+  return blocks;
+}
+
+// One sparse factorisation of the normal equations, of whose inverse only the wanted columns are
+// made.
 Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
+  const auto blind =
+      fail("calibrate_not_observable",
+           "the recording does not tell where the camera sits on the IMU; turn it to "
+           "and fro about all three axes, and shake it, while the board is in view");
   ceres::Problem problem;
   build(problem);
-  std::vector<double*> wanted = {x.q_BC.coeffs().data(), x.p_BC.data(), &x.time_offset_s};
-  Eigen::Index calibrated = 7;
-  if (!options_.hold_lens) {
-    wanted.push_back(x.lens.data()), calibrated += 4;
-    if (hasDistortion()) wanted.push_back(x.lens.data() + 4), calibrated += 4;
-  }
+  std::vector<double*> wanted = calibrationBlocks();
+  constexpr Eigen::Index kSizes[] = {3, 6, 7, 11, 15};  // of the first so many blocks
+  const Eigen::Index calibrated = kSizes[wanted.size() - 1], size = calibrated + 6;
   const std::size_t middle = x.gyro_bias.size() / 2;
-  wanted.push_back(x.gyro_bias[middle].data());
-  wanted.push_back(x.accel_bias[middle].data());
-  ceres::Problem::EvaluateOptions options;
-  options.num_threads = 2;
-  std::vector<double*> blocks;
-  problem.GetParameterBlocks(&blocks);
-  for (double* block : blocks) {
-    const bool is_wanted = std::find(wanted.begin(), wanted.end(), block) != wanted.end();
-    if (!is_wanted && !problem.IsParameterBlockConstant(block)) {
-      options.parameter_blocks.push_back(block);
-    }
-  }
-  options.parameter_blocks.insert(options.parameter_blocks.end(), wanted.begin(), wanted.end());
-  ceres::CRSMatrix crs;
+  wanted.insert(wanted.end(), {x.gyro_bias[middle].data(), x.accel_bias[middle].data()});
   std::vector<double> residuals;
-  problem.Evaluate(options, nullptr, &residuals, nullptr, &crs);
-  const Eigen::SparseMatrix<double> J = toEigen(crs);
+  const Eigen::SparseMatrix<double> J = jacobianWithLast(problem, wanted, residuals);
   const Eigen::SparseMatrix<double> information = J.transpose() * J;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(information);
-  const Eigen::Index size = calibrated + 6, first = information.cols() - size;
-  const char* blind =
-      "the recording does not tell where the camera sits on the IMU; turn it to and fro about all "
-      "three axes, and shake it, while the board is in view";
-  if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0.0) {
-    return fail("calibrate_not_observable", blind);
-  }
+  if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0.0) return blind;
   Eigen::MatrixXd units = Eigen::MatrixXd::Zero(information.cols(), size);
   units.bottomRows(size).setIdentity();
   const Eigen::MatrixXd columns = solver.solve(units);
-  const Eigen::MatrixXd covariance = columns.middleRows(first, size);
-  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0) {
-    return fail("calibrate_not_observable", blind);
-  }
+  const Eigen::MatrixXd covariance = columns.bottomRows(size);
+  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0) return blind;
   Certainty out;
   const Eigen::MatrixXd own = covariance.topLeftCorner(calibrated, calibrated);
   out.widened =
