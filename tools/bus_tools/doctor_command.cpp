@@ -33,8 +33,7 @@ const char* wordOf(Verdict verdict) {
   return "FAIL";
 }
 
-void tell(const Findings& findings) {
-  std::cout << toText(findings);
+void stopIfFailed(const Findings& findings) {
   const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
     return finding.verdict == Verdict::kFail;
   });
@@ -47,7 +46,9 @@ void runDoctor(const DoctorOptions& given) {
                        "--rig is judged by a recording; give --data DRIVE (with images) as well");
   }
   if (!given.recording.empty()) {
-    return tell(checkRigBy(given.recording, given.rig, given.rig_seconds));
+    const Findings findings = checkRigBy(given.recording, given.rig, given.rig_seconds);
+    std::cout << toText(findings);
+    return stopIfFailed(findings);
   }
   DoctorOptions options = given;
   options.bus.shared_memory_mb =
@@ -62,6 +63,7 @@ void runDoctor(const DoctorOptions& given) {
   for (const std::string& folder : options.folders) findings.push_back(checkWritable(folder));
   const Findings bus = checkBus(options.bus, options.seconds);
   findings.insert(findings.end(), bus.begin(), bus.end());
+  std::cout << toText(findings);
   if (!options.report.empty()) {
     writeReport({.bus = options.bus,
                  .file = options.report,
@@ -70,7 +72,7 @@ void runDoctor(const DoctorOptions& given) {
                 findings);
     std::cout << "report: " << options.report << '\n';
   }
-  tell(findings);
+  stopIfFailed(findings);
 }
 
 }  // namespace
