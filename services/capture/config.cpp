@@ -10,8 +10,6 @@ void describeDataset(Config& c, config::Fields& fields) {
               {"folder of the drive: EuRoC, KITTI raw or KITTI tracking; or a recording of images "
                "(.mcap)"});
   fields.text("dataset.sequence", c.dataset.sequence, {"of KITTI tracking: \"0001\""});
-  fields.text("dataset.rig", c.dataset.rig,
-              {"rig file of `perdure calibrate`, instead of the drive's own calibration"});
   fields.choice("dataset.cameras", c.dataset.cameras, {"mono", "stereo"},
                 {"mono: cam0 only; stereo: cam1 too, where the drive has one"});
   fields.number("dataset.lead_s", c.dataset.lead_s, config::atLeast(0),
@@ -28,9 +26,6 @@ void describeDataset(Config& c, config::Fields& fields) {
 }
 
 void describeLive(Config& c, config::Fields& fields) {
-  fields.text("rig", c.rig,
-              {"live: file with cameras and IMU of the vehicle, as `perdure calibrate` writes it; "
-               "the camera is asked for images of its size"});
   fields.text("camera.id", c.camera.id,
               {"live: libcamera's id of the camera, or a part of it; empty: the first there is"});
   fields.text(
@@ -62,6 +57,10 @@ void describe(Config& c, config::Fields& fields) {
   fields.choice("source", c.source, {"dataset", "libcamera"},
                 {"where images and samples come from: a drive in files, or a camera of libcamera "
                  "and an IMU of IIO"});
+  fields.text(
+      "rig", c.rig,
+      {"file with cameras and IMU of the vehicle, as `perdure calibrate` writes it: of live "
+       "sensors (the camera is asked for images of its size), and instead of a drive's own"});
   describeDataset(c, fields);
   describeLive(c, fields);
   fields.choice("pace.mode", c.pace.mode, {"clock", "follow"},

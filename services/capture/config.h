@@ -12,7 +12,6 @@ namespace perdure::capture {
 struct DatasetConfig {
   std::string path;
   std::string sequence;  ///< KITTI tracking only
-  std::string rig;       ///< a file that goes before the drive's own calibration
   std::string cameras = "stereo";
   double lead_s = 5.0, trail_s = 0.5;
 };

@@ -59,7 +59,7 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
   replay::DatasetOptions options;
   options.path = config.dataset.path;
   options.sequence = config.dataset.sequence;
-  options.rig = config.dataset.rig;
+  options.rig = config.rig;
   options.source = source;
   options.encoding = encodingOf(config.image.cam0);
   options.second_encoding = encodingOf(config.image.cam1);
