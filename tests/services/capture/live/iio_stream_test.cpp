@@ -72,7 +72,7 @@ TEST_F(Stream, GivesEveryScanInUnitsAtItsTimeWhateverTheClockThere) {
     EXPECT_NEAR(now.gyro->y(), -0.007, 1e-12);
     const double step = now.gyro->x() - before.gyro->x();
     EXPECT_NEAR(step < 0 ? step + 1.0 : step, 0.001, 1e-9) << "a scan is missing";
-    EXPECT_NEAR(static_cast<double>(now.time_ns - before.time_ns), 5e6, 1e5);
+    EXPECT_NEAR(static_cast<double>(now.time_ns - before.time_ns), 5e6, 5e5);
     EXPECT_LE(now.time_ns, arrived_ns_[i] + kSecond / 1000);
     EXPECT_LT(arrived_ns_[i] - now.time_ns, kSecond / 2);
   }
@@ -84,7 +84,7 @@ TEST_F(Stream, CountsWhereTheDeviceHasNoStamps) {
   ASSERT_TRUE(flows(150)) << stream_->problem();
   stream_.reset();
   for (std::size_t i = 1; i < scans_.size(); ++i) {
-    EXPECT_NEAR(static_cast<double>(scans_[i].time_ns - scans_[i - 1].time_ns), 1e7, 2e5);
+    EXPECT_NEAR(static_cast<double>(scans_[i].time_ns - scans_[i - 1].time_ns), 1e7, 5e5);
   }
 }
 

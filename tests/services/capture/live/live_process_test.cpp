@@ -78,7 +78,8 @@ TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
       {.id = "iio:device0", .name = "gyro", .accel = false, .rate_hz = 200.0},
       {.id = "iio:device1", .name = "accel", .gyro = false, .rate_hz = 125.0}};
   auto iiod = std::make_unique<FakeIiod>(address_, imus);
-  const Child capture(command({"imu.uri=ip:" + address_, "imu.gyro=gyro", "imu.accel=accel"}),
+  const Child capture(command({"imu.uri=ip:" + address_, "imu.gyro=gyro", "imu.accel=accel",
+                               "camera.id=that nobody has"}),
                       folder_.file("log"));
   ASSERT_TRUE(runUntil(loop_, [&] { return samples_.size() >= 200; })) << capture.log();
   EXPECT_TRUE(samples_.back().accel.isApprox(Eigen::Vector3d(0.05, -0.06, 9.81), 1e-9));
@@ -90,7 +91,8 @@ TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
   EXPECT_EQ(calibration_.cameras.size(), 1U);
   EXPECT_TRUE(calibration_.imu);
   ASSERT_TRUE(runUntil(loop_, [&] { return last_health_.state == HealthState::kDegraded; }));
-  EXPECT_THAT(last_health_.message, HasSubstr("libcamera sees no camera"));
+  EXPECT_THAT(last_health_.message,
+              HasSubstr("libcamera sees no camera with that nobody has in its id"));
   EXPECT_GT(last_health_.reasons["camera_absent"], 0U);
   EXPECT_EQ(last_health_.reasons["imu_absent"], 0U);
 
