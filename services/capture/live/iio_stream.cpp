@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kBlock_s = 0.01;       // of samples in one read: what it adds to their age
 constexpr unsigned kTimeout_ms = 1000;  // without a sample: gone
-constexpr std::chrono::milliseconds kPause{500};
 
 std::string sayError(ssize_t code) {
   char text[128];
@@ -305,10 +304,7 @@ class IioStream::Device {
 };
 
 IioStream::IioStream(IioSettings settings, std::function<void(const IioScan&)> give)
-    : settings_(std::move(settings)),
-      give_(std::move(give)),
-      problem_("the IMU has not been opened yet"),
-      thread_([this] { run(); }) {}
+    : settings_(std::move(settings)), give_(std::move(give)), thread_([this] { run(); }) {}
 
 IioStream::~IioStream() {
   {
@@ -319,44 +315,19 @@ IioStream::~IioStream() {
   thread_.join();
 }
 
-std::string IioStream::problem() const {
-  const std::lock_guard lock(mutex_);
-  return problem_;
-}
-
-std::string IioStream::name() const {
-  const std::lock_guard lock(mutex_);
-  return name_;
-}
-
-ReasonCounts IioStream::reasons() const {
-  const std::lock_guard lock(mutex_);
-  return reasons_;
-}
-
-void IioStream::note(const std::string& reason, const std::string& problem) {
-  const std::lock_guard lock(mutex_);
-  reasons_.add(reason);
-  problem_ = problem;
-  name_.clear();
-}
-
 void IioStream::run() {
   // libiio writes to sockets that may be gone: it says so, and needs no signal.
   sigset_t pipe;
   sigemptyset(&pipe);
   sigaddset(&pipe, SIGPIPE);
   pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
-  while (!stopping_) {
+  keepOpen(stopping_, [this] {
     if (auto device = Device::open(settings_)) {
       flow(**device);
     } else {
-      note(device.error().code, device.error().detail);
+      state_.fails(device.error());
     }
-    for (auto left = kPause; !stopping_ && left.count() > 0; left -= kPause / 10) {
-      std::this_thread::sleep_for(kPause / 10);
-    }
-  }
+  });
 }
 
 void IioStream::flow(Device& device) {
@@ -368,10 +339,8 @@ void IioStream::flow(Device& device) {
   ssize_t got = 0;
   std::uint64_t jumps = 0;
   while (!stopping_ && (got = device.read(give_)) >= 0) {
-    const std::lock_guard lock(mutex_);
-    problem_.clear();
-    name_ = device.name();
-    if (device.jumps() > jumps) reasons_.add("imu_clock_jump", device.jumps() - jumps);
+    state_.flows(device.name());
+    if (device.jumps() > jumps) state_.count("imu_clock_jump", device.jumps() - jumps);
     jumps = device.jumps();
   }
   {
@@ -379,8 +348,9 @@ void IioStream::flow(Device& device) {
     open_ = nullptr;
   }
   if (stopping_) return;
-  note("imu_lost", fmt::format("the IMU {} at {} gives nothing any more: {}; it is tried again.",
-                               device.name(), settings_.uri, sayError(got)));
+  state_.fails(
+      {"imu_lost", fmt::format("the IMU {} at {} gives nothing any more: {}; it is tried again.",
+                               device.name(), settings_.uri, sayError(got))});
 }
 
 }  // namespace perdure::capture

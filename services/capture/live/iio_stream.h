@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "common/base/result.h"
+#include "services/capture/live/device_state.h"
 #include "services/capture/live/imu_pairing.h"
 
 struct iio_buffer;
@@ -42,26 +42,20 @@ class IioStream {
   IioStream(const IioStream&) = delete;
   IioStream& operator=(const IioStream&) = delete;
 
-  /// A sentence with the mend; empty where it flows.
-  std::string problem() const;
-  /// What it is and at which rate, for people; empty while there is none.
-  std::string name() const;
-  /// "imu_absent" (a try to open it), "imu_lost" (it flowed), "imu_clock_jump".
-  ReasonCounts reasons() const;
+  /// Counts "imu_absent" (a try to open it), "imu_lost" (it flowed), "imu_clock_jump".
+  const DeviceState& state() const { return state_; }
 
  private:
   class Device;
   void run();
   void flow(Device& device);
-  void note(const std::string& reason, const std::string& problem);
 
   const IioSettings settings_;
   const std::function<void(const IioScan&)> give_;
   std::atomic<bool> stopping_{false};
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   iio_buffer* open_ = nullptr;  ///< to be cancelled when it is to stop
-  std::string problem_, name_;
-  ReasonCounts reasons_;
+  DeviceState state_{"the IMU has not been opened yet"};
   std::thread thread_;
 };
 

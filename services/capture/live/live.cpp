@@ -121,10 +121,10 @@ void Live::publish(const InertialPair& sample) {
 }
 
 void Live::updateHealth() {
-  std::string problem = camera_->problem(), names = camera_->name();
+  std::string problem = camera_->state().problem(), names = camera_->state().name();
   for (const auto& imu : imus_) {
-    join(problem, imu->problem(), " ");
-    join(names, imu->name(), "; ");
+    join(problem, imu->state().problem(), " ");
+    join(names, imu->state().name(), "; ");
   }
   if (names != said_ && !names.empty()) context_.log().info("gives {}", names);
   said_ = names;
@@ -136,8 +136,8 @@ void Live::report(ReasonCounts& counts) const {
     for (const auto& [reason, n] : more.all()) counts.add(reason, n);
   };
   add(reasons_);
-  add(camera_->reasons());
-  for (const auto& imu : imus_) add(imu->reasons());
+  add(camera_->state().reasons());
+  for (const auto& imu : imus_) add(imu->state().reasons());
   const std::lock_guard lock(pairing_mutex_);
   add(pairing_.reasons());
 }

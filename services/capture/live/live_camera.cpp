@@ -26,7 +26,6 @@ namespace formats = libcamera::formats;
 namespace controls = libcamera::controls;
 
 constexpr std::size_t kBuffers = 4;
-constexpr std::chrono::milliseconds kPause{500};
 constexpr std::chrono::milliseconds kSilence{1000};
 
 /// The best first: the least to convert, and all the colour there is. libcamera names the bytes of
@@ -279,49 +278,21 @@ class LiveCamera::Session {
 };
 
 LiveCamera::LiveCamera(CameraSettings settings, std::function<void(CameraImage)> give)
-    : settings_(std::move(settings)),
-      give_(std::move(give)),
-      problem_("the camera has not been opened yet"),
-      thread_([this] { run(); }) {}
+    : settings_(std::move(settings)), give_(std::move(give)), thread_([this] { run(); }) {}
 
 LiveCamera::~LiveCamera() {
   stopping_ = true;
   thread_.join();
 }
 
-std::string LiveCamera::problem() const {
-  const std::lock_guard lock(mutex_);
-  return problem_;
-}
-
-std::string LiveCamera::name() const {
-  const std::lock_guard lock(mutex_);
-  return name_;
-}
-
-ReasonCounts LiveCamera::reasons() const {
-  const std::lock_guard lock(mutex_);
-  return reasons_;
-}
-
-void LiveCamera::note(const std::string& reason, const std::string& problem) {
-  const std::lock_guard lock(mutex_);
-  reasons_.add(reason);
-  problem_ = problem;
-  name_.clear();
-}
-
 void LiveCamera::run() {
-  while (!stopping_) {
+  keepOpen(stopping_, [this] {
     if (auto session = Session::open(settings_)) {
       flow(**session);
     } else {
-      note(session.error().code, session.error().detail);
+      state_.fails(session.error());
     }
-    for (auto left = kPause; !stopping_ && left.count() > 0; left -= kPause / 10) {
-      std::this_thread::sleep_for(kPause / 10);
-    }
-  }
+  });
 }
 
 void LiveCamera::flow(Session& session) {
@@ -329,24 +300,23 @@ void LiveCamera::flow(Session& session) {
   while (!stopping_ && !session.gone()) {
     auto image = session.next();
     if (!image && image.error().code == "camera_silent") {
-      return note("camera_silent", "the camera " + session.name() +
-                                       " gives no images; it is opened again. Is its cable loose?");
+      return state_.fails({"camera_silent", "the camera " + session.name() +
+                                                " gives no images; it is opened again. Is its "
+                                                "cable loose?"});
     }
-    {
-      const std::lock_guard lock(mutex_);
-      name_ = session.name();
-      problem_ = session.shortcoming();
-      if (!image) reasons_.add(image.error());
-      if (image && last && image->number > *last + 1) {
-        reasons_.add("camera_frame_lost", image->number - *last - 1);
-      }
+    state_.flows(session.name(), session.shortcoming());
+    if (!image) {
+      state_.count(image.error().code);
+      continue;
     }
-    if (!image) continue;
+    if (last && image->number > *last + 1) {
+      state_.count("camera_frame_lost", image->number - *last - 1);
+    }
     last = image->number;
     give_(*std::move(image));
   }
   if (!stopping_) {
-    note("camera_lost", "the camera was unplugged; plug it in again, and it goes on.");
+    state_.fails({"camera_lost", "the camera was unplugged; plug it in again, and it goes on."});
   }
 }
 

@@ -5,12 +5,11 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 
-#include "common/base/result.h"
 #include "common/types/sensors.h"
+#include "services/capture/live/device_state.h"
 
 namespace perdure::capture {
 
@@ -42,26 +41,19 @@ class LiveCamera {
   LiveCamera(const LiveCamera&) = delete;
   LiveCamera& operator=(const LiveCamera&) = delete;
 
-  /// A sentence with the mend; empty where it flows as it is asked to.
-  std::string problem() const;
-  /// What it is and what it gives, for people; empty while there is none.
-  std::string name() const;
-  /// "camera_absent" (a try to open it), "camera_lost", "camera_silent" (it flowed),
-  /// "camera_frame_lost", "camera_frame_error", "camera_without_stamp" and those of packed().
-  ReasonCounts reasons() const;
+  /// Counts "camera_absent" (a try to open it), "camera_lost", "camera_silent" (it flowed),
+  /// "camera_frame_lost", "camera_frame_error", and the reasons of packed().
+  const DeviceState& state() const { return state_; }
 
  private:
   class Session;
   void run();
   void flow(Session& session);
-  void note(const std::string& reason, const std::string& problem);
 
   const CameraSettings settings_;
   const std::function<void(CameraImage)> give_;
   std::atomic<bool> stopping_{false};
-  mutable std::mutex mutex_;
-  std::string problem_, name_;
-  ReasonCounts reasons_;
+  DeviceState state_{"the camera has not been opened yet"};
   std::thread thread_;
 };
 

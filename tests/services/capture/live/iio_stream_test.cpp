@@ -61,9 +61,9 @@ class Stream : public ::testing::Test {
 TEST_F(Stream, GivesEveryScanInUnitsAtItsTimeWhateverTheClockThere) {
   const FakeIiod iiod(address_, {{.clock_ns = -977 * kSecond}});
   open({.rate_hz = 200.0});
-  ASSERT_TRUE(flows(400)) << stream_->problem();
-  EXPECT_EQ(stream_->problem(), "");
-  EXPECT_THAT(stream_->name(), HasSubstr("imu at 200 Hz"));
+  ASSERT_TRUE(flows(400)) << stream_->state().problem();
+  EXPECT_EQ(stream_->state().problem(), "");
+  EXPECT_THAT(stream_->state().name(), HasSubstr("imu at 200 Hz"));
   EXPECT_EQ(iiod.rateAskedFor(), 200.0);
   stream_.reset();
   for (std::size_t i = 1; i < scans_.size(); ++i) {
@@ -81,7 +81,7 @@ TEST_F(Stream, GivesEveryScanInUnitsAtItsTimeWhateverTheClockThere) {
 TEST_F(Stream, CountsWhereTheDeviceHasNoStamps) {
   const FakeIiod iiod(address_, {{.stamps = false, .rate_hz = 100.0}});
   open({.rate_hz = 100.0});
-  ASSERT_TRUE(flows(150)) << stream_->problem();
+  ASSERT_TRUE(flows(150)) << stream_->state().problem();
   stream_.reset();
   for (std::size_t i = 1; i < scans_.size(); ++i) {
     EXPECT_NEAR(static_cast<double>(scans_[i].time_ns - scans_[i - 1].time_ns), 1e7, 5e5);
@@ -91,7 +91,7 @@ TEST_F(Stream, CountsWhereTheDeviceHasNoStamps) {
 TEST_F(Stream, TurnsTheAxesAsMounted) {
   const FakeIiod iiod(address_, {{.mount = "0, -1, 0; 1, 0, 0; 0, 0, 1"}});
   open();
-  ASSERT_TRUE(flows(1)) << stream_->problem();
+  ASSERT_TRUE(flows(1)) << stream_->state().problem();
   stream_.reset();
   EXPECT_TRUE(scans_[0].accel->isApprox(Eigen::Vector3d(0.06, 0.05, 9.81), 1e-9));
   scans_.clear();
@@ -108,51 +108,51 @@ TEST_F(Stream, TakesTheDeviceAndTheTriggerThatAreNamed) {
                  {.id = "iio:device1", .name = "bmi_gyro", .accel = false},
                  {.id = "iio:device2", .name = "bmi_accel", .gyro = false, .needs_trigger = true}});
   open({.device = "bmi_accel", .trigger = "hrtimer", .gyro = false});
-  ASSERT_TRUE(flows(1)) << stream_->problem();
+  ASSERT_TRUE(flows(1)) << stream_->state().problem();
   stream_.reset();
   EXPECT_EQ(iiod.triggerSet(), "trigger0");
   EXPECT_FALSE(scans_[0].gyro);
   EXPECT_TRUE(scans_[0].accel);
   scans_.clear();
   open({.accel = false});
-  ASSERT_TRUE(flows(1)) << stream_->problem();
-  EXPECT_THAT(stream_->name(), HasSubstr("bmi_gyro"));
+  ASSERT_TRUE(flows(1)) << stream_->state().problem();
+  EXPECT_THAT(stream_->state().name(), HasSubstr("bmi_gyro"));
 }
 
 TEST_F(Stream, SaysWhatIsMissingAndTheMend) {
   open();
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_absent") > 0; }));
-  EXPECT_THAT(stream_->problem(), HasSubstr("no IIO context at ip:" + address_));
-  EXPECT_THAT(stream_->problem(), HasSubstr("imu.uri"));
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_absent") > 0; }));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr("no IIO context at ip:" + address_));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr("imu.uri"));
   stream_.reset();
   const FakeIiod iiod(address_, {{.gyro = false, .needs_trigger = true}});
   open();
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_absent") > 0; }));
-  EXPECT_THAT(stream_->problem(), HasSubstr("an accelerometer and a gyroscope"));
-  EXPECT_THAT(stream_->problem(), HasSubstr("imu, hrtimer"));
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_absent") > 0; }));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr("an accelerometer and a gyroscope"));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr("imu, hrtimer"));
   open({.gyro = false});
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_absent") > 0; }));
-  EXPECT_THAT(stream_->problem(), HasSubstr("imu.trigger"));
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_absent") > 0; }));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr("imu.trigger"));
   open({.trigger = "nobody", .gyro = false});
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_absent") > 0; }));
-  EXPECT_THAT(stream_->problem(), HasSubstr("the trigger nobody"));
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_absent") > 0; }));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr("the trigger nobody"));
   EXPECT_EQ(count(), 0U);
 }
 
 TEST_F(Stream, GoesOnWhenTheImuComesBack) {
   auto iiod = std::make_unique<FakeIiod>(address_, std::vector<FakeImu>{{}});
   open();
-  ASSERT_TRUE(flows(50)) << stream_->problem();
+  ASSERT_TRUE(flows(50)) << stream_->state().problem();
   iiod.reset();
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_lost") == 1; }));
-  EXPECT_NE(stream_->problem(), "");
-  EXPECT_EQ(stream_->name(), "");
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_lost") == 1; }));
+  EXPECT_NE(stream_->state().problem(), "");
+  EXPECT_EQ(stream_->state().name(), "");
   iiod = std::make_unique<FakeIiod>(address_, std::vector<FakeImu>{{}});
   const std::size_t before = count();
-  ASSERT_TRUE(flows(before + 50)) << stream_->problem();
-  EXPECT_EQ(stream_->problem(), "");
+  ASSERT_TRUE(flows(before + 50)) << stream_->state().problem();
+  EXPECT_EQ(stream_->state().problem(), "");
   iiod->fallSilent();
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_lost") == 2; }))
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_lost") == 2; }))
       << "nothing came, and the connection stood";
 }
 
@@ -161,7 +161,7 @@ TEST_F(Stream, FollowsAClockThatIsSetThereAndCountsIt) {
   open();
   ASSERT_TRUE(flows(150));
   iiod.stepClock(5 * kSecond);
-  ASSERT_TRUE(waitFor([&] { return stream_->reasons().of("imu_clock_jump") == 1; }));
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_clock_jump") == 1; }));
   const std::size_t before = count();
   ASSERT_TRUE(flows(before + 20));
   stream_.reset();

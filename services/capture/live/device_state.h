@@ -1,0 +1,65 @@
+// How a live device is, told by its own thread and asked by others.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "common/base/result.h"
+
+namespace perdure::capture {
+
+/// Safe from any thread.
+class DeviceState {
+ public:
+  explicit DeviceState(std::string problem) : problem_(std::move(problem)) {}
+
+  /// A sentence with the mend; empty where it flows.
+  std::string problem() const { return locked(problem_); }
+  /// What it is, for people; empty while there is none.
+  std::string name() const { return locked(name_); }
+  ReasonCounts reasons() const { return locked(reasons_); }
+
+  void flows(const std::string& name, const std::string& problem = {}) {
+    const std::lock_guard lock(mutex_);
+    name_ = name;
+    problem_ = problem;
+  }
+  void fails(const Reason& reason) {
+    const std::lock_guard lock(mutex_);
+    reasons_.add(reason);
+    problem_ = reason.detail;
+    name_.clear();
+  }
+  void count(const std::string& reason, std::uint64_t n = 1) {
+    const std::lock_guard lock(mutex_);
+    reasons_.add(reason, n);
+  }
+
+ private:
+  template <class T>
+  T locked(const T& value) const {
+    const std::lock_guard lock(mutex_);
+    return value;
+  }
+
+  mutable std::mutex mutex_;
+  std::string problem_, name_;
+  ReasonCounts reasons_;
+};
+
+/// Calls `flow`, which returns when the device is gone, again and again until it is to stop.
+inline void keepOpen(const std::atomic<bool>& stopping, const std::function<void()>& flow) {
+  constexpr std::chrono::milliseconds kPause{500};
+  while (!stopping) {
+    flow();
+    for (auto left = kPause; !stopping && left.count() > 0; left -= kPause / 10) {
+      std::this_thread::sleep_for(kPause / 10);
+    }
+  }
+}
+
+}  // namespace perdure::capture
