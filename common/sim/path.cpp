@@ -230,9 +230,12 @@ namespace {
 /// Waves of the road under the wheels, of about 3 to 9 m.
 class Roughness {
  public:
-  explicit Roughness(std::uint64_t seed) {
+  Roughness(std::uint64_t seed, double lap_m) {
     Dice dice(seed);
-    for (Wave& wave : waves_) wave = {dice.uniform(3.0, 9.0), dice.uniform(0.0, 2.0 * M_PI)};
+    for (Wave& wave : waves_) {
+      wave = {dice.uniform(3.0, 9.0), dice.uniform(0.0, 2.0 * M_PI)};
+      if (lap_m > 0.0) wave.length = lap_m / std::round(lap_m / wave.length);
+    }
   }
   /// Three heights within -1 and 1: of bounce, roll and pitch.
   Eigen::Vector3d at(double distance) const {
@@ -254,7 +257,7 @@ class Roughness {
 }  // namespace
 
 Trajectory vehicleMotion(const GroundPath& path, const Drive& drive, const Suspension& suspension) {
-  const Roughness roughness(seedOf("roughness", {suspension.seed}));
+  const Roughness roughness(seedOf("roughness", {suspension.seed}), suspension.lap_m);
   const std::vector<double>& s = drive.distance;
   std::vector<RigidTransform> controls;
   for (std::size_t i = 0; i < s.size(); ++i) {

@@ -66,6 +66,7 @@ struct Suspension {
   double roll_per_accel = 0.009, pitch_per_accel = 0.006;  ///< rad per m/s²
   double bounce_m = 0.004, sway_rad = 0.0025;              ///< amplitudes on a rough road
   std::uint64_t seed = 0;                                  ///< of the road's roughness
+  double lap_m = 0.0;  ///< after which the road is the same again; 0: never
 };
 Trajectory vehicleMotion(const GroundPath& path, const Drive& drive, const Suspension& suspension);
 /// Of a thing that stays upright.

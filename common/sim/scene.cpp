@@ -65,6 +65,10 @@ const std::vector<Entry>& entries() {
         "Single views for training, one a second: each looks at a thing of a class drawn evenly, "
         "from any side and as large in the image as may be; the body rests in between."},
        makeRandom},
+      {{"lap",
+        "A lap that ends at rest where it began, to be driven without end (capture's run.on_end: "
+        "repeat): memory does not grow, no frame is lost, and objects stay the same ones."},
+       makeLap},
   };
   return list;
 }

@@ -49,6 +49,9 @@ struct Detections {
   /// Width of the network's input over ModelInfo::input_width, where a time budget made it smaller;
   /// 0: not known, hence 1.
   double input_scale = 0.0;
+  /// Elapsed time of the network's forward pass, s; 0: not known. What else a result took is
+  /// Perdure's and the bus'.
+  double forward_s = 0.0;
 };
 
 /// What the activations mean. Latched on the topic `model`, keyed by hash.

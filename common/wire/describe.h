@@ -154,6 +154,7 @@ void describe(A& a, D& d, W& w) {
   a.value("model_hash", d.model_hash, w.model_hash);
   a.list("detections", d.detections, w.items, kDetections);
   a.number("input_scale", d.input_scale, w.input_scale, kInputScale);
+  a.number("forward_s", d.forward_s, w.forward_s, kNotNegative);
 }
 
 template <class A, Is<ModelInfo> D, class W>

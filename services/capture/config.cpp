@@ -78,8 +78,9 @@ void describe(Config& c, config::Fields& fields) {
   fields.text("run.state", c.run.state,
               {"file that says where the run is, so that a restarted capture carries on; "
                "empty: none"});
-  fields.choice("run.on_end", c.run.on_end, {"exit", "stay"},
-                {"at the end of the drive: exit with status 0, or stay for late readers"});
+  fields.choice("run.on_end", c.run.on_end, {"exit", "repeat", "stay"},
+                {"at the end of the drive: exit with status 0, stay for late readers, or repeat it "
+                 "without end, as one that ends how it began"});
 }
 
 void requireSource(const Config& config) {

@@ -14,9 +14,11 @@ std::optional<ImageEncoding> encodingOf(const std::string& name) {
   return std::nullopt;
 }
 
-TimePoint timeOf(const replay::Message& message) {
+/// Works on a message that is to be changed, too.
+template <class Message>
+auto& timeOf(Message& message) {
   return std::visit(
-      [](const auto& m) {
+      [](auto& m) -> auto& {
         if constexpr (requires { m.stamp; }) {
           return m.stamp.time;
         } else {
@@ -71,11 +73,23 @@ Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std
                std::function<void()> notify)
     : mono_(config.dataset.cameras == "mono"),
       quality_(config.image.compress == "jpeg" ? static_cast<int>(config.image.quality) : 0),
+      repeats_(config.run.on_end == "repeat"),
       drive_(std::move(drive)),
+      frame_count_(drive_->frameCount()),
       notify_(std::move(notify)) {
   const auto [begin, end] = spanOf(*drive_);
+  begin_ = begin;
   from_ = begin - durationFromSeconds(config.dataset.lead_s);
-  until_ = end + durationFromSeconds(config.dataset.trail_s);
+  until_ = end + durationFromSeconds(config.dataset.trail_s) + Duration{1};
+  if (repeats_) {
+    const auto pauses = static_cast<Duration::rep>(std::max<std::uint64_t>(frame_count_, 2) - 1);
+    length_ = end - begin + (end - begin) / pauses;
+    until_ = begin + length_;
+    // From the frame before on: the samples after the last one of a lap are that lap's.
+    first -= std::min<std::uint64_t>(first, 1);
+    lap_ = first / frame_count_;
+    first %= frame_count_;
+  }
   drive_->seek(first);
   thread_ = std::thread([this] { run(); });
 }
@@ -85,10 +99,19 @@ Loader::~Loader() {
   thread_.join();
 }
 
+bool Loader::isOver(const std::optional<replay::Message>& message) const {
+  return !message || timeOf(*message) >= until_;
+}
+
 bool Loader::isWanted(const replay::Message& message) const {
   const auto* frame = std::get_if<Frame>(&message);
   if (frame) return !mono_ || frame->camera == "cam0";
-  return timeOf(message) >= from_;
+  return timeOf(message) >= (lap_ == 0 ? from_ : begin_);
+}
+
+void Loader::moveToLap(replay::Message& message) const {
+  timeOf(message) += static_cast<Duration::rep>(lap_) * length_;
+  if (auto* frame = std::get_if<Frame>(&message)) frame->stamp.sequence += lap_ * frame_count_;
 }
 
 /// What cannot be compressed goes as it is, and is counted.
@@ -113,8 +136,14 @@ void Loader::run() {
       reasons_ = drive_->reasons();
       last_problem_ = drive_->lastProblem();
     }
-    if (!message || timeOf(*message) > until_) break;
+    if (isOver(message)) {
+      if (!repeats_) break;
+      ++lap_;
+      drive_->seek(0);
+      continue;
+    }
     if (!isWanted(*message)) continue;
+    moveToLap(*message);
     if (quality_ > 0) compress(*message);
     open = queue_.push(*std::move(message));
     notify_();

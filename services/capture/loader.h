@@ -19,7 +19,10 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
 
 class Loader {
  public:
-  /// From frame `first` on. `notify` is called on the loader's thread after each message.
+  /// From frame `first` on. `notify` is called on the loader's thread after each message. With
+  /// run.on_end "repeat" the drive has no end: frame n·frameCount() + i is its frame i, later by n
+  /// times its length (of all frames and the pause between two); it then begins one frame early,
+  /// with the samples that go with that one.
   Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
          std::function<void()> notify);
   ~Loader();
@@ -36,13 +39,20 @@ class Loader {
  private:
   void run();
   void finish();
+  bool isOver(const std::optional<replay::Message>& message) const;
   bool isWanted(const replay::Message& message) const;
+  void moveToLap(replay::Message& message) const;
   void compress(replay::Message& message);
 
   const bool mono_;
   const int quality_;  ///< of JPEG; 0: raw
+  const bool repeats_;
   std::unique_ptr<replay::Dataset> drive_;
-  TimePoint from_, until_;
+  TimePoint from_, until_;  ///< of the samples, the latter excluded
+  TimePoint begin_;         ///< of the first frame
+  Duration length_{0};      ///< of a lap
+  const std::uint64_t frame_count_;
+  std::uint64_t lap_ = 0;
   std::function<void()> notify_;
   BoundedQueue<replay::Message> queue_{16, Overflow::kBlock};
   mutable std::mutex mutex_;

@@ -176,7 +176,9 @@ void Node::testItself() {
 Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double floor) {
   const auto blob = makeBlob(at().input, frame);
   if (!blob) return tl::unexpected(blob.error());
+  const double begun = clock_s_ ? clock_s_() : 0.0;
   const auto tensors = sizes_[size_].network->forward(*blob);
+  forward_s_ = clock_s_ ? clock_s_() - begun : 0.0;
   if (!tensors) return tl::unexpected(tensors.error());
   DecodeOptions options = options_;
   options.score_threshold = floor;
@@ -216,6 +218,7 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   out.instance = info_.instance;
   out.model_hash = info_.hash;
   out.input_scale = inputScale();
+  out.forward_s = forward_s_;
   for (const Candidate& candidate : reported) out.detections.push_back(inImage(candidate, fit));
   if (priming) addPrimed(expected, frame, reported, *candidates, out);
   return out;

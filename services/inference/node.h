@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,6 +35,9 @@ class Node {
   /// and the predictions fit the frame. Reasons: "frame_malformed", "model_failed",
   /// "model_output_shape", "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
+
+  /// Seconds of a steady clock, for Detections::forward_s; without one it stays 0, not known.
+  void timeBy(std::function<double()> clock_s) { clock_s_ = std::move(clock_s); }
 
   /// Pixels of each input size that the network takes over those of its own, falling from 1. More
   /// than one where there is a time budget.
@@ -69,6 +73,8 @@ class Node {
   ModelDescription description_;  ///< at its own size
   std::vector<Size> sizes_;       ///< its own first, smaller ones where there is a budget
   std::size_t size_ = 0;
+  std::function<double()> clock_s_;
+  double forward_s_ = 0.0;  ///< of the last frame
   DecodeOptions options_;
   ModelInfo info_;
 };

@@ -27,6 +27,8 @@ Worker::Worker(Node& node, const OwnershipConfig& ownership, double budget_ms, W
       ownership_(firstOwnership(ownership, lease_)),
       swap_({node.model().instance, node.model().name, ownership.probation_s, lease_}) {
   swap_.learn(node.model());
+  node_.timeBy(
+      [] { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); });
   thread_ = std::thread([this] { run(); });
 }
 

@@ -106,6 +106,8 @@ TEST_F(Demo, WritesEveryOutputWellFormedAndEndsInOrder) {
   EXPECT_GT(result["services"]["vio"]["frames_in"], 30);
   EXPECT_GT(result["latency_ms"]["median"], 0.0);
   EXPECT_GE(result["latency_ms"]["p99"], result["latency_ms"]["median"]);
+  EXPECT_LT(result["latency_beyond_network_ms"]["median"], result["latency_ms"]["median"]);
+  EXPECT_GT(result["latency_beyond_network_ms"]["median"], 0.0);
   for (const char* json : {"objects.json", "map.geojson", "timing.json"}) {
     EXPECT_TRUE(Json::accept(contentsOf(folder_.file(std::string("out/") + json)))) << json;
   }

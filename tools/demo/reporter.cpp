@@ -57,6 +57,7 @@ Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, Out
   loop.on(landmarks_reader_, [this](const Landmarks& l) { outputs_.onLandmarks(l); });
   loop.on(detections_reader_, [this](const Detections& d) {
     if (detections_.insert(d.stamp.sequence).second) outputs_.onDetections(d);
+    latency_.onDetections(d);
     last_message_ns_ = monotonicNs();
   });
   loop.on(objects_reader_, [this](const Objects& o) { onObjects(o); });
@@ -75,10 +76,9 @@ void Reporter::onOdometry(const Odometry& odometry) {
 
 void Reporter::onObjects(const Objects& objects) {
   last_message_ns_ = monotonicNs();
+  latency_.onObjects(objects, last_message_ns_);
   outputs_.onObjects(objects);
-  if (!objects_.insert(objects.stamp.sequence).second) return;
-  const std::int64_t age_ns = last_message_ns_ - objects.stamp.captured_ns;
-  latency_ms_.push_back(static_cast<double>(age_ns) * 1e-6);
+  objects_.insert(objects.stamp.sequence);
 }
 
 void Reporter::onHealth(const Health& health) {
@@ -116,7 +116,7 @@ std::string Reporter::progressLine(std::size_t frames_in_all) const {
       "frame {}/{}  odometry {:.1f} Hz  detections {:.1f} Hz  objects {}  latency {:.0f} ms",
       newest_frame_ + 1, frames_in_all, vio == nullptr ? 0.0 : vio->rate_hz,
       inference == nullptr ? 0.0 : inference->rate_hz, outputs_.history().confirmedNow(),
-      latency_ms_.empty() ? 0.0 : latency_ms_.back());
+      latency_.last_ms());
 }
 
 Json Reporter::report() const {
@@ -126,14 +126,13 @@ Json Reporter::report() const {
                       {"dropped", counts.dropped()},           {"restarts", 0},
                       {"cpu_s", rounded(counts.cpuSeconds())}, {"reasons", counts.reasons()}};
   }
-  return {{"services", services},
-          {"messages",
-           {{"odometry", odometry_.size()},
-            {"detections", detections_.size()},
-            {"objects", objects_.size()}}},
-          {"latency_ms",
-           {{"median", rounded(quantile(latency_ms_, 0.5))},
-            {"p99", rounded(quantile(latency_ms_, 0.99))}}}};
+  Json all = {{"services", services},
+              {"messages",
+               {{"odometry", odometry_.size()},
+                {"detections", detections_.size()},
+                {"objects", objects_.size()}}}};
+  all.update(latency_.report());
+  return all;
 }
 
 Json Reporter::timing() const {

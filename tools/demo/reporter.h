@@ -10,6 +10,7 @@
 
 #include "common/bus/wait_loop.h"
 #include "common/types/health.h"
+#include "tools/demo/latency.h"
 #include "tools/outputs/output_writer.h"
 
 namespace perdure::tools {
@@ -48,7 +49,7 @@ class Reporter {
 
   /// "frame 57/154  10.0 Hz  objects 9  latency 83 ms".
   std::string progressLine(std::size_t frames_in_all) const;
-  /// services, latency_ms, counts of messages; restarts are the caller's.
+  /// services, latency, counts of messages; restarts are the caller's.
   nlohmann::ordered_json report() const;
   /// Processor time a frame by service, as means over each second.
   nlohmann::ordered_json timing() const;
@@ -70,7 +71,7 @@ class Reporter {
   std::uint64_t newest_frame_ = 0;
   TimePoint first_time_, newest_time_;
   std::int64_t last_message_ns_ = 0;
-  std::vector<double> latency_ms_;
+  LatencyMeter latency_;
   std::map<std::string, Health> newest_health_;
   std::map<std::string, ServiceCounts> services_;
   struct Span {

@@ -8,6 +8,7 @@
 namespace perdure::sim {
 
 Scene makeStreet(std::uint64_t seed, const SceneOptions& options);
+Scene makeLap(std::uint64_t seed, const SceneOptions& options);
 Scene makeRoom(std::uint64_t seed, const SceneOptions& options);
 Scene makeToy(std::uint64_t seed, const SceneOptions& options);
 Scene makeOcclusion(std::uint64_t seed, const SceneOptions& options);

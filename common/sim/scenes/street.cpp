@@ -1,4 +1,5 @@
-// A loop of four streets around a block, driven twice; side streets lead away from its corners.
+// A loop of four streets around a block, driven twice, or once from rest to rest; side streets lead
+// away from its corners.
 #include <algorithm>
 #include <limits>
 
@@ -11,6 +12,7 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kStreetSeconds = 60.0, kStreetRest = 1.2, kSideStreet = 38.0;
+constexpr double kLapSeconds = 36.0;
 constexpr double kStreetCameraHeight = 1.6;
 
 /// Crossings of the middle lines at (0, 0), (length, 0), (length, width), (0, width).
@@ -36,41 +38,67 @@ GroundPath loopOf(const Block& block, double radius) {
       true);
 }
 
-/// The calmest drive that has gone round twice at the end.
-Drive twoLaps(const GroundPath& loop, double from, double until_s) {
+/// The calmest drive to distance `to` (infinite: on and on) that has come `far` at `by_s`.
+Drive calmest(const GroundPath& loop, double from, double to, double far, double by_s,
+              double until_s) {
   SpeedLimits limits;
   limits.lateral = 2.5;
   double slow = 6.0, fast = 10.0;
   Drive best;
   for (int i = 0; i < 12; ++i) {
     limits.top = 0.5 * (slow + fast);
-    best = drive(loop, limits, from, std::numeric_limits<double>::infinity(), kStreetRest, until_s);
-    const bool enough = best.distanceAt(kStreetSeconds - 1.0) - from >= 2.0 * loop.length();
+    best = drive(loop, limits, from, to, kStreetRest, until_s);
+    const bool enough = best.distanceAt(by_s) - from >= far;
     (enough ? fast : slow) = limits.top;
   }
   return best;
+}
+
+Drive twoLaps(const GroundPath& loop, double from, double until_s) {
+  return calmest(loop, from, std::numeric_limits<double>::infinity(), 2.0 * loop.length(),
+                 kStreetSeconds - 1.0, until_s);
+}
+
+/// A drive stops within a step of the path's points: the whole of it is drawn to the lap's length.
+Drive oneLap(const GroundPath& loop, double from, double until_s) {
+  Drive lap = calmest(loop, from, from + loop.length(), loop.length() - 1e-6,
+                      kLapSeconds - 2.0 * kStreetRest, until_s);
+  const double share = loop.length() / (lap.distance.back() - from);
+  for (double& s : lap.distance) s = from + share * (s - from);
+  return lap;
+}
+
+using DrivesAs = Drive (*)(const GroundPath& loop, double from, double until_s);
+
+Scene makeBlock(SceneBuilder& builder, double seconds, DrivesAs drives, bool same_road) {
+  Dice& dice = builder.dice();
+  const Block block{dice.uniform(62.0, 66.0), dice.uniform(42.0, 44.5)};
+  const GroundPath loop = loopOf(block, 16.0);
+  Suspension suspension;
+  suspension.height = kStreetCameraHeight - kCameraAboveBody;
+  suspension.seed = dice.seed();
+  if (same_road) suspension.lap_m = loop.length();
+  const double from = dice.uniform(27.0, 33.0);  // on the first straight
+  builder.setBody(
+      vehicleMotion(loop, drives(loop, from, std::max(seconds, kStreetSeconds) + 2.0), suspension),
+      seconds, 1.15, 2.2);
+  builder.scene().rig = makeRig(Carrier::kVehicle, builder.options(), dice, 0.02);
+  drawDaylight(builder);
+  Streets streets(builder, roadsOf(block, dice.uniform(0.4, 0.6) * block.length), Furnishing{});
+  streets.furnish();
+  return builder.take();
 }
 
 }  // namespace
 
 Scene makeStreet(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("street", seed, options);
-  Dice& dice = builder.dice();
-  const Block block{dice.uniform(62.0, 66.0), dice.uniform(42.0, 44.5)};
-  const GroundPath loop = loopOf(block, 16.0);
-  const double seconds = builder.seconds(kStreetSeconds);
-  Suspension suspension;
-  suspension.height = kStreetCameraHeight - kCameraAboveBody;
-  suspension.seed = dice.seed();
-  const double from = dice.uniform(27.0, 33.0);  // on the first straight
-  builder.setBody(
-      vehicleMotion(loop, twoLaps(loop, from, std::max(seconds, kStreetSeconds) + 2.0), suspension),
-      seconds, 1.15, 2.2);
-  builder.scene().rig = makeRig(Carrier::kVehicle, options, dice, 0.02);
-  drawDaylight(builder);
-  Streets streets(builder, roadsOf(block, dice.uniform(0.4, 0.6) * block.length), Furnishing{});
-  streets.furnish();
-  return builder.take();
+  return makeBlock(builder, builder.seconds(kStreetSeconds), twoLaps, false);
+}
+
+Scene makeLap(std::uint64_t seed, const SceneOptions& options) {
+  SceneBuilder builder("lap", seed, options);
+  return makeBlock(builder, builder.seconds(kLapSeconds), oneLap, true);
 }
 
 }  // namespace perdure::sim

@@ -1,10 +1,12 @@
 #include "services/semantic_filter/core/object.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
@@ -22,6 +24,24 @@ State nearestTurn(const State& x, const State& reference) {
   if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2)
     y[kYaw] = wrapAngle(x[kYaw] + M_PI);
   return y;
+}
+
+/// Rounding may leave a covariance whose parts differ by many orders with a pivot just below zero.
+/// No reader takes such a message: its correlations get the least eigenvalues that are definite.
+Matrix7d definite(const Matrix7d& P) {
+  constexpr double kLeast = 1e-9;  // of correlations; and m², rad² for a variance
+  Matrix7d L = P;
+  if (choleskyInPlace(L)) return P;
+  const Vector7d sigma = P.diagonal().cwiseMax(kLeast).cwiseSqrt();
+  const Vector7d inverse = sigma.cwiseInverse();
+  const Matrix7d correlations = inverse.asDiagonal() * P * inverse.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix7d> parts(correlations);
+  const Matrix7d& V = parts.eigenvectors();
+  const Vector7d values = parts.eigenvalues().cwiseMax(kLeast);
+  Matrix7d result =
+      sigma.asDiagonal() * (V * values.asDiagonal() * V.transpose()) * sigma.asDiagonal();
+  makeSymmetric(result);
+  return result;
 }
 
 /// The Gaussian of the heaviest hypothesis, its covariance widened to what the others of the class
@@ -44,7 +64,7 @@ ClassBelief classBelief(const Object& object, const std::string& name) {
     weight += h.weight;
   }
   belief.mean = heaviest->x.head<7>();
-  belief.covariance = moments / weight;
+  belief.covariance = definite(moments / weight);
   belief.cross_pose = cross / weight;
   return belief;
 }

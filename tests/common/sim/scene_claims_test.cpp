@@ -110,6 +110,22 @@ TEST(Street, ComesByASecondTimeWithinAMinute) {
   }
 }
 
+TEST(Lap, EndsAtRestWhereItBegan) {
+  for (const auto seed : kSeeds) {
+    const Scene scene = makeScene("lap", seed, {});
+    const MotionState first = scene.body.at(0.0), last = scene.body.at(scene.seconds);
+    EXPECT_LT((first.T_WB.p - last.T_WB.p).norm(), 1e-6) << seed;
+    EXPECT_LT(first.T_WB.q.angularDistance(last.T_WB.q), 1e-6) << seed;
+    for (const double t : {0.0, 0.5, scene.seconds - 0.5, scene.seconds}) {
+      EXPECT_LT(scene.body.at(t).velocity_W.norm(), 1e-6) << seed << " at " << t;
+    }
+    double driven = 0.0;
+    for (double t = 0.0; t < scene.seconds; t += 0.01)
+      driven += 0.01 * scene.body.at(t).velocity_W.norm();
+    EXPECT_GT(driven, 150.0) << seed;
+  }
+}
+
 TEST(Street, HasThingsOfAllItsClassesOnBothSides) {
   const Scene scene = makeScene("street", 7, {});
   EXPECT_GT(ofClass(scene, "car").size(), 40u);

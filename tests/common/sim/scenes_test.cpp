@@ -228,7 +228,7 @@ INSTANTIATE_TEST_SUITE_P(All, EveryScene, testing::ValuesIn(allNames()),
 TEST(Scenes, AreThoseThatTheHandbookNames) {
   const auto names = allNames();
   for (const char* name : {"street", "room", "toy", "occlusion", "vanish", "row", "roll", "still",
-                           "straight", "traffic", "town", "random"}) {
+                           "straight", "traffic", "town", "random", "lap"}) {
     EXPECT_THAT(names, Contains(name));
   }
 }

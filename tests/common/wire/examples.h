@@ -131,7 +131,8 @@ class Examples {
     return d;
   }
   void fill(Detections& m) {
-    m = {stamp(), word(), bits(), bits(), several([&] { return detection(); }), uniform(0, 1)};
+    m = {stamp(),       word(),       bits(), bits(), several([&] { return detection(); }),
+         uniform(0, 1), uniform(0, 1)};
   }
   void fill(ModelInfo& m) {
     m = {bits(),     bits(),     word(),        several([&] { return word(); }),

@@ -29,12 +29,13 @@ class LoaderTest : public ::testing::Test {
 
   struct Loaded {
     std::vector<std::pair<std::uint64_t, std::string>> frames;
-    std::vector<std::int64_t> samples_ns;
+    std::vector<std::int64_t> samples_ns, frames_ns;
     ReasonCounts reasons;
     std::string problem;
     std::size_t compressed = 0;
   };
-  Loaded load(const testing::TinyDrive& drive, std::uint64_t first = 0) {
+  /// Until the end, or until there are `most` frames.
+  Loaded load(const testing::TinyDrive& drive, std::uint64_t first = 0, std::size_t most = 1000) {
     config_.dataset.path = drive.write(folder_);
     Loaded out;
     std::mutex mutex;
@@ -45,7 +46,7 @@ class LoaderTest : public ::testing::Test {
       ++notes;
       changed.notify_one();
     });
-    for (std::uint64_t seen = 0;; ++seen) {
+    for (std::uint64_t seen = 0; out.frames.size() < most; ++seen) {
       {
         std::unique_lock lock(mutex);
         changed.wait(lock, [&] { return notes > seen; });
@@ -60,8 +61,10 @@ class LoaderTest : public ::testing::Test {
         const auto pixels = vision::decompressed(*frame);
         EXPECT_TRUE(pixels);
         const double rounding = isCompressed(frame->encoding) ? 1.0 : 0.0;
-        EXPECT_NEAR(pixels->data->front(), frame->stamp.sequence, rounding)
+        EXPECT_NEAR(pixels->data->front(),
+                    frame->stamp.sequence % static_cast<std::uint64_t>(drive.frames), rounding)
             << "the pixels are of another frame";
+        out.frames_ns.push_back(toNanoseconds(frame->stamp.time));
         out.frames.emplace_back(frame->stamp.sequence, frame->camera);
       } else if (auto* imu = std::get_if<ImuSample>(&*message)) {
         out.samples_ns.push_back(toNanoseconds(imu->time));
@@ -94,6 +97,36 @@ TEST_F(LoaderTest, GivesAllFramesAndTheSamplesAroundThem) {
   EXPECT_EQ(out.frames.size(), 20u);
   EXPECT_EQ(out.samples_ns.front(), drive.start_ns - 500'000'000);
   EXPECT_EQ(out.samples_ns.back(), drive.start_ns + 19 * drive.frame_period_ns + 200'000'000);
+}
+
+TEST_F(LoaderTest, ADriveThatRepeatsGoesOnInTimeAndNumberWithoutASeam) {
+  testing::TinyDrive drive;
+  drive.imu_before_ns = 300'000'000;  // of neither these nor those after are any given twice
+  drive.imu_after_ns = 300'000'000;
+  config_.run.on_end = "repeat";
+  const Loaded out = load(drive, 0, 50);
+  ASSERT_EQ(out.frames.size(), 50u);
+  for (std::size_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(out.frames[i].first, i);
+    EXPECT_EQ(out.frames_ns[i],
+              drive.start_ns + static_cast<std::int64_t>(i) * drive.frame_period_ns);
+  }
+  EXPECT_EQ(out.samples_ns.front(), drive.start_ns - drive.imu_before_ns);
+  for (std::size_t i = 1; i < out.samples_ns.size(); ++i) {
+    ASSERT_EQ(out.samples_ns[i] - out.samples_ns[i - 1], drive.imu_period_ns) << i;
+  }
+  EXPECT_TRUE(out.reasons.all().empty());
+}
+
+TEST_F(LoaderTest, ARepeatedDriveCarriesOnInTheLapWhereItWas) {
+  testing::TinyDrive drive;
+  drive.imu_after_ns = 300'000'000;
+  config_.run.on_end = "repeat";
+  const Loaded out = load(drive, 60, 5);  // the first of the fourth lap
+  ASSERT_EQ(out.frames.size(), 5u);
+  EXPECT_EQ(out.frames[0].first, 59u) << "with the samples between it and the next";
+  EXPECT_EQ(out.frames_ns[1], drive.start_ns + 60 * drive.frame_period_ns);
+  EXPECT_LE(out.samples_ns.front(), out.frames_ns[0]);
 }
 
 TEST_F(LoaderTest, MonoLeavesTheSecondCameraOut) {

@@ -38,7 +38,11 @@ TEST(InferenceService, ABudgetThatIsKeptLeavesTheInputAlone) {
     rig.send();
     ASSERT_TRUE(rig.answered(rig.sent - 1)) << rig.service->log();
   }
-  for (const Detections& d : rig.answers) EXPECT_DOUBLE_EQ(d.input_scale, 1.0);
+  for (const Detections& d : rig.answers) {
+    EXPECT_DOUBLE_EQ(d.input_scale, 1.0);
+    EXPECT_GT(d.forward_s, 1e-4);
+    EXPECT_LT(d.forward_s, 10.0);
+  }
   EXPECT_FALSE(rig.health.reasons.contains("input_smaller"));
 }
 

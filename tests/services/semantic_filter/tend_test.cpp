@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "services/semantic_filter/core/birth.h"
@@ -199,6 +200,25 @@ TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
   EXPECT_NEAR(hint->distance_m, 10.0, 0.6);
   points.resize(3);
   EXPECT_FALSE(rangeFromLandmarks(e, points, parameters.birth));
+}
+
+TEST(Published, ACovarianceThatRoundingMadeIndefiniteIsMendedAndOthersAreLeftAlone) {
+  Object object = makeObject(1, "car", makeState(1, 2, 3, 0.1, 4, 1.8, 1.5), 0.04);
+  Matrix7d P = object.hypotheses[0].P.topLeftCorner<7, 7>();
+  EXPECT_EQ(toBelief(object, 0.7).best().covariance, P) << "to the bit";
+  // Length and width are one number but for rounding, far finer than the place.
+  P.block<2, 2>(kSize, kSize).setConstant(1e-8);
+  P(kSize + 1, kSize + 1) -= 1e-18;
+  P(0, 0) = 1e4;
+  object.hypotheses[0].P.topLeftCorner<7, 7>() = P;
+  Eigen::LLT<Matrix7d> before(P);
+  ASSERT_EQ(before.info(), Eigen::NumericalIssue);
+  const Matrix7d mended = toBelief(object, 0.7).best().covariance;
+  EXPECT_EQ(Eigen::LLT<Matrix7d>(mended).info(), Eigen::Success);
+  EXPECT_EQ(mended, mended.transpose());
+  const Vector7d sigma = P.diagonal().cwiseSqrt();
+  const Matrix7d scaled = (mended - P).cwiseQuotient(sigma * sigma.transpose());
+  EXPECT_LT(scaled.cwiseAbs().maxCoeff(), 1e-6);
 }
 
 }  // namespace
