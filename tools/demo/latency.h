@@ -18,9 +18,9 @@ class LatencyMeter {
   void onDetections(const Detections& detections);
 
   double last_ms() const { return last_ms_; }
-  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}, from the middle of the
-  /// exposure being handed out to the objects' arrival; beyond the network's is without
-  /// Detections::forward_s, over the frames whose detections say it.
+  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}, from capture's handing
+  /// the frame out to the objects' arrival; beyond the network's is without Detections::forward_s,
+  /// over the frames whose detections say it.
   nlohmann::ordered_json report() const;
 
  private:
