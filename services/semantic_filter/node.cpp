@@ -255,16 +255,14 @@ void Node::publish(const Entry& entry) {
   objects.T_WB = entry.input.view.T_WB;
   objects.up_W = entry.input.view.up_W;
   objects.next_id = ids_.next();
+  const MotionParameters& motion = config_.filter.motion;
   for (const auto& object : belief_.objects) {
-    objects.objects.push_back(toBelief(object, config_.filter.motion.min_speed));
-    addContext(objects.objects.back(), object);
-    if (objects.objects.back().moving <= 0.5) continue;
-    const double dt = toSeconds(entry.input.stamp.time - object.as_of);
-    const Eigen::Matrix3d grown = placeGrowth(object.best(), dt, config_.filter.motion);
-    for (auto& c : objects.objects.back().classes) {
-      c.mean.head<3>() += dt * objects.objects.back().velocity;
-      c.covariance.topLeftCorner<3, 3>() += grown;
+    ObjectBelief& belief = objects.objects.emplace_back(toBelief(object, motion.min_speed));
+    if (belief.moving > 0.5) {
+      const Object now = movedOn(object, entry.input.stamp.time, motion);
+      belief.classes = toBelief(now, motion.min_speed).classes;
     }
+    addContext(belief, object);
   }
   late_merges_.insert(late_merges_.end(), entry.merges.begin(), entry.merges.end());
   auto events = events_.update(objects, late_merges_);

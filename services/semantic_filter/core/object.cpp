@@ -30,8 +30,13 @@ State nearestTurn(const State& x, const State& reference) {
 /// No reader takes such a message: its correlations get the least eigenvalues that are definite.
 Matrix7d definite(const Matrix7d& P) {
   constexpr double kLeast = 1e-9;  // of correlations; and m², rad² for a variance
+  constexpr double kRounding = 1e-12;
   Matrix7d L = P;
-  if (choleskyInPlace(L)) return P;
+  // A pivot's share of its variance is that of the correlations, which is what a reader looks at.
+  if (choleskyInPlace(L) &&
+      (L.diagonal().array().square() > kRounding * P.diagonal().array()).all()) {
+    return P;
+  }
   const Vector7d sigma = P.diagonal().cwiseMax(kLeast).cwiseSqrt();
   const Vector7d inverse = sigma.cwiseInverse();
   const Matrix7d correlations = inverse.asDiagonal() * P * inverse.asDiagonal();

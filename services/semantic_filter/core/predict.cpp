@@ -177,11 +177,12 @@ State stateAt(const Hypothesis& h, double dt) {
   return x;
 }
 
-Eigen::Matrix3d placeGrowth(const Hypothesis& h, double dt, const MotionParameters& parameters) {
-  if (!h.moving) return Eigen::Matrix3d::Zero();
-  Hypothesis later = h;
-  predictHypothesis(later, dt, parameters);
-  return (later.P - h.P).topLeftCorner<3, 3>();
+Object movedOn(Object object, TimePoint time, const MotionParameters& parameters) {
+  const double dt = toSeconds(time - object.as_of);
+  for (auto& h : object.hypotheses) {
+    if (dt > 0.0) predictHypothesis(h, dt, parameters);
+  }
+  return object;
 }
 
 void predict(Object& object, TimePoint now, const PoseError& pose_error,

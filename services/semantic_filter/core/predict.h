@@ -24,8 +24,9 @@ std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6
 
 /// x at a later time: static ones stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
-/// What dt seconds add to the covariance of a moving one's place.
-Eigen::Matrix3d placeGrowth(const Hypothesis& h, double dt, const MotionParameters& parameters);
+/// Where its motion alone will have brought it by `time`, as_of left as it was: for what is said of
+/// it between two looks. Not kept, so that the belief itself depends on its looks only.
+Object movedOn(Object object, TimePoint time, const MotionParameters& parameters);
 /// How much the view of a point changed from camera pose a to b, in lengths after which what two
 /// looks have in common has fallen to 1/e.
 struct ViewScales {

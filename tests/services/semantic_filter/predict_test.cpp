@@ -108,5 +108,58 @@ TEST(Predict, LooksOfAnEarlierVisitVouchThatNothingHidesWhatIsBackInThePicture) 
   EXPECT_GT(screenedAt(40.0), 0.19);
 }
 
+/// A car's place and speed after many looks: what is known of its yaw hangs on both.
+Object drivingCar() {
+  Hypothesis h;
+  h.class_name = "car";
+  h.weight = 1.0;
+  h.moving = true;
+  h.x = testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5);
+  h.x[kVelocity] = 8.0;
+  h.P.setIdentity();
+  h.P *= 0.04;
+  // Unseen of late: nearer goes with slower, and with a yaw to the left.
+  h.P(0, kVelocity) = h.P(kVelocity, 0) = -0.03;
+  h.P(0, kYaw) = h.P(kYaw, 0) = 0.032;
+  h.P(kYaw, kVelocity) = h.P(kVelocity, kYaw) = -0.037;
+  h.C(kVelocity, 4) = 0.01;
+  Object object;
+  object.existence = {0.9, ExistenceEvidence::kPrior, object.as_of};
+  object.hypotheses = {h};
+  return object;
+}
+
+TEST(MovedOn, CarriesTheCovarianceWithItsCorrelationsAndThePoseErrorWithIt) {
+  const Object before = drivingCar();
+  const auto& P = before.best().P;
+  ASSERT_EQ(Eigen::LLT<Eigen::MatrixXd>(P).info(), Eigen::Success);
+  MotionParameters still;
+  still.acceleration = still.yaw_walk = 0.0;
+  constexpr double kDt = 0.5;
+  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(P.rows(), P.cols());
+  F.block<3, 3>(0, kVelocity).diagonal().setConstant(kDt);
+
+  const Object later = movedOn(before, before.as_of + std::chrono::milliseconds(500), still);
+  EXPECT_NEAR(later.best().x[0], 24.0, 1e-12);
+  EXPECT_LT((later.best().P - F * P * F.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_NEAR(later.best().C(0, 4), 0.005, 1e-12);
+  EXPECT_EQ(later.as_of, before.as_of);
+
+  // The place alone would not do: its correlation with the yaw has changed as well.
+  Matrix7d place_alone = P.topLeftCorner<7, 7>();
+  place_alone.topLeftCorner<3, 3>() = later.best().P.topLeftCorner<3, 3>();
+  EXPECT_EQ(Eigen::LLT<Matrix7d>(place_alone).info(), Eigen::NumericalIssue);
+  const Matrix7d published = toBelief(later, 0.7).best().covariance;
+  EXPECT_EQ(Eigen::LLT<Matrix7d>(published).info(), Eigen::Success);
+}
+
+TEST(MovedOn, WhatStandsOnlyBecomesLessCertain) {
+  Object object = drivingCar();
+  object.hypotheses[0].moving = false;
+  const Object later = movedOn(object, object.as_of + std::chrono::seconds(1), {});
+  EXPECT_EQ(later.best().x, object.best().x);
+  EXPECT_GT(later.best().P(0, 0), object.best().P(0, 0));
+}
+
 }  // namespace
 }  // namespace perdure::semantic_filter
