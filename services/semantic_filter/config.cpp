@@ -185,6 +185,8 @@ void describeTend(Parameters& p, Fields& fields) {
   fields.number("tend.gone", t.gone, between(0, 1), {"existence below which an object is gone"});
   fields.number("tend.gone_tentative", t.gone_tentative, between(0, 1),
                 {"the same for one that was never confirmed"});
+  fields.number("tend.tentative_s", t.tentative_s, positive(),
+                {"out of sight, after which what confirm_hits did not confirm is given up", "s"});
   fields.number("tend.class_dominates", t.class_dominates, between(0.5, 1),
                 {"a class above this ends the others"});
   fields.number("tend.size_gate", t.size_gate, positive(),

@@ -28,6 +28,7 @@ EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
   known.confirmed = known.ever_confirmed = o.confirmed;
   known.resolved = o.confirmed && o.best().probability >= kResolved;
   known.hidden = isHidden(o.visibility);
+  known.hits = o.hits;
   known.moving = o.moving > 0.5;
   known.class_name = o.best().name;
   return known;
@@ -50,13 +51,13 @@ void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Even
     add(EventKind::kClassResolved, pi);
     known.resolved = true;
   }
-  const bool hidden = isHidden(o.visibility);
+  const bool hidden = isHidden(o.visibility), detected = o.hits > known.hits;
   if (o.confirmed && hidden && !known.hidden) {
     add(o.visibility == Visibility::kOccluded ? EventKind::kOccluded : EventKind::kLeftView,
         o.existence);
     events.back().other_id = o.blocked_by;
   }
-  if (o.confirmed && !hidden && known.hidden && known.confirmed) {
+  if (o.confirmed && !hidden && known.hidden && known.confirmed && detected) {
     add(EventKind::kReappeared, o.existence);
   }
   known.ever_confirmed = known.ever_confirmed || o.confirmed;
@@ -66,7 +67,8 @@ void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Even
   if (o.confirmed && moving && !known.moving && known.static_once) add(EventKind::kMoved, o.moving);
   known.static_once = known.static_once || (o.confirmed && !moving);
   known.confirmed = o.confirmed;
-  known.hidden = hidden;
+  known.hidden = hidden || (known.hidden && !detected);
+  known.hits = o.hits;
   known.missing = missing;
   known.moving = moving;
   known.class_name = o.best().name;

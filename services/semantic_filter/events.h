@@ -22,7 +22,9 @@ class EventTracker {
 
  private:
   struct Known {
-    bool confirmed = false, resolved = false, missing = false, moving = false, hidden = false;
+    bool confirmed = false, resolved = false, missing = false, moving = false;
+    bool hidden = false;  ///< and not detected since
+    std::uint32_t hits = 0;
     bool static_once = false, ever_confirmed = false;
     std::string class_name;
   };

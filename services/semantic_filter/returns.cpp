@@ -15,12 +15,19 @@ TimePoint later(TimePoint time, double seconds) {
   return time + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
 }
 
-bool waits(const Object& o, const Parameters& parameters) {
-  return o.confirmed && o.visibility == Visibility::kOccluded &&
-         movingProbability(o, parameters.motion.min_speed) < 0.5;
-}
+constexpr double kShortestPause_s = 0.2;  // in which what should be in sight is not said again
+
+bool inSight(const Object& o) { return o.visible_fraction > 0.0; }
 
 }  // namespace
+
+/// Until it is detected again: that it should be in sight by now may be a misjudged edge.
+bool ReturnWatch::waits(const Object& o, const Parameters& parameters) const {
+  if (!o.confirmed || movingProbability(o, parameters.motion.min_speed) >= 0.5) return false;
+  if (o.visibility == Visibility::kOccluded) return true;
+  const auto known = waiting_.find(o.id);
+  return inSight(o) && known != waiting_.end() && o.hits == known->second.hits;
+}
 
 void ReturnWatch::clear() {
   waiting_.clear();
@@ -71,10 +78,13 @@ std::vector<Event> ReturnWatch::update(const std::vector<Object>& objects, const
   for (const Object& o : objects) {
     if (!waits(o, parameters)) continue;
     hidden.insert(o.id);
-    Waiting& waiting = waiting_[o.id];
+    const auto [known, fresh] = waiting_.try_emplace(o.id);
+    Waiting& waiting = known->second;
+    if (fresh) waiting.hits = o.hits;
     if (now.stamp.time < waiting.asked_again) continue;
     const auto seconds = expectReturn(objects, o, now, way, parameters.visibility);
-    const double pause = std::min(0.25 * seconds.value_or(kRemembered_s), kLongestPause_s);
+    const double pause = std::clamp(0.25 * seconds.value_or(kRemembered_s),
+                                    inSight(o) ? kShortestPause_s : 0.0, kLongestPause_s);
     waiting.asked_again = later(now.stamp.time, pause);
     if (!seconds) continue;
     const TimePoint expected = later(now.stamp.time, *seconds);

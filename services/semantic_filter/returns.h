@@ -30,11 +30,13 @@ class ReturnWatch {
   double speedWalk() const;
 
   struct Waiting {
+    std::uint32_t hits = 0;             ///< when it was hidden
     TimePoint asked_again;              ///< not before
     std::optional<TimePoint> expected;  ///< as said last
     double then_s = 0.0;                ///< how far off it was
   };
 
+  bool waits(const Object& object, const Parameters& parameters) const;
   static bool isNews(const Waiting& waiting, TimePoint expected, double seconds, double frame_s);
 
   std::map<ObjectId, Waiting> waiting_;

@@ -12,7 +12,6 @@ constexpr double kHorizon_s = 10.0;
 constexpr double kStride_s = 0.25;        // what is in sight for less may be passed over
 constexpr std::size_t kMostBlockers = 6;  // those next to it in the image
 constexpr double kNineInTen = 1.645;      // deviations of a Gaussian
-constexpr double kMostSpeedChange = 0.9;  // relative
 
 using Walk = std::vector<View>;  // one a frame, the present one first
 
@@ -55,14 +54,20 @@ std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Objec
   return result;
 }
 
+/// Of the first of `things`, as the others leave it.
+double shareInSight(const std::vector<Standing>& things, const View& view,
+                    const VisibilityParameters& parameters) {
+  std::vector<Outline> outlines;
+  for (const Standing& s : things) outlines.push_back(outlineOf(*s.object, s.x, view));
+  const CameraModel& camera = *view.camera;
+  return see(outlines, {}, camera.width(), camera.height(), parameters).front().fraction;
+}
+
 /// The first frame after the present one from which some of the first of `things` is seen.
 std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, const Walk& walk,
                                         double frame_s, const VisibilityParameters& parameters) {
   const auto inSight = [&](std::size_t n) {
-    std::vector<Outline> outlines;
-    for (const Standing& s : things) outlines.push_back(outlineOf(*s.object, s.x, walk[n]));
-    const CameraModel& camera = *walk[n].camera;
-    return see(outlines, {}, camera.width(), camera.height(), parameters).front().fraction > 0.0;
+    return shareInSight(things, walk[n], parameters) > 0.0;
   };
   const auto stride = static_cast<std::size_t>(std::max(1.0, std::floor(kStride_s / frame_s)));
   for (std::size_t n = stride; n < walk.size(); n += stride) {
@@ -72,6 +77,18 @@ std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, con
     return first;
   }
   return std::nullopt;
+}
+
+/// Frames after `first` in which it is all but surely found; what shows little is found late.
+std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, std::size_t first,
+                         const VisibilityParameters& parameters) {
+  constexpr double kMissed = 0.05;
+  double missed = 1.0;
+  std::size_t n = first;
+  for (; n < walk.size() && missed > kMissed; ++n) {
+    missed *= 1.0 - shareInSight(things, walk[n], parameters);
+  }
+  return n - first;
 }
 
 /// By one deviation each: what moves the edges that hide it.
@@ -91,6 +108,19 @@ std::vector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& ey
   deviations.push_back(grown);
   return deviations;
 }
+
+/// How far the ends of the interval are from what is expected, squared. A body that slows down may
+/// not come round at all: the two ends are not alike.
+struct Spread {
+  Spread(double expected_s, double frame_s)
+      : expected(expected_s), early(frame_s * frame_s), late(early) {}
+  void add(double one_s, double other_s) {
+    const auto [first, last] = std::minmax(one_s, other_s);
+    early += std::pow(std::max(expected - first, 0.0), 2);
+    late += std::pow(std::max(last - expected, 0.0), 2);
+  }
+  double expected, early, late;
+};
 
 bool goes(const Way& way) { return way.seconds > 0.0 && way.step.p.allFinite(); }
 
@@ -129,26 +159,25 @@ std::optional<Foreseen> foreseeReturn(const std::vector<Object>& objects, const 
   };
   Foreseen result;
   result.expected = way.seconds * static_cast<double>(*expected);
-  double variance = way.seconds * way.seconds / 12.0;  // of the frame in which it happens
-  const auto add = [&](double late, double early) {
-    variance += 0.25 * (late - early) * (late - early);
-  };
-  const double change = way.speed_walk * std::sqrt(result.expected / 3.0) / std::max(speed, 1e-3);
-  const double pace = std::min(change, kMostSpeedChange);
-  add(at(walkOn(now.view, way, 1.0 - pace)), at(walkOn(now.view, way, 1.0 + pace)));
+  Spread spread(result.expected, way.seconds);
+  const std::size_t found = framesToFind(things, walk, *expected, parameters);
+  spread.add(result.expected + way.seconds * static_cast<double>(found), result.expected);
+  const double walked = way.speed_walk * std::sqrt(result.expected / 3.0) / std::max(speed, 1e-3);
+  const double pace = kNineInTen * walked;
+  const double slower = pace < 1.0 ? at(walkOn(now.view, way, 1.0 - pace)) : kHorizon_s;
+  spread.add(slower, at(walkOn(now.view, way, 1.0 + pace)));
   for (std::size_t i = 0; i < std::min<std::size_t>(things.size(), 2); ++i) {
     const State x = things[i].x;
     for (const State& d : deviationsOf(things[i], now.view.T_WC().p)) {
-      things[i].x = x + d;
+      things[i].x = x + kNineInTen * d;
       const double one = at(walk);
-      things[i].x = x - d;
-      add(one, at(walk));
+      things[i].x = x - kNineInTen * d;
+      spread.add(one, at(walk));
     }
     things[i].x = x;
   }
-  const double reach = kNineInTen * std::sqrt(variance);
-  result.earliest = std::max(0.0, result.expected - reach);
-  result.latest = result.expected + reach;
+  result.earliest = std::max(0.0, result.expected - std::sqrt(spread.early));
+  result.latest = result.expected + std::sqrt(spread.late);
   return result;
 }
 

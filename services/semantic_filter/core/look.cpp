@@ -9,14 +9,6 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kNever = 1e9;              // a change of view that never counts
 
-/// Of the sides that were compared: a density of fewer is of other units.
-double logClutterOf(const Evidence& e, const BoxScore& score, const FrameContext& frame) {
-  const auto& ignored = score.ignored;
-  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) return e.log_clutter;
-  const CameraModel& camera = *frame.view.camera;
-  return logClutter(e.z, camera.width(), camera.height(), frame.parameters->clutter, ignored);
-}
-
 void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
                 const ObjectLook& look, const std::vector<Evidence>& boxes,
                 const FrameContext& frame) {
@@ -27,7 +19,7 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
         scoreBox(e.z, *h.box, h.covariance, look.sight.hidden, frame.parameters->box);
     if (!score) continue;
     const double log_l = logRatio(e, *frame.model, class_name, alike) + score->log_density -
-                         logClutterOf(e, *score, frame);
+                         logClutterOf(e, *score, frame.view, frame.parameters->clutter);
     h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
     h.nis[i] = score->nis / score->dof;
     h.part[i] = score->part;
@@ -65,6 +57,13 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const 
 }
 
 }  // namespace
+
+double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
+                    const ClutterParameters& parameters) {
+  const auto& ignored = score.ignored;
+  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) return e.log_clutter;
+  return logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
+}
 
 ViewWalk viewWalkOf(const FrameContext& frame) {
   const BoxParameters& box = frame.parameters->box;

@@ -52,6 +52,10 @@ struct FrameContext {
 /// What changes at an object with the view of this frame.
 ViewWalk viewWalkOf(const FrameContext& frame);
 
+/// log of the density of clutter, of the sides that were compared: one of fewer is of other units.
+double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
+                    const ClutterParameters& parameters);
+
 /// P_D of a class for an instance of this size in pixels (√ of its box's area), fully visible.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 

@@ -98,6 +98,8 @@ struct TendParameters {
   double certain = 0.99;  ///< existence is kept below it, so that misses can still be heard
   double gone = 0.02;     ///< existence below which an object is forgotten
   double gone_tentative = 0.05;
+  double tentative_s =
+      10.0;  ///< out of sight, after which what confirm_hits did not confirm is too
   double class_dominates = 0.995;
   double size_gate = 4.5;  ///< deviations of the class's size beyond which nothing is of the class
   double hypothesis_floor = 0.002;

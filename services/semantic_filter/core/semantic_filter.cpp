@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "services/semantic_filter/core/association.h"
 #include "services/semantic_filter/core/context.h"
@@ -29,18 +30,33 @@ bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
   return intersectionOverUnion(box_a, box_b) > 0.65;
 }
 
+constexpr double kMisjudged = 3.0;  // nats, against that the blocker is not where it was thought
+
 }  // namespace
 
 /// What a frame expects of each object's best hypothesis; worked out when first asked for.
 class Expected {
  public:
-  Expected(const Belief& belief, const FrameInput& input, const BoxParameters& parameters)
-      : belief_(belief), input_(input), parameters_(parameters), at_(belief.objects.size()) {}
+  Expected(const Belief& belief, const FrameInput& input, const Parameters& parameters)
+      : belief_(belief),
+        input_(input),
+        parameters_(parameters.box),
+        clutter_(parameters.clutter),
+        at_(belief.objects.size()) {}
 
   bool matches(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
+    return fit(j, hidden, box).has_value();
+  }
+
+  /// log of how well it explains the box, sides and class, against clutter.
+  std::optional<double> fit(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
     const Entry& e = entryOf(j);
-    return e.box && mayOverlap(box.z, *e.box, e.covariance) &&
-           scoreBox(box.z, *e.box, e.covariance, hidden, parameters_);
+    if (!e.box || !mayOverlap(box.z, *e.box, e.covariance)) return std::nullopt;
+    const auto score = scoreBox(box.z, *e.box, e.covariance, hidden, parameters_);
+    if (!score) return std::nullopt;
+    const Object& object = belief_.objects[j];
+    return score->log_density - logClutterOf(box, *score, input_.view, clutter_) +
+           logRatio(box, input_.model, object.best().class_name, object.alike);
   }
 
  private:
@@ -65,6 +81,7 @@ class Expected {
   const Belief& belief_;
   const FrameInput& input_;
   const BoxParameters& parameters_;
+  const ClutterParameters& clutter_;
   std::vector<Entry> at_;
 };
 
@@ -182,15 +199,21 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
     if (solid && sights[j].visibility == Visibility::kOccluded) hidden.push_back(j);
   }
   if (hidden.empty()) return;
-  Expected expected(belief, input, parameters_.box);
+  Expected expected(belief, input, parameters_);
   for (const auto& e : *input.boxes) {
     std::vector<std::size_t> may_be;
+    double best_hidden = -std::numeric_limits<double>::infinity();
     for (const std::size_t j : hidden) {
-      if (expected.matches(j, {}, e)) may_be.push_back(j);
+      const auto fit = expected.fit(j, {}, e);
+      if (!fit) continue;
+      may_be.push_back(j);
+      best_hidden = std::max(best_hidden, *fit);
     }
     bool others = may_be.empty();
     for (std::size_t j = 0; j < sights.size() && !others; ++j) {
-      others = sights[j].fraction > 0.0 && expected.matches(j, sights[j].hidden, e);
+      if (sights[j].fraction <= 0.0) continue;
+      const auto fit = expected.fit(j, sights[j].hidden, e);
+      others = fit && *fit > best_hidden - kMisjudged;
     }
     if (others) continue;
     for (const std::size_t j : may_be) {
@@ -218,7 +241,7 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
                             const FrameContext& frame, IdBook& ids) const {
   const auto& boxes = *input.boxes;
   std::vector<Object> born;
-  Expected expected(belief, input, parameters_.box);
+  Expected expected(belief, input, parameters_);
   std::vector<std::size_t> accepted;
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (claimed[static_cast<Eigen::Index>(z)] > parameters_.birth.claimed) accepted.push_back(z);

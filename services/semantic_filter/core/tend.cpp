@@ -137,6 +137,16 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
   object.running_nis = 1.0;
 }
 
+/// Seen once or twice and then no more, where nothing can be asked of it: what nobody was told of,
+/// and what is mostly not there, is not kept for it to come back.
+bool forgettable(const Object& o, const TendParameters& parameters) {
+  if (o.once_confirmed || o.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
+    return false;
+  const TimePoint last = std::max(o.hidden.last, o.away.last);
+  const bool unasked = o.hidden.count + o.away.count > 0;
+  return unasked && toSeconds(last - o.last_seen) > parameters.tentative_s;
+}
+
 }  // namespace
 
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate) {
@@ -194,7 +204,8 @@ void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
     }
   }
   std::erase_if(objects, [&](const Object& o) {
-    return o.existence < (o.hits > 1 ? parameters.gone : parameters.gone_tentative);
+    return forgettable(o, parameters) ||
+           o.existence < (o.hits > 1 ? parameters.gone : parameters.gone_tentative);
   });
   const auto limit = static_cast<std::size_t>(parameters.max_objects);
   if (objects.size() <= limit) return;

@@ -88,6 +88,24 @@ std::optional<Detection> detect(const TrueObject& object, const View& view,
   return d;
 }
 
+/// Seen four times and certain in each of its seven numbers alike.
+inline Object makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
+  Object o;
+  o.id = id;
+  o.existence = {0.9, ExistenceEvidence::kPrior, o.as_of};
+  o.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));
+  o.hits = 4;
+  o.visible_fraction = 1.0;
+  Hypothesis h;
+  h.class_name = name;
+  h.weight = 1.0;
+  h.x = x;
+  h.P.setZero();
+  h.P.diagonal().head<7>().setConstant(variance);
+  o.hypotheses = {h};
+  return o;
+}
+
 inline FrameStamp stampOf(std::uint64_t k) {
   FrameStamp s;
   s.source = 1;

@@ -14,25 +14,9 @@ namespace {
 
 using testing::makeCamera;
 using testing::makeModelInfo;
+using testing::makeObject;
 using testing::makePriors;
 using testing::makeState;
-
-Object makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
-  Object o;
-  o.id = id;
-  o.existence = {0.9, ExistenceEvidence::kPrior, o.as_of};
-  o.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));
-  o.hits = 4;
-  o.visible_fraction = 1.0;
-  Hypothesis h;
-  h.class_name = name;
-  h.weight = 1.0;
-  h.x = x;
-  h.P.setZero();
-  h.P.diagonal().head<7>().setConstant(variance);
-  o.hypotheses = {h};
-  return o;
-}
 
 class Tending : public ::testing::Test {
  protected:
@@ -200,6 +184,25 @@ TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
   EXPECT_NEAR(hint->distance_m, 10.0, 0.6);
   points.resize(3);
   EXPECT_FALSE(rangeFromLandmarks(e, points, parameters.birth));
+}
+
+TEST_F(Tending, WhatWasSeenOnceAndIsOutOfSightIsForgottenAndWhatWasConfirmedIsKept) {
+  const auto hiddenFor = [&](double seconds, std::uint32_t hits, bool confirmed) {
+    Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    o.hits = hits;
+    o.confirmed = o.once_confirmed = confirmed;
+    o.visible_fraction = 0.0;
+    o.hidden.count = 5;
+    o.hidden.last = o.last_seen + Duration(static_cast<std::int64_t>(1e9 * seconds));
+    std::vector<Object> objects{o};
+    confirmAndBury(objects, frame);
+    return objects.size();
+  };
+  const double patience = parameters.tend.tentative_s;
+  EXPECT_EQ(hiddenFor(patience + 1.0, 1, false), 0u);
+  EXPECT_EQ(hiddenFor(patience - 1.0, 1, false), 1u);
+  EXPECT_EQ(hiddenFor(patience + 1.0, 30, false), 1u) << "much is known of it";
+  EXPECT_EQ(hiddenFor(patience + 1.0, 3, true), 1u);
 }
 
 TEST(Published, ACovarianceThatRoundingMadeIndefiniteIsMendedAndOthersAreLeftAlone) {
