@@ -28,7 +28,7 @@ class BirthCost {
             const std::optional<RangeHint>& range, const FrameContext& frame,
             const Eigen::Vector3d& start)
       : z_(evidence.z),
-        view_(frame.view),
+        from_(frame.projector()),
         yaw_(yaw),
         yaw_sigma_(yaw_sigma),
         range_(range),
@@ -36,14 +36,14 @@ class BirthCost {
         start_(start),
         offset_(frame.offsetOf(prior.name)) {
     bias_sigma_ = biasSigma(viewWalkOf(frame).lasting, z_.width(), z_.height()).cwiseMax(1e-6);
-    position_weight_ = 1.0 / std::max((start - view_.T_WC().p).norm(), 1.0);
+    position_weight_ = 1.0 / std::max((start - from_.T_WC.p).norm(), 1.0);
     size_whitening_ = Cholesky(prior.log_size_covariance).whiten(Eigen::Matrix3d::Identity());
   }
 
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     State x = State::Zero();
     x.head<kFree>() = Eigen::Map<const VectorFit>(parameters);
-    const auto box = projectObserved(x, view_, offset_);
+    const auto box = projectObserved(x, from_, offset_);
     if (!box) return false;
     Eigen::Map<Residuals> r(residuals);
     Jacobian J = Jacobian::Zero();
@@ -56,7 +56,7 @@ class BirthCost {
     r.segment<3>(8) = size_whitening_ * (x.segment<3>(kSize) - log_size_);
     J.block<3, 3>(8, kSize) = size_whitening_;
     if (range_) {
-      const Eigen::Vector3d ray = x.head<3>() - view_.T_WC().p;
+      const Eigen::Vector3d ray = x.head<3>() - from_.T_WC.p;
       r[11] = (ray.norm() - range_->distance_m) / range_->sigma_m;
       J.block<1, 3>(11, 0) = ray.normalized().transpose() / range_->sigma_m;
     }
@@ -78,7 +78,7 @@ class BirthCost {
   }
 
   const BoxMeasurement& z_;
-  const View& view_;
+  Projector from_;
   double yaw_, yaw_sigma_;
   std::optional<RangeHint> range_;
   Eigen::Vector3d log_size_, start_;
@@ -169,8 +169,8 @@ void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
 double logShapeRatio(const Fit& fit, const ClassPrior& prior, double yaw_sigma,
                      const Evidence& evidence, const FrameContext& frame) {
   const auto& z = evidence.z;
-  const auto box =
-      projectObserved(fit.hypothesis.x, frame.view, frame.offsetOf(fit.hypothesis.class_name));
+  const auto box = projectObserved(fit.hypothesis.x, frame.projector(),
+                                   frame.offsetOf(fit.hypothesis.class_name));
   const bool whole = z.count() == 4 && box &&
                      std::all_of(box->exact.begin(), box->exact.end(), [](bool e) { return e; });
   if (!whole) return -fit.cost;

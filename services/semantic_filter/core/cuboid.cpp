@@ -9,12 +9,14 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
+using Corner = Eigen::Vector3d;
+
 /// The cuboid and its eight corners before the camera.
 struct Corners {
-  Eigen::Matrix3d R_WO, R_CW, R_CB;
-  Eigen::Vector3d size;                  ///< length, width, height
-  std::array<Eigen::Vector3d, 8> local;  ///< from the centre, along the cuboid's axes
-  std::array<Eigen::Vector3d, 8> p_C;
+  Eigen::Matrix3d R_WO;
+  std::array<Corner, 8> local;  ///< from the centre, along the cuboid's axes
+  std::array<Corner, 8> p_C;
+  bool all_before = true;  ///< the near plane
 };
 
 struct ImagePoint {
@@ -22,30 +24,26 @@ struct ImagePoint {
   int corner;  ///< -1: a cut by the near plane
 };
 
-Eigen::Vector3d cornerOf(int i, const Eigen::Vector3d& size) {
-  return {(i & 1) ? 0.5 * size.x() : -0.5 * size.x(), (i & 2) ? 0.5 * size.y() : -0.5 * size.y(),
-          (i & 4) ? 0.5 * size.z() : -0.5 * size.z()};
-}
-
 /// Nothing where all of it lies behind the near plane.
-std::optional<Corners> cornersBeforeCamera(const State& x, const View& view) {
-  Corners c;
-  const RigidTransform T_WC = view.T_WC();
-  c.R_CW = T_WC.q.conjugate().toRotationMatrix();
-  const Eigen::Vector3d centre_C = c.R_CW * (x.head<3>() - T_WC.p);
-  c.size = x.segment<3>(kSize).array().exp();
-  if (centre_C.z() + 0.5 * c.size.norm() < kNear) return std::nullopt;
-  c.R_CB = view.camera->T_BC().q.conjugate().toRotationMatrix();
-  c.R_WO = uprightRotation(x[kYaw], view.up_W);
-  const Eigen::Matrix3d R_CO = c.R_CW * c.R_WO;
+std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from) {
+  const Eigen::Vector3d centre_C = from.R_CW * (x.head<3>() - from.T_WC.p);
+  const Eigen::Vector3d half = 0.5 * x.segment<3>(kSize).array().exp();
+  if (centre_C.z() + half.norm() < kNear) return std::nullopt;
+  std::optional<Corners> result(std::in_place);
+  Corners& c = *result;
+  c.R_WO = from.R_WL * rotationAboutZ(x[kYaw]);
+  const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
   bool any = false;
   for (int i = 0; i < 8; ++i) {
-    c.local[i] = cornerOf(i, c.size);
+    c.local[i] = {(i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
+                  (i & 4) ? half.z() : -half.z()};
     c.p_C[i] = centre_C + R_CO * c.local[i];
-    any = any || c.p_C[i].z() >= kNear;
+    const bool before = c.p_C[i].z() >= kNear;
+    any = any || before;
+    c.all_before = c.all_before && before;
   }
   if (!any) return std::nullopt;
-  return c;
+  return result;
 }
 
 /// Pixel of a point in front; far outside the image where the distortion is not defined.
@@ -56,86 +54,101 @@ Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C) {
           camera.cy() + camera.fy() * direction.y() * 4.0};
 }
 
-void setSide(ProjectedBox& box, int side, const ImagePoint& point, const View& view,
+void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Projector& from,
              const Corners& corners) {
   box.sides[side] = point.pixel[side % 2];
   Eigen::Matrix<double, 2, 3> J_point;
-  if (point.corner < 0 || !view.camera->project(corners.p_C[point.corner], &J_point)) {
+  if (point.corner < 0 || !from.camera->project(corners.p_C[point.corner], &J_point)) {
     box.exact[side] = false;
     return;
   }
-  const Eigen::Vector3d& local = corners.local[point.corner];
+  const Corner& local = corners.local[point.corner];
   const Eigen::RowVector3d by_C = J_point.row(side % 2);
-  const Eigen::RowVector3d by_W = by_C * corners.R_CW;
+  const Eigen::RowVector3d by_W = by_C * from.R_CW;
   const Eigen::RowVector3d by_O = by_W * corners.R_WO;
   box.H.row(side).head<3>() = by_W;
   box.H(side, kYaw) = by_O.y() * local.x() - by_O.x() * local.y();  // turns x towards y
   box.H.row(side).segment<3>(kSize) = by_O.cwiseProduct(local.transpose());
-  const Eigen::Vector3d p_B =
-      corners.R_CB.transpose() * corners.p_C[point.corner] + view.camera->T_BC().p;
-  const Eigen::Vector3d by_B = (by_C * corners.R_CB).transpose();
+  const Eigen::Vector3d p_B = from.R_BC * corners.p_C[point.corner] + from.camera->T_BC().p;
+  const Eigen::Vector3d by_B = from.R_BC * by_C.transpose();
   box.H_pose.row(side).head<3>() = by_B.cross(p_B).transpose();
   box.H_pose.row(side).tail<3>() = -by_W;
 }
 
 using ImagePoints = InplaceVector<ImagePoint, kMostOutline>;
 
+void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
+  const Corner& a = corners.p_C[i];
+  for (int axis = 1; axis < 8; axis <<= 1) {
+    const int j = i | axis;
+    if (j == i) continue;
+    const Corner& b = corners.p_C[j];
+    if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
+    const double s = (kNear - a.z()) / (b.z() - a.z());
+    points.push_back({pixelOf(camera, a + s * (b - a)), -1});
+  }
+}
+
 ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
   ImagePoints points;
   for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d& a = corners.p_C[i];
+    const Corner& a = corners.p_C[i];
     if (a.z() >= kNear) points.push_back({pixelOf(camera, a), i});
-    for (int axis = 1; axis < 8; axis <<= 1) {
-      const int j = i | axis;
-      if (j == i) continue;
-      const Eigen::Vector3d& b = corners.p_C[j];
-      if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
-      const double s = (kNear - a.z()) / (b.z() - a.z());
-      points.push_back({pixelOf(camera, a + s * (b - a)), -1});
-    }
+    if (!corners.all_before) addCuts(points, i, corners, camera);
   }
   return points;
 }
 
 }  // namespace
 
+Projector::Projector(const View& view)
+    : camera(view.camera),
+      T_WC(view.T_WC()),
+      R_CW(T_WC.q.conjugate().toRotationMatrix()),
+      R_BC(view.camera->T_BC().R()),
+      R_WL(levelling(view.up_W).conjugate().toRotationMatrix()) {}
+
 Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
   return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
 }
 
-std::optional<ProjectedBox> projectCuboid(const State& x, const View& view) {
-  const auto corners = cornersBeforeCamera(x, view);
-  if (!corners) return std::nullopt;
-  std::optional<ProjectedBox> result(std::in_place);
-  ProjectedBox& box = *result;
-  const auto points = imagePoints(*corners, *view.camera);
+std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from) {
+  std::optional<ProjectedBox> result;
+  const auto corners = cornersBeforeCamera(x, from);
+  if (!corners) return result;
+  ProjectedBox& box = result.emplace();
+  const auto points = imagePoints(*corners, *from.camera);
   for (int side = 0; side < 4; ++side) {
     const ImagePoint* extreme = &points[0];
     for (const auto& point : points) {
       const double d = point.pixel[side % 2] - extreme->pixel[side % 2];
       if (side < 2 ? d < 0 : d > 0) extreme = &point;
     }
-    setSide(box, side, *extreme, view, *corners);
+    setSide(box, side, *extreme, from, *corners);
   }
   for (const auto& point : points) box.points.push_back(point.pixel);
   return result;
 }
 
-std::optional<ProjectedBox> projectObserved(const State& x, const View& view,
+std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
                                             const Eigen::Vector4d& offset) {
-  auto box = projectCuboid(x, view);
+  auto box = projectCuboid(x, from);
   if (!box) return box;
-  const ProjectedBox plain = *box;
-  const double limit[2] = {2.0 * view.camera->width(), 2.0 * view.camera->height()};
-  for (int i = 0; i < 4; ++i) {
-    const int low = i % 2, high = low + 2;
-    const double extent = plain.sides[high] - plain.sides[low];
-    const double b = x[kBias + i] + offset[i];
-    box->sides[i] += b * std::min(extent, limit[low]);
-    box->H(i, kBias + i) = std::min(extent, limit[low]);
-    if (extent >= limit[low]) continue;
-    box->H.row(i) += b * (plain.H.row(high) - plain.H.row(low));
-    box->H_pose.row(i) += b * (plain.H_pose.row(high) - plain.H_pose.row(low));
+  const double limit[2] = {2.0 * from.camera->width(), 2.0 * from.camera->height()};
+  for (int low = 0; low < 2; ++low) {
+    const int high = low + 2;
+    const double extent = box->sides[high] - box->sides[low];
+    const Eigen::Matrix<double, 1, kGeometry> by_state =
+        (box->H.row(high) - box->H.row(low)).head<kGeometry>();
+    const Eigen::Matrix<double, 1, 6> by_pose = box->H_pose.row(high) - box->H_pose.row(low);
+    for (const int i : {low, high}) {
+      const double b = x[kBias + i] + offset[i];
+      box->sides[i] += b * std::min(extent, limit[low]);
+      box->H(i, kBias + i) = std::min(extent, limit[low]);
+      if (extent >= limit[low]) continue;
+      box->H.row(i).head<kGeometry>() += b * by_state;
+      box->H_pose.row(i) += b * by_pose;
+    }
   }
   return box;
 }

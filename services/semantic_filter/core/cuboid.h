@@ -21,6 +21,16 @@ struct View {
   RigidTransform T_WC() const { return T_WB * camera->T_BC(); }
 };
 
+/// A view with what all projections from it share; a View where there is but one.
+struct Projector {
+  Projector(const View& view);  // NOLINT(google-explicit-constructor)
+
+  const CameraModel* camera;
+  RigidTransform T_WC;
+  Eigen::Matrix3d R_CW, R_BC;
+  Eigen::Matrix3d R_WL;  ///< from W turned so that z is against gravity
+};
+
 struct ProjectedBox {
   Eigen::Vector4d sides = Eigen::Vector4d::Zero();  ///< x1, y1, x2, y2; may lie outside the image
   Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
@@ -32,11 +42,11 @@ struct ProjectedBox {
 /// R_WO of an upright cuboid.
 Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
 /// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
-std::optional<ProjectedBox> projectCuboid(const State& x, const View& view);
+std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from);
 
 /// What a detector reports of it: the cuboid's box with the hypothesis's b and the detector's mean
 /// `offset` (in widths and heights, like b) added to its sides.
-std::optional<ProjectedBox> projectObserved(const State& x, const View& view,
+std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
                                             const Eigen::Vector4d& offset);
 
 /// Yaw in W from KITTI's alpha seen at `centre_W`: alpha = rotation_y - atan2(x, z) of the centre,

@@ -21,8 +21,9 @@ struct KeyView {
         error(pose_error),
         time(at),
         T_WC(of.T_WC()),
+        projector(of),
         insets(std::move(of_model)) {
-    view.camera = &camera;
+    view.camera = projector.camera = &camera;
   }
   KeyView(const KeyView&) = delete;
   KeyView& operator=(const KeyView&) = delete;
@@ -32,6 +33,7 @@ struct KeyView {
   PoseError error;
   TimePoint time;
   RigidTransform T_WC;
+  Projector projector;
   std::shared_ptr<const Insets> insets;  ///< of the network that looked
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/semantic_filter/core/keyframe.h"
+
 namespace perdure::semantic_filter {
 namespace {
 
@@ -40,9 +42,9 @@ double foundAs(const Hypothesis& hypothesis, const Object& object, double size_p
 }
 
 HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const Sight& sight,
-                      const FrameContext& frame) {
+                      const Projector& from, const FrameContext& frame) {
   HypothesisLook h;
-  h.box = projectObserved(hypothesis.x, frame.view, frame.offsetOf(hypothesis.class_name));
+  h.box = projectObserved(hypothesis.x, from, frame.offsetOf(hypothesis.class_name));
   h.late_looks =
       sharedLooks(hypothesis.x.head<3>(), object.late_view, frame.view, frame.parameters->looks);
   if (!h.box) return h;
@@ -64,6 +66,8 @@ double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
   if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) return e.log_clutter;
   return logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
 }
+
+Projector FrameContext::projector() const { return key_view ? key_view->projector : view; }
 
 ViewWalk viewWalkOf(const FrameContext& frame) {
   const BoxParameters& box = frame.parameters->box;
@@ -93,8 +97,9 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
   ObjectLook result;
   result.sight = sight;
   result.hypotheses.reserve(object.hypotheses.size());
+  const Projector from = frame.projector();
   for (const auto& hypothesis : object.hypotheses) {
-    result.hypotheses.push_back(lookAt(hypothesis, object, sight, frame));
+    result.hypotheses.push_back(lookAt(hypothesis, object, sight, from, frame));
   }
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     const bool near = std::any_of(result.hypotheses.begin(), result.hypotheses.end(),

@@ -43,6 +43,8 @@ struct FrameContext {
   const Parameters* parameters = nullptr;
   std::shared_ptr<const KeyView> key_view = {};  ///< of this frame, for what is remembered
 
+  /// Of `view`.
+  Projector projector() const;
   /// Where the network's boxes lie in the cuboid's image, on average, as projectObserved takes it.
   Eigen::Vector4d offsetOf(const std::string& class_name) const {
     return model ? model->insets->of(class_name) : Eigen::Vector4d::Zero();

@@ -61,8 +61,8 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
 }
 
 /// Two things that the image shows side by side are two, however near their estimated depths are.
-bool sameInImage(const State& a, const State& b, const View& view) {
-  const auto box_a = projectCuboid(a, view), box_b = projectCuboid(b, view);
+bool sameInImage(const State& a, const State& b, const Projector& from) {
+  const auto box_a = projectCuboid(a, from), box_b = projectCuboid(b, from);
   if (!box_a || !box_b) return true;
   const auto toBox = [](const Eigen::Vector4d& s) { return Box{s[0], s[1], s[2], s[3]}; };
   return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
@@ -128,7 +128,7 @@ bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
   const TendParameters& tend = frame.parameters->tend;
   const Shared shared = sharedVolume(x, y, frame.view.up_W);
   if (isOther(a) != isOther(b) && shared.of_lesser > tend.merge_inside) return true;
-  return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.view);
+  return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.projector());
 }
 
 /// Half the diagonal of the best hypothesis' cuboid.

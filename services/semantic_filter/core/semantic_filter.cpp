@@ -40,6 +40,7 @@ class Expected {
   Expected(const Belief& belief, const FrameInput& input, const Parameters& parameters)
       : belief_(belief),
         input_(input),
+        from_(input.view),
         parameters_(parameters.box),
         clutter_(parameters.clutter),
         at_(belief.objects.size()) {}
@@ -73,13 +74,14 @@ class Expected {
     const Object& object = belief_.objects[j];
     const Hypothesis& best = object.best();
     const State x = stateAt(best, toSeconds(input_.stamp.time - object.as_of));
-    e.box = projectObserved(x, input_.view, input_.model.insets->of(best.class_name));
+    e.box = projectObserved(x, from_, input_.model.insets->of(best.class_name));
     if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
     return e;
   }
 
   const Belief& belief_;
   const FrameInput& input_;
+  Projector from_;
   const BoxParameters& parameters_;
   const ClutterParameters& clutter_;
   std::vector<Entry> at_;
@@ -106,10 +108,11 @@ FrameContext SemanticFilter::contextOf(const FrameInput& input) const {
 }
 
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
+  const Projector from(input.view);
   std::vector<Outline> outlines;
   for (const auto& o : belief.objects) {
     outlines.push_back(
-        outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), input.view));
+        outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), from));
   }
   const auto& camera = *input.view.camera;
   auto sights =

@@ -134,7 +134,7 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
   const Eigen::MatrixXd P = information.solve(Eigen::MatrixXd::Identity(model.dim(), model.dim()));
   const double distance = (fit.x.head<3>() - frame.view.T_WC().p).norm();
   if (!P.allFinite()) return std::nullopt;
-  const auto now = projectCuboid(fit.x, frame.view);
+  const auto now = projectCuboid(fit.x, frame.projector());
   if (!now) return std::nullopt;
   const Eigen::Vector4d sigma =
       biasSigma(viewWalkOf(frame).lasting, std::max(now->sides[2] - now->sides[0], 1.0),

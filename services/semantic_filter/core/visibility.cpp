@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdint>
 #include <numeric>
 
 #include "services/semantic_filter/core/polygon.h"
@@ -15,15 +15,19 @@ struct Cell {
   double distance_m = 0.0, sigma_m = 0.0;  ///< of the blocker that hides most
   double strongest = 0.0;
   ObjectId blocker = 0;
+  std::uint64_t painting = 0;  ///< that it is of; of an earlier one it is blank
 };
 
+/// Its cells are kept from one painting to the next: to clear them all costs more than to use some.
 class DepthBuffer {
  public:
-  DepthBuffer(double width, double height, double cell_px)
-      : cell_(cell_px),
-        columns_(static_cast<int>(std::ceil(width / cell_px))),
-        rows_(static_cast<int>(std::ceil(height / cell_px))),
-        cells_(static_cast<std::size_t>(columns_) * rows_) {}
+  void begin(double width, double height, double cell_px) {
+    cell_ = cell_px;
+    columns_ = static_cast<int>(std::ceil(width / cell_px));
+    rows_ = static_cast<int>(std::ceil(height / cell_px));
+    cells_.resize(static_cast<std::size_t>(columns_) * rows_);
+    ++painting_;
+  }
 
   /// Calls f(cell, x, y) for each cell whose centre lies in the polygon; at least one cell of a
   /// polygon that is smaller than the grid.
@@ -52,7 +56,12 @@ class DepthBuffer {
   int rowOf(double y) const { return std::clamp(static_cast<int>(y / cell_), 0, rows_ - 1); }
   int columnOf(double x) const { return std::clamp(static_cast<int>(x / cell_), 0, columns_ - 1); }
   Cell& at(int row, int column) {
-    return cells_[static_cast<std::size_t>(row) * columns_ + column];
+    Cell& cell = cells_[static_cast<std::size_t>(row) * columns_ + column];
+    if (cell.painting != painting_) {
+      cell = {};
+      cell.painting = painting_;
+    }
+    return cell;
   }
   static void spanAt(const Polygon& hull, double y, double& left, double& right) {
     for (std::size_t i = 0; i < hull.size(); ++i) {
@@ -64,9 +73,10 @@ class DepthBuffer {
     }
   }
 
-  double cell_;
-  int columns_, rows_;
+  double cell_ = 1.0;
+  int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
+  std::uint64_t painting_ = 0;
 };
 
 /// P(the blocker in the cell stands nearer than the object).
@@ -75,26 +85,53 @@ double nearer(const Cell& cell, const Outline& o) {
   return 0.5 * std::erfc((cell.distance_m - o.distance_m) / (std::sqrt(2.0) * sigma));
 }
 
-struct Tally {
-  double total = 0.0, hidden = 0.0;
-  std::map<ObjectId, double> by_blocker;
-  std::array<double, 4> side_total{}, side_hidden{};
+/// What an object's cells hold of one that may hide it.
+struct Blocked {
+  ObjectId by;
+  double nearer;  ///< probability that this stands nearer than the object
+  double hidden = 0.0;
 };
 
-void addToTally(Tally& tally, const Cell& cell, double x, double y, const Outline& o) {
-  const double hidden = cell.strongest > 0.0 ? (1.0 - cell.transmittance) * nearer(cell, o) : 0.0;
-  tally.total += 1.0;
-  tally.hidden += hidden;
-  if (hidden > 0.0) tally.by_blocker[cell.blocker] += hidden;
-  const auto& s = o.box->sides;
-  const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
-  const bool in_band[4] = {x<s[0] + band_x, y<s[1] + band_y, x> s[2] - band_x, y> s[3] - band_y};
-  for (int i = 0; i < 4; ++i) {
-    if (!in_band[i]) continue;
-    tally.side_total[i] += 1.0;
-    tally.side_hidden[i] += hidden;
+struct Tally {
+  explicit Tally(const Outline& outline) : o(outline) {
+    const auto& s = o.box->sides;
+    const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
+    inner = {s[0] + band_x, s[1] + band_y, s[2] - band_x, s[3] - band_y};
   }
-}
+
+  void add(const Cell& cell, double x, double y) {
+    double share = 0.0;
+    if (cell.strongest > 0.0) {
+      Blocked& blocked = blockedBy(cell);
+      share = (1.0 - cell.transmittance) * blocked.nearer;
+      blocked.hidden += share;
+    }
+    total += 1.0;
+    hidden += share;
+    const bool in_band[4] = {x<inner[0], y<inner[1], x> inner[2], y> inner[3]};
+    for (int i = 0; i < 4; ++i) {
+      if (!in_band[i]) continue;
+      side_total[i] += 1.0;
+      side_hidden[i] += share;
+    }
+  }
+
+  const Outline& o;
+  std::array<double, 4> inner;  ///< where the bands along the four sides end
+  double total = 0.0, hidden = 0.0;
+  std::vector<Blocked> blockers;
+  std::array<double, 4> side_total{}, side_hidden{};
+
+ private:
+  /// Few hide one thing, and cells side by side mostly show the same.
+  Blocked& blockedBy(const Cell& cell) {
+    for (auto b = blockers.rbegin(); b != blockers.rend(); ++b) {
+      if (b->by == cell.blocker) return *b;
+    }
+    blockers.push_back({cell.blocker, nearer(cell, o)});
+    return blockers.back();
+  }
+};
 
 void paint(Cell& cell, const Outline& o) {
   if (o.solidity > cell.strongest) {
@@ -130,8 +167,9 @@ Sight classify(const Tally& tally, double in_image, double by_points,
   const double free = tally.total > 0.0 ? 1.0 - tally.hidden / tally.total : 0.0;
   sight.fraction = in_image * free * (1.0 - by_points);
   double most = 0.0;
-  for (const auto& [id, hidden] : tally.by_blocker) {
-    if (hidden > most) most = hidden, sight.blocked_by = id;
+  for (const Blocked& b : tally.blockers) {
+    const bool older = b.hidden == most && b.by < sight.blocked_by;
+    if (b.hidden > most || older) most = b.hidden, sight.blocked_by = b.by;
   }
   if (most < 0.1 * tally.total) sight.blocked_by = 0;
   for (int i = 0; i < 4; ++i) {
@@ -150,9 +188,9 @@ Sight classify(const Tally& tally, double in_image, double by_points,
 
 }  // namespace
 
-Outline outlineOf(const Object& object, const State& x, const View& view) {
+Outline outlineOf(const Object& object, const State& x, const Projector& from) {
   const Hypothesis& h = object.best();
-  const Eigen::Vector3d ray = x.head<3>() - view.T_WC().p;
+  const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
   Outline o;
   o.id = object.id;
   o.solidity = object.existence * object.support;
@@ -160,7 +198,7 @@ Outline outlineOf(const Object& object, const State& x, const View& view) {
   const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
   o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
   o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-  o.box = projectCuboid(x, view);
+  o.box = projectCuboid(x, from);
   return o;
 }
 
@@ -171,7 +209,8 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
-  DepthBuffer buffer(width, height, static_cast<double>(parameters.cell_px));
+  thread_local DepthBuffer buffer;
+  buffer.begin(width, height, static_cast<double>(parameters.cell_px));
   std::vector<Sight> sights(outlines.size());
   for (const std::size_t j : order) {
     const Outline& o = outlines[j];
@@ -180,10 +219,9 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
     Polygon inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
     inside = clip(clip(inside, 1, 0.0, true), 1, height, false);
     const double in_image = polygonArea(inside) / std::max(polygonArea(hull), 1e-9);
-    Tally tally;
+    Tally tally(o);
     if (!inside.empty()) {
-      buffer.visit(inside,
-                   [&](Cell& cell, double x, double y) { addToTally(tally, cell, x, y, o); });
+      buffer.visit(inside, [&](Cell& cell, double x, double y) { tally.add(cell, x, y); });
     }
     const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
     sights[j] = classify(tally, in_image, by_points, parameters);
