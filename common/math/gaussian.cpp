@@ -56,10 +56,15 @@ void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B) {
   L.triangularView<Eigen::Lower>().solveInPlace(B);
 }
 
-Cholesky::Cholesky(const MatrixView& S) : L_(S), positive_(choleskyInPlace(L_)) {}
+Cholesky::Cholesky(Eigen::MatrixXd S) : L_(std::move(S)), positive_(choleskyInPlace(L_)) {}
 
 Eigen::MatrixXd Cholesky::whiten(const MatrixView& B) const {
   return L_.triangularView<Eigen::Lower>().solve(B);
+}
+
+Eigen::VectorXd Cholesky::unwhiten(Eigen::VectorXd w) const {
+  L_.triangularView<Eigen::Lower>().adjoint().solveInPlace(w);
+  return w;
 }
 
 Eigen::MatrixXd Cholesky::solve(const MatrixView& B) const {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 
 namespace perdure {
 
@@ -46,11 +47,14 @@ void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B);
 class Cholesky {
  public:
   Cholesky() = default;
-  explicit Cholesky(const MatrixView& S);
+  explicit Cholesky(Eigen::MatrixXd S);
   bool positive() const { return positive_; }         ///< if not, nothing else may be asked
   Eigen::MatrixXd whiten(const MatrixView& B) const;  ///< L⁻¹ B
+  Eigen::VectorXd unwhiten(Eigen::VectorXd w) const;  ///< L⁻ᵀ w
   Eigen::MatrixXd solve(const MatrixView& B) const;   ///< S⁻¹ B
   double logDeterminant() const;                      ///< log |S|
+  /// Its storage, for the next one.
+  Eigen::MatrixXd release() && { return std::move(L_); }
 
  private:
   Eigen::MatrixXd L_;

@@ -3,6 +3,7 @@
 #include <deque>
 #include <functional>
 
+#include "common/base/heap.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
 #include "services/semantic_filter/node.h"
@@ -96,6 +97,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  keepFreedMemory();
   semantic_filter::Config config;
   return service::runService(
       argc, argv,

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <random>
 
+#include "common/base/heap.h"
 #include "services/semantic_filter/priors.h"
 #include "tests/bench/allocations.h"
 #include "tests/services/semantic_filter/scene.h"
@@ -198,6 +199,7 @@ int main(int argc, char** argv) {
     std::cerr << "usage: filter_bench [FRAMES [IN_VIEW]]   (from the repository's root)\n";
     return 64;
   }
+  perdure::keepFreedMemory();  // as perdure-semantic-filter does
   std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";
   for (const int n : {20, 60, 200}) {
     if (in_view == 0 || in_view == n) report(static_cast<std::size_t>(n), frames);

@@ -24,7 +24,7 @@ Matrix6d transition(const PoseError& earlier, const PoseError& later) {
 
 }  // namespace
 
-Looks::Looks(const Keyframes& keyframes)
+Looks::Looks(const Keyframes& keyframes, const PoseError& now)
     : keyframes_(&keyframes), pairs_(keyframes.size() * (keyframes.size() + 1) / 2) {
   for (std::size_t j = 0; j < keyframes.size(); ++j) {
     const PoseError& earlier = keyframes[j]->from->error;
@@ -33,6 +33,7 @@ Looks::Looks(const Keyframes& keyframes)
       pairs_[i * (i + 1) / 2 + j] =
           transition(earlier, keyframes[i]->from->error).lazyProduct(earlier.covariance);
     }
+    now_.push_back(transition(earlier, now).lazyProduct(earlier.covariance));
   }
 }
 
@@ -69,8 +70,7 @@ State BatchModel::at(const State& x, const FreeVector& step) const {
 std::optional<Stack> BatchModel::linearise(const State& x) const {
   const auto n = static_cast<Eigen::Index>(looks_.size());
   Stack s;
-  s.residual = Eigen::VectorXd::Zero(4 * n);
-  s.J = Eigen::MatrixXd::Zero(4 * n, dim_);
+  s.rows = Eigen::MatrixXd::Zero(4 * n, dim_ + 1);
   s.J_pose.assign(looks_.size(), Eigen::Matrix<double, 4, 6>::Zero());
   s.counts.assign(looks_.size(), {});
   for (std::size_t i = 0; i < looks_.size(); ++i) {
@@ -85,13 +85,13 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
       const double inside = a < 2 ? box->sides[a] - k.z.sides[a] : k.z.sides[a] - box->sides[a];
       if (!use[a] && !(box->exact[a] && inside > 0.0)) continue;
       s.counts[i][a] = true;
-      s.residual[row + a] = k.z.sides[a] - box->sides[a];
-      s.J.row(row + a).head<kGeometry>() = box->H.row(a).head<kGeometry>();
-      if (moving()) s.J.row(row + a).tail<3>() = -age(i) * box->H.row(a).head<3>();
+      s.rows(row + a, dim_) = k.z.sides[a] - box->sides[a];
+      s.rows.row(row + a).head<kGeometry>() = box->H.row(a).head<kGeometry>();
+      if (moving()) s.rows.block<1, 3>(row + a, kGeometry) = -age(i) * box->H.row(a).head<3>();
       s.J_pose[i].row(a) = box->H_pose.row(a);
     }
   }
-  if (!s.residual.allFinite() || !s.J.allFinite()) return std::nullopt;
+  if (!s.rows.allFinite()) return std::nullopt;
   return s;
 }
 
@@ -101,35 +101,53 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
   covariance.own.setZero(n, n);
   if (!looks_.exactPoses()) covariance.pose.resize(n, n);
   std::vector<Aspect> aspects;
-  for (const auto& k : looks_.keyframes()) aspects.push_back(aspectOf(x.head<3>(), k->from->T_WC));
+  std::vector<Eigen::Vector4d> lasting;  // deviations of b; 0 of a side that does not count
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    const Keyframe& k = *looks_.keyframes()[i];
+    aspects.push_back(aspectOf(x.head<3>(), k.from->T_WC));
+    lasting.push_back(k.z.lasting.cwiseSqrt());
+    for (int side = 0; side < 4; ++side) lasting.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
+  }
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       const double alike = std::exp(-viewChange(aspects[i], aspects[j], scales_));
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
-      covariance.own.block<4, 4>(row, column) = ownShare(s, i, j, alike);
+      auto own = covariance.own.block<4, 4>(row, column);
+      if (moving()) own = acceleration(s, i, j);
+      own.diagonal() += alike * lasting[i].cwiseProduct(lasting[j]);
       if (looks_.exactPoses()) continue;
       const Eigen::Matrix<double, 4, 6> J_i = s.J_pose[i].lazyProduct(looks_.poses(i, j));
       covariance.pose.block<4, 4>(row, column) = J_i.lazyProduct(s.J_pose[j].transpose());
+    }
+    const Keyframe& k = *looks_.keyframes()[i];
+    for (int side = 0; side < 4; ++side) {
+      const auto row = static_cast<Eigen::Index>(4 * i) + side;
+      covariance.own(row, row) += s.counts[i][side] ? k.z.variance[side] : kNoInformation;
     }
   }
   return covariance;
 }
 
-Eigen::MatrixXd SideCovariance::with(const Eigen::VectorXd& doubts) const {
-  Eigen::MatrixXd R = own;
+Gram gramOf(const Eigen::MatrixXd& whitened) {
+  return whitened.transpose().lazyProduct(whitened);
+}
+
+Cholesky SideCovariance::with(const Eigen::VectorXd& doubts, Eigen::MatrixXd R) const {
+  R = own;
   for (Eigen::Index j = 0; j < doubts.size(); ++j) {
     for (Eigen::Index i = j; i < doubts.size(); ++i) {
-      R.block<4, 4>(4 * i, 4 * j) *= std::sqrt(doubts[i] * doubts[j]);
+      const double widening = doubts[i] * doubts[j];
+      if (widening != 1.0) R.block<4, 4>(4 * i, 4 * j) *= std::sqrt(widening);
     }
   }
   if (pose.size() > 0) R.triangularView<Eigen::Lower>() += pose;
-  return R;
+  return Cholesky(std::move(R));
 }
 
 Eigen::VectorXd SideCovariance::withoutPose(const Eigen::VectorXd& residual,
-                                            const Cholesky& R) const {
+                                            const Eigen::VectorXd& explained) const {
   if (pose.size() == 0) return residual;
-  return residual - pose.selfadjointView<Eigen::Lower>() * R.solve(residual);
+  return residual - pose.selfadjointView<Eigen::Lower>() * explained;
 }
 
 double SideCovariance::deviation(const Eigen::VectorXd& residual, Eigen::Index look) const {
@@ -140,9 +158,8 @@ double SideCovariance::deviation(const Eigen::VectorXd& residual, Eigen::Index l
   return r.squaredNorm();
 }
 
-Quadratic BatchModel::quadratic(const State& x, const Eigen::MatrixXd& Jw,
-                                const Eigen::VectorXd& rw) const {
-  Quadratic q{Jw.transpose() * Jw, Jw.transpose() * rw};
+Quadratic BatchModel::quadratic(const State& x, const Gram& gram) const {
+  Quadratic q{gram.topLeftCorner(dim_, dim_), gram.col(dim_).head(dim_)};
   q.G.block<3, 3>(kSize, kSize) += size_information_;
   q.g.segment<3>(kSize) += size_information_ * (prior_.log_size - x.segment<3>(kSize));
   const double yaw_information = 1.0 / (kYawSpread * kYawSpread);
@@ -201,7 +218,7 @@ double BatchModel::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts
 
 Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
                                     const Eigen::VectorXd& doubts) const {
-  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(4, s.residual.size());
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(4, s.rows.rows());
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
     const double rho =
@@ -216,11 +233,10 @@ Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen:
 }
 
 Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
-  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(6, s.residual.size());
+  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(6, s.rows.rows());
   for (std::size_t i = 0; i < looks_.size(); ++i) {
-    const PoseError& then = looks_.keyframes()[i]->from->error;
     c.middleCols<4>(static_cast<Eigen::Index>(4 * i)) =
-        transition(then, frame_.pose_error) * then.covariance * s.J_pose[i].transpose();
+        looks_.poseNow(i).lazyProduct(s.J_pose[i].transpose());
   }
   return c;
 }
@@ -232,28 +248,15 @@ double BatchModel::age(std::size_t i) const {
              : 0.0;
 }
 
-/// Covariance of the sides of look i (the later one) and j, by what the network and the thing
-/// itself do. `alike` is the correlation of b from the two views.
-Eigen::Matrix4d BatchModel::ownShare(const Stack& s, std::size_t i, std::size_t j,
-                                     double alike) const {
-  const Keyframe& a = *looks_.keyframes()[i];
-  const Keyframe& b = *looks_.keyframes()[j];
-  Eigen::Matrix4d block = Eigen::Matrix4d::Zero();
-  if (moving()) {
-    // White acceleration since then: the later look is the nearer to the newest one.
-    const double near = age(i), far = age(j);
-    const double q = std::pow(frame_.parameters->motion.acceleration, 2);
-    const double variance = q * near * near * (3.0 * far - near) / 6.0;
-    block += variance * s.J.block<4, 3>(static_cast<Eigen::Index>(4 * i), 0) *
-             s.J.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0).transpose();
-  }
-  for (int side = 0; side < 4; ++side) {
-    if (s.counts[i][side] && s.counts[j][side]) {
-      block(side, side) += alike * std::sqrt(a.z.lasting[side] * b.z.lasting[side]);
-    }
-    if (i == j) block(side, side) += s.counts[i][side] ? a.z.variance[side] : kNoInformation;
-  }
-  return block;
+/// Covariance of the sides of look i (the later one) and j of what moves, by white acceleration
+/// since then: the later look is the nearer to the newest one.
+Eigen::Matrix4d BatchModel::acceleration(const Stack& s, std::size_t i, std::size_t j) const {
+  const double near = age(i), far = age(j);
+  const double q = std::pow(frame_.parameters->motion.acceleration, 2);
+  const double variance = q * near * near * (3.0 * far - near) / 6.0;
+  return variance * s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * i), 0)
+                        .lazyProduct(s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0)
+                                         .transpose());
 }
 
 std::vector<AzimuthLook> BatchModel::azimuths(const State& x) const {

@@ -15,11 +15,12 @@ namespace perdure::semantic_filter {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
-/// The looks at one object, and the covariances between the pose errors of all pairs of them.
+/// The looks at one object, and the covariances between the pose errors of all pairs of them, and
+/// with the present one.
 class Looks {
  public:
   /// `keyframes` are in order of time and outlive this.
-  explicit Looks(const Keyframes& keyframes);
+  Looks(const Keyframes& keyframes, const PoseError& now);
 
   const Keyframes& keyframes() const { return *keyframes_; }
   std::size_t size() const { return keyframes_->size(); }
@@ -27,10 +28,12 @@ class Looks {
   bool exactPoses() const { return exact_; }
   /// Of look i with the earlier or same look j.
   const Matrix6d& poses(std::size_t i, std::size_t j) const { return pairs_[i * (i + 1) / 2 + j]; }
+  /// Of the present pose with look i.
+  const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
 
  private:
   const Keyframes* keyframes_;
-  std::vector<Matrix6d> pairs_;
+  std::vector<Matrix6d> pairs_, now_;
   bool exact_ = true;
 };
 
@@ -41,11 +44,19 @@ using FreeMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMos
 
 /// Linearised at one state: four rows for each look.
 struct Stack {
-  Eigen::VectorXd residual;  ///< z - h(x), pixels; 0 where a side does not count
-  Eigen::MatrixXd J;         ///< by geometry (and velocity)
+  /// [J r]: derivatives by geometry (and velocity), and z - h(x), pixels; 0 where a side does not
+  /// count.
+  Eigen::MatrixXd rows;
   std::vector<Eigen::Matrix<double, 4, 6>> J_pose;
   std::vector<std::array<bool, 4>> counts;
+
+  auto J() const { return rows.leftCols(rows.cols() - 1); }
+  auto residual() const { return rows.col(rows.cols() - 1); }
 };
+
+/// Of the dimensions of a batch: [J r]ᵀ R⁻¹ [J r].
+using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree + 1, kMostFree + 1>;
+Gram gramOf(const Eigen::MatrixXd& whitened);
 
 /// Of the rows of a Stack given the cuboid, in two parts; of each the lower triangle alone.
 struct SideCovariance {
@@ -54,10 +65,11 @@ struct SideCovariance {
 
   /// The whole, its own part widened by the looks' doubts. A doubtful box says nothing of the pose:
   /// its doubt does not widen the error that all share.
-  Eigen::MatrixXd with(const Eigen::VectorXd& doubts) const;
-  /// What is left of the residuals when the pose errors have been estimated from them: a common
-  /// pose error is no contradiction. R is the whole.
-  Eigen::VectorXd withoutPose(const Eigen::VectorXd& residual, const Cholesky& R) const;
+  Cholesky with(const Eigen::VectorXd& doubts, Eigen::MatrixXd storage = {}) const;
+  /// What is left of the residuals r when the pose errors have been estimated from them: a common
+  /// pose error is no contradiction. `explained` is R⁻¹ r, R the whole.
+  Eigen::VectorXd withoutPose(const Eigen::VectorXd& residual,
+                              const Eigen::VectorXd& explained) const;
   /// Squared deviation of one look with these residuals.
   double deviation(const Eigen::VectorXd& residual, Eigen::Index look) const;
 };
@@ -80,8 +92,8 @@ class BatchModel {
   /// Nothing where a look does not see the cuboid at all.
   std::optional<Stack> linearise(const State& x) const;
   SideCovariance covariance(const State& x, const Stack& s) const;
-  /// Looks (whitened Jacobian and residual) and priors at x.
-  Quadratic quadratic(const State& x, const Eigen::MatrixXd& Jw, const Eigen::VectorXd& rw) const;
+  /// Looks and priors at x.
+  Quadratic quadratic(const State& x, const Gram& gram) const;
   /// Twice the negative logarithm of the priors, but for a constant and the azimuths.
   double priorCost(const State& x) const;
   /// The part of it that holds yaw to where it started.
@@ -103,7 +115,7 @@ class BatchModel {
 
  private:
   double age(std::size_t look) const;
-  Eigen::Matrix4d ownShare(const Stack& s, std::size_t i, std::size_t j, double alike) const;
+  Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
   std::vector<AzimuthLook> azimuths(const State& x) const;
   double azimuthSigma(const Keyframe& k) const;
   double azimuthWorth() const;

@@ -208,7 +208,7 @@ void smooth(Object& object, const FrameContext& frame) {
   const auto& p = *frame.parameters;
   object.fresh_keyframes = 0;
   const Hypothesis before = object.best();
-  const Looks looks(object.keyframes);
+  const Looks looks(object.keyframes, frame.pose_error);
   std::set<std::string> names;
   for (const auto& h : object.hypotheses) names.insert(h.class_name);
   const bool seek = object.remembered >= object.seek_modes_at;

@@ -25,6 +25,9 @@ struct Smoothed::Fit {
   Eigen::VectorXd doubts;
   Eigen::ArrayXi contradicted;
   Cholesky R;
+  Eigen::MatrixXd whitened;  ///< the rows of the stack by R
+
+  double squaredResidual() const { return whitened.rightCols<1>().squaredNorm(); }
 };
 
 namespace {
@@ -35,7 +38,8 @@ using Fit = Smoothed::Fit;
 /// changed enough to matter.
 bool doubtLooks(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
-  const Eigen::VectorXd residual = fit.covariance.withoutPose(fit.stack.residual, fit.R);
+  const Eigen::VectorXd residual = fit.covariance.withoutPose(
+      fit.stack.residual(), fit.R.unwhiten(fit.whitened.rightCols<1>()));
   fit.contradicted.resize(fit.doubts.size());
   bool matters = false;
   for (Eigen::Index i = 0; i < fit.doubts.size(); ++i) {
@@ -62,17 +66,17 @@ bool factorise(const BatchModel& model, Fit& fit, bool anew) {
     fit.covariance = model.covariance(fit.x, fit.stack);
     fit.covariance_at = fit.x;
   }
-  fit.R = Cholesky(fit.covariance.with(fit.doubts));
-  return fit.R.positive();
+  fit.R = fit.covariance.with(fit.doubts, std::move(fit.R).release());
+  if (!fit.R.positive()) return false;
+  fit.whitened = fit.R.whiten(fit.stack.rows);
+  return true;
 }
 
 /// One step of Levenberg and Marquardt's, and what it was to gain (squared deviations). False where
 /// none lowers the cost.
 bool descend(const BatchModel& model, Fit& fit, double& damping, double& gained) {
-  const Eigen::MatrixXd Jw = fit.R.whiten(fit.stack.J);
-  const Eigen::VectorXd rw = fit.R.whiten(fit.stack.residual);
-  const Quadratic q = model.quadratic(fit.x, Jw, rw);
-  const double cost = rw.squaredNorm() + model.priorCost(fit.x);
+  const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
+  const double cost = fit.squaredResidual() + model.priorCost(fit.x);
   for (int attempt = 0; attempt < 6; ++attempt) {
     FreeMatrix damped = q.G;
     damped.diagonal() *= 1.0 + damping;
@@ -80,11 +84,13 @@ bool descend(const BatchModel& model, Fit& fit, double& damping, double& gained)
     const State next = model.at(fit.x, step);
     auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
     if (stack) {
-      const Eigen::VectorXd w = fit.R.whiten(stack->residual);
-      if (w.squaredNorm() + model.priorCost(next) <= cost * (1.0 + 1e-3) + 1e-6) {
+      auto whitened = fit.R.whiten(stack->rows);
+      if (whitened.rightCols<1>().squaredNorm() + model.priorCost(next) <=
+          cost * (1.0 + 1e-3) + 1e-6) {
         gained = q.g.dot(step);
         fit.x = next;
         fit.stack = std::move(*stack);
+        fit.whitened = std::move(whitened);
         damping = std::max(0.1 * damping, 1e-6);
         return true;
       }
@@ -108,6 +114,7 @@ std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const L
     fit.covariance_at = like->covariance_at;
     fit.doubts = like->doubts;
     fit.R = like->R;
+    fit.whitened = fit.R.whiten(fit.stack.rows);
   } else if (!factorise(model, fit, true)) {
     return std::nullopt;
   }
@@ -127,9 +134,9 @@ std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const L
 /// The filter's state, with b and C, from the fit.
 std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const Hypothesis& start,
                                   const FrameContext& frame) {
-  const Eigen::MatrixXd Jw = fit.R.whiten(fit.stack.J);
-  const Eigen::VectorXd rw = fit.R.whiten(fit.stack.residual);
-  const Cholesky information(model.quadratic(fit.x, Jw, rw).G);
+  const auto Jw = fit.whitened.leftCols(model.dim());
+  const auto rw = fit.whitened.rightCols<1>();
+  const Cholesky information(model.quadratic(fit.x, gramOf(fit.whitened)).G);
   if (!information.positive()) return std::nullopt;
   const Eigen::MatrixXd P = information.solve(Eigen::MatrixXd::Identity(model.dim(), model.dim()));
   const double distance = (fit.x.head<3>() - frame.view.T_WC().p).norm();
@@ -213,14 +220,13 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
   const BatchModel model = modelOf();
   const Stack& stack = fit_->stack;
   // At this very state: a determinant of a hundred dimensions forgives no other.
-  const Cholesky R(model.covariance(fit_->x, stack).with(doubts));
+  const Cholesky R = model.covariance(fit_->x, stack).with(doubts);
   if (!R.positive()) return kImpossible;
-  const Eigen::MatrixXd Jw = R.whiten(stack.J);
-  const Eigen::VectorXd rw = R.whiten(stack.residual);
-  const Quadratic q = model.quadratic(fit_->x, Jw, rw);
+  const Gram gram = gramOf(R.whiten(stack.rows));
+  const Quadratic q = model.quadratic(fit_->x, gram);
   const Cholesky G(q.G);
   if (!G.positive()) return kImpossible;
-  const double cost = rw.squaredNorm() + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
+  const double cost = gram(model.dim(), model.dim()) + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
   const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);

@@ -105,7 +105,7 @@ TEST(Smoother, FindsThePlaceFromMetresAway) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Passing scene(seed);
     const FrameContext frame = scene.frame();
-    const Looks looks(scene.keyframes());
+    const Looks looks(scene.keyframes(), frame.pose_error);
     const auto s = Smoothed::make(scene.start(false), looks, frame);
     ASSERT_TRUE(s) << seed;
     EXPECT_LT(placeError(*s, scene).norm(), 0.7) << seed;
@@ -119,7 +119,7 @@ TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     const Passing scene(seed, 0.0, 0.3);
     const FrameContext frame = scene.frame();
-    const Looks looks(scene.keyframes());
+    const Looks looks(scene.keyframes(), frame.pose_error);
     const auto s = Smoothed::make(scene.start(false), looks, frame);
     ASSERT_TRUE(s) << seed;
     const Eigen::Vector3d e = placeError(*s, scene);
@@ -134,7 +134,7 @@ TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {
 TEST(Smoother, CorrelatesThePlaceWithThePresentPoseError) {
   const Passing scene(3, 0.0, 0.3);
   const FrameContext frame = scene.frame();
-  const Looks looks(scene.keyframes());
+  const Looks looks(scene.keyframes(), frame.pose_error);
   const auto s = Smoothed::make(scene.start(false), looks, frame);
   ASSERT_TRUE(s);
   // All poses share one error: beside the body the place is known far better than in W.
@@ -148,7 +148,7 @@ TEST(Smoother, OneBoxOfAnotherThingCountsLittle) {
   wrong.z.sides += Eigen::Vector4d(60, 5, 70, 8);
   scene.keyframes()[9] = std::make_shared<const Keyframe>(wrong);
   const FrameContext frame = scene.frame();
-  const Looks looks(scene.keyframes());
+  const Looks looks(scene.keyframes(), frame.pose_error);
   const auto s = Smoothed::make(scene.start(false), looks, frame);
   ASSERT_TRUE(s);
   EXPECT_GT(s->doubts()[9], 5.0);
@@ -160,7 +160,7 @@ TEST(Smoother, TellsWhatMovesFromWhatStands) {
     for (const double speed : {0.0, 5.0}) {
       const Passing scene(seed, speed);
       const FrameContext frame = scene.frame();
-      const Looks looks(scene.keyframes());
+      const Looks looks(scene.keyframes(), frame.pose_error);
       const auto still = Smoothed::make(scene.start(false), looks, frame);
       const auto moving = Smoothed::make(scene.start(true), looks, frame);
       ASSERT_TRUE(moving) << seed;
@@ -184,7 +184,7 @@ TEST(Smoother, TakesNoPlaceThatTheLooksDoNotFix) {
   Passing scene(2);
   scene.parameters().smooth.place = 1e-4;
   const FrameContext frame = scene.frame();
-  const Looks looks(scene.keyframes());
+  const Looks looks(scene.keyframes(), frame.pose_error);
   EXPECT_FALSE(Smoothed::make(scene.start(false), looks, frame));
 }
 
@@ -238,7 +238,7 @@ TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
     cut.z.sides[2] = box->sides[2] + cut_at;
     Keyframes keyframes = scene.keyframes();
     keyframes[9] = std::make_shared<const Keyframe>(cut);
-    const Looks looks(keyframes);
+    const Looks looks(keyframes, frame.pose_error);
     const BatchModel model(looks, false, "car", scene.truth()[kYaw], frame);
     const auto stack = model.linearise(scene.truth());
     const Eigen::VectorXd doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
