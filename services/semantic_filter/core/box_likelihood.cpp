@@ -112,12 +112,13 @@ Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box
 }
 
 bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
+  constexpr double kReach = 5.0;  // deviations
   for (int axis = 0; axis < 2; ++axis) {
-    const double reach =
-        5.0 * std::sqrt(std::max(covariance(axis, axis), covariance(axis + 2, axis + 2)) +
-                        z.variance[axis]);
-    if (z.sides[axis] > p.sides[axis + 2] + reach) return false;
-    if (p.sides[axis] > z.sides[axis + 2] + reach) return false;
+    const double gap =
+        std::max(z.sides[axis] - p.sides[axis + 2], p.sides[axis] - z.sides[axis + 2]);
+    if (gap <= 0.0) continue;
+    const double variance = std::max(covariance(axis, axis), covariance(axis + 2, axis + 2));
+    if (gap * gap > kReach * kReach * (variance + z.variance[axis])) return false;
   }
   return true;
 }
@@ -147,15 +148,18 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
   BoxScore score;
   score.dof = static_cast<int>(std::count(use.begin(), use.end(), true));
   if (score.dof == 0) return std::nullopt;
-  // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
+  const double gate = gateThreshold(parameters.gate, score.dof);
   Eigen::Vector4d nu = Eigen::Vector4d::Zero();
   Eigen::Matrix4d S = covariance;
   S.diagonal() += z.variance;
   for (int i = 0; i < 4; ++i) {
-    if (use[i]) {
-      nu[i] = z.sides[i] - predicted.sides[i];
-      continue;
-    }
+    if (!use[i]) continue;
+    nu[i] = z.sides[i] - predicted.sides[i];
+    if (nu[i] * nu[i] > gate * S(i, i)) return std::nullopt;  // one side alone is outside
+  }
+  // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
+  for (int i = 0; i < 4; ++i) {
+    if (use[i]) continue;
     S.row(i).setZero();
     S.col(i).setZero();
     S(i, i) = 1.0;
@@ -166,7 +170,7 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
   if (!choleskyInPlace(S)) return std::nullopt;
   whiten(S, nu);
   score.nis = nu.squaredNorm();
-  if (score.nis > gateThreshold(parameters.gate, score.dof)) return std::nullopt;
+  if (score.nis > gate) return std::nullopt;
   score.log_density +=
       logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), score.dof, parameters.tail);
   return score;

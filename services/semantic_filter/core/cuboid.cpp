@@ -9,14 +9,18 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
-using Corner = Eigen::Vector3d;
-
 /// The cuboid and its eight corners before the camera.
 struct Corners {
   Eigen::Matrix3d R_WO;
-  std::array<Corner, 8> local;  ///< from the centre, along the cuboid's axes
-  std::array<Corner, 8> p_C;
+  Eigen::Vector3d half;  ///< of length, width, height
+  std::array<Eigen::Vector3d, 8> p_C;
   bool all_before = true;  ///< the near plane
+
+  /// From the centre, along the cuboid's axes.
+  Eigen::Vector3d local(int i) const {
+    return {(i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
+            (i & 4) ? half.z() : -half.z()};
+  }
 };
 
 struct ImagePoint {
@@ -31,13 +35,17 @@ std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from
   if (centre_C.z() + half.norm() < kNear) return std::nullopt;
   std::optional<Corners> result(std::in_place);
   Corners& c = *result;
+  c.half = half;
   c.R_WO = from.R_WL * rotationAboutZ(x[kYaw]);
   const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
+  const Eigen::Vector3d along = half.x() * R_CO.col(0), across = half.y() * R_CO.col(1),
+                        up = half.z() * R_CO.col(2);
   bool any = false;
   for (int i = 0; i < 8; ++i) {
-    c.local[i] = {(i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
-                  (i & 4) ? half.z() : -half.z()};
-    c.p_C[i] = centre_C + R_CO * c.local[i];
+    c.p_C[i] = centre_C;
+    (i & 1) ? c.p_C[i] += along : c.p_C[i] -= along;
+    (i & 2) ? c.p_C[i] += across : c.p_C[i] -= across;
+    (i & 4) ? c.p_C[i] += up : c.p_C[i] -= up;
     const bool before = c.p_C[i].z() >= kNear;
     any = any || before;
     c.all_before = c.all_before && before;
@@ -62,7 +70,7 @@ void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Project
     box.exact[side] = false;
     return;
   }
-  const Corner& local = corners.local[point.corner];
+  const Eigen::Vector3d local = corners.local(point.corner);
   const Eigen::RowVector3d by_C = J_point.row(side % 2);
   const Eigen::RowVector3d by_W = by_C * from.R_CW;
   const Eigen::RowVector3d by_O = by_W * corners.R_WO;
@@ -78,11 +86,11 @@ void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Project
 using ImagePoints = InplaceVector<ImagePoint, kMostOutline>;
 
 void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
-  const Corner& a = corners.p_C[i];
+  const Eigen::Vector3d& a = corners.p_C[i];
   for (int axis = 1; axis < 8; axis <<= 1) {
     const int j = i | axis;
     if (j == i) continue;
-    const Corner& b = corners.p_C[j];
+    const Eigen::Vector3d& b = corners.p_C[j];
     if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
     const double s = (kNear - a.z()) / (b.z() - a.z());
     points.push_back({pixelOf(camera, a + s * (b - a)), -1});
@@ -92,7 +100,7 @@ void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraMod
 ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
   ImagePoints points;
   for (int i = 0; i < 8; ++i) {
-    const Corner& a = corners.p_C[i];
+    const Eigen::Vector3d& a = corners.p_C[i];
     if (a.z() >= kNear) points.push_back({pixelOf(camera, a), i});
     if (!corners.all_before) addCuts(points, i, corners, camera);
   }

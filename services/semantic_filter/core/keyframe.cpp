@@ -59,9 +59,11 @@ bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
               const SmoothParameters& parameters) {
   const Eigen::Vector3d place = object.best().x.head<3>();
   const Glimpse now = glimpseOf(place, keyframe);
-  for (const auto& other : object.keyframes) {
-    if (changeBetween(glimpseOf(place, *other), now, scales) < parameters.new_view) return false;
-  }
+  const auto same = [&](const auto& other) {
+    return changeBetween(glimpseOf(place, *other), now, scales) < parameters.new_view;
+  };
+  // The late ones first: they are the most alike.
+  if (std::any_of(object.keyframes.rbegin(), object.keyframes.rend(), same)) return false;
   object.keyframes.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
   thin(place, object.keyframes, scales, static_cast<std::size_t>(parameters.keyframes));
   return true;

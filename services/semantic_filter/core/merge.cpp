@@ -131,13 +131,23 @@ bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
   return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.projector());
 }
 
-/// Half the diagonal of the best hypothesis' cuboid.
-double reachOf(const Object& object) {
-  return 0.5 * object.best().x.segment<3>(kSize).array().exp().matrix().norm();
+/// Of an object's best hypothesis: where it stands, and half the diagonal of its cuboid. Of all
+/// pairs few touch, and to see that is most of the work: it is laid out apart from the beliefs.
+struct Ball {
+  Eigen::Vector3d centre;
+  double radius;
+  bool seen;
+};
+
+Ball ballOf(const Object& object) {
+  const State& x = object.best().x;
+  return {x.head<3>(), 0.5 * x.segment<3>(kSize).array().exp().matrix().norm(),
+          object.visible_fraction > 0.0};
 }
 
-bool touch(const Object& a, const Object& b, double reach) {
-  return (a.best().x - b.best().x).head<3>().squaredNorm() <= reach * reach;
+bool touch(const Ball& a, const Ball& b) {
+  const double reach = a.radius + b.radius;
+  return (a.seen || b.seen) && (a.centre - b.centre).squaredNorm() <= reach * reach;
 }
 
 bool oneHasBeenSeen(const Object& a, const Object& b) {
@@ -189,12 +199,12 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
 
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
-  std::vector<double> reach;
-  for (const Object& o : objects) reach.push_back(reachOf(o));
+  std::vector<Ball> balls;
+  for (const Object& o : objects) balls.push_back(ballOf(o));
   for (std::size_t i = 0; i < objects.size(); ++i) {
     for (std::size_t j = i + 1; j < objects.size();) {
       Object &a = objects[i], &b = objects[j];
-      if (!touch(a, b, reach[i] + reach[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
+      if (!touch(balls[i], balls[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
           !sameSpace(a, b, frame)) {
         ++j;
         continue;
@@ -204,8 +214,8 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
       absorb(a, b, frame);
       merges.push_back({a.id, b.id, false});
       objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
-      reach.erase(reach.begin() + static_cast<std::ptrdiff_t>(j));
-      reach[i] = reachOf(objects[i]);
+      balls.erase(balls.begin() + static_cast<std::ptrdiff_t>(j));
+      balls[i] = ballOf(objects[i]);
     }
   }
   return merges;

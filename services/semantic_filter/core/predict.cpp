@@ -85,8 +85,9 @@ bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
   CrossPose B = h.C;
   whitenRows(L, B);
   StateCovariance rest = h.P - B.lazyProduct(B.transpose()) / share;
-  if (!h.moving) rest.diagonal().tail<3>().setOnes();  // it has no velocity
-  return choleskyInPlace(rest);
+  if (h.moving) return choleskyInPlace(rest);
+  Eigen::Matrix<double, kVelocity, kVelocity> still = rest.topLeftCorner<kVelocity, kVelocity>();
+  return choleskyInPlace(still);
 }
 
 /// [P C; Cᵀ P_pose] must stay a covariance. Transitions are approximate, and vio's own updates

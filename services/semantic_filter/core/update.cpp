@@ -66,25 +66,16 @@ double doubtOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
   return std::max(1.0, (tail + whitened.squaredNorm()) / (tail + y.count));
 }
 
-/// Moment match of "no box" and each box by their shares (the second half of PDA).
-Hypothesis mix(const Hypothesis& none, double share_none,
-               const std::vector<std::pair<double, Hypothesis>>& parts) {
-  Hypothesis result = none;
-  result.weight = share_none;
-  if (share_none <= kNegligible) {
-    result = parts.front().second;
-    result.weight = parts.front().first;
-  } else if (!parts.empty()) {
-    Hypothesis first = parts.front().second;
-    first.weight = parts.front().first;
-    mergeInto(result, first);
+/// Moment match of "no box" and each box by their shares, which are the parts' weights (the second
+/// half of PDA).
+void mix(Hypothesis& none, double share_none, std::vector<Hypothesis>& parts) {
+  const bool negligible = share_none <= kNegligible;
+  Hypothesis& result = negligible ? parts.front() : none;
+  if (!negligible) result.weight = share_none;
+  for (Hypothesis& part : parts) {
+    if (&part != &result) mergeInto(result, part);
   }
-  for (std::size_t i = 1; i < parts.size(); ++i) {
-    Hypothesis part = parts[i].second;
-    part.weight = parts[i].first;
-    mergeInto(result, part);
-  }
-  return result;
+  if (negligible) none = std::move(result);
 }
 
 Shares sharesOf(const HypothesisLook& h, const std::vector<std::size_t>& looked_at,
@@ -106,17 +97,18 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
                  const HypothesisLook& seen, const std::vector<Evidence>& boxes, double repeated,
                  const FrameContext& frame) {
   const ProjectedBox* at_prior = seen.box ? &*seen.box : nullptr;
-  std::vector<std::pair<double, Hypothesis>> parts;
+  std::vector<Hypothesis> parts;
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
     auto hidden = look.sight.hidden;
     if (seen.part[i] >= 0) hidden[static_cast<std::size_t>(seen.part[i])] = true;
-    parts.emplace_back(shares.box[i], updateWithBox(h, z, hidden, repeated, frame, at_prior));
+    parts.push_back(updateWithBox(h, z, hidden, repeated, frame, at_prior));
+    parts.back().weight = shares.box[i];
   }
   if (parts.empty()) return;
   const double weight = h.weight;
-  h = mix(h, shares.none, parts);
+  mix(h, shares.none, parts);
   h.weight = weight;
 }
 
