@@ -97,6 +97,7 @@ void SoakRun::listen() {
     objects_.insert(o.stamp.sequence);
     const std::size_t lap = o.stamp.sequence / frames_a_lap_;
     if (confirmed_.size() <= lap) confirmed_.resize(lap + 1);
+    now_.held = o.objects.size();
     now_.confirmed = 0;
     for (const ObjectBelief& object : o.objects) {
       if (!object.confirmed) continue;
@@ -128,10 +129,10 @@ void SoakRun::note() {
   const Frames counts = frames();
   std::cout << fmt::format(
                    "{:>3} min  lap {}  frames {} (without odometry {}, detections {}, objects {})  "
-                   "confirmed {}  on the map {}  MB:{}",
+                   "held {}  confirmed {}  on the map {}  MB:{}",
                    points_.size() / 60, confirmed_.size(), counts.given, counts.without_odometry,
-                   counts.without_detections, counts.without_objects, now_.confirmed, now_.on_map,
-                   memory)
+                   counts.without_detections, counts.without_objects, now_.held, now_.confirmed,
+                   now_.on_map, memory)
             << std::endl;
 }
 
@@ -285,7 +286,8 @@ void SoakRun::draw(const fs::path& file) const {
   for (const SoakPoint& point : points_) {
     const double at = point.s / 60.0;
     for (const auto& [service, mb] : point.memory_mb) memory[service].emplace_back(at, mb);
-    objects["confirmed, working set"].emplace_back(at, static_cast<double>(point.confirmed));
+    objects["held"].emplace_back(at, static_cast<double>(point.held));
+    objects["confirmed of them"].emplace_back(at, static_cast<double>(point.confirmed));
     objects["on the map"].emplace_back(at, static_cast<double>(point.on_map));
   }
   chart(0, "resident memory, MB, over minutes", memory);

@@ -21,7 +21,7 @@ namespace perdure::test {
 struct SoakPoint {
   double s = 0.0;                           ///< since the first frame was handed out
   std::map<std::string, double> memory_mb;  ///< resident, by service
-  std::size_t confirmed = 0;                ///< of the working set
+  std::size_t held = 0, confirmed = 0;      ///< things of the working set
   std::uint64_t on_map = 0;                 ///< as map/header says
 };
 
