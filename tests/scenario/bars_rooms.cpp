@@ -84,7 +84,8 @@ Returns returnsOf(const Outcome& run, std::uint64_t id) {
       result.inside += s.earliest <= now && now <= s.latest ? 1.0 : 0.0;
     }
     if (!said.empty()) {
-      const double error = std::abs(said.back().expected - now) / frameSeconds(run);
+      constexpr double kRounding = 1e-6;  // of seconds since the clock's start, in frames
+      const double error = std::abs(said.back().expected - now) / frameSeconds(run) - kRounding;
       result.last_error = std::max(result.last_error, error);
     }
     said.clear();

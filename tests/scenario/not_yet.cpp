@@ -17,13 +17,11 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
        }},
       {"occlusion",
        {
-           {"frames by which the last one before a return is wrong",
-            "53, 50, 46: while the body sways about a place, what brings the thing back is not how "
-            "the body goes; to a frame where it walks on"},
            {"share of the predictions whose interval holds the return",
-            "0.944, 0.882, 0.875: a body that turns back is taken for one whose velocity wanders"},
+            "0.9, 0.885, 0.875: the body stops behind what hides the thing, having gone on for "
+            "seconds: of the first prediction that cannot be known"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 4, 10: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 4, 8: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
            {"merges that kept the younger id",
             "0, 0, 1: not yet looked into; with true poses it passes"},
@@ -31,71 +29,72 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"vanish",
        {
            {"visible frames until the one that was taken is `missing`",
-            "18, 8, 9: not yet looked into"},
+            "16, 8, 8: not yet looked into"},
            {"it is on the map where it stands now, with its id",
             "1, 1, 0: its old belief is lost before the new one is confirmed, or the new one is "
             "not placed"},
+           {"looks that showed a claimed thing and made it less sure",
+            "0, 0, 2: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"room",
        {
            {"objects for each one found",
-            "1.08, 1.12, 1.09: chairs close together change their ids"},
+            "1.08, 1.11, 1.09: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "6, 1, 2: looks whose box another thing may have made, or a belief of odd size given "
+            "4, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"row",
        {
            {"cars that are on the map twice at the end",
-            "1, 0, 1: cars of unusual size stand where the usual would"},
+            "1, 1, 1: cars of unusual size stand where the usual would"},
            {"cars of the row that are on the map within 0.5 m",
-            "5, 7, 9: placed along the line of sight to a metre"},
+            "5, 8, 8: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 0, 4: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "1.77, 28.1, 7.26: not by the roll alone: the estimate still settles as the camera "
+            "3.07, 28.1, 2.57: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.117, 0.142, 0.149: not by the roll alone: the estimate still settles as the camera "
-            "comes nearer"},
+            "0.0697, 0.142, 0.0736: not by the roll alone: the estimate still settles as the "
+            "camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.228, 0.218, 0.278: not by the roll alone: the estimate still settles as the camera "
+            "0.228, 0.218, 0.173: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "0, 1, 1: looks whose box another thing may have made, or a belief of odd size given "
+            "4, 1, 0: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
            {"merges that lost existence", "0, 0, 1: a miss in the same frame"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "3, 4, 2: what a moving car leaves behind where it was first believed to stand"},
+            "2, 4, 2: what a moving car leaves behind where it was first believed to stand"},
            {"`moved` events of the parked car that drives off",
             "1, 0, 0: the belief at rest follows it for some metres, so that the new one does not "
             "come from its place"},
            {"standing things on the map where nothing is",
-            "3, 4, 3: what a moving car leaves behind where it was first believed to stand"},
+            "2, 4, 3: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "5, 3, 7: looks whose box another thing may have made, or a belief of odd size given "
+            "7, 1, 8: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
+           {"merges that lost existence", "0, 1, 0: a miss in the same frame"},
        }},
       {"street",
        {
            {"second lap: share that keeps the id of the first",
-            "0.923, 0.941, 0.925: taken for moving on the first lap and given up out of view, or "
+            "0.92, 0.926, 0.925: taken for moving on the first lap and given up out of view, or "
             "two beliefs in one thing"},
            {"flicker: claims in full sight that ceased and came back",
-            "9, 12, 15: some misses in a row, or a place lost for a few frames"},
+            "13, 7, 15: some misses in a row, or a place lost for a few frames"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 2, 5: looks whose box another thing may have made, or a belief of odd size given "
+            "7, 2, 8: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
-           {"merges that kept the younger id",
-            "0, 0, 1: not yet looked into; with true poses it passes"},
-           {"merges that lost existence", "1, 2, 0: a miss in the same frame"},
        }},
       {"street recalled",
        {
