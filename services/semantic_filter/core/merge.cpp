@@ -29,9 +29,16 @@ void multiplyPmf(Object& a, const Object& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
+/// A guess of a moment, as the border of the image makes them, says nothing against a thing that was
+/// looked at for long.
+bool knownAsWell(const Object& guess, const Object& thing) {
+  constexpr std::uint32_t kFewer = 4;  // looks
+  return guess.once_confirmed || kFewer * guess.hits >= thing.hits;
+}
+
 void absorb(Object& a, const Object& b, const FrameContext& frame) {
   if (isOther(a) != isOther(b)) {
-    if (isOther(a)) {
+    if (isOther(a) && knownAsWell(b, a)) {
       a.hypotheses = b.hypotheses;
       a.classes = b.classes;
     }

@@ -99,6 +99,25 @@ TEST_F(Tending, OfTwoOfOneClassInOnePlaceTheOlderStays) {
   EXPECT_GE(objects[0].existence, 0.9);
 }
 
+TEST_F(Tending, AGuessOfOneLookDoesNotOverruleWhatWasLookedAtForLong) {
+  // A toy that leaves the picture, and the car that its rest at the border looks like.
+  const State toy = makeState(1.4, -0.4, 1.3, 0, 0.4, 0.2, 0.15);
+  const State car = makeState(1.6, -0.4, 1.5, 0, 4, 1.8, 1.5);
+  const auto merged = [&](std::uint32_t toy_hits, std::uint32_t car_hits) {
+    std::vector<Object> objects = {makeObject(1, kOtherClass, toy, 1e-4),
+                                   makeObject(2, "car", car, 0.01)};
+    objects[0].confirmed = objects[0].once_confirmed = true;
+    objects[0].hits = toy_hits, objects[1].hits = car_hits;
+    EXPECT_EQ(mergeObjects(objects, frame).size(), 1u);
+    EXPECT_EQ(objects[0].id, 1u);
+    EXPECT_EQ(objects[0].hits, toy_hits + car_hits);
+    return objects[0].best();
+  };
+  EXPECT_EQ(merged(345, 1).class_name, kOtherClass);
+  EXPECT_EQ(merged(345, 1).x, toy);
+  EXPECT_EQ(merged(5, 4).class_name, "car") << "it turned out to be one";
+}
+
 TEST_F(Tending, AChairUnderATableStaysTwoObjects) {
   std::vector<Object> objects = {
       makeObject(1, "dining table", makeState(3, 0, 0.4, 0, 1, 1.2, 0.75), 0.01),
