@@ -230,6 +230,14 @@ double SoakRun::growth_mb(const std::string& service, double from_s, double to_s
   return around(to_s) - around(from_s);
 }
 
+std::size_t SoakRun::mostHeld(double until_s) const {
+  std::size_t most = 0;
+  for (const SoakPoint& point : points_) {
+    if (point.s <= until_s) most = std::max(most, point.held);
+  }
+  return most;
+}
+
 nlohmann::ordered_json SoakRun::report() const {
   const Frames counts = frames();
   nlohmann::ordered_json json = {{"seconds", points_.empty() ? 0.0 : points_.back().s},
@@ -237,7 +245,8 @@ nlohmann::ordered_json SoakRun::report() const {
                                  {"frames", counts.given},
                                  {"without_odometry", counts.without_odometry},
                                  {"without_detections", counts.without_detections},
-                                 {"without_objects", counts.without_objects}};
+                                 {"without_objects", counts.without_objects},
+                                 {"most_held", mostHeld(seconds())}};
   json.update(latency_.report());
   for (const auto& [name, h] : health_) {
     json["services"][name] = {{"frames_in", h.frames_in},

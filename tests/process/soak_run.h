@@ -56,6 +56,8 @@ class SoakRun {
   /// Growth of a service's memory between two spans, MB: medians of a minute's points that end at
   /// each time, s.
   double growth_mb(const std::string& service, double from_s, double to_s) const;
+  /// The most things that the filter held in any frame up to then.
+  std::size_t mostHeld(double until_s) const;
   nlohmann::ordered_json report() const;
   /// Memory of each service, and objects, over time.
   void draw(const std::filesystem::path& file) const;

@@ -53,8 +53,15 @@ TEST(Soak, NothingGrowsOrGetsLostWhileALapIsDrivenAgainAndAgain) {
 
   ASSERT_GE(soak.laps(), 4u) << "too short to judge what stays";
   const double end = soak.points().back().s, settled = std::max(180.0, end / 6.0);
+  // A thing costs the filter about half a megabyte: its belief in each frame that waits for late
+  // detections. What was once needed stays with the process.
+  constexpr double kLeast_mb = 4.0, kThing_mb = 0.8;
+  const double more_things = static_cast<double>(soak.mostHeld(end) - soak.mostHeld(settled));
   for (const char* service : tools::kServices) {
-    EXPECT_LT(soak.growth_mb(service, settled, end), 4.0) << service;
+    const bool holds = std::string(service) == "semantic_filter";
+    EXPECT_LT(soak.growth_mb(service, settled, end),
+              kLeast_mb + (holds ? kThing_mb * more_things : 0.0))
+        << service << ", " << more_things << " things more";
   }
   const auto onMapAt = [&](double s) {
     const auto& points = soak.points();
