@@ -78,9 +78,16 @@ class Demo : public ::testing::Test {
   }
 
   std::unique_ptr<Child> start(std::vector<std::string> more) {
-    std::vector<std::string> command = {(programs() / "perdure").string(), "demo", "--data",
-                                        drive_.string(), "--model", model_.string(), "--out",
-                                        folder_.file("out"), "--root", sources().string()};
+    std::vector<std::string> command = {(programs() / "perdure").string(),
+                                        "demo",
+                                        "--data",
+                                        drive_.string(),
+                                        "--model",
+                                        model_.string(),
+                                        "--out",
+                                        folder_.file("out"),
+                                        "--root",
+                                        sources().string()};
     command.insert(command.end(), more.begin(), more.end());
     return std::make_unique<Child>(command, folder_.file("demo.log"));
   }
@@ -173,7 +180,8 @@ TEST_F(DemoFaults, SurvivesTheDeathOfEachServiceAndKeepsTheIds) {
   const auto demo = start({"--rate", "0.5"});
   Listener listener;
   ASSERT_TRUE(listener.until(60s, [&] { return listener.frame() >= 25; })) << demo->log();
-  for (const std::string service : {"map_store", "inference", "semantic_filter", "vio", "capture"}) {
+  for (const std::string service :
+       {"map_store", "inference", "semantic_filter", "vio", "capture"}) {
     SCOPED_TRACE(service);
     auto before = listener.instances();
     const Objects known = listener.objects();

@@ -128,9 +128,7 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
   return covariance;
 }
 
-Gram gramOf(const Eigen::MatrixXd& whitened) {
-  return whitened.transpose().lazyProduct(whitened);
-}
+Gram gramOf(const Eigen::MatrixXd& whitened) { return whitened.transpose().lazyProduct(whitened); }
 
 Cholesky SideCovariance::with(const Eigen::VectorXd& doubts, Eigen::MatrixXd R) const {
   R = own;
@@ -254,9 +252,9 @@ Eigen::Matrix4d BatchModel::acceleration(const Stack& s, std::size_t i, std::siz
   const double near = age(i), far = age(j);
   const double q = std::pow(frame_.parameters->motion.acceleration, 2);
   const double variance = q * near * near * (3.0 * far - near) / 6.0;
-  return variance * s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * i), 0)
-                        .lazyProduct(s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0)
-                                         .transpose());
+  return variance *
+         s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * i), 0)
+             .lazyProduct(s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0).transpose());
 }
 
 std::vector<AzimuthLook> BatchModel::azimuths(const State& x) const {

@@ -29,8 +29,8 @@ void multiplyPmf(Object& a, const Object& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// A guess of a moment, as the border of the image makes them, says nothing against a thing that was
-/// looked at for long.
+/// A guess of a moment, as the border of the image makes them, says nothing against a thing that
+/// was looked at for long.
 bool knownAsWell(const Object& guess, const Object& thing) {
   constexpr std::uint32_t kFewer = 4;  // looks
   return guess.once_confirmed || kFewer * guess.hits >= thing.hits;

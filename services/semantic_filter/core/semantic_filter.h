@@ -77,8 +77,8 @@ class SemanticFilter {
   Eigen::VectorXd associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
                                      const FrameInput& input, const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
-  /// A box that no visible object expects and that matches a hidden one says that the blocker was
-  /// misjudged: that object can be seen.
+  /// A box that a hidden object explains far better than any that is in sight says that the blocker
+  /// was misjudged: that object can be seen.
   void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input) const;
   /// The rest of an object that is almost out of the image is no new object.
   static bool leavesView(Expected& expected, const Belief& belief, const std::vector<Sight>& sights,

@@ -38,8 +38,8 @@ using Fit = Smoothed::Fit;
 /// changed enough to matter.
 bool doubtLooks(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
-  const Eigen::VectorXd residual = fit.covariance.withoutPose(
-      fit.stack.residual(), fit.R.unwhiten(fit.whitened.rightCols<1>()));
+  const Eigen::VectorXd residual =
+      fit.covariance.withoutPose(fit.stack.residual(), fit.R.unwhiten(fit.whitened.rightCols<1>()));
   fit.contradicted.resize(fit.doubts.size());
   bool matters = false;
   for (Eigen::Index i = 0; i < fit.doubts.size(); ++i) {
@@ -226,7 +226,8 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
   const Quadratic q = model.quadratic(fit_->x, gram);
   const Cholesky G(q.G);
   if (!G.positive()) return kImpossible;
-  const double cost = gram(model.dim(), model.dim()) + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
+  const double cost =
+      gram(model.dim(), model.dim()) + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
   const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);

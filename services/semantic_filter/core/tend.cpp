@@ -137,8 +137,8 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
   object.running_nis = 1.0;
 }
 
-/// Seen once or twice and then no more, where nothing can be asked of it: what nobody was told of,
-/// and what is mostly not there, is not kept for it to come back.
+/// Detected a few times and then no more, where nothing can be asked of it: what nobody was told
+/// of, and what is mostly not there, is not kept for it to come back.
 bool forgettable(const Object& o, const TendParameters& parameters) {
   if (o.once_confirmed || o.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;
