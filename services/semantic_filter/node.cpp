@@ -20,7 +20,7 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       instance_(instance),
       outputs_(std::move(outputs)),
       filter_(config.filter, priors),
-      long_term_(config.filter.memory) {}
+      long_term_(config.filter.memory, config.filter.motion.min_speed) {}
 
 void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) {

@@ -36,6 +36,51 @@ void trace(const test::Outcome& run, std::uint64_t truth_id, double within) {
   }
 }
 
+/// Of each thing whose id of the first half is not that of the second: what became of the first.
+void changedIds(const test::Outcome& run) {
+  const std::uint64_t all = run.truth.frames.size();
+  for (const auto& object : run.truth.truth.objects) {
+    if (object.moves || object.keys.size() != 1) continue;
+    const Eigen::Vector3d place = object.keys[0].centre_W;
+    const auto first = test::mostClaimed(run.inst_rows, place, 1.0, "", 0, all / 2);
+    const auto second = test::mostClaimed(run.inst_rows, place, 1.0, "", all / 2, all);
+    if (first == 0 || second == 0 || first == second) continue;
+    fmt::print("seed {} truth {} {}: id {} then {}\n", run.setting.seed, object.id,
+               object.class_name, first, second);
+    for (const auto id : {first, second}) {
+      const auto seen = run.journal.of(id);
+      const auto print = [&](const auto& one, const char* what) {
+        const auto& [frame, g] = one;
+        fmt::print("  {:4} {:11} id {:4} {} {:.2f} r {:.3f} {} {} moving {:.2f} apart {:.2f} hits {} misses {}\n",
+                   frame->frame, what, id, g->className(), g->pmf.front().second, g->existence,
+                   g->confirmed ? "confirmed" : "-", nameOf(g->visibility), g->moving,
+                   (g->centre - place).norm(), g->hits, g->visible_misses);
+      };
+      if (seen.empty()) continue;
+      print(seen.front(), "first");
+      for (std::size_t i = 1; i < seen.size(); ++i) {
+        const auto* a = seen[i - 1].second;
+        const auto* b = seen[i].second;
+        if (a->confirmed != b->confirmed) print(seen[i], b->confirmed ? "confirmed" : "unconfirmed");
+        else if (a->className() != b->className()) print(seen[i], "class");
+        else if ((a->moving > 0.5) != (b->moving > 0.5)) print(seen[i], "motion");
+        else if (std::abs(a->existence - b->existence) > 0.3) print(seen[i], "existence");
+        else if (seen[i].first->frame > seen[i-1].first->frame + 1) print(seen[i], "again");
+      }
+      print(seen.back(), "last");
+    }
+    for (const auto& e : run.events) {
+      const auto id = e["object_id"].get<std::uint64_t>();
+      const std::string kind = e["event"];
+      const bool merged = kind == "merged" && e.dump().find(std::to_string(first)) != std::string::npos;
+      if (((id == first || id == second) && kind != "occluded" && kind != "reappeared" && kind != "created") || merged) {
+        std::string text = e.dump();
+        fmt::print("    event {}\n", text.substr(0, 260));
+      }
+    }
+  }
+}
+
 /// What ctest tells the tests.
 void findSources() {
   namespace fs = std::filesystem;
@@ -52,6 +97,7 @@ int run(int argc, char** argv) {
   test::Setting setting;
   std::size_t seeds = 3;
   std::uint64_t first = 1, truth = 0;
+  bool changed = false;
   double within = 3.0;
   std::vector<std::string> scenes = test::scenesWithBars();
   CLI::App app("What each scene must show, and what the filter makes of it");
@@ -62,12 +108,21 @@ int run(int argc, char** argv) {
   app.add_option("--rate", setting.rate_hz, "Frames a second")->capture_default_str();
   app.add_option("--set", setting.assignments, "semantic_filter.KEY=VALUE or detector.KEY=VALUE");
   app.add_option("--truth", truth, "Print what is believed near this true object, by frame");
+  app.add_flag("--changed-ids", changed, "Print what became of ids that the second half has not");
   app.add_option("--within", within, "Metres from it")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   findSources();
   std::vector<std::uint64_t> numbers;
   for (std::size_t i = 0; i < seeds; ++i) numbers.push_back(first + i);
   for (const auto& scene : scenes) {
+    if (changed) {
+      for (const auto seed : numbers) {
+        setting.scene = scene;
+        setting.seed = seed;
+        changedIds(test::runScene(setting));
+      }
+      continue;
+    }
     if (truth != 0) {
       setting.scene = scene;
       setting.seed = first;

@@ -18,8 +18,8 @@ bool onTheMap(const Object& object) {
   return object.confirmed || (object.once_confirmed && object.existence >= 0.5);
 }
 
-bool mayMove(const Object& object) {
-  return object.best().moving || movingProbability(object, 0.0) > 0.5;
+bool mayMove(const Object& object, double min_speed) {
+  return movingProbability(object, min_speed) > 0.5;
 }
 
 /// Half of what it extends: an object is near when any of it is.
@@ -46,7 +46,7 @@ LongTerm::Leaving LongTerm::leaving(const std::vector<Object>& objects, const Ei
   std::map<ObjectId, TimePoint> waiting;
   for (const Object& o : objects) {
     if (!farAndUnseen(o, p_WB, now, oldest)) continue;
-    if (!onTheMap(o) || mayMove(o)) {
+    if (!onTheMap(o) || mayMove(o, min_speed_)) {
       result.forgotten.push_back(o.id);
       continue;
     }

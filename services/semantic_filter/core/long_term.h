@@ -17,7 +17,8 @@ namespace perdure::semantic_filter {
 
 class LongTerm {
  public:
-  explicit LongTerm(const MemoryParameters& parameters) : parameters_(parameters) {}
+  LongTerm(const MemoryParameters& parameters, double min_speed)
+      : parameters_(parameters), min_speed_(min_speed) {}
 
   /// What is to leave the working set now; ids in order.
   struct Leaving {
@@ -60,6 +61,7 @@ class LongTerm {
   bool due(const Eigen::Vector3d& p_WB, TimePoint now) const;
 
   MemoryParameters parameters_;
+  double min_speed_;  ///< m/s; what is slower stands
   /// Since when an object could leave; it may as soon as the map has a frame from then on.
   std::map<ObjectId, TimePoint> waiting_;
   TimePoint kept_;

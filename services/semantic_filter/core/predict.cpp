@@ -10,6 +10,8 @@
 namespace perdure::semantic_filter {
 namespace {
 
+constexpr double kNoWeight = 1e-12;
+
 void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m) {
   h.x = stateAt(h, dt);
   if (!h.moving) {
@@ -170,6 +172,38 @@ double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales) {
 double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
                   const ViewScales& scales) {
   return viewChange(aspectOf(position, a), aspectOf(position, b), scales);
+}
+
+void stop(Hypothesis& h) {
+  const Eigen::Matrix3d S = h.P.bottomRightCorner<3, 3>();
+  const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.rightCols<3>());
+  h.x -= K * Eigen::Vector3d(h.x.tail<3>());
+  h.x[kYaw] = wrapAngle(h.x[kYaw]);
+  h.P = (h.P - K * S * K.transpose()).eval();
+  h.C = (h.C - K * h.C.bottomRows<3>()).eval();
+  h.moving = false;
+  h.x.tail<3>().setZero();
+  h.P.bottomRows<3>().setZero();
+  h.P.rightCols<3>().setZero();
+  h.C.bottomRows<3>().setZero();
+  makeSymmetric(h.P);
+}
+
+void letSlowOnesStand(Object& object, double min_speed) {
+  const std::size_t count = object.hypotheses.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!object.hypotheses[i].moving) continue;
+    const double fast = fasterThan(object.hypotheses[i], min_speed);
+    if (fast > 0.5) continue;
+    Hypothesis rest = object.hypotheses[i];
+    stop(rest);
+    rest.weight *= 1.0 - fast;
+    object.hypotheses[i].weight *= fast;
+    object.hypotheses.push_back(std::move(rest));
+  }
+  if (object.hypotheses.size() == count) return;
+  std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight < kNoWeight; });
+  normalise(object, ClassEvidence::kMotion);
 }
 
 State stateAt(const Hypothesis& h, double dt) {

@@ -22,6 +22,11 @@ struct PoseError {
 /// products small, so that the inverse may lose its sense: then nothing.
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
+/// The hypothesis given that v = 0: what it took for motion was the error of its place.
+void stop(Hypothesis& h);
+/// When the object gets out of sight: what is more likely slower than `min_speed` may as well
+/// stand, and then it stays where it was. Divides such hypotheses by their speed.
+void letSlowOnesStand(Object& object, double min_speed);
 /// x at a later time: static ones stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
 /// Where its motion alone will have brought it by `time`, as_of left as it was: for what is said of

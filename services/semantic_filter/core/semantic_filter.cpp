@@ -16,7 +16,8 @@ namespace perdure::semantic_filter {
 namespace {
 
 /// A look that says nothing about the object, for its ledger.
-void noteUnused(Object& object, Visibility why, TimePoint now) {
+void noteUnused(Object& object, Visibility why, TimePoint now, double min_speed) {
+  if (object.hidden.count + object.away.count == 0) letSlowOnesStand(object, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
   LedgerEntry& entry = away ? object.away : object.hidden;
   if (entry.count++ == 0) entry.first = now;
@@ -134,7 +135,8 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
   const ViewWalk walk = viewWalkOf(frame);
   for (std::size_t j = 0; j < sights.size(); ++j) {
     if (sights[j].fraction <= 0.0) {
-      noteUnused(belief.objects[j], sights[j].visibility, input.stamp.time);
+      noteUnused(belief.objects[j], sights[j].visibility, input.stamp.time,
+                 parameters_.motion.min_speed);
       continue;
     }
     predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
@@ -150,7 +152,7 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
   return seen;
 }
 
-Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
+Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
                                                    const FrameInput& input,
                                                    const FrameContext& frame) const {
   const auto& boxes = *input.boxes;
@@ -171,11 +173,11 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, const std::ve
   const Association association = associate(psi, fresh);
   std::vector<Object*> to_smooth;
   for (Eigen::Index j = 0; j < n; ++j) {
-    const Seen& s = seen[static_cast<std::size_t>(j)];
+    Seen& s = seen[static_cast<std::size_t>(j)];
     Object& object = belief.objects[s.object];
-    const auto own = update(object, s.look, association.eta.row(j), boxes, frame);
-    if (own && sound(object) &&
-        rememberLook(object, boxes[*own], hiddenSides(s.look, *own), frame)) {
+    s.own = update(object, s.look, association.eta.row(j), boxes, frame);
+    if (s.own && sound(object) &&
+        rememberLook(object, boxes[*s.own], hiddenSides(s.look, *s.own), frame)) {
       to_smooth.push_back(&object);
     }
   }
@@ -280,16 +282,34 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
   }
 }
 
+void SemanticFilter::tend(Object& object, const Seen& seen, const FrameInput& input,
+                          const FrameContext& frame) const {
+  const auto pmf = classShares(object);
+  tendHypotheses(object, priors_, parameters_);
+  if (!object.hypotheses.empty()) return;
+  if (seen.own) {
+    const Evidence& box = (*input.boxes)[*seen.own];
+    const auto range = rangeFromLandmarks(box, input.points, parameters_.birth);
+    if (bearAgain(object, pmf, box, range, frame)) {
+      rememberLook(object, box, hiddenSides(seen.look, *seen.own), frame);
+      tendHypotheses(object, priors_, parameters_);
+    }
+  }
+  if (object.hypotheses.empty()) {
+    object.existence.become(0.0, ExistenceEvidence::kMisshapen, object.as_of);
+  }
+}
+
 StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook& ids) const {
   const FrameContext frame = contextOf(input);
   auto sights = seeAll(belief, input);
   if (!input.boxes) return {};
   reveal(belief, sights, input);
-  const auto seen = score(belief, sights, input, frame);
+  auto seen = score(belief, sights, input, frame);
   const auto claimed = associateAndUpdate(belief, seen, input, frame);
   for (const auto& s : seen) {
     Object& object = belief.objects[s.object];
-    if (sound(object)) tendHypotheses(object, priors_, parameters_);
+    if (sound(object)) tend(object, s, input, frame);
   }
   births(belief, sights, claimed, input, frame, ids);
   StepReport report;

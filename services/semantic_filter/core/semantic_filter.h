@@ -66,6 +66,7 @@ class SemanticFilter {
   struct Seen {
     std::size_t object;
     ObjectLook look;
+    std::optional<std::size_t> own = {};  ///< the box that is surely its own
   };
 
   FrameContext contextOf(const FrameInput& input) const;
@@ -74,8 +75,11 @@ class SemanticFilter {
   std::vector<Seen> score(Belief& belief, const std::vector<Sight>& sights, const FrameInput& input,
                           const FrameContext& frame) const;
   /// Updates what is seen; returns for each box how much of it is claimed.
-  Eigen::VectorXd associateAndUpdate(Belief& belief, const std::vector<Seen>& seen,
+  Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
                                      const FrameInput& input, const FrameContext& frame) const;
+  /// Of one object after its look; nothing may be left of it.
+  void tend(Object& object, const Seen& seen, const FrameInput& input,
+            const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
   /// A box that a hidden object explains far better than any that is in sight says that the blocker
   /// was misjudged: that object can be seen.

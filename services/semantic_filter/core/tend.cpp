@@ -20,22 +20,6 @@ double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<doub
   return whitened.squaredNorm();
 }
 
-/// The hypothesis given that v = 0: what it took for motion was the error of its place.
-void stop(Hypothesis& h) {
-  const Eigen::Matrix3d S = h.P.bottomRightCorner<3, 3>();
-  const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.rightCols<3>());
-  h.x -= K * Eigen::Vector3d(h.x.tail<3>());
-  h.x[kYaw] = wrapAngle(h.x[kYaw]);
-  h.P = (h.P - K * S * K.transpose()).eval();
-  h.C = (h.C - K * h.C.bottomRows<3>()).eval();
-  h.moving = false;
-  h.x.tail<3>().setZero();
-  h.P.bottomRows<3>().setZero();
-  h.P.rightCols<3>().setZero();
-  h.C.bottomRows<3>().setZero();
-  makeSymmetric(h.P);
-}
-
 void settleSlowOnes(Object& object, double min_speed) {
   for (auto& h : object.hypotheses) {
     if (!h.moving) continue;
@@ -85,7 +69,7 @@ bool scaleIsOpen(const Object& object, const TendParameters& tend) {
 }
 
 /// A car half as high as cars are is none: what has drifted there has lost its way. Whatever is
-/// left of the object is as likely as it was; where nothing is, the object goes.
+/// left of the object is as likely as it was.
 void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
   std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
@@ -93,7 +77,7 @@ void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate)
     lost += h.weight;
     return true;
   });
-  if (lost <= 0.0) return;
+  if (lost <= 0.0 || object.hypotheses.empty()) return;
   object.existence.become(object.existence * (1.0 - std::min(lost, 1.0)),
                           ExistenceEvidence::kMisshapen, object.as_of);
 }
