@@ -13,6 +13,7 @@ namespace {
 using testing::makeState;
 
 constexpr MemoryParameters kMemory{true, 100.0, 30.0, 5.0};
+constexpr double kStands = 0.7;  // m/s
 
 TimePoint at(double seconds) { return TimePoint(durationFromSeconds(seconds)); }
 
@@ -31,7 +32,7 @@ Object thingAt(ObjectId id, double x, double seen_s) {
 }
 
 struct Leavers {
-  LongTerm memory{kMemory};
+  LongTerm memory{kMemory, kStands};
   /// Of a filter at the origin that asks and is answered all along.
   LongTerm::Leaving after(const std::vector<Object>& objects, double now_s = 20.0) {
     (void)memory.leaving(objects, Eigen::Vector3d::Zero(), at(now_s), at(now_s - 3.0));
@@ -60,6 +61,14 @@ TEST(LongTerm, WhatMovesIsNeverArchivedAndForgottenOnceItIsFar) {
   EXPECT_EQ(leaving.forgotten, (std::vector<ObjectId>{1}));
 }
 
+TEST(LongTerm, WhatIsSlowerThanWhatCountsAsMovingIsArchived) {
+  Object creeping = thingAt(1, 140, 10);
+  creeping.hypotheses[0].moving = true;
+  creeping.hypotheses[0].x.tail<3>() << 0.2, 0, 0;
+  const auto leaving = Leavers().after({creeping});
+  EXPECT_EQ(leaving.archived, (std::vector<ObjectId>{1}));
+}
+
 TEST(LongTerm, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
   Object guess = thingAt(1, 140, 10);
   guess.confirmed = guess.once_confirmed = false;
@@ -74,7 +83,7 @@ TEST(LongTerm, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
 }
 
 TEST(LongTerm, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
-  LongTerm memory{kMemory};
+  LongTerm memory{kMemory, kStands};
   const std::vector<Object> things = {thingAt(1, 140, 10)};
   const auto question = memory.ask(Eigen::Vector3d::Zero(), at(14.0));
   ASSERT_TRUE(memory.answered(question->request, at(14.0), false));
@@ -85,7 +94,7 @@ TEST(LongTerm, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
 }
 
 TEST(LongTerm, AsksAsTheBodyMovesAndAgainWhereThereWasMoreThanOneAnswerHolds) {
-  LongTerm memory{kMemory};
+  LongTerm memory{kMemory, kStands};
   std::size_t asked = 0;
   for (int k = 0; k < 1000; ++k) {  // 10 m/s for 100 s
     const Eigen::Vector3d here(k * 1.0, 0, 0);

@@ -161,5 +161,30 @@ TEST(MovedOn, WhatStandsOnlyBecomesLessCertain) {
   EXPECT_GT(later.best().P(0, 0), object.best().P(0, 0));
 }
 
+TEST(OutOfSight, WhatIsSaidToStandStaysWhereItWasAndWhatDrivesDoesNot) {
+  const auto left = [](double speed) {
+    Object object = drivingCar();
+    object.hypotheses[0].x[kVelocity] = speed;
+    object.hypotheses[0].P.bottomRightCorner<3, 3>().diagonal().setConstant(0.16);
+    letSlowOnesStand(object, 0.7);
+    return object;
+  };
+  const Object slow = left(0.5);
+  ASSERT_EQ(slow.hypotheses.size(), 2u);
+  EXPECT_FALSE(slow.best().moving);
+  const double fast = fasterThan(slow.hypotheses[1], 0.7);
+  EXPECT_NEAR(slow.best().weight, 1.0 - fast, 1e-12);
+  EXPECT_NEAR(slow.hypotheses[1].weight, fast, 1e-12);
+  // Its place is that of a thing at rest: nearer goes with slower.
+  EXPECT_NEAR(slow.best().x[0], 20.0 + 0.03 / 0.16 * 0.5, 1e-9);
+  const Object later = movedOn(slow, slow.as_of + std::chrono::seconds(30), {});
+  EXPECT_EQ(later.best().x, slow.best().x);
+
+  const Object driving = left(8.0);
+  ASSERT_EQ(driving.hypotheses.size(), 1u);
+  EXPECT_TRUE(driving.best().moving);
+  EXPECT_EQ(driving.best().x, drivingCar().best().x);
+}
+
 }  // namespace
 }  // namespace perdure::semantic_filter

@@ -190,6 +190,37 @@ TEST_F(Tending, BirthRecoversSizeAndPlaceFromAnExactBoxAtTheTrueYaw) {
   EXPECT_LT(depth_sigma, 0.2 * 14.0);
 }
 
+TEST_F(Tending, WhatLostItsShapeBeginsAgainFromItsOwnBoxAsWhatItWas) {
+  frame.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.2));
+  const State truth = makeState(14.0, 3.0, 0.75, 0.6, 4.2, 1.75, 1.5);
+  const auto s = projectCuboid(truth, frame.view)->sides;
+  Detection d;
+  d.box = {s[0], s[1], s[2], s[3]};
+  d.activations = {0, 1.5F, -2, -2, 2};  // this once it looks more like a van
+  const auto e = *makeEvidence(d, model, camera.width(), camera.height(), parameters.box, {});
+
+  Object o = makeObject(7, "car", makeState(7.0, 1.5, 0.9, 0.6, 2.1, 0.87, 0.75), 0.001);
+  o.once_confirmed = true;
+  o.hits = 40;
+  const double existence = o.existence;
+  const auto pmf = classShares(o);
+  tendHypotheses(o, priors, parameters);
+  ASSERT_TRUE(o.hypotheses.empty());
+  ASSERT_TRUE(bearAgain(o, pmf, e, std::nullopt, frame));
+  EXPECT_EQ(o.id, 7u);
+  EXPECT_EQ(o.hits, 40u);
+  EXPECT_EQ(o.existence, existence);
+  EXPECT_EQ(classProbability(o, "car"), 1.0);
+  EXPECT_LT((o.best().x - truth).head<3>().norm(), 2.0);
+  EXPECT_NEAR(o.best().x[kSize + 2], std::log(1.5), 0.1);
+  EXPECT_GT(placeSigma(o.best(), Matrix6d::Zero()), 0.5) << "the place is as of one look";
+
+  // Of what was of no known class the box says what it is.
+  o.hypotheses.clear();
+  ASSERT_TRUE(bearAgain(o, {{kOtherClass, 1.0}}, e, std::nullopt, frame));
+  EXPECT_GT(classProbability(o, "van"), classProbability(o, "car"));
+}
+
 TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
   Evidence e;
   e.z.sides << 100, 100, 200, 200;
