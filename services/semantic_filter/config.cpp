@@ -197,6 +197,8 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"relative deviation of the distance until which \"other\" is not ruled out"});
   fields.number("tend.hypothesis_merge", t.hypothesis_merge, atLeast(0),
                 {"squared Mahalanobis distance at which two hypotheses are one"});
+  fields.number("tend.return_s", t.return_s, atLeast(0),
+                {"what is given up and found again in its place within it is the same thing", "s"});
   fields.number("tend.merge_overlap", t.merge_overlap, between(0, 1),
                 {"shared over joint volume at which two objects are one"});
   fields.number("tend.merge_inside", p.tend.merge_inside, positive(),

@@ -97,6 +97,12 @@ std::vector<Event> EventTracker::update(const Objects& objects,
       events.push_back(e);
       known_[m.survivor].moving = true;  // it is not said again of one that drives
     }
+    if (m.returned) {
+      e.kind = EventKind::kReappeared;
+      e.other_id = 0;
+      events.push_back(e);
+      known_[m.survivor] = it->second;
+    }
     known_.erase(it);
   }
   std::set<ObjectId> present;

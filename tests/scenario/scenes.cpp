@@ -51,29 +51,39 @@ void changedIds(const test::Outcome& run) {
       const auto seen = run.journal.of(id);
       const auto print = [&](const auto& one, const char* what) {
         const auto& [frame, g] = one;
-        fmt::print("  {:4} {:11} id {:4} {} {:.2f} r {:.3f} {} {} moving {:.2f} apart {:.2f} hits {} misses {}\n",
-                   frame->frame, what, id, g->className(), g->pmf.front().second, g->existence,
-                   g->confirmed ? "confirmed" : "-", nameOf(g->visibility), g->moving,
-                   (g->centre - place).norm(), g->hits, g->visible_misses);
+        fmt::print(
+            "  {:4} {:11} id {:4} {} {:.2f} r {:.3f} {} {} moving {:.2f} apart {:.2f} hits {} "
+            "misses {}\n",
+            frame->frame, what, id, g->className(), g->pmf.front().second, g->existence,
+            g->confirmed ? "confirmed" : "-", nameOf(g->visibility), g->moving,
+            (g->centre - place).norm(), g->hits, g->visible_misses);
       };
       if (seen.empty()) continue;
       print(seen.front(), "first");
       for (std::size_t i = 1; i < seen.size(); ++i) {
         const auto* a = seen[i - 1].second;
         const auto* b = seen[i].second;
-        if (a->confirmed != b->confirmed) print(seen[i], b->confirmed ? "confirmed" : "unconfirmed");
-        else if (a->className() != b->className()) print(seen[i], "class");
-        else if ((a->moving > 0.5) != (b->moving > 0.5)) print(seen[i], "motion");
-        else if (std::abs(a->existence - b->existence) > 0.3) print(seen[i], "existence");
-        else if (seen[i].first->frame > seen[i-1].first->frame + 1) print(seen[i], "again");
+        if (a->confirmed != b->confirmed)
+          print(seen[i], b->confirmed ? "confirmed" : "unconfirmed");
+        else if (a->className() != b->className())
+          print(seen[i], "class");
+        else if ((a->moving > 0.5) != (b->moving > 0.5))
+          print(seen[i], "motion");
+        else if (std::abs(a->existence - b->existence) > 0.3)
+          print(seen[i], "existence");
+        else if (seen[i].first->frame > seen[i - 1].first->frame + 1)
+          print(seen[i], "again");
       }
       print(seen.back(), "last");
     }
     for (const auto& e : run.events) {
       const auto id = e["object_id"].get<std::uint64_t>();
       const std::string kind = e["event"];
-      const bool merged = kind == "merged" && e.dump().find(std::to_string(first)) != std::string::npos;
-      if (((id == first || id == second) && kind != "occluded" && kind != "reappeared" && kind != "created") || merged) {
+      const bool merged =
+          kind == "merged" && e.dump().find(std::to_string(first)) != std::string::npos;
+      if (((id == first || id == second) && kind != "occluded" && kind != "reappeared" &&
+           kind != "created") ||
+          merged) {
         std::string text = e.dump();
         fmt::print("    event {}\n", text.substr(0, 260));
       }
@@ -105,6 +115,7 @@ int run(int argc, char** argv) {
   app.add_option("--seeds", seeds, "Of each scene")->capture_default_str();
   app.add_option("--seed", first, "The first")->capture_default_str();
   app.add_flag("--vio", setting.images, "Rendered, with vio in place of true poses");
+  app.add_option("--seconds", setting.seconds, "Of the scene; its own length without it");
   app.add_option("--rate", setting.rate_hz, "Frames a second")->capture_default_str();
   app.add_option("--set", setting.assignments, "semantic_filter.KEY=VALUE or detector.KEY=VALUE");
   app.add_option("--truth", truth, "Print what is believed near this true object, by frame");

@@ -103,6 +103,9 @@ void ObjectHistory::add(const Event& event) {
     case EventKind::kGone:
       gone_.insert(event.object_id);
       break;
+    case EventKind::kReappeared:
+      gone_.erase(event.object_id);
+      break;
     case EventKind::kArchived:
       archived_.insert(event.object_id);
       break;

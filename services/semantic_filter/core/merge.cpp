@@ -204,6 +204,11 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   return isCovariance(fused.P.topLeftCorner<7, 7>()) && fused.x.allFinite() ? fused : a;
 }
 
+void mergeTwo(Object& a, Object& b, const FrameContext& frame) {
+  bringUpToDate(a, b, frame);
+  absorb(a, b, frame);
+}
+
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
   std::vector<Ball> balls;
@@ -216,10 +221,9 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
         ++j;
         continue;
       }
-      bringUpToDate(a, b, frame);
       if (older(b, a)) std::swap(a, b);
-      absorb(a, b, frame);
-      merges.push_back({a.id, b.id, false});
+      mergeTwo(a, b, frame);
+      merges.push_back({a.id, b.id});
       objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
       balls.erase(balls.begin() + static_cast<std::ptrdiff_t>(j));
       balls[i] = ballOf(objects[i]);

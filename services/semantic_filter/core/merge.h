@@ -9,7 +9,8 @@ namespace perdure::semantic_filter {
 
 struct MergeRecord {
   ObjectId survivor = 0, absorbed = 0;
-  bool moved = false;  ///< the one was found again as the other, elsewhere (core/moved.h)
+  bool moved = false;     ///< the one was found again as the other, elsewhere (core/moved.h)
+  bool returned = false;  ///< the one was believed gone, and is found again as the other
 };
 
 /// Shared volume over joint volume of two upright cuboids.
@@ -19,6 +20,9 @@ double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 /// seen, or one hides the other; the rest waits: a frame that does not see them does not change
 /// them.
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame);
+
+/// Takes b, which is the same object, into a.
+void mergeTwo(Object& a, Object& b, const FrameContext& frame);
 
 /// The state of two beliefs about one object whose errors are independent but for the size prior
 /// and the pose error, both of which are counted once.

@@ -70,6 +70,19 @@ void takeUp(Object& past, Object&& now) {
   past = std::move(now);
 }
 
+/// What was known of it stays; how it is seen now is what the newcomer shows.
+void resume(Object& past, Object& now, const FrameContext& frame) {
+  mergeTwo(past, now, frame);
+  past.lead = now.lead;
+  past.hit_view = now.hit_view;
+  past.late_view = now.late_view;
+  past.screened = now.screened;
+  past.seen_existence = now.seen_existence;
+  past.visibility = now.visibility;
+  past.visible_fraction = now.visible_fraction;
+  past.blocked_by = now.blocked_by;
+}
+
 }  // namespace
 
 std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const ClassPriors& priors) {
@@ -78,11 +91,49 @@ std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const ClassP
     if (!isMissing(objects[i])) continue;
     const std::size_t j = nearest(objects, i, false, priors);
     if (j == objects.size() || nearest(objects, j, true, priors) != i) continue;
-    merges.push_back({objects[i].id, objects[j].id, true});
+    merges.push_back({objects[i].id, objects[j].id, true, false});
     takeUp(objects[i], std::move(objects[j]));
     objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
     if (j < i) --i;
   }
+  return merges;
+}
+
+void rememberGone(std::vector<Object>& gone, std::vector<Object> buried, TimePoint now,
+                  const TendParameters& parameters) {
+  std::erase_if(gone,
+                [&](const Object& o) { return toSeconds(now - o.as_of) > parameters.return_s; });
+  for (Object& o : buried) {
+    const Hypothesis& best = o.best();
+    if (!o.once_confirmed || best.moving || best.class_name == kOtherClass) continue;
+    o.visible_fraction = 0.0;
+    gone.push_back(std::move(o));
+  }
+}
+
+std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Object>& gone,
+                                   const FrameContext& frame) {
+  std::vector<MergeRecord> merges;
+  for (Object& o : objects) {
+    if (gone.empty()) break;
+    if (!o.confirmed || o.best().moving || o.visible_fraction <= 0.0) continue;
+    std::size_t found = gone.size();
+    double most = frame.parameters->tend.merge_overlap;
+    for (std::size_t i = 0; i < gone.size(); ++i) {
+      const Object& past = gone[i];
+      if (past.best().class_name != o.best().class_name || o.first_seen <= past.last_seen) continue;
+      const double shared = overlap(past.best().x, o.best().x, frame.view.up_W);
+      if (shared >= most) most = shared, found = i;
+    }
+    if (found == gone.size()) continue;
+    merges.push_back({gone[found].id, o.id, false, true});
+    resume(gone[found], o, frame);
+    o = std::move(gone[found]);
+    gone.erase(gone.begin() + static_cast<std::ptrdiff_t>(found));
+  }
+  if (merges.empty()) return merges;
+  std::stable_sort(objects.begin(), objects.end(),
+                   [](const Object& a, const Object& b) { return a.id < b.id; });
   return merges;
 }
 

@@ -1,5 +1,6 @@
-// One thing that was moved, or drove off, while nobody could follow it: it is missing where it
-// stood, and a newcomer of its class is near by (DESIGN 5, item 11).
+// A newcomer that is no new thing: one that was moved, or drove off, while nobody could follow it
+// is missing where it stood, and a newcomer of its class is near by (DESIGN 5, item 11); one that
+// was believed gone because the network missed it again and again is found where it was.
 #pragma once
 
 #include <vector>
@@ -14,5 +15,13 @@ namespace perdure::semantic_filter {
 /// near by, at a place that was looked at before, and empty. Each is taken with the nearest that
 /// would have it, too.
 std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const ClassPriors& priors);
+
+/// Keeps what was claimed at rest and is now believed gone, for `return_s` from then on.
+void rememberGone(std::vector<Object>& gone, std::vector<Object> buried, TimePoint now,
+                  const TendParameters& parameters);
+/// Gives a confirmed newcomer the id and the past of what is gone, of its class and in its place,
+/// and was not seen since the newcomer was. The newcomer's own id is absorbed.
+std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Object>& gone,
+                                   const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -105,6 +105,7 @@ struct TendParameters {
   double hypothesis_floor = 0.002;
   double scale_resolved = 0.06;   ///< relative deviation of the distance; before it "other" stays
   double hypothesis_merge = 1.0;  ///< squared Mahalanobis distance
+  double return_s = 60.0;         ///< what is found again in its place within it is the same thing
   double merge_overlap = 0.25;
   double merge_inside = 0.3;  ///< share of a thing of no known class that lies in a known one
   std::int64_t max_objects = 2000;

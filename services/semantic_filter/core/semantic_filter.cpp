@@ -318,7 +318,10 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   report.merges = mergeObjects(belief.objects, frame);
   const auto moved = reuniteMoved(belief.objects, priors_);
   report.merges.insert(report.merges.end(), moved.begin(), moved.end());
-  confirmAndBury(belief.objects, frame);
+  rememberGone(belief.gone, confirmAndBury(belief.objects, frame), input.stamp.time,
+               parameters_.tend);
+  const auto found = findAgain(belief.objects, belief.gone, frame);
+  report.merges.insert(report.merges.end(), found.begin(), found.end());
   contextualise(belief.objects, priors_.context);
   return report;
 }

@@ -27,6 +27,7 @@ struct FrameInput {
 
 struct Belief {
   std::vector<Object> objects;  ///< in order of id
+  std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
 };
 
 /// Gives ids to births. The same box of the same frame always gets the same id, so that stepping

@@ -173,7 +173,7 @@ double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
   return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
 }
 
-void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
+std::vector<Object> confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
   const TendParameters& parameters = frame.parameters->tend;
   for (auto& o : objects) {
     if (o.visible_fraction <= 0.0) continue;
@@ -187,15 +187,19 @@ void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
       o.confirmed = o.once_confirmed = true;
     }
   }
-  std::erase_if(objects, [&](const Object& o) {
-    return forgettable(o, parameters) ||
-           o.existence < (o.hits > 1 ? parameters.gone : parameters.gone_tentative);
+  std::vector<Object> buried;
+  std::erase_if(objects, [&](Object& o) {
+    if (forgettable(o, parameters)) return true;
+    if (o.existence >= (o.hits > 1 ? parameters.gone : parameters.gone_tentative)) return false;
+    buried.push_back(std::move(o));
+    return true;
   });
   const auto limit = static_cast<std::size_t>(parameters.max_objects);
-  if (objects.size() <= limit) return;
+  if (objects.size() <= limit) return buried;
   std::stable_sort(objects.begin(), objects.end(),
                    [](const auto& a, const auto& b) { return a.existence > b.existence; });
   objects.resize(limit);
+  return buried;
 }
 
 }  // namespace perdure::semantic_filter

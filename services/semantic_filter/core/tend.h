@@ -25,7 +25,7 @@ bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate);
 /// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
 /// Confirms what surely exists at a known place, takes that back where it is lost, and removes
-/// those whose existence has gone.
-void confirmAndBury(std::vector<Object>& objects, const FrameContext& frame);
+/// those whose existence has gone, which it returns.
+std::vector<Object> confirmAndBury(std::vector<Object>& objects, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -115,5 +115,71 @@ TEST_F(Moved, ACarThatDrivesFromWhereOneWasMissedIsThatCar) {
   EXPECT_TRUE(reuniteMoved(objects, priors).empty());
 }
 
+class FoundAgain : public Moved {
+ protected:
+  FoundAgain() {
+    frame.view.camera = &camera;
+    frame.priors = &priors;
+    frame.parameters = &parameters;
+  }
+  /// What was given up at 10 s, last seen at 8 s.
+  std::vector<Object> gone(const std::string& name, const State& x) {
+    Object o = missing(3, name, x, 8.0);
+    o.as_of = at(10.0);
+    std::vector<Object> list;
+    rememberGone(list, {o}, at(10.0), parameters.tend);
+    return list;
+  }
+  std::vector<MergeRecord> after(std::vector<Object> past, const Object& newcomer) {
+    objects = {newcomer};
+    objects[0].visible_fraction = 1.0;
+    return findAgain(objects, past, frame);
+  }
+  Parameters parameters;
+  FrameContext frame;
+  std::vector<Object> objects;
+};
+
+TEST_F(FoundAgain, InItsPlaceWhatWasGivenUpGoesOn) {
+  const State almost = makeState(5.05, 0.05, 0.4, 0, 0.5, 0.5, 0.9);
+  const auto merges = after(gone("chair", here), thing(9, "chair", almost, 11.0, 12.0));
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].survivor, 3u);
+  EXPECT_EQ(merges[0].absorbed, 9u);
+  EXPECT_TRUE(merges[0].returned);
+  ASSERT_EQ(objects.size(), 1u);
+  EXPECT_EQ(objects[0].id, 3u);
+  EXPECT_EQ(objects[0].first_seen, at(1.0));
+  EXPECT_EQ(objects[0].last_seen, at(12.0));
+  EXPECT_EQ(objects[0].hits, 12u);
+  EXPECT_EQ(objects[0].visible_fraction, 1.0);
+  EXPECT_GE(objects[0].existence, 0.95);
+  EXPECT_NEAR(objects[0].best().x[0], 5.025, 0.01) << "what was known of it counts";
+}
+
+TEST_F(FoundAgain, NothingElseIsTakenForIt) {
+  EXPECT_TRUE(after(gone("chair", here), thing(9, "chair", beside, 11.0, 12.0)).empty());
+  EXPECT_TRUE(after(gone("car", here), thing(9, "chair", here, 11.0, 12.0)).empty());
+  EXPECT_TRUE(after(gone("chair", here), thing(9, "chair", here, 7.0, 12.0)).empty())
+      << "both were seen";
+  EXPECT_TRUE(after(gone("chair", here), missing(9, "chair", here, 12.0)).empty());
+}
+
+TEST_F(FoundAgain, WhatWasNeverClaimedOrIsLongGoneIsForgotten) {
+  Object guess = missing(3, "chair", here, 8.0);
+  guess.once_confirmed = false;
+  Object driver = missing(4, "car", here, 8.0);
+  driver.hypotheses[0].moving = true;
+  std::vector<Object> list;
+  rememberGone(list, {guess, driver}, at(10.0), parameters.tend);
+  EXPECT_TRUE(list.empty());
+  list = gone("chair", here);
+  ASSERT_EQ(list.size(), 1u);
+  rememberGone(list, {}, at(9.9 + parameters.tend.return_s), parameters.tend);
+  EXPECT_EQ(list.size(), 1u);
+  rememberGone(list, {}, at(10.1 + parameters.tend.return_s), parameters.tend);
+  EXPECT_TRUE(list.empty());
+}
+
 }  // namespace
 }  // namespace perdure::semantic_filter

@@ -165,6 +165,51 @@ TEST(Node, AFrameWithoutDetectionsIsNoEvidenceAndAnEmptyListIs) {
   EXPECT_LT(existence(empty), existence(silent));
 }
 
+/// Sees the street, looks away, sees nothing of it for three seconds, and then all of it again.
+std::vector<ObjectId> missForAWhile(Harness& h) {
+  drive(h, 0, 20);
+  std::vector<ObjectId> ids;
+  for (const Object& o : h.node.belief().objects) {
+    if (o.confirmed) ids.push_back(o.id);
+  }
+  RigidTransform away = driveTo(20, 0.4);
+  away.q = away.q * Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
+  for (std::uint64_t k = 20; k < 90; ++k) {
+    h.node.onOdometry(odometryAt(k, k < 40 ? away : driveTo(20, 0.4)));
+    h.node.onDetections(
+        detectionsAt(k, k < 70 ? std::vector<Detection>{} : boxesAt(kStreet, 20, 0.4, k)));
+  }
+  return ids;
+}
+
+TEST(Node, WhatWasGivenUpAndIsFoundInItsPlaceIsTheSameThing) {
+  const auto count = [](const Harness& h, EventKind kind, ObjectId id) {
+    return std::count_if(h.events.begin(), h.events.end(),
+                         [&](const Event& e) { return e.kind == kind && e.object_id == id; });
+  };
+  Harness h;
+  const auto ids = missForAWhile(h);
+  ASSERT_GE(ids.size(), 2u);
+  for (const ObjectId id : ids) {
+    ASSERT_EQ(count(h, EventKind::kGone, id), 1);
+    EXPECT_EQ(count(h, EventKind::kBorn, id), 1);
+    EXPECT_EQ(count(h, EventKind::kMerged, id), 1);
+    EXPECT_EQ(count(h, EventKind::kReappeared, id), 1);
+    const auto& now = h.objects.back().objects;
+    const auto back = std::find_if(now.begin(), now.end(), [&](auto& o) { return o.id == id; });
+    ASSERT_NE(back, now.end());
+    EXPECT_TRUE(back->confirmed);
+    EXPECT_EQ(toNanoseconds(back->first_seen), 0);
+  }
+
+  Config forgets;
+  forgets.filter.tend.return_s = 0.5;
+  Harness short_memory(forgets);
+  for (const ObjectId id : missForAWhile(short_memory)) {
+    EXPECT_EQ(count(short_memory, EventKind::kReappeared, id), 0);
+  }
+}
+
 TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
   Harness h;
   drive(h, 0, 20);

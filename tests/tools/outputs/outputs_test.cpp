@@ -150,6 +150,20 @@ TEST(ObjectHistory, FinalHasNoRowsOfObjectsThatProvedMovingOrGone) {
   EXPECT_THAT(history.inst(), SizeIs(3));
 }
 
+TEST(ObjectHistory, WhatIsFoundAgainAfterItWasGivenUpHasItsRowsOfBefore) {
+  ObjectHistory history;
+  history.add(messageAt(0, {carAt(1, 8)}));
+  history.add(eventOf(EventKind::kGone, 1));
+  history.add(messageAt(1, {carAt(5, 8.1)}));
+  history.add(eventOf(EventKind::kMerged, 1, 5));
+  history.add(eventOf(EventKind::kReappeared, 1));
+  history.add(messageAt(2, {carAt(1, 8.2)}));
+  const auto rows = history.finalRows();
+  ASSERT_THAT(rows, SizeIs(3));
+  for (const auto& row : rows) EXPECT_EQ(row.object_id, 1u);
+  EXPECT_THAT(history.lastBeliefs(), SizeIs(1));
+}
+
 CameraCalibration aheadCamera() {
   CameraCalibration camera;
   camera.width = 640;
