@@ -125,6 +125,8 @@ void describeMotion(Parameters& p, Fields& fields) {
                 {"the same for the logarithm of the distance"});
   fields.number("looks.image_angle", p.looks.image_angle, positive(),
                 {"the same for the place in the image", "rad"});
+  fields.number("looks.found_prior", p.looks.found_prior, positive(),
+                {"what P_D is worth beside how often an object was found from there, in looks"});
 }
 
 void describeSmooth(SmoothParameters& p, Fields& fields) {
@@ -182,6 +184,8 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"and how well its place beside the body is known; given up at twice that", "m"});
   fields.number("tend.certain", t.certain, between(0.9, 0.999999),
                 {"existence is kept below it, so that misses can still be heard"});
+  fields.number("tend.certain_again", t.certain_again, between(0.9, 0.999999),
+                {"the same of what was found again after the camera had looked away"});
   fields.number("tend.gone", t.gone, between(0, 1), {"existence below which an object is gone"});
   fields.number("tend.gone_tentative", t.gone_tentative, between(0, 1),
                 {"the same for one that was never confirmed"});

@@ -9,7 +9,8 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
-constexpr double kNever = 1e9;              // a change of view that never counts
+constexpr double kMostFound = 0.98;
+constexpr double kNever = 1e9;  // a change of view that never counts
 
 void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
                 const ObjectLook& look, const std::vector<Evidence>& boxes,
@@ -41,8 +42,16 @@ double foundAs(const Hypothesis& hypothesis, const Object& object, double size_p
   return (1.0 - alike) * own + alike * detectionProbability(like, size_px, frame);
 }
 
-HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const Sight& sight,
-                      const Projector& from, const FrameContext& frame) {
+/// How often the object is found from here, beside P_D.
+double rateOf(const Object& object, const FrameContext& frame) {
+  if (object.best().moving) return 1.0;
+  return object.found_rate.factor(aspectOf(object.best().x.head<3>(), frame.view.T_WC()),
+                                  frame.parameters->looks.found_prior,
+                                  screenScales(frame.parameters->visibility));
+}
+
+HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double rate,
+                      const Sight& sight, const Projector& from, const FrameContext& frame) {
   HypothesisLook h;
   h.box = projectObserved(hypothesis.x, from, frame.offsetOf(hypothesis.class_name));
   h.late_looks =
@@ -52,7 +61,8 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, const 
   const double size =
       std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
   const double v = sight.fraction * (1.0 - object.screened);
-  h.detection = v * foundAs(hypothesis, object, size, frame);
+  h.expected = v * foundAs(hypothesis, object, size, frame);
+  h.detection = std::min(h.expected * rate, kMostFound * v);
   h.missed = v - h.detection;
   h.silent = 1.0 - h.detection;
   return h;
@@ -69,6 +79,10 @@ double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
 
 Projector FrameContext::projector() const { return key_view ? key_view->projector : view; }
 
+ViewScales screenScales(const VisibilityParameters& visibility) {
+  return {visibility.screen_angle, visibility.screen_log_distance, kNever};
+}
+
 ViewWalk viewWalkOf(const FrameContext& frame) {
   const BoxParameters& box = frame.parameters->box;
   const VisibilityParameters& visibility = frame.parameters->visibility;
@@ -79,7 +93,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
       box, frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{});
   walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
   walk.screened = visibility.screened;
-  walk.screen = {visibility.screen_angle, visibility.screen_log_distance, kNever};
+  walk.screen = screenScales(visibility);
   return walk;
 }
 
@@ -98,8 +112,9 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
   result.sight = sight;
   result.hypotheses.reserve(object.hypotheses.size());
   const Projector from = frame.projector();
+  const double rate = rateOf(object, frame);
   for (const auto& hypothesis : object.hypotheses) {
-    result.hypotheses.push_back(lookAt(hypothesis, object, sight, from, frame));
+    result.hypotheses.push_back(lookAt(hypothesis, object, rate, sight, from, frame));
   }
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     const bool near = std::any_of(result.hypotheses.begin(), result.hypotheses.end(),

@@ -24,6 +24,7 @@ struct HypothesisLook {
   std::vector<double> likelihood;  ///< L(z) for each box of the look, 0 outside the gate
   std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
   std::vector<int> part;           ///< BoxScore::part of each box
+  double expected = 0.0;           ///< v P_D of its class, whatever is known of the object itself
   double late_looks = 0.0;         ///< earlier looks that share this view, if it is true
 };
 
@@ -51,6 +52,8 @@ struct FrameContext {
   }
 };
 
+/// Changes of view after which what hides a thing, or makes the network miss it, is another.
+ViewScales screenScales(const VisibilityParameters& visibility);
 /// What changes at an object with the view of this frame.
 ViewWalk viewWalkOf(const FrameContext& frame);
 

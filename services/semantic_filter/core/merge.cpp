@@ -7,6 +7,7 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/keyframe.h"
 #include "services/semantic_filter/core/polygon.h"
+#include "services/semantic_filter/core/tend.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -51,9 +52,10 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
     a.hypotheses.front().weight = weight;
     multiplyPmf(a, b);
   }
-  a.existence.become(
-      std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence), frame.parameters->tend.certain),
-      ExistenceEvidence::kMerge, a.as_of);
+  a.found_again = a.found_again || b.found_again;
+  a.existence.become(std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence),
+                              certainty(a, frame.parameters->tend)),
+                     ExistenceEvidence::kMerge, a.as_of);
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
   a.once_confirmed = a.once_confirmed || b.once_confirmed;
@@ -61,6 +63,7 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
   a.late_view.looks += b.late_view.looks;
   a.support = std::max(a.support, b.support);
+  a.found_rate.join(b.found_rate, screenScales(frame.parameters->visibility));
   a.remembers_all = a.remembers_all && b.remembers_all;
   const auto& box = frame.parameters->box;
   joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},

@@ -12,6 +12,7 @@
 
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
+#include "services/semantic_filter/core/found_rate.h"
 #include "services/semantic_filter/core/ledger.h"
 
 namespace perdure::semantic_filter {
@@ -55,6 +56,7 @@ struct Object {
   TimePoint first_seen, last_seen, as_of;
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
   TimePoint came_back;                           ///< when it last came back into the picture
+  bool found_again = false;                      ///< detected on another visit than the first
   std::uint32_t hits = 0, visible_misses = 0;
   double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
   ViewPoint hit_view;        ///< of the last look that showed it
@@ -64,8 +66,9 @@ struct Object {
   double alike = 0.0;     ///< nats for "looks like a known class", if it is of none (logRatio)
   double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
   std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
-  double support = 1.0;                     ///< share of late visible looks that showed it
-  double seen_existence = 0.0;              ///< existence after the last look that showed it
+  FoundRate found_rate;
+  double support = 1.0;         ///< share of late visible looks that showed it
+  double seen_existence = 0.0;  ///< existence after the last look that showed it
   Visibility visibility = Visibility::kVisible;
   double visible_fraction = 1.0;
   ObjectId blocked_by = 0;

@@ -76,6 +76,7 @@ struct LooksParameters {
   double angle = 0.1;         ///< rad, change of aspect after which it has fallen to 1/e
   double log_distance = 0.1;  ///< the same for the logarithm of the distance
   double image_angle = 0.03;  ///< rad, the same for the place in the image
+  double found_prior = 3.0;   ///< looks; P_D beside how often an object was found from about here
 };
 
 struct VisibilityParameters {
@@ -96,7 +97,8 @@ struct TendParameters {
   double confirm_sigma_m =
       1.5;                ///< of its place beside the body; one that is not known is no claim
   double certain = 0.99;  ///< existence is kept below it, so that misses can still be heard
-  double gone = 0.02;     ///< existence below which an object is forgotten
+  double certain_again = 0.999;  ///< the same of what was found on another visit
+  double gone = 0.02;            ///< existence below which an object is forgotten
   double gone_tentative = 0.05;
   double tentative_s =
       10.0;  ///< out of sight, after which what confirm_hits did not confirm is too

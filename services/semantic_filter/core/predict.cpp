@@ -156,24 +156,6 @@ std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6
   return sane ? std::optional(transition) : std::nullopt;
 }
 
-Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC) {
-  const Eigen::Vector3d ray = position - T_WC.p;
-  const double distance = std::max(ray.norm(), 1e-3);
-  const Eigen::Vector3d ray_W = ray / distance;
-  return {ray_W, T_WC.q.conjugate() * ray_W, std::log(distance)};
-}
-
-double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales) {
-  return (a.ray_W - b.ray_W).norm() / scales.angle +
-         (a.ray_C - b.ray_C).norm() / scales.image_angle +
-         std::abs(a.log_distance - b.log_distance) / scales.log_distance;
-}
-
-double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
-                  const ViewScales& scales) {
-  return viewChange(aspectOf(position, a), aspectOf(position, b), scales);
-}
-
 void stop(Hypothesis& h) {
   const Eigen::Matrix3d S = h.P.bottomRightCorner<3, 3>();
   const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.rightCols<3>());
@@ -241,7 +223,10 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
                             ExistenceEvidence::kTime, now);
   }
   constexpr double kAway_s = 1.0;  // out of the picture, not behind something
-  if (dt > kAway_s && object.away.count > 0 && object.hidden.count == 0) object.came_back = now;
+  if (dt > kAway_s && object.away.count > 0 && object.hidden.count == 0) {
+    object.came_back = now;
+    object.found_rate.beginVisit(walk.screen);
+  }
   object.existence.note(ExistenceEvidence::kHidden, std::exchange(object.hidden, {}));
   object.existence.note(ExistenceEvidence::kAway, std::exchange(object.away, {}));
   object.as_of = now;

@@ -32,20 +32,6 @@ State stateAt(const Hypothesis& h, double dt);
 /// Where its motion alone will have brought it by `time`, as_of left as it was: for what is said of
 /// it between two looks. Not kept, so that the belief itself depends on its looks only.
 Object movedOn(Object object, TimePoint time, const MotionParameters& parameters);
-/// How much the view of a point changed from camera pose a to b, in lengths after which what two
-/// looks have in common has fallen to 1/e.
-struct ViewScales {
-  double angle, log_distance, image_angle;
-};
-/// Of a point from one camera pose.
-struct Aspect {
-  Eigen::Vector3d ray_W, ray_C;  ///< unit, from the camera to it
-  double log_distance;
-};
-Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);
-double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales);
-double viewChange(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
-                  const RigidTransform& T_WC_b, const ViewScales& scales);
 /// What changes at an object as the view of it changes, and goes back to where it began.
 struct ViewWalk {
   RigidTransform T_WC;  ///< the new view

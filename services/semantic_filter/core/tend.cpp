@@ -162,6 +162,10 @@ void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters&
   normalise(object, ClassEvidence::kMotion);
 }
 
+double certainty(const Object& object, const TendParameters& parameters) {
+  return object.found_again ? parameters.certain_again : parameters.certain;
+}
+
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
   Eigen::Matrix<double, 3, 6> shared = h.C.topRows<3>();
   Matrix6d L = P_pose;

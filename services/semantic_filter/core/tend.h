@@ -21,6 +21,9 @@ double distance2(const Hypothesis& a, const Hypothesis& b);
 /// Whether its size is `size_gate` deviations of the class's from that of the class, or further.
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate);
 
+/// The most that is believed of its existence.
+double certainty(const Object& object, const TendParameters& parameters);
+
 /// Standard deviation of the place relative to the body, metres: what the pose error does not
 /// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);

@@ -8,12 +8,14 @@
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/azimuth.h"
+#include "services/semantic_filter/core/tend.h"
 
 namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kNegligible = 0.01;  // share of a box in an update
 constexpr double kMaxHead = 6.0;      // nats
+constexpr double kAway_s = 1.0;       // after which what comes from the map is another visit
 
 using SideRows = Eigen::Matrix<double, 4, kVelocity>;  // no side depends on the velocity
 using Gains = Eigen::Matrix<double, kStateDim, 4>;
@@ -188,6 +190,8 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
     return;
   }
   ++object.hits;
+  const bool from_map = object.recalled && toSeconds(object.as_of - object.last_seen) > kAway_s;
+  object.found_again = object.found_again || from_map || object.came_back > object.first_seen;
   object.recalled = false;
   object.last_seen = object.as_of;
   const auto& box = shares.front().box;
@@ -195,6 +199,12 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
   if (!box.empty() && box[z] > 0.5) {
     object.running_nis = 0.85 * object.running_nis + 0.15 * look.hypotheses.front().nis[z];
   }
+}
+
+void countFound(Object& object, const ObjectLook& look, bool found, const FrameContext& frame) {
+  const Aspect from = aspectOf(object.best().x.head<3>(), frame.view.T_WC());
+  object.found_rate.add(from, look.hypotheses.front().expected, found,
+                        screenScales(frame.parameters->visibility));
 }
 
 /// By how much the noise of a look counts more because the last look had almost the same: that of
@@ -362,14 +372,15 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   const LookReasons reasons =
       reasonsOf(object, shares, seen, hit.worth, hit.worth, look.boxes, boxes, frame);
   const double r = object.existence;
-  double next =
-      existenceAfter(object, weigh(object, shares, hit.worth), frame.parameters->tend.certain);
+  double next = existenceAfter(object, weigh(object, shares, hit.worth),
+                               certainty(object, frame.parameters->tend));
   if (seen >= 0.5) {
     object.seen_existence = next;
   } else if (look.primed) {
     next = std::min(next, std::max(r, object.seen_existence));
   }
   bookExistence(object, next, reasons);
+  if (!look.primed && !object.best().moving) countFound(object, look, seen >= 0.5, frame);
   updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
   if (own) object.alike += hit.worth * boxes[look.boxes[*own]].log_ratio_best;
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};

@@ -165,6 +165,28 @@ TEST(Node, AFrameWithoutDetectionsIsNoEvidenceAndAnEmptyListIs) {
   EXPECT_LT(existence(empty), existence(silent));
 }
 
+TEST(Node, WhatIsFoundAgainAfterTheCameraLookedAwayIsBelievedMore) {
+  const auto surest = [](const Harness& h) {
+    double most = 0.0;
+    for (const auto& o : h.objects.back().objects) most = std::max(most, o.existence);
+    return most;
+  };
+  const TendParameters tend;
+  Harness h;
+  drive(h, 0, 20);
+  EXPECT_NEAR(surest(h), tend.certain, 1e-6);
+  RigidTransform away = driveTo(20, 0.4);
+  away.q = away.q * Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
+  for (std::uint64_t k = 20; k < 50; ++k) {
+    h.node.onOdometry(odometryAt(k, k < 40 ? away : driveTo(20, 0.4)));
+    h.node.onDetections(
+        detectionsAt(k, k < 40 ? std::vector<Detection>{}
+                               : boxesAt(kStreet, 20, 0.4, static_cast<std::uint32_t>(k))));
+  }
+  EXPECT_GT(surest(h), tend.certain);
+  EXPECT_LE(surest(h), tend.certain_again);
+}
+
 /// Sees the street, looks away, sees nothing of it for three seconds, and then all of it again.
 std::vector<ObjectId> missForAWhile(Harness& h) {
   drive(h, 0, 20);

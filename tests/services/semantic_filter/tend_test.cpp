@@ -221,6 +221,14 @@ TEST_F(Tending, WhatLostItsShapeBeginsAgainFromItsOwnBoxAsWhatItWas) {
   EXPECT_GT(classProbability(o, "van"), classProbability(o, "car"));
 }
 
+TEST_F(Tending, WhatWasFoundOnAnotherVisitIsSurerThanWhatWasSeenOnce) {
+  Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
+  EXPECT_EQ(certainty(o, parameters.tend), parameters.tend.certain);
+  o.found_again = true;
+  EXPECT_EQ(certainty(o, parameters.tend), parameters.tend.certain_again);
+  EXPECT_GT(parameters.tend.certain_again, parameters.tend.certain);
+}
+
 TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
   Evidence e;
   e.z.sides << 100, 100, 200, 200;
