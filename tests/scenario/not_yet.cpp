@@ -21,7 +21,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
             "0.9, 0.885, 0.875: the body stops behind what hides the thing, having gone on for "
             "seconds: of the first prediction that cannot be known"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 4, 8: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 4, 6: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
            {"merges that kept the younger id",
             "0, 0, 1: not yet looked into; with true poses it passes"},
@@ -29,7 +29,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"vanish",
        {
            {"visible frames until the one that was taken is `missing`",
-            "16, 8, 8: not yet looked into"},
+            "14, 6, 6: not yet looked into"},
            {"it is on the map where it stands now, with its id",
             "1, 1, 0: its old belief is lost before the new one is confirmed, or the new one is "
             "not placed"},
@@ -40,9 +40,9 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"room",
        {
            {"objects for each one found",
-            "1.08, 1.11, 1.05: chairs close together change their ids"},
+            "1.07, 1.11, 1.05: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "4, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
+            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"row",
@@ -58,16 +58,16 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "3.07, 28.1, 2.57: not by the roll alone: the estimate still settles as the camera "
+            "3.07, 28.1, 3.49: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.0697, 0.193, 0.0736: not by the roll alone: the estimate still settles as the "
-            "camera comes nearer"},
+            "0.11, 0.142, 0.0736: not by the roll alone: the estimate still settles as the camera "
+            "comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.228, 0.218, 0.173: not by the roll alone: the estimate still settles as the camera "
+            "0.27, 0.218, 0.214: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "4, 1, 0: looks whose box another thing may have made, or a belief of odd size given "
+            "1, 1, 0: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
            {"merges that lost existence", "0, 0, 1: a miss in the same frame"},
        }},
@@ -88,21 +88,21 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"street",
        {
            {"second lap: share that keeps the id of the first",
-            "0.918, 0.926, 0.925: taken for moving on the first lap and given up out of view, or "
-            "two beliefs in one thing"},
+            "0.918, 0.957, 0.943: two beliefs in one thing, of which the older survives where the "
+            "younger was told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "12, 7, 15: some misses in a row, or a place lost for a few frames"},
+            "7, 5, 7: some misses in a row, or a place lost for a few frames"},
            {"looks that showed a claimed thing and made it less sure",
-            "5, 2, 8: looks whose box another thing may have made, or a belief of odd size given "
+            "5, 2, 5: looks whose box another thing may have made, or a belief of odd size given "
             "up"},
        }},
       {"street recalled",
        {
            {"second lap: share that keeps the id of the first",
-            "0.925: taken for moving on the first lap and given up out of view, or two beliefs in "
-            "one thing"},
+            "0.918: two beliefs in one thing, of which the older survives where the younger was "
+            "told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "5: some misses in a row, or a place lost for a few frames"},
+            "3: some misses in a row, or a place lost for a few frames"},
        }},
       {"toy vio",
        {
@@ -123,23 +123,25 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
            {"share of the predictions whose interval holds the return",
             "0.7: a body that turns back is taken for one whose velocity wanders"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"vanish vio",
        {
            {"visible frames until the one that was taken is `missing`",
-            "20: not yet looked into; with true poses it passes"},
+            "19: not yet looked into; with true poses it passes"},
        }},
       {"room vio",
        {
-           {"objects for each one found", "1.11: chairs close together change their ids"},
+           {"share of them that are two objects at the end",
+            "0.857: not yet looked into; with true poses it passes"},
+           {"objects for each one found", "1.12: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
             "2: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"row vio",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "2: placed along the line of sight to a metre"},
+            "1: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
             "3: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
@@ -148,32 +150,32 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
            {"change of yaw meanwhile, deg, nine in ten",
             "6.18: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.121: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.119: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.355: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.252: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"traffic vio",
        {
            {"things in long-term memory where nothing stands",
             "3: what a moving car leaves behind where it was first believed to stand"},
            {"share of the parked ones left behind that it has",
-            "0.925: not yet looked into; with true poses it passes"},
+            "0.949: not yet looked into; with true poses it passes"},
            {"standing things on the map where nothing is",
             "4: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "11: looks whose box another thing may have made, or a belief of odd size given up"},
+            "5: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"street vio",
        {
            {"second lap: share that keeps the id of the first",
-            "0.885: taken for moving on the first lap and given up out of view, or two beliefs in "
-            "one thing"},
+            "0.902: two beliefs in one thing, of which the older survives where the younger was "
+            "told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "32: some misses in a row, or a place lost for a few frames"},
+            "18: some misses in a row, or a place lost for a few frames"},
            {"looks that showed a claimed thing and made it less sure",
-            "11: looks whose box another thing may have made, or a belief of odd size given up"},
+            "7: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
   };
   const auto found = all.find(scene);

@@ -36,7 +36,45 @@ void trace(const test::Outcome& run, std::uint64_t truth_id, double within) {
   }
 }
 
-/// Of each thing whose id of the first half is not that of the second: what became of the first.
+/// When an object was first and last published, and where what is said of it changed.
+void tell(const test::Outcome& run, ObjectId id, const Eigen::Vector3d& place) {
+  const auto seen = run.journal.of(id);
+  const auto line = [&](std::size_t i, const char* what) {
+    const auto& [frame, g] = seen[i];
+    fmt::print(
+        "  {:4} {:11} id {:4} {} {:.2f} r {:.3f} {} {} moving {:.2f} apart {:.2f} hits {} misses "
+        "{}\n",
+        frame->frame, what, id, g->className(), g->pmf.front().second, g->existence,
+        g->confirmed ? "confirmed" : "-", nameOf(g->visibility), g->moving,
+        (g->centre - place).norm(), g->hits, g->visible_misses);
+  };
+  if (seen.empty()) return;
+  line(0, "first");
+  for (std::size_t i = 1; i < seen.size(); ++i) {
+    const test::Glance &a = *seen[i - 1].second, &b = *seen[i].second;
+    if (seen[i].first->frame > seen[i - 1].first->frame + 1) {
+      line(i, "again");
+    } else if (a.confirmed != b.confirmed) {
+      line(i, b.confirmed ? "confirmed" : "unconfirmed");
+    } else if (a.className() != b.className()) {
+      line(i, "class");
+    } else if ((a.moving > 0.5) != (b.moving > 0.5)) {
+      line(i, "motion");
+    }
+  }
+  line(seen.size() - 1, "last");
+  const auto is = [id](const nlohmann::json& e, const char* key) {
+    return e.contains(key) && e[key].get<std::uint64_t>() == id;
+  };
+  for (const auto& e : run.events) {
+    const std::string kind = e["event"];
+    const bool ends = (is(e, "object_id") && (kind == "gone" || kind == "moved")) ||
+                      (kind == "merged" && (is(e, "object_id") || is(e, "other_id")));
+    if (ends) fmt::print("    {}\n", e.dump());
+  }
+}
+
+/// Of each thing whose id of the first half is not that of the second: what became of both.
 void changedIds(const test::Outcome& run) {
   const std::uint64_t all = run.truth.frames.size();
   for (const auto& object : run.truth.truth.objects) {
@@ -47,47 +85,8 @@ void changedIds(const test::Outcome& run) {
     if (first == 0 || second == 0 || first == second) continue;
     fmt::print("seed {} truth {} {}: id {} then {}\n", run.setting.seed, object.id,
                object.class_name, first, second);
-    for (const auto id : {first, second}) {
-      const auto seen = run.journal.of(id);
-      const auto print = [&](const auto& one, const char* what) {
-        const auto& [frame, g] = one;
-        fmt::print(
-            "  {:4} {:11} id {:4} {} {:.2f} r {:.3f} {} {} moving {:.2f} apart {:.2f} hits {} "
-            "misses {}\n",
-            frame->frame, what, id, g->className(), g->pmf.front().second, g->existence,
-            g->confirmed ? "confirmed" : "-", nameOf(g->visibility), g->moving,
-            (g->centre - place).norm(), g->hits, g->visible_misses);
-      };
-      if (seen.empty()) continue;
-      print(seen.front(), "first");
-      for (std::size_t i = 1; i < seen.size(); ++i) {
-        const auto* a = seen[i - 1].second;
-        const auto* b = seen[i].second;
-        if (a->confirmed != b->confirmed)
-          print(seen[i], b->confirmed ? "confirmed" : "unconfirmed");
-        else if (a->className() != b->className())
-          print(seen[i], "class");
-        else if ((a->moving > 0.5) != (b->moving > 0.5))
-          print(seen[i], "motion");
-        else if (std::abs(a->existence - b->existence) > 0.3)
-          print(seen[i], "existence");
-        else if (seen[i].first->frame > seen[i - 1].first->frame + 1)
-          print(seen[i], "again");
-      }
-      print(seen.back(), "last");
-    }
-    for (const auto& e : run.events) {
-      const auto id = e["object_id"].get<std::uint64_t>();
-      const std::string kind = e["event"];
-      const bool merged =
-          kind == "merged" && e.dump().find(std::to_string(first)) != std::string::npos;
-      if (((id == first || id == second) && kind != "occluded" && kind != "reappeared" &&
-           kind != "created") ||
-          merged) {
-        std::string text = e.dump();
-        fmt::print("    event {}\n", text.substr(0, 260));
-      }
-    }
+    tell(run, first, place);
+    tell(run, second, place);
   }
 }
 
