@@ -21,7 +21,7 @@ mkdir -p "$out"
 began=$(date +%s%N)
 say() { printf '%7.1f  %s\n' "$((($(date +%s%N) - began) / 1000000))e-3" "$1"; }
 rm -f "$out/verdicts"
-# judge NAME [WHAT EXPRESSION]…: figures of a run, and what must hold of them; `one` is the recall on one host.
+# judge NAME [WHAT EXPRESSION]…: figures of a run, and what must hold of them.
 judge() {
   say "$(python3 - "$out" "$@" << 'PY'
 import json, sys
@@ -34,7 +34,6 @@ def figures(run):
             "mb": round(int(open(f"{out}/{run}.bytes").read()) / 1e6, 1)}
 known = figures(name)
 print(name, " ".join(f"{key} {value}" for key, value in known.items()))
-known["one"] = sum(figures(run)["recall"] for run in ("one_host", "one_host_again")) / 2
 for what, holds in zip(claims[::2], claims[1::2]):
     print(" " * 9 + ("ok: " if eval(holds, known) else "FAILED: ") + f"{what} ({holds})")
 PY
@@ -89,7 +88,8 @@ drive() {
   echo $(($(sent h1) - before)) > "$out/$1.bytes"
 }
 # --- one host, three hosts ---
-# Twice: one object more or less, by the timing of a run, is .05 of recall here.
+# One object more or less is .05 of recall here, and the last digit of a pose decides on it: the
+# recall of a single run says nothing to .02, so that the means of all runs are compared (below).
 for run in one_host one_host_again; do
   on h3 env PERDURE_BUS="$out/one_host.yaml" "$PERDURE_BIN/perdure" demo --data "$drive" \
     --model models/perdure_320x240.onnx --root . --out "$out/$run" > "$out/$run.log" 2>&1
@@ -99,10 +99,9 @@ judge one_host
 judge one_host_again
 
 frames=("99 % of the frames at inference" "got >= .99 * sent")
-objects=("objects as on one host" "recall >= one - .02")
 for kind in raw jpeg; do
   drive "$kind" "$out/$kind"
-  judge "$kind" "${frames[@]}" "${objects[@]}"
+  judge "$kind" "${frames[@]}"
 done
 
 # --- closed to strangers, and by unicast alone ---
@@ -111,7 +110,7 @@ rm -rf "$out/security"
 printf 'bus:\n  interface: eth0\n  peers: [10.77.0.1, 10.77.0.2, 10.77.0.3]\n  security: %s\n' \
   "$out/security" > "$out/closed.yaml"
 drive closed "$out/jpeg" PERDURE_BUS="$out/closed.yaml"
-judge closed "${frames[@]}" "${objects[@]}"
+judge closed "${frames[@]}"
 
 # --- 5 % of all packets, of each process ---
 lossy=$(on h1 env PERDURE_BUS="$out/bus.yaml" "$PERDURE_BIN/perdure" env |
@@ -120,8 +119,20 @@ lossy=$(on h1 env PERDURE_BUS="$out/bus.yaml" "$PERDURE_BIN/perdure" env |
 [[ "$lossy" == *XmitLossiness* ]] || { say "FAILED: perdure env has no <Internal>"; exit 1; }
 for kind in raw jpeg; do
   drive "lossy_$kind" "$out/$kind" CYCLONEDDS_URI="$lossy"
-  judge "lossy_$kind" "${frames[@]}" "${objects[@]}"
+  judge "lossy_$kind" "${frames[@]}"
 done
+
+say "$(python3 - "$out" << 'PY'
+import json, sys
+out = sys.argv[1]
+def mean(*runs):
+    recalls = [json.load(open(f"{out}/{run}/report.json"))["objects"]["recall"] for run in runs]
+    return sum(recalls) / len(recalls)
+three, one = mean("raw", "jpeg", "closed", "lossy_raw", "lossy_jpeg"), mean("one_host", "one_host_again")
+print(("ok: " if three >= one - .02 else "FAILED: ") +
+      f"objects as on one host: recall {three:.3f} in the mean of five runs on three, {one:.3f} on one")
+PY
+)" | tee -a "$out/verdicts"
 
 # --- inference's link is cut, its host is gone ---
 # absent NAME SECONDS: from 8 s after the start on; says when its detections are heard again.
