@@ -74,7 +74,7 @@ FrameInput Node::makeInput(const Odometry& odometry) {
 void Node::beginWorld(const WorldId& world) {
   if (world_) reasons_.add("world_changed");
   world_ = world;
-  belief_.objects.clear();
+  belief_ = {};
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();

@@ -2,12 +2,16 @@
 // instances differ, and what a network misses from one side today it missed from there yesterday.
 #pragma once
 
+#include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "services/semantic_filter/core/aspect.h"
 
 namespace perdure::semantic_filter {
 
+/// Copied with every belief that is kept for late detections: what earlier visits counted is
+/// shared.
 class FoundRate {
  public:
   static constexpr std::size_t kMostViews = 96;  ///< of one visit, and of those before it
@@ -18,21 +22,23 @@ class FoundRate {
   /// Within one visit misses in a row do not excuse each other: the thing may have gone.
   void beginVisit(const ViewScales& scales);
   /// By how much P_D is to be multiplied from there: the mean of a beta prior that is worth `prior`
-  /// looks, after what earlier visits found from about there; 1 where there were none.
+  /// looks, after what earlier visits found from about there; 1 where there were none. Where the
+  /// object is in the image does not count.
   double factor(const Aspect& from, double prior, const ViewScales& scales) const;
   /// Takes in the looks at what turned out to be the same object.
   void join(const FoundRate& other, const ViewScales& scales);
-  std::size_t views() const { return before_.size() + now_.size(); }
+  std::size_t views() const { return (before_ ? before_->size() : 0) + now_.size(); }
 
  private:
   struct Count {
-    Aspect from;
-    float expected = 0.0F, found = 0.0F;
+    Eigen::Vector3f ray_W;
+    float log_distance = 0.0F, expected = 0.0F, found = 0.0F;
   };
   using Counts = std::vector<Count>;
   static void addTo(Counts& counts, const Count& count, const ViewScales& scales);
 
-  Counts before_, now_;
+  std::shared_ptr<const Counts> before_;
+  Counts now_;
 };
 
 }  // namespace perdure::semantic_filter
