@@ -62,7 +62,7 @@ void drawEllipse(cv::Mat& picture, const MapView& view, const ObjectGlance& obje
       Eigen::Matrix2d(object.p_covariance.topLeftCorner<2, 2>()));
   const Eigen::Vector2d axes = 2.0 * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   // What drove out of sight may be anywhere by now: a ring around half of the map tells nothing.
-  if (!axes.allFinite() || axes.maxCoeff() > 0.25 * (view.high - view.low).minCoeff()) return;
+  if (!axes.allFinite() || axes.maxCoeff() > 0.5 * (view.high - view.low).minCoeff()) return;
   Polyline line;
   constexpr int kSteps = 48;
   for (int i = 0; i <= kSteps; ++i) {
