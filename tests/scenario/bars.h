@@ -37,6 +37,13 @@ double number(std::size_t count);
 std::uint64_t mostClaimed(const std::vector<tools::EstimateRow>& rows, const Eigen::Vector3d& place,
                           double within, const std::string& class_name, std::uint64_t from = 0,
                           std::uint64_t until = ~0ULL);
+/// A thing that stands all the time, and the ids by which it was claimed in the halves of the run.
+struct IdsByHalf {
+  const sim::TruthObject* object = nullptr;
+  std::uint64_t first = 0, second = 0;
+};
+/// Of those that were claimed in both.
+std::vector<IdsByHalf> idsByHalf(const Outcome& run);
 /// The index of the frame nearest to that time.
 std::uint64_t frameAt(const Outcome& run, TimePoint time);
 

@@ -124,20 +124,12 @@ double movedEvents(const Outcome& run, const sim::TruthObject& object) {
   return number(run.countEvents("moved", ids));
 }
 
-/// Of the things that were claimed in both halves of the run: the share that kept their id.
+/// The share of them that kept their id.
 double keptIds(const Outcome& run) {
-  const std::uint64_t all = run.truth.frames.size();
-  double both = 0.0, kept = 0.0;
-  for (const auto& object : run.truth.truth.objects) {
-    if (object.moves || object.keys.size() != 1) continue;
-    const Eigen::Vector3d place = object.keys[0].centre_W;
-    const auto first = mostClaimed(run.inst_rows, place, 1.0, "", 0, all / 2);
-    const auto second = mostClaimed(run.inst_rows, place, 1.0, "", all / 2, all);
-    if (first == 0 || second == 0) continue;
-    both += 1.0;
-    kept += first == second ? 1.0 : 0.0;
-  }
-  return both > 0.0 ? kept / both : 0.0;
+  const auto claimed = idsByHalf(run);
+  const auto kept = std::count_if(claimed.begin(), claimed.end(),
+                                  [](const IdsByHalf& ids) { return ids.first == ids.second; });
+  return claimed.empty() ? 0.0 : static_cast<double>(kept) / number(claimed.size());
 }
 
 /// Interruptions of the claim of a thing in full sight.
@@ -160,6 +152,19 @@ double flicker(const Outcome& run) {
 }
 
 }  // namespace
+
+std::vector<IdsByHalf> idsByHalf(const Outcome& run) {
+  const std::uint64_t all = run.truth.frames.size();
+  std::vector<IdsByHalf> result;
+  for (const auto& object : run.truth.truth.objects) {
+    if (object.moves || object.keys.size() != 1) continue;
+    const Eigen::Vector3d place = object.keys[0].centre_W;
+    const auto first = mostClaimed(run.inst_rows, place, 1.0, "", 0, all / 2);
+    const auto second = mostClaimed(run.inst_rows, place, 1.0, "", all / 2, all);
+    if (first != 0 && second != 0) result.push_back({&object, first, second});
+  }
+  return result;
+}
 
 Bars rowBars(const Outcome& run) {
   double within = 0.0, doubled = 0.0;

@@ -76,17 +76,12 @@ void tell(const test::Outcome& run, ObjectId id, const Eigen::Vector3d& place) {
 
 /// Of each thing whose id of the first half is not that of the second: what became of both.
 void changedIds(const test::Outcome& run) {
-  const std::uint64_t all = run.truth.frames.size();
-  for (const auto& object : run.truth.truth.objects) {
-    if (object.moves || object.keys.size() != 1) continue;
-    const Eigen::Vector3d place = object.keys[0].centre_W;
-    const auto first = test::mostClaimed(run.inst_rows, place, 1.0, "", 0, all / 2);
-    const auto second = test::mostClaimed(run.inst_rows, place, 1.0, "", all / 2, all);
-    if (first == 0 || second == 0 || first == second) continue;
-    fmt::print("seed {} truth {} {}: id {} then {}\n", run.setting.seed, object.id,
-               object.class_name, first, second);
-    tell(run, first, place);
-    tell(run, second, place);
+  for (const auto& [object, first, second] : test::idsByHalf(run)) {
+    if (first == second) continue;
+    fmt::print("seed {} truth {} {}: id {} then {}\n", run.setting.seed, object->id,
+               object->class_name, first, second);
+    tell(run, first, object->keys[0].centre_W);
+    tell(run, second, object->keys[0].centre_W);
   }
 }
 

@@ -32,12 +32,6 @@ double logBirthRatio(const Evidence& evidence, const FrameContext& frame);
 std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHint>& range,
                            TimePoint now, const FrameContext& frame);
 
-/// What exists and has lost its place and shape, from a box that is its own: id, existence and
-/// known classes (`pmf`) stay, geometry and motion are those of a birth. False, and left as it is,
-/// where the box cannot fix one.
-bool bearAgain(Object& object, const std::vector<ClassNumber>& pmf, const Evidence& evidence,
-               const std::optional<RangeHint>& range, const FrameContext& frame);
-
 /// One hypothesis for a class and a yaw start. `cost` is half the squared whitened residual.
 struct Fit {
   Hypothesis hypothesis;

@@ -45,6 +45,9 @@ struct ViewPoint {
   double looks = 0.0;  ///< number of looks that share this view, discounted
 };
 
+/// Out of the picture, not behind something, for so long: what comes next is another visit.
+inline constexpr double kAnotherVisit_s = 1.0;
+
 struct Keyframe;
 
 struct Object {

@@ -222,8 +222,7 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
     object.existence.become(object.existence * std::exp(-dt / parameters.survival_s),
                             ExistenceEvidence::kTime, now);
   }
-  constexpr double kAway_s = 1.0;  // out of the picture, not behind something
-  if (dt > kAway_s && object.away.count > 0 && object.hidden.count == 0) {
+  if (dt > kAnotherVisit_s && object.away.count > 0 && object.hidden.count == 0) {
     object.came_back = now;
     object.found_rate.beginVisit(walk.screen);
   }

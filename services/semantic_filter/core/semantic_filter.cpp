@@ -9,6 +9,7 @@
 #include "services/semantic_filter/core/moved.h"
 #include "services/semantic_filter/core/new_classes.h"
 #include "services/semantic_filter/core/primed.h"
+#include "services/semantic_filter/core/rebirth.h"
 #include "services/semantic_filter/core/smooth.h"
 #include "services/semantic_filter/core/update.h"
 

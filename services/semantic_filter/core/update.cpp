@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kNegligible = 0.01;  // share of a box in an update
 constexpr double kMaxHead = 6.0;      // nats
-constexpr double kAway_s = 1.0;       // after which what comes from the map is another visit
 
 using SideRows = Eigen::Matrix<double, 4, kVelocity>;  // no side depends on the velocity
 using Gains = Eigen::Matrix<double, kStateDim, 4>;
@@ -190,7 +189,8 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
     return;
   }
   ++object.hits;
-  const bool from_map = object.recalled && toSeconds(object.as_of - object.last_seen) > kAway_s;
+  const bool from_map =
+      object.recalled && toSeconds(object.as_of - object.last_seen) > kAnotherVisit_s;
   object.found_again = object.found_again || from_map || object.came_back > object.first_seen;
   object.recalled = false;
   object.last_seen = object.as_of;

@@ -5,8 +5,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "services/semantic_filter/core/birth.h"
 #include "services/semantic_filter/core/merge.h"
+#include "services/semantic_filter/core/rebirth.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
