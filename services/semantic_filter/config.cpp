@@ -161,6 +161,18 @@ void describeMemory(MemoryParameters& p, Fields& fields) {
   fields.number("memory.after_s", p.after_s, positive(), {"and was not seen for this time", "s"});
 }
 
+void describeAlignment(AlignmentParameters& p, Fields& fields) {
+  fields.number("alignment.nats", p.nats, positive(),
+                {"log-likelihood ratio against chance from which the map of another frame of "
+                 "reference counts as found"});
+  fields.number("alignment.margin_nats", p.margin_nats, positive(),
+                {"and above the best other way to lay it"});
+  fields.integer("alignment.pairs", p.pairs, between(2, 100),
+                 {"things that are surely seen and on that map, at least"});
+  fields.number("alignment.known_share", p.known_share, between(0.01, 0.99),
+                {"of what is seen there is on that map"});
+}
+
 void describeTend(Parameters& p, Fields& fields) {
   auto& v = p.visibility;
   fields.integer("visibility.cell_px", v.cell_px, between(1, 256),
@@ -232,6 +244,7 @@ void describe(Config& c, Fields& fields) {
   describeTend(c.filter, fields);
   describeSmooth(c.filter.smooth, fields);
   describeMemory(c.filter.memory, fields);
+  describeAlignment(c.filter.alignment, fields);
 }
 
 }  // namespace perdure::semantic_filter

@@ -3,6 +3,8 @@
 
 #include <map>
 #include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "common/types/objects.h"
@@ -14,8 +16,8 @@ class EventTracker {
  public:
   /// Events since the last call, in order of object id. `merges` happened since then.
   std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
-  /// Objects that came back from the map with this id; the next update says so.
-  void recalled(ObjectId id, bool restored);
+  /// An object came back with this id, and how; the next update says so.
+  void recalled(ObjectId id, bool restored, std::string how = "");
   /// Objects that wait on the map from now on; the next update says so.
   void archived(ObjectId id) { archived_.insert(id); }
   void clear();
@@ -34,7 +36,7 @@ class EventTracker {
                const Event& blank);
 
   std::map<ObjectId, Known> known_;
-  std::map<ObjectId, bool> recalled_;
+  std::map<ObjectId, std::pair<bool, std::string>> recalled_;
   std::set<ObjectId> archived_;
 };
 

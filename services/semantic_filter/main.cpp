@@ -88,7 +88,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   askForRestore(context, queries, config, gate);
   context.onHealth([&] {
     context.health().state(gate.isOpen() ? HealthState::kOk : HealthState::kStarting,
-                           gate.isOpen() ? "" : "waits for the map store's working set");
+                           gate.isOpen() ? node.note() : "waits for the map store's working set");
   });
   context.run();
   node.flush();

@@ -20,7 +20,8 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       instance_(instance),
       outputs_(std::move(outputs)),
       filter_(config.filter, priors),
-      long_term_(config.filter.memory, config.filter.motion.min_speed) {}
+      long_term_(config.filter.memory, config.filter.motion.min_speed),
+      former_(config.filter) {}
 
 void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) {
@@ -72,7 +73,10 @@ FrameInput Node::makeInput(const Odometry& odometry) {
 }
 
 void Node::beginWorld(const WorldId& world) {
-  if (world_) reasons_.add("world_changed");
+  if (world_) {
+    reasons_.add("world_changed");
+    keepFormer();
+  }
   world_ = world;
   belief_ = {};
   history_.clear();
@@ -81,8 +85,7 @@ void Node::beginWorld(const WorldId& world) {
   events_.clear();
   returns_.clear();
   long_term_.clear();
-  if (waiting_recalled_ && waiting_recalled_->world == world) insertRecalled(*waiting_recalled_);
-  waiting_recalled_.reset();
+  if (const auto recalled = std::exchange(waiting_recalled_, std::nullopt)) onRecalled(*recalled);
 }
 
 void Node::onOdometry(const Odometry& odometry) {
@@ -242,6 +245,7 @@ void Node::stepAgainFrom(std::size_t index) {
 void Node::flush() {
   if (history_.empty() || history_.back().stepped) return;
   stepEntry(history_.back());
+  rejoin(history_.back());
   letGo(history_.back());
   publish(history_.back());
   askTheMap(history_.back());

@@ -19,6 +19,7 @@
 #include "services/semantic_filter/core/long_term.h"
 #include "services/semantic_filter/core/semantic_filter.h"
 #include "services/semantic_filter/events.h"
+#include "services/semantic_filter/former_map.h"
 #include "services/semantic_filter/model_book.h"
 #include "services/semantic_filter/probation.h"
 #include "services/semantic_filter/returns.h"
@@ -50,6 +51,8 @@ class Node {
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return belief_; }
+  /// For people: what the node is still at, beside its frames. Empty as a rule.
+  std::string note() const { return former_.note(); }
 
  private:
   struct Entry {
@@ -79,12 +82,18 @@ class Node {
   bool doubts(const Entry& entry, const Detections& detections);
   void settleDoubts(bool believed);
   // In node_memory.cpp.
+  std::vector<ObjectBelief> soundOf(std::vector<ObjectBelief> beliefs);
   void insertRecalled(const Recalled& recalled);
   void insert(const Object& object);
   void restore(const ObjectBelief& belief);
   void recall(const ObjectBelief& belief);
+  void recallLaid(const ObjectBelief& belief);
+  void onRecalledOfFormer(const Recalled& recalled);
   void letGo(const Entry& entry);
   void askTheMap(const Entry& entry);
+  void ask(const LongTerm::Question& question, const WorldId& world);
+  void keepFormer();
+  void rejoin(const Entry& entry);
 
   Config config_;
   InstanceId instance_;
@@ -106,6 +115,7 @@ class Node {
   EventTracker events_;
   ReturnWatch returns_;
   LongTerm long_term_;
+  FormerMap former_;
   ReasonCounts reasons_;
 };
 

@@ -1,4 +1,6 @@
 // What leaves the working set of the node for the map, and what comes back from there.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 
@@ -35,18 +37,58 @@ void Node::letGo(const Entry& entry) {
 
 void Node::askTheMap(const Entry& entry) {
   if (!outputs_.queries) return;
-  const auto question = long_term_.ask(entry.input.view.T_WB.p, entry.input.stamp.time);
-  if (const auto count = long_term_.takeUnanswered()) reasons_.add("map_store_silent", count);
-  if (!question) return;
+  const Eigen::Vector3d& p_WB = entry.input.view.T_WB.p;
+  const TimePoint now = entry.input.stamp.time;
+  if (const auto question = long_term_.ask(p_WB, now)) ask(*question, entry.world);
+  if (const auto question = former_.ask(p_WB, now)) ask(*question, *former_.world());
+  const auto silent = long_term_.takeUnanswered() + former_.takeUnanswered();
+  if (silent > 0) reasons_.add("map_store_silent", silent);
+}
+
+void Node::ask(const LongTerm::Question& question, const WorldId& world) {
   MapQuery query;
   query.client = instance_;
-  query.request = question->request;
+  query.request = question.request;
   query.kind = MapQueryKind::kRecall;
-  query.low = question->centre_W;
-  query.radius = question->radius_m;
-  query.world = entry.world;
+  query.low = question.centre_W;
+  query.radius = question.radius_m;
+  query.world = world;
   query.limit = kMostRecalled;
   outputs_.queries(query);
+}
+
+/// What was known when the frame of reference ended.
+void Node::keepFormer() {
+  std::vector<ObjectBelief> objects;
+  for (const Object& o : belief_.objects) {
+    objects.push_back(toBelief(o, config_.filter.motion.min_speed));
+  }
+  former_.keep(*world_, objects);
+}
+
+/// Where the map of before is found again, what it holds comes back, and what was taken for new
+/// meanwhile goes on under the old id.
+void Node::rejoin(const Entry& entry) {
+  const FrameInput& input = entry.input;
+  const FrameAlignment* found = former_.look(belief_.objects, input.view.T_WB.p, input.stamp.time);
+  if (!found) return;
+  for (const ObjectBelief& belief : former_.takeKept()) recallLaid(belief);
+  for (const auto& [remembered, seen] : found->pairs) {
+    if (const auto merge = filter_.join(belief_, remembered, seen, input)) {
+      late_merges_.push_back(*merge);
+    }
+    for (Entry& e : history_) (void)filter_.join(e.before, remembered, seen, e.input);
+  }
+}
+
+void Node::recallLaid(const ObjectBelief& belief) {
+  const auto same = [&](const Object& o) { return o.id == belief.id; };
+  if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) return;
+  if (last_T_WB_ && !long_term_.near(belief.best().mean.head<3>(), last_T_WB_->p)) return;
+  insert(fromBelief(belief, pose_error_.product, ExistenceEvidence::kRecall));
+  events_.recalled(belief.id, false,
+                   fmt::format("of frame of reference {:x}/{}, found again", former_.world()->world,
+                               former_.world()->epoch));
 }
 
 /// Into the newest belief and those that late detections may go back to, in order of id.
@@ -78,17 +120,22 @@ void Node::recall(const ObjectBelief& belief) {
   events_.recalled(belief.id, false);
 }
 
-void Node::insertRecalled(const Recalled& recalled) {
-  ids_.atLeast(recalled.next_id);
-  for (auto belief : recalled.objects) {
-    if (belief.classes.empty() || belief.id == 0) {
-      reasons_.add("recalled_malformed");
-      continue;
-    }
+/// What can be used of it, without its context; no id of it is given out again.
+std::vector<ObjectBelief> Node::soundOf(std::vector<ObjectBelief> beliefs) {
+  const auto malformed =
+      std::erase_if(beliefs, [](const ObjectBelief& b) { return b.classes.empty() || b.id == 0; });
+  if (malformed > 0) reasons_.add("recalled_malformed", malformed);
+  for (ObjectBelief& belief : beliefs) {
     ids_.atLeast(belief.id + 1);
+    removeContext(belief);
+  }
+  return beliefs;
+}
+
+void Node::insertRecalled(const Recalled& recalled) {
+  for (const ObjectBelief& belief : soundOf(recalled.objects)) {
     const auto same = [&](const Object& o) { return o.id == belief.id; };
     if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) continue;
-    removeContext(belief);
     recalled.restore ? restore(belief) : recall(belief);
   }
 }
@@ -101,12 +148,30 @@ void Node::onRecalled(const Recalled& recalled) {
     waiting_recalled_ = recalled;
     return;
   }
-  if (recalled.world != *world_) return reasons_.add("recalled_of_other_world");
+  if (recalled.world != *world_) return onRecalledOfFormer(recalled);
   const bool asked = recalled.restore || for_all;
   if (!asked && !long_term_.answered(recalled.request, recalled.kept, recalled.truncated)) {
     return reasons_.add("recalled_unasked");
   }
   insertRecalled(recalled);
+}
+
+void Node::onRecalledOfFormer(const Recalled& recalled) {
+  if (recalled.restore) return former_.keep(recalled.world, soundOf(recalled.objects));
+  if (!former_.found() || recalled.world != *former_.world()) {
+    return reasons_.add("recalled_of_other_world");
+  }
+  if (!former_.answered(recalled.request, recalled.kept, recalled.truncated)) {
+    return reasons_.add("recalled_unasked");
+  }
+  former_.refine(belief_.objects);
+  for (const ObjectBelief& belief : soundOf(recalled.objects)) {
+    if (belief.moving > 0.5) {
+      reasons_.add("recalled_moving");
+    } else {
+      recallLaid(former_.laid(belief));
+    }
+  }
 }
 
 }  // namespace perdure::semantic_filter

@@ -8,9 +8,11 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
+#include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <regex>
 
+#include "common/math/so3.h"
 #include "tools/demo/embedded_drive.h"
 #include "tools/demo/reporter.h"
 #include "tools/outputs/chart.h"
@@ -87,6 +89,7 @@ void SoakRun::listen() {
   loop_.on(odometry_reader_, [this](const Odometry& o) {
     if (begun_ns_ == 0) begun_ns_ = tools::monotonicNs();
     odometry_.insert(o.stamp.sequence);
+    if (o.stamp.sequence % frames_a_lap_ == 0) T_WB_[o.stamp.sequence / frames_a_lap_] = o.T_WB;
   });
   loop_.on(detections_reader_, [this](const Detections& d) {
     detections_.insert(d.stamp.sequence);
@@ -127,12 +130,13 @@ void SoakRun::note() {
     memory += fmt::format("  {} {:.1f}", service, mb);
   }
   const Frames counts = frames();
+  const Walk last = T_WB_.empty() ? Walk{} : walk().back();
   std::cout << fmt::format(
                    "{:>3} min  lap {}  frames {} (without odometry {}, detections {}, objects {})  "
-                   "held {}  confirmed {}  on the map {}  MB:{}",
+                   "held {}  confirmed {}  on the map {}  walked {:.2f} m {:.2f} deg  MB:{}",
                    points_.size() / 60, confirmed_.size(), counts.given, counts.without_odometry,
                    counts.without_detections, counts.without_objects, now_.held, now_.confirmed,
-                   now_.on_map, memory)
+                   now_.on_map, last.m, last.deg, memory)
             << std::endl;
 }
 
@@ -230,6 +234,17 @@ double SoakRun::growth_mb(const std::string& service, double from_s, double to_s
   return around(to_s) - around(from_s);
 }
 
+std::vector<SoakRun::Walk> SoakRun::walk() const {
+  std::vector<Walk> walk;
+  for (const auto& [lap, T_WB] : T_WB_) {
+    const RigidTransform& first = T_WB_.begin()->second;
+    const Eigen::Vector3d step = T_WB.p - first.p;
+    const double yaw = yawOf(Eigen::Matrix3d(T_WB.R() * first.R().transpose()));
+    walk.push_back({lap, step.norm(), step.z(), yaw * 180.0 / std::numbers::pi});
+  }
+  return walk;
+}
+
 std::size_t SoakRun::mostHeld(double until_s) const {
   std::size_t most = 0;
   for (const SoakPoint& point : points_) {
@@ -248,6 +263,10 @@ nlohmann::ordered_json SoakRun::report() const {
                                  {"without_objects", counts.without_objects},
                                  {"most_held", mostHeld(seconds())}};
   json.update(latency_.report());
+  json["walk"] = nlohmann::ordered_json::array();
+  for (const Walk& w : walk()) {
+    json["walk"].push_back({{"lap", w.lap}, {"m", w.m}, {"up_m", w.up_m}, {"deg", w.deg}});
+  }
   for (const auto& [name, h] : health_) {
     json["services"][name] = {{"frames_in", h.frames_in},
                               {"frames_out", h.frames_out},

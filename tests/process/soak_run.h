@@ -56,6 +56,13 @@ class SoakRun {
   /// Growth of a service's memory between two spans, MB: medians of a minute's points that end at
   /// each time, s.
   double growth_mb(const std::string& service, double from_s, double to_s) const;
+  /// How far the body is from where it was at the same place of the lap before all others that has
+  /// odometry there: metres and degrees about gravity, by lap. The body really is where it was.
+  struct Walk {
+    std::size_t lap = 0;
+    double m = 0.0, up_m = 0.0, deg = 0.0;
+  };
+  std::vector<Walk> walk() const;
   /// The most things that the filter held in any frame up to then.
   std::size_t mostHeld(double until_s) const;
   nlohmann::ordered_json report() const;
@@ -86,7 +93,8 @@ class SoakRun {
   std::map<std::string, std::unique_ptr<Child>> children_;
   std::map<std::string, Health> health_;
   std::set<std::uint64_t> odometry_, detections_, objects_;
-  std::vector<std::set<ObjectId>> confirmed_;  ///< by lap
+  std::vector<std::set<ObjectId>> confirmed_;   ///< by lap
+  std::map<std::size_t, RigidTransform> T_WB_;  ///< at the start of a lap
   tools::LatencyMeter latency_;
   SoakPoint now_;
   std::vector<SoakPoint> points_;

@@ -16,12 +16,6 @@ constexpr double kSameInImage = 0.6;  // intersection over union of two images o
 
 bool isOther(const Object& o) { return o.best().class_name == kOtherClass; }
 
-/// "other" is no class of its own: it may turn out to be the known thing in the same place.
-bool sameKind(const Object& a, const Object& b) {
-  if (a.best().moving != b.best().moving) return false;
-  return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
-}
-
 /// Weights of a's hypotheses once b's PMF is taken in as well.
 void multiplyPmf(Object& a, const Object& b) {
   for (auto& h : a.hypotheses) {
@@ -165,6 +159,12 @@ bool oneHasBeenSeen(const Object& a, const Object& b) {
 }
 
 }  // namespace
+
+/// "other" is no class of its own: it may turn out to be the known thing in the same place.
+bool sameKind(const Object& a, const Object& b) {
+  if (a.best().moving != b.best().moving) return false;
+  return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
+}
 
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
   return sharedVolume(a, b, up_W).of_joint;

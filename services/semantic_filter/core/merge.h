@@ -21,6 +21,9 @@ double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 /// them.
 std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame);
 
+/// Neither class nor motion forbids that they are one.
+bool sameKind(const Object& a, const Object& b);
+
 /// Takes b, which is the same object, into a.
 void mergeTwo(Object& a, Object& b, const FrameContext& frame);
 

@@ -134,6 +134,14 @@ struct MemoryParameters {
   double after_s = 5.0;    ///< and was not seen for so long
 };
 
+/// Of where the map of another frame of reference lies (core/map_alignment.h).
+struct AlignmentParameters {
+  double nats = 25.0;         ///< against chance, at least
+  double margin_nats = 10.0;  ///< above the best other way
+  std::int64_t pairs = 4;              ///< things that are surely in both, at least
+  double known_share = 0.7;   ///< of what is seen is on the map
+};
+
 struct Parameters {
   BoxParameters box;
   ClutterParameters clutter;
@@ -145,6 +153,7 @@ struct Parameters {
   TendParameters tend;
   SmoothParameters smooth;
   MemoryParameters memory;
+  AlignmentParameters alignment;
 };
 
 }  // namespace perdure::semantic_filter

@@ -301,6 +301,22 @@ void SemanticFilter::tend(Object& object, const Seen& seen, const FrameInput& in
   }
 }
 
+std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, ObjectId absorbed,
+                                                const FrameInput& input) const {
+  const auto find = [&](ObjectId wanted) {
+    return std::find_if(belief.objects.begin(), belief.objects.end(),
+                        [&](const Object& o) { return o.id == wanted; });
+  };
+  const auto kept = find(id), other = find(absorbed);
+  if (kept == belief.objects.end() || other == belief.objects.end() || kept == other) {
+    return std::nullopt;
+  }
+  if (!sameKind(*kept, *other)) return std::nullopt;
+  mergeTwo(*kept, *other, contextOf(input));
+  belief.objects.erase(other);
+  return MergeRecord{id, absorbed};
+}
+
 StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook& ids) const {
   const FrameContext frame = contextOf(input);
   auto sights = seeAll(belief, input);

@@ -59,6 +59,10 @@ class SemanticFilter {
 
   /// Belief after the frame.
   StepReport step(Belief& belief, const FrameInput& input, IdBook& ids) const;
+  /// Of two objects that are known to be one, `id` goes on with what both knew, as of that frame.
+  /// Nothing happens where one of them is not there, or their classes exclude each other.
+  std::optional<MergeRecord> join(Belief& belief, ObjectId id, ObjectId absorbed,
+                                  const FrameInput& input) const;
 
   const Parameters& parameters() const { return parameters_; }
   const ClassPriors& priors() const { return priors_; }
