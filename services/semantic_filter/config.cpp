@@ -173,6 +173,16 @@ void describeAlignment(AlignmentParameters& p, Fields& fields) {
                 {"of what is seen there is on that map"});
 }
 
+void describeDrift(DriftParameters& p, Fields& fields) {
+  fields.number("drift.position", p.position, positive(),
+                {"odometry's error that the map shows is taken out from here on", "m"});
+  fields.number("drift.rotation", p.rotation, positive(), {"or from here on", "rad"});
+  fields.integer("drift.things", p.things, between(1, 1000000),
+                 {"of earlier visits that were looked at since the last time, at least"});
+  fields.number("drift.within_m", p.within_m, positive(),
+                {"a thing is looked at once it is so near", "m"});
+}
+
 void describeTend(Parameters& p, Fields& fields) {
   auto& v = p.visibility;
   fields.integer("visibility.cell_px", v.cell_px, between(1, 256),
@@ -245,6 +255,7 @@ void describe(Config& c, Fields& fields) {
   describeSmooth(c.filter.smooth, fields);
   describeMemory(c.filter.memory, fields);
   describeAlignment(c.filter.alignment, fields);
+  describeDrift(c.filter.drift, fields);
 }
 
 }  // namespace perdure::semantic_filter

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/check.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/context.h"
 #include "services/semantic_filter/core/expect.h"
@@ -20,6 +21,7 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       instance_(instance),
       outputs_(std::move(outputs)),
       filter_(config.filter, priors),
+      drift_(config.filter.drift),
       long_term_(config.filter.memory, config.filter.motion.min_speed),
       former_(config.filter) {}
 
@@ -58,6 +60,7 @@ void Node::advancePoseError(const Odometry& odometry) {
     pose_error_.covariance = (A * pose_error_.covariance * A.transpose()).eval();
     pose_error_.covariance.diagonal() += metres * q;
     pose_error_.product = (A * pose_error_.product).eval();
+    drift_.predict(inM(*last_T_WB_), inM(odometry.T_WB), rotation, position);
   }
   last_T_WB_ = odometry.T_WB;
 }
@@ -66,7 +69,7 @@ FrameInput Node::makeInput(const Odometry& odometry) {
   FrameInput input;
   input.stamp = odometry.stamp;
   input.view.camera = camera_.get();
-  input.view.T_WB = odometry.T_WB;
+  input.view.T_WB = inM(odometry.T_WB);
   input.view.up_W = odometry.up_W;
   input.pose_error = pose_error_;
   return input;
@@ -82,10 +85,14 @@ void Node::beginWorld(const WorldId& world) {
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
+  T_MW_.reset();
+  drift_ = DriftWatch(config_.filter.drift);
   events_.clear();
   returns_.clear();
   long_term_.clear();
-  if (const auto recalled = std::exchange(waiting_recalled_, std::nullopt)) onRecalled(*recalled);
+  if (const auto recalled = std::exchange(waiting_recalled_, std::nullopt)) {
+    recalled->world == world ? insertRecalled(*recalled) : onRecalledOfFormer(*recalled);
+  }
 }
 
 void Node::onOdometry(const Odometry& odometry) {
@@ -121,7 +128,7 @@ void Node::onLandmarks(const Landmarks& landmarks) {
   for (auto& entry : history_) {
     if (!entry.input.stamp.sameFrame(landmarks.stamp)) continue;
     if (entry.stepped) reasons_.add("landmarks_after_step");
-    const Eigen::Vector3d centre = entry.input.view.T_WC().p;
+    const Eigen::Vector3d centre = inW(entry.input.view.T_WB) * entry.input.view.camera->T_BC().p;
     entry.input.points.clear();
     for (const auto& landmark : landmarks.landmarks) {
       if (!landmark.p_W.allFinite() || !landmark.covariance.allFinite()) continue;
@@ -230,6 +237,9 @@ void Node::stepEntry(Entry& entry) {
   StepReport report = filter_.step(belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
+  if (entry.input.boxes && !std::exchange(entry.told_pose, true)) {
+    drift_.hear(report.pose, entry.input.view.T_WB);
+  }
   entry.stepped = true;
 }
 
@@ -247,8 +257,28 @@ void Node::flush() {
   stepEntry(history_.back());
   rejoin(history_.back());
   letGo(history_.back());
+  correctDrift();
   publish(history_.back());
   askTheMap(history_.back());
+}
+
+/// Takes the pose's error out of all that refers to it, frames that may be stepped again included.
+void Node::correctDrift() {
+  const auto correction = drift_.correct(history_.back().input.view.T_WB, pose_error_);
+  if (!correction) return;
+  const Matrix6d F = regressOn(correction->before, correction->after);
+  for (Entry& e : history_) {
+    for (Object& o : e.before.objects) follow(o, *correction, e.input.pose_error);
+    e.input.view.T_WB = correction->step * e.input.view.T_WB;
+    e.input.pose_error.product = (F * e.input.pose_error.product).eval();
+    e.input.pose_error.covariance = correction->after;
+  }
+  for (Object& o : belief_.objects) follow(o, *correction, pose_error_);
+  for (Object& o : belief_.gone) follow(o, *correction, pose_error_);
+  pose_error_.product = (F * pose_error_.product).eval();
+  pose_error_.covariance = correction->after;
+  T_MW_ = inM(RigidTransform());
+  T_MW_ = correction->step * *T_MW_;
 }
 
 void Node::publish(const Entry& entry) {
@@ -256,7 +286,7 @@ void Node::publish(const Entry& entry) {
   objects.stamp = entry.input.stamp;
   objects.instance = instance_;
   objects.world = entry.world;
-  objects.T_WB = entry.input.view.T_WB;
+  objects.T_WB = inW(entry.input.view.T_WB);
   objects.up_W = entry.input.view.up_W;
   objects.next_id = ids_.next();
   const MotionParameters& motion = config_.filter.motion;
@@ -267,6 +297,7 @@ void Node::publish(const Entry& entry) {
       belief.classes = toBelief(now, motion.min_speed).classes;
     }
     addContext(belief, object);
+    if (T_MW_) belief = inW(std::move(belief));
   }
   late_merges_.insert(late_merges_.end(), entry.merges.begin(), entry.merges.end());
   auto events = events_.update(objects, late_merges_);

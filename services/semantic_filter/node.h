@@ -60,7 +60,7 @@ class Node {
     WorldId world;
     std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
     Belief before;
-    bool stepped = false;
+    bool stepped = false, told_pose = false;
     std::vector<MergeRecord> merges = {};
   };
 
@@ -73,6 +73,12 @@ class Node {
   void keepEarly(const Detections& detections);
   void forgetEarlyBefore(TimePoint time);
   void stepEntry(Entry& entry);
+  void correctDrift();
+  /// From W, the odometry's own, into M and back.
+  RigidTransform inM(const RigidTransform& T_WB) const { return T_MW_ ? *T_MW_ * T_WB : T_WB; }
+  ObjectBelief inM(ObjectBelief belief) const;
+  RigidTransform inW(const RigidTransform& T_MB) const;
+  ObjectBelief inW(ObjectBelief belief) const;
   void stepAgainFrom(std::size_t index);
   void publish(const Entry& entry);
   std::optional<ComingFrame> comingFrame(const Entry& entry) const;
@@ -87,11 +93,13 @@ class Node {
   void insert(const Object& object);
   void restore(const ObjectBelief& belief);
   void recall(const ObjectBelief& belief);
+  bool isNear(const ObjectBelief& belief) const;
   void recallLaid(const ObjectBelief& belief);
   void onRecalledOfFormer(const Recalled& recalled);
   void letGo(const Entry& entry);
   void askTheMap(const Entry& entry);
-  void ask(const LongTerm::Question& question, const WorldId& world);
+  /// `centre` is the question's, in that frame of reference.
+  void ask(const LongTerm::Question& question, const Eigen::Vector3d& centre, const WorldId& world);
   void keepFormer();
   void rejoin(const Entry& entry);
 
@@ -106,6 +114,9 @@ class Node {
   std::optional<WorldId> world_;
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;
+  /// Beliefs and views are in M: W less the drift that the map has shown. None: no such drift.
+  std::optional<RigidTransform> T_MW_;
+  DriftWatch drift_;
   Belief belief_;
   IdBook ids_;
   std::deque<Entry> history_;

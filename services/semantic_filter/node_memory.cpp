@@ -27,7 +27,7 @@ void Node::letGo(const Entry& entry) {
   std::set<ObjectId> ids(leaving.archived.begin(), leaving.archived.end());
   for (const Object& o : belief_.objects) {
     if (!ids.contains(o.id)) continue;
-    long_term_.rememberProduct(o);
+    long_term_.rememberReference(o, T_MW_);
     events_.archived(o.id);
   }
   ids.insert(leaving.forgotten.begin(), leaving.forgotten.end());
@@ -39,18 +39,24 @@ void Node::askTheMap(const Entry& entry) {
   if (!outputs_.queries) return;
   const Eigen::Vector3d& p_WB = entry.input.view.T_WB.p;
   const TimePoint now = entry.input.stamp.time;
-  if (const auto question = long_term_.ask(p_WB, now)) ask(*question, entry.world);
-  if (const auto question = former_.ask(p_WB, now)) ask(*question, *former_.world());
+  if (const auto question = long_term_.ask(p_WB, now)) {
+    ask(*question, inW(RigidTransform(Eigen::Quaterniond::Identity(), question->centre_W)).p,
+        entry.world);
+  }
+  if (const auto question = former_.ask(p_WB, now)) {
+    ask(*question, question->centre_W, *former_.world());
+  }
   const auto silent = long_term_.takeUnanswered() + former_.takeUnanswered();
   if (silent > 0) reasons_.add("map_store_silent", silent);
 }
 
-void Node::ask(const LongTerm::Question& question, const WorldId& world) {
+void Node::ask(const LongTerm::Question& question, const Eigen::Vector3d& centre,
+               const WorldId& world) {
   MapQuery query;
   query.client = instance_;
   query.request = question.request;
   query.kind = MapQueryKind::kRecall;
-  query.low = question.centre_W;
+  query.low = centre;
   query.radius = question.radius_m;
   query.world = world;
   query.limit = kMostRecalled;
@@ -61,7 +67,7 @@ void Node::ask(const LongTerm::Question& question, const WorldId& world) {
 void Node::keepFormer() {
   std::vector<ObjectBelief> objects;
   for (const Object& o : belief_.objects) {
-    objects.push_back(toBelief(o, config_.filter.motion.min_speed));
+    objects.push_back(inW(toBelief(o, config_.filter.motion.min_speed)));
   }
   former_.keep(*world_, objects);
 }
@@ -84,7 +90,7 @@ void Node::rejoin(const Entry& entry) {
 void Node::recallLaid(const ObjectBelief& belief) {
   const auto same = [&](const Object& o) { return o.id == belief.id; };
   if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) return;
-  if (last_T_WB_ && !long_term_.near(belief.best().mean.head<3>(), last_T_WB_->p)) return;
+  if (!isNear(belief)) return;
   insert(fromBelief(belief, pose_error_.product, ExistenceEvidence::kRecall));
   events_.recalled(belief.id, false,
                    fmt::format("of frame of reference {:x}/{}, found again", former_.world()->world,
@@ -102,22 +108,45 @@ void Node::insert(const Object& object) {
   for (auto& entry : history_) into(entry.before);
 }
 
+RigidTransform Node::inW(const RigidTransform& T_MB) const {
+  return T_MW_ ? T_MW_->inverse() * T_MB : T_MB;
+}
+
+ObjectBelief Node::inW(ObjectBelief belief) const {
+  return T_MW_ ? turned(T_MW_->inverse(), std::move(belief)) : belief;
+}
+
+ObjectBelief Node::inM(ObjectBelief belief) const {
+  return T_MW_ ? turned(*T_MW_, std::move(belief)) : belief;
+}
+
 void Node::restore(const ObjectBelief& belief) {
-  insert(fromBelief(belief, pose_error_.product, ExistenceEvidence::kRestore));
+  insert(fromBelief(inM(belief), pose_error_.product, ExistenceEvidence::kRestore));
   events_.recalled(belief.id, true);
 }
 
 void Node::recall(const ObjectBelief& belief) {
   if (belief.moving > 0.5) return reasons_.add("recalled_moving");
-  if (last_T_WB_ && !long_term_.near(belief.best().mean.head<3>(), last_T_WB_->p)) return;
-  const auto product = long_term_.productAt(belief.as_of);
-  Object object =
-      fromBelief(belief, product.value_or(pose_error_.product), ExistenceEvidence::kRecall);
-  if (!product) {  // of another run: how its error hangs together with this one's is not known
+  const auto reference = long_term_.referenceAt(belief.as_of);
+  ObjectBelief there = belief;
+  if (!reference) {
+    there = inM(std::move(there));
+  } else if (reference->T_MW) {  // W has drifted since then, M has not
+    there = turned(*reference->T_MW, std::move(there));
+  }
+  if (!isNear(there)) return;
+  Object object = fromBelief(there, reference ? reference->product : pose_error_.product,
+                             ExistenceEvidence::kRecall);
+  if (!reference) {  // of another run: how its error hangs together with this one's is not known
     for (auto& h : object.hypotheses) h.C.setZero();
   }
   insert(object);
   events_.recalled(belief.id, false);
+}
+
+/// `belief` is in M.
+bool Node::isNear(const ObjectBelief& belief) const {
+  return !last_T_WB_ || long_term_.near(belief.best().mean.head<3>(), inM(*last_T_WB_).p);
 }
 
 /// What can be used of it, without its context; no id of it is given out again.

@@ -7,10 +7,10 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kPatience_s = 1.0;           // for an answer
-constexpr double kAgain_s = 0.5;              // between questions whether what waits is on the disk
-constexpr double kStepShare = 1.0 / 3.0;      // of the margin: way between questions
-constexpr std::size_t kMostProducts = 20000;  // about 7 MB
+constexpr double kPatience_s = 1.0;       // for an answer
+constexpr double kAgain_s = 0.5;          // between questions whether what waits is on the disk
+constexpr double kStepShare = 1.0 / 3.0;  // of the margin: way between questions
+constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
 /// It is on the map, or will be with the next commit. One whose place beside the body is no longer
 /// known is no claim now, and yet what the map has of it is worth keeping.
@@ -99,14 +99,14 @@ bool LongTerm::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) co
   return (p_WO - p_WB).norm() <= parameters_.recall_m + parameters_.margin_m;
 }
 
-void LongTerm::rememberProduct(const Object& object) {
-  products_[object.as_of] = object.pose_product;
-  if (products_.size() > kMostProducts) products_.erase(products_.begin());
+void LongTerm::rememberReference(const Object& object, const std::optional<RigidTransform>& T_MW) {
+  references_[object.as_of] = {object.pose_product, T_MW};
+  if (references_.size() > kMostReferences) references_.erase(references_.begin());
 }
 
-std::optional<Matrix6d> LongTerm::productAt(TimePoint as_of) const {
-  const auto found = products_.find(as_of);
-  if (found == products_.end()) return std::nullopt;
+std::optional<LongTerm::Reference> LongTerm::referenceAt(TimePoint as_of) const {
+  const auto found = references_.find(as_of);
+  if (found == references_.end()) return std::nullopt;
   return found->second;
 }
 
@@ -115,7 +115,7 @@ void LongTerm::clear() {
   open_.reset();
   asked_at_.reset();
   known_around_.reset();
-  products_.clear();
+  references_.clear();
   kept_ = {};
 }
 

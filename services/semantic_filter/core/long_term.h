@@ -48,9 +48,14 @@ class LongTerm {
 
   /// Cross-covariances with the pose error refer to the product of its transitions at the time that
   /// the belief is of. The map does not hold that product.
-  void rememberProduct(const Object& object);
+  /// Nor how W lay to M, in which nothing drifts, when the object went.
+  struct Reference {
+    Matrix6d product;
+    std::optional<RigidTransform> T_MW;
+  };
+  void rememberReference(const Object& object, const std::optional<RigidTransform>& T_MW);
   /// Nothing where the belief is of another run, or too much was archived since.
-  std::optional<Matrix6d> productAt(TimePoint as_of) const;
+  std::optional<Reference> referenceAt(TimePoint as_of) const;
 
   /// Another frame of reference begins.
   void clear();
@@ -69,7 +74,7 @@ class LongTerm {
   std::optional<TimePoint> asked_at_;
   std::optional<Eigen::Vector3d> known_around_;  ///< centre of the newest question answered in full
   std::uint64_t requests_ = 0, unanswered_ = 0;
-  std::map<TimePoint, Matrix6d> products_;
+  std::map<TimePoint, Reference> references_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -61,7 +61,7 @@ double logSameYaw(double difference, double variance) {
   return std::log(std::max(density * std::sqrt(kPi / (2.0 * variance)), 1e-6));
 }
 
-Eigen::Matrix4d turned(const Eigen::Matrix4d& covariance, const Eigen::Matrix3d& R) {
+Eigen::Matrix4d rotated(const Eigen::Matrix4d& covariance, const Eigen::Matrix3d& R) {
   Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
   G.topLeftCorner<3, 3>() = R;
   return G * covariance * G.transpose();
@@ -87,7 +87,7 @@ struct Equations {
     const Eigen::Vector3d arm = R * (thing.p - middle_M);
     Eigen::Vector4d residual;
     residual << seen.p - (x.head<3>() + arm), wrapHalfTurn(seen.yaw - thing.yaw - x[3]);
-    Eigen::Matrix4d S = seen.covariance + turned(thing.covariance, R);
+    Eigen::Matrix4d S = seen.covariance + rotated(thing.covariance, R);
     S.diagonal().head<3>().array() += blur * blur;
     const Eigen::Matrix4d W = inverseSymmetric(S);
     const Eigen::Matrix4d J = jacobianAt(arm);
@@ -435,21 +435,33 @@ FrameAlignment refined(const FrameAlignment& start,
   return result;
 }
 
-ObjectBelief laidInto(const FrameAlignment& alignment, ObjectBelief belief) {
-  const Eigen::Matrix3d R = rotationAboutZ(alignment.yaw);
+ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief) {
+  const Eigen::Matrix3d R = T_AB.R();
+  const double yaw = yawOf(R);
   Matrix7d G = Matrix7d::Identity();
   G.topLeftCorner<3, 3>() = R;
   for (ClassBelief& c : belief.classes) {
-    const Eigen::Vector3d p_M = c.mean.head<3>();
-    c.mean.head<3>() = alignment * p_M;
-    c.mean[kYaw] = wrapAngle(c.mean[kYaw] + alignment.yaw);
-    const Eigen::Matrix4d J = jacobianAt(R * (p_M - alignment.about_M));
+    c.mean.head<3>() = (T_AB * Eigen::Vector3d(c.mean.head<3>())).eval();
+    c.mean[kYaw] = wrapAngle(c.mean[kYaw] + yaw);
     c.covariance = (G * c.covariance * G.transpose()).eval();
+    makeSymmetric(c.covariance);
+    c.cross_pose = (G * c.cross_pose).eval();
+    c.cross_pose.rightCols<3>() = (c.cross_pose.rightCols<3>() * R.transpose()).eval();
+  }
+  belief.velocity = R * belief.velocity;
+  return belief;
+}
+
+ObjectBelief laidInto(const FrameAlignment& alignment, ObjectBelief belief) {
+  const Eigen::Matrix3d R = rotationAboutZ(alignment.yaw);
+  belief = turned(RigidTransform(R, alignment.p), std::move(belief));
+  const Eigen::Vector3d middle = alignment * alignment.about_M;
+  for (ClassBelief& c : belief.classes) {
+    const Eigen::Matrix4d J = jacobianAt(c.mean.head<3>() - middle);
     c.covariance.topLeftCorner<4, 4>() += J * alignment.covariance * J.transpose();
     makeSymmetric(c.covariance);
     c.cross_pose.setZero();
   }
-  belief.velocity = R * belief.velocity;
   return belief;
 }
 

@@ -72,6 +72,9 @@ class MapAlignment {
 FrameAlignment refined(const FrameAlignment& start,
                        const std::vector<std::pair<Standing, Standing>>& pairs);
 
+/// A belief of frame B in frame A, both level.
+ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief);
+
 /// The belief in W. The alignment's error is in its covariance; how it hangs together with the
 /// error of the body's pose is not known.
 ObjectBelief laidInto(const FrameAlignment& alignment, ObjectBelief belief);

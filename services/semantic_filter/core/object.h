@@ -59,6 +59,7 @@ struct Object {
   TimePoint first_seen, last_seen, as_of;
   Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
   TimePoint came_back;                           ///< when it last came back into the picture
+  TimePoint told_pose;                           ///< when it last told of the pose's error
   bool found_again = false;                      ///< detected on another visit than the first
   std::uint32_t hits = 0, visible_misses = 0;
   double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed

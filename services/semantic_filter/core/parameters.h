@@ -142,6 +142,14 @@ struct AlignmentParameters {
   double known_share = 0.7;   ///< of what is seen is on the map
 };
 
+/// Of an error of the pose that the map shows, and that is taken out (core/drift_watch.h).
+struct DriftParameters {
+  double position = 0.1;    ///< m, least that is worth it
+  double rotation = 0.004;  ///< rad
+  std::int64_t things = 5;  ///< of earlier visits that were looked at, at least
+  double within_m = 25.0;   ///< a thing is looked at once it is so near
+};
+
 struct Parameters {
   BoxParameters box;
   ClutterParameters clutter;
@@ -154,6 +162,7 @@ struct Parameters {
   SmoothParameters smooth;
   MemoryParameters memory;
   AlignmentParameters alignment;
+  DriftParameters drift;
 };
 
 }  // namespace perdure::semantic_filter

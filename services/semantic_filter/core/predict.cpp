@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/math/gaussian.h"
+#include "common/math/so3.h"
 #include "common/math/small_cholesky.h"
 #include "services/semantic_filter/core/keyframe.h"
 

@@ -153,9 +153,17 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
   return seen;
 }
 
+bool SemanticFilter::tellsPose(const Object& object, const FrameContext& frame) const {
+  if (object.came_back <= std::max(object.told_pose, object.first_seen)) return false;
+  const Hypothesis& best = object.best();
+  return object.confirmed && !best.moving && best.weight > 0.5 &&
+         (best.x.head<3>() - frame.view.T_WB.p).norm() < parameters_.drift.within_m;
+}
+
 Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
                                                    const FrameInput& input,
-                                                   const FrameContext& frame) const {
+                                                   const FrameContext& frame,
+                                                   std::vector<PoseEvidence>& pose) const {
   const auto& boxes = *input.boxes;
   const auto n = static_cast<Eigen::Index>(seen.size());
   const auto m = static_cast<Eigen::Index>(boxes.size());
@@ -176,7 +184,14 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
   for (Eigen::Index j = 0; j < n; ++j) {
     Seen& s = seen[static_cast<std::size_t>(j)];
     Object& object = belief.objects[s.object];
+    const auto before = tellsPose(object, frame) ? std::optional(object.best()) : std::nullopt;
     s.own = update(object, s.look, association.eta.row(j), boxes, frame);
+    if (before && s.own && s.look.hypotheses[0].box) {
+      object.told_pose = object.as_of;
+      const auto told = poseEvidence(*before, *s.look.hypotheses[0].box, boxes[*s.own].z,
+                                     hiddenSides(s.look, *s.own), frame.pose_error.covariance);
+      if (told) pose.push_back(*told);
+    }
     if (s.own && sound(object) &&
         rememberLook(object, boxes[*s.own], hiddenSides(s.look, *s.own), frame)) {
       to_smooth.push_back(&object);
@@ -323,13 +338,13 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   if (!input.boxes) return {};
   reveal(belief, sights, input);
   auto seen = score(belief, sights, input, frame);
-  const auto claimed = associateAndUpdate(belief, seen, input, frame);
+  StepReport report;
+  const auto claimed = associateAndUpdate(belief, seen, input, frame, report.pose);
   for (const auto& s : seen) {
     Object& object = belief.objects[s.object];
     if (sound(object)) tend(object, s, input, frame);
   }
   births(belief, sights, claimed, input, frame, ids);
-  StepReport report;
   std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
   report.merges = mergeObjects(belief.objects, frame);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/birth.h"
+#include "services/semantic_filter/core/drift_watch.h"
 #include "services/semantic_filter/core/merge.h"
 #include "services/semantic_filter/core/tend.h"
 
@@ -46,6 +47,7 @@ class IdBook {
 };
 
 struct StepReport {
+  std::vector<PoseEvidence> pose;  ///< of things that came back from an earlier visit
   std::vector<MergeRecord> merges;
   std::size_t broken = 0;  ///< objects whose numbers went bad, and which were dropped
 };
@@ -81,7 +83,10 @@ class SemanticFilter {
                           const FrameContext& frame) const;
   /// Updates what is seen; returns for each box how much of it is claimed.
   Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
-                                     const FrameInput& input, const FrameContext& frame) const;
+                                     const FrameInput& input, const FrameContext& frame,
+                                     std::vector<PoseEvidence>& pose) const;
+  /// Whether a look at it will tell of the pose: once for each time that it comes back.
+  bool tellsPose(const Object& object, const FrameContext& frame) const;
   /// Of one object after its look; nothing may be left of it.
   void tend(Object& object, const Seen& seen, const FrameInput& input,
             const FrameContext& frame) const;

@@ -1,0 +1,210 @@
+// What things of an earlier visit say of the pose they are seen from.
+#include "services/semantic_filter/core/drift_watch.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeObject;
+using testing::makeState;
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kRotationWalk = 0.0005, kPositionWalk = 0.02, kMetres = 400.0;
+constexpr DriftParameters kParameters;
+
+Matrix6d walked() {
+  Matrix6d P = Matrix6d::Zero();
+  P.diagonal() << Eigen::Vector3d::Constant(kMetres * kRotationWalk * kRotationWalk),
+      Eigen::Vector3d::Constant(kMetres * kPositionWalk * kPositionWalk);
+  return P;
+}
+
+const RigidTransform kSaid(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())),
+                           {12.0, -7.0, 1.2});
+
+/// A street before the body, as known from earlier visits, seen from where the body really is.
+struct Street {
+  explicit Street(std::uint32_t seed) : random(seed) {
+    std::uniform_real_distribution<double> any(0.0, 1.0);
+    for (std::size_t i = 0; i < 12; ++i) {
+      const Eigen::Vector3d place(8.0 + 16.0 * any(random), -6.0 + 12.0 * any(random), -0.45);
+      State x = makeState(0, 0, 0, 0.4, 4.2, 1.75, 1.5);
+      x.head<3>() = kSaid * place;
+      truth.push_back(x);
+    }
+  }
+
+  double noise(double sigma) { return sigma * std::normal_distribution<double>()(random); }
+
+  std::vector<PoseEvidence> looks(const RigidTransform& T_WB, double known_to) {
+    const CameraModel camera{makeCamera()};
+    const Matrix6d P_pose = walked();
+    std::vector<PoseEvidence> result;
+    for (const State& x : truth) {
+      const auto seen = projectCuboid(x, Projector(View{&camera, T_WB}));
+      if (!seen) continue;
+      BoxMeasurement z;
+      for (int side = 0; side < 4; ++side) {
+        z.sides[side] = seen->sides[side] + noise(2.0);
+        z.variance[side] = 4.0;
+      }
+      Object thing = makeObject(1, "car", x, 0.0);
+      Hypothesis& h = thing.hypotheses[0];
+      h.P.setZero();
+      h.P.topLeftCorner<3, 3>().diagonal().setConstant(known_to * known_to);
+      for (int axis = 0; axis < 3; ++axis) h.x[axis] += noise(known_to);
+      const auto expected = projectCuboid(h.x, Projector(View{&camera, kSaid}));
+      if (!expected) continue;
+      if (const auto told = poseEvidence(h, *expected, z, {}, P_pose)) result.push_back(*told);
+    }
+    return result;
+  }
+
+  std::mt19937 random;
+  std::vector<State> truth;
+};
+
+DriftWatch driven() {
+  DriftWatch watch(kParameters);
+  for (int i = 0; i < 400; ++i) {  // to and fro: yaw alone does not carry it away
+    const Eigen::Vector3d a(0.0, 0.0, 0.0), b(i % 2 == 0 ? 1.0 : -1.0, 0.0, 0.0);
+    watch.predict(RigidTransform(Eigen::Quaterniond::Identity(), a),
+                  RigidTransform(Eigen::Quaterniond::Identity(), b), kRotationWalk, kPositionWalk);
+  }
+  return watch;
+}
+
+PoseError poseError() {
+  PoseError error;
+  error.covariance = walked();
+  return error;
+}
+
+RigidTransform truly(double yaw, const Eigen::Vector3d& p) {
+  Vector6d error;
+  error << 0.0, 0.0, yaw, p;
+  return boxPlus(kSaid, error);
+}
+
+TEST(DriftWatch, ThingsOfAnEarlierVisitSayWhereTheBodyIsAndHowSurely) {
+  double squared = 0.0, corrected = 0.0;
+  for (int run = 1; run <= 60; ++run) {
+    Street street(static_cast<std::uint32_t>(run));
+    const RigidTransform truth =
+        truly(street.noise(0.57 * kDegree), {street.noise(0.4), street.noise(0.4), 0.0});
+    DriftWatch watch = driven();
+    watch.hear(street.looks(truth, 0.15), kSaid);
+    const Matrix6d before = walked();
+    const auto correction = watch.correct(kSaid, poseError());
+    if (!correction) continue;  // by chance there is little to correct
+    const Vector6d left = boxMinus(truth, correction->step * kSaid);
+    EXPECT_LT(left.tail<3>().norm(), 0.35) << run;
+    EXPECT_LT(std::abs(left[2]), 1.2 * kDegree) << run;
+    EXPECT_LT(eigenvalues(before - correction->after).maxCoeff(), before.maxCoeff());
+    Eigen::Vector4d error = left.tail<4>();
+    squared += squaredMahalanobis(error, correction->after.bottomRightCorner<4, 4>()) / 4.0;
+    corrected += 1.0;
+    EXPECT_FALSE(watch.correct(kSaid, poseError())) << "it is taken out once";
+  }
+  EXPECT_GE(corrected, 30.0);
+  EXPECT_GT(squared / corrected, 0.5);
+  EXPECT_LT(squared / corrected, 1.5);
+}
+
+TEST(DriftWatch, WhatIsTooLittleOrTooUnsureOrOfTooFewThingsStays) {
+  Street street(3);
+  DriftWatch in_place = driven();
+  in_place.hear(street.looks(kSaid, 0.05), kSaid);
+  EXPECT_FALSE(in_place.correct(kSaid, poseError()));
+  const RigidTransform truth = truly(0.0, {0.4, -0.5, 0.0});
+  DriftWatch few = driven();
+  auto looks = street.looks(truth, 0.05);
+  ASSERT_GE(looks.size(), 5u);
+  looks.resize(static_cast<std::size_t>(kParameters.things) - 1);
+  few.hear(looks, kSaid);
+  EXPECT_FALSE(few.correct(kSaid, poseError()));
+  DriftWatch unsure = driven();
+  unsure.hear(street.looks(truth, 1.0), kSaid);
+  EXPECT_FALSE(unsure.correct(kSaid, poseError()));
+  DriftWatch unmoved(kParameters);  // the pose has no error yet
+  unmoved.hear(street.looks(truth, 0.05), kSaid);
+  EXPECT_FALSE(unmoved.correct(kSaid, poseError()));
+}
+
+/// Its place hangs together with the pose's error as that of a thing which was just born.
+CrossPose bornFrom(const RigidTransform& T_WB, const Eigen::Vector3d& place) {
+  CrossPose B = CrossPose::Zero();
+  B.topLeftCorner<3, 3>() = -skew(place - T_WB.p) * T_WB.R();
+  B.block<3, 3>(0, 3).setIdentity();
+  B.row(kYaw).head<3>() = T_WB.R().row(2);
+  return B;
+}
+
+TEST(DriftWatch, WhatWasBornUnderTheSameErrorTellsNothingOfIt) {
+  const CameraModel camera{makeCamera()};
+  State x = makeState(0, 0, 0, 0.4, 4.2, 1.75, 1.5);
+  x.head<3>() = kSaid * Eigen::Vector3d(15.0, 2.0, -0.45);
+  const auto predicted = projectCuboid(x, Projector(View{&camera, kSaid}));
+  ASSERT_TRUE(predicted);
+  BoxMeasurement z;
+  z.sides = predicted->sides.array() + 3.0;
+  z.variance.setConstant(4.0);
+  Object thing = makeObject(1, "car", x, 0.04);
+  Hypothesis& h = thing.hypotheses[0];
+  const auto known = poseEvidence(h, *predicted, z, {}, walked());
+  const CrossPose B = bornFrom(kSaid, x.head<3>());
+  h.C = B * walked();
+  h.P += B * walked() * B.transpose();
+  const auto born = poseEvidence(h, *predicted, z, {}, walked());
+  ASSERT_TRUE(known && born);
+  const Eigen::Matrix<double, 4, 4> a = known->information.bottomRightCorner<4, 4>(),
+                                    b = born->information.bottomRightCorner<4, 4>();
+  EXPECT_LT(b.norm(), 1e-6 * a.norm());
+  EXPECT_LT(born->pull.tail<4>().norm(), 1e-3 * known->pull.tail<4>().norm());
+}
+
+TEST(DriftWatch, NoOutlierIsHeard) {
+  const CameraModel camera{makeCamera()};
+  State x = makeState(0, 0, 0, 0.4, 4.2, 1.75, 1.5);
+  x.head<3>() = kSaid * Eigen::Vector3d(15.0, 2.0, -0.45);
+  const auto predicted = projectCuboid(x, Projector(View{&camera, kSaid}));
+  ASSERT_TRUE(predicted);
+  BoxMeasurement z;
+  z.sides = predicted->sides.array() + 150.0;
+  z.variance.setConstant(4.0);
+  const Object thing = makeObject(1, "car", x, 0.04);
+  EXPECT_FALSE(poseEvidence(thing.hypotheses[0], *predicted, z, {}, walked()));
+}
+
+TEST(DriftWatch, WhatWasBornWithTheErrorGoesWithThePoseAndWhatIsOlderStays) {
+  Street street(5);
+  const RigidTransform truth = truly(1.2 * kDegree, {0.5, -0.4, 0.0});
+  DriftWatch watch = driven();
+  watch.hear(street.looks(truth, 0.05), kSaid);
+  const auto correction = watch.correct(kSaid, poseError());
+  ASSERT_TRUE(correction);
+  const State x = makeState(20, -3, 0.75, 0.4, 4.2, 1.75, 1.5);
+  Object old = makeObject(1, "car", x, 0.04), young = old;
+  young.hypotheses[0].C = bornFrom(kSaid, x.head<3>()) * walked();
+  follow(old, *correction, poseError());
+  follow(young, *correction, poseError());
+  EXPECT_EQ(old.best().x, x);
+  const RigidTransform corrected = correction->step * kSaid;
+  const Eigen::Vector3d before = kSaid.inverse() * Eigen::Vector3d(x.head<3>());
+  const Eigen::Vector3d after = corrected.inverse() * Eigen::Vector3d(young.best().x.head<3>());
+  EXPECT_LT((after - before).norm(), 0.02);
+  EXPECT_NEAR(wrapAngle(young.best().x[kYaw] - x[kYaw] - correction->error[2]), 0.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
