@@ -23,6 +23,7 @@ class FormerMap {
   void keep(const WorldId& world, const std::vector<ObjectBelief>& objects);
   /// The frame of reference that is looked for, or was found.
   const std::optional<WorldId>& world() const { return world_; }
+  bool waits() const { return lookout_.has_value(); }
   bool found() const { return alignment_.has_value(); }
   /// For people; empty where nothing is looked for.
   std::string note() const;

@@ -86,6 +86,7 @@ void Node::beginWorld(const WorldId& world) {
   pose_error_ = {};
   last_T_WB_.reset();
   T_MW_.reset();
+  told_not_level_ = false;
   drift_ = DriftWatch(config_.filter.drift);
   events_.clear();
   returns_.clear();
@@ -232,12 +233,21 @@ void Node::forgetEarlyBefore(TimePoint time) {
   if (gone > 0) reasons_.add("detections_without_odometry", gone);
 }
 
+/// Where the map lies is sought in yaw about z and position.
+bool Node::isLevel(const Entry& entry) {
+  constexpr double kLevel = 0.99;  // 8 degrees
+  if (entry.input.view.up_W.normalized().z() > kLevel) return true;
+  if (!std::exchange(told_not_level_, true)) reasons_.add("frame_not_level_to_place_map");
+  return false;
+}
+
 void Node::stepEntry(Entry& entry) {
   entry.before = belief_;
   StepReport report = filter_.step(belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
-  if (entry.input.boxes && !std::exchange(entry.told_pose, true)) {
+  if (entry.input.boxes && !std::exchange(entry.told_pose, true) && !report.pose.empty() &&
+      isLevel(entry)) {
     drift_.hear(report.pose, entry.input.view.T_WB);
   }
   entry.stepped = true;

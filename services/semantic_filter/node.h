@@ -73,6 +73,7 @@ class Node {
   void keepEarly(const Detections& detections);
   void forgetEarlyBefore(TimePoint time);
   void stepEntry(Entry& entry);
+  bool isLevel(const Entry& entry);
   void correctDrift();
   /// From W, the odometry's own, into M and back.
   RigidTransform inM(const RigidTransform& T_WB) const { return T_MW_ ? *T_MW_ * T_WB : T_WB; }
@@ -117,6 +118,7 @@ class Node {
   /// Beliefs and views are in M: W less the drift that the map has shown. None: no such drift.
   std::optional<RigidTransform> T_MW_;
   DriftWatch drift_;
+  bool told_not_level_ = false;
   Belief belief_;
   IdBook ids_;
   std::deque<Entry> history_;

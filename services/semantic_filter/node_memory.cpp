@@ -75,6 +75,7 @@ void Node::keepFormer() {
 /// Where the map of before is found again, what it holds comes back, and what was taken for new
 /// meanwhile goes on under the old id.
 void Node::rejoin(const Entry& entry) {
+  if (!former_.waits() || !isLevel(entry)) return;
   const FrameInput& input = entry.input;
   const FrameAlignment* found = former_.look(belief_.objects, input.view.T_WB.p, input.stamp.time);
   if (!found) return;
