@@ -150,22 +150,30 @@ CrossPose bornFrom(const RigidTransform& T_WB, const Eigen::Vector3d& place) {
   return B;
 }
 
-TEST(DriftWatch, WhatWasBornUnderTheSameErrorTellsNothingOfIt) {
-  const CameraModel camera{makeCamera()};
+Hypothesis aCar() {
   State x = makeState(0, 0, 0, 0.4, 4.2, 1.75, 1.5);
   x.head<3>() = kSaid * Eigen::Vector3d(15.0, 2.0, -0.45);
-  const auto predicted = projectCuboid(x, Projector(View{&camera, kSaid}));
-  ASSERT_TRUE(predicted);
+  return makeObject(1, "car", x, 0.04).hypotheses[0];
+}
+
+/// By a box that is off by so many pixels.
+std::optional<PoseEvidence> toldBy(const Hypothesis& h, double pixels) {
+  const CameraModel camera{makeCamera()};
+  const auto predicted = projectCuboid(h.x, Projector(View{&camera, kSaid}));
+  if (!predicted) return std::nullopt;
   BoxMeasurement z;
-  z.sides = predicted->sides.array() + 3.0;
+  z.sides = predicted->sides.array() + pixels;
   z.variance.setConstant(4.0);
-  Object thing = makeObject(1, "car", x, 0.04);
-  Hypothesis& h = thing.hypotheses[0];
-  const auto known = poseEvidence(h, *predicted, z, {}, walked());
-  const CrossPose B = bornFrom(kSaid, x.head<3>());
+  return poseEvidence(h, *predicted, z, {}, walked());
+}
+
+TEST(DriftWatch, WhatWasBornUnderTheSameErrorTellsNothingOfIt) {
+  Hypothesis h = aCar();
+  const auto known = toldBy(h, 3.0);
+  const CrossPose B = bornFrom(kSaid, h.x.head<3>());
   h.C = B * walked();
   h.P += B * walked() * B.transpose();
-  const auto born = poseEvidence(h, *predicted, z, {}, walked());
+  const auto born = toldBy(h, 3.0);
   ASSERT_TRUE(known && born);
   const Eigen::Matrix<double, 4, 4> a = known->information.bottomRightCorner<4, 4>(),
                                     b = born->information.bottomRightCorner<4, 4>();
@@ -174,16 +182,8 @@ TEST(DriftWatch, WhatWasBornUnderTheSameErrorTellsNothingOfIt) {
 }
 
 TEST(DriftWatch, NoOutlierIsHeard) {
-  const CameraModel camera{makeCamera()};
-  State x = makeState(0, 0, 0, 0.4, 4.2, 1.75, 1.5);
-  x.head<3>() = kSaid * Eigen::Vector3d(15.0, 2.0, -0.45);
-  const auto predicted = projectCuboid(x, Projector(View{&camera, kSaid}));
-  ASSERT_TRUE(predicted);
-  BoxMeasurement z;
-  z.sides = predicted->sides.array() + 150.0;
-  z.variance.setConstant(4.0);
-  const Object thing = makeObject(1, "car", x, 0.04);
-  EXPECT_FALSE(poseEvidence(thing.hypotheses[0], *predicted, z, {}, walked()));
+  EXPECT_TRUE(toldBy(aCar(), 3.0));
+  EXPECT_FALSE(toldBy(aCar(), 150.0));
 }
 
 TEST(DriftWatch, WhatWasBornWithTheErrorGoesWithThePoseAndWhatIsOlderStays) {
