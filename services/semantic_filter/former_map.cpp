@@ -15,12 +15,12 @@ constexpr std::size_t kLastSeen = 16;  // things that say where the map lies abo
 
 bool stands(const ObjectBelief& belief) { return belief.confirmed && belief.moving < 0.5; }
 
-std::vector<Standing> standing(const std::vector<Object>& objects, double min_speed) {
-  std::vector<Standing> result;
+std::vector<PlacedThing> standing(const std::vector<Object>& objects, double min_speed) {
+  std::vector<PlacedThing> result;
   for (const Object& o : objects) {
     if (!o.confirmed || o.recalled) continue;
     const ObjectBelief belief = toBelief(o, min_speed);
-    if (stands(belief)) result.push_back(standingOf(belief));
+    if (stands(belief)) result.push_back(placedOf(belief));
   }
   return result;
 }
@@ -37,8 +37,8 @@ void FormerMap::keep(const WorldId& world, const std::vector<ObjectBelief>& obje
   if (kept.empty() || (lookout_ && kept.size() < lookout_->size())) return;
   world_ = world;
   kept_ = std::move(kept);
-  std::vector<Standing> things;
-  for (const ObjectBelief& belief : kept_) things.push_back(standingOf(belief));
+  std::vector<PlacedThing> things;
+  for (const ObjectBelief& belief : kept_) things.push_back(placedOf(belief));
   lookout_.emplace(std::move(things), parameters_.alignment);
   alignment_.reset();
   laid_.clear();
@@ -79,25 +79,25 @@ std::vector<ObjectBelief> FormerMap::takeKept() {
 
 void FormerMap::refine(const std::vector<Object>& objects) {
   if (!alignment_) return;
-  std::vector<std::pair<TimePoint, std::pair<Standing, Standing>>> seen_again;
+  std::vector<std::pair<TimePoint, std::pair<PlacedThing, PlacedThing>>> seen_again;
   for (const Object& o : objects) {
     const auto there = laid_.find(o.id);
     if (there == laid_.end() || o.recalled || o.hits <= there->second.second) continue;
     const ObjectBelief belief = toBelief(o, parameters_.motion.min_speed);
     if (stands(belief)) {
-      seen_again.push_back({o.last_seen, {there->second.first, standingOf(belief)}});
+      seen_again.push_back({o.last_seen, {there->second.first, placedOf(belief)}});
     }
   }
   std::stable_sort(seen_again.begin(), seen_again.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   if (seen_again.size() > kLastSeen) seen_again.resize(kLastSeen);
-  std::vector<std::pair<Standing, Standing>> pairs;
+  std::vector<std::pair<PlacedThing, PlacedThing>> pairs;
   for (const auto& [when, pair] : seen_again) pairs.push_back(pair);
   *alignment_ = refined(*alignment_, pairs);
 }
 
 ObjectBelief FormerMap::laid(const ObjectBelief& belief) {
-  laid_[belief.id] = {standingOf(belief), belief.hits};
+  laid_[belief.id] = {placedOf(belief), belief.hits};
   return laidInto(*alignment_, belief);
 }
 

@@ -52,7 +52,7 @@ class FormerMap {
   std::vector<ObjectBelief> kept_;
   std::optional<MapAlignment> lookout_;
   std::optional<FrameAlignment> alignment_;
-  std::map<ObjectId, std::pair<Standing, std::uint32_t>> laid_;  ///< in M, and its hits then
+  std::map<ObjectId, std::pair<PlacedThing, std::uint32_t>> laid_;  ///< in M, and its hits then
   std::optional<Eigen::Vector3d> looked_from_;
   TimePoint looked_at_;
   std::size_t looked_with_ = 0;

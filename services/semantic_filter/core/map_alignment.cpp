@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 #include <tuple>
 #include <unordered_map>
 
-#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
@@ -25,25 +25,21 @@ constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;  // what is ano
 constexpr double kSure = 0.9;
 constexpr double kDefaultShare = 1e-3;  // of a class that one of two PMFs does not name
 
-using Pose4 = Eigen::Vector4d;  // [p_W of the map's middle, yaw]
-
-/// Modulo 180°, into (-90°, 90°].
-double wrapHalfTurn(double angle) { return 0.5 * wrapAngle(2.0 * angle); }
-
 double shareOf(const std::vector<ClassNumber>& pmf, const std::string& name) {
   for (const auto& c : pmf)
     if (c.name == name) return c.value;
   return 0.0;
 }
 
-const std::string& mostProbable(const Standing& thing) {
+const std::string& mostProbable(const PlacedThing& thing) {
   return std::max_element(thing.pmf.begin(), thing.pmf.end(),
                           [](const auto& a, const auto& b) { return a.value < b.value; })
       ->name;
 }
 
 /// log of p(one thing has both PMFs) against p(two things have them).
-double logSameClass(const Standing& a, const Standing& b, const std::vector<ClassNumber>& common) {
+double logSameClass(const PlacedThing& a, const PlacedThing& b,
+                    const std::vector<ClassNumber>& common) {
   double ratio = kDefaultShare;
   for (const auto& c : common) {
     if (c.value > 0.0) ratio += shareOf(a.pmf, c.name) * shareOf(b.pmf, c.name) / c.value;
@@ -61,79 +57,14 @@ double logSameYaw(double difference, double variance) {
   return std::log(std::max(density * std::sqrt(kPi / (2.0 * variance)), 1e-6));
 }
 
-Eigen::Matrix4d rotated(const Eigen::Matrix4d& covariance, const Eigen::Matrix3d& R) {
-  Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
-  G.topLeftCorner<3, 3>() = R;
-  return G * covariance * G.transpose();
-}
-
-/// d[p_W, yaw_W] of a thing at `arm` (W, from the middle) by d[middle, yaw].
-Eigen::Matrix4d jacobianAt(const Eigen::Vector3d& arm) {
-  Eigen::Matrix4d J = Eigen::Matrix4d::Identity();
-  J(0, 3) = -arm.y();
-  J(1, 3) = arm.x();
-  return J;
-}
-
-/// Normal equations of [middle, yaw] from things of known identity.
-struct Equations {
-  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d pull = Eigen::Vector4d::Zero();
-  double chi2 = 0.0, weights = 0.0;
-
-  void add(const Standing& seen, const Standing& thing, const Eigen::Vector3d& middle_M,
-           const Pose4& x, double weight, double blur) {
-    const Eigen::Matrix3d R = rotationAboutZ(x[3]);
-    const Eigen::Vector3d arm = R * (thing.p - middle_M);
-    Eigen::Vector4d residual;
-    residual << seen.p - (x.head<3>() + arm), wrapHalfTurn(seen.yaw - thing.yaw - x[3]);
-    Eigen::Matrix4d S = seen.covariance + rotated(thing.covariance, R);
-    S.diagonal().head<3>().array() += blur * blur;
-    const Eigen::Matrix4d W = inverseSymmetric(S);
-    const Eigen::Matrix4d J = jacobianAt(arm);
-    information += weight * J.transpose() * W * J;
-    pull += weight * J.transpose() * W * residual;
-    chi2 += weight * residual.dot(W * residual);
-    weights += weight;
-  }
-
-  /// Errors that are larger than was said make the result as much less sure.
-  Eigen::Matrix4d covariance() const {
-    const double freedom = 4.0 * weights - 4.0;
-    const double scale = freedom > 0.0 ? std::max(1.0, chi2 / freedom) : 1.0;
-    return scale * inverseSymmetric(information);
-  }
-};
-
-FrameAlignment alignmentAt(const Pose4& x, const Eigen::Vector3d& middle_M) {
-  FrameAlignment alignment;
-  alignment.yaw = wrapAngle(x[3]);
-  alignment.about_M = middle_M;
-  alignment.p = x.head<3>() - rotationAboutZ(x[3]) * middle_M;
-  return alignment;
-}
-
-bool anotherWay(const Pose4& a, const Pose4& b) {
+bool anotherWay(const LevelPose& a, const LevelPose& b) {
   return (a - b).head<2>().norm() > kOther_m || std::abs(wrapAngle(a[3] - b[3])) > kOther_rad;
 }
 
 }  // namespace
 
-Standing standingOf(const ObjectBelief& belief) {
-  Standing thing;
-  thing.id = belief.id;
-  thing.p = belief.best().mean.head<3>();
-  thing.yaw = belief.best().mean[kYaw];
-  thing.covariance = belief.best().covariance.topLeftCorner<4, 4>();
-  for (const auto& c : belief.classes) thing.pmf.push_back({c.name, c.probability});
-  return thing;
-}
-
-Eigen::Vector3d FrameAlignment::operator*(const Eigen::Vector3d& p_M) const {
-  return rotationAboutZ(yaw) * p_M + p;
-}
-
-MapAlignment::MapAlignment(std::vector<Standing> remembered, const AlignmentParameters& parameters)
+MapAlignment::MapAlignment(std::vector<PlacedThing> remembered,
+                           const AlignmentParameters& parameters)
     : things_(std::move(remembered)), parameters_(parameters) {
   std::map<std::string, double> common;
   for (const auto& thing : things_) {
@@ -157,7 +88,7 @@ MapAlignment::MapAlignment(std::vector<Standing> remembered, const AlignmentPara
 
 class MapAlignment::Search {
  public:
-  Search(const MapAlignment& map, std::vector<Standing> seen)
+  Search(const MapAlignment& map, std::vector<PlacedThing> seen)
       : map_(map), seen_(std::move(seen)), same_class_(seen_.size() * map.things_.size()) {
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       for (std::size_t k = 0; k < map_.things_.size(); ++k) {
@@ -169,12 +100,12 @@ class MapAlignment::Search {
 
   std::optional<FrameAlignment> best() {
     struct Way {
-      Pose4 x;
+      LevelPose x;
       double nats;
     };
     std::vector<Way> ways;
-    for (const Pose4& start : proposals()) {
-      const Pose4 x = settled(start);
+    for (const LevelPose& start : proposals()) {
+      const LevelPose x = settled(start);
       ways.push_back({x, nats(x)});
     }
     if (ways.empty()) return std::nullopt;
@@ -186,11 +117,9 @@ class MapAlignment::Search {
     FrameAlignment alignment = alignmentAt(first.x, map_.middle_);
     alignment.nats = first.nats;
     alignment.next_nats = next == ways.end() ? 0.0 : std::max(next->nats, 0.0);
-    Equations equations;
-    for (std::size_t i = 0; i < seen_.size(); ++i) {
-      const auto [thing, share] = matchOf(i, first.x, 0.0);
-      if (share < kSure) continue;
-      equations.add(seen_[i], map_.things_[thing], map_.middle_, first.x, 1.0, 0.0);
+    AlignmentEquations equations;
+    for (const auto& [thing, i] : surePairs(first.x)) {
+      equations.add(seen_[i], map_.things_[thing], map_.middle_, first.x);
       alignment.pairs.emplace_back(map_.things_[thing].id, seen_[i].id);
     }
     if (alignment.pairs.size() < 2) return std::nullopt;
@@ -210,7 +139,7 @@ class MapAlignment::Search {
     Eigen::Vector2d heading = Eigen::Vector2d::Zero();
   };
 
-  double variance(const Standing& thing) const {
+  double variance(const PlacedThing& thing) const {
     return 0.5 * thing.covariance.topLeftCorner<2, 2>().trace();
   }
 
@@ -240,20 +169,20 @@ class MapAlignment::Search {
   }
 
   /// Whether the yaws of a seen thing and of one on the map allow that turn.
-  bool yawsAgree(const Standing& seen, const Standing& thing, double turn) const {
+  bool yawsAgree(const PlacedThing& seen, const PlacedThing& thing, double turn) const {
     const double deviation = std::sqrt(seen.covariance(3, 3) + thing.covariance(3, 3));
     return std::abs(wrapHalfTurn(seen.yaw - thing.yaw - turn)) < kGate * deviation + 0.05;
   }
 
-  std::vector<Pose4> proposals() const {
+  std::vector<LevelPose> proposals() const {
     std::unordered_map<std::uint64_t, Cell> cells;
     std::size_t votes = 0;
     for (const SeenPair& pair : seenPairs()) {
       if (votes > kMostVotes) break;
-      const Standing &a = seen_[pair.a], &b = seen_[pair.b];
+      const PlacedThing &a = seen_[pair.a], &b = seen_[pair.b];
       const Eigen::Vector2d between = (b.p - a.p).head<2>(), middle = 0.5 * (a.p + b.p).head<2>();
       for (auto it = pair.range.first; it != pair.range.second; ++it) {
-        const Standing &c = map_.things_[it->a], &d = map_.things_[it->b];
+        const PlacedThing &c = map_.things_[it->a], &d = map_.things_[it->b];
         const Eigen::Vector2d on_map = (d.p - c.p).head<2>();
         const double turn =
             wrapAngle(std::atan2(between.y(), between.x()) - std::atan2(on_map.y(), on_map.x()));
@@ -276,9 +205,9 @@ class MapAlignment::Search {
     std::partial_sort(most.begin(), most.begin() + static_cast<std::ptrdiff_t>(count), most.end(),
                       more);
     most.resize(count);
-    std::vector<Pose4> result;
+    std::vector<LevelPose> result;
     for (const auto& [key, cell] : most) {
-      Pose4 x;
+      LevelPose x;
       x << cell.middle / cell.votes, 0.0, std::atan2(cell.heading.y(), cell.heading.x());
       x[2] = height(x);
       result.push_back(x);
@@ -295,10 +224,10 @@ class MapAlignment::Search {
   }
 
   /// Of the map's middle, where things stand as high as those of their class on the map.
-  double height(const Pose4& x) const {
+  double height(const LevelPose& x) const {
     std::vector<double> heights;
-    for (const Standing& seen : seen_) {
-      for (const Standing& thing : map_.things_) {
+    for (const PlacedThing& seen : seen_) {
+      for (const PlacedThing& thing : map_.things_) {
         if (mostProbable(seen) != mostProbable(thing)) continue;
         const Eigen::Vector3d at = x.head<3>() + rotationAboutZ(x[3]) * (thing.p - map_.middle_);
         if ((at - seen.p).head<2>().norm() < kCell_m) {
@@ -320,13 +249,13 @@ class MapAlignment::Search {
   };
 
   /// Densities on the ground, of where the thing is seen, times their number. `blur`: m.
-  Likelihood likelihoodOf(std::size_t i, const Pose4& x, double blur) const {
-    const Standing& seen = seen_[i];
+  Likelihood likelihoodOf(std::size_t i, const LevelPose& x, double blur) const {
+    const PlacedThing& seen = seen_[i];
     const Eigen::Matrix3d R = rotationAboutZ(x[3]);
     const Eigen::Vector3d at = map_.middle_ + R.transpose() * (seen.p - x.head<3>());
     Likelihood l;
     for (std::size_t k = 0; k < map_.things_.size(); ++k) {
-      const Standing& thing = map_.things_[k];
+      const PlacedThing& thing = map_.things_[k];
       const Eigen::Vector2d off = (at - thing.p).head<2>();
       const double squared = off.squaredNorm();
       if (squared > 16.0 * kStreet_m * kStreet_m) continue;
@@ -356,14 +285,27 @@ class MapAlignment::Search {
   }
 
   /// Thing of the map that the seen one most likely is, and with what probability.
-  std::pair<std::size_t, double> matchOf(std::size_t i, const Pose4& x, double blur) const {
+  std::pair<std::size_t, double> matchOf(std::size_t i, const LevelPose& x, double blur) const {
     const Likelihood l = likelihoodOf(i, x, blur);
     const double w = map_.parameters_.known_share;
     const double all = (1.0 - w) * (l.by_chance + kFloor) + w * l.of_map;
     return {l.thing, w * l.of_thing / all};
   }
 
-  double nats(const Pose4& x) const {
+  /// Things of the map by the seen one that each surely is. Of two that would be one neither is:
+  /// they may as well be neighbours.
+  std::map<std::size_t, std::size_t> surePairs(const LevelPose& x) const {
+    std::map<std::size_t, std::size_t> pairs;
+    std::set<std::size_t> twice;
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      const auto [thing, share] = matchOf(i, x, 0.0);
+      if (share >= kSure && !pairs.emplace(thing, i).second) twice.insert(thing);
+    }
+    for (const std::size_t thing : twice) pairs.erase(thing);
+    return pairs;
+  }
+
+  double nats(const LevelPose& x) const {
     const double w = map_.parameters_.known_share;
     double sum = 0.0;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
@@ -373,9 +315,9 @@ class MapAlignment::Search {
     return sum;
   }
 
-  Pose4 settled(Pose4 x) const {
+  LevelPose settled(LevelPose x) const {
     for (const double blur : {2.0, 1.0, 0.5, 0.2, 0.0, 0.0}) {
-      Equations equations;
+      AlignmentEquations equations;
       equations.information.diagonal() << 1e-2, 1e-2, 1e-2, 1e-1;  // it stays about where it is
       for (std::size_t i = 0; i < seen_.size(); ++i) {
         const auto [thing, share] = matchOf(i, x, blur);
@@ -383,7 +325,7 @@ class MapAlignment::Search {
         equations.add(seen_[i], map_.things_[thing], map_.middle_, x, share, blur);
       }
       if (equations.weights == 0.0) break;
-      x += inverseSymmetric(equations.information) * equations.pull;
+      x += equations.step();
       x[3] = wrapAngle(x[3]);
     }
     return x;
@@ -393,76 +335,29 @@ class MapAlignment::Search {
   static constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 
   const MapAlignment& map_;
-  std::vector<Standing> seen_;
+  std::vector<PlacedThing> seen_;
   std::vector<double> same_class_;  ///< log, by seen and remembered
 };
 
-std::optional<FrameAlignment> MapAlignment::best(const std::vector<Standing>& seen) const {
-  std::vector<Standing> placed = seen;
-  const auto spread = [](const Standing& s) { return s.covariance.topLeftCorner<2, 2>().trace(); };
-  std::stable_sort(placed.begin(), placed.end(),
-                   [&](const Standing& a, const Standing& b) { return spread(a) < spread(b); });
+std::optional<FrameAlignment> MapAlignment::best(const std::vector<PlacedThing>& seen) const {
+  std::vector<PlacedThing> placed = seen;
+  const auto spread = [](const PlacedThing& s) {
+    return s.covariance.topLeftCorner<2, 2>().trace();
+  };
+  std::stable_sort(placed.begin(), placed.end(), [&](const PlacedThing& a, const PlacedThing& b) {
+    return spread(a) < spread(b);
+  });
   if (placed.size() > kMostSeen) placed.resize(kMostSeen);
   return Search(*this, std::move(placed)).best();
 }
 
-std::optional<FrameAlignment> MapAlignment::align(const std::vector<Standing>& seen) const {
+std::optional<FrameAlignment> MapAlignment::align(const std::vector<PlacedThing>& seen) const {
   const auto found = best(seen);
   if (!found || found->pairs.size() < static_cast<std::size_t>(parameters_.pairs) ||
       found->nats < parameters_.nats || found->nats - found->next_nats < parameters_.margin_nats) {
     return std::nullopt;
   }
   return found;
-}
-
-FrameAlignment refined(const FrameAlignment& start,
-                       const std::vector<std::pair<Standing, Standing>>& pairs) {
-  if (pairs.size() < 3) return start;
-  Eigen::Vector3d middle_M = Eigen::Vector3d::Zero();
-  for (const auto& [thing, seen] : pairs) middle_M += thing.p / static_cast<double>(pairs.size());
-  Pose4 x;
-  x << start * middle_M, start.yaw;
-  Equations last;
-  for (int i = 0; i < 3; ++i) {
-    last = {};
-    for (const auto& [thing, seen] : pairs) last.add(seen, thing, middle_M, x, 1.0, 0.0);
-    x += inverseSymmetric(last.information) * last.pull;
-  }
-  FrameAlignment result = alignmentAt(x, middle_M);
-  result.covariance = last.covariance();
-  result.nats = start.nats;
-  result.next_nats = start.next_nats;
-  return result;
-}
-
-ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief) {
-  const Eigen::Matrix3d R = T_AB.R();
-  const double yaw = yawOf(R);
-  Matrix7d G = Matrix7d::Identity();
-  G.topLeftCorner<3, 3>() = R;
-  for (ClassBelief& c : belief.classes) {
-    c.mean.head<3>() = (T_AB * Eigen::Vector3d(c.mean.head<3>())).eval();
-    c.mean[kYaw] = wrapAngle(c.mean[kYaw] + yaw);
-    c.covariance = (G * c.covariance * G.transpose()).eval();
-    makeSymmetric(c.covariance);
-    c.cross_pose = (G * c.cross_pose).eval();
-    c.cross_pose.rightCols<3>() = (c.cross_pose.rightCols<3>() * R.transpose()).eval();
-  }
-  belief.velocity = R * belief.velocity;
-  return belief;
-}
-
-ObjectBelief laidInto(const FrameAlignment& alignment, ObjectBelief belief) {
-  const Eigen::Matrix3d R = rotationAboutZ(alignment.yaw);
-  belief = turned(RigidTransform(R, alignment.p), std::move(belief));
-  const Eigen::Vector3d middle = alignment * alignment.about_M;
-  for (ClassBelief& c : belief.classes) {
-    const Eigen::Matrix4d J = jacobianAt(c.mean.head<3>() - middle);
-    c.covariance.topLeftCorner<4, 4>() += J * alignment.covariance * J.transpose();
-    makeSymmetric(c.covariance);
-    c.cross_pose.setZero();
-  }
-  return belief;
 }
 
 }  // namespace perdure::semantic_filter

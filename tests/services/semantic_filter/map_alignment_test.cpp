@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -28,7 +29,7 @@ class Town {
       const double side = any(random_) < 0.5 ? -1.0 : 1.0, s = along(random_);
       const bool east = any(random_) < 0.5, car = any(random_) < 0.6;
       const double off = street + side * (car ? 4.0 : 6.0 + any(random_));
-      Standing thing;
+      PlacedThing thing;
       thing.id = i + 1;
       thing.p = east ? Eigen::Vector3d(s, off, 0.75) : Eigen::Vector3d(off, s, 0.75);
       thing.yaw = car ? (east ? 0.0 : 90.0 * kDegree) : 180.0 * kDegree * any(random_);
@@ -42,9 +43,9 @@ class Town {
   }
 
   /// As a filter believes them: off by what it says.
-  std::vector<Standing> believed(const std::vector<Standing>& things) {
-    std::vector<Standing> result;
-    for (Standing thing : things) {
+  std::vector<PlacedThing> believed(const std::vector<PlacedThing>& things) {
+    std::vector<PlacedThing> result;
+    for (PlacedThing thing : things) {
       thing.covariance = covariance();
       const Eigen::Vector4d off = thing.covariance.llt().matrixL() * standard();
       thing.p += off.head<3>();
@@ -54,14 +55,14 @@ class Town {
     return result;
   }
 
-  std::vector<Standing> near(const Eigen::Vector2d& spot, double reach) const {
-    std::vector<Standing> result;
+  std::vector<PlacedThing> near(const Eigen::Vector2d& spot, double reach) const {
+    std::vector<PlacedThing> result;
     for (const auto& thing : truth_)
       if ((thing.p.head<2>() - spot).norm() < reach) result.push_back(thing);
     return result;
   }
 
-  const std::vector<Standing>& truth() const { return truth_; }
+  const std::vector<PlacedThing>& truth() const { return truth_; }
 
  private:
   Eigen::Vector4d standard() {
@@ -81,7 +82,7 @@ class Town {
   }
 
   std::mt19937 random_;
-  std::vector<Standing> truth_;
+  std::vector<PlacedThing> truth_;
 };
 
 struct Turn {
@@ -89,9 +90,9 @@ struct Turn {
   Eigen::Vector3d p;
 };
 
-std::vector<Standing> in(const Turn& W, std::vector<Standing> things) {
+std::vector<PlacedThing> in(const Turn& W, std::vector<PlacedThing> things) {
   const Eigen::Matrix3d R = rotationAboutZ(W.yaw);
-  for (Standing& thing : things) {
+  for (PlacedThing& thing : things) {
     thing.p = R * thing.p + W.p;
     thing.yaw = wrapAngle(thing.yaw + W.yaw);
     thing.covariance.topLeftCorner<3, 3>() =
@@ -160,9 +161,9 @@ TEST(MapAlignment, WhatWasMovedOrIsNewSinceThenIsNoHindrance) {
 }
 
 TEST(MapAlignment, ARowOfEqualThingsFitsInManyWaysAndIsNotFoundUntilSomethingIsOdd) {
-  std::vector<Standing> row;
+  std::vector<PlacedThing> row;
   for (std::size_t i = 0; i < 20; ++i) {
-    Standing car;
+    PlacedThing car;
     car.id = i + 1;
     car.p = {6.0 * static_cast<double>(i), 0.0, 0.75};
     car.covariance.diagonal() << 0.04, 0.04, 0.01, 0.02;
@@ -170,7 +171,7 @@ TEST(MapAlignment, ARowOfEqualThingsFitsInManyWaysAndIsNotFoundUntilSomethingIsO
     row.push_back(car);
   }
   const MapAlignment map(row, kParameters);
-  const std::vector<Standing> part(row.begin() + 4, row.begin() + 14);
+  const std::vector<PlacedThing> part(row.begin() + 4, row.begin() + 14);
   EXPECT_FALSE(map.align(in(kTurn, part)));
   const auto best = map.best(in(kTurn, part));
   ASSERT_TRUE(best);
@@ -188,6 +189,26 @@ TEST(MapAlignment, ARowOfEqualThingsFitsInManyWaysAndIsNotFoundUntilSomethingIsO
   EXPECT_LT(errorOf(*found).norm(), 0.3);
 }
 
+TEST(MapAlignment, OfTwoThatWouldBeOneThingNeitherIsIt) {
+  Town town(2);
+  const MapAlignment map(town.believed(town.truth()), kParameters);
+  auto seen = in(kTurn, town.believed(town.near({10, -5}, 35.0)));
+  const auto alone = map.align(seen);
+  ASSERT_TRUE(alone);
+  const ObjectId twice = alone->pairs.front().second;
+  const auto it =
+      std::find_if(seen.begin(), seen.end(), [&](const PlacedThing& s) { return s.id == twice; });
+  PlacedThing neighbour = *it;
+  neighbour.id = 5000;
+  seen.push_back(neighbour);
+  const auto found = map.align(seen);
+  ASSERT_TRUE(found);
+  for (const auto& [remembered, id] : found->pairs) {
+    EXPECT_NE(id, twice);
+    EXPECT_NE(id, neighbour.id);
+  }
+}
+
 TEST(MapAlignment, TooLittleIsNotEnough) {
   Town town(1);
   const MapAlignment map(town.believed(town.truth()), kParameters);
@@ -202,7 +223,7 @@ TEST(MapAlignment, ThingsOfKnownIdentitySayBetterWhereItLiesAboutThem) {
   rough.yaw = kTurn.yaw + 2.0 * kDegree;
   rough.p = kTurn.p + Eigen::Vector3d(0.4, -0.5, 0.2);
   const auto there = town.believed(town.truth()), here = in(kTurn, town.believed(town.truth()));
-  std::vector<std::pair<Standing, Standing>> pairs;
+  std::vector<std::pair<PlacedThing, PlacedThing>> pairs;
   for (std::size_t i = 0; i < 12; ++i) pairs.emplace_back(there[i], here[i]);
   const FrameAlignment better = refined(rough, pairs);
   EXPECT_LT(errorOf(better).head<3>().norm(), 0.4);
