@@ -1,4 +1,5 @@
 // perdure-inference: frames to detections.
+#include "common/bus/gaps.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"
 #include "services/inference/worker.h"
@@ -25,17 +26,20 @@ void run(service::Context& context, const inference::Config& config) {
                                [&] { context.stop(); });
   worker = &the_worker;
 
-  ReasonCounts refused;
+  ReasonCounts lost;
+  bus::Gaps gaps;
   context.on(bus::topics::kModel, [&](const ModelInfo& model) { worker->learn(model); });
   context.on(bus::topics::kSwap, [&](const SwapNotice& notice) { worker->told(notice); });
   context.on(bus::topics::frame(config.detection.camera), [&](const Frame& frame) {
+    const auto missed = gaps.before(frame.stamp.source, frame.stamp.sequence);
+    if (missed > 0) lost.add("frames_missed", missed);
     if (const auto pixels = vision::decompressed(frame)) {
       worker->offer(*pixels);
     } else {
-      refused.add(pixels.error());
+      lost.add(pixels.error());
     }
   });
-  context.countReasons([&]() -> const ReasonCounts& { return refused; });
+  context.countReasons([&]() -> const ReasonCounts& { return lost; });
   context.on(bus::topics::kPredictions, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
   constexpr std::chrono::seconds kHangs{10};  // no network takes so long for a frame

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "common/base/heap.h"
+#include "common/bus/gaps.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
 #include "services/semantic_filter/node.h"
@@ -67,8 +68,11 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
                               .predictions = context.sink(topics::kPredictions),
                               .queries = [&](const MapQuery& m) { (void)queries.write(m); }});
   Gate gate;
+  ReasonCounts lost;
+  bus::Gaps odometry_gaps;
   bus::Once odometry_once;  // repeated detections are the node's to count
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
+  context.countReasons([&]() -> const ReasonCounts& { return lost; });
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
   context.on(topics::kSwap, [&](const SwapNotice& m) { node.onSwap(m); });
@@ -78,6 +82,8 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   });
   context.on(topics::kOdometry, [&](const Odometry& m) {
     if (!odometry_once.first(m.stamp.source, m.stamp.sequence)) return;
+    const auto missed = odometry_gaps.before(m.stamp.source, m.stamp.sequence);
+    if (missed > 0) lost.add("odometry_missed", missed);
     context.health().frameIn();
     gate.pass([&, m] { node.onOdometry(m); });
   });

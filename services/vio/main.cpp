@@ -2,6 +2,7 @@
 #include <chrono>
 #include <opencv2/core/utility.hpp>
 
+#include "common/bus/gaps.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"
@@ -40,9 +41,12 @@ void serve(service::Context& context, const vio::Config& config) {
     context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
   }
   std::vector<bus::Once> once(config.cameras.size());
+  std::vector<bus::Gaps> gaps(config.cameras.size());
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
     context.on(topics::frame(config.cameras[i]), [&, i](const Frame& m) {
       if (!once[i].first(m.stamp.source, m.stamp.sequence)) return;
+      const auto missed = gaps[i].before(m.stamp.source, m.stamp.sequence);
+      if (missed > 0) own.add("frames_missed", missed);
       if (i == 0) context.health().frameIn();
       if (const auto pixels = vision::decompressed(m, ImageEncoding::kMono8)) {
         node.onFrame(*pixels);

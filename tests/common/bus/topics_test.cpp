@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/bus/domain.h"
+#include "common/bus/gaps.h"
 #include "common/bus/once.h"
 
 namespace perdure::bus {
@@ -50,6 +51,18 @@ TEST(Once, PassesEachIdentityOnceAndCountsTheRest) {
   EXPECT_EQ(once.repeated(), 1u);
   EXPECT_TRUE(once.first(1, 2));
   EXPECT_TRUE(once.first(1, 1)) << "it remembers only the newest two";
+}
+
+TEST(Gaps, CountsNumbersThatASourceLeftOut) {
+  Gaps gaps;
+  EXPECT_EQ(gaps.before(1, 40), 0u) << "who comes late has missed nothing";
+  EXPECT_EQ(gaps.before(1, 41), 0u);
+  EXPECT_EQ(gaps.before(1, 44), 2u);
+  EXPECT_EQ(gaps.before(1, 44), 0u) << "twice";
+  EXPECT_EQ(gaps.before(1, 43), 0u) << "late: it was counted, and DDS does not reorder one writer";
+  EXPECT_EQ(gaps.before(1, 45), 0u);
+  EXPECT_EQ(gaps.before(2, 7), 0u) << "another run of capture";
+  EXPECT_EQ(gaps.before(2, 9), 1u);
 }
 
 TEST(Configuration, OfLoopbackIsUnicastAndOfANetworkLeavesFragmentsAlone) {
