@@ -214,6 +214,7 @@ ModelInfo DetectionFile::modelAt(std::uint64_t frame) const {
   model.classes = classesAt(frame);
   std::string identity = "detections of a file";
   for (const auto& name : model.classes) identity += '\n' + name;
+  model.boxes = options_.boxes;
   model.hash = digest(identity);
   return model;
 }

@@ -26,6 +26,7 @@ struct DetectionFileOptions {
   /// network's opinion, not certainty.
   double score_floor = 0.01;
   double azimuth_sigma = 0.35;  ///< radians
+  BoxExtent boxes = BoxExtent::kCuboid;
 };
 
 /// Activations of a row: clutter 0; with `logit:` columns those; else logit(score) for its class

@@ -128,6 +128,7 @@ SimulatedDetector::SimulatedDetector(DetectorModel model, Truth truth,
   info_.input_width = camera.width;
   info_.input_height = camera.height;
   info_.box_sigma = model_.box_share;
+  info_.boxes = BoxExtent::kOutline;
   std::string all;
   for (const std::string& name : model_.classes) all += name + ",";
   info_.hash = digest(all + std::to_string(model_.seed));

@@ -54,6 +54,12 @@ struct Detections {
   double forward_s = 0.0;
 };
 
+/// What a detector's boxes enclose of a thing that nothing hides.
+enum class BoxExtent : std::uint8_t {
+  kCuboid = 0,  ///< the image of its cuboid, as networks that were trained on such labels (KITTI)
+  kOutline,     ///< its own image, which is rounder: what boxes drawn by hand enclose (COCO)
+};
+
 /// What the activations mean. Latched on the topic `model`, keyed by hash.
 struct ModelInfo {
   InstanceId instance = 0;
@@ -63,10 +69,10 @@ struct ModelInfo {
       classes;  ///< lower-case; K names, activations[k + 1] belongs to classes[k]
   std::uint32_t input_width = 0, input_height = 0;
   double box_sigma = 0.0;  ///< standard deviation of a box's side relative to its size; 0 = unknown
-  /// Four a class, or none: how far the sides (x1, y1, x2, y2) of its boxes lie inside the image of
-  /// the object's cuboid on average, in widths and heights of that image. A car's outline is
-  /// rounder than its cuboid's.
+  /// Four a class, or none: how far the sides (x1, y1, x2, y2) of its boxes lie inside of what they
+  /// enclose by `boxes`, on average, in widths and heights of that.
   std::vector<double> side_insets;
+  BoxExtent boxes = BoxExtent::kCuboid;
 };
 
 /// How one inference process follows another while frames go on (services/inference/README.md).

@@ -171,6 +171,7 @@ void describe(A& a, D& d, W& w) {
   a.numbers("side_insets", d.side_insets, w.side_insets, kInset, 4 * kClasses);
   a.ensure("side_insets", "size_mismatch",
            [&] { return d.side_insets.empty() || d.side_insets.size() == 4 * d.classes.size(); });
+  a.choice("boxes", d.boxes, w.boxes, BoxExtent::kOutline);
 }
 
 template <class A, Is<SwapNotice> D, class W>

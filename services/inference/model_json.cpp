@@ -128,6 +128,9 @@ void readAll(JsonReader& reader, const std::string& file, ModelDescription& mode
   readClasses(reader, file, model);
   readHeads(reader, file, model);
   reader.number("box_sigma", model.box_sigma, 0, 1);
+  reader.choice<BoxExtent>("box_extent", model.boxes,
+                           {{"cuboid", BoxExtent::kCuboid}, {"outline", BoxExtent::kOutline}},
+                           false);
   if (const Json* insets = reader.find("side_insets")) readInsets(*insets, reader, model);
   if (const Json* calibration = reader.find("calibration")) {
     readCalibration(*calibration, reader, model.calibration);

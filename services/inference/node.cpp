@@ -83,6 +83,7 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   info_.input_width = static_cast<std::uint32_t>(description_.input.width);
   info_.input_height = static_cast<std::uint32_t>(description_.input.height);
   info_.box_sigma = description_.box_sigma;
+  info_.boxes = description_.boxes;
   chooseClasses();
   if (!description_.side_insets.empty()) {
     for (const std::string& name : info_.classes) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "common/base/result.h"
 #include "services/semantic_filter/core/evidence.h"
@@ -14,6 +15,8 @@ namespace perdure::semantic_filter {
 
 class ModelBook {
  public:
+  explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
+
   /// Reason: "model_contradicts_its_hash": what was said first of a hash stands.
   Result<void> add(const ModelInfo& info);
   /// nullptr where no model of this hash was told, or too many since then.
@@ -27,6 +30,7 @@ class ModelBook {
     std::string name;
     Model model;
   };
+  ClassPriors priors_;
   std::map<std::uint64_t, Entry> entries_;
   std::deque<std::uint64_t> order_;  ///< of arrival
   std::uint64_t used_ = 0;

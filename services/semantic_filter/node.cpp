@@ -21,6 +21,7 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       instance_(instance),
       outputs_(std::move(outputs)),
       filter_(config.filter, priors),
+      models_(priors),
       drift_(config.filter.drift),
       long_term_(config.filter.memory, config.filter.motion.min_speed),
       former_(config.filter) {}

@@ -82,6 +82,7 @@ class Reader {
     p.azimuth_sigma = number(node, "azimuth_sigma", standard.azimuth_sigma, 0.01, 3.2);
     const YAML::Node yaw = node["yaw"];
     if (yaw && !YAML::convert<bool>::decode(yaw, p.has_yaw)) complain(yaw, "yaw: is true or false");
+    shape(node, p.shape);
     return p;
   }
 
@@ -90,16 +91,38 @@ class Reader {
   }
 
  private:
+  void shape(const YAML::Node& parent, Shape& target) {
+    const YAML::Node node = parent["shape"];
+    if (!node) return;
+    const auto wrong = [&](const YAML::Node& at) {
+      complain(at, "shape: one to three levels from the ground up, each [height, along, across, "
+                   "corner]: -1 to 1, and three shares from 0.05 to 1");
+    };
+    if (!node.IsSequence() || node.size() == 0 || node.size() > Shape::kMostLevels) {
+      return wrong(node);
+    }
+    std::vector<ShapeLevel> levels;
+    for (const YAML::Node& item : node) {
+      std::vector<double> v;
+      if (!YAML::convert<std::vector<double>>::decode(item, v) || v.size() != 4) return wrong(item);
+      const bool shares =
+          std::all_of(v.begin() + 1, v.end(), [](double s) { return s >= 0.05 && s <= 1.0; });
+      if (!shares || !(v[0] >= -1.0 && v[0] <= 1.0)) return wrong(item);
+      levels.push_back({v[0], v[1], v[2], v[3]});
+    }
+    target = shapeOf(levels);
+  }
+
   void checkKeys(const YAML::Node& node) {
     static const std::vector<std::string> known = {"size",          "spread", "common",
                                                    "frequency",     "moving", "speed",
-                                                   "azimuth_sigma", "yaw",    "detection"};
+                                                   "azimuth_sigma", "yaw",    "detection", "shape"};
     for (const auto& item : node) {
       const auto key = item.first.as<std::string>();
       if (std::find(known.begin(), known.end(), key) == known.end()) {
         complain(item.first, key +
                                  ": unknown; keys are size, spread, common, frequency, "
-                                 "detection, moving, speed, azimuth_sigma, yaw");
+                                 "detection, moving, speed, azimuth_sigma, yaw, shape");
       }
     }
   }

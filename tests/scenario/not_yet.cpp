@@ -9,100 +9,98 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.985, 0.978, 0.9: the car at 40 m is 16 px high and found in six looks of ten; it is "
-            "believed a little later"},
+            "0.986, 0.978, 0.902: the car at 40 m is 16 px high and found in six looks of ten; "
+            "it is believed a little later"},
            {"looks that showed a claimed thing and made it less sure",
-            "0, 0, 3: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
+            "0, 3, 0: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"occlusion",
        {
+           {"frames by which the last one before a return is wrong",
+            "2, 2, 2: what hides is taken for its cuboid, which is larger than it"},
            {"share of the predictions whose interval holds the return",
-            "0.9, 0.885, 0.875: the body stops behind what hides the thing, having gone on for "
-            "seconds: of the first prediction that cannot be known"},
+            "0.931, 0.846, 0.923: the body stops behind what hides the thing, having gone on "
+            "for seconds: of the first prediction that cannot be known"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 4, 6: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
+            "2, 1, 2: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
            {"merges that kept the younger id",
-            "0, 0, 1: not yet looked into; with true poses it passes"},
+            "1, 0, 0: not yet looked into"},
        }},
       {"vanish",
        {
            {"visible frames until the one that was taken is `missing`",
-            "14, 6, 6: not yet looked into"},
+            "14, 6, 17: not yet looked into"},
            {"it is on the map where it stands now, with its id",
             "1, 1, 0: its old belief is lost before the new one is confirmed, or the new one is "
             "not placed"},
            {"looks that showed a claimed thing and made it less sure",
-            "0, 0, 2: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
+            "0, 0, 6: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"room",
        {
-           {"objects for each one found",
-            "1.07, 1.11, 1.05: chairs close together change their ids"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
+            "2, 1, 0: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"row",
        {
            {"cars that are on the map twice at the end",
-            "1, 1, 1: cars of unusual size stand where the usual would"},
+            "3, 1, 0: cars of unusual size stand where the usual would"},
            {"cars of the row that are on the map within 0.5 m",
-            "3, 8, 8: placed along the line of sight to a metre"},
+            "10, 7, 8: not yet looked into since boxes are of shapes"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
+            "2, 2, 1: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "3.07, 28.1, 3.49: not by the roll alone: the estimate still settles as the camera "
+            "3.48, 5.7, 14.4: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.11, 0.142, 0.0736: not by the roll alone: the estimate still settles as the camera "
-            "comes nearer"},
+            "0.088, 0.119, 0.115: not by the roll alone: the estimate still settles as the "
+            "camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.27, 0.218, 0.214: not by the roll alone: the estimate still settles as the camera "
-            "comes nearer"},
+            "0.169, 0.357, 0.231: not by the roll alone: the estimate still settles as the "
+            "camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 1, 0: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
-           {"merges that lost existence", "0, 0, 1: a miss in the same frame"},
+            "0, 2, 3: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "2, 4, 2: what a moving car leaves behind where it was first believed to stand"},
+            "3, 2, 2: what a moving car leaves behind where it was first believed to stand"},
            {"`moved` events of the parked car that drives off",
-            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does not "
-            "come from its place"},
+            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does "
+            "not come from its place"},
            {"standing things on the map where nothing is",
-            "2, 4, 3: what a moving car leaves behind where it was first believed to stand"},
+            "4, 2, 2: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "6, 1, 6: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
-           {"merges that lost existence", "0, 1, 0: a miss in the same frame"},
+            "8, 6, 4: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"street",
        {
            {"second lap: share that keeps the id of the first",
-            "0.918, 0.957, 0.943: two beliefs in one thing, of which the older survives where the "
-            "younger was told of more often"},
+            "0.963, 0.929, 0.945: two beliefs in one thing, of which the older survives where "
+            "the younger was told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "7, 5, 7: some misses in a row, or a place lost for a few frames"},
+            "7, 7, 3: some misses in a row, or a place lost for a few frames"},
            {"looks that showed a claimed thing and made it less sure",
-            "5, 2, 5: looks whose box another thing may have made, or a belief of odd size given "
-            "up"},
+            "9, 3, 5: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
        }},
       {"street recalled",
        {
            {"second lap: share that keeps the id of the first",
-            "0.918: two beliefs in one thing, of which the older survives where the younger was "
+            "0.926: two beliefs in one thing, of which the older survives where the younger was "
             "told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "3: some misses in a row, or a place lost for a few frames"},
+            "4: some misses in a row, or a place lost for a few frames"},
        }},
       {"toy vio",
        {

@@ -238,7 +238,8 @@ void Study::measureSides(const Calibration& calibration) {
       if (h > kLarge_px && is.y1 > 1.0) errors.push_back((got.y1 - is.y1) / h);
       if (h > kLarge_px && is.y2 < frame.height - 1.0) errors.push_back((got.y2 - is.y2) / h);
       if (!target.hull) continue;
-      const Box& hull = *target.hull;
+      const bool outline = node_.description().boxes == BoxExtent::kOutline;
+      const Box& hull = outline ? target.box : *target.hull;
       if (std::min(hull.width(), hull.height()) <= kFull_px) continue;
       auto& of_class = insets[target.k - 1];
       of_class[0].push_back((got.x1 - hull.x1) / hull.width());

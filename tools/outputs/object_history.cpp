@@ -1,6 +1,7 @@
 #include "tools/outputs/object_history.h"
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 
 #include "common/math/so3.h"
 
@@ -28,47 +29,66 @@ ObjectRow rowOf(const ObjectBelief& object) {
 }
 
 struct Outline {
-  Box box;  ///< of the cuboid's corners; empty where the centre is not in the image
+  std::vector<cv::Point2f> hull;
   double depth = 0;
 };
 
-/// What a row looks like from a pose; nothing where its centre is outside the image.
-std::optional<Outline> outlineOf(const ObjectRow& row, const RigidTransform& T_CW,
-                                 const CameraModel& camera) {
+const ShapePoints& cuboidPoints() {
+  static const ShapePoints corners = [] {
+    ShapePoints points;
+    for (int i = 0; i < 8; ++i) {
+      points.emplace_back(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0);
+    }
+    return points;
+  }();
+  return corners;
+}
+
+/// What a row looks like from a pose: its shape's hull, or the box about its cuboid's image where
+/// no shape is known. Nothing where its centre is outside the image.
+std::optional<Outline> outlineOf(const ObjectRow& row, const ShapePoints* shape,
+                                 const RigidTransform& T_CW, const CameraModel& camera) {
   const Eigen::Vector3d centre = T_CW * row.p_W;
   const auto pixel = camera.project(centre);
   if (!pixel || !camera.inImage(*pixel)) return std::nullopt;
-  Outline outline{{pixel->x(), pixel->y(), pixel->x(), pixel->y()}, centre.z()};
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                               corner & 4 ? 0.5 : -0.5);
-    const auto at =
-        camera.project(T_CW * (row.p_W + rotationAboutZ(row.yaw) * half.cwiseProduct(row.size)));
-    if (!at) continue;
-    Box& box = outline.box;
-    box = Box{std::min(box.x1, at->x()), std::min(box.y1, at->y()), std::max(box.x2, at->x()),
-              std::max(box.y2, at->y())};
+  std::vector<cv::Point2f> points{{static_cast<float>(pixel->x()), static_cast<float>(pixel->y())}};
+  const Eigen::Matrix3d R = rotationAboutZ(row.yaw);
+  for (const Eigen::Vector3d& part : shape ? *shape : cuboidPoints()) {
+    const auto at = camera.project(T_CW * (row.p_W + 0.5 * (R * part.cwiseProduct(row.size))));
+    if (at) points.emplace_back(static_cast<float>(at->x()), static_cast<float>(at->y()));
   }
+  if (!shape) {
+    const auto [left, right] = std::minmax_element(
+        points.begin(), points.end(), [](const auto& p, const auto& q) { return p.x < q.x; });
+    const auto [top, bottom] = std::minmax_element(
+        points.begin(), points.end(), [](const auto& p, const auto& q) { return p.y < q.y; });
+    points = {{left->x, top->y}, {right->x, top->y}, {right->x, bottom->y}, {left->x, bottom->y}};
+  }
+  Outline outline{{}, centre.z()};
+  cv::convexHull(points, outline.hull);
   return outline;
 }
 
-bool covers(const Box& box, double x, double y) {
-  return x > box.x1 && x < box.x2 && y > box.y1 && y < box.y2;
+bool covers(const Outline& outline, const cv::Point2f& at) {
+  return cv::pointPolygonTest(outline.hull, at, false) > 0.0;
 }
 
 /// Share of an outline that no nearer one covers.
 double visibleShare(const Outline& outline, const std::vector<Outline>& all) {
   constexpr int kCells = 16;
-  int open = 0;
+  int open = 0, own = 0;
+  const cv::Rect2f box(cv::boundingRect(outline.hull));
   for (int i = 0; i < kCells * kCells; ++i) {
-    const double x = outline.box.x1 + (i % kCells + 0.5) / kCells * outline.box.width();
-    const double y = outline.box.y1 + (i / kCells + 0.5) / kCells * outline.box.height();
+    const cv::Point2f at(box.x + (static_cast<float>(i % kCells) + 0.5F) / kCells * box.width,
+                         box.y + (static_cast<float>(i / kCells) + 0.5F) / kCells * box.height);
+    if (!covers(outline, at)) continue;
+    ++own;
     const bool covered = std::any_of(all.begin(), all.end(), [&](const Outline& other) {
-      return other.depth < outline.depth && covers(other.box, x, y);
+      return other.depth < outline.depth && covers(other, at);
     });
     open += covered ? 0 : 1;
   }
-  return static_cast<double>(open) / (kCells * kCells);
+  return own == 0 ? 1.0 : static_cast<double>(open) / own;
 }
 
 }  // namespace
@@ -165,7 +185,9 @@ std::vector<ObjectRow> ObjectHistory::finalRowsOf(const FrameRecord& record,
     ObjectRow row = rowOf(last_.at(id));
     row.visible = !look.hidden;
     if (camera_) {
-      const auto outline = outlineOf(row, (record.T_WB * camera_->T_BC()).inverse(), *camera_);
+      const auto shape = shapes_.find(row.class_name);
+      const auto outline = outlineOf(row, shape == shapes_.end() ? nullptr : &shape->second,
+                                     (record.T_WB * camera_->T_BC()).inverse(), *camera_);
       if (!outline) continue;
       outlines.push_back(*outline);
     }

@@ -16,6 +16,9 @@
 
 namespace perdure::tools {
 
+/// Corners of a convex solid, in halves of length, width and height from the middle.
+using ShapePoints = std::vector<Eigen::Vector3d>;
+
 /// A line of objects_inst.csv or objects_final.csv: centre in W, metres, radians.
 struct ObjectRow {
   std::uint64_t frame = 0;
@@ -34,6 +37,9 @@ class ObjectHistory {
  public:
   /// Needed for FINAL: which frames the last estimate projects into.
   void setCamera(const CameraCalibration& calibration) { camera_.emplace(calibration); }
+  /// By class: what its things fill of their cuboids, for FINAL too. Of the rest no more is known
+  /// than the box about the cuboid's image, as before this is told.
+  void setShapes(std::map<std::string, ShapePoints> shapes) { shapes_ = std::move(shapes); }
   void add(const Objects& objects);
   void add(const Event& event);
 
@@ -65,6 +71,7 @@ class ObjectHistory {
   std::vector<ObjectRow> finalRowsOf(const FrameRecord& record, std::set<ObjectId>& begun) const;
   std::map<ObjectId, Look> looksOfSurvivors(const FrameRecord& record) const;
 
+  std::map<std::string, ShapePoints> shapes_;
   std::optional<CameraModel> camera_;
   std::map<std::uint64_t, FrameRecord> frames_;
   std::map<ObjectId, ObjectBelief> last_;

@@ -26,6 +26,9 @@ class OutputWriter {
   /// `sequence` fills the column of that name.
   OutputWriter(std::filesystem::path folder, std::string sequence);
 
+  void setShapes(std::map<std::string, ShapePoints> shapes) {
+    history_.setShapes(std::move(shapes));
+  }
   void onCalibration(const Calibration& calibration);
   void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);

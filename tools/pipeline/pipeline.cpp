@@ -58,11 +58,19 @@ void Pipeline::openRun() {
 
 void Pipeline::learn(const ModelInfo& model) {
   keep("model", model, TimePoint());
+  hear(model);
+}
+
+void Pipeline::hear(const ModelInfo& model) {
+  if (model.boxes == BoxExtent::kOutline) outputs_->setShapes(shapes_);
   filter_->onModel(model);
 }
 
 void Pipeline::openFilter() {
   const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
+  for (const auto& prior : priors.classes) {
+    shapes_[prior.name].assign(prior.shape.points.begin(), prior.shape.points.end());
+  }
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
@@ -163,6 +171,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
     file.file = options.detections;
     file.class_name = options.class_name;
     file.box_origin = options.box_origin;
+    if (options.outline_boxes) file.boxes = BoxExtent::kOutline;
     detection_file_ = replay::DetectionFile::read(file, aliases);
     return;
   }

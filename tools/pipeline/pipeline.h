@@ -64,6 +64,7 @@ class Pipeline {
   void openFilter();
   void openRun();
   void learn(const ModelInfo& model);
+  void hear(const ModelInfo& model);
   // In pipeline_recorded.cpp.
   void checkRecorded();
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
@@ -91,6 +92,7 @@ class Pipeline {
   StageTimer timer_;
   std::unique_ptr<replay::Dataset> dataset_;
   std::unique_ptr<OutputWriter> outputs_;
+  std::map<std::string, ShapePoints> shapes_;  ///< of the class priors
   std::unique_ptr<replay::RecordingWriter> run_;
   std::int64_t run_ns_ = 0;
   std::unique_ptr<PoseOdometry> poses_;

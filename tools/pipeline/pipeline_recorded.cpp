@@ -60,7 +60,7 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
   if (message.topic == "calibration") {
     give(Calibration(), [&](const auto& m) { filter([&] { filter_->onCalibration(m); }); });
   } else if (message.topic == "model") {
-    give(ModelInfo(), [&](const auto& m) { filter([&] { filter_->onModel(m); }); });
+    give(ModelInfo(), [&](const auto& m) { filter([&] { hear(m); }); });
   } else if (message.topic == "inference/swap") {
     give(SwapNotice(), [&](const auto& m) { filter([&] { filter_->onSwap(m); }); });
   } else if (message.topic == "odometry") {

@@ -22,6 +22,7 @@ struct PipelineOptions {
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
   double box_origin = 0.0;
+  bool outline_boxes = false;
   std::optional<double> seconds;
   std::optional<std::int64_t> seed;      ///< of --detections simulated
   std::vector<std::string> configs;      ///< service=FILE

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/types/detections.h"
+
 namespace perdure::inference {
 
 /// How the network's heads are laid out; one decode rule each (core/decode.cpp).
@@ -121,6 +123,7 @@ struct ModelDescription {
   double reach = 0.0;         ///< perdure: cells that a cell's centre may lie outside its box
   double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: the network has none
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0 unknown
+  BoxExtent boxes = BoxExtent::kCuboid;
   std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
   Calibration calibration;
 };

@@ -77,7 +77,7 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
     const Keyframe& k = *looks_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    const auto box = projectObserved(then, k.from->projector, k.from->insets->of(class_name_));
+    const auto box = projectObserved(then, k.from->projector, k.from->styles->of(class_name_));
     if (!box) return std::nullopt;
     const auto use = comparableSides(k.z, *box, k.hidden);
     const auto row = static_cast<Eigen::Index>(4 * i);

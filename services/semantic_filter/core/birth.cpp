@@ -34,7 +34,7 @@ class BirthCost {
         range_(range),
         log_size_(prior.log_size),
         start_(start),
-        offset_(frame.offsetOf(prior.name)) {
+        style_(frame.styleOf(prior.name)) {
     bias_sigma_ = biasSigma(viewWalkOf(frame).lasting, z_.width(), z_.height()).cwiseMax(1e-6);
     position_weight_ = 1.0 / std::max((start - from_.T_WC.p).norm(), 1.0);
     size_whitening_ = Cholesky(prior.log_size_covariance).whiten(Eigen::Matrix3d::Identity());
@@ -43,7 +43,7 @@ class BirthCost {
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     State x = State::Zero();
     x.head<kFree>() = Eigen::Map<const VectorFit>(parameters);
-    const auto box = projectObserved(x, from_, offset_);
+    const auto box = projectObserved(x, from_, style_);
     if (!box) return false;
     Eigen::Map<Residuals> r(residuals);
     Jacobian J = Jacobian::Zero();
@@ -82,7 +82,7 @@ class BirthCost {
   double yaw_, yaw_sigma_;
   std::optional<RangeHint> range_;
   Eigen::Vector3d log_size_, start_;
-  Eigen::Vector4d offset_;
+  const BoxStyle& style_;
   double position_weight_ = 1.0;
   Eigen::Vector4d bias_sigma_;
   Eigen::Matrix3d size_whitening_;
@@ -170,7 +170,7 @@ double logShapeRatio(const Fit& fit, const ClassPrior& prior, double yaw_sigma,
                      const Evidence& evidence, const FrameContext& frame) {
   const auto& z = evidence.z;
   const auto box = projectObserved(fit.hypothesis.x, frame.projector(),
-                                   frame.offsetOf(fit.hypothesis.class_name));
+                                   frame.styleOf(fit.hypothesis.class_name));
   const bool whole = z.count() == 4 && box &&
                      std::all_of(box->exact.begin(), box->exact.end(), [](bool e) { return e; });
   if (!whole) return -fit.cost;

@@ -9,17 +9,17 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
-/// The cuboid and its eight corners before the camera.
+/// The corners of a shape before the camera.
 struct Corners {
   Eigen::Matrix3d R_WO;
   Eigen::Vector3d half;  ///< of length, width, height
-  std::array<Eigen::Vector3d, 8> p_C;
-  bool all_before = true;  ///< the near plane
+  const Shape* shape = nullptr;
+  InplaceVector<Eigen::Vector3d, Shape::kMostPoints> p_C;
+  bool any_before = false, all_before = true;  ///< the near plane
 
   /// From the centre, along the cuboid's axes.
   Eigen::Vector3d local(int i) const {
-    return {(i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
-            (i & 4) ? half.z() : -half.z()};
+    return half.cwiseProduct(shape->points[static_cast<std::size_t>(i)]);
   }
 };
 
@@ -28,29 +28,29 @@ struct ImagePoint {
   int corner;  ///< -1: a cut by the near plane
 };
 
-/// Nothing where all of it lies behind the near plane.
-std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from) {
+/// Nothing where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
+/// are cut there.
+std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from,
+                                           const Shape& shape) {
   const Eigen::Vector3d centre_C = from.R_CW * (x.head<3>() - from.T_WC.p);
   const Eigen::Vector3d half = 0.5 * x.segment<3>(kSize).array().exp();
-  if (centre_C.z() + half.norm() < kNear) return std::nullopt;
+  const double reach = half.norm();
+  if (centre_C.z() + reach < kNear) return std::nullopt;
   std::optional<Corners> result(std::in_place);
   Corners& c = *result;
   c.half = half;
+  c.shape = centre_C.z() - reach < kNear ? &cuboidShape() : &shape;
   c.R_WO = from.R_WL * rotationAboutZ(x[kYaw]);
   const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
   const Eigen::Vector3d along = half.x() * R_CO.col(0), across = half.y() * R_CO.col(1),
                         up = half.z() * R_CO.col(2);
-  bool any = false;
-  for (int i = 0; i < 8; ++i) {
-    c.p_C[i] = centre_C;
-    (i & 1) ? c.p_C[i] += along : c.p_C[i] -= along;
-    (i & 2) ? c.p_C[i] += across : c.p_C[i] -= across;
-    (i & 4) ? c.p_C[i] += up : c.p_C[i] -= up;
-    const bool before = c.p_C[i].z() >= kNear;
-    any = any || before;
+  for (const Eigen::Vector3d& u : c.shape->points) {
+    c.p_C.push_back(((centre_C + u.x() * along) + u.y() * across) + u.z() * up);
+    const bool before = c.p_C[c.p_C.size() - 1].z() >= kNear;
+    c.any_before = c.any_before || before;
     c.all_before = c.all_before && before;
   }
-  if (!any) return std::nullopt;
+  if (!c.any_before) return std::nullopt;
   return result;
 }
 
@@ -66,7 +66,7 @@ void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Project
              const Corners& corners) {
   box.sides[side] = point.pixel[side % 2];
   Eigen::Matrix<double, 2, 3> J_point;
-  if (point.corner < 0 || !from.camera->project(corners.p_C[point.corner], &J_point)) {
+  if (point.corner < 0 || !from.camera->project(corners.p_C[static_cast<std::size_t>(point.corner)], &J_point)) {
     box.exact[side] = false;
     return;
   }
@@ -77,7 +77,8 @@ void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Project
   box.H.row(side).head<3>() = by_W;
   box.H(side, kYaw) = by_O.y() * local.x() - by_O.x() * local.y();  // turns x towards y
   box.H.row(side).segment<3>(kSize) = by_O.cwiseProduct(local.transpose());
-  const Eigen::Vector3d p_B = from.R_BC * corners.p_C[point.corner] + from.camera->T_BC().p;
+  const Eigen::Vector3d& p_C = corners.p_C[static_cast<std::size_t>(point.corner)];
+  const Eigen::Vector3d p_B = from.R_BC * p_C + from.camera->T_BC().p;
   const Eigen::Vector3d by_B = from.R_BC * by_C.transpose();
   box.H_pose.row(side).head<3>() = by_B.cross(p_B).transpose();
   box.H_pose.row(side).tail<3>() = -by_W;
@@ -85,10 +86,12 @@ void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Project
 
 using ImagePoints = InplaceVector<ImagePoint, kMostOutline>;
 
-void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
+/// Of the cuboid's edges.
+void addCuts(ImagePoints& points, std::size_t i, const Corners& corners,
+             const CameraModel& camera) {
   const Eigen::Vector3d& a = corners.p_C[i];
-  for (int axis = 1; axis < 8; axis <<= 1) {
-    const int j = i | axis;
+  for (std::size_t axis = 1; axis < 8; axis <<= 1) {
+    const std::size_t j = i | axis;
     if (j == i) continue;
     const Eigen::Vector3d& b = corners.p_C[j];
     if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
@@ -99,9 +102,9 @@ void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraMod
 
 ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
   ImagePoints points;
-  for (int i = 0; i < 8; ++i) {
+  for (std::size_t i = 0; i < corners.p_C.size(); ++i) {
     const Eigen::Vector3d& a = corners.p_C[i];
-    if (a.z() >= kNear) points.push_back({pixelOf(camera, a), i});
+    if (a.z() >= kNear) points.push_back({pixelOf(camera, a), static_cast<int>(i)});
     if (!corners.all_before) addCuts(points, i, corners, camera);
   }
   return points;
@@ -120,9 +123,10 @@ Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
   return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
 }
 
-std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from) {
+std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
+                                          const Shape& shape) {
   std::optional<ProjectedBox> result;
-  const auto corners = cornersBeforeCamera(x, from);
+  const auto corners = cornersBeforeCamera(x, from, shape);
   if (!corners) return result;
   ProjectedBox& box = result.emplace();
   const auto points = imagePoints(*corners, *from.camera);
@@ -139,8 +143,8 @@ std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from)
 }
 
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
-                                            const Eigen::Vector4d& offset) {
-  auto box = projectCuboid(x, from);
+                                            const BoxStyle& style) {
+  auto box = projectCuboid(x, from, style.shape);
   if (!box) return box;
   const double limit[2] = {2.0 * from.camera->width(), 2.0 * from.camera->height()};
   for (int low = 0; low < 2; ++low) {
@@ -150,7 +154,7 @@ std::optional<ProjectedBox> projectObserved(const State& x, const Projector& fro
         (box->H.row(high) - box->H.row(low)).head<kGeometry>();
     const Eigen::Matrix<double, 1, 6> by_pose = box->H_pose.row(high) - box->H_pose.row(low);
     for (const int i : {low, high}) {
-      const double b = x[kBias + i] + offset[i];
+      const double b = x[kBias + i] + style.offset[i];
       box->sides[i] += b * std::min(extent, limit[low]);
       box->H(i, kBias + i) = std::min(extent, limit[low]);
       if (extent >= limit[low]) continue;

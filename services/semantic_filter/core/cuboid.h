@@ -1,5 +1,5 @@
-// The image of a cuboid: the box around its eight corners, with Jacobians (b = π(g s) of eq. 7).
-// The cuboid stands upright: its z axis is against gravity; yaw 0 has its length along W's x.
+// The image of a thing in its cuboid: the box around its corners, with Jacobians (b = π(g s) of
+// eq. 7). The cuboid stands upright: its z axis is against gravity; yaw 0 has its length along W's x.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,6 +9,7 @@
 #include "common/camera/camera_model.h"
 #include "services/semantic_filter/core/object.h"
 #include "services/semantic_filter/core/polygon.h"
+#include "services/semantic_filter/core/shape.h"
 
 namespace perdure::semantic_filter {
 
@@ -42,12 +43,20 @@ struct ProjectedBox {
 /// R_WO of an upright cuboid.
 Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
 /// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
-std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from);
+/// The box is of `shape` within the cuboid, or of all of it where that reaches the near plane.
+std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
+                                          const Shape& shape = cuboidShape());
 
-/// What a detector reports of it: the cuboid's box with the hypothesis's b and the detector's mean
-/// `offset` (in widths and heights, like b) added to its sides.
+/// How a detector draws its boxes about things of a class.
+struct BoxStyle {
+  Eigen::Vector4d offset = Eigen::Vector4d::Zero();  ///< mean, in widths and heights, like b
+  Shape shape = cuboidShape();                       ///< what they enclose of the cuboid
+};
+
+/// What a detector reports of it: the shape's box with the hypothesis's b and the style's offset
+/// added to its sides.
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
-                                            const Eigen::Vector4d& offset);
+                                            const BoxStyle& style);
 
 /// Yaw in W from KITTI's alpha seen at `centre_W`: alpha = rotation_y - atan2(x, z) of the centre,
 /// in the gravity-levelled camera frame (DESIGN 5, item 8).

@@ -5,24 +5,37 @@
 
 namespace perdure::semantic_filter {
 
-Model makeModel(const ModelInfo& info) {
+namespace {
+
+BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors) {
+  BoxStyles styles;
+  if (info.boxes == BoxExtent::kOutline) {
+    for (const ClassPrior& prior : priors.classes) styles.by_class[prior.name].shape = prior.shape;
+  }
+  if (info.side_insets.size() != 4 * info.classes.size() || info.classes.empty()) return styles;
+  std::map<std::string, Eigen::Vector4d> offsets;
+  for (std::size_t k = 0; k < info.classes.size(); ++k) {
+    const Eigen::Vector4d inset(&info.side_insets[4 * k]);
+    // Left and top move to larger coordinates, right and bottom to smaller ones.
+    const Eigen::Vector4d offset(inset[0], inset[1], -inset[2], -inset[3]);
+    offsets[info.classes[k]] = offset;
+    styles.rest.offset += offset / static_cast<double>(info.classes.size());
+  }
+  for (auto& [name, style] : styles.by_class) style.offset = styles.rest.offset;
+  for (const auto& [name, offset] : offsets) styles.by_class[name].offset = offset;
+  return styles;
+}
+
+}  // namespace
+
+Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
   Model model;
   model.classes = info.classes;
   model.names = std::make_shared<const ClassNames>(info.classes.begin(), info.classes.end());
   for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
   model.input_width = info.input_width;
   model.box_sigma = info.box_sigma;
-  if (info.side_insets.size() == 4 * info.classes.size() && !info.classes.empty()) {
-    auto insets = std::make_shared<Insets>();
-    for (std::size_t k = 0; k < info.classes.size(); ++k) {
-      const Eigen::Vector4d inset(&info.side_insets[4 * k]);
-      // Left and top move to larger coordinates, right and bottom to smaller ones.
-      const Eigen::Vector4d offset(inset[0], inset[1], -inset[2], -inset[3]);
-      insets->by_class[info.classes[k]] = offset;
-      insets->mean += offset / static_cast<double>(info.classes.size());
-    }
-    model.insets = std::move(insets);
-  }
+  model.styles = std::make_shared<const BoxStyles>(stylesOf(info, priors));
   return model;
 }
 

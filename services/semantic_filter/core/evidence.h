@@ -12,18 +12,18 @@
 
 #include "common/types/detections.h"
 #include "services/semantic_filter/core/box_likelihood.h"
+#include "services/semantic_filter/core/priors.h"
 
 namespace perdure::semantic_filter {
 
-/// Where a model's boxes lie in the cuboids' images, by class. Of a class it does not name: the
-/// mean.
-struct Insets {
-  std::map<std::string, Eigen::Vector4d> by_class;
-  Eigen::Vector4d mean = Eigen::Vector4d::Zero();
+/// How a model draws its boxes, by class.
+struct BoxStyles {
+  std::map<std::string, BoxStyle> by_class;
+  BoxStyle rest;  ///< of a class that neither it nor the priors name: the mean of its offsets
 
-  const Eigen::Vector4d& of(const std::string& class_name) const {
+  const BoxStyle& of(const std::string& class_name) const {
     const auto it = by_class.find(class_name);
-    return it == by_class.end() ? mean : it->second;
+    return it == by_class.end() ? rest : it->second;
   }
 };
 
@@ -36,9 +36,10 @@ struct Model {
   std::map<std::string, std::size_t> index;  ///< name to position in `classes`
   double input_width = 0.0;                  ///< of the network, 0 = unknown
   double box_sigma = 0.0;
-  std::shared_ptr<const Insets> insets = std::make_shared<const Insets>();
+  std::shared_ptr<const BoxStyles> styles = std::make_shared<const BoxStyles>();
 };
-Model makeModel(const ModelInfo& info);
+/// Shapes are the priors', where the model says that its boxes enclose what is seen of a thing.
+Model makeModel(const ModelInfo& info, const ClassPriors& priors = {});
 /// What the model says of all its boxes, in images of this width in pixels.
 BoxNoise boxNoise(const Model& model, double image_width);
 

@@ -15,14 +15,14 @@ namespace perdure::semantic_filter {
 /// From where a frame's looks were taken; shared by all of them, and owner of its camera.
 struct KeyView {
   KeyView(const View& of, const PoseError& pose_error, TimePoint at,
-          std::shared_ptr<const Insets> of_model)
+          std::shared_ptr<const BoxStyles> of_model)
       : camera(*of.camera),
         view(of),
         error(pose_error),
         time(at),
         T_WC(of.T_WC()),
         projector(of),
-        insets(std::move(of_model)) {
+        styles(std::move(of_model)) {
     view.camera = projector.camera = &camera;
   }
   KeyView(const KeyView&) = delete;
@@ -34,7 +34,7 @@ struct KeyView {
   TimePoint time;
   RigidTransform T_WC;
   Projector projector;
-  std::shared_ptr<const Insets> insets;  ///< of the network that looked
+  std::shared_ptr<const BoxStyles> styles;  ///< of the network that looked
 };
 
 /// One box that was surely the object's.

@@ -46,9 +46,10 @@ struct FrameContext {
 
   /// Of `view`.
   Projector projector() const;
-  /// Where the network's boxes lie in the cuboid's image, on average, as projectObserved takes it.
-  Eigen::Vector4d offsetOf(const std::string& class_name) const {
-    return model ? model->insets->of(class_name) : Eigen::Vector4d::Zero();
+  /// How the network draws its boxes about things of a class, as projectObserved takes it.
+  const BoxStyle& styleOf(const std::string& class_name) const {
+    static const BoxStyle plain;
+    return model ? model->styles->of(class_name) : plain;
   }
 };
 

@@ -7,8 +7,9 @@
 
 namespace perdure::semantic_filter {
 
-/// Of points: the images of a cuboid's corners and of its edges' cuts by the near plane, or fewer.
-inline constexpr std::size_t kMostOutline = 20;
+/// Of points: the images of a shape's corners, or of a cuboid's and of its edges' cuts by the near
+/// plane.
+inline constexpr std::size_t kMostOutline = 24;
 /// With room for the points that cutting at the four borders of an image adds.
 using Polygon = InplaceVector<Eigen::Vector2d, kMostOutline + 8>;
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "services/semantic_filter/core/shape.h"
+
 namespace perdure::semantic_filter {
 
 struct ClassPrior {
@@ -19,6 +21,7 @@ struct ClassPrior {
   double speed_sigma = 0.0;            ///< of moving ones, along their length, m/s
   bool has_yaw = true;                 ///< false: too round for its yaw to show in a box
   double azimuth_sigma = 0.35;         ///< radians, floor of what a network's azimuth deserves
+  Shape shape = cuboidShape();         ///< what its things fill of their cuboids
 };
 
 /// How often things of two classes stand near each other, learned from maps (core/context.h).

@@ -76,7 +76,7 @@ class Expected {
     const Object& object = belief_.objects[j];
     const Hypothesis& best = object.best();
     const State x = stateAt(best, toSeconds(input_.stamp.time - object.as_of));
-    e.box = projectObserved(x, from_, input_.model.insets->of(best.class_name));
+    e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name));
     if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
     return e;
   }
@@ -106,7 +106,7 @@ FrameContext SemanticFilter::contextOf(const FrameInput& input) const {
           &priors_,
           &parameters_,
           std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
-                                          input.model.insets)};
+                                          input.model.styles)};
 }
 
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {

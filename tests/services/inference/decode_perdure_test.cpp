@@ -169,6 +169,21 @@ TEST(DecodePerdure, RefusesADescriptionThatDoesNotFitItself) {
   }
 }
 
+TEST(DecodePerdure, BoxesEncloseCuboidsUnlessItIsSaidOtherwise) {
+  testing::TinyOnnx tiny;
+  const std::string plain = tiny.azimuth_json;
+  EXPECT_EQ(parseModelDescription(tiny.json(), "m.json").boxes, BoxExtent::kCuboid);
+  tiny.azimuth_json = R"("box_extent": "outline",)" + plain;
+  EXPECT_EQ(parseModelDescription(tiny.json(), "m.json").boxes, BoxExtent::kOutline);
+  tiny.azimuth_json = R"("box_extent": "hull",)" + plain;
+  try {
+    parseModelDescription(tiny.json(), "m.json");
+    FAIL() << "it was taken";
+  } catch (const StartupError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("\"hull\" is not one of cuboid, outline"));
+  }
+}
+
 TEST(DecodePerdure, InsetsAreFourOfEachOfTheModelsClasses) {
   testing::TinyOnnx tiny;
   const std::string plain = tiny.azimuth_json;

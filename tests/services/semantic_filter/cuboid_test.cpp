@@ -52,25 +52,80 @@ TEST_F(Cuboid, JacobianByThePoseMatchesDifferences) {
 TEST_F(Cuboid, TheDetectorsErrorMovesEachSideByItsShareOfTheBox) {
   x.segment<4>(kBias) << 0.1, -0.05, 0.02, 0.03;
   const auto plain = projectCuboid(x, view),
-             seen = projectObserved(x, view, Eigen::Vector4d::Zero());
+             seen = projectObserved(x, view, BoxStyle());
   ASSERT_TRUE(plain && seen);
   const double width = plain->sides[2] - plain->sides[0];
   const double height = plain->sides[3] - plain->sides[1];
   EXPECT_NEAR(seen->sides[0] - plain->sides[0], 0.1 * width, 1e-9);
   EXPECT_NEAR(seen->sides[3] - plain->sides[3], 0.03 * height, 1e-9);
   const auto by_object = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
-    return projectObserved(State(v), view, Eigen::Vector4d::Zero())->sides;
+    return projectObserved(State(v), view, BoxStyle())->sides;
   };
   const auto by_pose = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     View moved = view;
     moved.T_WB = boxPlus(view.T_WB, v);
-    return projectObserved(x, moved, Eigen::Vector4d::Zero())->sides;
+    return projectObserved(x, moved, BoxStyle())->sides;
   };
   const Eigen::MatrixXd H = numericJacobian(by_object, x);
   const Eigen::MatrixXd H_pose = numericJacobian(by_pose, Eigen::VectorXd::Zero(6));
   EXPECT_LT((seen->H - H).cwiseAbs().maxCoeff(), 1e-4 * (1.0 + H.cwiseAbs().maxCoeff()));
   EXPECT_LT((seen->H_pose - H_pose).cwiseAbs().maxCoeff(),
             1e-4 * (1.0 + H_pose.cwiseAbs().maxCoeff()));
+}
+
+/// A car: wheels within its length, round corners, a roof that is narrower than the rest.
+Shape roundShape() {
+  return shapeOf({{-1.0, 0.65, 0.9, 1.0}, {0.0, 1.0, 1.0, 0.8}, {1.0, 0.2, 0.65, 0.7}});
+}
+
+TEST_F(Cuboid, AShapeLiesWithinItsCuboidAndCutsTheLowerCornersOff) {
+  const Shape shape = roundShape();
+  EXPECT_EQ(shape.points.size(), 20u) << "a level without cut corners has four";
+  const auto whole = projectCuboid(x, view), round = projectCuboid(x, view, shape);
+  ASSERT_TRUE(whole && round);
+  for (int side = 0; side < 4; ++side) {
+    const double inside = (side < 2 ? 1 : -1) * (round->sides[side] - whole->sides[side]);
+    EXPECT_GE(inside, 0.0) << side;
+  }
+  const double height = whole->sides[3] - whole->sides[1];
+  EXPECT_GT(whole->sides[3] - round->sides[3], 0.03 * height);
+}
+
+TEST_F(Cuboid, TheCuboidIsAShapeToo) {
+  const auto plain = projectCuboid(x, view);
+  const auto shaped = projectCuboid(x, view, shapeOf({{-1, 1, 1, 1}, {1, 1, 1, 1}}));
+  ASSERT_TRUE(plain && shaped);
+  EXPECT_EQ(plain->sides, shaped->sides);
+  EXPECT_EQ(plain->H, shaped->H);
+}
+
+TEST_F(Cuboid, JacobiansOfAShapeMatchDifferences) {
+  const BoxStyle style{Eigen::Vector4d(0.02, -0.01, 0.03, 0.0), roundShape()};
+  x.segment<4>(kBias) << 0.1, -0.05, 0.02, 0.03;
+  const auto box = projectObserved(x, view, style);
+  ASSERT_TRUE(box);
+  const auto by_object = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    return projectObserved(State(v), view, style)->sides;
+  };
+  const auto by_pose = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    View moved = view;
+    moved.T_WB = boxPlus(view.T_WB, v);
+    return projectObserved(x, moved, style)->sides;
+  };
+  const Eigen::MatrixXd H = numericJacobian(by_object, x);
+  const Eigen::MatrixXd H_pose = numericJacobian(by_pose, Eigen::VectorXd::Zero(6));
+  EXPECT_LT((box->H - H).cwiseAbs().maxCoeff(), 1e-4 * (1.0 + H.cwiseAbs().maxCoeff()));
+  EXPECT_LT((box->H_pose - H_pose).cwiseAbs().maxCoeff(),
+            1e-4 * (1.0 + H_pose.cwiseAbs().maxCoeff()));
+}
+
+TEST_F(Cuboid, AShapeThatReachesTheNearPlaneIsItsCuboid) {
+  const State beside =
+      makeState(view.T_WB.p.x() + 1.0, view.T_WB.p.y() - 2.0, 0.5, 0.4, 5.0, 2.0, 1.5);
+  const auto whole = projectCuboid(beside, view), round = projectCuboid(beside, view, roundShape());
+  ASSERT_TRUE(whole && round);
+  EXPECT_EQ(whole->sides, round->sides);
+  EXPECT_EQ(whole->exact, round->exact);
 }
 
 TEST_F(Cuboid, LinearCovarianceOfTheBoxMatchesMonteCarlo) {

@@ -57,6 +57,35 @@ TEST(ClassPriors, EveryMistakeIsNamedWithItsPlace) {
   }
 }
 
+TEST(ClassPriors, ShapesLieWithinTheCuboidAndFillItsLengthAndWidth) {
+  const ClassPriors priors = loadClassPriors(sourceFolder() + "/config/class_priors.yaml");
+  EXPECT_FALSE(priors.of("car").shape.is_cuboid);
+  EXPECT_TRUE(priors.of("zebra crossing").shape.is_cuboid);
+  for (const auto& p : priors.classes) {
+    Eigen::Vector3d most = Eigen::Vector3d::Zero(), least = most;
+    for (const Eigen::Vector3d& point : p.shape.points) {
+      most = most.cwiseMax(point), least = least.cwiseMin(point);
+    }
+    EXPECT_EQ(most, Eigen::Vector3d::Ones()) << p.name << ": size would not be its size";
+    EXPECT_EQ(least, -Eigen::Vector3d::Ones()) << p.name;
+  }
+}
+
+TEST(ClassPriors, AShapeThatIsNoneIsNamedWithItsPlace) {
+  for (const char* wrong : {"7", "[]", "[[0, 1, 1]]", "[[0, 1, 1, 2]]", "[[-2, 1, 1, 1]]",
+                            "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]"}) {
+    const std::string yaml = std::string("fallback: {}\nother: {}\nclasses:\n  car: {shape: ") +
+                             wrong + "}\n";
+    try {
+      parseClassPriors(yaml, "priors.yaml");
+      ADD_FAILURE() << "accepted " << wrong;
+    } catch (const StartupError& e) {
+      EXPECT_NE(std::string(e.what()).find("priors.yaml:4:"), std::string::npos) << e.what();
+      EXPECT_NE(std::string(e.what()).find("shape: one to three levels"), std::string::npos);
+    }
+  }
+}
+
 TEST(ClassPriors, AMissingFileIsNamed) {
   try {
     loadClassPriors("/nowhere/priors.yaml");

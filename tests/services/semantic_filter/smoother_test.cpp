@@ -80,7 +80,7 @@ class Passing {
     }
     keyframe.from = std::make_shared<const KeyView>(View{&camera_, believed, seen.up_W}, error_,
                                                     fromNanoseconds(std::int64_t{200'000'000} * k),
-                                                    std::make_shared<const Insets>());
+                                                    std::make_shared<const BoxStyles>());
     keyframes_.push_back(std::make_shared<const Keyframe>(keyframe));
     if (k == 17) truth_.head<3>() += t * truth_.tail<3>();
   }
@@ -259,12 +259,29 @@ TEST(Insets, MoveTheBoxInwardsAndAreAMeanForWhatTheyDoNotName) {
   const View view{&camera, RigidTransform(), Eigen::Vector3d::UnitZ()};
   const State x = makeState(20, 1, 0, 0.4, 4, 2, 1.5);
   const auto whole = projectCuboid(x, view);
-  const auto car = projectObserved(x, view, model.insets->of("car"));
+  const auto car = projectObserved(x, view, model.styles->of("car"));
   ASSERT_TRUE(whole && car);
   const double w = whole->sides[2] - whole->sides[0], h = whole->sides[3] - whole->sides[1];
   EXPECT_TRUE(car->sides.isApprox(whole->sides + Eigen::Vector4d(0.1 * w, 0, -0.1 * w, -0.2 * h)));
-  EXPECT_TRUE(model.insets->of(kOtherClass).isApprox(Eigen::Vector4d(0.03, 0.01, -0.04, -0.07)));
-  EXPECT_TRUE(makeModel(testing::makeModelInfo()).insets->of("car").isZero());
+  EXPECT_TRUE(model.styles->of(kOtherClass).offset.isApprox(Eigen::Vector4d(0.03, 0.01, -0.04, -0.07)));
+  EXPECT_TRUE(makeModel(testing::makeModelInfo()).styles->of("car").offset.isZero());
+}
+
+TEST(BoxStyles, AreThePriorsShapesWhereTheBoxesEncloseOutlines) {
+  ClassPriors priors;
+  priors.classes = {ClassPrior{.name = "car"}, ClassPrior{.name = "unicorn"}};
+  priors.classes[0].shape = shapeOf({{-1, 0.5, 0.5, 1}, {1, 1, 1, 0.5}});
+  ModelInfo info = testing::makeModelInfo();
+  EXPECT_TRUE(makeModel(info, priors).styles->of("car").shape.is_cuboid);
+  info.boxes = BoxExtent::kOutline;
+  info.side_insets.assign(4 * info.classes.size(), 0.02);
+  const Model model = makeModel(info, priors);
+  EXPECT_EQ(model.styles->of("car").shape.points.size(), 12u);
+  EXPECT_DOUBLE_EQ(model.styles->of("car").offset[0], 0.02);
+  EXPECT_TRUE(model.styles->of("unicorn").shape.is_cuboid);
+  EXPECT_DOUBLE_EQ(model.styles->of("unicorn").offset[3], -0.02)
+      << "of a class that the network does not know: the mean";
+  EXPECT_TRUE(model.styles->of(kOtherClass).shape.is_cuboid);
 }
 
 TEST(Keyframes, NewViewsAreRememberedAndTheMostAlikeForgotten) {

@@ -42,6 +42,7 @@ def description(temperature=1.0, clutter_rate=0.5, box_sigma=0.0, azimuth_sigma=
         "spread_scale": spread_scale,
         "levels": levels,
         "box_sigma": box_sigma,
+        "box_extent": "outline",
         "side_insets": side_insets or {},
         "calibration": {"temperature": temperature, "clutter_rate": clutter_rate},
     }

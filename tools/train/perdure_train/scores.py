@@ -210,15 +210,16 @@ def side_errors(frames):
 
 
 def side_insets(frames, cls):
-    """How far the sides lie inside the image of the cuboid, in its widths and heights: medians
-    (x1, y1, x2, y2) over the clear matches of one class; zeros where those are few."""
+    """How far the sides lie inside the outline, in its widths and heights: medians (x1, y1, x2, y2)
+    over the clear matches of one class that are wholly in sight; zeros where those are few."""
     insets = []
     for detections, truth, i, j in matches(frames, CLEAR):
-        hull = truth["hulls"][j]
-        sides = np.array([hull[2] - hull[0], hull[3] - hull[1]] * 2)
-        if truth["classes"][j] != cls or not sides.min() > FULL:
+        outline = truth["boxes"][j]
+        sides = np.array([outline[2] - outline[0], outline[3] - outline[1]] * 2)
+        whole = np.isfinite(truth["hulls"][j]).all()
+        if truth["classes"][j] != cls or not whole or not sides.min() > FULL:
             continue
-        insets.append((detections["boxes"][i] - hull) / sides * [1, 1, -1, -1])
+        insets.append((detections["boxes"][i] - outline) / sides * [1, 1, -1, -1])
     return np.median(insets, 0) if len(insets) >= 20 else np.zeros(4)
 
 

@@ -1,0 +1,32 @@
+// What a thing fills of its cuboid: a car stands on wheels, and its corners and its roof are round.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/base/inplace_vector.h"
+
+namespace perdure::semantic_filter {
+
+/// A level outline of the thing: a rectangle about the middle whose corners are cut.
+struct ShapeLevel {
+  double height = 0.0;                 ///< -1 (the ground) … 1 (the top)
+  double along = 1.0, across = 1.0;    ///< of half the length and half the width, (0, 1]
+  double corner = 1.0;                 ///< where the cut begins, of each side's half; 1: a rectangle
+};
+
+/// The corners of a convex solid; the image of its hull is the thing's.
+struct Shape {
+  static constexpr std::size_t kMostLevels = 3, kMostPoints = 8 * kMostLevels;
+  using Points = InplaceVector<Eigen::Vector3d, kMostPoints>;
+
+  Points points;  ///< in halves of length, width and height from the middle, -1 … 1
+  bool is_cuboid = false;
+};
+
+/// Bit i of a corner's number is set on the far side of axis i.
+const Shape& cuboidShape();
+/// At most Shape::kMostLevels of them.
+Shape shapeOf(const std::vector<ShapeLevel>& levels);
+
+}  // namespace perdure::semantic_filter
