@@ -23,7 +23,8 @@ std::string beyond(const Model& model, const Model& other, const std::string& ti
 }  // namespace
 
 Result<void> ModelBook::add(const ModelInfo& info) {
-  const auto [it, fresh] = entries_.try_emplace(info.hash, Entry{info.name, makeModel(info, priors_)});
+  const auto [it, fresh] =
+      entries_.try_emplace(info.hash, Entry{info.name, makeModel(info, priors_)});
   if (!fresh) {
     if (it->second.model.classes == info.classes) return {};
     return fail("model_contradicts_its_hash", info.name);

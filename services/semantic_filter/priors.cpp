@@ -95,8 +95,9 @@ class Reader {
     const YAML::Node node = parent["shape"];
     if (!node) return;
     const auto wrong = [&](const YAML::Node& at) {
-      complain(at, "shape: one to three levels from the ground up, each [height, along, across, "
-                   "corner]: -1 to 1, and three shares from 0.05 to 1");
+      complain(at,
+               "shape: one to three levels from the ground up, each [height, along, across, "
+               "corner]: -1 to 1, and three shares from 0.05 to 1");
     };
     if (!node.IsSequence() || node.size() == 0 || node.size() > Shape::kMostLevels) {
       return wrong(node);
@@ -114,9 +115,9 @@ class Reader {
   }
 
   void checkKeys(const YAML::Node& node) {
-    static const std::vector<std::string> known = {"size",          "spread", "common",
-                                                   "frequency",     "moving", "speed",
-                                                   "azimuth_sigma", "yaw",    "detection", "shape"};
+    static const std::vector<std::string> known = {
+        "size",  "spread",        "common", "frequency", "moving",
+        "speed", "azimuth_sigma", "yaw",    "detection", "shape"};
     for (const auto& item : node) {
       const auto key = item.first.as<std::string>();
       if (std::find(known.begin(), known.end(), key) == known.end()) {

@@ -25,8 +25,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
            {"looks that showed a claimed thing and made it less sure",
             "2, 1, 2: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
-           {"merges that kept the younger id",
-            "1, 0, 0: not yet looked into"},
+           {"merges that kept the younger id", "1, 0, 0: not yet looked into"},
        }},
       {"vanish",
        {

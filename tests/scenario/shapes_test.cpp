@@ -1,5 +1,5 @@
-// Whether the shapes of config/class_priors.yaml are those of the simulator's things: what is in the
-// image of a thing, by the renderer, against the image of its shape, seen upright and leaning.
+// Whether the shapes of config/class_priors.yaml are those of the simulator's things: what is in
+// the image of a thing, by the renderer, against the image of its shape, seen upright and leaning.
 #include <gtest/gtest.h>
 
 #include <cmath>

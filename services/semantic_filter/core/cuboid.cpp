@@ -66,7 +66,8 @@ void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Project
              const Corners& corners) {
   box.sides[side] = point.pixel[side % 2];
   Eigen::Matrix<double, 2, 3> J_point;
-  if (point.corner < 0 || !from.camera->project(corners.p_C[static_cast<std::size_t>(point.corner)], &J_point)) {
+  if (point.corner < 0 ||
+      !from.camera->project(corners.p_C[static_cast<std::size_t>(point.corner)], &J_point)) {
     box.exact[side] = false;
     return;
   }

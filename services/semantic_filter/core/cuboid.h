@@ -1,5 +1,6 @@
 // The image of a thing in its cuboid: the box around its corners, with Jacobians (b = π(g s) of
-// eq. 7). The cuboid stands upright: its z axis is against gravity; yaw 0 has its length along W's x.
+// eq. 7). The cuboid stands upright: its z axis is against gravity; yaw 0 has its length along x of
+// W.
 #pragma once
 
 #include <Eigen/Core>

@@ -10,9 +10,9 @@ namespace perdure::semantic_filter {
 
 /// A level outline of the thing: a rectangle about the middle whose corners are cut.
 struct ShapeLevel {
-  double height = 0.0;                 ///< -1 (the ground) … 1 (the top)
-  double along = 1.0, across = 1.0;    ///< of half the length and half the width, (0, 1]
-  double corner = 1.0;                 ///< where the cut begins, of each side's half; 1: a rectangle
+  double height = 0.0;               ///< -1 (the ground) … 1 (the top)
+  double along = 1.0, across = 1.0;  ///< of half the length and half the width, (0, 1]
+  double corner = 1.0;               ///< where the cut begins, of each side's half; 1: a rectangle
 };
 
 /// The corners of a convex solid; the image of its hull is the thing's.

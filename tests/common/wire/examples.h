@@ -135,8 +135,14 @@ class Examples {
          uniform(0, 1), uniform(0, 1)};
   }
   void fill(ModelInfo& m) {
-    m = {bits(),     bits(),     word(),        several([&] { return word(); }),
-         below(999), below(999), uniform(0, 1), {},
+    m = {bits(),
+         bits(),
+         word(),
+         several([&] { return word(); }),
+         below(999),
+         below(999),
+         uniform(0, 1),
+         {},
          coin() ? BoxExtent::kOutline : BoxExtent::kCuboid};
     for (std::size_t i = 0; i < 4 * m.classes.size(); ++i) {
       m.side_insets.push_back(uniform(-0.4, 0.4));

@@ -51,8 +51,7 @@ TEST_F(Cuboid, JacobianByThePoseMatchesDifferences) {
 
 TEST_F(Cuboid, TheDetectorsErrorMovesEachSideByItsShareOfTheBox) {
   x.segment<4>(kBias) << 0.1, -0.05, 0.02, 0.03;
-  const auto plain = projectCuboid(x, view),
-             seen = projectObserved(x, view, BoxStyle());
+  const auto plain = projectCuboid(x, view), seen = projectObserved(x, view, BoxStyle());
   ASSERT_TRUE(plain && seen);
   const double width = plain->sides[2] - plain->sides[0];
   const double height = plain->sides[3] - plain->sides[1];

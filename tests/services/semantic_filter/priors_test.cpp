@@ -74,8 +74,8 @@ TEST(ClassPriors, ShapesLieWithinTheCuboidAndFillItsLengthAndWidth) {
 TEST(ClassPriors, AShapeThatIsNoneIsNamedWithItsPlace) {
   for (const char* wrong : {"7", "[]", "[[0, 1, 1]]", "[[0, 1, 1, 2]]", "[[-2, 1, 1, 1]]",
                             "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]"}) {
-    const std::string yaml = std::string("fallback: {}\nother: {}\nclasses:\n  car: {shape: ") +
-                             wrong + "}\n";
+    const std::string yaml =
+        std::string("fallback: {}\nother: {}\nclasses:\n  car: {shape: ") + wrong + "}\n";
     try {
       parseClassPriors(yaml, "priors.yaml");
       ADD_FAILURE() << "accepted " << wrong;

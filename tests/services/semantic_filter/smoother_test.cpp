@@ -263,7 +263,8 @@ TEST(Insets, MoveTheBoxInwardsAndAreAMeanForWhatTheyDoNotName) {
   ASSERT_TRUE(whole && car);
   const double w = whole->sides[2] - whole->sides[0], h = whole->sides[3] - whole->sides[1];
   EXPECT_TRUE(car->sides.isApprox(whole->sides + Eigen::Vector4d(0.1 * w, 0, -0.1 * w, -0.2 * h)));
-  EXPECT_TRUE(model.styles->of(kOtherClass).offset.isApprox(Eigen::Vector4d(0.03, 0.01, -0.04, -0.07)));
+  EXPECT_TRUE(
+      model.styles->of(kOtherClass).offset.isApprox(Eigen::Vector4d(0.03, 0.01, -0.04, -0.07)));
   EXPECT_TRUE(makeModel(testing::makeModelInfo()).styles->of("car").offset.isZero());
 }
 
