@@ -17,11 +17,6 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
        }},
       {"occlusion",
        {
-           {"frames by which the last one before a return is wrong",
-            "2, 2, 2: what hides is taken for its cuboid, which is larger than it"},
-           {"share of the predictions whose interval holds the return",
-            "0.931, 0.846, 0.923: the body stops behind what hides the thing, having gone on "
-            "for seconds: of the first prediction that cannot be known"},
            {"looks that showed a claimed thing and made it less sure",
             "2, 1, 2: looks whose box another thing may have made, or a belief of odd size "
             "given up"},

@@ -11,6 +11,9 @@ namespace {
 constexpr double kHorizon_s = 10.0;
 constexpr double kStride_s = 0.25;        // what is in sight for less may be passed over
 constexpr std::size_t kMostBlockers = 6;  // those next to it in the image
+constexpr double kCellsAcross = 16.0;     // of a depth buffer's cells, across a thing
+constexpr double kMayBeFound = 0.5;       // of the share below which a miss says nothing
+constexpr double kSliver = 0.01;          // share in sight that nothing is found by
 constexpr double kNineInTen = 1.645;      // deviations of a Gaussian
 
 using Walk = std::vector<View>;  // one a frame, the present one first
@@ -30,7 +33,12 @@ Walk walkOn(const View& now, const Way& way, double pace) {
 struct Standing {
   const Object* object;
   State x;
+  const Shape* shape;
 };
+
+const Shape& shapeOf(const Object& object, const FrameInput& now) {
+  return now.model.styles->of(object.best().class_name).shape;
+}
 
 /// What may hide it on the way: solid, nearer, and next to it in the image.
 std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Object& hidden,
@@ -44,7 +52,7 @@ std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Objec
     const Eigen::Vector3d other = x.head<3>() - eye;
     if (other.norm() > ray.norm()) continue;
     const double apart = std::atan2(ray.cross(other).norm(), ray.dot(other));
-    near.push_back({o.id == hidden.blocked_by ? 0.0 : apart, {&o, x}});
+    near.push_back({o.id == hidden.blocked_by ? 0.0 : apart, {&o, x, &shapeOf(o, now)}});
   }
   const std::size_t kept = std::min(near.size(), kMostBlockers);
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(kept), near.end(),
@@ -54,20 +62,47 @@ std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Objec
   return result;
 }
 
-/// Of the first of `things`, as the others leave it.
+/// What lies within `sides` of a convex hull's points.
+Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
+  Polygon part = clip(clip(convexHull(points), 0, sides[0], true), 0, sides[2], false);
+  return clip(clip(part, 1, sides[1], true), 1, sides[3], false);
+}
+
+/// Of the first of `things`, as the others leave it. Finer than a frame's own depth buffer: which
+/// frame it is hangs on a tenth of a small thing.
 double shareInSight(const std::vector<Standing>& things, const View& view,
-                    const VisibilityParameters& parameters) {
+                    VisibilityParameters parameters) {
   std::vector<Outline> outlines;
-  for (const Standing& s : things) outlines.push_back(outlineOf(*s.object, s.x, view));
+  for (const Standing& s : things) {
+    outlines.push_back(outlineOf(*s.object, s.x, view, *s.shape));
+    const auto& window = outlines.front().box;
+    if (!window) return 0.0;
+    auto& box = outlines.back().box;
+    if (box && outlines.size() > 1) box->points = within(window->sides, box->points);
+  }
+  const Eigen::Vector4d& sides = outlines.front().box->sides;
+  const double side = std::min(sides[2] - sides[0], sides[3] - sides[1]);
+  parameters.cell_px = std::clamp(static_cast<std::int64_t>(side / kCellsAcross), std::int64_t{1},
+                                  parameters.cell_px);
+  parameters.minimum = 0.0;
   const CameraModel& camera = *view.camera;
   return see(outlines, {}, camera.width(), camera.height(), parameters).front().fraction;
 }
 
-/// The first frame after the present one from which some of the first of `things` is seen.
+/// Of the first of `things`, from which on it may be found. What shows as much already and was not
+/// found is found when a miss would say that it is gone.
+double shareToBeFound(const std::vector<Standing>& things, const View& now,
+                      const VisibilityParameters& parameters) {
+  const double sure = std::max(parameters.minimum, kSliver), least = kMayBeFound * sure;
+  return shareInSight(things, now, parameters) < least ? least : sure;
+}
+
+/// The first frame after the present one from which `share` of the first of `things` is seen.
 std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, const Walk& walk,
-                                        double frame_s, const VisibilityParameters& parameters) {
+                                        double share, double frame_s,
+                                        const VisibilityParameters& parameters) {
   const auto inSight = [&](std::size_t n) {
-    return shareInSight(things, walk[n], parameters) > 0.0;
+    return shareInSight(things, walk[n], parameters) >= share;
   };
   const auto stride = static_cast<std::size_t>(std::max(1.0, std::floor(kStride_s / frame_s)));
   for (std::size_t n = stride; n < walk.size(); n += stride) {
@@ -126,8 +161,9 @@ bool goes(const Way& way) { return way.seconds > 0.0 && way.step.p.allFinite(); 
 
 std::vector<Standing> inPlay(const std::vector<Object>& objects, const Object& hidden,
                              const FrameInput& now, const VisibilityParameters& parameters) {
-  std::vector<Standing> things{
-      {&hidden, stateAt(hidden.best(), toSeconds(now.stamp.time - hidden.as_of))}};
+  std::vector<Standing> things{{&hidden,
+                                stateAt(hidden.best(), toSeconds(now.stamp.time - hidden.as_of)),
+                                &shapeOf(hidden, now)}};
   const auto blockers = blockersOf(objects, hidden, now, parameters);
   things.insert(things.end(), blockers.begin(), blockers.end());
   return things;
@@ -139,8 +175,10 @@ std::optional<double> expectReturn(const std::vector<Object>& objects, const Obj
                                    const FrameInput& now, const Way& way,
                                    const VisibilityParameters& parameters) {
   if (!goes(way)) return std::nullopt;
-  const auto n = firstInSight(inPlay(objects, hidden, now, parameters), walkOn(now.view, way, 1.0),
-                              way.seconds, parameters);
+  const auto things = inPlay(objects, hidden, now, parameters);
+  const auto n =
+      firstInSight(things, walkOn(now.view, way, 1.0), shareToBeFound(things, now.view, parameters),
+                   way.seconds, parameters);
   return n ? std::optional(way.seconds * static_cast<double>(*n)) : std::nullopt;
 }
 
@@ -151,10 +189,11 @@ std::optional<Foreseen> foreseeReturn(const std::vector<Object>& objects, const 
   const double speed = way.step.p.norm() / way.seconds;
   auto things = inPlay(objects, hidden, now, parameters);
   const Walk walk = walkOn(now.view, way, 1.0);
-  const auto expected = firstInSight(things, walk, way.seconds, parameters);
+  const double share = shareToBeFound(things, now.view, parameters);
+  const auto expected = firstInSight(things, walk, share, way.seconds, parameters);
   if (!expected) return std::nullopt;
   const auto at = [&](const Walk& on) {
-    const auto n = firstInSight(things, on, way.seconds, parameters).value_or(walk.size());
+    const auto n = firstInSight(things, on, share, way.seconds, parameters).value_or(walk.size());
     return way.seconds * static_cast<double>(n);
   };
   Foreseen result;

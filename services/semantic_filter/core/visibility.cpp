@@ -188,7 +188,7 @@ Sight classify(const Tally& tally, double in_image, double by_points,
 
 }  // namespace
 
-Outline outlineOf(const Object& object, const State& x, const Projector& from) {
+Outline outlineOf(const Object& object, const State& x, const Projector& from, const Shape& shape) {
   const Hypothesis& h = object.best();
   const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
   Outline o;
@@ -198,7 +198,7 @@ Outline outlineOf(const Object& object, const State& x, const Projector& from) {
   const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
   o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
   o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-  o.box = projectCuboid(x, from);
+  o.box = projectCuboid(x, from, shape);
   return o;
 }
 

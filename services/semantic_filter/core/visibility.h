@@ -34,8 +34,9 @@ struct SightPoint {
   double sigma_m = 0.0;
 };
 
-/// Of the object's cuboid `x`, as it is seen `from` there.
-Outline outlineOf(const Object& object, const State& x, const Projector& from);
+/// Of the object in its cuboid `x`, as it is seen `from` there.
+Outline outlineOf(const Object& object, const State& x, const Projector& from,
+                  const Shape& shape = cuboidShape());
 
 /// One Sight for each outline, in the same order; `width`, `height` of the image in pixels.
 std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
