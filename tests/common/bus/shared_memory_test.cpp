@@ -43,7 +43,8 @@ class SharedMemory : public testing::Test {
     }
     test::ownNetwork();
     if (!test::ownFiles()) {
-      GTEST_SKIP() << "no /tmp of one's own: mount is not allowed here";
+      GTEST_SKIP()
+          << "no /tmp of one's own: mount is not allowed here, or the programs are below /tmp";
     }
     folder_ = std::make_unique<test::Folder>();
   }

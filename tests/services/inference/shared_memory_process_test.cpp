@@ -19,7 +19,9 @@ TEST(InferenceService, LooksAtImagesInSharedMemoryAndStillHearsItself) {
   if (std::system("command -v iox-roudi > /dev/null") != 0) {
     GTEST_SKIP() << "iox-roudi is not installed: deploy/install --runtime";
   }
-  if (!test::ownFiles()) GTEST_SKIP() << "no /tmp of one's own: mount is not allowed here";
+  if (!test::ownFiles())
+    GTEST_SKIP()
+        << "no /tmp of one's own: mount is not allowed here, or the programs are below /tmp";
   test::Folder folder;
   Child roudi({"iox-roudi", "-m", "off", "-c", (test::sources() / "deploy/roudi.toml").string()},
               folder.file("roudi.log"));
