@@ -227,6 +227,8 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"what is given up and found again in its place within it is the same thing", "s"});
   fields.number("tend.merge_overlap", t.merge_overlap, between(0, 1),
                 {"shared over joint volume at which two objects are one"});
+  fields.number("tend.merge_turns", t.merge_turns, between(0, 1),
+                {"the same of two that were in sight together and never found in one frame"});
   fields.number("tend.merge_inside", p.tend.merge_inside, positive(),
                 {"share of a thing of no known class that lies in a known one and makes it that"});
   fields.integer("tend.max_objects", t.max_objects, between(1, 1000000),

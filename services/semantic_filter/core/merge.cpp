@@ -1,6 +1,7 @@
 #include "services/semantic_filter/core/merge.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "common/math/gaussian.h"
@@ -12,6 +13,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
+constexpr double kSurelyOne = 0.6;    // overlap that two boxes of one frame do not make two things
 constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
 
 bool isOther(const Object& o) { return o.best().class_name == kOtherClass; }
@@ -31,12 +33,38 @@ bool knownAsWell(const Object& guess, const Object& thing) {
   return guess.once_confirmed || kFewer * guess.hits >= thing.hits;
 }
 
+/// They contradict each other: their mean would be wrong with more certainty than either, and of
+/// cuboids that are turned against each other it is of no thing's shape.
+bool contradict(const Hypothesis& a, const Hypothesis& b) {
+  constexpr double kBeyond = 24.3;  // of a squared deviation in seven dimensions, one in a thousand
+  constexpr double kTurned = 0.35;  // rad
+  if (a.moving) return false;
+  const Vector7d d = geometryDifference(a, b);
+  if (std::abs(d[kYaw]) > kTurned) return true;
+  const Cholesky P(a.P.topLeftCorner<kGeometry, kGeometry>() +
+                   b.P.topLeftCorner<kGeometry, kGeometry>());
+  return !P.positive() || P.whiten(d).squaredNorm() > kBeyond;
+}
+
+/// As many as both have, weighed by how often each was found: later looks will tell.
+void keepBoth(Object& a, const Object& b) {
+  const double share = static_cast<double>(b.hits) / std::max(1.0, double(a.hits) + double(b.hits));
+  for (auto& h : a.hypotheses) h.weight *= 1.0 - share;
+  for (Hypothesis h : b.hypotheses) {
+    h.weight *= share;
+    a.hypotheses.push_back(std::move(h));
+  }
+  normalise(a, ClassEvidence::kMerge);
+}
+
 void absorb(Object& a, const Object& b, const FrameContext& frame) {
   if (isOther(a) != isOther(b)) {
     if (isOther(a) && knownAsWell(b, a)) {
       a.hypotheses = b.hypotheses;
       a.classes = b.classes;
     }
+  } else if (contradict(a.best(), b.best())) {
+    keepBoth(a, b);
   } else {
     const ClassPrior& prior = frame.priors->of(a.best().class_name);
     const double weight = a.best().weight;
@@ -58,6 +86,8 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.late_view.looks += b.late_view.looks;
   a.support = std::max(a.support, b.support);
   a.found_rate.join(b.found_rate, screenScales(frame.parameters->visibility));
+  a.sightings.in_sight |= b.sightings.in_sight;
+  a.sightings.found |= b.sightings.found;
   a.remembers_all = a.remembers_all && b.remembers_all;
   const auto& box = frame.parameters->box;
   joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
@@ -125,13 +155,32 @@ Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W)
           shared / std::min(size_a.prod(), size_b.prod())};
 }
 
-/// Two beliefs about one thing: they overlap in space and in the image; or one is of no known class
-/// and lies in the other, since two solid things cannot share their space.
+/// Two boxes of one frame are of two things.
+bool foundTogether(const Object& a, const Object& b) {
+  return (a.sightings.found & b.sightings.found) != 0;
+}
+
+/// In sight both, each frame's box went to the one or to the other: so do two beliefs share the
+/// boxes of one thing.
+bool takeTurns(const Object& a, const Object& b) {
+  constexpr int kTurns = 4;
+  const Sightings &of_a = a.sightings, &of_b = b.sightings;
+  if (foundTogether(a, b) || a.hits < 2 || b.hits < 2) return false;
+  return std::popcount((of_a.found ^ of_b.found) & of_a.in_sight & of_b.in_sight) >= kTurns;
+}
+
+/// Two beliefs about one thing: they overlap in space and in the image, or less and take turns; or
+/// one is of no known class and lies in the other, since two solid things cannot share their space.
 bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
   const State &x = a.best().x, &y = b.best().x;
   const TendParameters& tend = frame.parameters->tend;
   const Shared shared = sharedVolume(x, y, frame.view.up_W);
-  if (isOther(a) != isOther(b) && shared.of_lesser > tend.merge_inside) return true;
+  if (isOther(a) != isOther(b)) {
+    if (shared.of_lesser > tend.merge_inside) return true;
+  } else {
+    if (shared.of_joint < kSurelyOne && foundTogether(a, b)) return false;
+    if (shared.of_joint >= tend.merge_turns && takeTurns(a, b)) return true;
+  }
   return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.projector());
 }
 

@@ -48,6 +48,17 @@ struct ViewPoint {
 /// Out of the picture, not behind something, for so long: what comes next is another visit.
 inline constexpr double kAnotherVisit_s = 1.0;
 
+/// Of the last 64 frames that heard detections, a bit each: whether the object was in sight, and
+/// whether it was found. Bits of one belief are of the same frames.
+struct Sightings {
+  std::uint64_t in_sight = 0, found = 0;
+
+  void add(bool is_in_sight, bool is_found) {
+    in_sight = in_sight << 1 | (is_in_sight ? 1U : 0U);
+    found = found << 1 | (is_found ? 1U : 0U);
+  }
+};
+
 struct Keyframe;
 
 struct Object {
@@ -71,6 +82,7 @@ struct Object {
   double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
   std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
   FoundRate found_rate;
+  Sightings sightings;
   double support = 1.0;         ///< share of late visible looks that showed it
   double seen_existence = 0.0;  ///< existence after the last look that showed it
   Visibility visibility = Visibility::kVisible;

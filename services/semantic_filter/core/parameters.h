@@ -109,6 +109,7 @@ struct TendParameters {
   double hypothesis_merge = 1.0;  ///< squared Mahalanobis distance
   double return_s = 60.0;         ///< what is found again in its place within it is the same thing
   double merge_overlap = 0.25;
+  double merge_turns = 0.1;   ///< the same of two that take turns in being found
   double merge_inside = 0.3;  ///< share of a thing of no known class that lies in a known one
   std::int64_t max_objects = 2000;
 };
@@ -138,7 +139,7 @@ struct MemoryParameters {
 struct AlignmentParameters {
   double nats = 25.0;         ///< against chance, at least
   double margin_nats = 10.0;  ///< above the best other way
-  std::int64_t pairs = 4;              ///< things that are surely in both, at least
+  std::int64_t pairs = 4;     ///< things that are surely in both, at least
   double known_share = 0.7;   ///< of what is seen is on the map
 };
 

@@ -347,6 +347,10 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook&
   births(belief, sights, claimed, input, frame, ids);
   std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
+  for (Object& o : belief.objects) {
+    const bool in_sight = o.visible_fraction > 0.0;
+    o.sightings.add(in_sight, in_sight && o.last_seen == input.stamp.time);
+  }
   report.merges = mergeObjects(belief.objects, frame);
   const auto moved = reuniteMoved(belief.objects, priors_);
   report.merges.insert(report.merges.end(), moved.begin(), moved.end());

@@ -99,6 +99,60 @@ TEST_F(Tending, OfTwoOfOneClassInOnePlaceTheOlderStays) {
   EXPECT_GE(objects[0].existence, 0.9);
 }
 
+/// As many frames as `pattern` has letters: which of two things in sight was found ("a", "b",
+/// "+" both, "-" none).
+void see(std::vector<Object>& two, const std::string& pattern) {
+  for (const char c : pattern) {
+    two[0].sightings.add(true, c == 'a' || c == '+');
+    two[1].sightings.add(true, c == 'b' || c == '+');
+  }
+}
+
+TEST_F(Tending, WhatOverlapsALittleAndTakesTurnsIsOne) {
+  const auto merged = [&](double apart_m, const std::string& pattern) {
+    std::vector<Object> objects = {
+        makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
+        makeObject(2, "car", makeState(10 + apart_m, 0, 0.7, 0, 4, 1.8, 1.5), 0.1)};
+    see(objects, pattern);
+    return mergeObjects(objects, frame).size() == 1;
+  };
+  const double little = 3.0, touching = 3.8;  // IoU of 1/7 and of 1/39
+  EXPECT_TRUE(merged(little, "abba"));
+  EXPECT_TRUE(merged(little, "-a-b--aaa"));
+  EXPECT_FALSE(merged(little, "abb-")) << "too few";
+  EXPECT_FALSE(merged(little, "abbaab+")) << "two boxes of one frame are of two things";
+  EXPECT_FALSE(merged(touching, "abbaabba"));
+  EXPECT_TRUE(merged(1.0, "----"));
+  EXPECT_FALSE(merged(1.1, "ab+")) << "two things that touch, badly placed";
+  EXPECT_TRUE(merged(0.3, "ab+")) << "two boxes of one thing, as networks make them";
+}
+
+TEST_F(Tending, OneThatIsOutOfSightTakesNoTurns) {
+  std::vector<Object> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
+                                 makeObject(2, "car", makeState(13, 0, 0.7, 0, 4, 1.8, 1.5), 0.1)};
+  for (int i = 0; i < 20; ++i) {
+    objects[0].sightings.add(i < 10, i < 10);
+    objects[1].sightings.add(i >= 10, i >= 10);
+  }
+  EXPECT_TRUE(mergeObjects(objects, frame).empty());
+}
+
+TEST_F(Tending, OfBeliefsThatContradictEachOtherBothAreKept) {
+  // A mean of cuboids that are turned against each other is of no thing.
+  std::vector<Object> objects = {
+      makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
+      makeObject(2, "car", makeState(10, 0.1, 0.7, 0.5, 4, 1.8, 1.5), 0.1)};
+  objects[0].hits = 3, objects[1].hits = 9;
+  ASSERT_EQ(mergeObjects(objects, frame).size(), 1u);
+  const Object& one = objects[0];
+  EXPECT_EQ(one.id, 1u);
+  EXPECT_EQ(one.hits, 12u);
+  ASSERT_EQ(one.hypotheses.size(), 2u);
+  EXPECT_NEAR(one.best().x[kYaw], 0.5, 1e-12) << "that which was found more often";
+  EXPECT_NEAR(one.best().weight, 0.75, 1e-9);
+  EXPECT_NEAR(one.hypotheses[1].x[kYaw], 0.0, 1e-12);
+}
+
 TEST_F(Tending, AGuessOfOneLookDoesNotOverruleWhatWasLookedAtForLong) {
   // A toy that leaves the picture, and the car that its rest at the border looks like.
   const State toy = makeState(1.4, -0.4, 1.3, 0, 0.4, 0.2, 0.15);
