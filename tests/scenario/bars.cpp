@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <set>
 #include <stdexcept>
 
 namespace perdure::test {
@@ -40,6 +42,16 @@ struct Merges {
 Merges mergesOf(const Outcome& run) {
   Merges merges;
   std::set<std::uint64_t> absorbed;
+  std::map<std::uint64_t, std::uint64_t> claimed_at;  // the first frame, by id
+  for (const JournalFrame& f : run.journal.frames) {
+    for (const Glance& g : f.objects) {
+      if (g.confirmed) claimed_at.try_emplace(g.id, f.frame);
+    }
+  }
+  const auto wasClaimed = [&](std::uint64_t id, std::uint64_t until) {
+    const auto it = claimed_at.find(id);
+    return it != claimed_at.end() && it->second <= until;
+  };
   for (const auto& event : run.events) {
     if (event["event"] != "merged") continue;
     merges.count += 1.0;
@@ -51,7 +63,9 @@ Merges mergesOf(const Outcome& run) {
     const Glance* b = before ? before->find(other) : nullptr;
     if (!now || !a || !b) continue;
     // What was claimed keeps its id, whatever guesses are older.
-    if (a->confirmed == b->confirmed && b->first_seen < a->first_seen) merges.younger += 1.0;
+    const bool kept_was = wasClaimed(kept, before->frame);
+    const bool other_was = wasClaimed(other, before->frame);
+    if (kept_was == other_was && b->first_seen < a->first_seen) merges.younger += 1.0;
     if (now->hits < a->hits + b->hits) merges.lost_hits += 1.0;
     // A miss in the same frame may take a little.
     if (now->existence < std::max(a->existence, b->existence) - 0.05) merges.lost_existence += 1.0;

@@ -313,7 +313,7 @@ double logBirthRatio(const Evidence& evidence, const FrameContext& frame) {
     sum += frame.priors->of(name).frequency * std::exp(logRatio(evidence, *frame.model, name));
   }
   const double named = sum / frequencies(frame);
-  return std::log(p.birth.odds) +
+  return std::log(p.birth.odds) - evidence.log_remnants +
          std::log((1.0 - p.clutter.other_prior) * named +
                   p.clutter.other_prior * std::exp(evidence.log_ratio_other));
 }

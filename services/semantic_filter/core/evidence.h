@@ -46,6 +46,8 @@ BoxNoise boxNoise(const Model& model, double image_width);
 struct Evidence {
   BoxMeasurement z;
   double log_clutter = 0.0;
+  /// By which things of which too little is seen to ask for them make such a box commoner, nats.
+  double log_remnants = 0.0;
   std::vector<double> log_ratio;  ///< by the model's class, clamped
   double log_ratio_best = 0.0;    ///< the most of them
   double log_ratio_other = 0.0;   ///< of a real thing of no known class, at first sight

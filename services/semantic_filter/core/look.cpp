@@ -73,8 +73,11 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double
 double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters) {
   const auto& ignored = score.ignored;
-  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) return e.log_clutter;
-  return logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
+  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) {
+    return e.log_clutter + e.log_remnants;
+  }
+  return e.log_remnants +
+         logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
 }
 
 Projector FrameContext::projector() const { return key_view ? key_view->projector : view; }

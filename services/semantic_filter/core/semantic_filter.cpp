@@ -247,6 +247,28 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
   }
 }
 
+std::optional<FrameInput> SemanticFilter::withRemnants(const Belief& belief,
+                                                       const std::vector<Sight>& sights,
+                                                       const FrameInput& input) const {
+  Expected expected(belief, input, parameters_);
+  std::optional<FrameInput> result;
+  for (std::size_t z = 0; z < input.boxes->size(); ++z) {
+    double boxes = 0.0;
+    for (std::size_t j = 0; j < sights.size(); ++j) {
+      const Object& o = belief.objects[j];
+      const double found =
+          o.existence * sights[j].remnant * priors_.of(o.best().class_name).detection_probability;
+      if (found <= 0.0) continue;
+      const auto fit = expected.fit(j, sights[j].hidden, (*input.boxes)[z]);
+      if (fit) boxes += found * std::exp(*fit);
+    }
+    if (boxes <= 0.0) continue;
+    if (!result) result = input;
+    (*result->boxes)[z].log_remnants = std::log1p(boxes);
+  }
+  return result;
+}
+
 bool SemanticFilter::leavesView(Expected& expected, const Belief& belief,
                                 const std::vector<Sight>& sights, const Evidence& box) {
   if (box.z.count() == 4) return false;  // what leaves is cut by the border
@@ -332,10 +354,12 @@ std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, Obj
   return MergeRecord{id, absorbed};
 }
 
-StepReport SemanticFilter::step(Belief& belief, const FrameInput& input, IdBook& ids) const {
+StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook& ids) const {
+  auto sights = seeAll(belief, heard);
+  if (!heard.boxes) return {};
+  const auto explained = withRemnants(belief, sights, heard);
+  const FrameInput& input = explained ? *explained : heard;
   const FrameContext frame = contextOf(input);
-  auto sights = seeAll(belief, input);
-  if (!input.boxes) return {};
   reveal(belief, sights, input);
   auto seen = score(belief, sights, input, frame);
   StepReport report;

@@ -60,7 +60,7 @@ class SemanticFilter {
       : parameters_(parameters), priors_(priors) {}
 
   /// Belief after the frame.
-  StepReport step(Belief& belief, const FrameInput& input, IdBook& ids) const;
+  StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
   /// Of two objects that are known to be one, `id` goes on with what both knew, as of that frame.
   /// Nothing happens where one of them is not there, or their classes exclude each other.
   std::optional<MergeRecord> join(Belief& belief, ObjectId id, ObjectId absorbed,
@@ -91,6 +91,11 @@ class SemanticFilter {
   void tend(Object& object, const Seen& seen, const FrameInput& input,
             const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
+  /// What border objects explain of the boxes: of an object with v = 0 a strip in the image may yet
+  /// be detected, so that its box is less likely to be clutter, a birth or of anything else. The
+  /// object itself stays as it is. Nothing where there is no such box.
+  std::optional<FrameInput> withRemnants(const Belief& belief, const std::vector<Sight>& sights,
+                                         const FrameInput& input) const;
   /// A box that a hidden object explains far better than any that is in sight says that the blocker
   /// was misjudged: that object can be seen.
   void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input) const;

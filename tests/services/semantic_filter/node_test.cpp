@@ -266,24 +266,29 @@ TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
   EXPECT_EQ(reappeared(), confirmed);
 }
 
+/// Things of which the map knows, each certain to some variance, in the place of a first frame.
+Recalled restored(const std::vector<TrueObject>& things, const std::vector<double>& variances) {
+  Recalled recalled;
+  recalled.world = {5, 0};
+  recalled.restore = true;
+  recalled.client = 9;
+  recalled.next_id = 10;
+  for (std::size_t i = 0; i < things.size(); ++i) {
+    Object object = testing::makeObject(i + 1, things[i].class_name, things[i].x, variances[i]);
+    object.confirmed = true;
+    recalled.objects.push_back(toBelief(object, 0.7));
+  }
+  return recalled;
+}
+
 TEST(Node, ABoxThatAHiddenThingExplainsFarBetterThanItsBlockerShowsItAndBearsNothing) {
   // A table that the image's border cuts and a chair before it hides but for a rest, which the
   // detector finds. The chair's box has the same upper and lower side.
   const State table = makeState(8.3, -6.6, 0.37, 0, 0.8, 1.5, 0.74);
   const State chair = makeState(6.9, -4.9, 0.59, 0, 0.5, 0.75, 0.64);
   Harness h;
-  Recalled recalled;
-  recalled.world = {5, 0};
-  recalled.restore = true;
-  recalled.client = 9;
-  recalled.next_id = 10;
-  for (const auto& [id, x, name] : {std::tuple{1, table, "dining table"}, {2, chair, "chair"}}) {
-    Object object = testing::makeObject(static_cast<ObjectId>(id), name, x, 1e-4);
-    object.confirmed = true;
-    recalled.objects.push_back(toBelief(object, 0.7));
-  }
-  h.node.onRecalled(recalled);
   const std::vector<TrueObject> things{{table, "dining table"}, {chair, "chair"}};
+  h.node.onRecalled(restored(things, {1e-4, 1e-4}));
   const auto boxes = [&](std::uint64_t k) { return boxesAt(things, k, 0.0); };
   for (std::uint64_t k = 0; k < 10; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(0, 0.0)));
@@ -300,6 +305,41 @@ TEST(Node, ABoxThatAHiddenThingExplainsFarBetterThanItsBlockerShowsItAndBearsNot
   h.node.flush();
   ASSERT_EQ(h.node.belief().objects.size(), 2u);
   EXPECT_GE(h.node.belief().objects[0].hits, 12u);
+}
+
+TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt) {
+  // Two chairs at the left border: of one a strip is in the image, the nearer one is gone.
+  const TrueObject at_border{makeState(6.3, 5.38, 0.45, 0, 0.5, 0.5, 0.9), "chair"};
+  const TrueObject taken{makeState(5.6, 4.35, 0.45, 0, 0.5, 0.5, 0.9), "chair"};
+  Harness h;
+  h.node.onRecalled(restored({at_border, taken}, {1e-4, 0.01}));
+  double before = 0.0;
+  for (std::uint64_t k = 0; k < 8; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(0, 0.0)));
+    if (k == 0) {
+      h.node.flush();
+      const auto& seen = h.objects.back().objects;
+      ASSERT_EQ(seen.size(), 2u);
+      ASSERT_EQ(seen[0].visibility, Visibility::kOutOfView);
+      ASSERT_NE(seen[1].visibility, Visibility::kOutOfView);
+      before = h.node.belief().objects[0].existence;
+    }
+    const auto boxes = boxesAt({at_border}, k, 0.0);
+    ASSERT_EQ(boxes.size(), 1u);
+    h.node.onDetections(detectionsAt(k, boxes));
+  }
+  h.node.flush();
+  const auto& objects = h.node.belief().objects;
+  ASSERT_FALSE(objects.empty());
+  ASSERT_EQ(objects[0].id, 1u);
+  EXPECT_EQ(objects[0].hits, 4u);
+  EXPECT_EQ(objects[0].existence, before);
+  for (const Object& o : objects) {
+    if (o.id == 1) continue;
+    EXPECT_EQ(o.id, 2u);
+    EXPECT_EQ(o.hits, 4u);
+    EXPECT_LT(o.existence, 0.8);
+  }
 }
 
 TEST(Node, ARestartedNodeGoesOnWithTheSameIds) {
