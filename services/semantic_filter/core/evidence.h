@@ -46,7 +46,7 @@ BoxNoise boxNoise(const Model& model, double image_width);
 struct Evidence {
   BoxMeasurement z;
   double log_clutter = 0.0;
-  /// By which things of which too little is seen to ask for them make such a box commoner, nats.
+  /// Nats by which things that show less than visibility.minimum make such a box commoner.
   double log_remnants = 0.0;
   std::vector<double> log_ratio;  ///< by the model's class, clamped
   double log_ratio_best = 0.0;    ///< the most of them

@@ -91,9 +91,9 @@ class SemanticFilter {
   void tend(Object& object, const Seen& seen, const FrameInput& input,
             const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
-  /// What border objects explain of the boxes: of an object with v = 0 a strip in the image may yet
-  /// be detected, so that its box is less likely to be clutter, a birth or of anything else. The
-  /// object itself stays as it is. Nothing where there is no such box.
+  /// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less
+  /// likely to be clutter, new, or of anything else. The object itself stays as it is. Nothing where
+  /// there is no such box.
   std::optional<FrameInput> withRemnants(const Belief& belief, const std::vector<Sight>& sights,
                                          const FrameInput& input) const;
   /// A box that a hidden object explains far better than any that is in sight says that the blocker

@@ -176,7 +176,7 @@ Sight classify(const Tally& tally, double in_image, double by_points,
     sight.hidden[i] = tally.side_total[i] > 0.0 && tally.side_hidden[i] > 0.5 * tally.side_total[i];
   }
   if (sight.fraction < parameters.minimum) {
-    if (in_image < parameters.minimum) sight.remnant = sight.fraction;
+    sight.remnant = sight.fraction;
     sight.fraction = 0.0;
     sight.visibility =
         in_image < parameters.minimum ? Visibility::kOutOfView : Visibility::kOccluded;

@@ -23,7 +23,7 @@ struct Outline {
 struct Sight {
   Visibility visibility = Visibility::kBehind;
   double fraction = 0.0;  ///< v; exactly 0 where a frame says nothing about the object
-  double remnant = 0.0;   ///< of one whose v is 0: what the border leaves of it in the image
+  double remnant = 0.0;   ///< what is to be seen of one whose v is 0, less than visibility.minimum
   ObjectId blocked_by = 0;
   std::array<bool, 4> hidden{};  ///< sides (x1, y1, x2, y2) that lie behind a nearer object
 };

@@ -66,6 +66,23 @@ TEST_F(Sighting, BehindAndBesideAreToldApart) {
   EXPECT_EQ(s[1].fraction, 0.0);
 }
 
+TEST_F(Sighting, TooLittleToAskForIsARemnant) {
+  const double least = VisibilityParameters{}.minimum;
+  const auto s = seeThem({outline(1, makeState(25, 2.1, 0.75, 0, 4.2, 1.7, 1.5)),
+                          outline(2, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7)),
+                          outline(3, makeState(12, 11.0, 0.75, 0, 4.2, 1.7, 1.5)),
+                          outline(4, makeState(12, 30, 0.75, 0, 4.2, 1.7, 1.5))});
+  EXPECT_EQ(s[0].visibility, Visibility::kOccluded);
+  EXPECT_EQ(s[2].visibility, Visibility::kOutOfView);
+  for (const int j : {0, 2}) {
+    EXPECT_EQ(s[j].fraction, 0.0);
+    EXPECT_GT(s[j].remnant, 0.0) << "object " << j;
+    EXPECT_LT(s[j].remnant, least);
+  }
+  EXPECT_EQ(s[1].remnant, 0.0);
+  EXPECT_EQ(s[3].remnant, 0.0);
+}
+
 TEST_F(Sighting, LandmarksInFrontHideAndLandmarksSeenThroughSpeakAgainst) {
   const Outline car = outline(1, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5));
   const auto& b = car.box->sides;
