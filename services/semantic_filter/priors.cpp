@@ -173,6 +173,14 @@ ClassPriors loadPriors(const Config& config) {
   return priors;
 }
 
+std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors) {
+  std::map<std::string, std::vector<Eigen::Vector3d>> result;
+  for (const auto& prior : priors.classes) {
+    result[prior.name].assign(prior.shape.points.begin(), prior.shape.points.end());
+  }
+  return result;
+}
+
 ClassPriors loadClassPriors(const std::string& path) {
   std::ifstream in(path);
   if (!in) {

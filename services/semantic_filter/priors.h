@@ -1,7 +1,9 @@
 // Reads config/class_priors.yaml, and the priors of a configuration.
 #pragma once
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "services/semantic_filter/config.h"
 #include "services/semantic_filter/core/priors.h"
@@ -14,6 +16,9 @@ ClassPriors loadPriors(const Config& config);
 /// Throws StartupError: kUnavailable where the file cannot be read, kConfiguration with all that is
 /// wrong in it as file:line:col.
 ClassPriors loadClassPriors(const std::string& path);
+/// By class: points that span what its things fill of their cuboids, in halves of the cuboid's
+/// sides.
+std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors);
 ClassPriors parseClassPriors(const std::string& yaml, const std::string& file);
 
 }  // namespace perdure::semantic_filter

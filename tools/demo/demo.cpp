@@ -131,7 +131,7 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   domain_ = std::make_unique<bus::Domain>(busOptions(options_.root));
   participant_ = std::make_unique<bus::Participant>(*domain_, "demo");
   loop_ = std::make_unique<bus::WaitLoop>(*participant_);
-  reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_);
+  reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_, shapesFor(options_));
 
   socket_ = socketFolder() + "/supervisor.sock";
   const fs::path config = folders_.run / "supervisord.conf";

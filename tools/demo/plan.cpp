@@ -6,6 +6,8 @@
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "common/config/fields.h"
+#include "services/semantic_filter/priors.h"
 #include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
@@ -102,6 +104,17 @@ DemoFolders prepareFolders(const DemoOptions& options) {
   if (error) cannotUse(folders.out, error.message());
   std::ofstream(folders.run / kMark) << "";
   return folders;
+}
+
+std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options) {
+  const fs::path root = fs::absolute(options.root);
+  semantic_filter::Config config;
+  config::Fields fields;
+  semantic_filter::describe(config, fields);
+  const fs::path file = root / "config" / "semantic_filter.yaml";
+  if (fs::exists(file)) config::refuse(config::readFile(fields, file.string()));
+  return semantic_filter::shapePoints(
+      semantic_filter::loadClassPriors((root / config.class_priors).string()));
 }
 
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders) {

@@ -1,8 +1,10 @@
 // What the demo is asked for, and how the services are to be started for it.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,10 @@ struct DemoFolders {
 
 /// Makes OUT and empties OUT/run, which is this command's own. Throws StartupError.
 DemoFolders prepareFolders(const DemoOptions& options);
+
+/// What things of each class fill of their cuboids, by the filter's configuration in ROOT. Throws
+/// StartupError where that, or the class priors that it names, cannot be used.
+std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options);
 
 /// In the order of kServices. Throws StartupError where a program is missing or --rate is wrong.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);

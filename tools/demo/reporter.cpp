@@ -43,11 +43,14 @@ std::map<std::string, std::uint64_t> ServiceCounts::reasons() const {
   return total;
 }
 
-Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs)
+Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
+                   std::map<std::string, ShapePoints> shapes)
     : outputs_(outputs),
+      shapes_(std::move(shapes)),
       calibration_reader_(participant, bus::topics::kCalibration),
       odometry_reader_(participant, bus::topics::kOdometry),
       landmarks_reader_(participant, bus::topics::kLandmarks),
+      model_reader_(participant, bus::topics::kModel),
       detections_reader_(participant, bus::topics::kDetections),
       objects_reader_(participant, bus::topics::kObjects),
       events_reader_(participant, bus::topics::kEvents),
@@ -55,6 +58,7 @@ Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, Out
   loop.on(calibration_reader_, [this](const Calibration& c) { outputs_.onCalibration(c); });
   loop.on(odometry_reader_, [this](const Odometry& o) { onOdometry(o); });
   loop.on(landmarks_reader_, [this](const Landmarks& l) { outputs_.onLandmarks(l); });
+  loop.on(model_reader_, [this](const ModelInfo& m) { onModel(m); });
   loop.on(detections_reader_, [this](const Detections& d) {
     if (detections_.insert(d.stamp.sequence).second) outputs_.onDetections(d);
     latency_.onDetections(d);
@@ -79,6 +83,10 @@ void Reporter::onObjects(const Objects& objects) {
   latency_.onObjects(objects, last_message_ns_);
   outputs_.onObjects(objects);
   objects_.insert(objects.stamp.sequence);
+}
+
+void Reporter::onModel(const ModelInfo& model) {
+  if (model.boxes == BoxExtent::kOutline) outputs_.setShapes(shapes_);
 }
 
 void Reporter::onHealth(const Health& health) {

@@ -33,7 +33,9 @@ class ServiceCounts {
 class Reporter {
  public:
   /// Subscribes. `loop` must outlive it and be run by the caller.
-  Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs);
+  /// `shapes` are of the filter's class priors, for a network whose boxes enclose outlines.
+  Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
+           std::map<std::string, ShapePoints> shapes);
 
   /// Of what came so far.
   std::size_t odometryFrames() const { return odometry_.size(); }
@@ -58,11 +60,14 @@ class Reporter {
   void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);
   void onHealth(const Health& health);
+  void onModel(const ModelInfo& model);
 
   OutputWriter& outputs_;
+  std::map<std::string, ShapePoints> shapes_;
   bus::Reader<Calibration> calibration_reader_;
   bus::Reader<Odometry> odometry_reader_;
   bus::Reader<Landmarks> landmarks_reader_;
+  bus::Reader<ModelInfo> model_reader_;
   bus::Reader<Detections> detections_reader_;
   bus::Reader<Objects> objects_reader_;
   bus::Reader<Event> events_reader_;

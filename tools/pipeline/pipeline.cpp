@@ -68,9 +68,7 @@ void Pipeline::hear(const ModelInfo& model) {
 
 void Pipeline::openFilter() {
   const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
-  for (const auto& prior : priors.classes) {
-    shapes_[prior.name].assign(prior.shape.points.begin(), prior.shape.points.end());
-  }
+  shapes_ = semantic_filter::shapePoints(priors);
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;

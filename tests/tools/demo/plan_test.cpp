@@ -55,6 +55,28 @@ TEST_F(DemoPlan, PacesCaptureByTheClockOrLetsItFollow) {
   }
 }
 
+TEST_F(DemoPlan, ShapesAreOfThePriorsThatTheFiltersConfigurationNames) {
+  fs::create_directories(folder_ / "config");
+  std::ofstream(folder_ / "config" / "semantic_filter.yaml") << "class_priors: mine.yaml\n";
+  EXPECT_THROW(shapesFor(options_), StartupError);  // there is none yet
+  std::ofstream(folder_ / "mine.yaml")
+      << "fallback: {size: [0.7, 0.6, 0.7], spread: [0.4, 0.4, 0.4], common: 0.5, detection: 0.6}\n"
+         "other: {size: [1, 1, 1], spread: [0.4, 0.4, 0.4], common: 0.5, detection: 0.6}\n"
+         "classes:\n"
+         "  chair: {size: [0.5, 0.5, 0.9], spread: [0.1, 0.1, 0.1], common: 0.05, detection: 0.8}\n"
+         "  car: {size: [4.2, 1.8, 1.5], spread: [0.1, 0.1, 0.1], common: 0.05, detection: 0.9,\n"
+         "        shape: [[-1, 1, 1, 0.2], [1, 0.5, 0.6, 0.1]]}\n";
+  const auto shapes = shapesFor(options_);
+  ASSERT_EQ(shapes.size(), 2u);
+  EXPECT_EQ(shapes.at("chair").size(), 8u);  // the cuboid's corners
+  double highest = -1.0, widest_on_top = 0.0;
+  for (const auto& p : shapes.at("car")) highest = std::max(highest, p.z());
+  for (const auto& p : shapes.at("car")) {
+    if (p.z() == highest) widest_on_top = std::max(widest_on_top, std::abs(p.y()));
+  }
+  EXPECT_DOUBLE_EQ(widest_on_top, 0.6);
+}
+
 TEST_F(DemoPlan, GivesEachServiceWhatItNeeds) {
   EXPECT_THAT(commandOf("inference"), Contains("model.path=/models/net.onnx"));
   EXPECT_THAT(commandOf("capture"), Contains("dataset.path=/data/drive"));
