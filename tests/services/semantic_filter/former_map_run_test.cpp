@@ -11,9 +11,9 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
 /// Cars at uneven gaps and a few people, on both sides of 120 m.
-std::vector<TrueObject> longStreet(double least_gap = 7.0) {
+std::vector<TrueObject> longStreet(double least_gap = 7.0, unsigned seed = 3) {
   std::vector<TrueObject> things;
-  std::mt19937 random(3);
+  std::mt19937 random(seed);
   std::uniform_real_distribution<double> any(0.0, 1.0);
   for (const double side : {-4.5, 4.5}) {
     for (double x = 14.0; x < 120.0; x += least_gap + 6.0 * any(random)) {
@@ -123,8 +123,8 @@ TEST(FormerMap, TheNextDayFindsTheMapOfTheDayBefore) {
 
 /// Mean distance between the things and what is claimed of them, where odometry has them now, after
 /// it drifted for a while: the street is driven to and fro.
-double errorAfterDrift(const Config& config) {
-  Pair pair(config, longStreet(4.5));
+double errorAfterDrift(const Config& config, unsigned seed) {
+  Pair pair(config, longStreet(4.5, seed));
   pair.driveTo(60);
   pair.drift = RigidTransform(Eigen::Quaterniond(Eigen::AngleAxisd(4e-5, Eigen::Vector3d::UnitZ())),
                               {0.001, -0.0012, 0.0});
@@ -149,9 +149,13 @@ TEST(FormerMap, ThingsStayWhereTheyAreBesideTheBodyWhileOdometryDrifts) {
   config.filter.pose.walk_position = 0.03;
   config.filter.pose.walk_rotation = 0.0007;
   config.filter.motion.position_walk = 0.002;  // things do not follow by themselves
-  const double error = errorAfterDrift(config);
-  config.filter.drift.things = 1000000;
-  const double without = errorAfterDrift(config);
+  Config none = config;
+  none.filter.drift.things = 1000000;
+  double error = 0.0, without = 0.0;  // of one street chance decides by a fifth
+  for (unsigned seed = 3; seed < 7; ++seed) {
+    error += errorAfterDrift(config, seed) / 4.0;
+    without += errorAfterDrift(none, seed) / 4.0;
+  }
   EXPECT_LT(error, 0.85 * without) << error << " m, without " << without << " m";
 }
 
