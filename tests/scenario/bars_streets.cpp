@@ -151,6 +151,23 @@ double flicker(const Outcome& run) {
   return toggles;
 }
 
+/// What was claimed at rest and is believed metres from there one frame later.
+double jumps(const Outcome& run) {
+  constexpr double kFar = 3.0;  // metres
+  double count = 0.0;
+  std::map<ObjectId, Eigen::Vector3d> claimed;
+  for (const JournalFrame& f : run.journal.frames) {
+    std::map<ObjectId, Eigen::Vector3d> now;
+    for (const Glance& g : f.objects) {
+      const auto before = claimed.find(g.id);
+      if (before != claimed.end() && (g.centre - before->second).norm() > kFar) count += 1.0;
+      if (g.confirmed && g.moving < 0.5) now.emplace(g.id, g.centre);
+    }
+    claimed = std::move(now);
+  }
+  return count;
+}
+
 }  // namespace
 
 std::vector<IdsByHalf> idsByHalf(const Outcome& run) {
@@ -213,7 +230,9 @@ Bars streetBars(const Outcome& run) {
       onAverage(atLeast(0.98, "second lap: share that keeps the id of the first", keptIds(run))),
       onAverage(atMost(1.02, "objects of the map for each one found", run.final.idsPerFound())),
       atMost(0, "switches of id, FINAL", number(run.final.id_switches)),
-      atMost(0, "flicker: claims in full sight that ceased and came back", flicker(run))};
+      atMost(0, "flicker: claims in full sight that ceased and came back", flicker(run)),
+      atMost(0, "claims at rest that jump by more than 3 m from one frame to the next",
+             jumps(run))};
 }
 
 }  // namespace perdure::test

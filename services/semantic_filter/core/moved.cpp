@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "services/semantic_filter/core/keyframe.h"
+#include "services/semantic_filter/core/tend.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -31,14 +32,20 @@ bool wasLookedAt(const Eigen::Vector3d& place, const Object& missing) {
   return count >= kLooks && 2 * count >= static_cast<std::ptrdiff_t>(looks.size());
 }
 
+bool isThere(const Object& o, const FrameContext& frame) {
+  return o.confirmed || established(o, frame);
+}
+
 /// Metres between where the one stood and where the other must have been then; infinite where they
 /// cannot be one.
-double apart(const Object& missing, const Object& found, const ClassPriors& priors) {
-  if (!found.confirmed || found.best().class_name != missing.best().class_name) return kTooFar;
+double apart(const Object& missing, const Object& found, const FrameContext& frame) {
+  if (!isThere(found, frame) || found.best().class_name != missing.best().class_name)
+    return kTooFar;
   const double since = toSeconds(found.first_seen - missing.last_seen);
   if (since < -kOverlap_s) return kTooFar;
   const Hypothesis& h = found.best();
-  const bool carried = priors.of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
+  const bool carried =
+      frame.priors->of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
   if (h.moving ? since > kDriven_s : !carried) return kTooFar;
   const State then = stateAt(h, toSeconds(missing.last_seen - found.as_of));
   const double metres = (then - missing.best().x).head<3>().norm();
@@ -48,13 +55,13 @@ double apart(const Object& missing, const Object& found, const ClassPriors& prio
 }
 
 std::size_t nearest(const std::vector<Object>& objects, std::size_t of, bool among_missing,
-                    const ClassPriors& priors) {
+                    const FrameContext& frame) {
   std::size_t best = objects.size();
   double least = kTooFar;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     if (i == of || isMissing(objects[i]) != among_missing) continue;
-    const double d = among_missing ? apart(objects[i], objects[of], priors)
-                                   : apart(objects[of], objects[i], priors);
+    const double d = among_missing ? apart(objects[i], objects[of], frame)
+                                   : apart(objects[of], objects[i], frame);
     if (d < least) least = d, best = i;
   }
   return best;
@@ -85,12 +92,12 @@ void resume(Object& past, Object& now, const FrameContext& frame) {
 
 }  // namespace
 
-std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const ClassPriors& priors) {
+std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     if (!isMissing(objects[i])) continue;
-    const std::size_t j = nearest(objects, i, false, priors);
-    if (j == objects.size() || nearest(objects, j, true, priors) != i) continue;
+    const std::size_t j = nearest(objects, i, false, frame);
+    if (j == objects.size() || nearest(objects, j, true, frame) != i) continue;
     merges.push_back({objects[i].id, objects[j].id, true, false});
     takeUp(objects[i], std::move(objects[j]));
     objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
@@ -116,7 +123,7 @@ std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Obj
   std::vector<MergeRecord> merges;
   for (Object& o : objects) {
     if (gone.empty()) break;
-    if (!o.confirmed || o.best().moving || o.visible_fraction <= 0.0) continue;
+    if (!isThere(o, frame) || o.best().moving || o.visible_fraction <= 0.0) continue;
     std::size_t found = gone.size();
     double most = frame.parameters->tend.merge_overlap;
     for (std::size_t i = 0; i < gone.size(); ++i) {

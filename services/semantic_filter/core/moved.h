@@ -10,17 +10,17 @@
 namespace perdure::semantic_filter {
 
 /// Gives the newcomer the id and the past of what is missing; its own id is absorbed. Newcomers are
-/// confirmed and were first seen when the other was seen no more. One that moves must have been
+/// established and were first seen when the other was seen no more. One that moves must have been
 /// where the other stood when that was last seen; one that stands is of a class that is carried,
 /// near by, at a place that was looked at before, and empty. Each is taken with the nearest that
 /// would have it, too.
-std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const ClassPriors& priors);
+std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const FrameContext& frame);
 
 /// Keeps what was claimed at rest and is now believed gone, for `return_s` from then on.
 void rememberGone(std::vector<Object>& gone, std::vector<Object> buried, TimePoint now,
                   const TendParameters& parameters);
-/// Gives a confirmed newcomer the id and the past of what is gone, of its class and in its place,
-/// and was not seen since the newcomer was. The newcomer's own id is absorbed.
+/// Gives an established newcomer the id and the past of what is gone, of its class and in its
+/// place, and was not seen since the newcomer was. The newcomer's own id is absorbed.
 std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Object>& gone,
                                    const FrameContext& frame);
 

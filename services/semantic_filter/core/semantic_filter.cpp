@@ -185,6 +185,8 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
     Seen& s = seen[static_cast<std::size_t>(j)];
     Object& object = belief.objects[s.object];
     const auto before = tellsPose(object, frame) ? std::optional(object.best()) : std::nullopt;
+    const bool claimed = object.once_confirmed && !object.best().moving;
+    if (claimed && !s.look.boxes.empty()) s.before = object;
     s.own = update(object, s.look, association.eta.row(j), boxes, frame);
     if (before && s.own && s.look.hypotheses[0].box) {
       object.told_pose = object.as_of;
@@ -324,6 +326,10 @@ void SemanticFilter::tend(Object& object, const Seen& seen, const FrameInput& in
                           const FrameContext& frame) const {
   const auto pmf = classShares(object);
   tendHypotheses(object, priors_, parameters_);
+  if (object.hypotheses.empty() && seen.before) {
+    object = missed(*seen.before, seen.look, frame);
+    if (sound(object)) tendHypotheses(object, priors_, parameters_);
+  }
   if (!object.hypotheses.empty()) return;
   if (seen.own) {
     const Evidence& box = (*input.boxes)[*seen.own];
@@ -376,7 +382,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
     o.sightings.add(in_sight, in_sight && o.last_seen == input.stamp.time);
   }
   report.merges = mergeObjects(belief.objects, frame);
-  const auto moved = reuniteMoved(belief.objects, priors_);
+  const auto moved = reuniteMoved(belief.objects, frame);
   report.merges.insert(report.merges.end(), moved.begin(), moved.end());
   rememberGone(belief.gone, confirmAndBury(belief.objects, frame), input.stamp.time,
                parameters_.tend);

@@ -74,6 +74,7 @@ class SemanticFilter {
     std::size_t object;
     ObjectLook look;
     std::optional<std::size_t> own = {};  ///< the box that is surely its own
+    std::optional<Object> before = {};    ///< of what is claimed at rest: what it was until then
   };
 
   FrameContext contextOf(const FrameInput& input) const;
@@ -92,8 +93,8 @@ class SemanticFilter {
             const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
   /// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less
-  /// likely to be clutter, new, or of anything else. The object itself stays as it is. Nothing where
-  /// there is no such box.
+  /// likely to be clutter, new, or of anything else. The object itself stays as it is. Nothing
+  /// where there is no such box.
   std::optional<FrameInput> withRemnants(const Belief& belief, const std::vector<Sight>& sights,
                                          const FrameInput& input) const;
   /// A box that a hidden object explains far better than any that is in sight says that the blocker

@@ -177,17 +177,33 @@ double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
   return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
 }
 
+double placeSigma(const Object& object, const Matrix6d& P_pose) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& h : object.hypotheses) mean += h.weight * h.x.head<3>();
+  double variance = 0.0;
+  for (const auto& h : object.hypotheses) {
+    const double own = placeSigma(h, P_pose);
+    variance += h.weight * (own * own + (h.x.head<3>() - mean).squaredNorm());
+  }
+  return std::sqrt(variance);
+}
+
+bool established(const Object& object, const FrameContext& frame) {
+  const TendParameters& tend = frame.parameters->tend;
+  return object.existence >= tend.confirm && object.hits >= tend.confirm_hits &&
+         placeSigma(object.best(), frame.pose_error.covariance) < tend.confirm_sigma_m;
+}
+
 std::vector<Object> confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
   const TendParameters& parameters = frame.parameters->tend;
   for (auto& o : objects) {
     if (o.visible_fraction <= 0.0) continue;
-    const double sigma = placeSigma(o.best(), frame.pose_error.covariance);
+    const double sigma = placeSigma(o, frame.pose_error.covariance);
     if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) {
       o.confirmed = false;
       continue;
     }
-    if (o.existence >= parameters.confirm && o.hits >= parameters.confirm_hits &&
-        sigma < parameters.confirm_sigma_m) {
+    if (established(o, frame) && sigma < parameters.confirm_sigma_m) {
       o.confirmed = o.once_confirmed = true;
     }
   }

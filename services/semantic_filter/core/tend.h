@@ -27,6 +27,11 @@ double certainty(const Object& object, const TendParameters& parameters);
 /// Standard deviation of the place relative to the body, metres: what the pose error does not
 /// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
+/// The same of an object: of its hypotheses, and by how far they are from each other.
+double placeSigma(const Object& object, const Matrix6d& P_pose);
+/// Whether it surely exists and its best hypothesis knows its place. A claim asks all of them for
+/// the place; to be a thing that was known before, its being there is enough.
+bool established(const Object& object, const FrameContext& frame);
 /// Confirms what surely exists at a known place, takes that back where it is lost, and removes
 /// those whose existence has gone, which it returns.
 std::vector<Object> confirmAndBury(std::vector<Object>& objects, const FrameContext& frame);

@@ -391,4 +391,10 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   return own ? std::optional(look.boxes[*own]) : std::nullopt;
 }
 
+Object missed(Object object, ObjectLook look, const FrameContext& frame) {
+  look.boxes.clear();
+  update(object, look, {}, {}, frame);
+  return object;
+}
+
 }  // namespace perdure::semantic_filter

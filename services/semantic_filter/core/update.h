@@ -20,6 +20,9 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const Eigen::VectorXd& eta, const std::vector<Evidence>& boxes,
                                   const FrameContext& frame);
 
+/// The object after the same look, had none of its boxes been the object's.
+Object missed(Object object, ObjectLook look, const FrameContext& frame);
+
 /// One hypothesis against one box: the iterated consider-EKF. The box's variance counts `repeated`
 /// times, and more where the box is an outlier. `at_prior` is the projection of the prior where it
 /// is known already.

@@ -47,8 +47,15 @@ class Moved : public ::testing::Test {
     return o;
   }
 
+  Moved() {
+    frame.view.camera = &camera;
+    frame.priors = &priors;
+    frame.parameters = &parameters;
+  }
   CameraModel camera{makeCamera()};
   ClassPriors priors = makePriors();
+  Parameters parameters;
+  FrameContext frame;
   const State here = makeState(5, 0, 0.4, 0, 0.5, 0.5, 0.9);
   const State beside = makeState(5, 1.4, 0.4, 0, 0.5, 0.5, 0.9);
 };
@@ -56,7 +63,7 @@ class Moved : public ::testing::Test {
 TEST_F(Moved, AChairThatIsMissingAndOneThatIsNewBesideItAreOneThatWasMoved) {
   std::vector<Object> objects = {missing(3, "chair", here, 8.0),
                                  thing(9, "chair", beside, 18.0, 19.0)};
-  const auto merges = reuniteMoved(objects, priors);
+  const auto merges = reuniteMoved(objects, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(merges[0].absorbed, 9u);
@@ -78,7 +85,7 @@ TEST_F(Moved, WhatIsThereStillOrOfAnotherClassOrWasSeenBeforeStaysTwo) {
            {missing(3, "chair", here, 8.0),
             thing(9, "chair", makeState(5, 4.0, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)}}) {
     auto objects = pair;
-    EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+    EXPECT_TRUE(reuniteMoved(objects, frame).empty());
     EXPECT_EQ(objects.size(), 2u);
   }
 }
@@ -87,14 +94,14 @@ TEST_F(Moved, WhatIsNewWhereNobodyLookedBeforeHasNotMoved) {
   std::vector<Object> objects = {
       missing(3, "chair", makeState(1.2, 0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
       thing(9, "chair", makeState(-0.6, 0.5, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)};
-  EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
 }
 
 TEST_F(Moved, OfTwoMissingOnesTheNearestIsTheOneThatWasMoved) {
   std::vector<Object> objects = {
       missing(2, "chair", makeState(5, -1.0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
       missing(3, "chair", here, 8.0), thing(9, "chair", beside, 18.0, 19.0)};
-  const auto merges = reuniteMoved(objects, priors);
+  const auto merges = reuniteMoved(objects, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(objects.size(), 2u);
@@ -107,21 +114,16 @@ TEST_F(Moved, ACarThatDrivesFromWhereOneWasMissedIsThatCar) {
   Object newcomer = thing(9, "car", driving, 8.2, 9.0);
   newcomer.hypotheses[0].moving = true;
   std::vector<Object> objects = {missing(3, "car", parked, 8.0), newcomer};
-  EXPECT_EQ(reuniteMoved(objects, priors).size(), 1u);
+  EXPECT_EQ(reuniteMoved(objects, frame).size(), 1u);
   objects = {missing(3, "car", parked, 8.0), newcomer};
   objects[1].hypotheses[0].x[kVelocity] = -4.0;  // it comes from elsewhere
-  EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
   objects = {missing(3, "car", parked, 4.0), newcomer};  // it has been missed for long
-  EXPECT_TRUE(reuniteMoved(objects, priors).empty());
+  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
 }
 
 class FoundAgain : public Moved {
  protected:
-  FoundAgain() {
-    frame.view.camera = &camera;
-    frame.priors = &priors;
-    frame.parameters = &parameters;
-  }
   /// What was given up at 10 s, last seen at 8 s.
   std::vector<Object> gone(const std::string& name, const State& x) {
     Object o = missing(3, name, x, 8.0);
@@ -135,8 +137,6 @@ class FoundAgain : public Moved {
     objects[0].visible_fraction = 1.0;
     return findAgain(objects, past, frame);
   }
-  Parameters parameters;
-  FrameContext frame;
   std::vector<Object> objects;
 };
 
@@ -155,6 +155,18 @@ TEST_F(FoundAgain, InItsPlaceWhatWasGivenUpGoesOn) {
   EXPECT_EQ(objects[0].visible_fraction, 1.0);
   EXPECT_GE(objects[0].existence, 0.95);
   EXPECT_NEAR(objects[0].best().x[0], 5.025, 0.01) << "what was known of it counts";
+}
+
+TEST_F(FoundAgain, WhatIsSurelyThereIsEnoughThoughItsPlaceIsNotYetAClaim) {
+  Object newcomer = thing(9, "chair", here, 11.0, 12.0);
+  newcomer.existence = {0.97, ExistenceEvidence::kPrior, at(12.0)};
+  newcomer.confirmed = false;  // or else it is something larger, further off
+  newcomer.hypotheses.push_back(
+      thing(9, "dining table", makeState(12, 0, 0, 0, 2, 2, 2), 11.0, 12.0).best());
+  newcomer.hypotheses[0].weight = 0.7, newcomer.hypotheses[1].weight = 0.3;
+  EXPECT_EQ(after(gone("chair", here), newcomer).size(), 1u);
+  newcomer.hits = 1;
+  EXPECT_TRUE(after(gone("chair", here), newcomer).empty());
 }
 
 TEST_F(FoundAgain, NothingElseIsTakenForIt) {

@@ -7,6 +7,7 @@
 
 #include "services/semantic_filter/core/merge.h"
 #include "services/semantic_filter/core/rebirth.h"
+#include "services/semantic_filter/core/semantic_filter.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -273,6 +274,66 @@ TEST_F(Tending, WhatLostItsShapeBeginsAgainFromItsOwnBoxAsWhatItWas) {
   o.hypotheses.clear();
   ASSERT_TRUE(bearAgain(o, {{kOtherClass, 1.0}}, e, std::nullopt, frame));
   EXPECT_GT(classProbability(o, "van"), classProbability(o, "car"));
+}
+
+TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
+  frame.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.2));
+  const Eigen::Vector3d size = priors.of("car").log_size;
+  const Eigen::Vector3d sigma = priors.of("car").log_size_covariance.diagonal().cwiseSqrt();
+  State x = makeState(14.0, 1.0, 0.75, 1.2, 4.2, 1.75, 1.5);
+  x.segment<3>(kSize) << size[0] - 3.5 * sigma[0], size.tail<2>();
+  Object car = makeObject(3, "car", x, 0.05);
+  car.existence = {0.99, ExistenceEvidence::kPrior, car.as_of};
+  car.hits = 30;
+  car.first_seen = car.last_seen = car.as_of = testing::stampOf(0).time;
+  State shown = x;  // what passes before it hides an end of it, and is on no map
+  shown[kSize] -= 0.3;
+  const auto s = projectCuboid(shown, frame.view)->sides;
+  Detection d;
+  d.box = {s[0], s[1], s[2], s[3]};
+  d.activations = {0, 4, -2, -2, -2};
+
+  const auto after = [&](bool claimed) {
+    Belief belief{{car}, {}};
+    belief.objects[0].confirmed = belief.objects[0].once_confirmed = claimed;
+    FrameInput input;
+    input.stamp = testing::stampOf(1);
+    input.view = frame.view;
+    input.model = model;
+    input.boxes = {{*makeEvidence(d, model, camera.width(), camera.height(), parameters.box,
+                                  parameters.clutter)}};
+    IdBook ids;
+    ids.atLeast(10);
+    SemanticFilter(parameters, priors).step(belief, input, ids);
+    return belief.objects.at(0);
+  };
+  const Object guess = after(false);
+  ASSERT_EQ(guess.id, 3u);
+  EXPECT_GT((guess.best().x - x).head<3>().norm(), 0.5) << "begins again from that box";
+  const Object o = after(true);
+  ASSERT_EQ(o.id, 3u);
+  EXPECT_LT((o.best().x - x).head<3>().norm(), 1e-3);
+  EXPECT_LT(o.existence, 0.99);
+  EXPECT_EQ(o.hits, 30u);
+  EXPECT_EQ(o.visible_misses, 1u);
+}
+
+TEST_F(Tending, WhatMayBeAtTwoPlacesIsNotClaimedAtEither) {
+  // A large thing far off, or a small one near by: each of them well placed.
+  const auto claimed = [&](double far_off, double weight) {
+    Object o = makeObject(1, "car", makeState(30, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    o.existence = {0.97, ExistenceEvidence::kPrior, o.as_of};
+    o.hypotheses.push_back(
+        makeObject(1, kOtherClass, makeState(30 - far_off, 0, 1.0, 0, 2, 0.9, 0.8), 0.04).best());
+    o.hypotheses[0].weight = 1.0 - weight;
+    o.hypotheses[1].weight = weight;
+    std::vector<Object> objects{o};
+    confirmAndBury(objects, frame);
+    return objects.at(0).confirmed;
+  };
+  EXPECT_TRUE(claimed(0.5, 0.4));
+  EXPECT_FALSE(claimed(15.0, 0.4));
+  EXPECT_TRUE(claimed(15.0, 0.001)) << "that it is near is ruled out";
 }
 
 TEST_F(Tending, WhatWasFoundOnAnotherVisitIsSurerThanWhatWasSeenOnce) {

@@ -142,6 +142,22 @@ TEST_F(Update, ASightOfItSaysThatItIsNotScreened) {
 }
 
 /// One look in five does not show it, from a place where the camera stands.
+TEST_F(Update, ALookWhoseBoxIsRefusedIsAMiss) {
+  const std::vector<Evidence> boxes{evidenceOf(object.best().x)};
+  const ObjectLook seen = lookAt(boxes, 0.9);
+  Object hit = object, miss = object;
+  update(hit, seen, Eigen::VectorXd::Ones(1), boxes, frame);
+  ASSERT_EQ(hit.hits, object.hits + 1);
+  update(miss, lookAt({}, 0.9), Eigen::VectorXd(), {}, frame);
+  const Object refused = missed(object, seen, frame);
+  EXPECT_EQ(refused.existence, miss.existence);
+  EXPECT_LT(refused.existence, object.existence);
+  EXPECT_EQ(refused.hits, object.hits);
+  EXPECT_EQ(refused.visible_misses, object.visible_misses + 1);
+  EXPECT_EQ(refused.best().x, object.best().x);
+  EXPECT_EQ(refused.best().P, object.best().P);
+}
+
 TEST_F(Update, WhatIsFoundAgainFromOnePlaceWasMissedByTheNetwork) {
   const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
   for (int i = 0; i < 100; ++i) {
