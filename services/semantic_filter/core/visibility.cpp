@@ -18,14 +18,16 @@ struct Cell {
   std::uint64_t painting = 0;  ///< that it is of; of an earlier one it is blank
 };
 
-/// Its cells are kept from one painting to the next: to clear them all costs more than to use some.
+/// Its cells are kept from one painting to the next, of other grids too: to clear them all, or to
+/// make them anew, costs more than to use some.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {
     cell_ = cell_px;
     columns_ = static_cast<int>(std::ceil(width / cell_px));
     rows_ = static_cast<int>(std::ceil(height / cell_px));
-    cells_.resize(static_cast<std::size_t>(columns_) * rows_);
+    const std::size_t cells = static_cast<std::size_t>(columns_) * rows_;
+    if (cells > cells_.size()) cells_.resize(cells);
     ++painting_;
   }
 

@@ -52,6 +52,25 @@ TEST_F(Sighting, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
   EXPECT_FALSE(s[0].hidden[2]);
 }
 
+TEST_F(Sighting, PaintingsOnOtherGridsLeaveNothingBehind) {
+  const auto rear = outline(7, makeState(30, 1.5, 0.75, M_PI / 2, 4.2, 1.7, 1.5));
+  const auto front = outline(3, makeState(10, 1.3, 0.75, 0, 3.0, 1.8, 2.5));
+  const auto share = [&](const std::vector<Outline>& things, std::int64_t cell_px) {
+    VisibilityParameters parameters;
+    parameters.cell_px = cell_px;
+    return see(things, {}, camera.width(), camera.height(), parameters).front().fraction;
+  };
+  const double coarse = share({rear, front}, 8), fine = share({rear, front}, 2);
+  ASSERT_NEAR(coarse, fine, 0.15);
+  ASSERT_LT(fine, 0.8);
+  for (const std::int64_t cell_px : {2, 8, 1, 3, 2}) {
+    EXPECT_EQ(share({rear}, cell_px), 1.0) << cell_px;
+    share({rear, front}, cell_px);
+  }
+  EXPECT_EQ(share({rear, front}, 8), coarse);
+  EXPECT_EQ(share({rear, front}, 2), fine);
+}
+
 TEST_F(Sighting, ADoubtfulObjectHidesNothing) {
   const auto s = seeThem({outline(7, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5)),
                           outline(3, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7), 0.3)});
