@@ -162,8 +162,7 @@ bool SemanticFilter::tellsPose(const Object& object, const FrameContext& frame) 
 
 Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
                                                    const FrameInput& input,
-                                                   const FrameContext& frame,
-                                                   std::vector<PoseEvidence>& pose) const {
+                                                   const FrameContext& frame) const {
   const auto& boxes = *input.boxes;
   const auto n = static_cast<Eigen::Index>(seen.size());
   const auto m = static_cast<Eigen::Index>(boxes.size());
@@ -190,9 +189,8 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
     s.own = update(object, s.look, association.eta.row(j), boxes, frame);
     if (before && s.own && s.look.hypotheses[0].box) {
       object.told_pose = object.as_of;
-      const auto told = poseEvidence(*before, *s.look.hypotheses[0].box, boxes[*s.own].z,
-                                     hiddenSides(s.look, *s.own), frame.pose_error.covariance);
-      if (told) pose.push_back(*told);
+      s.told = poseEvidence(*before, *s.look.hypotheses[0].box, boxes[*s.own].z,
+                            hiddenSides(s.look, *s.own), frame.pose_error.covariance);
     }
     if (s.own && sound(object) &&
         rememberLook(object, boxes[*s.own], hiddenSides(s.look, *s.own), frame)) {
@@ -322,12 +320,13 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
   }
 }
 
-void SemanticFilter::tend(Object& object, const Seen& seen, const FrameInput& input,
+void SemanticFilter::tend(Object& object, Seen& seen, const FrameInput& input,
                           const FrameContext& frame) const {
   const auto pmf = classShares(object);
   tendHypotheses(object, priors_, parameters_);
   if (object.hypotheses.empty() && seen.before) {
     object = missed(*seen.before, seen.look, frame);
+    seen.told.reset();
     if (sound(object)) tendHypotheses(object, priors_, parameters_);
   }
   if (!object.hypotheses.empty()) return;
@@ -369,10 +368,11 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   reveal(belief, sights, input);
   auto seen = score(belief, sights, input, frame);
   StepReport report;
-  const auto claimed = associateAndUpdate(belief, seen, input, frame, report.pose);
-  for (const auto& s : seen) {
+  const auto claimed = associateAndUpdate(belief, seen, input, frame);
+  for (auto& s : seen) {
     Object& object = belief.objects[s.object];
     if (sound(object)) tend(object, s, input, frame);
+    if (s.told) report.pose.push_back(*s.told);
   }
   births(belief, sights, claimed, input, frame, ids);
   std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });

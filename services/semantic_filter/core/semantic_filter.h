@@ -73,8 +73,9 @@ class SemanticFilter {
   struct Seen {
     std::size_t object;
     ObjectLook look;
-    std::optional<std::size_t> own = {};  ///< the box that is surely its own
-    std::optional<Object> before = {};    ///< of what is claimed at rest: what it was until then
+    std::optional<std::size_t> own = {};    ///< the box that is surely its own
+    std::optional<Object> before = {};      ///< of what is claimed at rest: what it was until then
+    std::optional<PoseEvidence> told = {};  ///< until the look is taken back
   };
 
   FrameContext contextOf(const FrameInput& input) const;
@@ -84,13 +85,11 @@ class SemanticFilter {
                           const FrameContext& frame) const;
   /// Updates what is seen; returns for each box how much of it is claimed.
   Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
-                                     const FrameInput& input, const FrameContext& frame,
-                                     std::vector<PoseEvidence>& pose) const;
+                                     const FrameInput& input, const FrameContext& frame) const;
   /// Whether a look at it will tell of the pose: once for each time that it comes back.
   bool tellsPose(const Object& object, const FrameContext& frame) const;
   /// Of one object after its look; nothing may be left of it.
-  void tend(Object& object, const Seen& seen, const FrameInput& input,
-            const FrameContext& frame) const;
+  void tend(Object& object, Seen& seen, const FrameInput& input, const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
   /// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less
   /// likely to be clutter, new, or of anything else. The object itself stays as it is. Nothing

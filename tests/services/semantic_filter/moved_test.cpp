@@ -8,13 +8,11 @@
 namespace perdure::semantic_filter {
 namespace {
 
-using testing::makeCamera;
-using testing::makePriors;
 using testing::makeState;
 
 TimePoint at(double seconds) { return fromNanoseconds(static_cast<std::int64_t>(1e9 * seconds)); }
 
-class Moved : public ::testing::Test {
+class Moved : public ::testing::Test, protected testing::UsualFrame {
  protected:
   /// Claimed, with five looks in the last half second, from the origin along x.
   Object thing(ObjectId id, const std::string& name, const State& x, double first, double last) {
@@ -47,15 +45,6 @@ class Moved : public ::testing::Test {
     return o;
   }
 
-  Moved() {
-    frame.view.camera = &camera;
-    frame.priors = &priors;
-    frame.parameters = &parameters;
-  }
-  CameraModel camera{makeCamera()};
-  ClassPriors priors = makePriors();
-  Parameters parameters;
-  FrameContext frame;
   const State here = makeState(5, 0, 0.4, 0, 0.5, 0.5, 0.9);
   const State beside = makeState(5, 1.4, 0.4, 0, 0.5, 0.5, 0.9);
 };

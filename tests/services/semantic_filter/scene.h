@@ -106,6 +106,23 @@ inline Object makeObject(ObjectId id, const std::string& name, const State& x, d
   return o;
 }
 
+/// What the verbs are told of a frame, from the origin, with the usual camera, classes and
+/// parameters.
+struct UsualFrame {
+  UsualFrame() {
+    frame.view.camera = &camera;
+    frame.model = &model;
+    frame.priors = &priors;
+    frame.parameters = &parameters;
+  }
+  UsualFrame(const UsualFrame&) = delete;
+  CameraModel camera{makeCamera()};
+  Model model = makeModel(makeModelInfo());
+  ClassPriors priors = makePriors();
+  Parameters parameters;
+  FrameContext frame;
+};
+
 inline FrameStamp stampOf(std::uint64_t k) {
   FrameStamp s;
   s.source = 1;
