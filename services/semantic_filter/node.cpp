@@ -111,6 +111,7 @@ void Node::onOdometry(const Odometry& odometry) {
   advancePoseError(odometry);
   history_.push_back({makeInput(odometry), odometry.world, camera_, {}, false});
   if (history_.size() > static_cast<std::size_t>(config_.history.frames)) {
+    spare_ = std::move(history_.front().before);
     history_.pop_front();
     ids_.forgetBefore(history_.front().input.stamp.sequence);
   }
@@ -243,6 +244,9 @@ bool Node::isLevel(const Entry& entry) {
 }
 
 void Node::stepEntry(Entry& entry) {
+  if (entry.before.objects.empty()) entry.before = std::exchange(spare_, {});
+  const std::size_t objects = belief_.objects.size();
+  if (entry.before.objects.capacity() < objects) entry.before.objects.reserve(objects + objects / 4);
   entry.before = belief_;
   StepReport report = filter_.step(belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);

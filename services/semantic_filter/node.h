@@ -120,6 +120,7 @@ class Node {
   DriftWatch drift_;
   bool told_not_level_ = false;
   Belief belief_;
+  Belief spare_;  ///< an old one, whose memory the next copy takes
   IdBook ids_;
   std::deque<Entry> history_;
   std::deque<Detections> early_;

@@ -176,7 +176,9 @@ ClassPriors loadPriors(const Config& config) {
 std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors) {
   std::map<std::string, std::vector<Eigen::Vector3d>> result;
   for (const auto& prior : priors.classes) {
-    result[prior.name].assign(prior.shape.points.begin(), prior.shape.points.end());
+    for (int i = 0; i < prior.shape.corners(); ++i) {
+      result[prior.name].push_back(prior.shape.corner(i));
+    }
   }
   return result;
 }

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "common/base/heap.h"
+#include "common/config/fields.h"
 #include "services/semantic_filter/priors.h"
 #include "tests/bench/allocations.h"
 #include "tests/services/semantic_filter/scene.h"
@@ -96,12 +97,12 @@ struct Sample {
 
 class Drive {
  public:
-  Drive(std::size_t in_view, std::uint32_t seed)
+  Drive(const Config& config, std::size_t in_view, std::uint32_t seed)
       : field_(in_view, seed),
         random_(seed + 1),
         camera_(makeLookout()),
         model_(camera_),
-        node_(Config{}, loadPriors(Config{}), 9,
+        node_(config, loadPriors(config), 9,
               {[this](const Objects& m) { newest_ = m; }, {}, {}}) {
     node_.onCalibration(testing::calibrationOf(camera_));
     node_.onModel(makeModelOfField());
@@ -169,8 +170,16 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
-void report(std::size_t asked, int frames) {
-  Drive drive(asked, 1);
+Config configure(const std::vector<std::string>& assignments) {
+  Config config;
+  config::Fields fields;
+  describe(config, fields);
+  for (const auto& one : assignments) config::refuse(config::assign(fields, one));
+  return config;
+}
+
+void report(const Config& config, std::size_t asked, int frames) {
+  Drive drive(config, asked, 1);
   constexpr std::uint64_t kWarmUp = 60;
   for (std::uint64_t k = 0; k < kWarmUp; ++k) drive.frame(k);
   std::vector<double> ms, allocations, in_view, boxes, objects;
@@ -192,16 +201,23 @@ void report(std::size_t asked, int frames) {
 }  // namespace perdure::semantic_filter::bench
 
 int main(int argc, char** argv) {
-  using perdure::semantic_filter::bench::report;
+  using namespace perdure::semantic_filter;
   const int frames = argc > 1 ? std::atoi(argv[1]) : 200;
   const int in_view = argc > 2 ? std::atoi(argv[2]) : 0;
-  if (frames < 1 || in_view < 0 || argc > 3) {
-    std::cerr << "usage: filter_bench [FRAMES [IN_VIEW]]   (from the repository's root)\n";
+  if (frames < 1 || in_view < 0) {
+    std::cerr << "usage: filter_bench [FRAMES [IN_VIEW [KEY=VALUE]…]]   (from the repository's root;"
+                 " all numbers in view with 0; keys as in config/semantic_filter.yaml)\n";
     return 64;
   }
   perdure::keepFreedMemory();  // as perdure-semantic-filter does
-  std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";
-  for (const int n : {20, 60, 200}) {
-    if (in_view == 0 || in_view == n) report(static_cast<std::size_t>(n), frames);
+  try {
+    const Config config = bench::configure({argv + std::min(argc, 3), argv + argc});
+    std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";
+    for (const int n : {20, 60, 200}) {
+      if (in_view == 0 || in_view == n) bench::report(config, static_cast<std::size_t>(n), frames);
+    }
+  } catch (const std::exception& e) {
+    std::cerr << e.what() << '\n';
+    return 64;
   }
 }

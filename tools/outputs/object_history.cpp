@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::tools {
@@ -93,13 +94,21 @@ double visibleShare(const Outline& outline, const std::vector<Outline>& all) {
 
 }  // namespace
 
+ObjectHistory::Place ObjectHistory::placeOf(const ObjectBelief& object) {
+  const ClassBelief& best = object.best();
+  return {best.mean.head<3>(), best.covariance.topLeftCorner<3, 3>()};
+}
+
 void ObjectHistory::add(const Objects& message) {
   FrameRecord record;
   record.time = message.stamp.time;
   record.T_WB = message.T_WB;
   for (const ObjectBelief& object : message.objects) {
     if (object.classes.empty()) continue;
-    record.looks[object.id] = {isHidden(object.visibility), object.existence >= kBelievedFrom};
+    Look& look = record.looks[object.id];
+    look.hidden = isHidden(object.visibility);
+    look.believed = object.existence >= kBelievedFrom;
+    if (object.confirmed && object.moving >= kMovingAbove) look.driving = placeOf(object);
     std::uint64_t& newest = last_frame_[object.id];
     if (message.stamp.sequence >= newest) {
       newest = message.stamp.sequence;
@@ -175,6 +184,23 @@ std::map<ObjectId, ObjectHistory::Look> ObjectHistory::looksOfSurvivors(
   return looks;
 }
 
+/// Of what was surely elsewhere when it was claimed to be moving: the last frame in which it was.
+std::map<ObjectId, std::uint64_t> ObjectHistory::lastFramesElsewhere() const {
+  constexpr double kSurely = 21.1;  // χ² of three degrees of freedom, .9999
+  std::map<ObjectId, std::uint64_t> result;
+  for (const auto& [frame, record] : frames_) {
+    for (const auto& [id, look] : record.looks) {
+      const auto last = last_.find(survivorOf(id));
+      if (!look.driving || last == last_.end()) continue;
+      const Place now = placeOf(last->second);
+      const Eigen::Vector3d apart = look.driving->p_W - now.p_W;
+      const Eigen::Matrix3d covariance = look.driving->covariance + now.covariance;
+      if (squaredMahalanobis(apart, covariance) > kSurely) result[last->first] = frame;
+    }
+  }
+  return result;
+}
+
 std::vector<ObjectRow> ObjectHistory::finalRowsOf(const FrameRecord& record,
                                                   std::set<ObjectId>& begun) const {
   std::vector<ObjectRow> rows;
@@ -203,8 +229,11 @@ std::vector<ObjectRow> ObjectHistory::finalRowsOf(const FrameRecord& record,
 std::vector<ObjectRow> ObjectHistory::finalRows() const {
   std::vector<ObjectRow> rows;
   std::set<ObjectId> begun;
+  const auto elsewhere = lastFramesElsewhere();
   for (const auto& [frame, record] : frames_) {
     for (ObjectRow& row : finalRowsOf(record, begun)) {
+      const auto until = elsewhere.find(row.object_id);
+      if (until != elsewhere.end() && frame <= until->second) continue;
       row.frame = frame;
       row.time = record.time;
       rows.push_back(std::move(row));

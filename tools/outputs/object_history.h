@@ -48,7 +48,8 @@ class ObjectHistory {
   /// The surviving id after merges, the last estimate, from the first detection on that made it
   /// more than a faint guess (r of .1), in the frames in which it projects into the image and is
   /// not hidden: neither known to be so at the time, nor with under .6 of it in sight beside the
-  /// last estimates of nearer ones. Objects that were judged moving or gone at last give none.
+  /// last estimates of nearer ones. Objects that were judged moving or gone at last give none; what
+  /// drove before it came to rest where it is gives none until then.
   std::vector<ObjectRow> finalRows() const;
   /// The last belief of each confirmed object that is not gone and was not merged away, by id.
   std::vector<ObjectBelief> lastBeliefs() const;
@@ -57,9 +58,14 @@ class ObjectHistory {
   std::size_t confirmedNow() const;
 
  private:
+  struct Place {
+    Eigen::Vector3d p_W;
+    Eigen::Matrix3d covariance;
+  };
   struct Look {
     bool hidden = false;    ///< known to be occluded
     bool believed = false;  ///< more than a faint guess
+    std::optional<Place> driving;  ///< where, of what was claimed to be moving
   };
   struct FrameRecord {
     TimePoint time;
@@ -67,7 +73,9 @@ class ObjectHistory {
     std::vector<ObjectRow> inst;
     std::map<ObjectId, Look> looks;
   };
+  static Place placeOf(const ObjectBelief& object);
   bool endsAsStaticThing(ObjectId id) const;
+  std::map<ObjectId, std::uint64_t> lastFramesElsewhere() const;
   std::vector<ObjectRow> finalRowsOf(const FrameRecord& record, std::set<ObjectId>& begun) const;
   std::map<ObjectId, Look> looksOfSurvivors(const FrameRecord& record) const;
 

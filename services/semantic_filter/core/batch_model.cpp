@@ -10,7 +10,6 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kNoInformation = 1e8;  // px², of a side that does not count
-constexpr double kLargestTransition = 10.0;
 constexpr double kYawSpread = 0.8;  // rad, around the start: which way a cuboid lies
 constexpr double kAzimuthCorrelation = 0.5;
 constexpr double kOtherScale = 1.0;  // of the logarithm of all three dimensions
@@ -24,17 +23,71 @@ Matrix6d transition(const PoseError& earlier, const PoseError& later) {
 
 }  // namespace
 
-Looks::Looks(const Keyframes& keyframes, const PoseError& now)
-    : keyframes_(&keyframes), pairs_(keyframes.size() * (keyframes.size() + 1) / 2) {
-  for (std::size_t j = 0; j < keyframes.size(); ++j) {
-    const PoseError& earlier = keyframes[j]->from->error;
-    exact_ = exact_ && earlier.covariance.isZero(0.0);
-    for (std::size_t i = j; i < keyframes.size() && !exact_; ++i) {
+Looks::Looks(const Keyframes& keyframes, const PoseError& now) : keyframes_(&keyframes) {
+  for (const auto& k : keyframes) exact_ = exact_ && k->from->error.covariance.isZero(0.0);
+  if (exact_) {
+    now_.assign(keyframes.size(), Matrix6d::Zero());
+  } else if (!chain(now)) {
+    pairUp(now);
+  }
+}
+
+bool Looks::chain(const PoseError& now) {
+  constexpr double kLargest = 10.0;
+  const auto sane = [](const Matrix6d& m) {
+    return m.allFinite() && m.cwiseAbs().maxCoeff() < kLargest;
+  };
+  const KeyView& first = *keyframes_->front()->from;
+  for (const auto& k : *keyframes_) {
+    const KeyView& view = *k->from;
+    const Matrix6d onto = view.error.product.lazyProduct(first.product_inverse);
+    const Matrix6d back = first.error.product.lazyProduct(view.product_inverse);
+    const Matrix6d on = now.product.lazyProduct(view.product_inverse);
+    if (!sane(onto) || !sane(back) || !sane(on)) {
+      onto_.clear(), from_.clear(), now_.clear();
+      return false;
+    }
+    onto_.push_back(onto);
+    from_.push_back(back.lazyProduct(view.error.covariance));
+    now_.push_back(on.lazyProduct(view.error.covariance));
+  }
+  return true;
+}
+
+void Looks::pairUp(const PoseError& now) {
+  pairs_.resize(size() * (size() + 1) / 2);
+  for (std::size_t j = 0; j < size(); ++j) {
+    const PoseError& earlier = (*keyframes_)[j]->from->error;
+    for (std::size_t i = j; i < size(); ++i) {
       pairs_[i * (i + 1) / 2 + j] =
-          transition(earlier, keyframes[i]->from->error).lazyProduct(earlier.covariance);
+          transition(earlier, (*keyframes_)[i]->from->error).lazyProduct(earlier.covariance);
     }
     now_.push_back(transition(earlier, now).lazyProduct(earlier.covariance));
   }
+}
+
+Eigen::MatrixXd Looks::poseCovariance(const std::vector<PoseJacobian>& J) const {
+  const auto n = static_cast<Eigen::Index>(size());
+  Eigen::MatrixXd result(4 * n, 4 * n);
+  if (pairs_.empty()) {
+    Eigen::Matrix<double, Eigen::Dynamic, 6> later(4 * n, 6);
+    Eigen::Matrix<double, 6, Eigen::Dynamic> earlier(6, 4 * n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      later.middleRows<4>(4 * i) = J[k].lazyProduct(onto_[k]);
+      earlier.middleCols<4>(4 * i) = from_[k].lazyProduct(J[k].transpose());
+    }
+    result.triangularView<Eigen::Lower>() = later * earlier;
+    return result;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const auto k = static_cast<std::size_t>(i), l = static_cast<std::size_t>(j);
+      const PoseJacobian J_i = J[k].lazyProduct(pairs_[k * (k + 1) / 2 + l]);
+      result.block<4, 4>(4 * i, 4 * j) = J_i.lazyProduct(J[l].transpose());
+    }
+  }
+  return result;
 }
 
 BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name, double yaw,
@@ -71,7 +124,7 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
   const auto n = static_cast<Eigen::Index>(looks_.size());
   Stack s;
   s.rows = Eigen::MatrixXd::Zero(4 * n, dim_ + 1);
-  s.J_pose.assign(looks_.size(), Eigen::Matrix<double, 4, 6>::Zero());
+  s.J_pose.assign(looks_.size(), PoseJacobian::Zero());
   s.counts.assign(looks_.size(), {});
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
@@ -99,7 +152,7 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
   const auto n = static_cast<Eigen::Index>(4 * looks_.size());
   SideCovariance covariance;
   covariance.own.setZero(n, n);
-  if (!looks_.exactPoses()) covariance.pose.resize(n, n);
+  if (!looks_.exactPoses()) covariance.pose = looks_.poseCovariance(s.J_pose);
   std::vector<Aspect> aspects;
   std::vector<Eigen::Vector4d> lasting;  // deviations of b; 0 of a side that does not count
   for (std::size_t i = 0; i < looks_.size(); ++i) {
@@ -115,9 +168,6 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
       auto own = covariance.own.block<4, 4>(row, column);
       if (moving()) own = acceleration(s, i, j);
       own.diagonal() += alike * lasting[i].cwiseProduct(lasting[j]);
-      if (looks_.exactPoses()) continue;
-      const Eigen::Matrix<double, 4, 6> J_i = s.J_pose[i].lazyProduct(looks_.poses(i, j));
-      covariance.pose.block<4, 4>(row, column) = J_i.lazyProduct(s.J_pose[j].transpose());
     }
     const Keyframe& k = *looks_.keyframes()[i];
     for (int side = 0; side < 4; ++side) {

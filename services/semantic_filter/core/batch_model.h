@@ -15,6 +15,8 @@ namespace perdure::semantic_filter {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
+using PoseJacobian = Eigen::Matrix<double, 4, 6>;
+
 /// The looks at one object, and the covariances between the pose errors of all pairs of them, and
 /// with the present one.
 class Looks {
@@ -26,14 +28,21 @@ class Looks {
   std::size_t size() const { return keyframes_->size(); }
   /// True where all poses are exact.
   bool exactPoses() const { return exact_; }
-  /// Of look i with the earlier or same look j.
-  const Matrix6d& poses(std::size_t i, std::size_t j) const { return pairs_[i * (i + 1) / 2 + j]; }
+  /// Of all sides, by their derivatives by the looks' poses; its lower triangle.
+  Eigen::MatrixXd poseCovariance(const std::vector<PoseJacobian>& J) const;
   /// Of the present pose with look i.
   const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
 
  private:
   const Keyframes* keyframes_;
-  std::vector<Matrix6d> pairs_, now_;
+  bool chain(const PoseError& now);
+  void pairUp(const PoseError& now);
+
+  /// Φ_i (from the first look to look i) and Φ_i⁻¹ P_i: look i and an earlier j have the covariance
+  /// Φ_i (Φ_j⁻¹ P_j). Of no size where a Φ_i has no inverse worth the name.
+  std::vector<Matrix6d> onto_, from_;
+  std::vector<Matrix6d> pairs_;  ///< then, of i and j <= i
+  std::vector<Matrix6d> now_;
   bool exact_ = true;
 };
 
@@ -47,7 +56,7 @@ struct Stack {
   /// [J r]: derivatives by geometry (and velocity), and z - h(x), pixels; 0 where a side does not
   /// count.
   Eigen::MatrixXd rows;
-  std::vector<Eigen::Matrix<double, 4, 6>> J_pose;
+  std::vector<PoseJacobian> J_pose;
   std::vector<std::array<bool, 4>> counts;
 
   auto J() const { return rows.leftCols(rows.cols() - 1); }

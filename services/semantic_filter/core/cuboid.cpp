@@ -1,6 +1,9 @@
 #include "services/semantic_filter/core/cuboid.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 
 #include "common/math/so3.h"
 
@@ -9,23 +12,44 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
+using PerCorner = Shape::PerCorner;
+
 /// The corners of a shape before the camera.
 struct Corners {
   Eigen::Matrix3d R_WO;
   Eigen::Vector3d half;  ///< of length, width, height
   const Shape* shape = nullptr;
-  InplaceVector<Eigen::Vector3d, Shape::kMostPoints> p_C;
-  bool any_before = false, all_before = true;  ///< the near plane
+  PerCorner x, y, z;       ///< in C
+  bool all_before = true;  ///< the near plane
 
   /// From the centre, along the cuboid's axes.
-  Eigen::Vector3d local(int i) const {
-    return half.cwiseProduct(shape->points[static_cast<std::size_t>(i)]);
-  }
+  Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i)); }
+  Eigen::Vector3d p_C(int i) const { return {x[i], y[i], z[i]}; }
 };
 
-struct ImagePoint {
-  Eigen::Vector2d pixel;
-  int corner;  ///< -1: a cut by the near plane
+constexpr int kCut = -1;
+
+/// Pixels of corners, and of cuts by the near plane.
+struct ImagePoints {
+  using Coordinates = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostOutline, 1>;
+  Coordinates u, v;
+  std::array<int, kMostOutline> corner;  ///< or kCut
+
+  Eigen::Vector4d sides() const {
+    return {u.minCoeff(), v.minCoeff(), u.maxCoeff(), v.maxCoeff()};
+  }
+  /// The corner whose u or v is this; a number that is none has no corner.
+  int at(const Coordinates& values, double value) const {
+    const auto i = std::find(values.begin(), values.end(), value) - values.begin();
+    return i < values.size() ? corner[static_cast<std::size_t>(i)] : kCut;
+  }
+  void add(const Eigen::Vector2d& pixel, int of) {
+    corner[static_cast<std::size_t>(u.size())] = of;
+    u.conservativeResize(u.size() + 1);
+    v.conservativeResize(v.size() + 1);
+    u[u.size() - 1] = pixel.x();
+    v[v.size() - 1] = pixel.y();
+  }
 };
 
 /// Nothing where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
@@ -44,13 +68,15 @@ std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from
   const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
   const Eigen::Vector3d along = half.x() * R_CO.col(0), across = half.y() * R_CO.col(1),
                         up = half.z() * R_CO.col(2);
-  for (const Eigen::Vector3d& u : c.shape->points) {
-    c.p_C.push_back(((centre_C + u.x() * along) + u.y() * across) + u.z() * up);
-    const bool before = c.p_C[c.p_C.size() - 1].z() >= kNear;
-    c.any_before = c.any_before || before;
-    c.all_before = c.all_before && before;
-  }
-  if (!c.any_before) return std::nullopt;
+  const auto coordinate = [&](int i) {
+    const Shape& s = *c.shape;
+    return ((centre_C[i] + along[i] * s.along) + across[i] * s.across) + up[i] * s.up;
+  };
+  c.x = coordinate(0);
+  c.y = coordinate(1);
+  c.z = coordinate(2);
+  c.all_before = c.z.minCoeff() >= kNear;
+  if (c.z.maxCoeff() < kNear) return std::nullopt;
   return result;
 }
 
@@ -62,53 +88,57 @@ Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C) {
           camera.cy() + camera.fy() * direction.y() * 4.0};
 }
 
-void setSide(ProjectedBox& box, int side, const ImagePoint& point, const Projector& from,
+/// Of the cuboid's edges.
+void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
+  const Eigen::Vector3d a = corners.p_C(i);
+  for (int axis = 1; axis < 8; axis <<= 1) {
+    const int j = i | axis;
+    if (j == i) continue;
+    const Eigen::Vector3d b = corners.p_C(j);
+    if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
+    const double s = (kNear - a.z()) / (b.z() - a.z());
+    points.add(pixelOf(camera, a + s * (b - a)), kCut);
+  }
+}
+
+ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
+  ImagePoints points;
+  const int n = corners.shape->corners();
+  if (corners.all_before && camera.calibration().distortion == DistortionModel::kNone) {
+    const PerCorner inverse_depth = 1.0 / corners.z;
+    points.u = camera.fx() * (corners.x * inverse_depth) + camera.cx();
+    points.v = camera.fy() * (corners.y * inverse_depth) + camera.cy();
+    std::iota(points.corner.begin(), points.corner.begin() + n, 0);
+    return points;
+  }
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3d a = corners.p_C(i);
+    if (a.z() >= kNear) points.add(pixelOf(camera, a), i);
+    if (!corners.all_before) addCuts(points, i, corners, camera);
+  }
+  return points;
+}
+
+/// Derivatives of a side, which is the image of a corner.
+void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
              const Corners& corners) {
-  box.sides[side] = point.pixel[side % 2];
   Eigen::Matrix<double, 2, 3> J_point;
-  if (point.corner < 0 ||
-      !from.camera->project(corners.p_C[static_cast<std::size_t>(point.corner)], &J_point)) {
+  const Eigen::Vector3d p_C = corner == kCut ? Eigen::Vector3d::Zero() : corners.p_C(corner);
+  if (corner == kCut || !from.camera->project(p_C, &J_point)) {
     box.exact[side] = false;
     return;
   }
-  const Eigen::Vector3d local = corners.local(point.corner);
+  const Eigen::Vector3d local = corners.local(corner);
   const Eigen::RowVector3d by_C = J_point.row(side % 2);
   const Eigen::RowVector3d by_W = by_C * from.R_CW;
   const Eigen::RowVector3d by_O = by_W * corners.R_WO;
   box.H.row(side).head<3>() = by_W;
   box.H(side, kYaw) = by_O.y() * local.x() - by_O.x() * local.y();  // turns x towards y
   box.H.row(side).segment<3>(kSize) = by_O.cwiseProduct(local.transpose());
-  const Eigen::Vector3d& p_C = corners.p_C[static_cast<std::size_t>(point.corner)];
   const Eigen::Vector3d p_B = from.R_BC * p_C + from.camera->T_BC().p;
   const Eigen::Vector3d by_B = from.R_BC * by_C.transpose();
   box.H_pose.row(side).head<3>() = by_B.cross(p_B).transpose();
   box.H_pose.row(side).tail<3>() = -by_W;
-}
-
-using ImagePoints = InplaceVector<ImagePoint, kMostOutline>;
-
-/// Of the cuboid's edges.
-void addCuts(ImagePoints& points, std::size_t i, const Corners& corners,
-             const CameraModel& camera) {
-  const Eigen::Vector3d& a = corners.p_C[i];
-  for (std::size_t axis = 1; axis < 8; axis <<= 1) {
-    const std::size_t j = i | axis;
-    if (j == i) continue;
-    const Eigen::Vector3d& b = corners.p_C[j];
-    if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
-    const double s = (kNear - a.z()) / (b.z() - a.z());
-    points.push_back({pixelOf(camera, a + s * (b - a)), -1});
-  }
-}
-
-ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
-  ImagePoints points;
-  for (std::size_t i = 0; i < corners.p_C.size(); ++i) {
-    const Eigen::Vector3d& a = corners.p_C[i];
-    if (a.z() >= kNear) points.push_back({pixelOf(camera, a), static_cast<int>(i)});
-    if (!corners.all_before) addCuts(points, i, corners, camera);
-  }
-  return points;
 }
 
 }  // namespace
@@ -130,16 +160,27 @@ std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
   const auto corners = cornersBeforeCamera(x, from, shape);
   if (!corners) return result;
   ProjectedBox& box = result.emplace();
-  const auto points = imagePoints(*corners, *from.camera);
+  const ImagePoints points = imagePoints(*corners, *from.camera);
+  box.sides = points.sides();
   for (int side = 0; side < 4; ++side) {
-    const ImagePoint* extreme = &points[0];
-    for (const auto& point : points) {
-      const double d = point.pixel[side % 2] - extreme->pixel[side % 2];
-      if (side < 2 ? d < 0 : d > 0) extreme = &point;
-    }
-    setSide(box, side, *extreme, from, *corners);
+    setSide(box, side, points.at(side % 2 == 0 ? points.u : points.v, box.sides[side]), from,
+            *corners);
   }
-  for (const auto& point : points) box.points.push_back(point.pixel);
+  return result;
+}
+
+std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
+                                               const Shape& shape) {
+  std::optional<ProjectedOutline> result;
+  const auto corners = cornersBeforeCamera(x, from, shape);
+  if (!corners) return result;
+  ProjectedOutline& outline = result.emplace();
+  const ImagePoints points = imagePoints(*corners, *from.camera);
+  outline.sides = points.sides();
+  outline.points.resize(static_cast<std::size_t>(points.u.size()));
+  for (int i = 0; i < points.u.size(); ++i) {
+    outline.points[static_cast<std::size_t>(i)] = {points.u[i], points.v[i]};
+  }
   return result;
 }
 

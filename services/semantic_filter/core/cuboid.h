@@ -38,7 +38,12 @@ struct ProjectedBox {
   Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
   Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();  ///< by [θ, p] of T_WB
   std::array<bool, 4> exact{true, true, true, true};  ///< false: set by the near plane's cut
-  Polygon points;  ///< images of corners and cuts, in no order, for the outline
+};
+
+/// The same without derivatives.
+struct ProjectedOutline {
+  Eigen::Vector4d sides;  ///< x1, y1, x2, y2; may lie outside the image
+  Polygon points;         ///< images of corners and cuts by the near plane, in no order
 };
 
 /// R_WO of an upright cuboid.
@@ -47,6 +52,8 @@ Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
 /// The box is of `shape` within the cuboid, or of all of it where that reaches the near plane.
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
                                           const Shape& shape = cuboidShape());
+std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
+                                               const Shape& shape = cuboidShape());
 
 /// How a detector draws its boxes about things of a class.
 struct BoxStyle {

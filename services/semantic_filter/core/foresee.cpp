@@ -62,6 +62,10 @@ std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Objec
   return result;
 }
 
+bool apart(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+  return a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
+}
+
 /// What lies within `sides` of a convex hull's points.
 Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
   Polygon part = clip(clip(convexHull(points), 0, sides[0], true), 0, sides[2], false);
@@ -72,20 +76,23 @@ Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
 /// frame it is hangs on a tenth of a small thing.
 double shareInSight(const std::vector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
-  std::vector<Outline> outlines;
-  for (const Standing& s : things) {
-    outlines.push_back(outlineOf(*s.object, s.x, view, *s.shape));
-    const auto& window = outlines.front().box;
-    if (!window) return 0.0;
-    auto& box = outlines.back().box;
-    if (box && outlines.size() > 1) box->points = within(window->sides, box->points);
+  const Projector from(view);
+  const Standing& first = things.front();
+  std::vector<Outline> outlines{outlineOf(*first.object, first.x, from, *first.shape)};
+  if (!outlines.front().box) return 0.0;
+  const Eigen::Vector4d sides = outlines.front().box->sides;
+  const CameraModel& camera = *view.camera;
+  if (apart(sides, {0.0, 0.0, camera.width(), camera.height()})) return 0.0;
+  for (auto s = things.begin() + 1; s != things.end(); ++s) {
+    Outline blocker = outlineOf(*s->object, s->x, from, *s->shape);
+    if (!blocker.box || apart(blocker.box->sides, sides)) continue;
+    blocker.box->points = within(sides, blocker.box->points);
+    outlines.push_back(std::move(blocker));
   }
-  const Eigen::Vector4d& sides = outlines.front().box->sides;
   const double side = std::min(sides[2] - sides[0], sides[3] - sides[1]);
   parameters.cell_px = std::clamp(static_cast<std::int64_t>(side / kCellsAcross), std::int64_t{1},
                                   parameters.cell_px);
   parameters.minimum = 0.0;
-  const CameraModel& camera = *view.camera;
   return see(outlines, {}, camera.width(), camera.height(), parameters).front().fraction;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/camera/camera_model.h"
+#include "common/math/gaussian.h"
 #include "services/semantic_filter/core/look.h"
 
 namespace perdure::semantic_filter {
@@ -19,6 +20,7 @@ struct KeyView {
       : camera(*of.camera),
         view(of),
         error(pose_error),
+        product_inverse(inverse(pose_error.product)),
         time(at),
         T_WC(of.T_WC()),
         projector(of),
@@ -31,6 +33,7 @@ struct KeyView {
   CameraModel camera;
   View view;
   PoseError error;
+  Matrix6d product_inverse;  ///< of error.product; not finite where there is none
   TimePoint time;
   RigidTransform T_WC;
   Projector projector;

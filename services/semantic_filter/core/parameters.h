@@ -119,7 +119,7 @@ struct SmoothParameters {
   std::int64_t keyframes = 24;  ///< remembered at most, of one object
   std::int64_t least = 5;       ///< with fewer the filter's own state stays
   double fresh = 0.3;           ///< share of the looks that is new when it is smoothed again
-  std::int64_t per_frame = 4;   ///< objects that are smoothed in one frame, those in most need
+  std::int64_t per_frame = 2;   ///< objects that are smoothed in one frame, those in most need
   std::int64_t patience = 3;    ///< times as many new looks that are waited for, at most
   double new_view = 0.12;       ///< change of view, in lengths of b's correlation, that is new
   double place = 0.2;           ///< relative to the distance: a place less well known is not taken

@@ -250,15 +250,19 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
 std::optional<FrameInput> SemanticFilter::withRemnants(const Belief& belief,
                                                        const std::vector<Sight>& sights,
                                                        const FrameInput& input) const {
-  Expected expected(belief, input, parameters_);
+  std::vector<std::pair<std::size_t, double>> remnants;  // and how surely each is found
+  for (std::size_t j = 0; j < sights.size(); ++j) {
+    if (sights[j].remnant <= 0.0) continue;
+    const Object& o = belief.objects[j];
+    const double found = priors_.of(o.best().class_name).detection_probability;
+    remnants.emplace_back(j, o.existence * sights[j].remnant * found);
+  }
   std::optional<FrameInput> result;
+  if (remnants.empty()) return result;
+  Expected expected(belief, input, parameters_);
   for (std::size_t z = 0; z < input.boxes->size(); ++z) {
     double boxes = 0.0;
-    for (std::size_t j = 0; j < sights.size(); ++j) {
-      const Object& o = belief.objects[j];
-      const double found =
-          o.existence * sights[j].remnant * priors_.of(o.best().class_name).detection_probability;
-      if (found <= 0.0) continue;
+    for (const auto& [j, found] : remnants) {
       const auto fit = expected.fit(j, sights[j].hidden, (*input.boxes)[z]);
       if (fit) boxes += found * std::exp(*fit);
     }

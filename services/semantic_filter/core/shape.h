@@ -4,8 +4,6 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "common/base/inplace_vector.h"
-
 namespace perdure::semantic_filter {
 
 /// A level outline of the thing: a rectangle about the middle whose corners are cut.
@@ -17,11 +15,15 @@ struct ShapeLevel {
 
 /// The corners of a convex solid; the image of its hull is the thing's.
 struct Shape {
-  static constexpr std::size_t kMostLevels = 3, kMostPoints = 8 * kMostLevels;
-  using Points = InplaceVector<Eigen::Vector3d, kMostPoints>;
+  static constexpr int kMostLevels = 3, kMostCorners = 8 * kMostLevels;
+  /// A number for each corner.
+  using PerCorner = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostCorners, 1>;
 
-  Points points;  ///< in halves of length, width and height from the middle, -1 … 1
+  PerCorner along, across, up;  ///< in halves of length, width and height from the middle, -1 … 1
   bool is_cuboid = false;
+
+  int corners() const { return static_cast<int>(along.size()); }
+  Eigen::Vector3d corner(int i) const { return {along[i], across[i], up[i]}; }
 };
 
 /// Bit i of a corner's number is set on the far side of axis i.

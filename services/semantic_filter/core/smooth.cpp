@@ -133,8 +133,9 @@ void forgetContradicted(Object& object, const Verdicts& verdicts, std::size_t le
 
 /// Nothing where too many looks contradict.
 std::optional<Smoothed> fit(const Hypothesis& start, const Looks& looks, const FrameContext& frame,
-                            const Smoothed* like = nullptr) {
-  auto smoothed = Smoothed::make(start, looks, frame, like);
+                            const Smoothed* like = nullptr,
+                            const std::vector<const Hypothesis*>& found = {}) {
+  auto smoothed = Smoothed::make(start, looks, frame, like, found);
   const bool taken = smoothed && smoothed->contradicted() <= frame.parameters->smooth.contradicted;
   return taken ? std::move(smoothed) : std::nullopt;
 }
@@ -142,7 +143,9 @@ std::optional<Smoothed> fit(const Hypothesis& start, const Looks& looks, const F
 void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fits& fits) {
   const Hypothesis best = object.hypotheses[fits.front().index];
   for (const auto& start : otherStarts(best, frame.priors->of(best.class_name))) {
-    auto smoothed = fit(start, looks, frame, &fits.front().smoothed);
+    std::vector<const Hypothesis*> found;
+    for (const Fitted& f : fits) found.push_back(&f.smoothed.hypothesis());
+    auto smoothed = fit(start, looks, frame, &fits.front().smoothed, found);
     if (!smoothed) continue;
     Hypothesis h = smoothed->hypothesis();
     h.head = smoothed->logHead();
@@ -159,11 +162,12 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
     auto& h = object.hypotheses[i];
     if (h.class_name != name || h.weight < p.least_weight) continue;
-    auto smoothed = fit(h, looks, frame);
+    Fits& others = h.moving ? moving : still;
+    auto smoothed = fit(h, looks, frame, others.empty() ? nullptr : &others.front().smoothed);
     if (!smoothed) continue;
     h = smoothed->hypothesis();
     verdicts.add(smoothed->contradictions());
-    (h.moving ? moving : still).push_back({i, std::move(*smoothed)});
+    others.push_back({i, std::move(*smoothed)});
   }
   if (seek && !still.empty() && name == object.best().class_name) {
     seekModes(object, looks, frame, still);

@@ -72,37 +72,62 @@ bool factorise(const BatchModel& model, Fit& fit, bool anew) {
   return true;
 }
 
-/// One step of Levenberg and Marquardt's, and what it was to gain (squared deviations). False where
-/// none lowers the cost.
-bool descend(const BatchModel& model, Fit& fit, double& damping, double& gained) {
+/// Damping of Levenberg and Marquardt's steps, less by what the last one gained of what it was to
+/// gain (Nielsen 1999). Where an extreme corner gives way to another the cost has a kink, at which a
+/// damping that falls after each success fails at every other step.
+class Damping {
+ public:
+  double value() const { return value_; }
+  void failed() { value_ = std::max(5.0 * value_, kFelt); }
+  void succeeded(double share) {
+    value_ = std::max(value_ * std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * share - 1.0, 3)), 1e-6);
+  }
+
+ private:
+  static constexpr double kFelt = 0.03;  // a lesser one hardly changes a step
+  double value_ = 1e-4;
+};
+
+/// One step, and what it was to gain (squared deviations). False where none lowers the cost.
+bool descend(const BatchModel& model, Fit& fit, Damping& damping, double& gained) {
   const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
   const double cost = fit.squaredResidual() + model.priorCost(fit.x);
   for (int attempt = 0; attempt < 6; ++attempt) {
     FreeMatrix damped = q.G;
-    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal() *= 1.0 + damping.value();
     const FreeVector step = solveSymmetric(damped, q.g);
     const State next = model.at(fit.x, step);
     auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
     if (stack) {
       auto whitened = fit.R.whiten(stack->rows);
-      if (whitened.rightCols<1>().squaredNorm() + model.priorCost(next) <=
-          cost * (1.0 + 1e-3) + 1e-6) {
+      const double then = whitened.rightCols<1>().squaredNorm() + model.priorCost(next);
+      if (then <= cost * (1.0 + 1e-3) + 1e-6) {
         gained = q.g.dot(step);
         fit.x = next;
         fit.stack = std::move(*stack);
         fit.whitened = std::move(whitened);
-        damping = std::max(0.1 * damping, 1e-6);
+        damping.succeeded(gained > 1e-9 ? (cost - then) / gained : 1.0);
         return true;
       }
     }
-    damping *= 10.0;
+    damping.failed();
   }
   return false;
 }
 
+bool isOneOf(const std::vector<const Hypothesis*>& found, const State& x) {
+  constexpr double kSame = 0.25;  // squared deviations
+  return std::any_of(found.begin(), found.end(), [&](const Hypothesis* mode) {
+    Hypothesis h = *mode;
+    h.x = x;
+    return distance2(*mode, h) < kSame;
+  });
+}
+
 /// `like` has the covariance and the doubts to begin with: those of another mode of the same looks.
 std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const Looks& looks,
-                            double tail, const Fit* like) {
+                            double tail, const Fit* like,
+                            const std::vector<const Hypothesis*>& found) {
   Fit fit;
   fit.x = start;
   fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
@@ -119,14 +144,19 @@ std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const L
     return std::nullopt;
   }
   const Eigen::Vector3d from = looks.keyframes().back()->from->T_WC.p;
-  double damping = 1e-4;
+  Damping damping;
+  double before = 0.0;
   for (int round = 0; round < kRounds; ++round) {
     double gained = 0.0;
     const bool better = descend(model, fit, damping, gained);
+    if (isOneOf(found, fit.x)) return std::nullopt;
     const bool doubted = doubtLooks(fit, tail);
     const bool elsewhere = movedInView(fit, from);
     if ((doubted || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
     if (round > 0 && (!better || gained < kEnough)) break;
+    const bool converges = !doubted && !elsewhere && gained < 0.5 * before;
+    if (round > 0 && converges && gained * gained < kEnough * before) break;
+    before = gained;
   }
   return fit;
 }
@@ -189,12 +219,13 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
 }  // namespace
 
 std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& looks,
-                                       const FrameContext& frame, const Smoothed* like) {
+                                       const FrameContext& frame, const Smoothed* like,
+                                       const std::vector<const Hypothesis*>& found) {
   const BatchModel model(looks, start.moving, start.class_name, start.x[kYaw], frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
-  auto fit =
-      fitLooks(model, x, looks, frame.parameters->box.tail, like ? like->fit_.get() : nullptr);
+  auto fit = fitLooks(model, x, looks, frame.parameters->box.tail,
+                      like ? like->fit_.get() : nullptr, found);
   if (!fit) return std::nullopt;
   const auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;

@@ -10,6 +10,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "services/semantic_filter/core/batch_model.h"
 
@@ -22,9 +23,11 @@ class Smoothed {
 
   /// Nothing where the looks do not see `start`, or do not fix its place. `like`: another mode of
   /// the same looks, at rest or moving as `start`, to begin with what it found of the boxes'
-  /// errors.
+  /// errors. `found`: modes of the same looks, to which a further fit need not come: nothing where
+  /// it does.
   static std::optional<Smoothed> make(const Hypothesis& start, const Looks& looks,
-                                      const FrameContext& frame, const Smoothed* like = nullptr);
+                                      const FrameContext& frame, const Smoothed* like = nullptr,
+                                      const std::vector<const Hypothesis*>& found = {});
 
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// By how much each look's noise is widened (t distribution), >= 1.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 
 #include "services/semantic_filter/core/polygon.h"
 
@@ -15,11 +16,17 @@ struct Cell {
   double distance_m = 0.0, sigma_m = 0.0;  ///< of the blocker that hides most
   double strongest = 0.0;
   ObjectId blocker = 0;
-  std::uint64_t painting = 0;  ///< that it is of; of an earlier one it is blank
+};
+
+/// Cells side by side in a row; x and y of the centre of the first one.
+struct Span {
+  std::size_t first;
+  int cells;
+  double x, y;
 };
 
 /// Its cells are kept from one painting to the next, of other grids too: to clear them all, or to
-/// make them anew, costs more than to use some.
+/// make them anew, costs more than to use some. Most are blank, and are told by their stamps alone.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {
@@ -27,58 +34,83 @@ class DepthBuffer {
     columns_ = static_cast<int>(std::ceil(width / cell_px));
     rows_ = static_cast<int>(std::ceil(height / cell_px));
     const std::size_t cells = static_cast<std::size_t>(columns_) * rows_;
-    if (cells > cells_.size()) cells_.resize(cells);
-    ++painting_;
+    if (cells > cells_.size()) cells_.resize(cells), painted_.resize(cells, 0);
+    if (++painting_ == 0) {
+      std::fill(painted_.begin(), painted_.end(), 0);
+      painting_ = 1;
+    }
   }
 
-  /// Calls f(cell, x, y) for each cell whose centre lies in the polygon; at least one cell of a
-  /// polygon that is smaller than the grid.
-  template <class F>
-  void visit(const Polygon& hull, const F& f) {
-    int visited = 0;
+  /// Nothing where nothing was painted.
+  const Cell* find(std::size_t i) const { return painted_[i] == painting_ ? &cells_[i] : nullptr; }
+  Cell& at(std::size_t i) {
+    if (std::exchange(painted_[i], painting_) != painting_) cells_[i] = {};
+    return cells_[i];
+  }
+  double cell() const { return cell_; }
+
+  /// Cells side by side whose centres lie in the polygon, row by row; at least one cell of a polygon
+  /// that is smaller than the grid. Until this is asked again.
+  const std::vector<Span>& spansOf(const Polygon& hull) {
+    spans_.clear();
+    if (hull.empty()) return spans_;
     double low = 1e30, high = -1e30;
     for (const auto& p : hull) low = std::min(low, p.y()), high = std::max(high, p.y());
-    for (int row = rowOf(low); row <= rowOf(high); ++row) {
-      const double y = (row + 0.5) * cell_;
-      double left = 1e30, right = -1e30;
-      spanAt(hull, y, left, right);
+    const int top = rowOf(low);
+    edges_.assign(static_cast<std::size_t>(rowOf(high) - top + 1), {1e30, -1e30});
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+      const auto& a = hull[i];
+      cross(a, hull[i + 1 < hull.size() ? i + 1 : 0], top);
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const auto [left, right] = edges_[i];
+      const int row = top + static_cast<int>(i);
       const int first = std::max(0, static_cast<int>(std::ceil(left / cell_ - 0.5)));
       const int last = std::min(columns_ - 1, static_cast<int>(std::floor(right / cell_ - 0.5)));
-      for (int column = first; column <= last; ++column, ++visited) {
-        f(at(row, column), (column + 0.5) * cell_, y);
-      }
+      if (first > last) continue;
+      spans_.push_back({indexOf(row, first), last - first + 1, (first + 0.5) * cell_, centreOf(row)});
     }
-    if (visited > 0 || hull.empty()) return;
+    if (!spans_.empty()) return spans_;
     const Eigen::Vector2d centre =
         std::accumulate(hull.begin(), hull.end(), Eigen::Vector2d(0, 0)) / double(hull.size());
-    f(at(rowOf(centre.y()), columnOf(centre.x())), centre.x(), centre.y());
+    spans_.push_back(
+        {indexOf(rowOf(centre.y()), columnOf(centre.x())), 1, centre.x(), centre.y()});
+    return spans_;
   }
 
  private:
+  struct Edges {
+    double left, right;
+  };
+
   int rowOf(double y) const { return std::clamp(static_cast<int>(y / cell_), 0, rows_ - 1); }
   int columnOf(double x) const { return std::clamp(static_cast<int>(x / cell_), 0, columns_ - 1); }
-  Cell& at(int row, int column) {
-    Cell& cell = cells_[static_cast<std::size_t>(row) * columns_ + column];
-    if (cell.painting != painting_) {
-      cell = {};
-      cell.painting = painting_;
-    }
-    return cell;
+  double centreOf(int row) const { return (row + 0.5) * cell_; }
+  std::size_t indexOf(int row, int column) const {
+    return static_cast<std::size_t>(row) * columns_ + column;
   }
-  static void spanAt(const Polygon& hull, double y, double& left, double& right) {
-    for (std::size_t i = 0; i < hull.size(); ++i) {
-      const auto& a = hull[i];
-      const auto& b = hull[(i + 1) % hull.size()];
-      if ((a.y() <= y) == (b.y() <= y)) continue;
-      const double x = a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
-      left = std::min(left, x), right = std::max(right, x);
+  /// Puts the line from a to b into the edges of the rows whose centres it crosses.
+  void cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, int top) {
+    const double low = std::min(a.y(), b.y()), high = std::max(a.y(), b.y());
+    if (!(low < high)) return;
+    const double slope = (b.x() - a.x()) / (b.y() - a.y());
+    const int end = top + static_cast<int>(edges_.size());
+    for (int row = std::max(top, static_cast<int>(std::ceil(low / cell_ - 0.5))); row < end; ++row) {
+      const double y = centreOf(row);
+      if (y >= high) break;
+      Edges& edges = edges_[static_cast<std::size_t>(row - top)];
+      const double x = a.x() + (y - a.y()) * slope;
+      edges.left = std::min(edges.left, x), edges.right = std::max(edges.right, x);
     }
   }
 
   double cell_ = 1.0;
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
-  std::uint64_t painting_ = 0;
+  std::vector<std::uint32_t> painted_;  ///< which painting each cell is of
+  std::uint32_t painting_ = 0;
+  std::vector<Span> spans_;
+  std::vector<Edges> edges_;  ///< of a polygon, by row
 };
 
 /// P(the blocker in the cell stands nearer than the object).
@@ -101,21 +133,28 @@ struct Tally {
     inner = {s[0] + band_x, s[1] + band_y, s[2] - band_x, s[3] - band_y};
   }
 
-  void add(const Cell& cell, double x, double y) {
-    double share = 0.0;
-    if (cell.strongest > 0.0) {
-      Blocked& blocked = blockedBy(cell);
-      share = (1.0 - cell.transmittance) * blocked.nearer;
-      blocked.hidden += share;
-    }
-    total += 1.0;
+  /// A row of cells that nothing hides as yet.
+  void add(const Span& span, double cell_px) {
+    const double cells = span.cells;
+    const auto upTo = [&](double limit) {  // cells with a centre below it
+      return std::clamp(std::ceil((limit - span.x) / cell_px), 0.0, cells);
+    };
+    total += cells;
+    side_total[0] += upTo(inner[0]);
+    side_total[2] += cells - upTo(std::nextafter(inner[2], 1e30));
+    if (span.y < inner[1]) side_total[1] += cells;
+    if (span.y > inner[3]) side_total[3] += cells;
+  }
+  /// One of them, which something was painted in.
+  void hide(const Cell& cell, double x, double y) {
+    Blocked& blocked = blockedBy(cell);
+    const double share = (1.0 - cell.transmittance) * blocked.nearer;
+    blocked.hidden += share;
     hidden += share;
-    const bool in_band[4] = {x<inner[0], y<inner[1], x> inner[2], y> inner[3]};
-    for (int i = 0; i < 4; ++i) {
-      if (!in_band[i]) continue;
-      side_total[i] += 1.0;
-      side_hidden[i] += share;
-    }
+    if (x < inner[0]) side_hidden[0] += share;
+    if (y < inner[1]) side_hidden[1] += share;
+    if (x > inner[2]) side_hidden[2] += share;
+    if (y > inner[3]) side_hidden[3] += share;
   }
 
   const Outline& o;
@@ -201,7 +240,7 @@ Outline outlineOf(const Object& object, const State& x, const Projector& from, c
   const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
   o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
   o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-  o.box = projectCuboid(x, from, shape);
+  o.box = projectOutline(x, from, shape);
   return o;
 }
 
@@ -212,7 +251,8 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
-  thread_local DepthBuffer buffer;
+  thread_local DepthBuffer kept;
+  DepthBuffer& buffer = kept;
   buffer.begin(width, height, static_cast<double>(parameters.cell_px));
   std::vector<Sight> sights(outlines.size());
   for (const std::size_t j : order) {
@@ -223,13 +263,22 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
     inside = clip(clip(inside, 1, 0.0, true), 1, height, false);
     const double in_image = polygonArea(inside) / std::max(polygonArea(hull), 1e-9);
     Tally tally(o);
-    if (!inside.empty()) {
-      buffer.visit(inside, [&](Cell& cell, double x, double y) { tally.add(cell, x, y); });
+    const std::vector<Span>& spans = buffer.spansOf(inside);
+    for (const Span& span : spans) {
+      tally.add(span, buffer.cell());
+      for (int i = 0; i < span.cells; ++i) {
+        const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+        if (cell) tally.hide(*cell, span.x + i * buffer.cell(), span.y);
+      }
     }
     const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
     sights[j] = classify(tally, in_image, by_points, parameters);
-    if (o.solidity < parameters.solid || inside.empty()) continue;
-    buffer.visit(inside, [&](Cell& cell, double, double) { paint(cell, o); });
+    if (o.solidity < parameters.solid) continue;
+    for (const Span& span : spans) {
+      for (int i = 0; i < span.cells; ++i) {
+        paint(buffer.at(span.first + static_cast<std::size_t>(i)), o);
+      }
+    }
   }
   return sights;
 }

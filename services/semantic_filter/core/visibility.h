@@ -17,7 +17,7 @@ struct Outline {
   double distance_m = 0.0;     ///< from the camera to the centre
   double depth_sigma_m = 0.0;  ///< standard deviation of that distance
   double extent_m = 0.0;       ///< half of the cuboid's largest side
-  std::optional<ProjectedBox> box;
+  std::optional<ProjectedOutline> box;
 };
 
 struct Sight {

@@ -48,9 +48,8 @@ ModelInfo modelOf(const sim::DetectorModel& detector, const CameraModel& camera)
 }
 
 /// √ of the area of the whole image, pixels.
-double sizeOf(const ProjectedBox& box) {
-  const auto& s = box.sides;
-  return std::sqrt((s[2] - s[0]) * (s[3] - s[1]));
+double sizeOf(const Eigen::Vector4d& sides) {
+  return std::sqrt((sides[2] - sides[0]) * (sides[3] - sides[1]));
 }
 
 double radiusOf(const State& x) {
@@ -206,8 +205,8 @@ void World::see(WorldFrame& frame) {
     const State x = things_[i].at(frame.t_s);
     o.distance_m = (x.head<3>() - frame.true_view.T_WC().p).norm();
     o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-    o.box = projectCuboid(x, frame.true_view);
-    if (o.box && sizeOf(*o.box) >= things_[i].comes_out_px) errors_[i].out = true;
+    o.box = projectOutline(x, frame.true_view);
+    if (o.box && sizeOf(o.box->sides) >= things_[i].comes_out_px) errors_[i].out = true;
     if (!present(i, frame.t_s)) o.box.reset();
     std::optional<Box> inside;
     if (o.box) {
@@ -304,7 +303,7 @@ std::optional<Detection> World::look(std::size_t thing, const State& x, const Wo
   const ClassPrior prior = told_.priors.of(things_[thing].class_name);
   const FrameContext context{
       frame.true_view, {}, &read_model_, &told_.priors, &told_.config.filter};
-  const double size_px = sizeOf(*projected);
+  const double size_px = sizeOf(projected->sides);
   if (!dice_.chance(sight.fraction * detectionProbability(prior, size_px, context))) {
     return std::nullopt;
   }

@@ -79,7 +79,7 @@ Shape roundShape() {
 
 TEST_F(Cuboid, AShapeLiesWithinItsCuboidAndCutsTheLowerCornersOff) {
   const Shape shape = roundShape();
-  EXPECT_EQ(shape.points.size(), 20u) << "a level without cut corners has four";
+  EXPECT_EQ(shape.corners(), 20) << "a level without cut corners has four";
   const auto whole = projectCuboid(x, view), round = projectCuboid(x, view, shape);
   ASSERT_TRUE(whole && round);
   for (int side = 0; side < 4; ++side) {

@@ -63,7 +63,8 @@ TEST(ClassPriors, ShapesLieWithinTheCuboidAndFillItsLengthAndWidth) {
   EXPECT_TRUE(priors.of("zebra crossing").shape.is_cuboid);
   for (const auto& p : priors.classes) {
     Eigen::Vector3d most = Eigen::Vector3d::Zero(), least = most;
-    for (const Eigen::Vector3d& point : p.shape.points) {
+    for (int i = 0; i < p.shape.corners(); ++i) {
+      const Eigen::Vector3d point = p.shape.corner(i);
       most = most.cwiseMax(point), least = least.cwiseMin(point);
     }
     EXPECT_EQ(most, Eigen::Vector3d::Ones()) << p.name << ": size would not be its size";

@@ -277,7 +277,7 @@ TEST(BoxStyles, AreThePriorsShapesWhereTheBoxesEncloseOutlines) {
   info.boxes = BoxExtent::kOutline;
   info.side_insets.assign(4 * info.classes.size(), 0.02);
   const Model model = makeModel(info, priors);
-  EXPECT_EQ(model.styles->of("car").shape.points.size(), 12u);
+  EXPECT_EQ(model.styles->of("car").shape.corners(), 12);
   EXPECT_DOUBLE_EQ(model.styles->of("car").offset[0], 0.02);
   EXPECT_TRUE(model.styles->of("unicorn").shape.is_cuboid);
   EXPECT_DOUBLE_EQ(model.styles->of("unicorn").offset[3], -0.02)

@@ -22,7 +22,7 @@ class Sighting : public ::testing::Test {
             (x.head<3>() - view.T_WC().p).norm(),
             sigma,
             0.5 * std::exp(x[4]),
-            projectCuboid(x, view)};
+            projectOutline(x, view)};
   }
   std::vector<Sight> seeThem(const std::vector<Outline>& o,
                              const std::vector<SightPoint>& points = {}) const {

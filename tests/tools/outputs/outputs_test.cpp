@@ -150,6 +150,22 @@ TEST(ObjectHistory, FinalHasNoRowsOfObjectsThatProvedMovingOrGone) {
   EXPECT_THAT(history.inst(), SizeIs(3));
 }
 
+TEST(ObjectHistory, FinalOfWhatDroveBeginsWhereItCameToRest) {
+  ObjectHistory history;
+  const auto driving = [](ObjectId id, double x) {
+    ObjectBelief car = carAt(id, x);
+    car.moving = 0.9;
+    return car;
+  };
+  history.add(messageAt(0, {carAt(1, 5), driving(2, 20.5)}));
+  history.add(messageAt(1, {driving(1, 12), driving(2, 20.2)}));
+  history.add(messageAt(2, {carAt(1, 30), carAt(2, 20)}));
+  std::map<ObjectId, std::vector<std::uint64_t>> frames;
+  for (const auto& row : history.finalRows()) frames[row.object_id].push_back(row.frame);
+  EXPECT_EQ(frames[1], std::vector<std::uint64_t>{2});
+  EXPECT_THAT(frames[2], SizeIs(3)) << "judged moving where it stands: it stood there";
+}
+
 TEST(ObjectHistory, WhatIsFoundAgainAfterItWasGivenUpHasItsRowsOfBefore) {
   ObjectHistory history;
   history.add(messageAt(0, {carAt(1, 8)}));
