@@ -102,8 +102,7 @@ class Drive {
         random_(seed + 1),
         camera_(makeLookout()),
         model_(camera_),
-        node_(config, loadPriors(config), 9,
-              {[this](const Objects& m) { newest_ = m; }, {}, {}}) {
+        node_(config, loadPriors(config), 9, {[this](const Objects& m) { newest_ = m; }, {}, {}}) {
     node_.onCalibration(testing::calibrationOf(camera_));
     node_.onModel(makeModelOfField());
   }
@@ -205,8 +204,9 @@ int main(int argc, char** argv) {
   const int frames = argc > 1 ? std::atoi(argv[1]) : 200;
   const int in_view = argc > 2 ? std::atoi(argv[2]) : 0;
   if (frames < 1 || in_view < 0) {
-    std::cerr << "usage: filter_bench [FRAMES [IN_VIEW [KEY=VALUE]…]]   (from the repository's root;"
-                 " all numbers in view with 0; keys as in config/semantic_filter.yaml)\n";
+    std::cerr
+        << "usage: filter_bench [FRAMES [IN_VIEW [KEY=VALUE]…]]   (from the repository's root;"
+           " all numbers in view with 0; keys as in config/semantic_filter.yaml)\n";
     return 64;
   }
   perdure::keepFreedMemory();  // as perdure-semantic-filter does

@@ -55,8 +55,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
            {"looks that showed a claimed thing and made it less sure",
             "1, 0, 3: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
-           {"merges that lost existence",
-            "0, 1, 0: a merge in the frame of a miss"},
+           {"merges that lost existence", "0, 1, 0: a merge in the frame of a miss"},
        }},
       {"traffic",
        {
@@ -100,8 +99,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
             "a little later"},
            {"P(car, exists) of the real cars at the end",
             "0.863: the car at 43 m is 16 px high and found in six looks of ten"},
-           {"share of the far ones that is accepted at the end",
-            "0.5: the car at 43 m, as above"},
+           {"share of the far ones that is accepted at the end", "0.5: the car at 43 m, as above"},
        }},
       {"still vio",
        {

@@ -63,8 +63,8 @@ class ObjectHistory {
     Eigen::Matrix3d covariance;
   };
   struct Look {
-    bool hidden = false;    ///< known to be occluded
-    bool believed = false;  ///< more than a faint guess
+    bool hidden = false;           ///< known to be occluded
+    bool believed = false;         ///< more than a faint guess
     std::optional<Place> driving;  ///< where, of what was claimed to be moving
   };
   struct FrameRecord {

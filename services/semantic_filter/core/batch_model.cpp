@@ -10,7 +10,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kNoInformation = 1e8;  // px², of a side that does not count
-constexpr double kYawSpread = 0.8;  // rad, around the start: which way a cuboid lies
+constexpr double kYawSpread = 0.8;      // rad, around the start: which way a cuboid lies
 constexpr double kAzimuthCorrelation = 0.5;
 constexpr double kOtherScale = 1.0;  // of the logarithm of all three dimensions
 constexpr double kAzimuthTail = 3.0;

@@ -35,9 +35,7 @@ struct ImagePoints {
   Coordinates u, v;
   std::array<int, kMostOutline> corner;  ///< or kCut
 
-  Eigen::Vector4d sides() const {
-    return {u.minCoeff(), v.minCoeff(), u.maxCoeff(), v.maxCoeff()};
-  }
+  Eigen::Vector4d sides() const { return {u.minCoeff(), v.minCoeff(), u.maxCoeff(), v.maxCoeff()}; }
   /// The corner whose u or v is this; a number that is none has no corner.
   int at(const Coordinates& values, double value) const {
     const auto i = std::find(values.begin(), values.end(), value) - values.begin();

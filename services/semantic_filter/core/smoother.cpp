@@ -73,8 +73,8 @@ bool factorise(const BatchModel& model, Fit& fit, bool anew) {
 }
 
 /// Damping of Levenberg and Marquardt's steps, less by what the last one gained of what it was to
-/// gain (Nielsen 1999). Where an extreme corner gives way to another the cost has a kink, at which a
-/// damping that falls after each success fails at every other step.
+/// gain (Nielsen 1999). Where an extreme corner gives way to another the cost has a kink, at which
+/// a damping that falls after each success fails at every other step.
 class Damping {
  public:
   double value() const { return value_; }

@@ -49,8 +49,8 @@ class DepthBuffer {
   }
   double cell() const { return cell_; }
 
-  /// Cells side by side whose centres lie in the polygon, row by row; at least one cell of a polygon
-  /// that is smaller than the grid. Until this is asked again.
+  /// Cells side by side whose centres lie in the polygon, row by row; at least one cell of a
+  /// polygon that is smaller than the grid. Until this is asked again.
   const std::vector<Span>& spansOf(const Polygon& hull) {
     spans_.clear();
     if (hull.empty()) return spans_;
@@ -68,13 +68,13 @@ class DepthBuffer {
       const int first = std::max(0, static_cast<int>(std::ceil(left / cell_ - 0.5)));
       const int last = std::min(columns_ - 1, static_cast<int>(std::floor(right / cell_ - 0.5)));
       if (first > last) continue;
-      spans_.push_back({indexOf(row, first), last - first + 1, (first + 0.5) * cell_, centreOf(row)});
+      spans_.push_back(
+          {indexOf(row, first), last - first + 1, (first + 0.5) * cell_, centreOf(row)});
     }
     if (!spans_.empty()) return spans_;
     const Eigen::Vector2d centre =
         std::accumulate(hull.begin(), hull.end(), Eigen::Vector2d(0, 0)) / double(hull.size());
-    spans_.push_back(
-        {indexOf(rowOf(centre.y()), columnOf(centre.x())), 1, centre.x(), centre.y()});
+    spans_.push_back({indexOf(rowOf(centre.y()), columnOf(centre.x())), 1, centre.x(), centre.y()});
     return spans_;
   }
 
@@ -95,7 +95,8 @@ class DepthBuffer {
     if (!(low < high)) return;
     const double slope = (b.x() - a.x()) / (b.y() - a.y());
     const int end = top + static_cast<int>(edges_.size());
-    for (int row = std::max(top, static_cast<int>(std::ceil(low / cell_ - 0.5))); row < end; ++row) {
+    for (int row = std::max(top, static_cast<int>(std::ceil(low / cell_ - 0.5))); row < end;
+         ++row) {
       const double y = centreOf(row);
       if (y >= high) break;
       Edges& edges = edges_[static_cast<std::size_t>(row - top)];
