@@ -249,6 +249,8 @@ double BatchModel::logSpeedPrior() const {
   return moving() ? std::log(speed_information_.determinant()) - 3.0 * std::log(2.0 * M_PI) : 0.0;
 }
 
+double BatchModel::logSizePrior() const { return std::log(size_information_.determinant()); }
+
 double BatchModel::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < looks_.size(); ++i) {

@@ -113,6 +113,8 @@ class BatchModel {
   double logHead(const State& x) const;
   /// log |Λ / 2π| of the velocity's prior, which only what moves has.
   double logSpeedPrior() const;
+  /// log |Λ| of the size's prior.
+  double logSizePrior() const;
   /// The part of log |R| that is of no density: a side that is cut has a probability (of lying
   /// beyond the cut), and whether it counts depends on the state.
   double logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts) const;

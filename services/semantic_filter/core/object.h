@@ -79,6 +79,7 @@ struct Object {
   /// Log-odds by which "it is a real thing" is above "it is there still" (core/update.h).
   double lead = 0.0;
   double alike = 0.0;     ///< nats for "looks like a known class", if it is of none (logRatio)
+  std::string resembles;  ///< the class that the network last saw in it; "" where none
   double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
   std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
   FoundRate found_rate;

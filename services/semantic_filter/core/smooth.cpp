@@ -186,6 +186,53 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
   weighMotion(object.hypotheses, name, *at_rest, *driving, frame);
 }
 
+/// A thing of no known class that the network takes for one: boxes that were of two things make the
+/// shape of none, and what is of no known class takes any. Whether all looks together are of the
+/// class after all. To look like one at all is paid for once, as at birth.
+void tryWhatItResembles(Object& object, const Looks& looks, const FrameContext& frame) {
+  constexpr double kLeastOdds = -6.0, kSurest = 15.0;  // nats
+  const Hypothesis other = object.best();
+  if (other.class_name != kOtherClass || other.moving || object.resembles.empty()) return;
+  if (classProbability(object, object.resembles) > 0.0) return;
+  const Parameters& p = *frame.parameters;
+  const ClassPrior& prior = frame.priors->of(object.resembles);
+  if (prior.name != object.resembles) return;
+  const auto as_other = fit(other, looks, frame);
+  if (!as_other) return;
+  const Hypothesis& whole = as_other->hypothesis();
+  const double distance = (whole.x.head<3>() - frame.view.T_WC().p).norm();
+  const double place = std::sqrt(whole.P.topLeftCorner<3, 3>().trace());
+  if (place > p.tend.scale_resolved * distance) return;
+  Hypothesis start = other;
+  start.class_name = object.resembles;
+  start.x.segment<3>(kSize) = prior.log_size;
+  std::vector<Hypothesis> starts = otherStarts(start, prior);
+  starts.push_back(start);
+  std::vector<Smoothed> fits;
+  for (const Hypothesis& one : starts) {
+    std::vector<const Hypothesis*> found;
+    for (const Smoothed& f : fits) found.push_back(&f.hypothesis());
+    auto smoothed = fit(one, looks, frame, fits.empty() ? nullptr : &fits.front(), found);
+    // What the image's border cuts on all sides fits any box.
+    if (smoothed && smoothed->sides() >= as_other->sides() &&
+        !misshapen(smoothed->hypothesis(), prior, p.tend.size_gate)) {
+      fits.push_back(std::move(*smoothed));
+    }
+  }
+  if (fits.empty()) return;
+  Eigen::VectorXd doubts = as_other->doubts();
+  for (const Smoothed& one : fits) doubts = doubts.cwiseMin(one.doubts());
+  const double most = as_other->logEvidence(doubts);
+  const double at_birth = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -
+                          std::log(std::max(p.clutter.other_lookalike, 1e-3));
+  for (const Smoothed& one : fits) {
+    const double odds = one.logEvidence(doubts) - most + at_birth;
+    if (odds < kLeastOdds) continue;
+    object.hypotheses.push_back(one.hypothesis());
+    object.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kSurest));
+  }
+}
+
 }  // namespace
 
 bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
@@ -219,6 +266,7 @@ void smooth(Object& object, const FrameContext& frame) {
   if (seek) object.seek_modes_at = 2 * object.remembered;
   Verdicts verdicts;
   for (const auto& name : names) smoothClass(object, name, looks, frame, seek, verdicts);
+  tryWhatItResembles(object, looks, frame);
   std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight <= 0.0; });
   forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
   normalise(object, ClassEvidence::kMotion);

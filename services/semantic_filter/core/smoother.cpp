@@ -244,6 +244,14 @@ const Eigen::VectorXd& Smoothed::doubts() const { return fit_->doubts; }
 
 const Eigen::ArrayXi& Smoothed::contradictions() const { return fit_->contradicted; }
 
+std::size_t Smoothed::sides() const {
+  std::size_t sum = 0;
+  for (const auto& counts : fit_->stack.counts) {
+    sum += static_cast<std::size_t>(std::count(counts.begin(), counts.end(), true));
+  }
+  return sum;
+}
+
 double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }
 
 double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
@@ -262,7 +270,8 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
   const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);
-  return yaw + 0.5 * (free + model.logSpeedPrior() - cost - volume - G.logDeterminant());
+  const double priors = model.logSpeedPrior() + model.logSizePrior();
+  return yaw + 0.5 * (free + priors - cost - volume - G.logDeterminant());
 }
 
 }  // namespace perdure::semantic_filter

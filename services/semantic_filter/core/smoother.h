@@ -34,9 +34,11 @@ class Smoothed {
   const Eigen::VectorXd& doubts() const;
   /// Share of the looks that contradict it.
   double contradicted() const { return contradictions().cast<double>().mean(); }
+  /// Sides that count as measured, of all looks.
+  std::size_t sides() const;
   /// 1 for each look that does.
   const Eigen::ArrayXi& contradictions() const;
-  /// log p(looks | this class, and that it moves or not), by Laplace's method. To compare two, both
+  /// log p(boxes | this class, and that it moves or not), by Laplace's method. To compare two, both
   /// are asked with the same doubts. `of_yaw`: to compare modes of yaw, with what azimuths say and
   /// without the prior around the start.
   double logEvidence(const Eigen::VectorXd& doubts, bool of_yaw = false) const;

@@ -280,6 +280,12 @@ double existenceAfter(Object& object, const MeanA& mean_A, double certain) {
   return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 
+std::string classSeenIn(const Evidence& box, const Model& model) {
+  const auto most = std::max_element(box.log_ratio.begin(), box.log_ratio.end());
+  if (most == box.log_ratio.end() || *most <= 0.0) return {};
+  return model.classes[static_cast<std::size_t>(most - box.log_ratio.begin())];
+}
+
 }  // namespace
 
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
@@ -382,7 +388,11 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   bookExistence(object, next, reasons);
   if (!look.primed && !object.best().moving) countFound(object, look, seen >= 0.5, frame);
   updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
-  if (own) object.alike += hit.worth * boxes[look.boxes[*own]].log_ratio_best;
+  if (own) {
+    const Evidence& box = boxes[look.boxes[*own]];
+    object.alike += hit.worth * box.log_ratio_best;
+    object.resembles = classSeenIn(box, *frame.model);
+  }
   if (seen >= 0.5) object.hit_view = {frame.view.T_WC(), 1.0 + hit.looks};
   if (seen >= 0.5 || !look.primed) {  // to be asked again is no look of its own
     object.late_view = {frame.view.T_WC(), hit.looks + std::min(1.0, look.sight.fraction)};

@@ -214,6 +214,28 @@ TEST(Smooth, SeeksTheYawThatTheFilterGaveUp) {
   EXPECT_GE(found, 17) << "of " << kRuns;
 }
 
+/// What the looks at a car make of a thing of no known class that the network takes for a
+/// `resembles`.
+std::string classAfterAll(const Passing& scene, const std::string& resembles) {
+  Object object = turnedBy(0.0, scene);
+  object.hypotheses.front().class_name = kOtherClass;
+  object.resembles = resembles;
+  smooth(object, scene.frame());
+  return object.best().class_name;
+}
+
+TEST(Smooth, WhatIsOfNoKnownClassBecomesTheOneItResemblesWhereAllLooksAreOfIt) {
+  int cars = 0;
+  constexpr int kRuns = 20;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    cars += classAfterAll(Passing(seed), "car") == "car" ? 1 : 0;
+    EXPECT_EQ(classAfterAll(Passing(seed), "chair"), kOtherClass) << "of a car's size";
+    EXPECT_EQ(classAfterAll(Passing(seed), "unicorn"), kOtherClass) << "of no known size";
+    EXPECT_EQ(classAfterAll(Passing(seed), ""), kOtherClass);
+  }
+  EXPECT_GE(cars, 18) << "of " << kRuns;
+}
+
 TEST(Smooth, ModesThatTheLooksDoNotTellApartAreKeptAndPublishedAsOneWideGaussian) {
   const Passing scene(4);
   Object object = turnedBy(0.0, scene);
