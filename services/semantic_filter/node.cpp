@@ -245,9 +245,8 @@ bool Node::isLevel(const Entry& entry) {
 
 void Node::stepEntry(Entry& entry) {
   if (entry.before.objects.empty()) entry.before = std::exchange(spare_, {});
-  const std::size_t objects = belief_.objects.size();
-  if (entry.before.objects.capacity() < objects)
-    entry.before.objects.reserve(objects + objects / 4);
+  const std::size_t n = belief_.objects.size();
+  if (entry.before.objects.capacity() < n) entry.before.objects.reserve(n + n / 4);
   entry.before = belief_;
   StepReport report = filter_.step(belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);

@@ -64,6 +64,7 @@ class DepthBuffer {
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       const auto [left, right] = edges_[i];
+      if (left > right) continue;
       const int row = top + static_cast<int>(i);
       const int first = std::max(0, static_cast<int>(std::ceil(left / cell_ - 0.5)));
       const int last = std::min(columns_ - 1, static_cast<int>(std::floor(right / cell_ - 0.5)));
