@@ -111,6 +111,13 @@ std::optional<std::vector<double>> primedRatios(const Detection& detection, cons
   return ratios;
 }
 
+std::string classSeenIn(const Evidence& evidence, const Model& model) {
+  const auto& ratios = evidence.log_ratio;
+  const auto most = std::max_element(ratios.begin(), ratios.end());
+  if (most == ratios.end() || *most <= 0.0) return {};
+  return model.classes[static_cast<std::size_t>(most - ratios.begin())];
+}
+
 double alikeProbability(double prior, double alike) {
   constexpr double kMost = 0.5;  // from another side it may look like nothing
   const double looks_alike = prior * std::exp(std::min(alike, 100.0));

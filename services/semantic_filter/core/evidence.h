@@ -72,6 +72,9 @@ using PrimedAnswers = std::map<ObjectId, std::vector<double>>;
 std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
                                                 const ClutterParameters& clutter);
 
+/// The class that the network sees in it; "" where it is more like clutter than like any.
+std::string classSeenIn(const Evidence& evidence, const Model& model);
+
 /// That a thing of no known class looks like one of a known class: `prior` is the share of such
 /// things, `alike` the nats by which its looks resembled one.
 double alikeProbability(double prior, double alike);

@@ -231,6 +231,7 @@ void tryWhatItResembles(Object& object, const Looks& looks, const FrameContext& 
     object.hypotheses.push_back(one.hypothesis());
     object.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kSurest));
   }
+  normalise(object, ClassEvidence::kGeometry);
 }
 
 }  // namespace
@@ -266,10 +267,10 @@ void smooth(Object& object, const FrameContext& frame) {
   if (seek) object.seek_modes_at = 2 * object.remembered;
   Verdicts verdicts;
   for (const auto& name : names) smoothClass(object, name, looks, frame, seek, verdicts);
-  tryWhatItResembles(object, looks, frame);
   std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight <= 0.0; });
-  forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
   normalise(object, ClassEvidence::kMotion);
+  tryWhatItResembles(object, looks, frame);
+  forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));
   const bool same =
       before.class_name == object.best().class_name && before.moving == object.best().moving;
   const bool settled = same && distance2(before, object.best()) < kLittle;

@@ -280,12 +280,6 @@ double existenceAfter(Object& object, const MeanA& mean_A, double certain) {
   return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 
-std::string classSeenIn(const Evidence& box, const Model& model) {
-  const auto most = std::max_element(box.log_ratio.begin(), box.log_ratio.end());
-  if (most == box.log_ratio.end() || *most <= 0.0) return {};
-  return model.classes[static_cast<std::size_t>(most - box.log_ratio.begin())];
-}
-
 }  // namespace
 
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
