@@ -192,6 +192,10 @@ void describeTend(Parameters& p, Fields& fields) {
   fields.number("visibility.full", v.full, between(0, 1), {"fraction that is called visible"});
   fields.number("visibility.screened", v.screened, between(0, 0.99),
                 {"that something not on the map hides an object from a view not yet tried"});
+  fields.number("visibility.elusive", v.elusive, between(0, 0.9),
+                {"that the network finds an object but seldom from a view not yet tried"});
+  fields.number("visibility.elusive_found", v.elusive_found, between(0, 1),
+                {"at this share of how often it finds others"});
   fields.number("visibility.screen_angle", v.screen_angle, positive(),
                 {"change of aspect after which what is known of that has fallen to 1/e", "rad"});
   fields.number("visibility.screen_log_distance", v.screen_log_distance, positive(),

@@ -20,74 +20,74 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
        }},
       {"vanish",
        {
-           {"it is on the map where it stands now, with its id",
-            "1, 1, 0: its old belief is lost before the new one is confirmed, or the new one is "
-            "not placed"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 0, 1: looks whose box another thing may have made, or a belief of odd size "
+            "1, 0, 2: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"room",
        {
+           {"objects for each one found",
+            "1.04, 1.04, 1.09: couches below the floor that a few boxes of hidden ones made"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 3, 2: looks whose box another thing may have made, or a belief of odd size "
+            "1, 3, 2: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"row",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "7, 8, 7: not yet looked into since boxes are of shapes"},
+            "7, 9, 8: not yet looked into since boxes are of shapes"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 3, 0: looks whose box another thing may have made, or a belief of odd size "
+            "3, 3, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "4.14, 6.76, 6.14: not by the roll alone: the estimate still settles as the camera "
+            "5.63, 3.77, 6.14: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, median",
             "0.121, 0.127, 0.114: not by the roll alone: the estimate still settles as the "
             "camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.192, 0.285, 0.357: not by the roll alone: the estimate still settles as the "
+            "1.71, 0.194, 0.392: not by the roll alone: the estimate still settles as the "
             "camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 0, 3: looks whose box another thing may have made, or a belief of odd size "
+            "1, 1, 2: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
-           {"merges that lost existence", "0, 1, 0: a merge in the frame of a miss"},
+           {"merges that lost existence", "0, 0, 1: a merge in the frame of a miss"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "2, 2, 3: what a moving car leaves behind where it was first believed to stand"},
+            "2, 3, 3: what a moving car leaves behind where it was first believed to stand"},
            {"`moved` events of the parked car that drives off",
             "1, 0, 0: the belief at rest follows it for some metres, so that the new one does "
             "not come from its place"},
            {"standing things on the map where nothing is",
-            "2, 2, 3: what a moving car leaves behind where it was first believed to stand"},
+            "3, 3, 3: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "5, 2, 0: looks whose box another thing may have made, or a belief of odd size "
+            "4, 2, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"street",
        {
            {"second lap: share that keeps the id of the first",
-            "0.98, 0.986, 0.962: two beliefs in one thing, of which the older survives where "
+            "0.941, 0.971, 0.962: two beliefs in one thing, of which the older survives where "
             "the younger was told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "5, 6, 3: some misses in a row, or a place lost for a few frames"},
+            "3, 2, 3: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "2, 2, 3: young ones, of five to sixteen looks, that are something or somewhere "
+            "2, 1, 3: young ones, of five to sixteen looks, that are something or somewhere "
             "else after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 2, 2: looks whose box another thing may have made, or a belief of odd size "
+            "1, 3, 3: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
+           {"merges that lost existence", "1, 0, 0: a merge in the frame of a miss"},
        }},
       {"street recalled",
        {
            {"second lap: share that keeps the id of the first",
-            "0.96: two beliefs in one thing, of which the older survives where the younger was "
+            "0.94: two beliefs in one thing, of which the older survives where the younger was "
             "told of more often"},
            {"flicker: claims in full sight that ceased and came back",
             "1: some misses in a row, or a place lost for a few frames"},
@@ -98,10 +98,10 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy vio",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.351: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
+            "0.502: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
             "a little later"},
            {"P(car, exists) of the real cars at the end",
-            "0.863: the car at 43 m is 16 px high and found in six looks of ten"},
+            "0.91: the car at 43 m is 16 px high and found in six looks of ten"},
            {"share of the far ones that is accepted at the end", "0.5: the car at 43 m, as above"},
        }},
       {"still vio",
@@ -112,53 +112,54 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"occlusion vio",
        {
            {"share of the predictions whose interval holds the return",
-            "0.741: a body that turns back is taken for one whose velocity wanders"},
+            "0.75: a body that turns back is taken for one whose velocity wanders"},
            {"looks that showed a claimed thing and made it less sure",
-            "2: looks whose box another thing may have made, or a belief of odd size given up"},
+            "3: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"room vio",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "6: looks whose box another thing may have made, or a belief of odd size given up"},
+            "5: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"row vio",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "7: placed along the line of sight to a metre"},
+            "6: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
-            "2: looks whose box another thing may have made, or a belief of odd size given up"},
+            "3: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"roll vio",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "6.5: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "6.16: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.128: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.132: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.257: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.413: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "2: looks whose box another thing may have made, or a belief of odd size given up"},
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"traffic vio",
        {
            {"things in long-term memory where nothing stands",
-            "1: what a moving car leaves behind where it was first believed to stand"},
+            "3: what a moving car leaves behind where it was first believed to stand"},
            {"standing things on the map where nothing is",
-            "1: what a moving car leaves behind where it was first believed to stand"},
+            "3: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "4: looks whose box another thing may have made, or a belief of odd size given up"},
+            "6: looks whose box another thing may have made, or a belief of odd size given up"},
+           {"merges that lost existence", "1: not yet looked into; with true poses it passes"},
        }},
       {"street vio",
        {
            {"second lap: share that keeps the id of the first",
             "0.942: not yet looked into; with true poses it passes"},
            {"flicker: claims in full sight that ceased and came back",
-            "13: some misses in a row, or a place lost for a few frames"},
+            "6: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
             "2: young ones, of five to sixteen looks, that are something or somewhere else "
             "after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "3: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
   };
   const auto found = all.find(scene);

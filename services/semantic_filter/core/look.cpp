@@ -61,7 +61,8 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double
   const double size =
       std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
   const double v = sight.fraction * (1.0 - object.screened);
-  h.expected = v * foundAs(hypothesis, object, size, frame);
+  h.expected = sight.fraction * shareFound(object, frame.parameters->visibility.elusive_found) *
+               foundAs(hypothesis, object, size, frame);
   h.detection = std::min(h.expected * rate, kMostFound * v);
   h.missed = v - h.detection;
   h.silent = 1.0 - h.detection;
@@ -96,8 +97,13 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
       box, frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{});
   walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
   walk.screened = visibility.screened;
+  walk.elusive = visibility.elusive;
   walk.screen = screenScales(visibility);
   return walk;
+}
+
+double shareFound(const Object& object, double elusive_found) {
+  return 1.0 - object.screened - (1.0 - elusive_found) * object.elusive;
 }
 
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {

@@ -62,6 +62,10 @@ ViewWalk viewWalkOf(const FrameContext& frame);
 double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters);
 
+/// By what P_D and what is visible are to be multiplied: what is screened is not found, what is
+/// elusive seldom.
+double shareFound(const Object& object, double elusive_found);
+
 /// P_D of a class for an instance of this size in pixels (√ of its box's area), fully visible.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 

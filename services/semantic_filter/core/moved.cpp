@@ -84,6 +84,7 @@ void resume(Object& past, Object& now, const FrameContext& frame) {
   past.hit_view = now.hit_view;
   past.late_view = now.late_view;
   past.screened = now.screened;
+  past.elusive = now.elusive;
   past.seen_existence = now.seen_existence;
   past.visibility = now.visibility;
   past.visible_fraction = now.visible_fraction;

@@ -70,6 +70,10 @@ ClassBelief classBelief(const Object& object, const std::string& name) {
   }
   belief.mean = heaviest->x.head<7>();
   belief.covariance = definite(moments / weight);
+  if (name == kOtherClass && !heaviest->modes_sought) {
+    constexpr double kAnyYaw = M_PI * M_PI / 12.0;  // modulo 180 degrees
+    belief.covariance(kYaw, kYaw) = std::max(belief.covariance(kYaw, kYaw), kAnyYaw);
+  }
   belief.cross_pose = cross / weight;
   return belief;
 }

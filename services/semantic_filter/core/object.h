@@ -37,6 +37,7 @@ struct Hypothesis {
   CrossPose C = CrossPose::Zero();
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
   double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
+  bool modes_sought = false;  ///< of yaw, and weighed by all looks that are remembered
 };
 
 /// From where the object was last looked at, for the correlation of looks (DESIGN 5, item 7).
@@ -76,12 +77,14 @@ struct Object {
   double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
   ViewPoint hit_view;        ///< of the last look that showed it
   ViewPoint late_view;       ///< of the last look, whatever it showed
-  /// Log-odds by which "it is a real thing" is above "it is there still" (core/update.h).
+  /// Log-odds by which "it is a real thing" is above "it is there still" (core/weigh.cpp).
   double lead = 0.0;
   double alike = 0.0;     ///< nats for "looks like a known class", if it is of none (logRatio)
   std::string resembles;  ///< the class that the network last saw in it; "" where none
   double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
-  std::optional<RigidTransform> last_view;  ///< T_WC that `screened` and b refer to
+  double elusive =
+      0.0;  ///< that it is not, and the network seldom finds it from here, if it exists
+  std::optional<RigidTransform> last_view;  ///< T_WC that those and b refer to
   FoundRate found_rate;
   Sightings sightings;
   double support = 1.0;         ///< share of late visible looks that showed it

@@ -86,6 +86,8 @@ struct VisibilityParameters {
   /// That something not on the map hides an object from a view in which it was not yet seen; what
   /// is known of that falls to 1/e after a change of
   double screened = 0.2;
+  double elusive = 0.05;             ///< that nothing does, and the network seldom finds it:
+  double elusive_found = 0.3;        ///< this share of P_D
   double screen_angle = 0.15;        ///< aspect, rad
   double screen_log_distance = 0.3;  ///< logarithm of the distance
   double solid = 0.4;  ///< existence (times its late hit rate) from which an object can hide others

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "common/math/small_cholesky.h"
+#include "common/math/so3.h"
 #include "services/semantic_filter/core/keyframe.h"
 
 namespace perdure::semantic_filter {
@@ -79,6 +79,8 @@ void predictScreen(Object& object, const ViewWalk& walk) {
                           : 0.0;
   const double here = screenedFromHere(object, place, walk);
   object.screened = here + keep * (object.screened - here);
+  object.elusive = walk.elusive + keep * (object.elusive - walk.elusive);
+  object.elusive = std::min(object.elusive, 1.0 - object.screened);
 }
 
 /// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see.

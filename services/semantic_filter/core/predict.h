@@ -39,6 +39,7 @@ struct ViewWalk {
   SideError lasting;    ///< of b, stationary
   ViewScales bias{1, 1, 1};
   double screened = 0.0;  ///< Object::screened, stationary
+  double elusive = 0.0;   ///< Object::elusive, stationary
   ViewScales screen{1, 1, 1};
 };
 /// Brings the object up to `now`: noise on every hypothesis, P_xg, survival of its existence.

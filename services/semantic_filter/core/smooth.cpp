@@ -171,6 +171,7 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
   }
   if (seek && !still.empty() && name == object.best().class_name) {
     seekModes(object, looks, frame, still);
+    for (const Fitted& f : still) object.hypotheses[f.index].modes_sought = true;
   }
   weighModes(object.hypotheses, still, p.least_weight);
   weighModes(object.hypotheses, moving, p.least_weight);

@@ -8,7 +8,7 @@
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/azimuth.h"
-#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/weigh.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -235,51 +235,6 @@ Worth worthOf(const Object& object, const ObjectLook& look, const std::vector<Sh
   return {worthOfLook(looks, correlation), looks};
 }
 
-/// Of A over the hypotheses, by a look's worth and in full.
-struct MeanA {
-  double tempered = 0.0, full = 0.0;
-};
-
-/// π ∝ π A. Within a class the hypotheses differ by geometry alone, whose shared errors are in the
-/// state: A counts in full there. Between classes, and for existence, looks share what the network
-/// mistakes: A counts by the look's worth. Returns the mean of A over the prior.
-/// A frame that does not show the object says that it is screened, too: P(frame | screened) is 1.
-MeanA weigh(Object& object, const std::vector<Shares>& shares, double worth) {
-  std::map<std::string, std::pair<double, double>> classes;  // weight, Σ w A
-  double mean_A = 0.0, tempered_A = 0.0;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    auto& [weight, sum] = classes[object.hypotheses[i].class_name];
-    weight += object.hypotheses[i].weight;
-    sum += object.hypotheses[i].weight * shares[i].A;
-  }
-  for (const auto& [name, c] : classes) {
-    if (c.first <= 0.0) continue;
-    mean_A += c.second;
-    tempered_A += c.first * std::pow(c.second / c.first, worth);
-  }
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    const auto& [weight, sum] = classes[object.hypotheses[i].class_name];
-    if (weight > 0.0) {
-      object.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, worth - 1.0);
-    }
-  }
-  object.screened = std::min(1.0, object.screened / mean_A);
-  return {tempered_A, mean_A};
-}
-
-/// Existence has two accounts. "It is a real thing": looks from one place share the network's
-/// mistakes, hits and misses alike, so that A counts by the look's worth. "It is there still": a
-/// patch of wall that passes for a chair does not go away, so that A counts in full, and one hit
-/// tells that the misses before it were the network's. The lower of the two is believed.
-double existenceAfter(Object& object, const MeanA& mean_A, double certain) {
-  const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
-  const double most = logOdds(certain), now = logOdds(std::min<double>(object.existence, certain));
-  const double real = std::min(now + std::max(object.lead, 0.0) + std::log(mean_A.tempered), most);
-  const double still = std::min(now - std::min(object.lead, 0.0) + std::log(mean_A.full), most);
-  object.lead = real - still;
-  return 1.0 / (1.0 + std::exp(-std::min(real, still)));
-}
-
 }  // namespace
 
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
@@ -372,8 +327,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   const LookReasons reasons =
       reasonsOf(object, shares, seen, hit.worth, hit.worth, look.boxes, boxes, frame);
   const double r = object.existence;
-  double next = existenceAfter(object, weigh(object, shares, hit.worth),
-                               certainty(object, frame.parameters->tend));
+  double next = weigh(object, shares, hit.worth, seen >= 0.5, *frame.parameters);
   if (seen >= 0.5) {
     object.seen_existence = next;
   } else if (look.primed) {

@@ -16,6 +16,7 @@ int run(int argc, char** argv) {
   std::size_t runs = 50;
   std::vector<std::string> assignments, without;
   std::string picture;
+  bool outliers = false;
   CLI::App app("Whether the semantic filter's beliefs are true, where the world is as it is told");
   app.add_option("--runs", runs, "Seeded worlds")->capture_default_str();
   app.add_option("--seed", options.seed, "Of the first")->capture_default_str();
@@ -27,6 +28,7 @@ int run(int argc, char** argv) {
       "--without", without,
       "Leave out: pose-noise, clutter, motion, screens, hiding, lasting, shared, azimuths");
   app.add_option("--picture", picture, "PNG with reliability diagrams and histograms");
+  app.add_flag("--outliers", outliers, "Print the objects that are far from what they say");
   CLI11_PARSE(app, argc, argv);
   const std::map<std::string, bool*> parts{
       {"pose-noise", &options.pose_noise}, {"clutter", &options.clutter},
@@ -42,6 +44,7 @@ int run(int argc, char** argv) {
   }
   const auto scores = test::runWorlds(options, test::readTold(assignments), runs);
   print(scores);
+  if (outliers) print(scores.outliers);
   if (!picture.empty()) test::drawBeliefs(scores, picture);
   return 0;
 }

@@ -21,6 +21,7 @@ constexpr std::uint64_t kForgotten = 5;
 constexpr double kLeastExistence = 0.05;  // of an object that is asked
 constexpr double kOldestAge = 60.0;       // frames
 constexpr std::uint32_t kLeastVisible = 20;
+constexpr double kOutlier = 25.0;  // squared, normalised
 
 /// Below 1: could be boxes of one thing.
 double apartness(const Box& a, const Box& b) {
@@ -171,9 +172,15 @@ class Trial {
         const Eigen::Vector3d part = e.segment<3>(at);
         return squaredMahalanobis(part, P.block<3, 3>(at, at));
       };
-      s.all_position.nees.push_back(nees(0));
-      s.all_half_yaw.nees.push_back(e[3] * e[3] / P(3, 3));
-      s.all_size.nees.push_back(nees(4));
+      const double position = nees(0), half_yaw = e[3] * e[3] / P(3, 3), size = nees(4);
+      s.all_position.nees.push_back(position);
+      s.all_half_yaw.nees.push_back(half_yaw);
+      s.all_size.nees.push_back(size);
+      if (std::max({position, half_yaw, size}) < kOutlier) continue;
+      s.outliers.push_back({options_.seed, o.id, o.best().name, position, half_yaw, size,
+                            e.head<3>().norm(), e[3], std::sqrt(P(3, 3)),
+                            thing.x.segment<3>(4).array().exp(),
+                            o.best().mean.segment<3>(4).array().exp(), o.hits, o.visible_misses});
     }
     s.position.add(s.all_position);
     s.half_yaw.add(s.all_half_yaw);
@@ -227,6 +234,7 @@ void BeliefScores::add(const BeliefScores& world) {
   wrong_class += world.wrong_class;
   new_boxes += world.new_boxes;
   false_boxes += world.false_boxes;
+  append(outliers, world.outliers);
 }
 
 BeliefScores runWorld(const WorldOptions& options, const Told& told) {
@@ -252,6 +260,25 @@ void print(const BeliefScores& s) {
   print(s.existence);
   print(s.classes.best());
   std::printf("all classes: Brier %.3f, skill %.2f\n", s.classes.brier(), s.classes.skill());
+}
+
+void print(std::vector<Outlier> outliers) {
+  const auto most = [](const Outlier& o) { return std::max({o.position, o.half_yaw, o.size}); };
+  std::sort(outliers.begin(), outliers.end(),
+            [&](const Outlier& a, const Outlier& b) { return most(a) > most(b); });
+  std::printf("\n%6s %5s %-13s %8s %8s %8s %6s %7s %7s  %-16s %-16s %5s %6s\n", "world", "id",
+              "class", "position", "yaw", "size", "m off", "turned", "said", "true size",
+              "believed", "hits", "misses");
+  for (const Outlier& o : outliers) {
+    const auto& t = o.true_size;
+    const auto& b = o.believed_size;
+    std::printf(
+        "%6llu %5llu %-13s %8.1f %8.1f %8.1f %6.2f %7.3f %7.3f  %4.2f %4.2f %4.2f   "
+        "%4.2f %4.2f %4.2f   %5u %6u\n",
+        static_cast<unsigned long long>(o.world), static_cast<unsigned long long>(o.id),
+        o.class_name.c_str(), o.position, o.half_yaw, o.size, o.apart_m, o.turned, o.sigma_yaw,
+        t[0], t[1], t[2], b[0], b[1], b[2], o.hits, o.misses);
+  }
 }
 
 }  // namespace perdure::test

@@ -81,6 +81,7 @@ World::World(const WorldOptions& options, const Told& told)
     : options_(options),
       told_(told),
       dice_(sim::seedOf("world of beliefs", {options.seed})),
+      elusive_dice_(sim::seedOf("what is elusive in the world of beliefs", {options.seed})),
       camera_(makeCamera()),
       model_(modelOf(told.detector, camera_)),
       read_model_(makeModel(model_)),
@@ -230,7 +231,10 @@ void World::changeView(std::size_t thing, const State& x, const RigidTransform& 
   e.box.draw(dice_, keep({p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle}));
   e.looks.draw(dice_, keep({p.looks.angle, p.looks.log_distance, p.looks.image_angle}));
   const double stays = keep({p.visibility.screen_angle, p.visibility.screen_log_distance, kNever});
-  if (!dice_.chance(stays)) e.screened = dice_.chance(p.visibility.screened);
+  if (!dice_.chance(stays)) {
+    e.screened = dice_.chance(p.visibility.screened);
+    e.elusive = elusive_dice_.chance(p.visibility.elusive);
+  }
   e.last_T_WC = T_WC;
 }
 
@@ -305,6 +309,10 @@ std::optional<Detection> World::look(std::size_t thing, const State& x, const Wo
       frame.true_view, {}, &read_model_, &told_.priors, &told_.config.filter};
   const double size_px = sizeOf(projected->sides);
   if (!dice_.chance(sight.fraction * detectionProbability(prior, size_px, context))) {
+    return std::nullopt;
+  }
+  const bool elusive = errors.elusive && options_.screens;
+  if (elusive && !elusive_dice_.chance(told_.config.filter.visibility.elusive_found)) {
     return std::nullopt;
   }
   const Box box = *frame.outlines[thing];

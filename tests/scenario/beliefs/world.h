@@ -91,7 +91,7 @@ class World {
   struct Errors {
     std::optional<RigidTransform> last_T_WC;
     Drift box, looks;
-    bool screened = false, out = false;
+    bool screened = false, elusive = false, out = false;
   };
 
   void place();
@@ -112,7 +112,7 @@ class World {
 
   WorldOptions options_;
   Told told_;
-  sim::Dice dice_;
+  sim::Dice dice_, elusive_dice_;  ///< its own: what else a seed draws does not depend on it
   CameraModel camera_;
   ModelInfo model_;
   semantic_filter::Model read_model_;

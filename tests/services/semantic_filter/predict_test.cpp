@@ -108,6 +108,26 @@ TEST(Predict, LooksOfAnEarlierVisitVouchThatNothingHidesWhatIsBackInThePicture) 
   EXPECT_GT(screenedAt(40.0), 0.19);
 }
 
+/// What was found often, or seldom, from here says little of elsewhere.
+TEST(Predict, HowOftenItIsFoundFromElsewhereIsNotKnown) {
+  ViewWalk walk = walkWith({});
+  walk.screened = 0.2;
+  walk.elusive = 0.05;
+  walk.screen = {0.15, 0.3, 1e9};
+  for (const double now : {0.0, 0.7}) {
+    Object object = biasedCar(walk);
+    object.screened = 0.1;
+    object.elusive = now;
+    object.last_view = walk.T_WC;
+    ViewWalk moved = walk;
+    predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
+    EXPECT_NEAR(object.elusive, now, 1e-12);
+    moved.T_WC.p += moved.T_WC.R() * Eigen::Vector3d(40.0, 0, 0);
+    predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
+    EXPECT_NEAR(object.elusive, 0.05, 0.02);
+  }
+}
+
 /// A car's place and speed after many looks: what is known of its yaw hangs on both.
 Object drivingCar() {
   Hypothesis h;

@@ -208,6 +208,19 @@ TEST_F(Tending, WhatWasSeenOnceAndIsOutOfSightIsForgottenAndWhatWasConfirmedIsKe
   EXPECT_EQ(hiddenFor(patience + 1.0, 3, true), 1u);
 }
 
+/// It begins from one yaw, and boxes of anything close at it.
+TEST(Published, TheYawOfWhatIsOfNoKnownClassIsUnknownUntilItsModesWereSought) {
+  const auto sigmaYaw = [](const char* name, bool sought) {
+    Object object = makeObject(1, name, makeState(10, 0, 0.7, 0.3, 1, 1, 1), 0.004);
+    object.hypotheses[0].modes_sought = sought;
+    return std::sqrt(toBelief(object, 0.7).best().covariance(kYaw, kYaw));
+  };
+  const double any = M_PI / std::sqrt(12.0);
+  EXPECT_NEAR(sigmaYaw("other", false), any, 1e-9);
+  EXPECT_LT(sigmaYaw("other", true), 0.5 * any);
+  EXPECT_LT(sigmaYaw("car", false), 0.5 * any);
+}
+
 TEST(Published, ACovarianceThatRoundingMadeIndefiniteIsMendedAndOthersAreLeftAlone) {
   Object object = makeObject(1, "car", makeState(1, 2, 3, 0.1, 4, 1.8, 1.5), 0.04);
   Matrix7d P = object.hypotheses[0].P.topLeftCorner<7, 7>();

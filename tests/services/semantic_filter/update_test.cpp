@@ -66,6 +66,7 @@ bool sameBits(const Object& a, const Object& b) {
   const double r_a = a.existence, r_b = b.existence;
   if (std::memcmp(&r_a, &r_b, sizeof(double)) != 0) return false;
   if (std::memcmp(&a.screened, &b.screened, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.elusive, &b.elusive, sizeof(double)) != 0) return false;
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
     if (std::memcmp(&x.weight, &y.weight, sizeof(double)) != 0) return false;
@@ -139,6 +140,77 @@ TEST_F(Update, ASightOfItSaysThatItIsNotScreened) {
   const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
   update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
   EXPECT_LT(object.screened, 0.01);
+}
+
+/// Found in one look of five: by the tenth look that is known.
+TEST_F(Update, WhatIsSeldomFoundFromHereIsElusiveAndStaysBelieved) {
+  const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
+  parameters.visibility.elusive_found = 0.3;
+  Object plain = object, asked = object;
+  asked.elusive = 0.1;
+  asked.existence = plain.existence = {0.99, ExistenceEvidence::kPrior, object.as_of};
+  double least = 1.0, least_plain = 1.0;
+  for (int i = 0; i < 60; ++i) {
+    const auto& boxes = i % 5 == 0 ? box : nothing;
+    const Eigen::VectorXd eta = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(boxes.size()));
+    std::swap(object, asked);
+    update(object, lookAt(boxes, 1.0), eta, boxes, frame);
+    std::swap(object, asked);
+    std::swap(object, plain);
+    update(object, lookAt(boxes, 1.0), eta, boxes, frame);
+    std::swap(object, plain);
+    if (i < 10) continue;
+    least = std::min<double>(least, asked.existence);
+    least_plain = std::min<double>(least_plain, plain.existence);
+  }
+  EXPECT_GT(asked.elusive, 0.9);
+  EXPECT_GT(least, 0.5);
+  EXPECT_LT(least_plain, 0.2);
+}
+
+/// What all looks have weighed is not given up by one that it explains nearly as well.
+TEST_F(Update, AModeThatAllLooksHaveWeighedStaysUntilTheyAreAskedAgain) {
+  Hypothesis turned = object.hypotheses[0];  // each look speaks against it, by a factor of ten
+  turned.x[kYaw] += 1.0;
+  turned.weight = 0.05;
+  object.hypotheses = {object.hypotheses[0], turned};
+  object.hypotheses[0].weight = 0.95;
+  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const auto turnedAfter = [&](bool sought) {
+    Object one = object;
+    for (auto& h : one.hypotheses) h.modes_sought = sought;
+    std::swap(object, one);
+    ObjectLook l = lookAt(boxes, 1.0);
+    const double A = 1.0 + l.hypotheses[0].detection * (l.hypotheses[0].likelihood[0] - 1.0);
+    l.hypotheses[1].likelihood[0] = 0.1 * l.hypotheses[0].likelihood[0];
+    EXPECT_GT(A, 10.0);
+    for (int i = 0; i < 3; ++i) {
+      update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
+      normalise(object, ClassEvidence::kGeometry);
+    }
+    std::swap(object, one);
+    double off = 0.0;
+    for (const auto& h : one.hypotheses) off += h.x[kYaw] > 1.0 ? h.weight : 0.0;
+    return off;
+  };
+  const double least = parameters.smooth.least_weight;
+  EXPECT_LT(turnedAfter(false), 1e-3);
+  EXPECT_NEAR(turnedAfter(true), least, 0.1 * least);
+}
+
+TEST_F(Update, ALookWeighsHowOftenItIsFoundFromHere) {
+  parameters.visibility.elusive_found = 0.3;
+  object.hypotheses.resize(1);
+  object.hypotheses[0].weight = 1.0;
+  object.screened = 0.2;
+  object.elusive = 0.1;
+  const ObjectLook l = lookAt({}, 1.0);
+  const double P_D = l.hypotheses[0].detection / (0.7 + 0.3 * 0.1);
+  const double A = 0.2 + 0.1 * (1.0 - 0.3 * P_D) + 0.7 * (1.0 - P_D);
+  EXPECT_NEAR(l.hypotheses[0].silent, A, 1e-12);
+  update(object, l, Eigen::VectorXd(0), {}, frame);
+  EXPECT_NEAR(object.screened, 0.2 / A, 1e-12);
+  EXPECT_NEAR(object.elusive, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
 }
 
 /// One look in five does not show it, from a place where the camera stands.
