@@ -82,8 +82,7 @@ struct Object {
   double alike = 0.0;     ///< nats for "looks like a known class", if it is of none (logRatio)
   std::string resembles;  ///< the class that the network last saw in it; "" where none
   double screened = 0.0;  ///< probability that something not on the map hides it, if it exists
-  double elusive =
-      0.0;  ///< that it is not, and the network seldom finds it from here, if it exists
+  double elusive = 0.0;   ///< that nothing does, and the network seldom finds it from here
   std::optional<RigidTransform> last_view;  ///< T_WC that those and b refer to
   FoundRate found_rate;
   Sightings sightings;

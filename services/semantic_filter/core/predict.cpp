@@ -79,7 +79,10 @@ void predictScreen(Object& object, const ViewWalk& walk) {
                           : 0.0;
   const double here = screenedFromHere(object, place, walk);
   object.screened = here + keep * (object.screened - here);
-  object.elusive = walk.elusive + keep * (object.elusive - walk.elusive);
+  // What drives and is not found is lost rather than seldom found: it would take the boxes of what
+  // stands where it was lost.
+  object.elusive =
+      object.best().moving ? 0.0 : walk.elusive + keep * (object.elusive - walk.elusive);
   object.elusive = std::min(object.elusive, 1.0 - object.screened);
 }
 

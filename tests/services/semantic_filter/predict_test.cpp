@@ -125,6 +125,9 @@ TEST(Predict, HowOftenItIsFoundFromElsewhereIsNotKnown) {
     moved.T_WC.p += moved.T_WC.R() * Eigen::Vector3d(40.0, 0, 0);
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
     EXPECT_NEAR(object.elusive, 0.05, 0.02);
+    object.hypotheses[0].moving = true;
+    predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
+    EXPECT_EQ(object.elusive, 0.0) << "what drives and is not found is lost";
   }
 }
 
