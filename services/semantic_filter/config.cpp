@@ -46,6 +46,9 @@ void describeBox(BoxParameters& p, Fields& fields) {
       {"change of aspect or log distance after which a side's noise is another (half of it "
        "in the image)",
        "rad"});
+  fields.number("box.assumed_sides", p.assumed_sides, atLeast(0),
+                {"sides of boxes that weigh as much as what is assumed here of a network's errors, "
+                 "which are learned; 0: nothing is learned"});
   fields.integer("box.iterations", p.iterations, between(1, 20), {"of the iterated EKF"});
 }
 

@@ -158,7 +158,7 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
     aspects.push_back(aspectOf(x.head<3>(), k.from->T_WC));
-    lasting.push_back(k.z.lasting.cwiseSqrt());
+    lasting.push_back((rescale(k) * k.z.lasting).cwiseSqrt());
     for (int side = 0; side < 4; ++side) lasting.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
   }
   for (std::size_t i = 0; i < looks_.size(); ++i) {
@@ -172,7 +172,7 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
     const Keyframe& k = *looks_.keyframes()[i];
     for (int side = 0; side < 4; ++side) {
       const auto row = static_cast<Eigen::Index>(4 * i) + side;
-      covariance.own(row, row) += s.counts[i][side] ? k.z.variance[side] : kNoInformation;
+      covariance.own(row, row) += s.counts[i][side] ? rescale(k) * k.z.variance[side] : kNoInformation;
     }
   }
   return covariance;
@@ -258,7 +258,7 @@ double BatchModel::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts
     for (int a = 0; a < 4; ++a) {
       const bool cut = !k.z.measured[a] || k.hidden[a];
       if (!cut && s.counts[i][a]) continue;
-      const double own = k.z.variance[a] + k.z.lasting[a];
+      const double own = rescale(k) * (k.z.variance[a] + k.z.lasting[a]);
       sum += std::log(s.counts[i][a] ? own : kNoInformation);
       sum += cut ? std::log(doubts[static_cast<Eigen::Index>(i)]) : -std::log(own);
     }
@@ -276,7 +276,8 @@ Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen:
     for (int a = 0; a < 4; ++a) {
       if (!s.counts[i][a]) continue;
       const auto row = static_cast<Eigen::Index>(4 * i) + a;
-      c(a, row) = rho * sigma[a] * std::sqrt(k.z.lasting[a] * doubts[static_cast<Eigen::Index>(i)]);
+      const double variance = rescale(k) * k.z.lasting[a];
+      c(a, row) = rho * sigma[a] * std::sqrt(variance * doubts[static_cast<Eigen::Index>(i)]);
     }
   }
   return c;
@@ -289,6 +290,11 @@ Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
         looks_.poseNow(i).lazyProduct(s.J_pose[i].transpose());
   }
   return c;
+}
+
+double BatchModel::rescale(const Keyframe& k) const {
+  const BoxErrors &then = k.from->errors, &now = frame_.errors;
+  return then.model == now.model ? now.ratio / then.ratio : 1.0;
 }
 
 /// Seconds from the look to the newest one, which the position is of.

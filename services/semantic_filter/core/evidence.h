@@ -31,6 +31,7 @@ using ClassNames = std::set<std::string>;
 
 /// What the filter keeps of a ModelInfo.
 struct Model {
+  std::uint64_t hash = 0;
   std::vector<std::string> classes;
   std::shared_ptr<const ClassNames> names = std::make_shared<const ClassNames>();  ///< the same
   std::map<std::string, std::size_t> index;  ///< name to position in `classes`

@@ -16,7 +16,7 @@ namespace perdure::semantic_filter {
 /// From where a frame's looks were taken; shared by all of them, and owner of its camera.
 struct KeyView {
   KeyView(const View& of, const PoseError& pose_error, TimePoint at,
-          std::shared_ptr<const BoxStyles> of_model)
+          std::shared_ptr<const BoxStyles> of_model, BoxErrors box_errors = {})
       : camera(*of.camera),
         view(of),
         error(pose_error),
@@ -24,7 +24,8 @@ struct KeyView {
         time(at),
         T_WC(of.T_WC()),
         projector(of),
-        styles(std::move(of_model)) {
+        styles(std::move(of_model)),
+        errors(box_errors) {
     view.camera = projector.camera = &camera;
   }
   KeyView(const KeyView&) = delete;
@@ -38,6 +39,7 @@ struct KeyView {
   RigidTransform T_WC;
   Projector projector;
   std::shared_ptr<const BoxStyles> styles;  ///< of the network that looked
+  BoxErrors errors;                         ///< of its boxes, as they were thought to be
 };
 
 /// One box that was surely the object's.

@@ -93,8 +93,9 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   ViewWalk walk;
   walk.T_WC = frame.view.T_WC();
   walk.focal = frame.view.camera->fx();
-  walk.lasting = lastingError(
-      box, frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{});
+  const BoxNoise noise =
+      frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{};
+  walk.lasting = lastingError(box, noise) * std::sqrt(frame.errors.ratio);
   walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
   walk.screened = visibility.screened;
   walk.elusive = visibility.elusive;

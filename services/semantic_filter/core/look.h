@@ -14,6 +14,12 @@ namespace perdure::semantic_filter {
 
 struct KeyView;
 
+/// Of the boxes of one network.
+struct BoxErrors {
+  std::uint64_t model = 0;
+  double ratio = 1.0;  ///< BoxScales::ratio
+};
+
 /// One hypothesis in one frame.
 struct HypothesisLook {
   std::optional<ProjectedBox> box;
@@ -43,6 +49,7 @@ struct FrameContext {
   const ClassPriors* priors = nullptr;
   const Parameters* parameters = nullptr;
   std::shared_ptr<const KeyView> key_view = {};  ///< of this frame, for what is remembered
+  BoxErrors errors = {};
 
   /// Of `view`.
   Projector projector() const;

@@ -99,14 +99,21 @@ void IdBook::forgetBefore(std::uint64_t frame_sequence) {
   given_.erase(given_.begin(), given_.lower_bound({frame_sequence, 0}));
 }
 
-FrameContext SemanticFilter::contextOf(const FrameInput& input) const {
+BoxErrors SemanticFilter::errorsOf(const Belief& belief, const FrameInput& input) const {
+  const std::uint64_t model = input.model.hash;
+  return {model, belief.box_scales.ratio(model, parameters_.box.assumed_sides)};
+}
+
+FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& input) const {
+  const BoxErrors errors = errorsOf(belief, input);
   return {input.view,
           input.pose_error,
           &input.model,
           &priors_,
           &parameters_,
           std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
-                                          input.model.styles)};
+                                          input.model.styles, errors),
+          errors};
 }
 
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
@@ -197,19 +204,22 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
       to_smooth.push_back(&object);
     }
   }
-  smoothNeediest(to_smooth, frame);
+  smoothNeediest(to_smooth, belief.box_scales, frame);
   return association.claimed;
 }
 
 /// As many as a frame has time for; the others wait.
-void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame) {
+void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, BoxScales& box_scales,
+                                    const FrameContext& frame) {
   const double fresh = frame.parameters->smooth.fresh;
   std::stable_sort(objects.begin(), objects.end(), [fresh](const Object* a, const Object* b) {
     return smoothingNeed(*a, fresh) > smoothingNeed(*b, fresh);
   });
   const auto most = static_cast<std::size_t>(frame.parameters->smooth.per_frame);
   if (objects.size() > most) objects.resize(most);
-  for (Object* object : objects) smooth(*object, frame);
+  for (Object* object : objects) {
+    if (const auto over = smooth(*object, frame)) box_scales.hear(frame.errors.model, *over);
+  }
 }
 
 void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
@@ -247,9 +257,8 @@ void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
   }
 }
 
-std::optional<FrameInput> SemanticFilter::withRemnants(const Belief& belief,
-                                                       const std::vector<Sight>& sights,
-                                                       const FrameInput& input) const {
+void SemanticFilter::explainRemnants(const Belief& belief, const std::vector<Sight>& sights,
+                                     FrameInput& input) const {
   std::vector<std::pair<std::size_t, double>> remnants;  // and how surely each is found
   for (std::size_t j = 0; j < sights.size(); ++j) {
     if (sights[j].remnant <= 0.0) continue;
@@ -257,20 +266,16 @@ std::optional<FrameInput> SemanticFilter::withRemnants(const Belief& belief,
     const double found = priors_.of(o.best().class_name).detection_probability;
     remnants.emplace_back(j, o.existence * sights[j].remnant * found);
   }
-  std::optional<FrameInput> result;
-  if (remnants.empty()) return result;
+  if (remnants.empty()) return;
   Expected expected(belief, input, parameters_);
-  for (std::size_t z = 0; z < input.boxes->size(); ++z) {
+  for (Evidence& box : *input.boxes) {
     double boxes = 0.0;
     for (const auto& [j, found] : remnants) {
-      const auto fit = expected.fit(j, sights[j].hidden, (*input.boxes)[z]);
+      const auto fit = expected.fit(j, sights[j].hidden, box);
       if (fit) boxes += found * std::exp(*fit);
     }
-    if (boxes <= 0.0) continue;
-    if (!result) result = input;
-    (*result->boxes)[z].log_remnants = std::log1p(boxes);
+    box.log_remnants = std::log1p(boxes);
   }
-  return result;
 }
 
 bool SemanticFilter::leavesView(Expected& expected, const Belief& belief,
@@ -358,7 +363,7 @@ std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, Obj
     return std::nullopt;
   }
   if (!sameKind(*kept, *other)) return std::nullopt;
-  mergeTwo(*kept, *other, contextOf(input));
+  mergeTwo(*kept, *other, contextOf(belief, input));
   belief.objects.erase(other);
   return MergeRecord{id, absorbed};
 }
@@ -366,9 +371,11 @@ std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, Obj
 StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook& ids) const {
   auto sights = seeAll(belief, heard);
   if (!heard.boxes) return {};
-  const auto explained = withRemnants(belief, sights, heard);
-  const FrameInput& input = explained ? *explained : heard;
-  const FrameContext frame = contextOf(input);
+  FrameInput input = heard;
+  const double ratio = errorsOf(belief, heard).ratio;
+  for (Evidence& box : *input.boxes) box.z.variance *= ratio, box.z.lasting *= ratio;
+  explainRemnants(belief, sights, input);
+  const FrameContext frame = contextOf(belief, input);
   reveal(belief, sights, input);
   auto seen = score(belief, sights, input, frame);
   StepReport report;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/birth.h"
+#include "services/semantic_filter/core/box_scale.h"
 #include "services/semantic_filter/core/drift_watch.h"
 #include "services/semantic_filter/core/merge.h"
 #include "services/semantic_filter/core/tend.h"
@@ -29,6 +30,7 @@ struct FrameInput {
 struct Belief {
   std::vector<Object> objects;  ///< in order of id
   std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
+  BoxScales box_scales = {};
 };
 
 /// Gives ids to births. The same box of the same frame always gets the same id, so that stepping
@@ -78,7 +80,8 @@ class SemanticFilter {
     std::optional<PoseEvidence> told = {};  ///< until the look is taken back
   };
 
-  FrameContext contextOf(const FrameInput& input) const;
+  BoxErrors errorsOf(const Belief& belief, const FrameInput& input) const;
+  FrameContext contextOf(const Belief& belief, const FrameInput& input) const;
   /// Visibility of all objects, published with them; one Sight for each.
   std::vector<Sight> seeAll(Belief& belief, const FrameInput& input) const;
   std::vector<Seen> score(Belief& belief, const std::vector<Sight>& sights, const FrameInput& input,
@@ -90,12 +93,12 @@ class SemanticFilter {
   bool tellsPose(const Object& object, const FrameContext& frame) const;
   /// Of one object after its look; nothing may be left of it.
   void tend(Object& object, Seen& seen, const FrameInput& input, const FrameContext& frame) const;
-  static void smoothNeediest(std::vector<Object*>& objects, const FrameContext& frame);
+  static void smoothNeediest(std::vector<Object*>& objects, BoxScales& box_scales,
+                             const FrameContext& frame);
   /// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less
-  /// likely to be clutter, new, or of anything else. The object itself stays as it is. Nothing
-  /// where there is no such box.
-  std::optional<FrameInput> withRemnants(const Belief& belief, const std::vector<Sight>& sights,
-                                         const FrameInput& input) const;
+  /// likely to be clutter, new, or of anything else. The object itself stays as it is.
+  void explainRemnants(const Belief& belief, const std::vector<Sight>& sights,
+                       FrameInput& input) const;
   /// A box that a hidden object explains far better than any that is in sight says that the blocker
   /// was misjudged: that object can be seen.
   void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "common/math/so3.h"
@@ -155,8 +156,9 @@ void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fi
   }
 }
 
-void smoothClass(Object& object, const std::string& name, const Looks& looks,
-                 const FrameContext& frame, bool seek, Verdicts& verdicts) {
+/// What the best fit of a thing of the class at rest leaves over.
+std::optional<Leftover> smoothClass(Object& object, const std::string& name, const Looks& looks,
+                                    const FrameContext& frame, bool seek, Verdicts& verdicts) {
   const auto& p = frame.parameters->smooth;
   Fits still, moving;
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
@@ -176,15 +178,17 @@ void smoothClass(Object& object, const std::string& name, const Looks& looks,
   weighModes(object.hypotheses, still, p.least_weight);
   weighModes(object.hypotheses, moving, p.least_weight);
   auto at_rest = heaviest(object.hypotheses, std::move(still));
+  const auto over = at_rest ? std::optional(at_rest->leftover()) : std::nullopt;
   const auto driving = heaviest(object.hypotheses, std::move(moving));
-  if (!driving) return;
+  if (!driving) return over;
   if (!at_rest) {
     at_rest = fit(atRest(driving->hypothesis(), object.keyframes), looks, frame);
-    if (!at_rest) return;
+    if (!at_rest) return over;
     object.hypotheses.push_back(at_rest->hypothesis());
     object.hypotheses.back().weight = 1e-3 * driving->hypothesis().weight;
   }
   weighMotion(object.hypotheses, name, *at_rest, *driving, frame);
+  return over;
 }
 
 /// A thing of no known class that the network takes for one: boxes that were of two things make the
@@ -235,6 +239,17 @@ void tryWhatItResembles(Object& object, const Looks& looks, const FrameContext& 
   normalise(object, ClassEvidence::kGeometry);
 }
 
+/// All of its looks are of the present network, and it is something that stands.
+bool tellsOfBoxes(const Object& object, const FrameContext& frame) {
+  constexpr double kSure = 0.9;
+  const Hypothesis& best = object.best();
+  return !best.moving && best.class_name != kOtherClass && object.existence > kSure &&
+         movingProbability(object, frame.parameters->motion.min_speed) < 1.0 - kSure &&
+         std::all_of(object.keyframes.begin(), object.keyframes.end(), [&](const auto& k) {
+           return k->from->errors.model == frame.errors.model;
+         });
+}
+
 }  // namespace
 
 bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
@@ -255,10 +270,11 @@ double smoothingNeed(const Object& object, double fresh) {
          (fresh * static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
 }
 
-void smooth(Object& object, const FrameContext& frame) {
+std::optional<Leftover> smooth(Object& object, const FrameContext& frame) {
   const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smooth.patience);
   constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
   const auto& p = *frame.parameters;
+  const double fresh = object.fresh_keyframes / static_cast<double>(object.keyframes.size());
   object.fresh_keyframes = 0;
   const Hypothesis before = object.best();
   const Looks looks(object.keyframes, frame.pose_error);
@@ -267,7 +283,11 @@ void smooth(Object& object, const FrameContext& frame) {
   const bool seek = object.remembered >= object.seek_modes_at;
   if (seek) object.seek_modes_at = 2 * object.remembered;
   Verdicts verdicts;
-  for (const auto& name : names) smoothClass(object, name, looks, frame, seek, verdicts);
+  std::map<std::string, Leftover> over;
+  for (const auto& name : names) {
+    const auto left = smoothClass(object, name, looks, frame, seek, verdicts);
+    if (left) over[name] = *left;
+  }
   std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight <= 0.0; });
   normalise(object, ClassEvidence::kMotion);
   tryWhatItResembles(object, looks, frame);
@@ -276,6 +296,9 @@ void smooth(Object& object, const FrameContext& frame) {
       before.class_name == object.best().class_name && before.moving == object.best().moving;
   const bool settled = same && distance2(before, object.best()) < kLittle;
   object.smoothing_patience = settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
+  const auto told = over.find(object.best().class_name);
+  if (told == over.end() || !tellsOfBoxes(object, frame)) return std::nullopt;
+  return Leftover{told->second.ratio, told->second.sides * std::min(fresh, 1.0)};
 }
 
 }  // namespace perdure::semantic_filter

@@ -252,6 +252,14 @@ std::size_t Smoothed::sides() const {
   return sum;
 }
 
+Leftover Smoothed::leftover() const {
+  // Of a Gaussian residual of four dimensions: a doubt is never less than one.
+  constexpr double kShareLeftByDoubts = 0.83;
+  const double free = static_cast<double>(sides()) - modelOf().dim();
+  if (free <= 0.0) return {};
+  return {frame_->errors.ratio * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
+}
+
 double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }
 
 double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/batch_model.h"
+#include "services/semantic_filter/core/box_scale.h"
 
 namespace perdure::semantic_filter {
 
@@ -34,6 +35,9 @@ class Smoothed {
   const Eigen::VectorXd& doubts() const;
   /// Share of the looks that contradict it.
   double contradicted() const { return contradictions().cast<double>().mean(); }
+  /// What it leaves over of the boxes, beside what was assumed of their errors at first; of as many
+  /// sides as it has degrees of freedom.
+  Leftover leftover() const;
   /// Sides that count as measured, of all looks.
   std::size_t sides() const;
   /// 1 for each look that does.
