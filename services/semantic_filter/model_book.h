@@ -24,6 +24,8 @@ class ModelBook {
   /// Detections of this (known) model are used in a frame of this time. Where the frame is newer
   /// than all before and their model was another one: a sentence on what changes.
   std::optional<std::string> use(std::uint64_t hash, TimePoint time);
+  /// The one of the newest frame; 0 before there is one.
+  std::uint64_t used() const { return used_; }
 
  private:
   struct Entry {

@@ -1,6 +1,9 @@
 #include "services/semantic_filter/node.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
@@ -82,7 +85,7 @@ void Node::beginWorld(const WorldId& world) {
     keepFormer();
   }
   world_ = world;
-  belief_ = {};
+  belief_ = {.objects = {}, .gone = {}, .box_scales = belief_.box_scales};
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
@@ -341,6 +344,16 @@ std::optional<ComingFrame> Node::comingFrame(const Entry& entry) const {
     return coming;
   }
   return std::nullopt;
+}
+
+std::string Node::note() const {
+  constexpr double kWorthSaying = 1.1;
+  std::string note = former_.note();
+  const double assumed = config_.filter.box.assumed_sides;
+  const double times = std::sqrt(belief_.box_scales.ratio(models_.used(), assumed));
+  if (std::max(times, 1.0 / times) < kWorthSaying) return note;
+  if (!note.empty()) note += "; ";
+  return note + fmt::format("boxes err {:.2f} times as far as was assumed", times);
 }
 
 void Node::publishPredictions(const Entry& entry, const std::optional<ComingFrame>& coming) {

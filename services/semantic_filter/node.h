@@ -51,8 +51,9 @@ class Node {
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return belief_; }
-  /// For people: what the node is still at, beside its frames. Empty as a rule.
-  std::string note() const { return former_.note(); }
+  /// For people: what the node is still at beside its frames, and what it makes of the network's
+  /// boxes.
+  std::string note() const;
 
  private:
   struct Entry {

@@ -154,12 +154,12 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
   covariance.own.setZero(n, n);
   if (!looks_.exactPoses()) covariance.pose = looks_.poseCovariance(s.J_pose);
   std::vector<Aspect> aspects;
-  std::vector<Eigen::Vector4d> lasting;  // deviations of b; 0 of a side that does not count
+  std::vector<Eigen::Vector4d> stays;  // deviations of b; 0 of a side that does not count
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
     aspects.push_back(aspectOf(x.head<3>(), k.from->T_WC));
-    lasting.push_back((rescale(k) * k.z.lasting).cwiseSqrt());
-    for (int side = 0; side < 4; ++side) lasting.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
+    stays.push_back(lasting(k).cwiseSqrt());
+    for (int side = 0; side < 4; ++side) stays.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
   }
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
@@ -167,12 +167,12 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
       auto own = covariance.own.block<4, 4>(row, column);
       if (moving()) own = acceleration(s, i, j);
-      own.diagonal() += alike * lasting[i].cwiseProduct(lasting[j]);
+      own.diagonal() += alike * stays[i].cwiseProduct(stays[j]);
     }
     const Keyframe& k = *looks_.keyframes()[i];
     for (int side = 0; side < 4; ++side) {
       const auto row = static_cast<Eigen::Index>(4 * i) + side;
-      covariance.own(row, row) += s.counts[i][side] ? rescale(k) * k.z.variance[side] : kNoInformation;
+      covariance.own(row, row) += s.counts[i][side] ? noise(k)[side] : kNoInformation;
     }
   }
   return covariance;
@@ -258,7 +258,7 @@ double BatchModel::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts
     for (int a = 0; a < 4; ++a) {
       const bool cut = !k.z.measured[a] || k.hidden[a];
       if (!cut && s.counts[i][a]) continue;
-      const double own = rescale(k) * (k.z.variance[a] + k.z.lasting[a]);
+      const double own = noise(k)[a] + lasting(k)[a];
       sum += std::log(s.counts[i][a] ? own : kNoInformation);
       sum += cut ? std::log(doubts[static_cast<Eigen::Index>(i)]) : -std::log(own);
     }
@@ -276,8 +276,7 @@ Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen:
     for (int a = 0; a < 4; ++a) {
       if (!s.counts[i][a]) continue;
       const auto row = static_cast<Eigen::Index>(4 * i) + a;
-      const double variance = rescale(k) * k.z.lasting[a];
-      c(a, row) = rho * sigma[a] * std::sqrt(variance * doubts[static_cast<Eigen::Index>(i)]);
+      c(a, row) = rho * sigma[a] * std::sqrt(lasting(k)[a] * doubts[static_cast<Eigen::Index>(i)]);
     }
   }
   return c;
@@ -292,9 +291,14 @@ Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
   return c;
 }
 
-double BatchModel::rescale(const Keyframe& k) const {
+Eigen::Vector4d BatchModel::noise(const Keyframe& k) const {
   const BoxErrors &then = k.from->errors, &now = frame_.errors;
-  return then.model == now.model ? now.ratio / then.ratio : 1.0;
+  return (then.model == now.model ? now.noise / then.noise : 1.0) * k.z.variance;
+}
+
+Eigen::Vector4d BatchModel::lasting(const Keyframe& k) const {
+  const BoxErrors &then = k.from->errors, &now = frame_.errors;
+  return (then.model == now.model ? now.lasting() / then.lasting() : 1.0) * k.z.lasting;
 }
 
 /// Seconds from the look to the newest one, which the position is of.

@@ -126,8 +126,9 @@ class BatchModel {
 
  private:
   double age(std::size_t look) const;
-  /// By what the variances of its box are to be multiplied: more is known of the network now.
-  double rescale(const Keyframe& k) const;
+  /// Of its box, as the network is known now.
+  Eigen::Vector4d noise(const Keyframe& k) const;
+  Eigen::Vector4d lasting(const Keyframe& k) const;
   Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
   std::vector<AzimuthLook> azimuths(const State& x) const;
   double azimuthSigma(const Keyframe& k) const;

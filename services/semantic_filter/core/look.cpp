@@ -95,7 +95,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   walk.focal = frame.view.camera->fx();
   const BoxNoise noise =
       frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{};
-  walk.lasting = lastingError(box, noise) * std::sqrt(frame.errors.ratio);
+  walk.lasting = lastingError(box, noise) * std::sqrt(frame.errors.lasting());
   walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
   walk.screened = visibility.screened;
   walk.elusive = visibility.elusive;

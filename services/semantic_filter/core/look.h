@@ -2,6 +2,7 @@
 // look is worth beside earlier looks from the same place (DESIGN 5, items 5 and 7).
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -14,10 +15,13 @@ namespace perdure::semantic_filter {
 
 struct KeyView;
 
-/// Of the boxes of one network.
+/// Of the boxes of one network, beside what is assumed of them.
 struct BoxErrors {
   std::uint64_t model = 0;
-  double ratio = 1.0;  ///< BoxScales::ratio
+  double noise = 1.0;  ///< of variances: BoxScales::ratio
+  /// The same of b. What the looks at one thing have in common passes for its place and size: what
+  /// is left over of fits tells of b by half only, as networks go.
+  double lasting() const { return std::sqrt(noise); }
 };
 
 /// One hypothesis in one frame.

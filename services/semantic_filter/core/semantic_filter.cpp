@@ -372,8 +372,11 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   auto sights = seeAll(belief, heard);
   if (!heard.boxes) return {};
   FrameInput input = heard;
-  const double ratio = errorsOf(belief, heard).ratio;
-  for (Evidence& box : *input.boxes) box.z.variance *= ratio, box.z.lasting *= ratio;
+  const BoxErrors errors = errorsOf(belief, heard);
+  for (Evidence& box : *input.boxes) {
+    box.z.variance *= errors.noise;
+    box.z.lasting *= errors.lasting();
+  }
   explainRemnants(belief, sights, input);
   const FrameContext frame = contextOf(belief, input);
   reveal(belief, sights, input);

@@ -245,9 +245,8 @@ bool tellsOfBoxes(const Object& object, const FrameContext& frame) {
   const Hypothesis& best = object.best();
   return !best.moving && best.class_name != kOtherClass && object.existence > kSure &&
          movingProbability(object, frame.parameters->motion.min_speed) < 1.0 - kSure &&
-         std::all_of(object.keyframes.begin(), object.keyframes.end(), [&](const auto& k) {
-           return k->from->errors.model == frame.errors.model;
-         });
+         std::all_of(object.keyframes.begin(), object.keyframes.end(),
+                     [&](const auto& k) { return k->from->errors.model == frame.errors.model; });
 }
 
 }  // namespace

@@ -257,7 +257,7 @@ Leftover Smoothed::leftover() const {
   constexpr double kShareLeftByDoubts = 0.83;
   const double free = static_cast<double>(sides()) - modelOf().dim();
   if (free <= 0.0) return {};
-  return {frame_->errors.ratio * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
+  return {frame_->errors.noise * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
 }
 
 double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }

@@ -97,6 +97,21 @@ class Passing {
   Keyframes keyframes_;
 };
 
+/// The same looks, their boxes' noise `factor` times as it was, at a time when the errors of their
+/// network were taken for `then`.
+Keyframes lookedAs(const Keyframes& looks, double factor, const BoxErrors& then) {
+  Keyframes result;
+  for (const auto& look : looks) {
+    Keyframe k = *look;
+    const KeyView& v = *look->from;
+    k.from = std::make_shared<const KeyView>(v.view, v.error, v.time, v.styles, then);
+    k.z.variance *= factor;
+    k.z.lasting *= std::sqrt(factor);
+    result.push_back(std::make_shared<const Keyframe>(k));
+  }
+  return result;
+}
+
 Eigen::Vector3d placeError(const Smoothed& s, const Passing& scene) {
   return (s.hypothesis().x - scene.truth()).head<3>();
 }
@@ -111,6 +126,39 @@ TEST(Smoother, FindsThePlaceFromMetresAway) {
     EXPECT_LT(placeError(*s, scene).norm(), 0.7) << seed;
     EXPECT_LT(s->contradicted(), 0.1) << seed;
   }
+}
+
+TEST(Smoother, OldLooksCountAsTheirNetworkIsKnownNow) {
+  const Passing scene(3);
+  FrameContext frame = scene.frame();
+  frame.errors = {17, 0.25};
+  const Keyframes early = lookedAs(scene.keyframes(), 1.0, {17, 1.0});
+  const Keyframes late = lookedAs(scene.keyframes(), 0.25, {17, 0.25});
+  const Keyframes other = lookedAs(scene.keyframes(), 1.0, {18, 1.0});
+  std::vector<Hypothesis> fits;
+  for (const Keyframes* looks : {&early, &late, &other}) {
+    const Looks all(*looks, frame.pose_error);
+    const auto s = Smoothed::make(scene.start(false), all, frame);
+    ASSERT_TRUE(s);
+    fits.push_back(s->hypothesis());
+  }
+  EXPECT_LT((fits[0].x - fits[1].x).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((fits[0].P - fits[1].P).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_GT(fits[2].P(0, 0), 1.2 * fits[0].P(0, 0));  // nothing was learned of that one
+}
+
+TEST(Smoother, LeavesOverWhatTheBoxesErrMoreThanAssumed) {
+  double left = 0.0, sides = 0.0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const Passing scene(seed);
+    const FrameContext frame = scene.frame();
+    const Looks looks(scene.keyframes(), frame.pose_error);
+    const auto s = Smoothed::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(s) << seed;
+    left += s->leftover().sides * s->leftover().ratio;
+    sides += s->leftover().sides;
+  }
+  EXPECT_NEAR(left / sides, 1.0, 0.15);
 }
 
 TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {

@@ -1,0 +1,107 @@
+// How far a network's boxes err, learned while driving past parked cars.
+#include <gtest/gtest.h>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::detect;
+using testing::detectionsAt;
+using testing::driveTo;
+using testing::Harness;
+using testing::makeState;
+using testing::odometryAt;
+using testing::TrueObject;
+
+constexpr double kMetres = 0.4;
+constexpr std::uint64_t kFrames = 200;
+
+std::vector<TrueObject> parkedCars() {
+  std::vector<TrueObject> cars;
+  for (int i = 0; i < 16; ++i) {
+    const double side = i % 2 == 0 ? 4.0 : -4.5;
+    cars.push_back({makeState(14.0 + 6.0 * i, side, 0.75, 0.1 * (i % 3), 4.2, 1.75, 1.5), "car"});
+  }
+  return cars;
+}
+
+/// Boxes whose sides err `noise` times as far as is assumed.
+Detections boxesAt(std::uint64_t k, double noise) {
+  static const CameraModel camera{testing::makeCamera()};
+  static const std::vector<TrueObject> cars = parkedCars();
+  std::mt19937 random(static_cast<std::uint32_t>(k) + 77);
+  const View view{&camera, driveTo(k, kMetres), Eigen::Vector3d::UnitZ()};
+  std::vector<Detection> list;
+  for (const TrueObject& car : cars) {
+    if ((car.x.head<3>() - view.T_WB.p).norm() > 40.0) continue;
+    if (auto d = detect(car, view, BoxParameters{}, noise, 3.0, random)) list.push_back(*d);
+  }
+  return detectionsAt(k, std::move(list));
+}
+
+double learned(const Harness& h) {
+  return h.node.belief().box_scales.ratio(testing::makeModelInfo().hash,
+                                          Parameters{}.box.assumed_sides);
+}
+
+double learnedFrom(double noise) {
+  Harness h;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    h.node.onDetections(boxesAt(k, noise));
+  }
+  return learned(h);
+}
+
+TEST(BoxScaleRun, LearnsHowFarBoxesErr) {
+  // The errors are drawn anew at each look: of what is assumed to stay with the thing nothing does.
+  const double third = learnedFrom(0.35), once = learnedFrom(1.0), twice = learnedFrom(1.6);
+  EXPECT_GT(third, 0.08);
+  EXPECT_LT(third, 0.5);
+  EXPECT_GT(once, 0.75);
+  EXPECT_LT(once, 1.6);
+  EXPECT_GT(twice, 1.6);
+  EXPECT_LT(twice, 4.5);
+}
+
+TEST(BoxScaleRun, LearnsTheSameFromLateBoxes) {
+  Harness on_time, late;
+  constexpr std::uint64_t kLate = 2;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    on_time.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    on_time.node.onDetections(boxesAt(k, 0.35));
+    late.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    if (k >= kLate) late.node.onDetections(boxesAt(k - kLate, 0.35));
+  }
+  for (std::uint64_t k = kFrames - kLate; k < kFrames; ++k)
+    late.node.onDetections(boxesAt(k, 0.35));
+  EXPECT_LT(learned(on_time), 0.9);
+  EXPECT_NEAR(learned(late), learned(on_time), 1e-9);
+}
+
+TEST(BoxScaleRun, SaysWhatItMakesOfTheBoxes) {
+  Harness h;
+  EXPECT_EQ(h.node.note(), "");
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    h.node.onDetections(boxesAt(k, 0.35));
+  }
+  EXPECT_NE(h.node.note().find("boxes err 0."), std::string::npos) << h.node.note();
+}
+
+TEST(BoxScaleRun, KeepsItWhenOdometryBeginsAnew) {
+  Harness h;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    h.node.onDetections(boxesAt(k, 0.35));
+  }
+  const double before = learned(h);
+  Odometry anew = odometryAt(kFrames, driveTo(0, kMetres));
+  anew.world = {6, 1};
+  h.node.onOdometry(anew);
+  EXPECT_EQ(learned(h), before);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
