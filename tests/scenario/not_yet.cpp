@@ -15,79 +15,70 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"occlusion",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "2, 1, 0: looks whose box another thing may have made, or a belief of odd size "
+            "1, 1, 0: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"vanish",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "1, 0, 2: looks whose box another thing may have made, or a belief of odd size "
+            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"room",
        {
-           {"objects for each one found",
-            "1.04, 1.04, 1.09: couches below the floor that a few boxes of hidden ones made"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 3, 2: looks whose box another thing may have made, or a belief of odd size "
+            "2, 2, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"row",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "7, 9, 8: not yet looked into since boxes are of shapes"},
-           {"looks that showed a claimed thing and made it less sure",
-            "3, 3, 1: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
-       }},
-      {"roll",
-       {
-           {"change of yaw meanwhile, deg, nine in ten",
-            "5.63, 4.28, 6.14: not by the roll alone: the estimate still settles as the camera "
-            "comes nearer"},
-           {"change of a length, width or height, share, median",
-            "0.121, 0.0896, 0.114: not by the roll alone: the estimate still settles as the "
-            "camera comes nearer"},
-           {"change of a length, width or height, share, nine in ten",
-            "1.71, 0.202, 0.392: not by the roll alone: the estimate still settles as the "
-            "camera comes nearer"},
-           {"looks that showed a claimed thing and made it less sure",
-            "1, 0, 2: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
-           {"merges that lost existence", "0, 1, 1: a merge in the frame of a miss"},
-       }},
-      {"traffic",
-       {
-           {"things in long-term memory where nothing stands",
-            "2, 3, 3: what a moving car leaves behind where it was first believed to stand"},
-           {"`moved` events of the parked car that drives off",
-            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does "
-            "not come from its place"},
-           {"standing things on the map where nothing is",
-            "3, 3, 3: what a moving car leaves behind where it was first believed to stand"},
+            "5, 6, 8: not yet looked into since boxes are of shapes"},
            {"looks that showed a claimed thing and made it less sure",
             "4, 2, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
+      {"roll",
+       {
+           {"change of a length, width or height, share, median",
+            "0.0905, 0.103, 0.101: not by the roll alone: the estimate still settles as the "
+            "camera comes nearer"},
+           {"change of a length, width or height, share, nine in ten",
+            "0.193, 0.229, 0.232: not by the roll alone: the estimate still settles as the "
+            "camera comes nearer"},
+           {"looks that showed a claimed thing and made it less sure",
+            "1, 0, 3: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
+       }},
+      {"traffic",
+       {
+           {"things in long-term memory where nothing stands",
+            "2, 2, 4: what a moving car leaves behind where it was first believed to stand"},
+           {"`moved` events of the parked car that drives off",
+            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does "
+            "not come from its place"},
+           {"standing things on the map where nothing is",
+            "2, 2, 4: what a moving car leaves behind where it was first believed to stand"},
+           {"looks that showed a claimed thing and made it less sure",
+            "5, 3, 2: looks whose box another thing may have made, or a belief of odd size "
+            "given up"},
+       }},
       {"street",
        {
-           {"second lap: share that keeps the id of the first",
-            "0.941, 0.971, 0.962: two beliefs in one thing, of which the older survives where "
-            "the younger was told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "3, 2, 3: some misses in a row, or a place lost for a few frames"},
+            "4, 1, 1: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "2, 1, 3: young ones, of five to sixteen looks, that are something or somewhere "
+            "4, 4, 6: young ones, of five to sixteen looks, that are something or somewhere "
             "else after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 3, 3: looks whose box another thing may have made, or a belief of odd size "
+            "3, 6, 7: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
-           {"merges that lost existence", "1, 0, 0: a merge in the frame of a miss"},
+           {"merges that lost existence", "0, 1, 0: a merge in the frame of a miss"},
        }},
       {"street recalled",
        {
            {"second lap: share that keeps the id of the first",
-            "0.94: two beliefs in one thing, of which the older survives where the younger was "
+            "0.96: two beliefs in one thing, of which the older survives where the younger was "
             "told of more often"},
            {"flicker: claims in full sight that ceased and came back",
             "1: some misses in a row, or a place lost for a few frames"},
@@ -98,7 +89,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy vio",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.502: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
+            "0.503: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
             "a little later"},
            {"P(car, exists) of the real cars at the end",
             "0.91: the car at 43 m is 16 px high and found in six looks of ten"},
@@ -107,59 +98,69 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"still vio",
        {
            {"deviations between true distance and belief, the most (the toy's as other)",
-            "3.53: no other is left of the toy"},
+            "3.55: no other is left of the toy"},
        }},
       {"occlusion vio",
        {
            {"share of the predictions whose interval holds the return",
-            "0.75: a body that turns back is taken for one whose velocity wanders"},
+            "0.792: a body that turns back is taken for one whose velocity wanders"},
            {"looks that showed a claimed thing and made it less sure",
-            "3: looks whose box another thing may have made, or a belief of odd size given up"},
+            "2: looks whose box another thing may have made, or a belief of odd size given up"},
+       }},
+      {"vanish vio",
+       {
+           {"visible frames until it is `gone`",
+            "35: at 20 Hz, where a frame tells less; at 10 Hz and with true poses it passes"},
+           {"looks that showed a claimed thing and made it less sure",
+            "1: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"room vio",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"row vio",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "6: placed along the line of sight to a metre"},
+            "3: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
             "5: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"roll vio",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "6.16: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "7.26: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.128: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.112: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.355: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.186: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "3: looks whose box another thing may have made, or a belief of odd size given up"},
+            "5: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"traffic vio",
        {
            {"things in long-term memory where nothing stands",
             "2: what a moving car leaves behind where it was first believed to stand"},
+           {"`moved` events of the parked car that drives off",
+            "0: the belief at rest follows it for some metres, so that the new one does not "
+            "come from its place"},
            {"standing things on the map where nothing is",
             "2: what a moving car leaves behind where it was first believed to stand"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "4: looks whose box another thing may have made, or a belief of odd size given up"},
            {"merges that lost existence", "1: not yet looked into; with true poses it passes"},
        }},
       {"street vio",
        {
            {"second lap: share that keeps the id of the first",
-            "0.942: not yet looked into; with true poses it passes"},
+            "0.891: not yet looked into; with true poses it passes"},
            {"flicker: claims in full sight that ceased and came back",
             "6: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "2: young ones, of five to sixteen looks, that are something or somewhere else "
+            "6: young ones, of five to sixteen looks, that are something or somewhere else "
             "after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "3: looks whose box another thing may have made, or a belief of odd size given up"},
+            "6: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
   };
   const auto found = all.find(scene);
