@@ -2,6 +2,9 @@
 // published of each object in each frame, events, the map at the end.
 #pragma once
 
+#include <map>
+#include <vector>
+
 #include "tests/scenario/scenario.h"
 
 namespace perdure::test {
@@ -44,6 +47,10 @@ struct IdsByHalf {
 };
 /// Of those that were claimed in both.
 std::vector<IdsByHalf> idsByHalf(const Outcome& run);
+/// What is on the map at the end, is believed to stand, and has nothing within 3 m.
+std::vector<MapObject> ghosts(const Outcome& run);
+/// True things, and in how many frames that found the object each was the nearest to it.
+std::map<const sim::TruthObject*, std::size_t> foundNearest(const Outcome& run, ObjectId id);
 /// The index of the frame nearest to that time.
 std::uint64_t frameAt(const Outcome& run, TimePoint time);
 

@@ -85,6 +85,22 @@ void changedIds(const test::Outcome& run) {
   }
 }
 
+/// Of each thing on the map where nothing stands: what was said of it, and the true thing that was
+/// nearest to it while it was found.
+void tellOfGhosts(const test::Outcome& run) {
+  for (const auto& ghost : test::ghosts(run)) {
+    const auto nearest = test::foundNearest(run, ghost.id);
+    fmt::print("seed {} ghost at {:.1f} {:.1f} {:.1f}, found nearest to", run.setting.seed,
+               ghost.centre.x(), ghost.centre.y(), ghost.centre.z());
+    for (const auto& [object, times] : nearest) {
+      fmt::print(" {} {}{} ({} times)", object->class_name, object->id,
+                 object->moves ? " which moves" : "", times);
+    }
+    fmt::print("\n");
+    tell(run, ghost.id, ghost.centre);
+  }
+}
+
 /// What ctest tells the tests.
 void findSources() {
   namespace fs = std::filesystem;
@@ -101,7 +117,7 @@ int run(int argc, char** argv) {
   test::Setting setting;
   std::size_t seeds = 3;
   std::uint64_t first = 1, truth = 0;
-  bool changed = false;
+  bool changed = false, of_ghosts = false;
   double within = 3.0;
   std::vector<std::string> scenes = test::scenesWithBars();
   CLI::App app("What each scene must show, and what the filter makes of it");
@@ -114,17 +130,20 @@ int run(int argc, char** argv) {
   app.add_option("--set", setting.assignments, "semantic_filter.KEY=VALUE or detector.KEY=VALUE");
   app.add_option("--truth", truth, "Print what is believed near this true object, by frame");
   app.add_flag("--changed-ids", changed, "Print what became of ids that the second half has not");
+  app.add_flag("--ghosts", of_ghosts, "Print what is on the map in the end where nothing stands");
   app.add_option("--within", within, "Metres from it")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   findSources();
   std::vector<std::uint64_t> numbers;
   for (std::size_t i = 0; i < seeds; ++i) numbers.push_back(first + i);
   for (const auto& scene : scenes) {
-    if (changed) {
+    if (changed || of_ghosts) {
       for (const auto seed : numbers) {
         setting.scene = scene;
         setting.seed = seed;
-        changedIds(test::runScene(setting));
+        const auto outcome = test::runScene(setting);
+        if (changed) changedIds(outcome);
+        if (of_ghosts) tellOfGhosts(outcome);
       }
       continue;
     }

@@ -367,6 +367,7 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   if (object.hypotheses.empty()) return std::nullopt;
   object.first_seen = object.last_seen = object.as_of = now;
   object.pose_product = frame.pose_error.product;
+  object.first_box = object.last_box = OwnBox{now, evidence.z.box()};
   object.hits = 1;
   object.asked = frame.model->names;
   bookBirth(object, kept, evidence, frame);

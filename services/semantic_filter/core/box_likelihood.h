@@ -24,6 +24,7 @@ struct BoxMeasurement {
   int count() const;
   double width() const { return sides[2] - sides[0]; }
   double height() const { return sides[3] - sides[1]; }
+  Box box() const { return {sides[0], sides[1], sides[2], sides[3]}; }
 };
 
 /// What a network says of the errors of its boxes; 0 where it does not.

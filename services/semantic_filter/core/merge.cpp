@@ -82,6 +82,10 @@ void absorb(Object& a, const Object& b, const FrameContext& frame) {
   a.confirmed = a.confirmed || b.confirmed;
   a.once_confirmed = a.once_confirmed || b.once_confirmed;
   a.last_seen = std::max(a.last_seen, b.last_seen);
+  if (b.first_box && (!a.first_box || b.first_box->time < a.first_box->time)) {
+    a.first_box = b.first_box;
+  }
+  if (b.last_box && (!a.last_box || b.last_box->time > a.last_box->time)) a.last_box = b.last_box;
   a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
   a.late_view.looks += b.late_view.looks;
   a.support = std::max(a.support, b.support);

@@ -12,6 +12,7 @@ namespace {
 constexpr double kMissing = 0.5;    // existence of what was claimed
 constexpr double kOverlap_s = 0.5;  // both may have been seen for so long
 constexpr double kDriven_s = 2.0;   // and for so long nobody knows it
+constexpr double kTraced_s = 3.0;   // for which a speed tells where something came from
 constexpr double kCarried_m = 2.5;  // by which things are carried without leaving
 constexpr int kLooks = 3;           // at the empty place
 constexpr double kTooFar = std::numeric_limits<double>::infinity();
@@ -36,6 +37,16 @@ bool isThere(const Object& o, const FrameContext& frame) {
   return o.confirmed || established(o, frame);
 }
 
+/// The one was seen in a box, and from then on the other in almost the same: they are one thing,
+/// though it was not believed to be where it was.
+bool takesOver(const Object& found, const Object& missing) {
+  constexpr double kAtOnce_s = 0.3, kAlike = 0.5;
+  if (!found.first_box || !missing.last_box) return false;
+  const double since = toSeconds(found.first_box->time - missing.last_box->time);
+  return since > 0.0 && since <= kAtOnce_s &&
+         intersectionOverUnion(found.first_box->box, missing.last_box->box) > kAlike;
+}
+
 /// Metres between where the one stood and where the other must have been then; infinite where they
 /// cannot be one.
 double apart(const Object& missing, const Object& found, const FrameContext& frame) {
@@ -46,8 +57,11 @@ double apart(const Object& missing, const Object& found, const FrameContext& fra
   const Hypothesis& h = found.best();
   const bool carried =
       frame.priors->of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
+  if (h.moving && takesOver(found, missing)) return 0.0;
   if (h.moving ? since > kDriven_s : !carried) return kTooFar;
-  const State then = stateAt(h, toSeconds(missing.last_seen - found.as_of));
+  const double ago = toSeconds(found.as_of - missing.last_seen);
+  if (h.moving && ago > kTraced_s) return kTooFar;
+  const State then = stateAt(h, -ago);
   const double metres = (then - missing.best().x).head<3>().norm();
   // A belief at rest follows what drives off a little before it loses it.
   const double length = h.x.segment<3>(kSize).array().exp().maxCoeff();
@@ -71,6 +85,7 @@ std::size_t nearest(const std::vector<Object>& objects, std::size_t of, bool amo
 void takeUp(Object& past, Object&& now) {
   now.id = past.id;
   now.first_seen = past.first_seen;
+  now.first_box = past.first_box;
   now.hits += past.hits;
   now.visible_misses += past.visible_misses;
   now.once_confirmed = true;
@@ -124,18 +139,24 @@ std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Obj
   std::vector<MergeRecord> merges;
   for (Object& o : objects) {
     if (gone.empty()) break;
-    if (!isThere(o, frame) || o.best().moving || o.visible_fraction <= 0.0) continue;
+    if (!isThere(o, frame) || o.visible_fraction <= 0.0) continue;
+    const bool drives = o.best().moving;
     std::size_t found = gone.size();
     double most = frame.parameters->tend.merge_overlap;
     for (std::size_t i = 0; i < gone.size(); ++i) {
       const Object& past = gone[i];
       if (past.best().class_name != o.best().class_name || o.first_seen <= past.last_seen) continue;
-      const double shared = overlap(past.best().x, o.best().x, frame.view.up_W);
+      const double shared = drives ? (takesOver(o, past) ? 1.0 : 0.0)
+                                   : overlap(past.best().x, o.best().x, frame.view.up_W);
       if (shared >= most) most = shared, found = i;
     }
     if (found == gone.size()) continue;
-    merges.push_back({gone[found].id, o.id, false, true});
-    resume(gone[found], o, frame);
+    merges.push_back({gone[found].id, o.id, drives, !drives});
+    if (drives) {
+      takeUp(gone[found], std::move(o));
+    } else {
+      resume(gone[found], o, frame);
+    }
     o = std::move(gone[found]);
     gone.erase(gone.begin() + static_cast<std::ptrdiff_t>(found));
   }

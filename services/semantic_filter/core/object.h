@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/types/detections.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 #include "services/semantic_filter/core/found_rate.h"
@@ -46,6 +47,12 @@ struct ViewPoint {
   double looks = 0.0;  ///< number of looks that share this view, discounted
 };
 
+/// A box that was surely the object's, pixels.
+struct OwnBox {
+  TimePoint time;
+  Box box;
+};
+
 /// Out of the picture, not behind something, for so long: what comes next is another visit.
 inline constexpr double kAnotherVisit_s = 1.0;
 
@@ -74,9 +81,10 @@ struct Object {
   TimePoint told_pose;                           ///< when it last told of the pose's error
   bool found_again = false;                      ///< detected on another visit than the first
   std::uint32_t hits = 0, visible_misses = 0;
-  double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
-  ViewPoint hit_view;        ///< of the last look that showed it
-  ViewPoint late_view;       ///< of the last look, whatever it showed
+  double running_nis = 1.0;                   ///< per degree of freedom, of the boxes it claimed
+  std::optional<OwnBox> first_box, last_box;  ///< none of one that came back
+  ViewPoint hit_view;                         ///< of the last look that showed it
+  ViewPoint late_view;                        ///< of the last look, whatever it showed
   /// Log-odds by which "it is a real thing" is above "it is there still" (core/weigh.cpp).
   double lead = 0.0;
   double alike = 0.0;     ///< nats for "looks like a known class", if it is of none (logRatio)

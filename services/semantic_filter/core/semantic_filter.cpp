@@ -383,11 +383,14 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   auto seen = score(belief, sights, input, frame);
   StepReport report;
   const auto claimed = associateAndUpdate(belief, seen, input, frame);
+  std::vector<Object> lost;
   for (auto& s : seen) {
     Object& object = belief.objects[s.object];
     if (sound(object)) tend(object, s, input, frame);
+    if (object.hypotheses.empty() && s.before) lost.push_back(std::move(*s.before));
     if (s.told) report.pose.push_back(*s.told);
   }
+  rememberGone(belief.gone, std::move(lost), input.stamp.time, parameters_.tend);
   births(belief, sights, claimed, input, frame, ids);
   std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });
   report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });

@@ -338,6 +338,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
   updateAzimuths(object, shares, hit.worth, look.boxes, boxes, frame);
   if (own) {
     const Evidence& box = boxes[look.boxes[*own]];
+    object.last_box = OwnBox{object.as_of, box.z.box()};
     object.alike += hit.worth * box.log_ratio_best;
     object.resembles = classSeenIn(box, *frame.model);
   }

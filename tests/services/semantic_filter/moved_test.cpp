@@ -109,6 +109,75 @@ TEST_F(Moved, ACarThatDrivesFromWhereOneWasMissedIsThatCar) {
   EXPECT_TRUE(reuniteMoved(objects, frame).empty());
   objects = {missing(3, "car", parked, 4.0), newcomer};  // it has been missed for long
   EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+  objects = {missing(3, "car", parked, 8.0), newcomer};
+  objects[1].as_of = at(12.0);  // it has driven since; what it did then its speed does not tell
+  objects[1].hypotheses[0].x[0] = 36.0;
+  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+}
+
+/// One that was believed to stand where it is not, and a newcomer that drives where it is.
+struct TakenOver {
+  Object past, now;
+};
+
+class TookItsBox : public Moved {
+ protected:
+  TakenOver pair() {
+    TakenOver two{missing(3, "car", makeState(24, 3, 0.3, 0, 5.0, 2.0, 1.9), 8.0),
+                  thing(9, "car", makeState(20, 2, 0.75, 0, 4.2, 1.75, 1.5), 8.1, 8.6)};
+    two.now.hypotheses[0].moving = true;
+    two.now.hypotheses[0].x[kVelocity] = 4.0;
+    two.past.last_box = OwnBox{at(8.0), {100, 100, 180, 160}};
+    two.now.first_box = OwnBox{at(8.1), {104, 102, 182, 160}};
+    return two;
+  }
+  std::vector<MergeRecord> reunited(const TakenOver& two) {
+    objects = {two.past, two.now};
+    return reuniteMoved(objects, frame);
+  }
+  std::vector<Object> objects;
+};
+
+TEST_F(TookItsBox, WhatDrivesInTheBoxOfWhatIsMissingIsThatWhereverItWasBelievedToBe) {
+  const auto merges = reunited(pair());
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].survivor, 3u);
+  EXPECT_TRUE(merges[0].moved);
+  ASSERT_EQ(objects.size(), 1u);
+  EXPECT_NEAR(objects[0].best().x[0], 20.0, 1e-9);
+}
+
+TEST_F(TookItsBox, AnotherBoxOrALaterOneOrOneOfTheSameImageIsAnotherThing) {
+  TakenOver two = pair();
+  two.now.first_box->box = {150, 100, 230, 160};
+  EXPECT_TRUE(reunited(two).empty());
+  two = pair();
+  two.now.first_box->time = at(8.9);
+  EXPECT_TRUE(reunited(two).empty());
+  two = pair();
+  two.now.first_box->time = at(8.0);
+  EXPECT_TRUE(reunited(two).empty());
+  two = pair();
+  two.now.hypotheses[0].moving = false;
+  EXPECT_TRUE(reunited(two).empty());
+  two = pair();
+  two.past.last_box.reset();  // it came back from the map
+  EXPECT_TRUE(reunited(two).empty());
+}
+
+TEST_F(TookItsBox, OfWhatWasGivenUpAsWell) {
+  const TakenOver two = pair();
+  std::vector<Object> gone;
+  rememberGone(gone, {two.past}, at(8.1), parameters.tend);
+  objects = {two.now};
+  objects[0].visible_fraction = 1.0;
+  const auto merges = findAgain(objects, gone, frame);
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_TRUE(merges[0].moved);
+  EXPECT_FALSE(merges[0].returned);
+  EXPECT_EQ(objects[0].id, 3u);
+  EXPECT_TRUE(objects[0].best().moving);
+  EXPECT_TRUE(gone.empty());
 }
 
 class FoundAgain : public Moved {
