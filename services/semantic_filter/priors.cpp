@@ -97,7 +97,8 @@ class Reader {
     const auto wrong = [&](const YAML::Node& at) {
       complain(at,
                "shape: one to three levels from the ground up, each [height, along, across, "
-               "corner]: -1 to 1, and three shares from 0.05 to 1");
+               "corner] or [height, along, across, corner, forward]: -1 to 1, three shares from "
+               "0.05 to 1, and what keeps it within the length");
     };
     if (!node.IsSequence() || node.size() == 0 || node.size() > Shape::kMostLevels) {
       return wrong(node);
@@ -105,11 +106,15 @@ class Reader {
     std::vector<ShapeLevel> levels;
     for (const YAML::Node& item : node) {
       std::vector<double> v;
-      if (!YAML::convert<std::vector<double>>::decode(item, v) || v.size() != 4) return wrong(item);
+      if (!YAML::convert<std::vector<double>>::decode(item, v) || v.size() < 4 || v.size() > 5) {
+        return wrong(item);
+      }
       const bool shares =
-          std::all_of(v.begin() + 1, v.end(), [](double s) { return s >= 0.05 && s <= 1.0; });
-      if (!shares || !(v[0] >= -1.0 && v[0] <= 1.0)) return wrong(item);
-      levels.push_back({v[0], v[1], v[2], v[3]});
+          std::all_of(v.begin() + 1, v.begin() + 4, [](double s) { return s >= 0.05 && s <= 1.0; });
+      const double forward = v.size() == 5 ? v[4] : 0.0;
+      const bool within = std::abs(forward) + v[1] <= 1.0;
+      if (!shares || !within || !(v[0] >= -1.0 && v[0] <= 1.0)) return wrong(item);
+      levels.push_back({v[0], v[1], v[2], v[3], forward});
     }
     target = shapeOf(levels);
   }
@@ -177,7 +182,7 @@ std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPrior
   std::map<std::string, std::vector<Eigen::Vector3d>> result;
   for (const auto& prior : priors.classes) {
     for (int i = 0; i < prior.shape.corners(); ++i) {
-      result[prior.name].push_back(prior.shape.corner(i));
+      result[prior.name].push_back(prior.shape.corner(i, 0.0));
     }
   }
   return result;

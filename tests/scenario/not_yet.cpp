@@ -21,7 +21,7 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"vanish",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "2, 0, 1: looks whose box another thing may have made, or a belief of odd size "
+            "3, 0, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"room",
@@ -33,47 +33,52 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"row",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "5, 6, 8: not yet looked into since boxes are of shapes"},
+            "6, 8, 6: not yet looked into since boxes are of shapes"},
            {"looks that showed a claimed thing and made it less sure",
-            "4, 2, 1: looks whose box another thing may have made, or a belief of odd size "
+            "0, 6, 0: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"roll",
        {
+           {"change of yaw meanwhile, deg, nine in ten",
+            "28.3, 4.16, 5.49: not by the roll alone: the estimate still settles as the camera "
+            "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.0905, 0.103, 0.101: not by the roll alone: the estimate still settles as the "
+            "0.1, 0.0545, 0.0889: not by the roll alone: the estimate still settles as the "
             "camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.193, 0.229, 0.232: not by the roll alone: the estimate still settles as the "
+            "0.21, 0.286, 0.221: not by the roll alone: the estimate still settles as the "
             "camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 0, 3: looks whose box another thing may have made, or a belief of odd size "
+            "2, 2, 2: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "2, 2, 4: what a moving car leaves behind where it was first believed to stand"},
-           {"`moved` events of the parked car that drives off",
-            "1, 0, 0: the belief at rest follows it for some metres, so that the new one does "
-            "not come from its place"},
+            "2, 2, 3: people who walk along the road, and a parked car that is misplaced; what "
+            "drives leaves none"},
            {"standing things on the map where nothing is",
-            "2, 2, 4: what a moving car leaves behind where it was first believed to stand"},
+            "2, 3, 3: people who walk along the road, and a parked car that is misplaced; what "
+            "drives leaves none"},
            {"looks that showed a claimed thing and made it less sure",
-            "5, 3, 2: looks whose box another thing may have made, or a belief of odd size "
+            "5, 2, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
+           {"merges that lost existence", "1, 0, 0: a merge in the frame of a miss"},
        }},
       {"street",
        {
+           {"second lap: share that keeps the id of the first",
+            "0.961, 0.971, 0.981: two beliefs in one thing, of which the older survives where "
+            "the younger was told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "4, 1, 1: some misses in a row, or a place lost for a few frames"},
+            "3, 0, 3: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "4, 4, 6: young ones, of five to sixteen looks, that are something or somewhere "
+            "2, 1, 4: young ones, of five to sixteen looks, that are something or somewhere "
             "else after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 6, 7: looks whose box another thing may have made, or a belief of odd size "
+            "1, 3, 1: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
-           {"merges that lost existence", "0, 1, 0: a merge in the frame of a miss"},
        }},
       {"street recalled",
        {
@@ -89,10 +94,10 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy vio",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.503: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
+            "0.502: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
             "a little later"},
            {"P(car, exists) of the real cars at the end",
-            "0.91: the car at 43 m is 16 px high and found in six looks of ten"},
+            "0.914: the car at 43 m is 16 px high and found in six looks of ten"},
            {"share of the far ones that is accepted at the end", "0.5: the car at 43 m, as above"},
        }},
       {"still vio",
@@ -122,45 +127,44 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"row vio",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "3: placed along the line of sight to a metre"},
+            "4: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "2: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"roll vio",
        {
-           {"change of yaw meanwhile, deg, nine in ten",
-            "7.26: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.112: not by the roll alone: the estimate still settles as the camera comes nearer"},
+            "0.0746: not by the roll alone: the estimate still settles as the camera comes "
+            "nearer"},
            {"change of a length, width or height, share, nine in ten",
             "0.186: not by the roll alone: the estimate still settles as the camera comes nearer"},
+           {"recall under 1 m", "0.798: not yet looked into; with true poses it passes"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "2: looks whose box another thing may have made, or a belief of odd size given up"},
+           {"merges that lost existence", "1: not yet looked into; with true poses it passes"},
        }},
       {"traffic vio",
        {
            {"things in long-term memory where nothing stands",
-            "2: what a moving car leaves behind where it was first believed to stand"},
-           {"`moved` events of the parked car that drives off",
-            "0: the belief at rest follows it for some metres, so that the new one does not "
-            "come from its place"},
+            "4: people who walk along the road, and a parked car that is misplaced; what drives "
+            "leaves none"},
            {"standing things on the map where nothing is",
-            "2: what a moving car leaves behind where it was first believed to stand"},
+            "4: people who walk along the road, and a parked car that is misplaced; what drives "
+            "leaves none"},
            {"looks that showed a claimed thing and made it less sure",
-            "4: looks whose box another thing may have made, or a belief of odd size given up"},
-           {"merges that lost existence", "1: not yet looked into; with true poses it passes"},
+            "5: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"street vio",
        {
            {"second lap: share that keeps the id of the first",
-            "0.891: not yet looked into; with true poses it passes"},
+            "0.889: not yet looked into; with true poses it passes"},
            {"flicker: claims in full sight that ceased and came back",
-            "6: some misses in a row, or a place lost for a few frames"},
+            "5: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "6: young ones, of five to sixteen looks, that are something or somewhere else "
+            "4: young ones, of five to sixteen looks, that are something or somewhere else "
             "after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "6: looks whose box another thing may have made, or a belief of odd size given up"},
+            "7: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
   };
   const auto found = all.find(scene);

@@ -90,22 +90,23 @@ Eigen::MatrixXd Looks::poseCovariance(const std::vector<PoseJacobian>& J) const 
   return result;
 }
 
-BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name, double yaw,
-                       const FrameContext& frame)
+BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name,
+                       const State& start, const FrameContext& frame)
     : looks_(looks),
       frame_(frame),
       prior_(frame.priors->of(class_name)),
       class_name_(class_name),
-      yaw_(yaw),
+      yaw_(start[kYaw]),
       dim_(moving ? kMostFree : kGeometry) {
   // At birth "other" has three scales, which one Gaussian has to cover here.
   if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
   size_information_ = inverseSymmetric(prior_.log_size_covariance);
   const auto& box = frame.parameters->box;
   scales_ = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
+  facing_ = facingOf(logHead(start));
   if (!moving) return;
   const double s2 = std::max(prior_.speed_sigma * prior_.speed_sigma, 0.01);
-  const Eigen::Vector3d along(std::cos(yaw), std::sin(yaw), 0.0);
+  const Eigen::Vector3d along(std::cos(yaw_), std::sin(yaw_), 0.0);
   Eigen::Matrix3d P = s2 * along * along.transpose();
   P.diagonal().head<2>().array() += kAcross * kAcross * s2;
   P(2, 2) = kUpwards * kUpwards;
@@ -130,7 +131,8 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
     const Keyframe& k = *looks_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    const auto box = projectObserved(then, k.from->projector, k.from->styles->of(class_name_));
+    const auto box =
+        projectObserved(then, k.from->projector, k.from->styles->of(class_name_), facing_);
     if (!box) return std::nullopt;
     const auto use = comparableSides(k.z, *box, k.hidden);
     const auto row = static_cast<Eigen::Index>(4 * i);

@@ -91,8 +91,9 @@ struct Quadratic {
 /// `doubts` (one for each look, >= 1) widen whole looks; x has b = 0.
 class BatchModel {
  public:
-  /// Of a class, at rest or moving, with this yaw at the start.
-  BatchModel(const Looks& looks, bool moving, const std::string& class_name, double yaw,
+  /// Of a class, at rest or moving. It faces as the azimuths say at the start, and its yaw is about
+  /// what it is there.
+  BatchModel(const Looks& looks, bool moving, const std::string& class_name, const State& start,
              const FrameContext& frame);
 
   int dim() const { return dim_; }
@@ -139,7 +140,7 @@ class BatchModel {
   const FrameContext& frame_;
   ClassPrior prior_;
   std::string class_name_;
-  double yaw_;
+  double yaw_, facing_ = 0.0;
   int dim_;
   Eigen::Matrix3d size_information_, speed_information_ = Eigen::Matrix3d::Zero();
   ViewScales scales_{1, 1, 1};

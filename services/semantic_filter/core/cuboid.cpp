@@ -19,11 +19,12 @@ struct Corners {
   Eigen::Matrix3d R_WO;
   Eigen::Vector3d half;  ///< of length, width, height
   const Shape* shape = nullptr;
+  double facing = 0.0;
   PerCorner x, y, z;       ///< in C
   bool all_before = true;  ///< the near plane
 
   /// From the centre, along the cuboid's axes.
-  Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i)); }
+  Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, facing)); }
   Eigen::Vector3d p_C(int i) const { return {x[i], y[i], z[i]}; }
 };
 
@@ -53,7 +54,7 @@ struct ImagePoints {
 /// Nothing where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
 /// are cut there.
 std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from,
-                                           const Shape& shape) {
+                                           const Shape& shape, double facing) {
   const Eigen::Vector3d centre_C = from.R_CW * (x.head<3>() - from.T_WC.p);
   const Eigen::Vector3d half = 0.5 * x.segment<3>(kSize).array().exp();
   const double reach = half.norm();
@@ -62,13 +63,15 @@ std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from
   Corners& c = *result;
   c.half = half;
   c.shape = centre_C.z() - reach < kNear ? &cuboidShape() : &shape;
+  c.facing = facing;
   c.R_WO = from.R_WL * rotationAboutZ(x[kYaw]);
   const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
   const Eigen::Vector3d along = half.x() * R_CO.col(0), across = half.y() * R_CO.col(1),
                         up = half.z() * R_CO.col(2);
+  const Shape& s = *c.shape;
+  const PerCorner forward = s.along + facing * s.forward;
   const auto coordinate = [&](int i) {
-    const Shape& s = *c.shape;
-    return ((centre_C[i] + along[i] * s.along) + across[i] * s.across) + up[i] * s.up;
+    return ((centre_C[i] + along[i] * forward) + across[i] * s.across) + up[i] * s.up;
   };
   c.x = coordinate(0);
   c.y = coordinate(1);
@@ -152,10 +155,10 @@ Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
   return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
 }
 
-std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
-                                          const Shape& shape) {
+std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from, const Shape& shape,
+                                          double facing) {
   std::optional<ProjectedBox> result;
-  const auto corners = cornersBeforeCamera(x, from, shape);
+  const auto corners = cornersBeforeCamera(x, from, shape, facing);
   if (!corners) return result;
   ProjectedBox& box = result.emplace();
   const ImagePoints points = imagePoints(*corners, *from.camera);
@@ -170,7 +173,7 @@ std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
                                                const Shape& shape) {
   std::optional<ProjectedOutline> result;
-  const auto corners = cornersBeforeCamera(x, from, shape);
+  const auto corners = cornersBeforeCamera(x, from, shape, 0.0);
   if (!corners) return result;
   ProjectedOutline& outline = result.emplace();
   const ImagePoints points = imagePoints(*corners, *from.camera);
@@ -183,8 +186,8 @@ std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& 
 }
 
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
-                                            const BoxStyle& style) {
-  auto box = projectCuboid(x, from, style.shape);
+                                            const BoxStyle& style, double facing) {
+  auto box = projectCuboid(x, from, style.shape, facing);
   if (!box) return box;
   const double limit[2] = {2.0 * from.camera->width(), 2.0 * from.camera->height()};
   for (int low = 0; low < 2; ++low) {

@@ -23,7 +23,7 @@ std::optional<Prediction> predictionOf(const Object& object, const FrameInput& n
   if (probability < kPredictionFloor) return std::nullopt;
   const double since = toSeconds(now.stamp.time - object.as_of);
   const BoxStyle& style = now.model.styles->of(best.class_name);
-  const auto box = projectObserved(stateAt(best, since), now.view, style);
+  const auto box = projectObserved(stateAt(best, since), now.view, style, best.facing());
   if (!box || !(box->sides.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
   if (box->sides[0] >= box->sides[2] || box->sides[1] >= box->sides[3]) return std::nullopt;
   const Eigen::Vector4d& s = box->sides;
@@ -33,7 +33,8 @@ std::optional<Prediction> predictionOf(const Object& object, const FrameInput& n
     prediction.side_sigma[i] = std::max(kLeastSigma, std::sqrt(std::max(S(i, i), 0.0)));
   }
   if (!coming) return prediction;
-  const auto next = projectObserved(stateAt(best, since + coming->seconds), coming->view, style);
+  const auto next =
+      projectObserved(stateAt(best, since + coming->seconds), coming->view, style, best.facing());
   if (!next || !next->sides.allFinite()) return prediction;
   for (int i = 0; i < 4; ++i) {
     const double speed = (next->sides[i] - box->sides[i]) / coming->seconds;

@@ -53,7 +53,8 @@ double rateOf(const Object& object, const FrameContext& frame) {
 HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double rate,
                       const Sight& sight, const Projector& from, const FrameContext& frame) {
   HypothesisLook h;
-  h.box = projectObserved(hypothesis.x, from, frame.styleOf(hypothesis.class_name));
+  h.box = projectObserved(hypothesis.x, from, frame.styleOf(hypothesis.class_name),
+                          hypothesis.facing());
   h.late_looks =
       sharedLooks(hypothesis.x.head<3>(), object.late_view, frame.view, frame.parameters->looks);
   if (!h.box) return h;

@@ -17,9 +17,7 @@ constexpr double kCarried_m = 2.5;  // by which things are carried without leavi
 constexpr int kLooks = 3;           // at the empty place
 constexpr double kTooFar = std::numeric_limits<double>::infinity();
 
-bool isMissing(const Object& o) {
-  return o.once_confirmed && o.existence < kMissing && o.best().class_name != kOtherClass;
-}
+bool isMissing(const Object& o) { return o.once_confirmed && o.existence < kMissing; }
 
 /// Whether most looks that showed the one had the other's place in the picture, and nothing was
 /// there: what is new only because nobody looked there before has not moved.
@@ -38,10 +36,12 @@ bool isThere(const Object& o, const FrameContext& frame) {
 }
 
 /// The one was seen in a box, and from then on the other in almost the same: they are one thing,
-/// though it was not believed to be where it was.
+/// though it was not believed to be where it was, or, bent to what no car is, not what it was.
 bool takesOver(const Object& found, const Object& missing) {
-  constexpr double kAtOnce_s = 0.3, kAlike = 0.5;
-  if (!found.first_box || !missing.last_box) return false;
+  constexpr double kAtOnce_s = 0.5, kAlike = 0.5;
+  if (!found.best().moving || !found.first_box || !missing.last_box) return false;
+  const std::string& was = missing.best().class_name;
+  if (was != found.best().class_name && was != kOtherClass) return false;
   const double since = toSeconds(found.first_box->time - missing.last_box->time);
   return since > 0.0 && since <= kAtOnce_s &&
          intersectionOverUnion(found.first_box->box, missing.last_box->box) > kAlike;
@@ -50,14 +50,14 @@ bool takesOver(const Object& found, const Object& missing) {
 /// Metres between where the one stood and where the other must have been then; infinite where they
 /// cannot be one.
 double apart(const Object& missing, const Object& found, const FrameContext& frame) {
-  if (!isThere(found, frame) || found.best().class_name != missing.best().class_name)
-    return kTooFar;
+  const Hypothesis& h = found.best();
+  if (!isThere(found, frame) || h.class_name == kOtherClass) return kTooFar;
+  if (takesOver(found, missing)) return 0.0;
+  if (h.class_name != missing.best().class_name) return kTooFar;
   const double since = toSeconds(found.first_seen - missing.last_seen);
   if (since < -kOverlap_s) return kTooFar;
-  const Hypothesis& h = found.best();
   const bool carried =
       frame.priors->of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
-  if (h.moving && takesOver(found, missing)) return 0.0;
   if (h.moving ? since > kDriven_s : !carried) return kTooFar;
   const double ago = toSeconds(found.as_of - missing.last_seen);
   if (h.moving && ago > kTraced_s) return kTooFar;
@@ -145,9 +145,11 @@ std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Obj
     double most = frame.parameters->tend.merge_overlap;
     for (std::size_t i = 0; i < gone.size(); ++i) {
       const Object& past = gone[i];
-      if (past.best().class_name != o.best().class_name || o.first_seen <= past.last_seen) continue;
-      const double shared = drives ? (takesOver(o, past) ? 1.0 : 0.0)
-                                   : overlap(past.best().x, o.best().x, frame.view.up_W);
+      if (o.first_seen <= past.last_seen) continue;
+      const bool alike = past.best().class_name == o.best().class_name;
+      const double shared = drives  ? (takesOver(o, past) ? 1.0 : 0.0)
+                            : alike ? overlap(past.best().x, o.best().x, frame.view.up_W)
+                                    : 0.0;
       if (shared >= most) most = shared, found = i;
     }
     if (found == gone.size()) continue;

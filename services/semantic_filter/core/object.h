@@ -15,6 +15,7 @@
 #include "common/types/odometry.h"
 #include "services/semantic_filter/core/found_rate.h"
 #include "services/semantic_filter/core/ledger.h"
+#include "services/semantic_filter/core/shape.h"
 
 namespace perdure::semantic_filter {
 
@@ -37,6 +38,9 @@ struct Hypothesis {
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
+
+  /// Shape::corner's, in expectation.
+  double facing() const { return facingOf(head); }
   double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
   bool modes_sought = false;  ///< of yaw, and weighed by all looks that are remembered
 };

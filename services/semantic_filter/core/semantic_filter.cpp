@@ -76,7 +76,7 @@ class Expected {
     const Object& object = belief_.objects[j];
     const Hypothesis& best = object.best();
     const State x = stateAt(best, toSeconds(input_.stamp.time - object.as_of));
-    e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name));
+    e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name), best.facing());
     if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
     return e;
   }

@@ -221,7 +221,7 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
 std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& looks,
                                        const FrameContext& frame, const Smoothed* like,
                                        const std::vector<const Hypothesis*>& found) {
-  const BatchModel model(looks, start.moving, start.class_name, start.x[kYaw], frame);
+  const BatchModel model(looks, start.moving, start.class_name, start.x, frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
   auto fit = fitLooks(model, x, looks, frame.parameters->box.tail,
@@ -231,13 +231,13 @@ std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& loo
   if (!h) return std::nullopt;
   Smoothed result(looks, frame);
   result.hypothesis_ = *h;
-  result.start_yaw_ = start.x[kYaw];
+  result.start_ = start.x;
   result.fit_ = std::make_shared<const Fit>(std::move(*fit));
   return result;
 }
 
 BatchModel Smoothed::modelOf() const {
-  return {*looks_, hypothesis_.moving, hypothesis_.class_name, start_yaw_, *frame_};
+  return {*looks_, hypothesis_.moving, hypothesis_.class_name, start_, *frame_};
 }
 
 const Eigen::VectorXd& Smoothed::doubts() const { return fit_->doubts; }

@@ -57,7 +57,7 @@ class Smoothed {
   std::shared_ptr<const Fit> fit_;
   const Looks* looks_;
   const FrameContext* frame_;
-  double start_yaw_ = 0.0;
+  State start_ = State::Zero();
 };
 
 }  // namespace perdure::semantic_filter

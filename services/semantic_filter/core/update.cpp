@@ -248,7 +248,7 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
     std::optional<ProjectedBox> box;
     if (i > 0 || !at_prior) {
-      box = projectObserved(x, frame.projector(), frame.styleOf(prior.class_name));
+      box = projectObserved(x, frame.projector(), frame.styleOf(prior.class_name), prior.facing());
       if (!box) break;
     }
     Innovation now = innovation(z, box ? *box : *at_prior, hidden);

@@ -74,7 +74,7 @@ TEST_F(Cuboid, TheDetectorsErrorMovesEachSideByItsShareOfTheBox) {
 
 /// A car: wheels within its length, round corners, a roof that is narrower than the rest.
 Shape roundShape() {
-  return shapeOf({{-1.0, 0.65, 0.9, 1.0}, {0.0, 1.0, 1.0, 0.8}, {1.0, 0.2, 0.65, 0.7}});
+  return shapeOf({{-1.0, 0.65, 0.9, 1.0}, {0.0, 1.0, 1.0, 0.8}, {1.0, 0.2, 0.65, 0.7, -0.3}});
 }
 
 TEST_F(Cuboid, AShapeLiesWithinItsCuboidAndCutsTheLowerCornersOff) {
@@ -101,21 +101,37 @@ TEST_F(Cuboid, TheCuboidIsAShapeToo) {
 TEST_F(Cuboid, JacobiansOfAShapeMatchDifferences) {
   const BoxStyle style{Eigen::Vector4d(0.02, -0.01, 0.03, 0.0), roundShape()};
   x.segment<4>(kBias) << 0.1, -0.05, 0.02, 0.03;
-  const auto box = projectObserved(x, view, style);
+  const auto box = projectObserved(x, view, style, 0.6);
   ASSERT_TRUE(box);
   const auto by_object = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
-    return projectObserved(State(v), view, style)->sides;
+    return projectObserved(State(v), view, style, 0.6)->sides;
   };
   const auto by_pose = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     View moved = view;
     moved.T_WB = boxPlus(view.T_WB, v);
-    return projectObserved(x, moved, style)->sides;
+    return projectObserved(x, moved, style, 0.6)->sides;
   };
   const Eigen::MatrixXd H = numericJacobian(by_object, x);
   const Eigen::MatrixXd H_pose = numericJacobian(by_pose, Eigen::VectorXd::Zero(6));
   EXPECT_LT((box->H - H).cwiseAbs().maxCoeff(), 1e-4 * (1.0 + H.cwiseAbs().maxCoeff()));
   EXPECT_LT((box->H_pose - H_pose).cwiseAbs().maxCoeff(),
             1e-4 * (1.0 + H_pose.cwiseAbs().maxCoeff()));
+}
+
+TEST_F(Cuboid, AShapeThatFacesTheOtherWayIsTheOneTurnedRound) {
+  const Shape shape = roundShape();
+  State turned = x;
+  turned[kYaw] = wrapAngle(x[kYaw] + M_PI);
+  const auto backwards = projectCuboid(x, view, shape, -1.0),
+             other = projectCuboid(turned, view, shape, 1.0);
+  const auto forwards = projectCuboid(x, view, shape, 1.0), either = projectCuboid(x, view, shape);
+  ASSERT_TRUE(backwards && other && forwards && either);
+  EXPECT_LT((backwards->sides - other->sides).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_GT((backwards->sides - forwards->sides).cwiseAbs().maxCoeff(), 1.0) << "pixels";
+  EXPECT_EQ(either->sides, projectCuboid(turned, view, shape)->sides);
+  EXPECT_NEAR(facingOf(0.0), 0.0, 1e-12);
+  EXPECT_GT(facingOf(6.0), 0.99);
+  EXPECT_EQ(facingOf(-2.0), -facingOf(2.0));
 }
 
 TEST_F(Cuboid, AShapeThatReachesTheNearPlaneIsItsCuboid) {

@@ -64,17 +64,19 @@ TEST(ClassPriors, ShapesLieWithinTheCuboidAndFillItsLengthAndWidth) {
   for (const auto& p : priors.classes) {
     Eigen::Vector3d most = Eigen::Vector3d::Zero(), least = most;
     for (int i = 0; i < p.shape.corners(); ++i) {
-      const Eigen::Vector3d point = p.shape.corner(i);
+      const Eigen::Vector3d point = p.shape.corner(i, 1.0);
       most = most.cwiseMax(point), least = least.cwiseMin(point);
     }
     EXPECT_EQ(most, Eigen::Vector3d::Ones()) << p.name << ": size would not be its size";
     EXPECT_EQ(least, -Eigen::Vector3d::Ones()) << p.name;
+    EXPECT_TRUE(p.has_yaw || (p.shape.forward == 0.0).all()) << p.name << ": faces nowhere";
   }
 }
 
 TEST(ClassPriors, AShapeThatIsNoneIsNamedWithItsPlace) {
-  for (const char* wrong : {"7", "[]", "[[0, 1, 1]]", "[[0, 1, 1, 2]]", "[[-2, 1, 1, 1]]",
-                            "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]"}) {
+  for (const char* wrong :
+       {"7", "[]", "[[0, 1, 1]]", "[[0, 1, 1, 2]]", "[[-2, 1, 1, 1]]", "[[0, 0.8, 1, 1, 0.3]]",
+        "[[0, 1, 1, 1, 0, 0]]", "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]"}) {
     const std::string yaml =
         std::string("fallback: {}\nother: {}\nclasses:\n  car: {shape: ") + wrong + "}\n";
     try {

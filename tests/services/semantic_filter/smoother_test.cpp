@@ -298,6 +298,41 @@ TEST(Smooth, ModesThatTheLooksDoNotTellApartAreKeptAndPublishedAsOneWideGaussian
   EXPECT_NEAR(belief.best().covariance(3, 3), 0.01 + 0.4 * 1.0, 1e-9);
 }
 
+/// The same looks with exact boxes of what has its roof behind its middle, and, if told, azimuths.
+Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimuths) {
+  auto styles = std::make_shared<BoxStyles>();
+  styles->rest.shape = shapeOf({{-1, 1, 1, 1}, {0, 1, 1, 1}, {1, 0.3, 0.7, 1, -0.5}});
+  Keyframes result;
+  for (const auto& look : looks) {
+    Keyframe k = *look;
+    const KeyView& v = *look->from;
+    k.from = std::make_shared<const KeyView>(v.view, v.error, v.time, styles, v.errors);
+    k.z.sides = projectCuboid(truth, v.projector, styles->rest.shape, 1.0)->sides;
+    if (with_azimuths) {
+      k.azimuth = wrapAngle(yawFromAzimuth(0.0, truth.head<3>(), v.view) - truth[kYaw]);
+    }
+    result.push_back(std::make_shared<const Keyframe>(k));
+  }
+  return result;
+}
+
+TEST(Smoothed, BoxesOfWhatLeansAreExplainedIfAzimuthsSayWhereItFaces) {
+  Passing scene(6);
+  const auto left_over = [&](bool with_azimuths, double turned) {
+    const Keyframes keyframes = ofLeaning(scene.keyframes(), scene.truth(), with_azimuths);
+    FrameContext frame = scene.frame();
+    frame.key_view = keyframes.back()->from;
+    const Looks looks(keyframes, frame.pose_error);
+    Hypothesis start = scene.start(false);
+    start.x[kYaw] = wrapAngle(start.x[kYaw] + turned);
+    const auto fit = Smoothed::make(start, looks, frame);
+    return fit ? fit->leftover().ratio : 1e9;
+  };
+  const double told = left_over(true, 0.0);
+  EXPECT_NEAR(left_over(true, M_PI), told, 1e-3 * told) << "it began the other way round";
+  EXPECT_GT(left_over(false, 0.0), 1.5 * told);
+}
+
 TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
   Passing scene(6);
   const FrameContext frame = scene.frame();
@@ -309,7 +344,7 @@ TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
     Keyframes keyframes = scene.keyframes();
     keyframes[9] = std::make_shared<const Keyframe>(cut);
     const Looks looks(keyframes, frame.pose_error);
-    const BatchModel model(looks, false, "car", scene.truth()[kYaw], frame);
+    const BatchModel model(looks, false, "car", scene.truth(), frame);
     const auto stack = model.linearise(scene.truth());
     const Eigen::VectorXd doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
     const Cholesky R(model.covariance(scene.truth(), *stack).with(doubts));
