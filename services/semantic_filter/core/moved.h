@@ -22,8 +22,8 @@ std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const FrameC
 void rememberGone(std::vector<Object>& gone, std::vector<Object> buried, TimePoint now,
                   const TendParameters& parameters);
 /// Gives an established newcomer the id and the past of what is gone, of its class and in its
-/// place, and was not seen since the newcomer was; or that it takes over the box of, and drives. The
-/// newcomer's own id is absorbed.
+/// place, and was not seen since the newcomer was; or that it takes over the box of, and drives.
+/// The newcomer's own id is absorbed.
 std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Object>& gone,
                                    const FrameContext& frame);
 
