@@ -1,6 +1,8 @@
 // Row, roll, traffic, street.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "common/math/so3.h"
 #include "tests/scenario/bars.h"

@@ -38,11 +38,11 @@ struct Hypothesis {
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
+  double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
+  bool modes_sought = false;  ///< of yaw, and weighed by all looks that are remembered
 
   /// Shape::corner's, in expectation.
   double facing() const { return facingOf(head); }
-  double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
-  bool modes_sought = false;  ///< of yaw, and weighed by all looks that are remembered
 };
 
 /// From where the object was last looked at, for the correlation of looks (DESIGN 5, item 7).
