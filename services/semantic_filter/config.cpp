@@ -154,6 +154,24 @@ void describeSmooth(SmoothParameters& p, Fields& fields) {
                 {"of a hypothesis that is worth the estimate"});
 }
 
+void describeGround(GroundParameters& p, Fields& fields) {
+  fields.boolean("ground.use", p.use,
+                 {"what stands near by tells how high the ground is that things stand on"});
+  fields.number("ground.slope", p.slope, positive(), {"standard deviation of its slope"});
+  fields.number("ground.roughness", p.roughness, positive(),
+                {"random walk of its height beside that", "m/√m"});
+  fields.number("ground.assumed", p.assumed, positive(),
+                {"things that weigh as much as these two, until it is known how even it is"});
+  fields.number("ground.sigma_m", p.sigma_m, positive(),
+                {"standard deviation of a thing's underside beside it", "m"});
+  fields.number("ground.reach_m", p.reach_m, positive(),
+                {"what stands further away says nothing of it", "m"});
+  fields.number("ground.resolved", p.resolved, between(0, 1),
+                {"relative deviation of the place of what tells of it, at most"});
+  fields.number("ground.span_m", p.span_m, positive(),
+                {"over which the undersides of what does not stand on it are spread", "m"});
+}
+
 void describeMemory(MemoryParameters& p, Fields& fields) {
   fields.boolean("memory.archive", p.archive,
                  {"what is far and was not seen for long waits on the map, until it comes near"});
@@ -262,6 +280,7 @@ void describe(Config& c, Fields& fields) {
   describeMotion(c.filter, fields);
   describeTend(c.filter, fields);
   describeSmooth(c.filter.smooth, fields);
+  describeGround(c.filter.ground, fields);
   describeMemory(c.filter.memory, fields);
   describeAlignment(c.filter.alignment, fields);
   describeDrift(c.filter.drift, fields);

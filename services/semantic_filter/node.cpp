@@ -85,7 +85,8 @@ void Node::beginWorld(const WorldId& world) {
     keepFormer();
   }
   world_ = world;
-  belief_ = {.objects = {}, .gone = {}, .box_scales = belief_.box_scales};
+  belief_ = {
+      .objects = {}, .gone = {}, .box_scales = belief_.box_scales, .evenness = belief_.evenness};
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();

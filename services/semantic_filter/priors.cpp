@@ -80,6 +80,7 @@ class Reader {
     p.moving = number(node, "moving", standard.moving, 0.0, 0.99);
     p.speed_sigma = number(node, "speed", standard.speed_sigma, 0.0, 100.0);
     p.azimuth_sigma = number(node, "azimuth_sigma", standard.azimuth_sigma, 0.01, 3.2);
+    p.stands = number(node, "stands", standard.stands, 0.0, 0.999);
     const YAML::Node yaw = node["yaw"];
     if (yaw && !YAML::convert<bool>::decode(yaw, p.has_yaw)) complain(yaw, "yaw: is true or false");
     shape(node, p.shape);
@@ -121,14 +122,14 @@ class Reader {
 
   void checkKeys(const YAML::Node& node) {
     static const std::vector<std::string> known = {
-        "size",  "spread",        "common", "frequency", "moving",
-        "speed", "azimuth_sigma", "yaw",    "detection", "shape"};
+        "size",          "spread", "common",    "frequency", "moving", "speed",
+        "azimuth_sigma", "yaw",    "detection", "shape",     "stands"};
     for (const auto& item : node) {
       const auto key = item.first.as<std::string>();
       if (std::find(known.begin(), known.end(), key) == known.end()) {
         complain(item.first, key +
                                  ": unknown; keys are size, spread, common, frequency, "
-                                 "detection, moving, speed, azimuth_sigma, yaw, shape");
+                                 "detection, moving, speed, azimuth_sigma, yaw, shape, stands");
       }
     }
   }

@@ -7,6 +7,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/ground.h"
 #include "services/semantic_filter/core/update.h"
 
 namespace perdure::semantic_filter {
@@ -201,7 +202,8 @@ void addClass(Object& object, const ClassPrior& prior, double ratio, const Evide
     fits.push_back(fit->hypothesis);
     const double part = frame.parameters->box.part;
     const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, evidence, frame));
-    fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape);
+    const double ground = std::exp(standOnGround(fits.back(), 0, frame));
+    fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape) * ground;
   }
   weighByAzimuth(fits, evidence, prior, frame);
   for (const auto& h : fits) {

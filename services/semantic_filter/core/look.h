@@ -14,6 +14,7 @@
 namespace perdure::semantic_filter {
 
 struct KeyView;
+class Ground;
 
 /// Of the boxes of one network, beside what is assumed of them.
 struct BoxErrors {
@@ -54,6 +55,7 @@ struct FrameContext {
   const Parameters* parameters = nullptr;
   std::shared_ptr<const KeyView> key_view = {};  ///< of this frame, for what is remembered
   BoxErrors errors = {};
+  std::shared_ptr<const Ground> ground = {};  ///< before this frame; none: nothing is known of it
 
   /// Of `view`.
   Projector projector() const;

@@ -247,6 +247,7 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   const Vector7d pull =
       J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d) : Vector7d(J_b * d - J_prior * prior_mean);
   Hypothesis fused = a;
+  fused.footing = {};
   fused.x.head<7>() += P * pull;
   fused.x[kYaw] = wrapAngle(fused.x[kYaw]);
   const Eigen::Matrix<double, 7, 6> B = P * (J_a * B_a + J_new * B_b);

@@ -30,6 +30,12 @@ using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< P_xg with the pose 
 inline constexpr int kYaw = 3, kSize = 4, kBias = 7, kVelocity = 11;
 inline constexpr int kGeometry = kBias;  ///< dimensions of the cuboid alone
 
+/// What the looks at a thing alone say of the ground that it stands on (core/ground.h).
+struct Footing {
+  double above = 0.0;     ///< m, beside the underside of the hypothesis
+  double variance = 0.0;  ///< m², given the pose; 0: they say nothing
+};
+
 struct Hypothesis {
   std::string class_name;
   bool moving = false;
@@ -40,6 +46,7 @@ struct Hypothesis {
   double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
   double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
   bool modes_sought = false;  ///< of yaw, and weighed by all looks that are remembered
+  Footing footing = {};
 
   /// Shape::corner's, in expectation.
   double facing() const { return facingOf(head); }

@@ -130,6 +130,18 @@ struct SmoothParameters {
   double least_weight = 0.02;   ///< of a hypothesis that is worth it
 };
 
+/// Of the ground that things stand on (core/ground.h).
+struct GroundParameters {
+  bool use = true;
+  double slope = 0.03;      ///< standard deviation
+  double roughness = 0.04;  ///< m/√m
+  double assumed = 5.0;     ///< things that weigh as much as these assumptions
+  double sigma_m = 0.05;    ///< of an underside beside the ground: kerbs, wheels
+  double reach_m = 60.0;    ///< things further away say nothing of it
+  double resolved = 0.06;   ///< relative deviation of the place of what tells, at most
+  double span_m = 3.0;      ///< undersides of what does not stand on it are this far apart
+};
+
 /// Of what leaves the working set for the map and comes back (DESIGN 5, item 13).
 struct MemoryParameters {
   bool archive = true;
@@ -164,6 +176,7 @@ struct Parameters {
   VisibilityParameters visibility;
   TendParameters tend;
   SmoothParameters smooth;
+  GroundParameters ground;
   MemoryParameters memory;
   AlignmentParameters alignment;
   DriftParameters drift;

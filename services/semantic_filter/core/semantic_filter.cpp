@@ -113,7 +113,9 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
           &parameters_,
           std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
                                           input.model.styles, errors),
-          errors};
+          errors,
+          std::make_shared<const Ground>(belief.objects, belief.evenness, input.view.up_W, priors_,
+                                         parameters_.ground)};
 }
 
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
@@ -204,12 +206,12 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
       to_smooth.push_back(&object);
     }
   }
-  smoothNeediest(to_smooth, belief.box_scales, frame);
+  smoothNeediest(to_smooth, belief, frame);
   return association.claimed;
 }
 
 /// As many as a frame has time for; the others wait.
-void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, BoxScales& box_scales,
+void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, Belief& belief,
                                     const FrameContext& frame) {
   const double fresh = frame.parameters->smooth.fresh;
   std::stable_sort(objects.begin(), objects.end(), [fresh](const Object* a, const Object* b) {
@@ -218,7 +220,9 @@ void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, BoxScales& bo
   const auto most = static_cast<std::size_t>(frame.parameters->smooth.per_frame);
   if (objects.size() > most) objects.resize(most);
   for (Object* object : objects) {
-    if (const auto over = smooth(*object, frame)) box_scales.hear(frame.errors.model, *over);
+    const double share = object->fresh_keyframes / static_cast<double>(object->keyframes.size());
+    if (const auto over = smooth(*object, frame)) belief.box_scales.hear(frame.errors.model, *over);
+    frame.ground->tell(belief.evenness, *object, share);
   }
 }
 

@@ -11,6 +11,7 @@
 #include "services/semantic_filter/core/birth.h"
 #include "services/semantic_filter/core/box_scale.h"
 #include "services/semantic_filter/core/drift_watch.h"
+#include "services/semantic_filter/core/ground.h"
 #include "services/semantic_filter/core/merge.h"
 #include "services/semantic_filter/core/tend.h"
 
@@ -31,6 +32,7 @@ struct Belief {
   std::vector<Object> objects;  ///< in order of id
   std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
   BoxScales box_scales = {};
+  Evenness evenness = {};
 };
 
 /// Gives ids to births. The same box of the same frame always gets the same id, so that stepping
@@ -93,7 +95,7 @@ class SemanticFilter {
   bool tellsPose(const Object& object, const FrameContext& frame) const;
   /// Of one object after its look; nothing may be left of it.
   void tend(Object& object, Seen& seen, const FrameInput& input, const FrameContext& frame) const;
-  static void smoothNeediest(std::vector<Object*>& objects, BoxScales& box_scales,
+  static void smoothNeediest(std::vector<Object*>& objects, Belief& belief,
                              const FrameContext& frame);
   /// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less
   /// likely to be clutter, new, or of anything else. The object itself stays as it is.

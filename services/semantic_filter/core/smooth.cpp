@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/ground.h"
 #include "services/semantic_filter/core/smoother.h"
 #include "services/semantic_filter/core/tend.h"
 
@@ -25,9 +26,18 @@ Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
   return h;
 }
 
-/// Of one class: whether it moves, by what all looks say.
-void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smoothed& still,
-                 const Smoothed& moving, const FrameContext& frame) {
+/// A fit of one of an object's hypotheses, by its index.
+struct Fitted {
+  std::size_t index;
+  Smoothed smoothed;
+  double ground;  ///< nats, of standing on it
+};
+using Fits = std::vector<Fitted>;
+
+/// Of one class: whether it moves, by what all looks and the ground say.
+void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
+                 const Fitted& driving, const FrameContext& frame) {
+  const Smoothed &still = at_rest.smoothed, &moving = driving.smoothed;
   constexpr double kSurest = 15.0;  // nats
   const ClassPrior& prior = frame.priors->of(name);
   const auto& motion = frame.parameters->motion;
@@ -35,9 +45,10 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smo
   const double pace =
       motion.creeping + (1.0 - motion.creeping) *
                             fasterThan(moving.hypothesis(), motion.slow_share * prior.speed_sigma);
-  const double log_odds = std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) +
-                                         std::log((1.0 - prior.moving) / prior.moving / pace),
-                                     -kSurest, kSurest);
+  const double log_odds =
+      std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) + at_rest.ground -
+                     driving.ground + std::log((1.0 - prior.moving) / prior.moving / pace),
+                 -kSurest, kSurest);
   const double rests = 1.0 / (1.0 + std::exp(-log_odds));
   double weight[2] = {0.0, 0.0};
   for (const auto& h : hs) {
@@ -51,20 +62,13 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Smo
   }
 }
 
-/// Fits of an object's hypotheses of one class, at rest or moving, by their index.
-struct Fitted {
-  std::size_t index;
-  Smoothed smoothed;
-};
-using Fits = std::vector<Fitted>;
-
 bool oneMode(const Hypothesis& a, const Hypothesis& b) {
   constexpr double kTwins = 1.0;  // squared deviations
   return std::min(distance2(a, b), distance2(b, a)) < kTwins;
 }
 
-/// What all looks say of each mode. One that was reached twice counts once; those that say less
-/// than `least` of the best go.
+/// What all looks and the ground say of each mode. One that was reached twice counts once; those
+/// that say less than `least` of the best go.
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
   if (fits.size() < 2) return;
   Eigen::VectorXd doubts = fits.front().smoothed.doubts();
@@ -76,7 +80,7 @@ void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
     all += hs[f->index].weight;
     const bool twin = std::any_of(
         fits.begin(), f, [&](const Fitted& g) { return oneMode(hs[g.index], hs[f->index]); });
-    evidence.push_back(twin ? kNone : f->smoothed.logEvidence(doubts, true));
+    evidence.push_back(twin ? kNone : f->smoothed.logEvidence(doubts, true) + f->ground);
     most = std::max(most, evidence.back());
   }
   for (auto& e : evidence) {
@@ -90,11 +94,11 @@ void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
 }
 
 /// The fit whose hypothesis weighs most.
-std::optional<Smoothed> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits) {
+std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits) {
   const auto best = std::max_element(fits.begin(), fits.end(), [&](const auto& a, const auto& b) {
     return hs[a.index].weight < hs[b.index].weight;
   });
-  return best == fits.end() ? std::nullopt : std::optional(std::move(best->smoothed));
+  return best == fits.end() ? std::nullopt : std::optional(std::move(*best));
 }
 
 /// A thing at rest as none of its hypotheses may have it: turned, and of usual size.
@@ -151,8 +155,9 @@ void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fi
     Hypothesis h = smoothed->hypothesis();
     h.head = smoothed->logHead();
     if (h.head < 0.0) h.head = -h.head, h.x[kYaw] = wrapAngle(h.x[kYaw] + M_PI);
+    const double ground = standOnGround(h, object.id, frame);
     object.hypotheses.push_back(h);
-    fits.push_back({object.hypotheses.size() - 1, std::move(*smoothed)});
+    fits.push_back({object.hypotheses.size() - 1, std::move(*smoothed), ground});
   }
 }
 
@@ -168,8 +173,9 @@ std::optional<Leftover> smoothClass(Object& object, const std::string& name, con
     auto smoothed = fit(h, looks, frame, others.empty() ? nullptr : &others.front().smoothed);
     if (!smoothed) continue;
     h = smoothed->hypothesis();
+    const double ground = standOnGround(h, object.id, frame);
     verdicts.add(smoothed->contradictions());
-    others.push_back({i, std::move(*smoothed)});
+    others.push_back({i, std::move(*smoothed), ground});
   }
   if (seek && !still.empty() && name == object.best().class_name) {
     seekModes(object, looks, frame, still);
@@ -178,14 +184,18 @@ std::optional<Leftover> smoothClass(Object& object, const std::string& name, con
   weighModes(object.hypotheses, still, p.least_weight);
   weighModes(object.hypotheses, moving, p.least_weight);
   auto at_rest = heaviest(object.hypotheses, std::move(still));
-  const auto over = at_rest ? std::optional(at_rest->leftover()) : std::nullopt;
+  const auto over = at_rest ? std::optional(at_rest->smoothed.leftover()) : std::nullopt;
   const auto driving = heaviest(object.hypotheses, std::move(moving));
   if (!driving) return over;
   if (!at_rest) {
-    at_rest = fit(atRest(driving->hypothesis(), object.keyframes), looks, frame);
-    if (!at_rest) return over;
-    object.hypotheses.push_back(at_rest->hypothesis());
-    object.hypotheses.back().weight = 1e-3 * driving->hypothesis().weight;
+    const Hypothesis& mover = driving->smoothed.hypothesis();
+    auto smoothed = fit(atRest(mover, object.keyframes), looks, frame);
+    if (!smoothed) return over;
+    object.hypotheses.push_back(smoothed->hypothesis());
+    Hypothesis& h = object.hypotheses.back();
+    h.weight = 1e-3 * mover.weight;
+    const double ground = standOnGround(h, object.id, frame);
+    at_rest.emplace(Fitted{object.hypotheses.size() - 1, std::move(*smoothed), ground});
   }
   weighMotion(object.hypotheses, name, *at_rest, *driving, frame);
   return over;
@@ -231,9 +241,11 @@ void tryWhatItResembles(Object& object, const Looks& looks, const FrameContext& 
   const double at_birth = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -
                           std::log(std::max(p.clutter.other_lookalike, 1e-3));
   for (const Smoothed& one : fits) {
-    const double odds = one.logEvidence(doubts) - most + at_birth;
+    Hypothesis h = one.hypothesis();
+    const double ground = standOnGround(h, object.id, frame);
+    const double odds = one.logEvidence(doubts) - most + at_birth + ground;
     if (odds < kLeastOdds) continue;
-    object.hypotheses.push_back(one.hypothesis());
+    object.hypotheses.push_back(h);
     object.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kSurest));
   }
   normalise(object, ClassEvidence::kGeometry);
