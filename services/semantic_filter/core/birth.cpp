@@ -192,6 +192,17 @@ double logShapeRatio(const Fit& fit, const ClassPrior& prior, double yaw_sigma,
   return -fit.cost - 0.5 * std::log(2.0 * M_PI * variance) + std::log(range);
 }
 
+/// How much better the thing's underside fits the ground than that of clutter does, whose boxes are
+/// as likely anywhere in the image: 1 where nothing is known of the ground.
+double groundRatio(Hypothesis& h, const FrameContext& frame) {
+  const double log_ratio = standOnGround(h, 0, frame);
+  if (log_ratio == 0.0) return 1.0;
+  const CameraModel& camera = *frame.view.camera;
+  const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
+  const double span = camera.height() * distance / camera.fy();
+  return std::exp(log_ratio) * std::max(span / frame.parameters->ground.span_m, 1.0);
+}
+
 void addClass(Object& object, const ClassPrior& prior, double ratio, const Evidence& evidence,
               const std::vector<YawStart>& starts, const std::optional<RangeHint>& range,
               const FrameContext& frame) {
@@ -202,7 +213,7 @@ void addClass(Object& object, const ClassPrior& prior, double ratio, const Evide
     fits.push_back(fit->hypothesis);
     const double part = frame.parameters->box.part;
     const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, evidence, frame));
-    const double ground = std::exp(standOnGround(fits.back(), 0, frame));
+    const double ground = groundRatio(fits.back(), frame);
     fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape) * ground;
   }
   weighByAzimuth(fits, evidence, prior, frame);
