@@ -54,6 +54,31 @@ TEST(Gaussian, CholeskyWhitensAndKnowsTheDeterminant) {
   EXPECT_NEAR(chol.logDeterminant(), std::log(S.determinant()), 1e-10);
 }
 
+TEST(Gaussian, CholeskyIsThatOfEigenWhateverTheSize) {
+  for (int n = 1; n < 40; n += n < 18 ? 1 : 7) {
+    const Eigen::MatrixXd S = covariance(n, 50 + n);
+    const Cholesky chol(S);
+    ASSERT_TRUE(chol.positive());
+    Eigen::MatrixXd L = S;
+    ASSERT_TRUE(choleskyInPlace(L));
+    EXPECT_NEAR(chol.logDeterminant(), 2.0 * L.diagonal().array().log().sum(), 1e-9);
+    for (const int columns : {1, 3, 4, 5, 8, 11}) {
+      Eigen::MatrixXd B = random(n, columns, 90 + n);
+      const Eigen::MatrixXd W = chol.whiten(B);
+      whitenInPlace(L, B);
+      EXPECT_LT((W - B).norm(), 1e-7 * (1.0 + B.norm())) << n << " x " << columns;
+    }
+  }
+}
+
+TEST(Gaussian, CholeskyRefusesAPivotWhereverItIs) {
+  for (int at = 0; at < 19; ++at) {
+    Eigen::MatrixXd S = covariance(19, 7);
+    S(at, at) = -1.0;
+    EXPECT_FALSE(Cholesky(S).positive()) << at;
+  }
+}
+
 TEST(Gaussian, WhatIsNotPositiveIsNoCovariance) {
   Eigen::MatrixXd S = covariance(5, 6);
   EXPECT_TRUE(isCovariance(S));
