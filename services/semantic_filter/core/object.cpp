@@ -136,11 +136,11 @@ void book(Object& object, ClassEvidence why) {
 
 void normalise(Object& object, ClassEvidence why) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) sum += h.weight;
+  for (const auto& h : object.hypotheses.read()) sum += h.weight;
   check(sum > 0.0, "an object keeps a hypothesis of positive weight");
-  for (auto& h : object.hypotheses) h.weight /= sum;
+  auto& hs = object.hypotheses.write();
+  for (auto& h : hs) h.weight /= sum;
   const auto heavier = [](const auto& a, const auto& b) { return a.weight > b.weight; };
-  auto& hs = object.hypotheses;
   if (!std::is_sorted(hs.begin(), hs.end(), heavier)) {  // which moves nothing
     std::stable_sort(hs.begin(), hs.end(), heavier);
   }

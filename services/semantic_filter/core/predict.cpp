@@ -64,7 +64,7 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
 /// own: what is not found where it was found then is gone rather than screened.
 double screenedFromHere(const Object& object, const Eigen::Vector3d& place, const ViewWalk& walk) {
   double screened = walk.screened;
-  for (const auto& k : object.keyframes) {
+  for (const auto& k : object.keyframes.read()) {
     if (k->from->time >= object.came_back) break;  // they are in order of time
     screened *= 1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.screen));
   }
@@ -120,14 +120,14 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
 /// it may have stayed.
 void giveUpLostOnes(Object& object, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : object.hypotheses.read()) {
     const double sigma = std::sqrt(h.P.topLeftCorner<2, 2>().trace());
     if (!h.moving || sigma < lost_sigma_m) kept += h.weight;
   }
   if (kept >= 1.0 - 1e-9) return;
   object.existence.become(object.existence * kept, ExistenceEvidence::kLost, now);
   if (kept <= 1e-9) return;  // nothing is left of it; it will be buried
-  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
     return h.moving && std::sqrt(h.P.topLeftCorner<2, 2>().trace()) >= lost_sigma_m;
   });
   normalise(object, ClassEvidence::kMotion);
@@ -180,17 +180,19 @@ void stop(Hypothesis& h) {
 void letSlowOnesStand(Object& object, double min_speed) {
   const std::size_t count = object.hypotheses.size();
   for (std::size_t i = 0; i < count; ++i) {
-    if (!object.hypotheses[i].moving) continue;
-    const double fast = fasterThan(object.hypotheses[i], min_speed);
+    const Hypothesis& moving = object.hypotheses.read()[i];
+    if (!moving.moving) continue;
+    const double fast = fasterThan(moving, min_speed);
     if (fast > 0.5) continue;
-    Hypothesis rest = object.hypotheses[i];
+    Hypothesis rest = moving;
     stop(rest);
     rest.weight *= 1.0 - fast;
     object.hypotheses[i].weight *= fast;
     object.hypotheses.push_back(std::move(rest));
   }
   if (object.hypotheses.size() == count) return;
-  std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight < kNoWeight; });
+  std::erase_if(object.hypotheses.write(),
+                [](const Hypothesis& h) { return h.weight < kNoWeight; });
   normalise(object, ClassEvidence::kMotion);
 }
 
@@ -202,9 +204,8 @@ State stateAt(const Hypothesis& h, double dt) {
 
 Object movedOn(Object object, TimePoint time, const MotionParameters& parameters) {
   const double dt = toSeconds(time - object.as_of);
-  for (auto& h : object.hypotheses) {
-    if (dt > 0.0) predictHypothesis(h, dt, parameters);
-  }
+  if (dt <= 0.0) return object;
+  for (auto& h : object.hypotheses) predictHypothesis(h, dt, parameters);
   return object;
 }
 

@@ -20,7 +20,13 @@ double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<doub
   return whitened.squaredNorm();
 }
 
+bool hasMoving(const Object& object) {
+  return std::any_of(object.hypotheses.begin(), object.hypotheses.end(),
+                     [](const auto& h) { return h.moving; });
+}
+
 void settleSlowOnes(Object& object, double min_speed) {
+  if (!hasMoving(object)) return;
   for (auto& h : object.hypotheses) {
     if (!h.moving) continue;
     const Eigen::Matrix2d P = h.P.block<2, 2>(kVelocity, kVelocity);
@@ -33,6 +39,7 @@ void settleSlowOnes(Object& object, double min_speed) {
 /// What moves seldom creeps: the Gaussian prior of a moving one's velocity has a hole around zero.
 /// Without it a parked car of unusual size is one of usual size that creeps.
 void weighPace(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
+  if (!hasMoving(object)) return;
   for (auto& h : object.hypotheses) {
     if (!h.moving) continue;
     const double slow = motion.slow_share * priors.of(h.class_name).speed_sigma;
@@ -49,7 +56,7 @@ bool wider(const Hypothesis& a, const Hypothesis& b) {
 }
 
 void mergeNearOnes(Object& object, double threshold) {
-  auto& hs = object.hypotheses;
+  auto& hs = object.hypotheses.write();
   for (std::size_t i = 0; i < hs.size(); ++i) {
     for (std::size_t j = hs.size() - 1; j > i; --j) {
       if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
@@ -72,7 +79,7 @@ bool scaleIsOpen(const Object& object, const TendParameters& tend) {
 /// left of the object is as likely as it was.
 void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
-  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
     if (!misshapen(h, priors.of(h.class_name), size_gate)) return false;
     lost += h.weight;
     return true;
@@ -87,15 +94,10 @@ void pruneLightOnes(Object& object, const TendParameters& tend) {
   const bool dominant =
       object.hits >= 3 && classProbability(object, best_class) > tend.class_dominates;
   const bool open = scaleIsOpen(object, tend);
-  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
     if (open && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
     return h.weight < tend.hypothesis_floor || (dominant && h.class_name != best_class);
   });
-}
-
-bool hasMoving(const Object& object) {
-  return std::any_of(object.hypotheses.begin(), object.hypotheses.end(),
-                     [](const auto& h) { return h.moving; });
 }
 
 void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
