@@ -4,24 +4,14 @@
 #include <cmath>
 #include <vector>
 
-// The loader picks a clone before a sanitizer's run time has begun.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define PERDURE_ALSO_AVX2 __attribute__((target_clones("avx2", "default")))
-#else
-#define PERDURE_ALSO_AVX2
-#endif
-#define PERDURE_INLINE inline __attribute__((always_inline))
+#include "common/math/simd.h"
 
 namespace perdure::dense {
 namespace {
 
+using simd::Four, simd::four, simd::Two, simd::two;
+
 constexpr long kFour = 4, kEight = 8;
-using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
-
-PERDURE_INLINE Four& four(double* p) { return *reinterpret_cast<Four*>(p); }
-PERDURE_INLINE const Four& four(const double* p) { return *reinterpret_cast<const Four*>(p); }
-
 /// Columns j to j + 4 of rows i to i + 4 N, less what the columns before j explain; where they lie
 /// below the diagonal block, which is factorised, times its inverse.
 template <int N, bool kBelow>
@@ -119,7 +109,76 @@ PERDURE_INLINE void whitenPanel(const double* L, long stride, long n, double* B,
   }
 }
 
+/// Rows i on of columns j to j + N of A Bᵀ.
+template <class V, int kRows, int N>
+PERDURE_INLINE void timesTransposedTile(const double* A, long rows, const double* B, long columns,
+                                        long inner, long i, long j, double* product) {
+  constexpr long kLanes = sizeof(V) / sizeof(double);
+  const auto at = [](auto* p) -> auto& {
+    if constexpr (sizeof(V) == sizeof(Four)) {
+      return four(p);
+    } else if constexpr (sizeof(V) == sizeof(Two)) {
+      return two(p);
+    } else {
+      return *p;
+    }
+  };
+  V sum[N][kRows];
+  for (int c = 0; c < N; ++c) {
+    for (int r = 0; r < kRows; ++r) sum[c][r] = at(A + i + kLanes * r) * B[j + c];
+  }
+  for (long k = 1; k < inner; ++k) {
+    for (int c = 0; c < N; ++c) {
+      const double by = B[k * columns + j + c];
+      for (int r = 0; r < kRows; ++r) sum[c][r] += at(A + k * rows + i + kLanes * r) * by;
+    }
+  }
+  for (int c = 0; c < N; ++c) {
+    for (int r = 0; r < kRows; ++r) at(product + (j + c) * rows + i + kLanes * r) = sum[c][r];
+  }
+}
+
+template <int N>
+PERDURE_INLINE void timesTransposedColumns(const double* A, long rows, const double* B,
+                                           long columns, long inner, long j, double* product) {
+  long i = 0;
+  for (; i + kEight <= rows; i += kEight) {
+    timesTransposedTile<Four, 2, N>(A, rows, B, columns, inner, i, j, product);
+  }
+  for (; i + kFour <= rows; i += kFour) {
+    timesTransposedTile<Four, 1, N>(A, rows, B, columns, inner, i, j, product);
+  }
+  for (; i + 2 <= rows; i += 2) {
+    timesTransposedTile<Two, 1, N>(A, rows, B, columns, inner, i, j, product);
+  }
+  for (; i < rows; ++i) {
+    timesTransposedTile<double, 1, N>(A, rows, B, columns, inner, i, j, product);
+  }
+}
+
 }  // namespace
+
+PERDURE_ALSO_AVX2 void timesTransposed(const double* A, long rows, const double* B, long columns,
+                                       long inner, double* product) {
+  long j = 0;
+  for (; j + kFour <= columns; j += kFour) {
+    timesTransposedColumns<kFour>(A, rows, B, columns, inner, j, product);
+  }
+  for (; j + 2 <= columns; j += 2) {
+    timesTransposedColumns<2>(A, rows, B, columns, inner, j, product);
+  }
+  for (; j < columns; ++j) timesTransposedColumns<1>(A, rows, B, columns, inner, j, product);
+}
+
+PERDURE_ALSO_AVX2 void fourRowsTimes(const double* A, const double* B, long stride, long inner,
+                                     long columns, double* product) {
+  for (long j = 0; j < columns; ++j) {
+    const double* by = B + j * stride;
+    Four sum = four(A) * by[0];
+    for (long k = 1; k < inner; ++k) sum += four(A + kFour * k) * by[k];
+    four(product + kFour * j) = sum;
+  }
+}
 
 PERDURE_ALSO_AVX2 bool factorise(double* S, long stride, long n) {
   Four inverse = {0.0, 0.0, 0.0, 0.0};

@@ -17,4 +17,12 @@ void whiten(const double* L, long stride, long n, double* B, long m);
 /// four.
 void multiplySix(const double* A, const double* B, long n, double* product);
 
+/// A Bᵀ with A rows × inner and B columns × inner.
+void timesTransposed(const double* A, long rows, const double* B, long columns, long inner,
+                     double* product);
+
+/// A B with A 4 × inner and B inner × columns, whose columns are `stride` numbers apart.
+void fourRowsTimes(const double* A, const double* B, long stride, long inner, long columns,
+                   double* product);
+
 }  // namespace perdure::dense

@@ -92,8 +92,7 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
   const double side = std::min(sides[2] - sides[0], sides[3] - sides[1]);
   parameters.cell_px = std::clamp(static_cast<std::int64_t>(side / kCellsAcross), std::int64_t{1},
                                   parameters.cell_px);
-  parameters.minimum = 0.0;
-  return see(outlines, {}, camera.width(), camera.height(), parameters).front().fraction;
+  return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
 }
 
 /// Of the first of `things`, from which on it may be found. What shows as much already and was not

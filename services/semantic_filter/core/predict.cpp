@@ -5,6 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
+#include "common/math/small_products.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/keyframe.h"
 
@@ -53,8 +54,8 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
     keep = correlation * sigma.cwiseQuotient(stationaryBias(h.x, *last, walk).cwiseMax(1e-12));
   }
   h.x.segment<4>(kBias) = keep.asDiagonal() * h.x.segment<4>(kBias);
-  h.P.middleRows<4>(kBias) = (keep.asDiagonal() * h.P.middleRows<4>(kBias)).eval();
-  h.P.middleCols<4>(kBias) = (h.P.middleCols<4>(kBias) * keep.asDiagonal()).eval();
+  for (int j = 0; j < kStateDim; ++j) h.P.block<4, 1>(kBias, j).array() *= keep.array();
+  for (int i = 0; i < 4; ++i) h.P.col(kBias + i) *= keep[i];
   h.C.middleRows<4>(kBias) = (keep.asDiagonal() * h.C.middleRows<4>(kBias)).eval();
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
@@ -86,13 +87,12 @@ void predictScreen(Object& object, const ViewWalk& walk) {
   object.elusive = std::min(object.elusive, 1.0 - object.screened);
 }
 
-/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see.
-bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
-  Matrix6d L = P_pose;
-  if (!choleskyInPlace(L)) return false;
+/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see. L_pose
+/// is P_pose's Cholesky factor.
+bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   CrossPose B = h.C;
-  whitenRows(L, B);
-  StateCovariance rest = h.P - B.lazyProduct(B.transpose()) / share;
+  whitenRows(L_pose, B);
+  StateCovariance rest = h.P - timesTransposed(B, B) / share;
   if (h.moving) return choleskyInPlace(rest);
   Eigen::Matrix<double, kVelocity, kVelocity> still = rest.topLeftCorner<kVelocity, kVelocity>();
   return choleskyInPlace(still);
@@ -101,9 +101,9 @@ bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
 /// [P C; Cᵀ P_pose] must stay a covariance. Transitions are approximate, and vio's own updates
 /// shrink P_pose: C is scaled down where the pose would explain more of P than there is. (Much of
 /// P may well be the pose: a limit of .9 here costs half of the recall on KITTI.)
-void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
+void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose) {
   constexpr double kExplained = 0.9999;
-  if (h.C.isZero(0.0) || isExplained(h, P_pose, kExplained)) return;
+  if (h.C.isZero(0.0) || (L_pose && isExplained(h, *L_pose, kExplained))) return;
   const Eigen::Index n = h.moving ? kStateDim : kVelocity;
   const Cholesky P(h.P.topLeftCorner(n, n));
   const Cholesky pose(P_pose);
@@ -215,11 +215,13 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
   // Where the transition is lost nothing is left of C.
   const Matrix6d transition =
       transitionBetween(object.pose_product, pose_error.product).value_or(Matrix6d::Zero());
+  std::optional<Matrix6d> L_pose = pose_error.covariance;
+  if (!choleskyInPlace(*L_pose)) L_pose.reset();
   for (auto& h : object.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
     predictBias(h, object.last_view, walk);
-    h.C = h.C.lazyProduct(transition.transpose()).eval();
-    keepConsistent(h, pose_error.covariance);
+    h.C = timesTransposed(h.C, transition);
+    keepConsistent(h, pose_error.covariance, L_pose);
   }
   const bool unseen =
       object.last_seen < object.as_of || object.hidden.count + object.away.count > 0;

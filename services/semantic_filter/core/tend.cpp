@@ -133,6 +133,22 @@ bool forgettable(const Object& o, const TendParameters& parameters) {
   return unasked && toSeconds(last - o.last_seen) > parameters.tentative_s;
 }
 
+/// Of the pose's covariance; nothing where that is not positive definite.
+std::optional<Matrix6d> factorOf(const Matrix6d& P_pose) {
+  std::optional<Matrix6d> L = P_pose;
+  if (!choleskyInPlace(*L)) L.reset();
+  return L;
+}
+
+double sigmaGivenPose(const Hypothesis& h, const std::optional<Matrix6d>& L_pose) {
+  Eigen::Matrix<double, 3, 6> shared = Eigen::Matrix<double, 3, 6>::Zero();
+  if (L_pose) {
+    shared = h.C.topRows<3>();
+    whitenRows(*L_pose, shared);
+  }
+  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
+}
+
 }  // namespace
 
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate) {
@@ -169,22 +185,16 @@ double certainty(const Object& object, const TendParameters& parameters) {
 }
 
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
-  Eigen::Matrix<double, 3, 6> shared = h.C.topRows<3>();
-  Matrix6d L = P_pose;
-  if (choleskyInPlace(L)) {
-    whitenRows(L, shared);
-  } else {
-    shared.setZero();
-  }
-  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
+  return sigmaGivenPose(h, factorOf(P_pose));
 }
 
 double placeSigma(const Object& object, const Matrix6d& P_pose) {
+  const auto L_pose = factorOf(P_pose);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const auto& h : object.hypotheses) mean += h.weight * h.x.head<3>();
   double variance = 0.0;
   for (const auto& h : object.hypotheses) {
-    const double own = placeSigma(h, P_pose);
+    const double own = sigmaGivenPose(h, L_pose);
     variance += h.weight * (own * own + (h.x.head<3>() - mean).squaredNorm());
   }
   return std::sqrt(variance);

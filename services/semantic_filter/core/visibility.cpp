@@ -246,6 +246,73 @@ Outline outlineOf(const Object& object, const State& x, const Projector& from, c
   return o;
 }
 
+namespace {
+
+/// What the image shows of an outline, and its share of the whole.
+struct InImage {
+  Polygon inside;
+  double share;
+};
+
+InImage inImage(const Outline& o, double width, double height) {
+  const Polygon hull = convexHull(o.box->points);
+  InImage result;
+  result.inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
+  result.inside = clip(clip(result.inside, 1, 0.0, true), 1, height, false);
+  result.share = polygonArea(result.inside) / std::max(polygonArea(hull), 1e-9);
+  return result;
+}
+
+void paint(DepthBuffer& buffer, const std::vector<Span>& spans, const Outline& o) {
+  for (const Span& span : spans) {
+    for (int i = 0; i < span.cells; ++i) {
+      paint(buffer.at(span.first + static_cast<std::size_t>(i)), o);
+    }
+  }
+}
+
+Tally tallyOf(const DepthBuffer& buffer, const std::vector<Span>& spans, const Outline& o) {
+  Tally tally(o);
+  for (const Span& span : spans) {
+    tally.add(span, buffer.cell());
+    for (int i = 0; i < span.cells; ++i) {
+      const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+      if (cell) tally.hide(*cell, span.x + i * buffer.cell(), span.y);
+    }
+  }
+  return tally;
+}
+
+DepthBuffer& begin(double width, double height, const VisibilityParameters& parameters) {
+  thread_local DepthBuffer kept;
+  kept.begin(width, height, static_cast<double>(parameters.cell_px));
+  return kept;
+}
+
+}  // namespace
+
+double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
+                    const VisibilityParameters& parameters) {
+  const Outline& first = outlines.front();
+  if (!first.box) return 0.0;
+  std::vector<const Outline*> hiding;
+  for (const Outline& o : outlines) {
+    const bool hides = o.box && o.distance_m < first.distance_m && o.solidity >= parameters.solid;
+    if (hides) hiding.push_back(&o);
+  }
+  const InImage in_image = inImage(first, width, height);
+  if (in_image.inside.empty()) return 0.0;
+  if (hiding.empty()) return in_image.share;
+  std::stable_sort(hiding.begin(), hiding.end(),
+                   [](const auto* a, const auto* b) { return a->distance_m < b->distance_m; });
+  DepthBuffer& buffer = begin(width, height, parameters);
+  for (const Outline* o : hiding) {
+    paint(buffer, buffer.spansOf(inImage(*o, width, height).inside), *o);
+  }
+  const Tally tally = tallyOf(buffer, buffer.spansOf(in_image.inside), first);
+  return tally.total > 0.0 ? in_image.share * (1.0 - tally.hidden / tally.total) : 0.0;
+}
+
 std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
                        double width, double height, const VisibilityParameters& parameters) {
   std::vector<std::size_t> order(outlines.size());
@@ -253,34 +320,17 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
-  thread_local DepthBuffer kept;
-  DepthBuffer& buffer = kept;
-  buffer.begin(width, height, static_cast<double>(parameters.cell_px));
+  DepthBuffer& buffer = begin(width, height, parameters);
   std::vector<Sight> sights(outlines.size());
   for (const std::size_t j : order) {
     const Outline& o = outlines[j];
     if (!o.box) continue;
-    const Polygon hull = convexHull(o.box->points);
-    Polygon inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
-    inside = clip(clip(inside, 1, 0.0, true), 1, height, false);
-    const double in_image = polygonArea(inside) / std::max(polygonArea(hull), 1e-9);
-    Tally tally(o);
-    const std::vector<Span>& spans = buffer.spansOf(inside);
-    for (const Span& span : spans) {
-      tally.add(span, buffer.cell());
-      for (int i = 0; i < span.cells; ++i) {
-        const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
-        if (cell) tally.hide(*cell, span.x + i * buffer.cell(), span.y);
-      }
-    }
-    const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
-    sights[j] = classify(tally, in_image, by_points, parameters);
-    if (o.solidity < parameters.solid) continue;
-    for (const Span& span : spans) {
-      for (int i = 0; i < span.cells; ++i) {
-        paint(buffer.at(span.first + static_cast<std::size_t>(i)), o);
-      }
-    }
+    const InImage in_image = inImage(o, width, height);
+    const std::vector<Span>& spans = buffer.spansOf(in_image.inside);
+    const Tally tally = tallyOf(buffer, spans, o);
+    const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, in_image.inside, points);
+    sights[j] = classify(tally, in_image.share, by_points, parameters);
+    if (o.solidity >= parameters.solid) paint(buffer, spans, o);
   }
   return sights;
 }
