@@ -12,14 +12,16 @@ namespace perdure {
 template <int N>
 bool choleskyInPlace(Eigen::Matrix<double, N, N>& S) {
   for (int j = 0; j < N; ++j) {
-    for (int k = 0; k < j; ++k) {
-      const double by = S(j, k);
-      for (int i = j; i < N; ++i) S(i, j) -= S(i, k) * by;
-    }
-    if (!(S(j, j) > 0.0)) return false;
-    const double pivot = std::sqrt(S(j, j));
+    double pivot = S(j, j);
+    for (int k = 0; k < j; ++k) pivot -= S(j, k) * S(j, k);
+    if (!(pivot > 0.0)) return false;
+    pivot = std::sqrt(pivot);
     S(j, j) = pivot;
-    for (int i = j + 1; i < N; ++i) S(i, j) /= pivot;
+    for (int i = j + 1; i < N; ++i) {
+      double sum = S(i, j);
+      for (int k = 0; k < j; ++k) sum -= S(i, k) * S(j, k);
+      S(i, j) = sum / pivot;
+    }
   }
   return true;
 }

@@ -129,12 +129,17 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
   s.rows = Eigen::MatrixXd::Zero(4 * n, dim_ + 1);
   s.J_pose.assign(looks_.size(), PoseJacobian::Zero());
   s.counts.assign(looks_.size(), {});
+  const BoxStyles* styles = nullptr;
+  const BoxStyle* style = nullptr;
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    const auto box =
-        projectObserved(then, k.from->projector, k.from->styles->of(class_name_), facing_);
+    if (k.from->styles.get() != styles) {  // looks of one network are mostly side by side
+      styles = k.from->styles.get();
+      style = &styles->of(class_name_);
+    }
+    const auto box = projectObserved(then, k.from->projector, *style, facing_);
     if (!box) return std::nullopt;
     const auto use = comparableSides(k.z, *box, k.hidden);
     const auto row = static_cast<Eigen::Index>(4 * i);

@@ -185,17 +185,32 @@ void project(const Corners& corners, const CameraModel& camera, ImagePoints& poi
   points.bound();
 }
 
+/// Derivatives of one coordinate of the image of a point in front. False where it has none.
+bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, int axis,
+                       Eigen::RowVector3d& by_C) {
+  if (camera.calibration().distortion == DistortionModel::kNone) {
+    const double focal = axis == 0 ? camera.fx() : camera.fy(), inverse_depth = 1.0 / p_C.z();
+    by_C.setZero();
+    by_C[axis] = focal * inverse_depth;
+    by_C[2] = focal * (-(p_C[axis] * inverse_depth) * inverse_depth);
+    return true;
+  }
+  Eigen::Matrix<double, 2, 3> J_point;
+  if (!camera.project(p_C, &J_point)) return false;
+  by_C = J_point.row(axis);
+  return true;
+}
+
 /// Derivatives of a side, which is the image of a corner.
 void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
              const Corners& corners) {
-  Eigen::Matrix<double, 2, 3> J_point;
   const Eigen::Vector3d p_C = corner == kCut ? Eigen::Vector3d::Zero() : corners.p_C(corner);
-  if (corner == kCut || !from.camera->project(p_C, &J_point)) {
+  Eigen::RowVector3d by_C;
+  if (corner == kCut || !coordinateByPoint(*from.camera, p_C, side % 2, by_C)) {
     box.exact[side] = false;
     return;
   }
   const Eigen::Vector3d local = corners.local(corner);
-  const Eigen::RowVector3d by_C = J_point.row(side % 2);
   const Eigen::RowVector3d by_W = by_C * from.R_CW;
   const Eigen::RowVector3d by_O = by_W * corners.R_WO;
   box.H.row(side).head<3>() = by_W;

@@ -182,25 +182,27 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
   const Eigen::MatrixXd Bw =
       fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
   const Eigen::MatrixXd Ew = fit.R->whiten(model.poseNow(fit.stack).transpose());
-  const Eigen::MatrixXd BJ = Bw.transpose() * Jw;
-  const Eigen::MatrixXd C = -P * (Jw.transpose() * Ew);
+  // Tall and narrow: to pack them for Eigen's product costs more than the sums.
+  const Eigen::MatrixXd BJ = Bw.transpose().lazyProduct(Jw);
+  const Eigen::MatrixXd C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
 
   // State order: geometry, b, velocity.
   const int g = kGeometry;
   Hypothesis h = start;
   h.moving = model.moving();
   h.x = fit.x;
-  h.x.segment<4>(kBias) = Bw.transpose() * rw;
+  h.x.segment<4>(kBias) = Bw.transpose().lazyProduct(rw);
   h.P.setZero();
   h.P.topLeftCorner(g, g) = P.topLeftCorner(g, g);
-  h.P.block<4, 4>(kBias, kBias) = -Bw.transpose() * Bw + BJ * P * BJ.transpose();
+  h.P.block<4, 4>(kBias, kBias) =
+      BJ.lazyProduct(P.lazyProduct(BJ.transpose()).eval()) - Bw.transpose().lazyProduct(Bw);
   h.P.block<4, 4>(kBias, kBias).diagonal() += sigma.cwiseAbs2();
-  const Eigen::MatrixXd cross = -BJ * P;
+  const Eigen::MatrixXd cross = -BJ.lazyProduct(P);
   h.P.block(kBias, 0, 4, g) = cross.leftCols(g);
   h.P.block(0, kBias, g, 4) = cross.leftCols(g).transpose();
   h.C.setZero();
   h.C.topRows(g) = C.topRows(g);
-  h.C.middleRows<4>(kBias) = -Bw.transpose() * Ew - BJ * C;
+  h.C.middleRows<4>(kBias) = -Bw.transpose().lazyProduct(Ew) - BJ.lazyProduct(C);
   if (model.moving()) {
     h.P.bottomRightCorner<3, 3>() = P.bottomRightCorner<3, 3>();
     h.P.block(kVelocity, 0, 3, g) = P.bottomLeftCorner(3, g);

@@ -100,6 +100,8 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
                  const FrameContext& frame) {
   const ProjectedBox* at_prior = seen.box ? &*seen.box : nullptr;
   std::vector<Hypothesis> parts;
+  parts.reserve(static_cast<std::size_t>(std::count_if(
+      shares.box.begin(), shares.box.end(), [](double share) { return !(share < kNegligible); })));
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;

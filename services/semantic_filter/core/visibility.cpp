@@ -128,8 +128,27 @@ struct Blocked {
   double hidden = 0.0;
 };
 
+class Blockers {
+ public:
+  explicit Blockers(const Outline& outline) : o_(outline) {}
+
+  /// Few hide one thing, and cells side by side mostly show the same.
+  Blocked& of(const Cell& cell) {
+    for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
+      if (b->by == cell.blocker) return *b;
+    }
+    all_.push_back({cell.blocker, nearer(cell, o_)});
+    return all_.back();
+  }
+  const std::vector<Blocked>& all() const { return all_; }
+
+ private:
+  const Outline& o_;
+  std::vector<Blocked> all_;
+};
+
 struct Tally {
-  explicit Tally(const Outline& outline) : o(outline) {
+  explicit Tally(const Outline& outline) : o(outline), blockers(outline) {
     const auto& s = o.box->sides;
     const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
     inner = {s[0] + band_x, s[1] + band_y, s[2] - band_x, s[3] - band_y};
@@ -149,7 +168,7 @@ struct Tally {
   }
   /// One of them, which something was painted in.
   void hide(const Cell& cell, double x, double y) {
-    Blocked& blocked = blockedBy(cell);
+    Blocked& blocked = blockers.of(cell);
     const double share = (1.0 - cell.transmittance) * blocked.nearer;
     blocked.hidden += share;
     hidden += share;
@@ -162,18 +181,8 @@ struct Tally {
   const Outline& o;
   std::array<double, 4> inner;  ///< where the bands along the four sides end
   double total = 0.0, hidden = 0.0;
-  std::vector<Blocked> blockers;
+  Blockers blockers;
   std::array<double, 4> side_total{}, side_hidden{};
-
- private:
-  /// Few hide one thing, and cells side by side mostly show the same.
-  Blocked& blockedBy(const Cell& cell) {
-    for (auto b = blockers.rbegin(); b != blockers.rend(); ++b) {
-      if (b->by == cell.blocker) return *b;
-    }
-    blockers.push_back({cell.blocker, nearer(cell, o)});
-    return blockers.back();
-  }
 };
 
 void paint(Cell& cell, const Outline& o) {
@@ -210,7 +219,7 @@ Sight classify(const Tally& tally, double in_image, double by_points,
   const double free = tally.total > 0.0 ? 1.0 - tally.hidden / tally.total : 0.0;
   sight.fraction = in_image * free * (1.0 - by_points);
   double most = 0.0;
-  for (const Blocked& b : tally.blockers) {
+  for (const Blocked& b : tally.blockers.all()) {
     const bool older = b.hidden == most && b.by < sight.blocked_by;
     if (b.hidden > most || older) most = b.hidden, sight.blocked_by = b.by;
   }
@@ -309,8 +318,16 @@ double shareOfFirst(const std::vector<Outline>& outlines, double width, double h
   for (const Outline* o : hiding) {
     paint(buffer, buffer.spansOf(inImage(*o, width, height).inside), *o);
   }
-  const Tally tally = tallyOf(buffer, buffer.spansOf(in_image.inside), first);
-  return tally.total > 0.0 ? in_image.share * (1.0 - tally.hidden / tally.total) : 0.0;
+  double cells = 0.0, hidden = 0.0;
+  Blockers blockers(first);
+  for (const Span& span : buffer.spansOf(in_image.inside)) {
+    cells += span.cells;
+    for (int i = 0; i < span.cells; ++i) {
+      const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+      if (cell) hidden += (1.0 - cell->transmittance) * blockers.of(*cell).nearer;
+    }
+  }
+  return cells > 0.0 ? in_image.share * (1.0 - hidden / cells) : 0.0;
 }
 
 std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
