@@ -138,10 +138,11 @@ PERDURE_INLINE void timesTransposedTile(const double* A, long rows, const double
   }
 }
 
+/// Of those columns the rows from i on.
 template <int N>
 PERDURE_INLINE void timesTransposedColumns(const double* A, long rows, const double* B,
-                                           long columns, long inner, long j, double* product) {
-  long i = 0;
+                                           long columns, long inner, long i, long j,
+                                           double* product) {
   for (; i + kEight <= rows; i += kEight) {
     timesTransposedTile<Four, 2, N>(A, rows, B, columns, inner, i, j, product);
   }
@@ -162,12 +163,21 @@ PERDURE_ALSO_AVX2 void timesTransposed(const double* A, long rows, const double*
                                        long inner, double* product) {
   long j = 0;
   for (; j + kFour <= columns; j += kFour) {
-    timesTransposedColumns<kFour>(A, rows, B, columns, inner, j, product);
+    timesTransposedColumns<kFour>(A, rows, B, columns, inner, 0, j, product);
   }
   for (; j + 2 <= columns; j += 2) {
-    timesTransposedColumns<2>(A, rows, B, columns, inner, j, product);
+    timesTransposedColumns<2>(A, rows, B, columns, inner, 0, j, product);
   }
-  for (; j < columns; ++j) timesTransposedColumns<1>(A, rows, B, columns, inner, j, product);
+  for (; j < columns; ++j) timesTransposedColumns<1>(A, rows, B, columns, inner, 0, j, product);
+}
+
+PERDURE_ALSO_AVX2 void lowerTimesTransposed(const double* A, long rows, long inner,
+                                            double* product) {
+  long j = 0;
+  for (; j + kFour <= rows; j += kFour) {
+    timesTransposedColumns<kFour>(A, rows, A, rows, inner, j, j, product);
+  }
+  for (; j < rows; ++j) timesTransposedColumns<1>(A, rows, A, rows, inner, j, j, product);
 }
 
 PERDURE_ALSO_AVX2 void fourRowsTimes(const double* A, const double* B, long stride, long inner,

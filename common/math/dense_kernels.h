@@ -21,6 +21,9 @@ void multiplySix(const double* A, const double* B, long n, double* product);
 void timesTransposed(const double* A, long rows, const double* B, long columns, long inner,
                      double* product);
 
+/// A Aᵀ with A rows × inner; of what is above the diagonal only some is written.
+void lowerTimesTransposed(const double* A, long rows, long inner, double* product);
+
 /// A B with A 4 × inner and B inner × columns, whose columns are `stride` numbers apart.
 void fourRowsTimes(const double* A, const double* B, long stride, long inner, long columns,
                    double* product);

@@ -17,6 +17,14 @@ Eigen::Matrix<double, N, M> timesTransposed(const Eigen::Matrix<double, N, K>& A
   return product;
 }
 
+/// A Aᵀ of an N × K matrix, on and below the diagonal; above it whatever.
+template <int N, int K>
+Eigen::Matrix<double, N, N> lowerTimesTransposed(const Eigen::Matrix<double, N, K>& A) {
+  Eigen::Matrix<double, N, N> product = Eigen::Matrix<double, N, N>::Zero();
+  dense::lowerTimesTransposed(A.data(), N, K, product.data());
+  return product;
+}
+
 /// A Bᵀ with the first K columns of A, N × N.
 template <int N, int M, int K>
 Eigen::Matrix<double, N, M> leftTimesTransposed(const Eigen::Matrix<double, N, N>& A,

@@ -308,6 +308,7 @@ void Node::publish(const Entry& entry) {
   objects.up_W = entry.input.view.up_W;
   objects.next_id = ids_.next();
   const MotionParameters& motion = config_.filter.motion;
+  objects.objects.reserve(belief_.objects.size());
   for (const auto& object : belief_.objects) {
     ObjectBelief& belief = objects.objects.emplace_back(toBelief(object, motion.min_speed));
     if (belief.moving > 0.5) {

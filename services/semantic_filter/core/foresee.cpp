@@ -78,7 +78,9 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
   const Standing& first = things.front();
-  std::vector<Outline> outlines{outlineOf(*first.object, first.x, from, *first.shape)};
+  thread_local std::vector<Outline> outlines;
+  outlines.clear();
+  outlines.push_back(outlineOf(*first.object, first.x, from, *first.shape));
   if (!outlines.front().box) return 0.0;
   const Eigen::Vector4d sides = outlines.front().box->sides;
   const CameraModel& camera = *view.camera;

@@ -34,6 +34,7 @@ double changeBetween(const Glimpse& a, const Glimpse& b, const ViewScales& scale
 std::size_t leastApart(const Eigen::Vector3d& place, const Keyframes& all,
                        const ViewScales& scales) {
   std::vector<Glimpse> glimpses;
+  glimpses.reserve(all.size());
   for (const auto& k : all) glimpses.push_back(glimpseOf(place, *k));
   std::vector<double> apart(all.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < all.size(); ++i) {

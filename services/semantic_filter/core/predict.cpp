@@ -92,7 +92,7 @@ void predictScreen(Object& object, const ViewWalk& walk) {
 bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   CrossPose B = h.C;
   whitenRows(L_pose, B);
-  StateCovariance rest = h.P - timesTransposed(B, B) / share;
+  StateCovariance rest = h.P - lowerTimesTransposed(B) / share;
   if (h.moving) return choleskyInPlace(rest);
   Eigen::Matrix<double, kVelocity, kVelocity> still = rest.topLeftCorner<kVelocity, kVelocity>();
   return choleskyInPlace(still);

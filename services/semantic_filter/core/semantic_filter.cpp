@@ -119,6 +119,7 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
   const Projector from(input.view);
   std::vector<Outline> outlines;
+  outlines.reserve(belief.objects.size());
   for (const auto& o : belief.objects) {
     outlines.push_back(
         outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), from));
@@ -140,6 +141,8 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
                                                         const FrameInput& input,
                                                         const FrameContext& frame) const {
   std::vector<Seen> seen;
+  seen.reserve(static_cast<std::size_t>(std::count_if(
+      sights.begin(), sights.end(), [](const Sight& s) { return s.fraction > 0.0; })));
   const ViewWalk walk = viewWalkOf(frame);
   for (std::size_t j = 0; j < sights.size(); ++j) {
     if (sights[j].fraction <= 0.0) {

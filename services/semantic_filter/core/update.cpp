@@ -99,9 +99,8 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
                  const HypothesisLook& seen, const std::vector<Evidence>& boxes, double repeated,
                  const FrameContext& frame) {
   const ProjectedBox* at_prior = seen.box ? &*seen.box : nullptr;
-  std::vector<Hypothesis> parts;
-  parts.reserve(static_cast<std::size_t>(std::count_if(
-      shares.box.begin(), shares.box.end(), [](double share) { return !(share < kNegligible); })));
+  thread_local std::vector<Hypothesis> parts;
+  parts.clear();
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
@@ -314,6 +313,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const FrameContext& frame) {
   if (look.sight.fraction <= 0.0) return std::nullopt;
   std::vector<Shares> shares;
+  shares.reserve(look.hypotheses.size());
   for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, look.boxes, eta));
   const double seen = probabilitySeen(object, shares);
   const Worth hit = worthOf(object, look, shares, frame.parameters->looks.correlation);

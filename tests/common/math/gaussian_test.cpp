@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 
+#include "common/math/small_products.h"
+
 namespace perdure {
 namespace {
 
@@ -69,6 +71,26 @@ TEST(Gaussian, CholeskyIsThatOfEigenWhateverTheSize) {
       EXPECT_LT((W - B).norm(), 1e-7 * (1.0 + B.norm())) << n << " x " << columns;
     }
   }
+}
+
+TEST(SmallProducts, AreThoseOfEigen) {
+  const Eigen::Matrix<double, 14, 14> P = random(14, 14, 1);
+  const Eigen::Matrix<double, 14, 6> C = random(14, 6, 2);
+  const Eigen::Matrix<double, 4, 11> H = random(4, 11, 3);
+  const Eigen::Matrix<double, 4, 6> G = random(4, 6, 4);
+  const Eigen::Matrix<double, 7, 5> A = random(7, 5, 5);
+  const Eigen::Matrix<double, 3, 5> B = random(3, 5, 6);
+  const auto same = [](const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+    return (a - b).cwiseAbs().maxCoeff() < 1e-13;
+  };
+  EXPECT_TRUE(same(leftTimesTransposed(P, H), P.leftCols<11>() * H.transpose()));
+  EXPECT_TRUE(same(timesTransposed(C, G), C * G.transpose()));
+  EXPECT_TRUE(same(timesTransposed(A, B), A * B.transpose()));
+  EXPECT_TRUE(same(timesTop<6>(H, C), H * C.topRows<11>()));
+  EXPECT_TRUE(same(timesTop<11>(H, P), H * P.topLeftCorner<11, 11>()));
+  const Eigen::MatrixXd whole = C * C.transpose();
+  const Eigen::MatrixXd lower = lowerTimesTransposed(C);
+  EXPECT_TRUE(same(lower.triangularView<Eigen::Lower>(), whole.triangularView<Eigen::Lower>()));
 }
 
 TEST(Gaussian, CholeskyRefusesAPivotWhereverItIs) {
