@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/math/dense_kernels.h"
+
 namespace perdure {
 
 double logGaussian(const VectorView& residual, const MatrixView& S) {
@@ -56,10 +58,13 @@ void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B) {
   L.triangularView<Eigen::Lower>().solveInPlace(B);
 }
 
-Cholesky::Cholesky(Eigen::MatrixXd S) : L_(std::move(S)), positive_(choleskyInPlace(L_)) {}
+Cholesky::Cholesky(Eigen::MatrixXd S)
+    : L_(std::move(S)), positive_(dense::factorise(L_.data(), L_.rows(), L_.rows())) {}
 
 Eigen::MatrixXd Cholesky::whiten(const MatrixView& B) const {
-  return L_.triangularView<Eigen::Lower>().solve(B);
+  Eigen::MatrixXd W = B;
+  dense::whiten(L_.data(), L_.rows(), L_.rows(), W.data(), W.cols());
+  return W;
 }
 
 Eigen::VectorXd Cholesky::unwhiten(Eigen::VectorXd w) const {

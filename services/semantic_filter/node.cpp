@@ -252,7 +252,7 @@ void Node::stepEntry(Entry& entry) {
   const std::size_t n = belief_.objects.size();
   if (entry.before.objects.capacity() < n) entry.before.objects.reserve(n + n / 4);
   entry.before = belief_;
-  StepReport report = filter_.step(belief_, entry.input, ids_);
+  StepReport report = filter_.step(entry.before, belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
   if (entry.input.boxes && !std::exchange(entry.told_pose, true) && !report.pose.empty() &&
@@ -309,6 +309,7 @@ void Node::publish(const Entry& entry) {
   objects.up_W = entry.input.view.up_W;
   objects.next_id = ids_.next();
   const MotionParameters& motion = config_.filter.motion;
+  objects.objects.reserve(belief_.objects.size());
   for (const auto& object : belief_.objects) {
     ObjectBelief& belief = objects.objects.emplace_back(toBelief(object, motion.min_speed));
     if (belief.moving > 0.5) {

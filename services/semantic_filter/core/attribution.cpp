@@ -29,6 +29,8 @@ double excusedByScreen(const Object& object, const std::vector<ClassNumber>& pmf
   const double open = 1.0 - object.screened;
   if (object.screened <= 0.0 || open < kLeast) return 0.0;
   std::vector<double> A, unscreened;
+  A.reserve(shares.size());
+  unscreened.reserve(shares.size());
   for (const Shares& s : shares) {
     A.push_back(s.A);
     unscreened.push_back(std::max(1.0 + (s.A - 1.0) / open, kLeast));
@@ -44,6 +46,7 @@ double saidByNetwork(const Object& object, const std::vector<Shares>& shares,
                      const std::string& class_name, const std::vector<std::size_t>& looked_at,
                      const std::vector<Evidence>& boxes, const FrameContext& frame) {
   std::vector<double> unsaid;  // 1 / g_k, of each box
+  unsaid.reserve(looked_at.size());
   for (const std::size_t z : looked_at) {
     unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name, object.alike)));
   }
@@ -73,6 +76,7 @@ LookReasons reasonsOf(const Object& object, const std::vector<Shares>& shares, d
   }
   if (worth < kLittleWorth) reasons.kind = ExistenceEvidence::kRepeated;
   std::vector<ClassNumber> said;
+  said.reserve(pmf.size());
   for (const ClassNumber& c : pmf) {
     said.push_back(
         {c.name, exponent * saidByNetwork(object, shares, c.name, looked_at, boxes, frame)});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/dense_kernels.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 
@@ -66,19 +67,21 @@ void Looks::pairUp(const PoseError& now) {
   }
 }
 
-Eigen::MatrixXd Looks::poseCovariance(const std::vector<PoseJacobian>& J) const {
+void Looks::poseCovariance(const std::vector<PoseJacobian>& J, Eigen::MatrixXd& result) const {
   const auto n = static_cast<Eigen::Index>(size());
-  Eigen::MatrixXd result(4 * n, 4 * n);
+  result.resize(4 * n, 4 * n);
   if (pairs_.empty()) {
-    Eigen::Matrix<double, Eigen::Dynamic, 6> later(4 * n, 6);
-    Eigen::Matrix<double, 6, Eigen::Dynamic> earlier(6, 4 * n);
+    thread_local Eigen::Matrix<double, Eigen::Dynamic, 6> later;
+    thread_local Eigen::Matrix<double, 6, Eigen::Dynamic> earlier;
+    later.resize(4 * n, 6);
+    earlier.resize(6, 4 * n);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto k = static_cast<std::size_t>(i);
       later.middleRows<4>(4 * i) = J[k].lazyProduct(onto_[k]);
       earlier.middleCols<4>(4 * i) = from_[k].lazyProduct(J[k].transpose());
     }
-    result.triangularView<Eigen::Lower>() = later * earlier;
-    return result;
+    dense::multiplySix(later.data(), earlier.data(), 4 * n, result.data());
+    return;
   }
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
@@ -87,7 +90,6 @@ Eigen::MatrixXd Looks::poseCovariance(const std::vector<PoseJacobian>& J) const 
       result.block<4, 4>(4 * i, 4 * j) = J_i.lazyProduct(J[l].transpose());
     }
   }
-  return result;
 }
 
 BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name,
@@ -127,12 +129,17 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
   s.rows = Eigen::MatrixXd::Zero(4 * n, dim_ + 1);
   s.J_pose.assign(looks_.size(), PoseJacobian::Zero());
   s.counts.assign(looks_.size(), {});
+  const BoxStyles* styles = nullptr;
+  const BoxStyle* style = nullptr;
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    const auto box =
-        projectObserved(then, k.from->projector, k.from->styles->of(class_name_), facing_);
+    if (k.from->styles.get() != styles) {  // looks of one network are mostly side by side
+      styles = k.from->styles.get();
+      style = &styles->of(class_name_);
+    }
+    const auto box = projectObserved(then, k.from->projector, *style, facing_);
     if (!box) return std::nullopt;
     const auto use = comparableSides(k.z, *box, k.hidden);
     const auto row = static_cast<Eigen::Index>(4 * i);
@@ -150,13 +157,15 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
   return s;
 }
 
-SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
+void BatchModel::covariance(const State& x, const Stack& s, SideCovariance& result) const {
   const auto n = static_cast<Eigen::Index>(4 * looks_.size());
-  SideCovariance covariance;
-  covariance.own.setZero(n, n);
-  if (!looks_.exactPoses()) covariance.pose = looks_.poseCovariance(s.J_pose);
+  result.own.resize(n, n);
+  result.pose.resize(0, 0);
+  if (!looks_.exactPoses()) looks_.poseCovariance(s.J_pose, result.pose);
   std::vector<Aspect> aspects;
   std::vector<Eigen::Vector4d> stays;  // deviations of b; 0 of a side that does not count
+  aspects.reserve(looks_.size());
+  stays.reserve(looks_.size());
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     const Keyframe& k = *looks_.keyframes()[i];
     aspects.push_back(aspectOf(x.head<3>(), k.from->T_WC));
@@ -167,30 +176,41 @@ SideCovariance BatchModel::covariance(const State& x, const Stack& s) const {
     for (std::size_t j = 0; j <= i; ++j) {
       const double alike = std::exp(-viewChange(aspects[i], aspects[j], scales_));
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
-      auto own = covariance.own.block<4, 4>(row, column);
-      if (moving()) own = acceleration(s, i, j);
+      Eigen::Matrix4d own =
+          moving() ? acceleration(s, i, j) : Eigen::Matrix4d(Eigen::Matrix4d::Zero());
       own.diagonal() += alike * stays[i].cwiseProduct(stays[j]);
+      result.own.block<4, 4>(row, column) = own;
     }
-    const Keyframe& k = *looks_.keyframes()[i];
+    const Eigen::Vector4d new_each_time = noise(*looks_.keyframes()[i]);
     for (int side = 0; side < 4; ++side) {
       const auto row = static_cast<Eigen::Index>(4 * i) + side;
-      covariance.own(row, row) += s.counts[i][side] ? noise(k)[side] : kNoInformation;
+      result.own(row, row) += s.counts[i][side] ? new_each_time[side] : kNoInformation;
     }
   }
-  return covariance;
 }
 
-Gram gramOf(const Eigen::MatrixXd& whitened) { return whitened.transpose().lazyProduct(whitened); }
-
-Cholesky SideCovariance::with(const Eigen::VectorXd& doubts, Eigen::MatrixXd R) const {
-  R = own;
-  for (Eigen::Index j = 0; j < doubts.size(); ++j) {
-    for (Eigen::Index i = j; i < doubts.size(); ++i) {
-      const double widening = doubts[i] * doubts[j];
-      if (widening != 1.0) R.block<4, 4>(4 * i, 4 * j) *= std::sqrt(widening);
+Gram gramOf(const Eigen::MatrixXd& whitened) {
+  const Eigen::Index n = whitened.cols();
+  Gram gram(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      gram(i, j) = gram(j, i) = whitened.col(i).dot(whitened.col(j));
     }
   }
-  if (pose.size() > 0) R.triangularView<Eigen::Lower>() += pose;
+  return gram;
+}
+
+Cholesky SideCovariance::with(const Eigen::VectorXd& doubts, Eigen::MatrixXd R) const {
+  R.resize(own.rows(), own.cols());
+  const Eigen::Index n = own.rows();
+  for (Eigen::Index j = 0; j < doubts.size(); ++j) {
+    for (Eigen::Index i = j; i < doubts.size(); ++i) {
+      const double widening = std::sqrt(doubts[i] * doubts[j]);
+      R.block<4, 4>(4 * i, 4 * j) = widening * own.block<4, 4>(4 * i, 4 * j);
+    }
+    if (pose.size() == 0) continue;
+    R.block(4 * j, 4 * j, n - 4 * j, 4) += pose.block(4 * j, 4 * j, n - 4 * j, 4);
+  }
   return Cholesky(std::move(R));
 }
 

@@ -29,7 +29,7 @@ class Looks {
   /// True where all poses are exact.
   bool exactPoses() const { return exact_; }
   /// Of all sides, by their derivatives by the looks' poses; its lower triangle.
-  Eigen::MatrixXd poseCovariance(const std::vector<PoseJacobian>& J) const;
+  void poseCovariance(const std::vector<PoseJacobian>& J, Eigen::MatrixXd& result) const;
   /// Of the present pose with look i.
   const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
 
@@ -101,7 +101,8 @@ class BatchModel {
   State at(const State& x, const FreeVector& step) const;
   /// Nothing where a look does not see the cuboid at all.
   std::optional<Stack> linearise(const State& x) const;
-  SideCovariance covariance(const State& x, const Stack& s) const;
+  /// Into `result`, whose memory it takes.
+  void covariance(const State& x, const Stack& s, SideCovariance& result) const;
   /// Looks and priors at x.
   Quadratic quadratic(const State& x, const Gram& gram) const;
   /// Twice the negative logarithm of the priors, but for a constant and the azimuths.

@@ -5,6 +5,7 @@
 
 #include "common/math/chi2.h"
 #include "common/math/small_cholesky.h"
+#include "common/math/small_products.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -102,12 +103,10 @@ Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box
                                     const Eigen::Matrix<double, 6, 6>& P_pose) {
   // No side depends on the velocity.
   const Eigen::Matrix<double, 4, kVelocity> H = box.H.leftCols<kVelocity>();
-  const Eigen::Matrix<double, 4, kVelocity> HP =
-      H.lazyProduct(h.P.topLeftCorner<kVelocity, kVelocity>());
-  const Eigen::Matrix<double, 4, 6> HC = H.lazyProduct(h.C.topRows<kVelocity>());
-  const Eigen::Matrix<double, 4, 6> pose = HC + 0.5 * box.H_pose.lazyProduct(P_pose);
-  const Eigen::Matrix4d half =
-      0.5 * HP.lazyProduct(H.transpose()) + pose.lazyProduct(box.H_pose.transpose());
+  const auto HP = timesTop<kVelocity>(H, h.P);
+  const Eigen::Matrix<double, 4, 6> pose =
+      timesTop<6>(H, h.C) + 0.5 * timesTop<6>(box.H_pose, P_pose);
+  const Eigen::Matrix4d half = 0.5 * timesTransposed(HP, H) + timesTransposed(pose, box.H_pose);
   return half + half.transpose();
 }
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
+#include "common/math/simd.h"
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
@@ -12,7 +12,68 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
-using PerCorner = Shape::PerCorner;
+/// A number for each corner.
+using PerCorner = std::array<double, Shape::kMostCorners>;
+
+/// From the camera to the middle of a cuboid, and from there along half of each of its axes, in C.
+struct Frame {
+  Eigen::Vector3d centre, along, across, up;
+  double facing;
+};
+
+/// Of N coordinates.
+template <int N>
+struct Range {
+  std::array<double, N> least, most;
+};
+
+/// Where a shape's corners are in C, and the range of their depths.
+PERDURE_ALSO_AVX2 void placeCorners(const Frame& frame, const Shape& shape, PerCorner& x,
+                                    PerCorner& y, PerCorner& z, Range<1>& depths) {
+  simd::Four least, most;
+  double* const to[3] = {x.data(), y.data(), z.data()};
+  for (int i = 0; i < shape.corners(); i += 4) {
+    const simd::Four forward =
+        simd::four(shape.along.data() + i) + frame.facing * simd::four(shape.forward.data() + i);
+    const simd::Four across = simd::four(shape.across.data() + i);
+    const simd::Four up = simd::four(shape.up.data() + i);
+    for (int axis = 0; axis < 3; ++axis) {
+      simd::four(to[axis] + i) =
+          ((frame.centre[axis] + frame.along[axis] * forward) + frame.across[axis] * across) +
+          frame.up[axis] * up;
+    }
+    const simd::Four depth = simd::four(z.data() + i);
+    if (i == 0) least = most = depth;
+    simd::keepLeast(least, depth);
+    simd::keepMost(most, depth);
+  }
+  depths = {{simd::leastOf(least)}, {simd::mostOf(most)}};
+}
+
+/// Their pixels by a camera without distortion, and the box about these.
+PERDURE_ALSO_AVX2 void projectCorners(const CameraModel& camera, const PerCorner& x,
+                                      const PerCorner& y, const PerCorner& z, int corners,
+                                      double* u, double* v, Range<2>& box) {
+  simd::Four least[2], most[2];
+  const double focal[2] = {camera.fx(), camera.fy()}, middle[2] = {camera.cx(), camera.cy()};
+  const double* const from[2] = {x.data(), y.data()};
+  double* const to[2] = {u, v};
+  for (int i = 0; i < corners; i += 4) {
+    const simd::Four inverse_depth = 1.0 / simd::four(z.data() + i);
+    for (int axis = 0; axis < 2; ++axis) {
+      const simd::Four pixels =
+          focal[axis] * (simd::four(from[axis] + i) * inverse_depth) + middle[axis];
+      simd::four(to[axis] + i) = pixels;
+      if (i == 0) least[axis] = most[axis] = pixels;
+      simd::keepLeast(least[axis], pixels);
+      simd::keepMost(most[axis], pixels);
+    }
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    box.least[axis] = simd::leastOf(least[axis]);
+    box.most[axis] = simd::mostOf(most[axis]);
+  }
+}
 
 /// The corners of a shape before the camera.
 struct Corners {
@@ -25,60 +86,63 @@ struct Corners {
 
   /// From the centre, along the cuboid's axes.
   Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, facing)); }
-  Eigen::Vector3d p_C(int i) const { return {x[i], y[i], z[i]}; }
+  Eigen::Vector3d p_C(int i) const {
+    const auto k = static_cast<std::size_t>(i);
+    return {x[k], y[k], z[k]};
+  }
 };
 
 constexpr int kCut = -1;
 
 /// Pixels of corners, and of cuts by the near plane.
 struct ImagePoints {
-  using Coordinates = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostOutline, 1>;
+  using Coordinates = std::array<double, kMostOutline>;
   Coordinates u, v;
-  std::array<int, kMostOutline> corner;  ///< or kCut
+  std::array<int, kMostOutline> corner;  ///< or kCut; not set where all are corners, in order
+  bool in_order = false;
+  std::size_t size = 0;
+  Eigen::Vector4d sides;
 
-  Eigen::Vector4d sides() const { return {u.minCoeff(), v.minCoeff(), u.maxCoeff(), v.maxCoeff()}; }
   /// The corner whose u or v is this; a number that is none has no corner.
   int at(const Coordinates& values, double value) const {
-    const auto i = std::find(values.begin(), values.end(), value) - values.begin();
-    return i < values.size() ? corner[static_cast<std::size_t>(i)] : kCut;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (values[i] == value) return in_order ? static_cast<int>(i) : corner[i];
+    }
+    return kCut;
   }
   void add(const Eigen::Vector2d& pixel, int of) {
-    corner[static_cast<std::size_t>(u.size())] = of;
-    u.conservativeResize(u.size() + 1);
-    v.conservativeResize(v.size() + 1);
-    u[u.size() - 1] = pixel.x();
-    v[v.size() - 1] = pixel.y();
+    corner[size] = of;
+    u[size] = pixel.x();
+    v[size] = pixel.y();
+    ++size;
+  }
+  void bound() {
+    const auto [u_least, u_most] = std::minmax_element(u.begin(), u.begin() + size);
+    const auto [v_least, v_most] = std::minmax_element(v.begin(), v.begin() + size);
+    sides = {*u_least, *v_least, *u_most, *v_most};
   }
 };
 
-/// Nothing where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
+/// False where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
 /// are cut there.
-std::optional<Corners> cornersBeforeCamera(const State& x, const Projector& from,
-                                           const Shape& shape, double facing) {
-  const Eigen::Vector3d centre_C = from.R_CW * (x.head<3>() - from.T_WC.p);
-  const Eigen::Vector3d half = 0.5 * x.segment<3>(kSize).array().exp();
-  const double reach = half.norm();
-  if (centre_C.z() + reach < kNear) return std::nullopt;
-  std::optional<Corners> result(std::in_place);
-  Corners& c = *result;
-  c.half = half;
-  c.shape = centre_C.z() - reach < kNear ? &cuboidShape() : &shape;
-  c.facing = facing;
+bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double facing,
+                         Corners& c) {
+  Frame frame;
+  frame.centre = from.R_CW * (x.head<3>() - from.T_WC.p);
+  c.half = 0.5 * x.segment<3>(kSize).array().exp();
+  const double reach = c.half.norm();
+  if (frame.centre.z() + reach < kNear) return false;
+  c.shape = frame.centre.z() - reach < kNear ? &cuboidShape() : &shape;
+  c.facing = frame.facing = facing;
   c.R_WO = from.R_WL * rotationAboutZ(x[kYaw]);
   const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
-  const Eigen::Vector3d along = half.x() * R_CO.col(0), across = half.y() * R_CO.col(1),
-                        up = half.z() * R_CO.col(2);
-  const Shape& s = *c.shape;
-  const PerCorner forward = s.along + facing * s.forward;
-  const auto coordinate = [&](int i) {
-    return ((centre_C[i] + along[i] * forward) + across[i] * s.across) + up[i] * s.up;
-  };
-  c.x = coordinate(0);
-  c.y = coordinate(1);
-  c.z = coordinate(2);
-  c.all_before = c.z.minCoeff() >= kNear;
-  if (c.z.maxCoeff() < kNear) return std::nullopt;
-  return result;
+  frame.along = c.half.x() * R_CO.col(0);
+  frame.across = c.half.y() * R_CO.col(1);
+  frame.up = c.half.z() * R_CO.col(2);
+  Range<1> depths;
+  placeCorners(frame, *c.shape, c.x, c.y, c.z, depths);
+  c.all_before = depths.least[0] >= kNear;
+  return depths.most[0] >= kNear;
 }
 
 /// Pixel of a point in front; far outside the image where the distortion is not defined.
@@ -102,35 +166,51 @@ void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraMod
   }
 }
 
-ImagePoints imagePoints(const Corners& corners, const CameraModel& camera) {
-  ImagePoints points;
+void project(const Corners& corners, const CameraModel& camera, ImagePoints& points) {
   const int n = corners.shape->corners();
   if (corners.all_before && camera.calibration().distortion == DistortionModel::kNone) {
-    const PerCorner inverse_depth = 1.0 / corners.z;
-    points.u = camera.fx() * (corners.x * inverse_depth) + camera.cx();
-    points.v = camera.fy() * (corners.y * inverse_depth) + camera.cy();
-    std::iota(points.corner.begin(), points.corner.begin() + n, 0);
-    return points;
+    Range<2> box;
+    projectCorners(camera, corners.x, corners.y, corners.z, n, points.u.data(), points.v.data(),
+                   box);
+    points.in_order = true;
+    points.size = static_cast<std::size_t>(n);
+    points.sides = {box.least[0], box.least[1], box.most[0], box.most[1]};
+    return;
   }
   for (int i = 0; i < n; ++i) {
     const Eigen::Vector3d a = corners.p_C(i);
     if (a.z() >= kNear) points.add(pixelOf(camera, a), i);
     if (!corners.all_before) addCuts(points, i, corners, camera);
   }
-  return points;
+  points.bound();
+}
+
+/// Derivatives of one coordinate of the image of a point in front. False where it has none.
+bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, int axis,
+                       Eigen::RowVector3d& by_C) {
+  if (camera.calibration().distortion == DistortionModel::kNone) {
+    const double focal = axis == 0 ? camera.fx() : camera.fy(), inverse_depth = 1.0 / p_C.z();
+    by_C.setZero();
+    by_C[axis] = focal * inverse_depth;
+    by_C[2] = focal * (-(p_C[axis] * inverse_depth) * inverse_depth);
+    return true;
+  }
+  Eigen::Matrix<double, 2, 3> J_point;
+  if (!camera.project(p_C, &J_point)) return false;
+  by_C = J_point.row(axis);
+  return true;
 }
 
 /// Derivatives of a side, which is the image of a corner.
 void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
              const Corners& corners) {
-  Eigen::Matrix<double, 2, 3> J_point;
   const Eigen::Vector3d p_C = corner == kCut ? Eigen::Vector3d::Zero() : corners.p_C(corner);
-  if (corner == kCut || !from.camera->project(p_C, &J_point)) {
+  Eigen::RowVector3d by_C;
+  if (corner == kCut || !coordinateByPoint(*from.camera, p_C, side % 2, by_C)) {
     box.exact[side] = false;
     return;
   }
   const Eigen::Vector3d local = corners.local(corner);
-  const Eigen::RowVector3d by_C = J_point.row(side % 2);
   const Eigen::RowVector3d by_W = by_C * from.R_CW;
   const Eigen::RowVector3d by_O = by_W * corners.R_WO;
   box.H.row(side).head<3>() = by_W;
@@ -158,14 +238,15 @@ Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from, const Shape& shape,
                                           double facing) {
   std::optional<ProjectedBox> result;
-  const auto corners = cornersBeforeCamera(x, from, shape, facing);
-  if (!corners) return result;
+  Corners corners;
+  if (!cornersBeforeCamera(x, from, shape, facing, corners)) return result;
   ProjectedBox& box = result.emplace();
-  const ImagePoints points = imagePoints(*corners, *from.camera);
-  box.sides = points.sides();
+  ImagePoints points;
+  project(corners, *from.camera, points);
+  box.sides = points.sides;
   for (int side = 0; side < 4; ++side) {
     setSide(box, side, points.at(side % 2 == 0 ? points.u : points.v, box.sides[side]), from,
-            *corners);
+            corners);
   }
   return result;
 }
@@ -173,14 +254,15 @@ std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
                                                const Shape& shape) {
   std::optional<ProjectedOutline> result;
-  const auto corners = cornersBeforeCamera(x, from, shape, 0.0);
-  if (!corners) return result;
+  Corners corners;
+  if (!cornersBeforeCamera(x, from, shape, 0.0, corners)) return result;
   ProjectedOutline& outline = result.emplace();
-  const ImagePoints points = imagePoints(*corners, *from.camera);
-  outline.sides = points.sides();
-  outline.points.resize(static_cast<std::size_t>(points.u.size()));
-  for (int i = 0; i < points.u.size(); ++i) {
-    outline.points[static_cast<std::size_t>(i)] = {points.u[i], points.v[i]};
+  ImagePoints points;
+  project(corners, *from.camera, points);
+  outline.sides = points.sides;
+  outline.points.resize(points.size);
+  for (std::size_t i = 0; i < points.size; ++i) {
+    outline.points[i] = {points.u[i], points.v[i]};
   }
   return result;
 }

@@ -78,7 +78,9 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
   const Standing& first = things.front();
-  std::vector<Outline> outlines{outlineOf(*first.object, first.x, from, *first.shape)};
+  thread_local std::vector<Outline> outlines;
+  outlines.clear();
+  outlines.push_back(outlineOf(*first.object, first.x, from, *first.shape));
   if (!outlines.front().box) return 0.0;
   const Eigen::Vector4d sides = outlines.front().box->sides;
   const CameraModel& camera = *view.camera;
@@ -92,8 +94,7 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
   const double side = std::min(sides[2] - sides[0], sides[3] - sides[1]);
   parameters.cell_px = std::clamp(static_cast<std::int64_t>(side / kCellsAcross), std::int64_t{1},
                                   parameters.cell_px);
-  parameters.minimum = 0.0;
-  return see(outlines, {}, camera.width(), camera.height(), parameters).front().fraction;
+  return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
 }
 
 /// Of the first of `things`, from which on it may be found. What shows as much already and was not

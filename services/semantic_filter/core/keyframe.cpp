@@ -34,6 +34,7 @@ double changeBetween(const Glimpse& a, const Glimpse& b, const ViewScales& scale
 std::size_t leastApart(const Eigen::Vector3d& place, const Keyframes& all,
                        const ViewScales& scales) {
   std::vector<Glimpse> glimpses;
+  glimpses.reserve(all.size());
   for (const auto& k : all) glimpses.push_back(glimpseOf(place, *k));
   std::vector<double> apart(all.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -63,18 +64,21 @@ bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
     return changeBetween(glimpseOf(place, *other), now, scales) < parameters.new_view;
   };
   // The late ones first: they are the most alike.
-  if (std::any_of(object.keyframes.rbegin(), object.keyframes.rend(), same)) return false;
-  object.keyframes.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
-  thin(place, object.keyframes, scales, static_cast<std::size_t>(parameters.keyframes));
+  const Keyframes& known = object.keyframes.read();
+  if (std::any_of(known.rbegin(), known.rend(), same)) return false;
+  Keyframes& all = object.keyframes.write();
+  all.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
+  thin(place, all, scales, static_cast<std::size_t>(parameters.keyframes));
   return true;
 }
 
 void joinKeyframes(Object& a, const Object& b, const ViewScales& scales,
                    const SmoothParameters& parameters) {
-  a.keyframes.insert(a.keyframes.end(), b.keyframes.begin(), b.keyframes.end());
-  std::stable_sort(a.keyframes.begin(), a.keyframes.end(),
+  Keyframes& all = a.keyframes.write();
+  all.insert(all.end(), b.keyframes.begin(), b.keyframes.end());
+  std::stable_sort(all.begin(), all.end(),
                    [](const auto& x, const auto& y) { return x->from->time < y->from->time; });
-  thin(a.best().x.head<3>(), a.keyframes, scales, static_cast<std::size_t>(parameters.keyframes));
+  thin(a.best().x.head<3>(), all, scales, static_cast<std::size_t>(parameters.keyframes));
 }
 
 }  // namespace perdure::semantic_filter

@@ -70,6 +70,41 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double
   return h;
 }
 
+/// Where boxes lie that mayOverlap may be true of, for one of the hypotheses: to see that a box
+/// lies elsewhere is most of the work.
+struct Reach {
+  double least[2], most[2];
+
+  /// True where in doubt.
+  bool touches(const BoxMeasurement& z) const {
+    for (int axis = 0; axis < 2; ++axis) {
+      if (z.sides[axis] > most[axis] || z.sides[axis + 2] < least[axis]) return false;
+    }
+    return true;
+  }
+};
+
+Reach reachOf(const std::vector<HypothesisLook>& hypotheses, const std::vector<Evidence>& boxes) {
+  constexpr double kFar = 1e30, kReach = 5.01;  // a little more than mayOverlap's deviations
+  double noise[2] = {0.0, 0.0};
+  for (const Evidence& e : boxes) {
+    for (int axis = 0; axis < 2; ++axis) noise[axis] = std::max(noise[axis], e.z.variance[axis]);
+  }
+  Reach reach{{kFar, kFar}, {-kFar, -kFar}};
+  for (const HypothesisLook& h : hypotheses) {
+    if (!h.box) continue;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double variance = std::max(h.covariance(axis, axis), h.covariance(axis + 2, axis + 2));
+      const double far = kReach * std::sqrt(std::max(variance + noise[axis], 0.0));
+      const double least = h.box->sides[axis] - far, most = h.box->sides[axis + 2] + far;
+      if (!std::isfinite(least + most)) return {{-kFar, -kFar}, {kFar, kFar}};
+      reach.least[axis] = std::min(reach.least[axis], least);
+      reach.most[axis] = std::max(reach.most[axis], most);
+    }
+  }
+  return reach;
+}
+
 }  // namespace
 
 double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
@@ -127,7 +162,9 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
   for (const auto& hypothesis : object.hypotheses) {
     result.hypotheses.push_back(lookAt(hypothesis, object, rate, sight, from, frame));
   }
+  const Reach reach = reachOf(result.hypotheses, boxes);
   for (std::size_t z = 0; z < boxes.size(); ++z) {
+    if (!reach.touches(boxes[z].z)) continue;
     const bool near = std::any_of(result.hypotheses.begin(), result.hypotheses.end(),
                                   [&](const HypothesisLook& h) {
                                     return h.box && mayOverlap(boxes[z].z, *h.box, h.covariance);

@@ -126,8 +126,8 @@ Entrants entrantsOf(const Object& object, const std::vector<ClassPrior>& enterin
 
 void enter(Object& object, const Entrants& entrants) {
   for (auto& h : object.hypotheses) h.weight *= 1.0 - entrants.share;
-  object.hypotheses.insert(object.hypotheses.end(), entrants.hypotheses.begin(),
-                           entrants.hypotheses.end());
+  auto& hs = object.hypotheses.write();
+  hs.insert(hs.end(), entrants.hypotheses.begin(), entrants.hypotheses.end());
   normalise(object, ClassEvidence::kPrior);
   for (auto& h : object.hypotheses) {
     for (const auto& fit : entrants.fits) h.weight *= fit.name == h.class_name ? fit.value : 1.0;

@@ -115,6 +115,7 @@ bool sound(const Object& object) {
 
 std::vector<ClassNumber> classShares(const Object& object) {
   std::vector<ClassNumber> pmf;
+  pmf.reserve(object.hypotheses.size());
   double sum = 0.0;
   for (const auto& h : object.hypotheses) {
     const auto same = [&](const ClassNumber& c) { return c.name == h.class_name; };
@@ -136,13 +137,15 @@ void book(Object& object, ClassEvidence why) {
 
 void normalise(Object& object, ClassEvidence why) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) sum += h.weight;
+  for (const auto& h : object.hypotheses.read()) sum += h.weight;
   check(sum > 0.0, "an object keeps a hypothesis of positive weight");
-  for (auto& h : object.hypotheses) h.weight /= sum;
+  auto& hs = object.hypotheses.write();
+  for (auto& h : hs) h.weight /= sum;
   const auto heavier = [](const auto& a, const auto& b) { return a.weight > b.weight; };
-  auto& hs = object.hypotheses;
-  if (!std::is_sorted(hs.begin(), hs.end(), heavier)) {  // which moves nothing
-    std::stable_sort(hs.begin(), hs.end(), heavier);
+  // Few, and nearly in order: std::stable_sort would ask for memory for as many again.
+  for (auto next = hs.begin(); next != hs.end(); ++next) {
+    const auto at = std::upper_bound(hs.begin(), next, *next, heavier);
+    if (at != next) std::rotate(at, next, next + 1);
   }
   book(object, why);
 }
@@ -172,14 +175,18 @@ ObjectBelief toBelief(const Object& object, double min_speed) {
   belief.id = object.id;
   belief.existence = object.existence;
   belief.confirmed = object.confirmed;
+  std::vector<const std::string*> names;
+  names.reserve(object.hypotheses.size());
   for (const auto& h : object.hypotheses) {
-    const auto same = [&](const auto& c) { return c.name == h.class_name; };
-    if (std::none_of(belief.classes.begin(), belief.classes.end(), same)) {
-      belief.classes.push_back(classBelief(object, h.class_name));
-    }
+    const auto same = [&](const std::string* name) { return *name == h.class_name; };
+    if (std::none_of(names.begin(), names.end(), same)) names.push_back(&h.class_name);
   }
-  std::stable_sort(belief.classes.begin(), belief.classes.end(),
-                   [](const auto& a, const auto& b) { return a.probability > b.probability; });
+  belief.classes.reserve(names.size());
+  for (const std::string* name : names) belief.classes.push_back(classBelief(object, *name));
+  const auto likelier = [](const auto& a, const auto& b) { return a.probability > b.probability; };
+  if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
+    std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
+  }
   belief.visibility = object.visibility;
   belief.visible_fraction = object.visible_fraction;
   belief.blocked_by = object.blocked_by;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/shared_vector.h"
 #include "common/types/detections.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
@@ -83,7 +84,7 @@ struct Keyframe;
 struct Object {
   ObjectId id = 0;
   Existence existence;
-  std::vector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
+  SharedVector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
   bool confirmed = false;
   bool once_confirmed = false;  ///< it was; hence the map knows it
   TimePoint first_seen, last_seen, as_of;
@@ -112,7 +113,7 @@ struct Object {
   ObjectId blocked_by = 0;
   bool recalled = false;
   /// Looks that are remembered, in order of time.
-  std::vector<std::shared_ptr<const Keyframe>> keyframes;
+  SharedVector<std::shared_ptr<const Keyframe>> keyframes;
   /// False for one that came back (restart, recall): what it knew before is in its state alone, and
   /// an estimate from the looks since then would lose it.
   bool remembers_all = true;

@@ -5,6 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
+#include "common/math/small_products.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/keyframe.h"
 
@@ -53,8 +54,8 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
     keep = correlation * sigma.cwiseQuotient(stationaryBias(h.x, *last, walk).cwiseMax(1e-12));
   }
   h.x.segment<4>(kBias) = keep.asDiagonal() * h.x.segment<4>(kBias);
-  h.P.middleRows<4>(kBias) = (keep.asDiagonal() * h.P.middleRows<4>(kBias)).eval();
-  h.P.middleCols<4>(kBias) = (h.P.middleCols<4>(kBias) * keep.asDiagonal()).eval();
+  for (int j = 0; j < kStateDim; ++j) h.P.block<4, 1>(kBias, j).array() *= keep.array();
+  for (int i = 0; i < 4; ++i) h.P.col(kBias + i) *= keep[i];
   h.C.middleRows<4>(kBias) = (keep.asDiagonal() * h.C.middleRows<4>(kBias)).eval();
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
@@ -64,7 +65,7 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
 /// own: what is not found where it was found then is gone rather than screened.
 double screenedFromHere(const Object& object, const Eigen::Vector3d& place, const ViewWalk& walk) {
   double screened = walk.screened;
-  for (const auto& k : object.keyframes) {
+  for (const auto& k : object.keyframes.read()) {
     if (k->from->time >= object.came_back) break;  // they are in order of time
     screened *= 1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.screen));
   }
@@ -86,13 +87,12 @@ void predictScreen(Object& object, const ViewWalk& walk) {
   object.elusive = std::min(object.elusive, 1.0 - object.screened);
 }
 
-/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see.
-bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
-  Matrix6d L = P_pose;
-  if (!choleskyInPlace(L)) return false;
+/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see. L_pose
+/// is P_pose's Cholesky factor.
+bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   CrossPose B = h.C;
-  whitenRows(L, B);
-  StateCovariance rest = h.P - B.lazyProduct(B.transpose()) / share;
+  whitenRows(L_pose, B);
+  StateCovariance rest = h.P - lowerTimesTransposed(B) / share;
   if (h.moving) return choleskyInPlace(rest);
   Eigen::Matrix<double, kVelocity, kVelocity> still = rest.topLeftCorner<kVelocity, kVelocity>();
   return choleskyInPlace(still);
@@ -101,9 +101,9 @@ bool isExplained(const Hypothesis& h, const Matrix6d& P_pose, double share) {
 /// [P C; Cᵀ P_pose] must stay a covariance. Transitions are approximate, and vio's own updates
 /// shrink P_pose: C is scaled down where the pose would explain more of P than there is. (Much of
 /// P may well be the pose: a limit of .9 here costs half of the recall on KITTI.)
-void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
+void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose) {
   constexpr double kExplained = 0.9999;
-  if (h.C.isZero(0.0) || isExplained(h, P_pose, kExplained)) return;
+  if (h.C.isZero(0.0) || (L_pose && isExplained(h, *L_pose, kExplained))) return;
   const Eigen::Index n = h.moving ? kStateDim : kVelocity;
   const Cholesky P(h.P.topLeftCorner(n, n));
   const Cholesky pose(P_pose);
@@ -120,14 +120,14 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose) {
 /// it may have stayed.
 void giveUpLostOnes(Object& object, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : object.hypotheses.read()) {
     const double sigma = std::sqrt(h.P.topLeftCorner<2, 2>().trace());
     if (!h.moving || sigma < lost_sigma_m) kept += h.weight;
   }
   if (kept >= 1.0 - 1e-9) return;
   object.existence.become(object.existence * kept, ExistenceEvidence::kLost, now);
   if (kept <= 1e-9) return;  // nothing is left of it; it will be buried
-  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
     return h.moving && std::sqrt(h.P.topLeftCorner<2, 2>().trace()) >= lost_sigma_m;
   });
   normalise(object, ClassEvidence::kMotion);
@@ -180,17 +180,19 @@ void stop(Hypothesis& h) {
 void letSlowOnesStand(Object& object, double min_speed) {
   const std::size_t count = object.hypotheses.size();
   for (std::size_t i = 0; i < count; ++i) {
-    if (!object.hypotheses[i].moving) continue;
-    const double fast = fasterThan(object.hypotheses[i], min_speed);
+    const Hypothesis& moving = object.hypotheses.read()[i];
+    if (!moving.moving) continue;
+    const double fast = fasterThan(moving, min_speed);
     if (fast > 0.5) continue;
-    Hypothesis rest = object.hypotheses[i];
+    Hypothesis rest = moving;
     stop(rest);
     rest.weight *= 1.0 - fast;
     object.hypotheses[i].weight *= fast;
     object.hypotheses.push_back(std::move(rest));
   }
   if (object.hypotheses.size() == count) return;
-  std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight < kNoWeight; });
+  std::erase_if(object.hypotheses.write(),
+                [](const Hypothesis& h) { return h.weight < kNoWeight; });
   normalise(object, ClassEvidence::kMotion);
 }
 
@@ -202,9 +204,8 @@ State stateAt(const Hypothesis& h, double dt) {
 
 Object movedOn(Object object, TimePoint time, const MotionParameters& parameters) {
   const double dt = toSeconds(time - object.as_of);
-  for (auto& h : object.hypotheses) {
-    if (dt > 0.0) predictHypothesis(h, dt, parameters);
-  }
+  if (dt <= 0.0) return object;
+  for (auto& h : object.hypotheses) predictHypothesis(h, dt, parameters);
   return object;
 }
 
@@ -214,11 +215,13 @@ void predict(Object& object, TimePoint now, const PoseError& pose_error,
   // Where the transition is lost nothing is left of C.
   const Matrix6d transition =
       transitionBetween(object.pose_product, pose_error.product).value_or(Matrix6d::Zero());
+  std::optional<Matrix6d> L_pose = pose_error.covariance;
+  if (!choleskyInPlace(*L_pose)) L_pose.reset();
   for (auto& h : object.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
     predictBias(h, object.last_view, walk);
-    h.C = h.C.lazyProduct(transition.transpose()).eval();
-    keepConsistent(h, pose_error.covariance);
+    h.C = timesTransposed(h.C, transition);
+    keepConsistent(h, pose_error.covariance, L_pose);
   }
   const bool unseen =
       object.last_seen < object.as_of || object.hidden.count + object.away.count > 0;

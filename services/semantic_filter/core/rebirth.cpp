@@ -23,7 +23,11 @@ bool bearAgain(Object& object, const std::vector<ClassNumber>& pmf, const Eviden
       known.back().weight *= c.value / now->value;
     }
   }
-  object.hypotheses = std::move(of_known > 0.5 ? known : born->hypotheses);
+  if (of_known > 0.5) {
+    object.hypotheses = std::move(known);
+  } else {
+    object.hypotheses = std::move(born->hypotheses);
+  }
   object.keyframes.clear();
   object.remembers_all = true;
   object.fresh_keyframes = object.remembered = object.seek_modes_at = 0;

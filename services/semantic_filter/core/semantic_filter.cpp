@@ -121,6 +121,7 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
   const Projector from(input.view);
   std::vector<Outline> outlines;
+  outlines.reserve(belief.objects.size());
   for (const auto& o : belief.objects) {
     outlines.push_back(
         outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), from));
@@ -142,6 +143,8 @@ std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
                                                         const FrameInput& input,
                                                         const FrameContext& frame) const {
   std::vector<Seen> seen;
+  seen.reserve(static_cast<std::size_t>(std::count_if(
+      sights.begin(), sights.end(), [](const Sight& s) { return s.fraction > 0.0; })));
   const ViewWalk walk = viewWalkOf(frame);
   for (std::size_t j = 0; j < sights.size(); ++j) {
     if (sights[j].fraction <= 0.0) {
@@ -193,8 +196,7 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
     Seen& s = seen[static_cast<std::size_t>(j)];
     Object& object = belief.objects[s.object];
     const auto before = tellsPose(object, frame) ? std::optional(object.best()) : std::nullopt;
-    const bool claimed = object.once_confirmed && !object.best().moving;
-    if (claimed && !s.look.boxes.empty()) s.before = object;
+    s.claimed = object.once_confirmed && !object.best().moving && !s.look.boxes.empty();
     s.own = update(object, s.look, association.eta.row(j), boxes, frame);
     if (before && s.own && s.look.hypotheses[0].box) {
       object.told_pose = object.as_of;
@@ -333,12 +335,24 @@ void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
   }
 }
 
-void SemanticFilter::tend(Object& object, Seen& seen, const FrameInput& input,
+Object SemanticFilter::untilLook(const Object& was, const Object& now, const Seen& seen,
+                                 const FrameInput& input, const FrameContext& frame) const {
+  Object object = was;
+  object.visibility = now.visibility;
+  object.visible_fraction = now.visible_fraction;
+  object.blocked_by = now.blocked_by;
+  predict(object, input.stamp.time, input.pose_error, parameters_.motion, viewWalkOf(frame));
+  const ObjectLook first = look(object, seen.look.sight, *input.boxes, frame);
+  admitNewClasses(object, first, *input.boxes, frame);
+  return object;
+}
+
+void SemanticFilter::tend(Object& object, const Object& was, Seen& seen, const FrameInput& input,
                           const FrameContext& frame) const {
   const auto pmf = classShares(object);
   tendHypotheses(object, priors_, parameters_);
-  if (object.hypotheses.empty() && seen.before) {
-    object = missed(*seen.before, seen.look, frame);
+  if (object.hypotheses.empty() && seen.claimed) {
+    object = missed(untilLook(was, object, seen, input, frame), seen.look, frame);
     seen.told.reset();
     if (sound(object)) tendHypotheses(object, priors_, parameters_);
   }
@@ -372,7 +386,8 @@ std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, Obj
   return MergeRecord{id, absorbed};
 }
 
-StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook& ids) const {
+StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
+                                IdBook& ids) const {
   auto sights = seeAll(belief, heard);
   if (!heard.boxes) return {};
   FrameInput input = heard;
@@ -390,8 +405,11 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   std::vector<Object> lost;
   for (auto& s : seen) {
     Object& object = belief.objects[s.object];
-    if (sound(object)) tend(object, s, input, frame);
-    if (object.hypotheses.empty() && s.before) lost.push_back(std::move(*s.before));
+    const Object& was = before.objects[s.object];
+    if (sound(object)) tend(object, was, s, input, frame);
+    if (object.hypotheses.empty() && s.claimed) {
+      lost.push_back(untilLook(was, object, s, input, frame));
+    }
     if (s.told) report.pose.push_back(*s.told);
   }
   rememberGone(belief.gone, std::move(lost), input.stamp.time, parameters_.tend);

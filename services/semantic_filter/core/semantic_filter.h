@@ -63,8 +63,8 @@ class SemanticFilter {
   SemanticFilter(const Parameters& parameters, const ClassPriors& priors)
       : parameters_(parameters), priors_(priors) {}
 
-  /// Belief after the frame.
-  StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
+  /// Makes `belief`, a copy of that `before` the frame, the one after it.
+  StepReport step(const Belief& before, Belief& belief, const FrameInput& heard, IdBook& ids) const;
   /// Of two objects that are known to be one, `id` goes on with what both knew, as of that frame.
   /// Nothing happens where one of them is not there, or their classes exclude each other.
   std::optional<MergeRecord> join(Belief& belief, ObjectId id, ObjectId absorbed,
@@ -78,7 +78,7 @@ class SemanticFilter {
     std::size_t object;
     ObjectLook look;
     std::optional<std::size_t> own = {};    ///< the box that is surely its own
-    std::optional<Object> before = {};      ///< of what is claimed at rest: what it was until then
+    bool claimed = false;                   ///< at rest, and a box lies near
     std::optional<PoseEvidence> told = {};  ///< until the look is taken back
   };
 
@@ -93,8 +93,13 @@ class SemanticFilter {
                                      const FrameInput& input, const FrameContext& frame) const;
   /// Whether a look at it will tell of the pose: once for each time that it comes back.
   bool tellsPose(const Object& object, const FrameContext& frame) const;
+  /// One as it was scored, until its look was heard: from `was`, as it was before the frame, and
+  /// `now`, as it is.
+  Object untilLook(const Object& was, const Object& now, const Seen& seen, const FrameInput& input,
+                   const FrameContext& frame) const;
   /// Of one object after its look; nothing may be left of it.
-  void tend(Object& object, Seen& seen, const FrameInput& input, const FrameContext& frame) const;
+  void tend(Object& object, const Object& was, Seen& seen, const FrameInput& input,
+            const FrameContext& frame) const;
   static void smoothNeediest(std::vector<Object*>& objects, Belief& belief,
                              const FrameContext& frame);
   /// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less

@@ -128,10 +128,9 @@ struct Verdicts {
 void forgetContradicted(Object& object, const Verdicts& verdicts, std::size_t least) {
   if (verdicts.fits == 0) return;
   std::vector<std::shared_ptr<const Keyframe>> kept;
-  for (std::size_t i = 0; i < object.keyframes.size(); ++i) {
-    if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) {
-      kept.push_back(object.keyframes[i]);
-    }
+  const auto& all = object.keyframes.read();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) kept.push_back(all[i]);
   }
   if (kept.size() >= least) object.keyframes = std::move(kept);
 }
@@ -181,23 +180,23 @@ std::optional<Leftover> smoothClass(Object& object, const std::string& name, con
     seekModes(object, looks, frame, still);
     for (const Fitted& f : still) object.hypotheses[f.index].modes_sought = true;
   }
-  weighModes(object.hypotheses, still, p.least_weight);
-  weighModes(object.hypotheses, moving, p.least_weight);
-  auto at_rest = heaviest(object.hypotheses, std::move(still));
+  weighModes(object.hypotheses.write(), still, p.least_weight);
+  weighModes(object.hypotheses.write(), moving, p.least_weight);
+  auto at_rest = heaviest(object.hypotheses.read(), std::move(still));
   const auto over = at_rest ? std::optional(at_rest->smoothed.leftover()) : std::nullopt;
-  const auto driving = heaviest(object.hypotheses, std::move(moving));
+  const auto driving = heaviest(object.hypotheses.read(), std::move(moving));
   if (!driving) return over;
   if (!at_rest) {
     const Hypothesis& mover = driving->smoothed.hypothesis();
-    auto smoothed = fit(atRest(mover, object.keyframes), looks, frame);
+    auto smoothed = fit(atRest(mover, object.keyframes.read()), looks, frame);
     if (!smoothed) return over;
-    object.hypotheses.push_back(smoothed->hypothesis());
-    Hypothesis& h = object.hypotheses.back();
+    Hypothesis h = smoothed->hypothesis();
     h.weight = 1e-3 * mover.weight;
     const double ground = standOnGround(h, object.id, frame);
+    object.hypotheses.push_back(h);
     at_rest.emplace(Fitted{object.hypotheses.size() - 1, std::move(*smoothed), ground});
   }
-  weighMotion(object.hypotheses, name, *at_rest, *driving, frame);
+  weighMotion(object.hypotheses.write(), name, *at_rest, *driving, frame);
   return over;
 }
 
@@ -288,9 +287,9 @@ std::optional<Leftover> smooth(Object& object, const FrameContext& frame) {
   const double fresh = object.fresh_keyframes / static_cast<double>(object.keyframes.size());
   object.fresh_keyframes = 0;
   const Hypothesis before = object.best();
-  const Looks looks(object.keyframes, frame.pose_error);
+  const Looks looks(object.keyframes.read(), frame.pose_error);
   std::set<std::string> names;
-  for (const auto& h : object.hypotheses) names.insert(h.class_name);
+  for (const auto& h : object.hypotheses.read()) names.insert(h.class_name);
   const bool seek = object.remembered >= object.seek_modes_at;
   if (seek) object.seek_modes_at = 2 * object.remembered;
   Verdicts verdicts;
@@ -299,7 +298,7 @@ std::optional<Leftover> smooth(Object& object, const FrameContext& frame) {
     const auto left = smoothClass(object, name, looks, frame, seek, verdicts);
     if (left) over[name] = *left;
   }
-  std::erase_if(object.hypotheses, [](const Hypothesis& h) { return h.weight <= 0.0; });
+  std::erase_if(object.hypotheses.write(), [](const Hypothesis& h) { return h.weight <= 0.0; });
   normalise(object, ClassEvidence::kMotion);
   tryWhatItResembles(object, looks, frame);
   forgetContradicted(object, verdicts, static_cast<std::size_t>(p.smooth.least));

@@ -20,11 +20,11 @@ constexpr double kEnough = 0.02;        // squared deviations that a further ste
 struct Smoothed::Fit {
   State x;
   Stack stack;
-  SideCovariance covariance;
-  State covariance_at;  ///< the x that it is of
+  std::shared_ptr<const SideCovariance> covariance;  ///< shared by fits of the same looks
+  State covariance_at;                               ///< the x that it is of
   Eigen::VectorXd doubts;
   Eigen::ArrayXi contradicted;
-  Cholesky R;
+  std::shared_ptr<const Cholesky> R;
   Eigen::MatrixXd whitened;  ///< the rows of the stack by R
 
   double squaredResidual() const { return whitened.rightCols<1>().squaredNorm(); }
@@ -38,12 +38,12 @@ using Fit = Smoothed::Fit;
 /// changed enough to matter.
 bool doubtLooks(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
-  const Eigen::VectorXd residual =
-      fit.covariance.withoutPose(fit.stack.residual(), fit.R.unwhiten(fit.whitened.rightCols<1>()));
+  const Eigen::VectorXd residual = fit.covariance->withoutPose(
+      fit.stack.residual(), fit.R->unwhiten(fit.whitened.rightCols<1>()));
   fit.contradicted.resize(fit.doubts.size());
   bool matters = false;
   for (Eigen::Index i = 0; i < fit.doubts.size(); ++i) {
-    const double nis = fit.covariance.deviation(residual, i);
+    const double nis = fit.covariance->deviation(residual, i);
     const auto& counts = fit.stack.counts[static_cast<std::size_t>(i)];
     const auto n = static_cast<double>(std::count(counts.begin(), counts.end(), true));
     const double doubt = std::max(1.0, (tail + nis) / (tail + n));
@@ -63,12 +63,14 @@ bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
 
 bool factorise(const BatchModel& model, Fit& fit, bool anew) {
   if (anew) {
-    fit.covariance = model.covariance(fit.x, fit.stack);
+    auto covariance = std::make_shared<SideCovariance>();
+    model.covariance(fit.x, fit.stack, *covariance);
+    fit.covariance = std::move(covariance);
     fit.covariance_at = fit.x;
   }
-  fit.R = fit.covariance.with(fit.doubts, std::move(fit.R).release());
-  if (!fit.R.positive()) return false;
-  fit.whitened = fit.R.whiten(fit.stack.rows);
+  fit.R = std::make_shared<const Cholesky>(fit.covariance->with(fit.doubts));
+  if (!fit.R->positive()) return false;
+  fit.whitened = fit.R->whiten(fit.stack.rows);
   return true;
 }
 
@@ -99,7 +101,7 @@ bool descend(const BatchModel& model, Fit& fit, Damping& damping, double& gained
     const State next = model.at(fit.x, step);
     auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
     if (stack) {
-      auto whitened = fit.R.whiten(stack->rows);
+      auto whitened = fit.R->whiten(stack->rows);
       const double then = whitened.rightCols<1>().squaredNorm() + model.priorCost(next);
       if (then <= cost * (1.0 + 1e-3) + 1e-6) {
         gained = q.g.dot(step);
@@ -139,7 +141,7 @@ std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const L
     fit.covariance_at = like->covariance_at;
     fit.doubts = like->doubts;
     fit.R = like->R;
-    fit.whitened = fit.R.whiten(fit.stack.rows);
+    fit.whitened = fit.R->whiten(fit.stack.rows);
   } else if (!factorise(model, fit, true)) {
     return std::nullopt;
   }
@@ -178,27 +180,29 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
                 std::max(now->sides[3] - now->sides[1], 1.0))
           .cwiseMax(1e-6);
   const Eigen::MatrixXd Bw =
-      fit.R.whiten(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
-  const Eigen::MatrixXd Ew = fit.R.whiten(model.poseNow(fit.stack).transpose());
-  const Eigen::MatrixXd BJ = Bw.transpose() * Jw;
-  const Eigen::MatrixXd C = -P * (Jw.transpose() * Ew);
+      fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
+  const Eigen::MatrixXd Ew = fit.R->whiten(model.poseNow(fit.stack).transpose());
+  // Tall and narrow: to pack them for Eigen's product costs more than the sums.
+  const Eigen::MatrixXd BJ = Bw.transpose().lazyProduct(Jw);
+  const Eigen::MatrixXd C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
 
   // State order: geometry, b, velocity.
   const int g = kGeometry;
   Hypothesis h = start;
   h.moving = model.moving();
   h.x = fit.x;
-  h.x.segment<4>(kBias) = Bw.transpose() * rw;
+  h.x.segment<4>(kBias) = Bw.transpose().lazyProduct(rw);
   h.P.setZero();
   h.P.topLeftCorner(g, g) = P.topLeftCorner(g, g);
-  h.P.block<4, 4>(kBias, kBias) = -Bw.transpose() * Bw + BJ * P * BJ.transpose();
+  h.P.block<4, 4>(kBias, kBias) =
+      BJ.lazyProduct(P.lazyProduct(BJ.transpose()).eval()) - Bw.transpose().lazyProduct(Bw);
   h.P.block<4, 4>(kBias, kBias).diagonal() += sigma.cwiseAbs2();
-  const Eigen::MatrixXd cross = -BJ * P;
+  const Eigen::MatrixXd cross = -BJ.lazyProduct(P);
   h.P.block(kBias, 0, 4, g) = cross.leftCols(g);
   h.P.block(0, kBias, g, 4) = cross.leftCols(g).transpose();
   h.C.setZero();
   h.C.topRows(g) = C.topRows(g);
-  h.C.middleRows<4>(kBias) = -Bw.transpose() * Ew - BJ * C;
+  h.C.middleRows<4>(kBias) = -Bw.transpose().lazyProduct(Ew) - BJ.lazyProduct(C);
   if (model.moving()) {
     h.P.bottomRightCorner<3, 3>() = P.bottomRightCorner<3, 3>();
     h.P.block(kVelocity, 0, 3, g) = P.bottomLeftCorner(3, g);
@@ -267,7 +271,10 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
   const BatchModel model = modelOf();
   const Stack& stack = fit_->stack;
   // At this very state: a determinant of a hundred dimensions forgives no other.
-  const Cholesky R = model.covariance(fit_->x, stack).with(doubts);
+  thread_local SideCovariance covariance;
+  thread_local Eigen::MatrixXd storage;
+  model.covariance(fit_->x, stack, covariance);
+  Cholesky R = covariance.with(doubts, std::move(storage));
   if (!R.positive()) return kImpossible;
   const Gram gram = gramOf(R.whiten(stack.rows));
   const Quadratic q = model.quadratic(fit_->x, gram);
@@ -278,6 +285,7 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
   const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);
+  storage = std::move(R).release();
   const double priors = model.logSpeedPrior() + model.logSizePrior();
   return yaw + 0.5 * (free + priors - cost - volume - G.logDeterminant());
 }

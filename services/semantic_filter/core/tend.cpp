@@ -20,7 +20,13 @@ double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<doub
   return whitened.squaredNorm();
 }
 
+bool hasMoving(const Object& object) {
+  return std::any_of(object.hypotheses.begin(), object.hypotheses.end(),
+                     [](const auto& h) { return h.moving; });
+}
+
 void settleSlowOnes(Object& object, double min_speed) {
+  if (!hasMoving(object)) return;
   for (auto& h : object.hypotheses) {
     if (!h.moving) continue;
     const Eigen::Matrix2d P = h.P.block<2, 2>(kVelocity, kVelocity);
@@ -33,6 +39,7 @@ void settleSlowOnes(Object& object, double min_speed) {
 /// What moves seldom creeps: the Gaussian prior of a moving one's velocity has a hole around zero.
 /// Without it a parked car of unusual size is one of usual size that creeps.
 void weighPace(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
+  if (!hasMoving(object)) return;
   for (auto& h : object.hypotheses) {
     if (!h.moving) continue;
     const double slow = motion.slow_share * priors.of(h.class_name).speed_sigma;
@@ -49,7 +56,7 @@ bool wider(const Hypothesis& a, const Hypothesis& b) {
 }
 
 void mergeNearOnes(Object& object, double threshold) {
-  auto& hs = object.hypotheses;
+  auto& hs = object.hypotheses.write();
   for (std::size_t i = 0; i < hs.size(); ++i) {
     for (std::size_t j = hs.size() - 1; j > i; --j) {
       if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
@@ -72,7 +79,7 @@ bool scaleIsOpen(const Object& object, const TendParameters& tend) {
 /// left of the object is as likely as it was.
 void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
-  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
     if (!misshapen(h, priors.of(h.class_name), size_gate)) return false;
     lost += h.weight;
     return true;
@@ -87,15 +94,10 @@ void pruneLightOnes(Object& object, const TendParameters& tend) {
   const bool dominant =
       object.hits >= 3 && classProbability(object, best_class) > tend.class_dominates;
   const bool open = scaleIsOpen(object, tend);
-  std::erase_if(object.hypotheses, [&](const Hypothesis& h) {
+  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
     if (open && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
     return h.weight < tend.hypothesis_floor || (dominant && h.class_name != best_class);
   });
-}
-
-bool hasMoving(const Object& object) {
-  return std::any_of(object.hypotheses.begin(), object.hypotheses.end(),
-                     [](const auto& h) { return h.moving; });
 }
 
 void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
@@ -129,6 +131,22 @@ bool forgettable(const Object& o, const TendParameters& parameters) {
   const TimePoint last = std::max(o.hidden.last, o.away.last);
   const bool unasked = o.hidden.count + o.away.count > 0;
   return unasked && toSeconds(last - o.last_seen) > parameters.tentative_s;
+}
+
+/// Of the pose's covariance; nothing where that is not positive definite.
+std::optional<Matrix6d> factorOf(const Matrix6d& P_pose) {
+  std::optional<Matrix6d> L = P_pose;
+  if (!choleskyInPlace(*L)) L.reset();
+  return L;
+}
+
+double sigmaGivenPose(const Hypothesis& h, const std::optional<Matrix6d>& L_pose) {
+  Eigen::Matrix<double, 3, 6> shared = Eigen::Matrix<double, 3, 6>::Zero();
+  if (L_pose) {
+    shared = h.C.topRows<3>();
+    whitenRows(*L_pose, shared);
+  }
+  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
 }
 
 }  // namespace
@@ -167,22 +185,16 @@ double certainty(const Object& object, const TendParameters& parameters) {
 }
 
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
-  Eigen::Matrix<double, 3, 6> shared = h.C.topRows<3>();
-  Matrix6d L = P_pose;
-  if (choleskyInPlace(L)) {
-    whitenRows(L, shared);
-  } else {
-    shared.setZero();
-  }
-  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
+  return sigmaGivenPose(h, factorOf(P_pose));
 }
 
 double placeSigma(const Object& object, const Matrix6d& P_pose) {
+  const auto L_pose = factorOf(P_pose);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const auto& h : object.hypotheses) mean += h.weight * h.x.head<3>();
   double variance = 0.0;
   for (const auto& h : object.hypotheses) {
-    const double own = placeSigma(h, P_pose);
+    const double own = sigmaGivenPose(h, L_pose);
     variance += h.weight * (own * own + (h.x.head<3>() - mean).squaredNorm());
   }
   return std::sqrt(variance);

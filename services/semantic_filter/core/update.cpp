@@ -6,6 +6,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
+#include "common/math/small_products.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/azimuth.h"
 #include "services/semantic_filter/core/weigh.h"
@@ -98,7 +99,8 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
                  const HypothesisLook& seen, const std::vector<Evidence>& boxes, double repeated,
                  const FrameContext& frame) {
   const ProjectedBox* at_prior = seen.box ? &*seen.box : nullptr;
-  std::vector<Hypothesis> parts;
+  thread_local std::vector<Hypothesis> parts;
+  parts.clear();
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
@@ -243,7 +245,7 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
   const Matrix6d& P_pose = frame.pose_error.covariance;
   State x = prior.x;
   double doubt = 1.0;
-  Innovation y;
+  Eigen::Matrix<double, 4, 6> pose, pose_of_gain;
   std::optional<Gain> gain;
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
     std::optional<ProjectedBox> box;
@@ -254,12 +256,9 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
     Innovation now = innovation(z, box ? *box : *at_prior, hidden);
     if (now.count == 0) break;
     now.variance *= repeated * doubt;
-    const Gains PHt = prior.P.leftCols<kVelocity>().lazyProduct(now.H.transpose()) +
-                      prior.C.lazyProduct(now.H_pose.transpose());
-    const Eigen::Matrix<double, 4, 6> pose =
-        now.H.lazyProduct(prior.C.topRows<kVelocity>()) + now.H_pose.lazyProduct(P_pose);
-    const Eigen::Matrix4d S =
-        now.H.lazyProduct(PHt.topRows<kVelocity>()) + now.H_pose.lazyProduct(pose.transpose());
+    const Gains PHt = leftTimesTransposed(prior.P, now.H) + timesTransposed(prior.C, now.H_pose);
+    pose = timesTop<6>(now.H, prior.C) + timesTop<6>(now.H_pose, P_pose);
+    const Eigen::Matrix4d S = timesTop<4>(now.H, PHt) + timesTransposed(now.H_pose, pose);
     auto next_gain = gainOf(PHt, S, now.variance);
     if (i == 0 && next_gain) {
       doubt = doubtOf(now, next_gain->L, frame.parameters->box.tail);
@@ -276,18 +275,17 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
     if (!next.allFinite()) break;
     const double step = (next.head<3>() - x.head<3>()).norm();
     x = next;
-    y = now;
+    pose_of_gain = pose;
     gain = next_gain;
     if (step < 0.01) break;
   }
   Hypothesis posterior = prior;
   if (!gain) return posterior;
   posterior.x = x;
-  posterior.P -= gain->W.lazyProduct(gain->W.transpose());
-  Eigen::Matrix<double, 6, 4> pose =
-      (y.H.lazyProduct(prior.C.topRows<kVelocity>()) + y.H_pose.lazyProduct(P_pose)).transpose();
-  whitenRows(gain->L, pose);
-  posterior.C -= gain->W.lazyProduct(pose.transpose());
+  posterior.P -= timesTransposed(gain->W, gain->W);
+  Eigen::Matrix<double, 6, 4> whitened = pose_of_gain.transpose();
+  whitenRows(gain->L, whitened);
+  posterior.C -= timesTransposed(gain->W, whitened);
   return posterior;
 }
 
@@ -315,6 +313,7 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
                                   const FrameContext& frame) {
   if (look.sight.fraction <= 0.0) return std::nullopt;
   std::vector<Shares> shares;
+  shares.reserve(look.hypotheses.size());
   for (const auto& h : look.hypotheses) shares.push_back(sharesOf(h, look.boxes, eta));
   const double seen = probabilitySeen(object, shares);
   const Worth hit = worthOf(object, look, shares, frame.parameters->looks.correlation);

@@ -128,8 +128,27 @@ struct Blocked {
   double hidden = 0.0;
 };
 
+class Blockers {
+ public:
+  explicit Blockers(const Outline& outline) : o_(outline) {}
+
+  /// Few hide one thing, and cells side by side mostly show the same.
+  Blocked& of(const Cell& cell) {
+    for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
+      if (b->by == cell.blocker) return *b;
+    }
+    all_.push_back({cell.blocker, nearer(cell, o_)});
+    return all_.back();
+  }
+  const std::vector<Blocked>& all() const { return all_; }
+
+ private:
+  const Outline& o_;
+  std::vector<Blocked> all_;
+};
+
 struct Tally {
-  explicit Tally(const Outline& outline) : o(outline) {
+  explicit Tally(const Outline& outline) : o(outline), blockers(outline) {
     const auto& s = o.box->sides;
     const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
     inner = {s[0] + band_x, s[1] + band_y, s[2] - band_x, s[3] - band_y};
@@ -149,7 +168,7 @@ struct Tally {
   }
   /// One of them, which something was painted in.
   void hide(const Cell& cell, double x, double y) {
-    Blocked& blocked = blockedBy(cell);
+    Blocked& blocked = blockers.of(cell);
     const double share = (1.0 - cell.transmittance) * blocked.nearer;
     blocked.hidden += share;
     hidden += share;
@@ -162,18 +181,8 @@ struct Tally {
   const Outline& o;
   std::array<double, 4> inner;  ///< where the bands along the four sides end
   double total = 0.0, hidden = 0.0;
-  std::vector<Blocked> blockers;
+  Blockers blockers;
   std::array<double, 4> side_total{}, side_hidden{};
-
- private:
-  /// Few hide one thing, and cells side by side mostly show the same.
-  Blocked& blockedBy(const Cell& cell) {
-    for (auto b = blockers.rbegin(); b != blockers.rend(); ++b) {
-      if (b->by == cell.blocker) return *b;
-    }
-    blockers.push_back({cell.blocker, nearer(cell, o)});
-    return blockers.back();
-  }
 };
 
 void paint(Cell& cell, const Outline& o) {
@@ -210,7 +219,7 @@ Sight classify(const Tally& tally, double in_image, double by_points,
   const double free = tally.total > 0.0 ? 1.0 - tally.hidden / tally.total : 0.0;
   sight.fraction = in_image * free * (1.0 - by_points);
   double most = 0.0;
-  for (const Blocked& b : tally.blockers) {
+  for (const Blocked& b : tally.blockers.all()) {
     const bool older = b.hidden == most && b.by < sight.blocked_by;
     if (b.hidden > most || older) most = b.hidden, sight.blocked_by = b.by;
   }
@@ -246,6 +255,81 @@ Outline outlineOf(const Object& object, const State& x, const Projector& from, c
   return o;
 }
 
+namespace {
+
+/// What the image shows of an outline, and its share of the whole.
+struct InImage {
+  Polygon inside;
+  double share;
+};
+
+InImage inImage(const Outline& o, double width, double height) {
+  const Polygon hull = convexHull(o.box->points);
+  InImage result;
+  result.inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
+  result.inside = clip(clip(result.inside, 1, 0.0, true), 1, height, false);
+  result.share = polygonArea(result.inside) / std::max(polygonArea(hull), 1e-9);
+  return result;
+}
+
+void paint(DepthBuffer& buffer, const std::vector<Span>& spans, const Outline& o) {
+  for (const Span& span : spans) {
+    for (int i = 0; i < span.cells; ++i) {
+      paint(buffer.at(span.first + static_cast<std::size_t>(i)), o);
+    }
+  }
+}
+
+Tally tallyOf(const DepthBuffer& buffer, const std::vector<Span>& spans, const Outline& o) {
+  Tally tally(o);
+  for (const Span& span : spans) {
+    tally.add(span, buffer.cell());
+    for (int i = 0; i < span.cells; ++i) {
+      const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+      if (cell) tally.hide(*cell, span.x + i * buffer.cell(), span.y);
+    }
+  }
+  return tally;
+}
+
+DepthBuffer& begin(double width, double height, const VisibilityParameters& parameters) {
+  thread_local DepthBuffer kept;
+  kept.begin(width, height, static_cast<double>(parameters.cell_px));
+  return kept;
+}
+
+}  // namespace
+
+double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
+                    const VisibilityParameters& parameters) {
+  const Outline& first = outlines.front();
+  if (!first.box) return 0.0;
+  std::vector<const Outline*> hiding;
+  for (const Outline& o : outlines) {
+    const bool hides = o.box && o.distance_m < first.distance_m && o.solidity >= parameters.solid;
+    if (hides) hiding.push_back(&o);
+  }
+  const InImage in_image = inImage(first, width, height);
+  if (in_image.inside.empty()) return 0.0;
+  if (hiding.empty()) return in_image.share;
+  std::stable_sort(hiding.begin(), hiding.end(),
+                   [](const auto* a, const auto* b) { return a->distance_m < b->distance_m; });
+  DepthBuffer& buffer = begin(width, height, parameters);
+  for (const Outline* o : hiding) {
+    paint(buffer, buffer.spansOf(inImage(*o, width, height).inside), *o);
+  }
+  double cells = 0.0, hidden = 0.0;
+  Blockers blockers(first);
+  for (const Span& span : buffer.spansOf(in_image.inside)) {
+    cells += span.cells;
+    for (int i = 0; i < span.cells; ++i) {
+      const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+      if (cell) hidden += (1.0 - cell->transmittance) * blockers.of(*cell).nearer;
+    }
+  }
+  return cells > 0.0 ? in_image.share * (1.0 - hidden / cells) : 0.0;
+}
+
 std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
                        double width, double height, const VisibilityParameters& parameters) {
   std::vector<std::size_t> order(outlines.size());
@@ -253,34 +337,17 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
-  thread_local DepthBuffer kept;
-  DepthBuffer& buffer = kept;
-  buffer.begin(width, height, static_cast<double>(parameters.cell_px));
+  DepthBuffer& buffer = begin(width, height, parameters);
   std::vector<Sight> sights(outlines.size());
   for (const std::size_t j : order) {
     const Outline& o = outlines[j];
     if (!o.box) continue;
-    const Polygon hull = convexHull(o.box->points);
-    Polygon inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
-    inside = clip(clip(inside, 1, 0.0, true), 1, height, false);
-    const double in_image = polygonArea(inside) / std::max(polygonArea(hull), 1e-9);
-    Tally tally(o);
-    const std::vector<Span>& spans = buffer.spansOf(inside);
-    for (const Span& span : spans) {
-      tally.add(span, buffer.cell());
-      for (int i = 0; i < span.cells; ++i) {
-        const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
-        if (cell) tally.hide(*cell, span.x + i * buffer.cell(), span.y);
-      }
-    }
-    const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, inside, points);
-    sights[j] = classify(tally, in_image, by_points, parameters);
-    if (o.solidity < parameters.solid) continue;
-    for (const Span& span : spans) {
-      for (int i = 0; i < span.cells; ++i) {
-        paint(buffer.at(span.first + static_cast<std::size_t>(i)), o);
-      }
-    }
+    const InImage in_image = inImage(o, width, height);
+    const std::vector<Span>& spans = buffer.spansOf(in_image.inside);
+    const Tally tally = tallyOf(buffer, spans, o);
+    const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, in_image.inside, points);
+    sights[j] = classify(tally, in_image.share, by_points, parameters);
+    if (o.solidity >= parameters.solid) paint(buffer, spans, o);
   }
   return sights;
 }

@@ -39,6 +39,11 @@ struct SightPoint {
 Outline outlineOf(const Object& object, const State& x, const Projector& from,
                   const Shape& shape = cuboidShape());
 
+/// Sight::fraction of the first outline as `see` gives it, without landmarks and for any minimum:
+/// what nothing nearer hides of it.
+double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
+                    const VisibilityParameters& parameters);
+
 /// One Sight for each outline, in the same order; `width`, `height` of the image in pixels.
 std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
                        double width, double height, const VisibilityParameters& parameters);

@@ -96,7 +96,7 @@ double existenceAfter(Object& object, const MeanA& mean_A, double certain) {
 double weigh(Object& object, const std::vector<Shares>& shares, double worth, bool seen,
              const Parameters& parameters) {
   const MeanA mean_A = weighHypotheses(object, shares, worth);
-  if (seen) keepModes(object.hypotheses, shares, parameters.smooth.least_weight);
+  if (seen) keepModes(object.hypotheses.write(), shares, parameters.smooth.least_weight);
   hearFromHere(object, mean_A.full, parameters.visibility.elusive_found);
   return existenceAfter(object, mean_A, certainty(object, parameters.tend));
 }

@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 
+#include "common/math/small_products.h"
+
 namespace perdure {
 namespace {
 
@@ -52,6 +54,51 @@ TEST(Gaussian, CholeskyWhitensAndKnowsTheDeterminant) {
   EXPECT_TRUE(W.isLowerTriangular(1e-15));
   EXPECT_LT((S * chol.solve(Eigen::Vector4d::Ones()) - Eigen::Vector4d::Ones()).norm(), 1e-10);
   EXPECT_NEAR(chol.logDeterminant(), std::log(S.determinant()), 1e-10);
+}
+
+TEST(Gaussian, CholeskyIsThatOfEigenWhateverTheSize) {
+  for (int n = 1; n < 40; n += n < 18 ? 1 : 7) {
+    const Eigen::MatrixXd S = covariance(n, 50 + n);
+    const Cholesky chol(S);
+    ASSERT_TRUE(chol.positive());
+    Eigen::MatrixXd L = S;
+    ASSERT_TRUE(choleskyInPlace(L));
+    EXPECT_NEAR(chol.logDeterminant(), 2.0 * L.diagonal().array().log().sum(), 1e-9);
+    for (const int columns : {1, 3, 4, 5, 8, 11}) {
+      Eigen::MatrixXd B = random(n, columns, 90 + n);
+      const Eigen::MatrixXd W = chol.whiten(B);
+      whitenInPlace(L, B);
+      EXPECT_LT((W - B).norm(), 1e-7 * (1.0 + B.norm())) << n << " x " << columns;
+    }
+  }
+}
+
+TEST(SmallProducts, AreThoseOfEigen) {
+  const Eigen::Matrix<double, 14, 14> P = random(14, 14, 1);
+  const Eigen::Matrix<double, 14, 6> C = random(14, 6, 2);
+  const Eigen::Matrix<double, 4, 11> H = random(4, 11, 3);
+  const Eigen::Matrix<double, 4, 6> G = random(4, 6, 4);
+  const Eigen::Matrix<double, 7, 5> A = random(7, 5, 5);
+  const Eigen::Matrix<double, 3, 5> B = random(3, 5, 6);
+  const auto same = [](const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+    return (a - b).cwiseAbs().maxCoeff() < 1e-13;
+  };
+  EXPECT_TRUE(same(leftTimesTransposed(P, H), P.leftCols<11>() * H.transpose()));
+  EXPECT_TRUE(same(timesTransposed(C, G), C * G.transpose()));
+  EXPECT_TRUE(same(timesTransposed(A, B), A * B.transpose()));
+  EXPECT_TRUE(same(timesTop<6>(H, C), H * C.topRows<11>()));
+  EXPECT_TRUE(same(timesTop<11>(H, P), H * P.topLeftCorner<11, 11>()));
+  const Eigen::MatrixXd whole = C * C.transpose();
+  const Eigen::MatrixXd lower = lowerTimesTransposed(C);
+  EXPECT_TRUE(same(lower.triangularView<Eigen::Lower>(), whole.triangularView<Eigen::Lower>()));
+}
+
+TEST(Gaussian, CholeskyRefusesAPivotWhereverItIs) {
+  for (int at = 0; at < 19; ++at) {
+    Eigen::MatrixXd S = covariance(19, 7);
+    S(at, at) = -1.0;
+    EXPECT_FALSE(Cholesky(S).positive()) << at;
+  }
 }
 
 TEST(Gaussian, WhatIsNotPositiveIsNoCovariance) {

@@ -57,7 +57,8 @@ class Walk {
 /// Largest difference of the lower triangle, in shares of the largest number.
 double worstShare(const Walk& walk) {
   const Looks looks(walk.keyframes, walk.now);
-  const Eigen::MatrixXd covariance = looks.poseCovariance(walk.J);
+  Eigen::MatrixXd covariance;
+  looks.poseCovariance(walk.J, covariance);
   double worst = 0.0, largest = 0.0;
   for (std::size_t i = 0; i < walk.errors.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {

@@ -347,7 +347,9 @@ TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
     const BatchModel model(looks, false, "car", scene.truth(), frame);
     const auto stack = model.linearise(scene.truth());
     const Eigen::VectorXd doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
-    const Cholesky R(model.covariance(scene.truth(), *stack).with(doubts));
+    SideCovariance covariance;
+    model.covariance(scene.truth(), *stack, covariance);
+    const Cholesky R(covariance.with(doubts));
     EXPECT_EQ(stack->counts[9][2], cut_at > 0.0);
     return std::pair(R.logDeterminant(), model.logVolumeOfCuts(*stack, doubts));
   };

@@ -134,7 +134,8 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
                                   parameters.clutter)}};
     IdBook ids;
     ids.atLeast(10);
-    SemanticFilter(parameters, priors).step(belief, input, ids);
+    const Belief before = belief;
+    SemanticFilter(parameters, priors).step(before, belief, input, ids);
     return belief.objects.at(0);
   };
   const Object guess = after(false);

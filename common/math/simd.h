@@ -1,0 +1,38 @@
+// Four numbers at once, for the few loops that a frame spends its time in. Written with GCC's
+// vector types: what has no AVX2 computes the same by halves. On x86-64 a function may be compiled
+// for AVX2 as well, taken where the machine has it; without fused multiply-add, so that a result
+// does not depend on the machine.
+#pragma once
+
+#include <algorithm>
+
+// The loader picks a clone before a sanitizer's run time has begun.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define PERDURE_ALSO_AVX2 __attribute__((target_clones("avx2", "default")))
+#else
+#define PERDURE_ALSO_AVX2
+#endif
+// A clone's own functions have to be part of it.
+#define PERDURE_INLINE inline __attribute__((always_inline))
+
+namespace perdure::simd {
+
+using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
+using Two = double __attribute__((vector_size(16), aligned(8), may_alias));
+
+PERDURE_INLINE Four& four(double* p) { return *reinterpret_cast<Four*>(p); }
+PERDURE_INLINE const Four& four(const double* p) { return *reinterpret_cast<const Four*>(p); }
+PERDURE_INLINE Two& two(double* p) { return *reinterpret_cast<Two*>(p); }
+PERDURE_INLINE const Two& two(const double* p) { return *reinterpret_cast<const Two*>(p); }
+
+PERDURE_INLINE void keepLeast(Four& least, const Four& x) { least = x < least ? x : least; }
+PERDURE_INLINE void keepMost(Four& most, const Four& x) { most = x > most ? x : most; }
+PERDURE_INLINE double leastOf(const Four& x) {
+  return std::min(std::min(x[0], x[1]), std::min(x[2], x[3]));
+}
+PERDURE_INLINE double mostOf(const Four& x) {
+  return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));
+}
+
+}  // namespace perdure::simd

@@ -1,0 +1,47 @@
+// Products of matrices of fixed size by dense_kernels.h: what an update of a filter takes by the
+// thousand. Sums are in the order of the inner dimension, as Eigen's lazyProduct has them.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/math/dense_kernels.h"
+
+namespace perdure {
+
+/// A Bᵀ of N × K and M × K matrices.
+template <int N, int M, int K>
+Eigen::Matrix<double, N, M> timesTransposed(const Eigen::Matrix<double, N, K>& A,
+                                            const Eigen::Matrix<double, M, K>& B) {
+  Eigen::Matrix<double, N, M> product;
+  dense::timesTransposed(A.data(), N, B.data(), M, K, product.data());
+  return product;
+}
+
+/// A Aᵀ of an N × K matrix, on and below the diagonal; above it whatever.
+template <int N, int K>
+Eigen::Matrix<double, N, N> lowerTimesTransposed(const Eigen::Matrix<double, N, K>& A) {
+  Eigen::Matrix<double, N, N> product = Eigen::Matrix<double, N, N>::Zero();
+  dense::lowerTimesTransposed(A.data(), N, K, product.data());
+  return product;
+}
+
+/// A Bᵀ with the first K columns of A, N × N.
+template <int N, int M, int K>
+Eigen::Matrix<double, N, M> leftTimesTransposed(const Eigen::Matrix<double, N, N>& A,
+                                                const Eigen::Matrix<double, M, K>& B) {
+  Eigen::Matrix<double, N, M> product;
+  dense::timesTransposed(A.data(), N, B.data(), M, K, product.data());
+  return product;
+}
+
+/// A B of a 4 × K matrix and the first K rows and M columns of B.
+template <int M, int K, int N, int P>
+Eigen::Matrix<double, 4, M> timesTop(const Eigen::Matrix<double, 4, K>& A,
+                                     const Eigen::Matrix<double, N, P>& B) {
+  static_assert(K <= N && M <= P);
+  Eigen::Matrix<double, 4, M> product;
+  dense::fourRowsTimes(A.data(), B.data(), N, K, M, product.data());
+  return product;
+}
+
+}  // namespace perdure
