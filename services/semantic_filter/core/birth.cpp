@@ -16,6 +16,10 @@ namespace {
 constexpr int kFree = kVelocity;  // dimensions of the fit: geometry and bias
 using VectorFit = Eigen::Matrix<double, kFree, 1>;
 
+/// Residuals where nothing is before the camera: the solver reads them of a step whose cost cannot
+/// be told, and must not take it.
+constexpr double kNoStep = 1e100;
+
 /// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range,
 /// four of bias.
 class BirthCost {
@@ -45,8 +49,11 @@ class BirthCost {
     State x = State::Zero();
     x.head<kFree>() = Eigen::Map<const VectorFit>(parameters);
     const auto box = projectObserved(x, from_, style_);
-    if (!box) return false;
     Eigen::Map<Residuals> r(residuals);
+    if (!box) {
+      r.setConstant(kNoStep);
+      return false;
+    }
     Jacobian J = Jacobian::Zero();
     r.setZero();
     sides(*box, r, J);
@@ -343,11 +350,12 @@ std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, 
   const BirthCost cost(evidence, prior, yaw, yaw_sigma, range, frame, start);
   VectorFit x = VectorFit::Zero();
   x.head<7>() << start, yaw, prior.log_size;
+  BirthCost::Residuals r;
+  BirthCost::Jacobian J;
+  if (!cost(x.data(), r.data(), J.data())) return std::nullopt;  // the solver would not ask
   ceres::TinySolver<BirthCost> solver;
   solver.options.max_num_iterations = 15;
   solver.Solve(cost, &x);
-  BirthCost::Residuals r;
-  BirthCost::Jacobian J;
   if (!x.allFinite() || !cost(x.data(), r.data(), J.data())) return std::nullopt;
   const Cholesky hessian(J.transpose() * J);
   if (!hessian.positive()) return std::nullopt;
