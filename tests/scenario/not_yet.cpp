@@ -83,17 +83,6 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
             "1, 2, 3: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
        }},
-      {"street recalled",
-       {
-           {"second lap: share that keeps the id of the first",
-            "0.96: two beliefs in one thing, of which the older survives where the younger was "
-            "told of more often"},
-           {"flicker: claims in full sight that ceased and came back",
-            "1: some misses in a row, or a place lost for a few frames"},
-           {"claims at rest that jump by more than 3 m from one frame to the next",
-            "3: young ones, of five to sixteen looks, that are something or somewhere else after "
-            "all"},
-       }},
       {"toy vio",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
