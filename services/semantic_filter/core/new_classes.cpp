@@ -62,6 +62,7 @@ double logSizeDensity(const Hypothesis& h, const ClassPrior& prior) {
 /// The hypothesis as one of another class: its geometry, given that class's size prior.
 Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   h.class_name = prior.name;
+  h.footing = {};
   const Eigen::Matrix3d S = h.P.block<3, 3>(kSize, kSize) + prior.log_size_covariance;
   const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.middleCols<3>(kSize));
   h.x += K * (prior.log_size - Eigen::Vector3d(h.x.segment<3>(kSize)));

@@ -105,12 +105,14 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
   const ClassPrior& prior = priors.of(object.best().class_name);
   if (prior.moving <= 0.0 || object.hits < 3) return;
   Hypothesis twin = object.best();
+  twin.footing = {};
   twin.moving = true;
   twin.weight *= motion.start_probability;
   twin.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;  // (3 m/s)²: just driving off
   twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
   // Or it stands where we are wrong about it: the same thing along the ray, near and far.
   Hypothesis wide = object.best();
+  wide.footing = {};
   wide.weight *= motion.start_probability * motion.misplaced_odds;
   const Eigen::Vector3d ray = wide.x.head<3>() - object.hit_view.T_WC.p;
   const double relative = motion.misplaced_sigma;
