@@ -170,6 +170,10 @@ void describeGround(GroundParameters& p, Fields& fields) {
                 {"relative deviation of the place of what tells of it, at most"});
   fields.number("ground.span_m", p.span_m, positive(),
                 {"over which the undersides of what does not stand on it are spread", "m"});
+  fields.number("ground.body_height_m", p.body_height_m, between(0, 100),
+                {"of the IMU above the ground that what carries it stands on; 0: not known", "m"});
+  fields.number("ground.body_height_sigma_m", p.body_height_sigma_m, positive(),
+                {"standard deviation of that", "m"});
 }
 
 void describeMemory(MemoryParameters& p, Fields& fields) {

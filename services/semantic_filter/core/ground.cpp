@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kNearest = 12, kLeast = 3;
 constexpr double kLevelSigma = 10.0;   // m, of the ground beside the mean of those that tell
 constexpr double kOutlier = 12.0;      // squared deviations from what the others say
+constexpr double kBounce = 0.03;       // m, of the body beside its height, as it goes
 constexpr double kSurelyStands = 0.9;  // of a class whose things may tell
 
 using Row = Eigen::Matrix<double, 1, kStateDim>;
@@ -74,7 +75,17 @@ void Evenness::hear(double above, const GroundHeight& others, double own_varianc
   things_ += weight;
 }
 
-Ground::Ground(const std::vector<Object>& objects, const Evenness& evenness,
+void Path::go(const Eigen::Vector3d& body) {
+  constexpr double kApart = 4.0;  // m
+  if (!places_.empty() && (body - places_[places_.size() - 1]).norm() < kApart) return;
+  if (places_.size() == kPlaces) {
+    std::copy(places_.begin() + 1, places_.end(), places_.begin());
+    places_.resize(kPlaces - 1);
+  }
+  places_.push_back(body);
+}
+
+Ground::Ground(const std::vector<Object>& objects, const Path& path, const Evenness& evenness,
                const Eigen::Vector3d& up_W, const ClassPriors& priors,
                const GroundParameters& parameters)
     : parameters_(parameters),
@@ -83,6 +94,11 @@ Ground::Ground(const std::vector<Object>& objects, const Evenness& evenness,
       up_(up_W.normalized()) {
   constexpr double kSure = 0.8, kHalf = 0.5;
   if (!parameters.use) return;
+  if (parameters.body_height_m > 0.0) {
+    for (const Eigen::Vector3d& p : path) {
+      path_.push_back({0, horizontal(p), up_.dot(p) - parameters.body_height_m, kBounce * kBounce});
+    }
+  }
   for (const Object& o : objects) {
     const Hypothesis& best = o.best();
     if (best.footing.variance <= 0.0 || best.moving || best.weight < kHalf) continue;
@@ -103,61 +119,70 @@ void Ground::tell(Evenness& evenness, const Object& object, double share) const 
                 std::min(share, 1.0));
 }
 
+std::vector<Ground::Near> Ground::around(const std::vector<Stand>& stands,
+                                         const Eigen::Vector2d& here, ObjectId except,
+                                         std::size_t most) const {
+  std::vector<Near> nearest;
+  for (const Stand& s : stands) {
+    const double apart = (s.place - here).squaredNorm();
+    const bool reaches = apart <= parameters_.reach_m * parameters_.reach_m;
+    if (reaches && (s.id == 0 || s.id != except)) nearest.push_back({apart, &s});
+  }
+  std::sort(nearest.begin(), nearest.end(), [](const Near& a, const Near& b) {
+    return a.apart < b.apart || (a.apart == b.apart && a.stand->id < b.stand->id);
+  });
+  if (nearest.size() > most) nearest.resize(most);
+  return nearest;
+}
+
 std::optional<GroundHeight> Ground::below(const Eigen::Vector3d& place, ObjectId except) const {
   const Eigen::Vector2d here = horizontal(place);
-  std::vector<std::pair<double, const Stand*>> nearest;
-  for (const Stand& s : stands_) {
-    const double apart = (s.place - here).squaredNorm();
-    if (s.id == except || apart > parameters_.reach_m * parameters_.reach_m) continue;
-    nearest.emplace_back(apart, &s);
-  }
-  if (nearest.size() < kLeast) return std::nullopt;
-  const std::size_t most = std::min(nearest.size(), kNearest);
-  std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(most),
-                    nearest.end(), [](const auto& a, const auto& b) {
-                      return a.first < b.first ||
-                             (a.first == b.first && a.second->id < b.second->id);
-                    });
-  nearest.resize(most);
+  std::vector<Near> tell = around(path_, here, except, Path::kPlaces);
+  const std::size_t on_path = tell.size(), least = on_path > 0 ? 1 : kLeast;
+  const std::vector<Near> things = around(stands_, here, except, kNearest);
+  tell.insert(tell.end(), things.begin(), things.end());
+  if (tell.size() < least) return std::nullopt;
   double level = 0.0;
-  for (const auto& [apart, s] : nearest) level += s->height / static_cast<double>(most);
+  for (const Near& near : tell) level += near.stand->height / static_cast<double>(tell.size());
   const double slope = ratio_ * std::pow(parameters_.slope, 2);
   const double rough = ratio_ * std::pow(parameters_.roughness, 2);
-  while (nearest.size() >= kLeast) {
-    const auto n = static_cast<Eigen::Index>(nearest.size());
+  const double body = std::pow(parameters_.body_height_sigma_m, 2);
+  while (tell.size() >= least) {
+    const auto n = static_cast<Eigen::Index>(tell.size()), m = static_cast<Eigen::Index>(on_path);
     Eigen::MatrixXd K(n, n);
     Eigen::VectorXd z(n);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const Stand& a = *nearest[static_cast<std::size_t>(i)].second;
+      const Stand& a = *tell[static_cast<std::size_t>(i)].stand;
       const Eigen::Vector2d da = a.place - here;
       z[i] = a.height - level;
       for (Eigen::Index j = 0; j <= i; ++j) {
-        const Eigen::Vector2d db = nearest[static_cast<std::size_t>(j)].second->place - here;
+        const Eigen::Vector2d db = tell[static_cast<std::size_t>(j)].stand->place - here;
         K(i, j) = K(j, i) = kLevelSigma * kLevelSigma + slope * da.dot(db) +
                             0.5 * rough * (da.norm() + db.norm() - (da - db).norm());
       }
       K(i, i) += a.variance;
     }
+    K.topLeftCorner(m, m).array() += body;
     const Cholesky S(K);
     if (!S.positive()) return std::nullopt;
     const Eigen::MatrixXd J = S.solve(Eigen::MatrixXd::Identity(n, n));
     const Eigen::VectorXd weighed = J * z;
-    // Each beside what the others say of it.
+    // Each thing beside what the others say of it.
     Eigen::Index worst = 0;
     double most_off = 0.0;
-    for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index i = m; i < n; ++i) {
       const double off = weighed[i] * weighed[i] / J(i, i);
       if (off > most_off) worst = i, most_off = off;
     }
     if (most_off > kOutlier) {
-      nearest.erase(nearest.begin() + worst);
+      tell.erase(tell.begin() + worst);
       continue;
     }
     const double prior = kLevelSigma * kLevelSigma;
     const Eigen::VectorXd shares = prior * J.rowwise().sum();
-    double noise = 0.0;
+    double noise = body * std::pow(shares.head(m).sum(), 2);
     for (Eigen::Index i = 0; i < n; ++i) {
-      noise += shares[i] * shares[i] * nearest[static_cast<std::size_t>(i)].second->variance;
+      noise += shares[i] * shares[i] * tell[static_cast<std::size_t>(i)].stand->variance;
     }
     const double variance = std::max(prior * (1.0 - shares.sum()), noise);
     return GroundHeight{level + prior * weighed.sum(), variance, variance - noise};

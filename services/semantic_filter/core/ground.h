@@ -1,7 +1,8 @@
 // How high the ground is, by what stands on it: things placed by parallax tell where their
 // undersides are, and what else stands near by stands about as high. A thing far ahead, of which
 // size alone says how far it is, so stands where the street is; one that seems to stand below it is
-// nearer, or moves.
+// nearer, or moves. What carries the body stands on it, too: where the body's height above it is
+// known, the way that it came tells of it from the first frame on.
 //
 // The ground is a level plane of unknown height with a slope N(0, ground.slope²) and Brownian
 // unevenness, ground.roughness² a metre; nothing is known of it where nothing stands. Heights are
@@ -12,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/base/inplace_vector.h"
 #include "services/semantic_filter/core/look.h"
 #include "services/semantic_filter/core/object.h"
 
@@ -36,15 +38,32 @@ class Evenness {
   double squares_ = 0.0, things_ = 0.0;
 };
 
+/// Where the body went lately, by places that are some metres apart. Part of the belief.
+class Path {
+ public:
+  static constexpr std::size_t kPlaces = 6;
+
+  void go(const Eigen::Vector3d& body);
+
+  const Eigen::Vector3d* begin() const { return places_.begin(); }
+  const Eigen::Vector3d* end() const { return places_.end(); }
+
+ private:
+  InplaceVector<Eigen::Vector3d, kPlaces> places_;  ///< the newest last
+};
+
 class Ground {
  public:
-  /// Of all that stands surely, was seen from several sides and is of a class that does.
-  Ground(const std::vector<Object>& objects, const Evenness& evenness, const Eigen::Vector3d& up_W,
-         const ClassPriors& priors, const GroundParameters& parameters);
+  /// Of all that stands surely, was seen from several sides and is of a class that does; and, where
+  /// its height above the ground is known, of where the body went.
+  Ground(const std::vector<Object>& objects, const Path& path, const Evenness& evenness,
+         const Eigen::Vector3d& up_W, const ClassPriors& priors,
+         const GroundParameters& parameters);
 
   /// What the object's footing says of how even it is.
   void tell(Evenness& evenness, const Object& object, double share) const;
-  /// Below `place`, without what `except` itself says; nothing where too few tell.
+  /// Below `place`, without what `except` itself says; nothing where fewer than three tell and the
+  /// body's height is not known.
   std::optional<GroundHeight> below(const Eigen::Vector3d& place, ObjectId except) const;
 
  private:
@@ -54,13 +73,22 @@ class Ground {
     double height, variance;
   };
 
+  struct Near {
+    double apart;  ///< m²
+    const Stand* stand;
+  };
+
+  /// Those of `stands` within reach of a place, but for `except`; the nearest first, `most` of
+  /// them.
+  std::vector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
+                           ObjectId except, std::size_t most) const;
   Eigen::Vector2d horizontal(const Eigen::Vector3d& p) const { return axes_ * p; }
 
   GroundParameters parameters_;
   double ratio_;
   Eigen::Matrix<double, 2, 3> axes_;
   Eigen::Vector3d up_;
-  std::vector<Stand> stands_;
+  std::vector<Stand> stands_, path_;  ///< those on the path have the body's height in common
 };
 
 /// Keeps what the hypothesis, as the looks alone have it, says of the ground (Footing), and then

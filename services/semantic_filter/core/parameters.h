@@ -140,6 +140,9 @@ struct GroundParameters {
   double reach_m = 60.0;    ///< things further away say nothing of it
   double resolved = 0.06;   ///< relative deviation of the place of what tells, at most
   double span_m = 3.0;      ///< undersides of what does not stand on it are this far apart
+  /// Of the body's origin above the ground that what carries it stands on; 0: not known.
+  double body_height_m = 0.0;
+  double body_height_sigma_m = 0.05;
 };
 
 /// Of what leaves the working set for the map and comes back (DESIGN 5, item 13).

@@ -114,8 +114,8 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
           std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
                                           input.model.styles, errors),
           errors,
-          std::make_shared<const Ground>(belief.objects, belief.evenness, input.view.up_W, priors_,
-                                         parameters_.ground)};
+          std::make_shared<const Ground>(belief.objects, belief.path, belief.evenness,
+                                         input.view.up_W, priors_, parameters_.ground)};
 }
 
 std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
@@ -388,6 +388,7 @@ std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, Obj
 
 StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
                                 IdBook& ids) const {
+  belief.path.go(heard.view.T_WB.p);
   auto sights = seeAll(belief, heard);
   if (!heard.boxes) return {};
   FrameInput input = heard;

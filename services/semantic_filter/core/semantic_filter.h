@@ -33,6 +33,7 @@ struct Belief {
   std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
   BoxScales box_scales = {};
   Evenness evenness = {};
+  Path path = {};  ///< of the body
 };
 
 /// Gives ids to births. The same box of the same frame always gets the same id, so that stepping

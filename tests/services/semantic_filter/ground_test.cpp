@@ -41,7 +41,7 @@ std::vector<Object> street(Height height, int things = 8) {
 }
 
 Ground groundOf(const std::vector<Object>& objects) {
-  return {objects, {}, kUp, standing(), GroundParameters{}};
+  return {objects, Path{}, Evenness{}, kUp, standing(), GroundParameters{}};
 }
 
 class Standing : public ::testing::Test {
@@ -50,8 +50,8 @@ class Standing : public ::testing::Test {
   void know(double level, int things = 8) {
     usual_.priors = standing();
     const auto cars = street([level](double, double) { return level; }, things);
-    usual_.frame.ground = std::make_shared<const Ground>(cars, Evenness{}, kUp, usual_.priors,
-                                                         usual_.parameters.ground);
+    usual_.frame.ground = std::make_shared<const Ground>(cars, Path{}, Evenness{}, kUp,
+                                                         usual_.priors, usual_.parameters.ground);
   }
   /// A car ahead of which size alone says how far it is: it is placed along the ray to it.
   static Hypothesis farCar(double range_error) {
@@ -113,6 +113,49 @@ TEST(Ground, WhatMovesOrMayNotExistOrNeedNotStandSaysNothing) {
   cars[1].existence = {0.3, ExistenceEvidence::kPrior, cars[1].as_of};
   cars[2].hypotheses[0].class_name = kOtherClass;
   EXPECT_FALSE(groundOf(cars).below({8, 0, 0}, 0));
+}
+
+/// Of a body `height` above a ground that it went along by `metres`, rising by `slope`.
+Ground groundOfBody(double height, double metres, double slope, const std::vector<Object>& cars) {
+  Path path;
+  for (double x = -metres; x <= 0.0; x += 0.5) path.go({x, 0, slope * x + height});
+  GroundParameters parameters;
+  parameters.body_height_m = height;
+  return {cars, path, Evenness{}, kUp, standing(), parameters};
+}
+
+TEST(Ground, IsBelowABodyOfKnownHeightFromTheFirstFrameOn) {
+  const Ground ground = groundOfBody(1.5, 0.0, 0.0, {});
+  const auto near = ground.below({3, 0, 0}, 0), far = ground.below({30, 0, 0}, 0);
+  ASSERT_TRUE(near && far);
+  EXPECT_NEAR(near->mean, 0.0, 1e-3);
+  EXPECT_GT(std::sqrt(near->variance), GroundParameters{}.body_height_sigma_m);
+  EXPECT_LT(std::sqrt(near->variance), 0.15);
+  EXPECT_GT(std::sqrt(far->variance), 0.5) << "whether it rises is not known yet";
+  EXPECT_FALSE(ground.below({200, 0, 0}, 0));
+  EXPECT_TRUE(ground.below({3, 0, 0}, 1)) << "the body is none of the things";
+}
+
+TEST(Ground, GoesOnAsTheBodyCame) {
+  const auto ahead = groundOfBody(1.5, 30.0, 0.05, {}).below({20, 0, 0}, 0);
+  const auto level = groundOfBody(1.5, 0.0, 0.05, {}).below({20, 0, 0}, 0);
+  ASSERT_TRUE(ahead && level);
+  EXPECT_NEAR(ahead->mean, 1.0, 2.0 * std::sqrt(ahead->variance));
+  EXPECT_GT(ahead->mean, 0.5);
+  EXPECT_LT(ahead->variance, 0.7 * level->variance);
+}
+
+/// All places of the path err alike where the height that was told is wrong.
+TEST(Ground, ThingsMendAHeightThatIsWrong) {
+  Path path;
+  for (double x = -30.0; x <= 0.0; x += 0.5) path.go({x, 0, 1.5});
+  GroundParameters parameters;
+  parameters.body_height_m = 1.3;
+  const auto cars = street([](double, double) { return 0.0; });
+  const Ground ground(cars, path, Evenness{}, kUp, standing(), parameters);
+  const auto at = ground.below({15, 0, 0}, 0);
+  ASSERT_TRUE(at);
+  EXPECT_NEAR(at->mean, 0.0, 0.06);
 }
 
 TEST(Ground, LearnsHowEvenItIs) {
