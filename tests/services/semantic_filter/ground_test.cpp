@@ -6,6 +6,7 @@
 #include <random>
 
 #include "common/math/gaussian.h"
+#include "services/semantic_filter/core/tend.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -247,6 +248,21 @@ TEST_F(Standing, KeepsWhatTheLooksAloneSaid) {
   EXPECT_LT(now, alone);
   EXPECT_NEAR(now + h.footing.above, alone, 1e-9);
   EXPECT_GT(h.footing.variance, 0.0);
+}
+
+/// Its underside is not the one that the looks told.
+TEST_F(Standing, WhatATwinOfItDoesIsNotToldByItsLooks) {
+  Object o = testing::makeObject(1, "car", testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+  o.hits = 3;
+  o.running_nis = 2.0 * usual_.parameters.motion.start_nis;
+  o.hypotheses[0].footing = {0.1, 0.01};
+  for (ClassPrior& c : usual_.priors.classes) c.moving = 0.3;
+  tendHypotheses(o, usual_.priors, usual_.parameters);
+  ASSERT_EQ(o.hypotheses.size(), 3u) << "one that drives off, and one that is misplaced";
+  for (const Hypothesis& h : o.hypotheses.read()) {
+    const bool itself = !h.moving && h.P(0, 0) < 0.05;
+    EXPECT_EQ(h.footing.variance > 0.0, itself);
+  }
 }
 
 }  // namespace
