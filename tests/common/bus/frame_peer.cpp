@@ -105,6 +105,8 @@ int write(const Participant& participant, int count, std::uint32_t side) {
   while (writer.matched() == 0 && std::chrono::steady_clock::now() < patience) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  // That we know the reader does not say that it knows us, and until then it hears nothing.
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
   std::cout << "ready" << std::endl;
   std::uint64_t copied = 0, failed = 0;
   for (int i = 0; i < count; ++i) {
