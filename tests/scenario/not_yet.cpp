@@ -57,15 +57,13 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "2, 1, 4: people who walk along the road, and a parked car that is misplaced; what "
+            "2, 2, 3: people who walk along the road, and a parked car that is misplaced; what "
             "drives leaves none"},
-           {"`moved` events of the parked car that drives off",
-            "1, 0, 2: it is seen for a second before it leaves, and held for a thing that grows"},
            {"standing things on the map where nothing is",
-            "2, 1, 4: people who walk along the road, and a parked car that is misplaced; what "
+            "2, 2, 3: people who walk along the road, and a parked car that is misplaced; what "
             "drives leaves none"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 2, 5: looks whose box another thing may have made, or a belief of odd size "
+            "3, 3, 4: looks whose box another thing may have made, or a belief of odd size "
             "given up"},
            {"merges that lost existence", "1, 0, 0: a merge in the frame of a miss"},
        }},

@@ -160,6 +160,25 @@ void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fi
   }
 }
 
+/// What stands where the ground is not may go along it elsewhere: one that moves, which the filter
+/// has given up, is tried again.
+std::optional<Fitted> driveFrom(Object& object, const Fitted& at_rest, const Looks& looks,
+                                const FrameContext& frame) {
+  constexpr double kContradicted = -1.0;  // nats
+  if (at_rest.ground > kContradicted) return std::nullopt;
+  Hypothesis start = object.hypotheses[at_rest.index];
+  if (frame.priors->of(start.class_name).moving <= 0.0) return std::nullopt;
+  start.moving = true;
+  start.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;
+  auto smoothed = fit(start, looks, frame, &at_rest.smoothed);
+  if (!smoothed) return std::nullopt;
+  Hypothesis h = smoothed->hypothesis();
+  h.weight = 1e-3 * start.weight;
+  const double ground = standOnGround(h, object.id, frame);
+  object.hypotheses.push_back(h);
+  return Fitted{object.hypotheses.size() - 1, std::move(*smoothed), ground};
+}
+
 /// What the best fit of a thing of the class at rest leaves over.
 std::optional<Leftover> smoothClass(Object& object, const std::string& name, const Looks& looks,
                                     const FrameContext& frame, bool seek, Verdicts& verdicts) {
@@ -184,7 +203,8 @@ std::optional<Leftover> smoothClass(Object& object, const std::string& name, con
   weighModes(object.hypotheses.write(), moving, p.least_weight);
   auto at_rest = heaviest(object.hypotheses.read(), std::move(still));
   const auto over = at_rest ? std::optional(at_rest->smoothed.leftover()) : std::nullopt;
-  const auto driving = heaviest(object.hypotheses.read(), std::move(moving));
+  auto driving = heaviest(object.hypotheses.read(), std::move(moving));
+  if (!driving && at_rest) driving = driveFrom(object, *at_rest, looks, frame);
   if (!driving) return over;
   if (!at_rest) {
     const Hypothesis& mover = driving->smoothed.hypothesis();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/ground.h"
 #include "services/semantic_filter/core/smooth.h"
 #include "services/semantic_filter/core/tend.h"
 #include "tests/services/semantic_filter/scene.h"
@@ -23,7 +24,7 @@ class Passing {
  public:
   explicit Passing(unsigned seed, double speed = 0.0, double pose_sigma = 0.0)
       : camera_(makeCamera()), random_(seed), priors_(makePriors()) {
-    for (auto& c : priors_.classes) c.moving = 0.2, c.speed_sigma = 8.0;
+    for (auto& c : priors_.classes) c.moving = 0.2, c.speed_sigma = 8.0, c.stands = 0.97;
     parameters_.smooth.new_view = 0.01;
     truth_ = makeState(32.0, 5.0, 0.8, 0.15, 4.3, 1.8, 1.45);
     truth_[kVelocity] = speed;
@@ -260,6 +261,30 @@ TEST(Smooth, SeeksTheYawThatTheFilterGaveUp) {
     EXPECT_EQ(object.seek_modes_at, 2 * scene.keyframes().size());
   }
   EXPECT_GE(found, 17) << "of " << kRuns;
+}
+
+/// Whether anything of a car at rest moves after its smoothing, beside a ground at `height`.
+bool mayMoveOver(double height, const Passing& scene) {
+  FrameContext frame = scene.frame();
+  Path path;
+  for (double x = 0.0; x <= 24.0; x += 4.0) path.go({x, 0.0, 1.2});
+  GroundParameters ground;
+  ground.body_height_m = 1.2 - height;
+  frame.ground = std::make_shared<const Ground>(std::vector<Object>{}, path, Evenness{},
+                                                frame.view.up_W, *frame.priors, ground);
+  Object object = turnedBy(0.0, scene);
+  smooth(object, frame);
+  const auto& hs = object.hypotheses.read();
+  return std::any_of(hs.begin(), hs.end(), [](const Hypothesis& h) { return h.moving; });
+}
+
+TEST(Smooth, WhatStandsBelowTheGroundMayMoveInstead) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const Passing scene(seed);
+    const double underside = scene.truth()[2] - 0.5 * std::exp(scene.truth()[kSize + 2]);
+    EXPECT_FALSE(mayMoveOver(underside, scene)) << seed;
+    EXPECT_TRUE(mayMoveOver(underside + 0.8, scene)) << seed;
+  }
 }
 
 /// What the looks at a car make of a thing of no known class that the network takes for a
