@@ -68,7 +68,7 @@ class Ground {
 
  private:
   struct Stand {
-    ObjectId id;
+    ObjectId id;            ///< 0: the body's
     Eigen::Vector2d place;  ///< horizontal
     double height, variance;
   };

@@ -166,10 +166,8 @@ std::optional<Fitted> driveFrom(Object& object, const Fitted& at_rest, const Loo
                                 const FrameContext& frame) {
   constexpr double kContradicted = -1.0;  // nats
   if (at_rest.ground > kContradicted) return std::nullopt;
-  Hypothesis start = object.hypotheses[at_rest.index];
+  const Hypothesis start = drivingOff(object.hypotheses[at_rest.index]);
   if (frame.priors->of(start.class_name).moving <= 0.0) return std::nullopt;
-  start.moving = true;
-  start.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;
   auto smoothed = fit(start, looks, frame, &at_rest.smoothed);
   if (!smoothed) return std::nullopt;
   Hypothesis h = smoothed->hypothesis();

@@ -104,11 +104,8 @@ void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParame
   if (object.running_nis < motion.start_nis || hasMoving(object)) return;
   const ClassPrior& prior = priors.of(object.best().class_name);
   if (prior.moving <= 0.0 || object.hits < 3) return;
-  Hypothesis twin = object.best();
-  twin.footing = {};
-  twin.moving = true;
+  Hypothesis twin = drivingOff(object.best());
   twin.weight *= motion.start_probability;
-  twin.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;  // (3 m/s)²: just driving off
   twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
   // Or it stands where we are wrong about it: the same thing along the ray, near and far.
   Hypothesis wide = object.best();
@@ -166,6 +163,13 @@ double distance2(const Hypothesis& a, const Hypothesis& b) {
     result += deviation2<3>((a.x - b.x).tail<3>(), P_v);
   }
   return result;
+}
+
+Hypothesis drivingOff(Hypothesis at_rest) {
+  at_rest.footing = {};
+  at_rest.moving = true;
+  at_rest.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;  // (3 m/s)²
+  return at_rest;
 }
 
 void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters) {

@@ -14,6 +14,9 @@ namespace perdure::semantic_filter {
 /// contradict gets a moving twin and one that is misplaced along the ray. Nothing may be left.
 void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters);
 
+/// One at rest as it may just be driving off.
+Hypothesis drivingOff(Hypothesis at_rest);
+
 /// Squared Mahalanobis distance of b from a by a's covariance: geometry, yaw modulo 180°, and the
 /// velocity where a moves.
 double distance2(const Hypothesis& a, const Hypothesis& b);
