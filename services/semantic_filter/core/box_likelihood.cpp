@@ -140,6 +140,13 @@ double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) 
 
 using Sides = std::array<bool, 4>;
 
+/// One side alone.
+bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predicted,
+               const Eigen::Matrix4d& covariance, int side) {
+  const double nu = z.sides[side] - predicted.sides[side];
+  return nu * nu > gate * (covariance(side, side) + z.variance[side]);
+}
+
 /// Of the sides in use; those that are not used have the probability that they lie beyond.
 std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                    const Eigen::Matrix4d& covariance, const Sides& use,
@@ -153,8 +160,8 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
   S.diagonal() += z.variance;
   for (int i = 0; i < 4; ++i) {
     if (!use[i]) continue;
+    if (outsideOf(gate, z, predicted, covariance, i)) return std::nullopt;
     nu[i] = z.sides[i] - predicted.sides[i];
-    if (nu[i] * nu[i] > gate * S(i, i)) return std::nullopt;  // one side alone is outside
   }
   // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
   for (int i = 0; i < 4; ++i) {
@@ -162,14 +169,16 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
     S.row(i).setZero();
     S.col(i).setZero();
     S(i, i) = 1.0;
-    if (!predicted.exact[i]) continue;
-    const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
-    score.log_density += logBelowZero(within(z, predicted, i), variance);
   }
   if (!choleskyInPlace(S)) return std::nullopt;
   whiten(S, nu);
   score.nis = nu.squaredNorm();
   if (score.nis > gate) return std::nullopt;
+  for (int i = 0; i < 4; ++i) {
+    if (use[i] || !predicted.exact[i]) continue;
+    const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
+    score.log_density += logBelowZero(within(z, predicted, i), variance);
+  }
   score.log_density +=
       logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), score.dof, parameters.tail);
   return score;
@@ -179,6 +188,24 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
 double logAnywhere(const ProjectedBox& predicted, int side) {
   const int axis = side % 2;
   return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
+}
+
+/// Of the sides in use, those without which the others may fit: none of them is outside alone.
+Sides mayBeHidden(const BoxMeasurement& z, const ProjectedBox& predicted,
+                  const Eigen::Matrix4d& covariance, const Sides& use,
+                  const BoxParameters& parameters) {
+  Sides result{}, outside{};
+  const auto compared = static_cast<int>(std::count(use.begin(), use.end(), true));
+  if (compared < 3) return result;
+  const double gate = gateThreshold(parameters.gate, compared - 1);
+  for (int i = 0; i < 4; ++i) {
+    outside[i] = use[i] && outsideOf(gate, z, predicted, covariance, i);
+  }
+  const auto all_outside = std::count(outside.begin(), outside.end(), true);
+  for (int i = 0; i < 4; ++i) {
+    result[i] = use[i] && all_outside == (outside[i] ? 1 : 0) && within(z, predicted, i) < 0.0;
+  }
+  return result;
 }
 
 void keepLikelier(std::optional<BoxScore>& best, const std::optional<BoxScore>& next,
@@ -222,14 +249,15 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     log_shown += std::log(1.0 - parameters.amodal);
   }
   consider(use, log_shown, -1);
-  for (int i = 0; i < 4 && !fits && parameters.part > 0.0; ++i) {
-    if (!use[i] || within(z, predicted, i) >= 0.0) continue;
+  const Sides parts = fits || parameters.part <= 0.0
+                          ? Sides{}
+                          : mayBeHidden(z, predicted, covariance, use, parameters);
+  for (int i = 0; i < 4 && !fits; ++i) {
+    if (!parts[i]) continue;
     Sides others = use;
     others[i] = false;
-    if (std::count(others.begin(), others.end(), true) < 2) continue;
     // The four sides are as likely to be hidden by what is not on the map.
-    const double log_share = std::log(0.25 * parameters.part) + logAnywhere(predicted, i);
-    consider(others, log_shown + log_share, i);
+    consider(others, log_shown + std::log(0.25 * parameters.part) + logAnywhere(predicted, i), i);
   }
   if (best) best->ignored = ignored;
   return best;

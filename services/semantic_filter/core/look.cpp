@@ -23,9 +23,8 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
     if (!score) continue;
     const double log_l = logRatio(e, *frame.model, class_name, alike) + score->log_density -
                          logClutterOf(e, *score, frame.view, frame.parameters->clutter);
-    h.likelihood[i] = std::exp(std::min(log_l, kMaxLogLikelihood));
-    h.nis[i] = score->nis / score->dof;
-    h.part[i] = score->part;
+    h.fits[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), score->nis / score->dof,
+                 score->part};
   }
 }
 
@@ -173,9 +172,7 @@ ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evid
   }
   for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {
     HypothesisLook& h = result.hypotheses[i];
-    h.likelihood.assign(result.boxes.size(), 0.0);
-    h.nis.assign(result.boxes.size(), 0.0);
-    h.part.assign(result.boxes.size(), -1);
+    h.fits.assign(result.boxes.size(), {});
     if (h.box) scoreBoxes(h, object.hypotheses[i].class_name, object.alike, result, boxes, frame);
   }
   return result;
@@ -188,8 +185,9 @@ std::array<bool, 4> hiddenSides(const ObjectLook& look, std::size_t box) {
   if (i == look.boxes.size()) return hidden;
   const auto best = std::max_element(
       look.hypotheses.begin(), look.hypotheses.end(),
-      [i](const auto& a, const auto& b) { return a.likelihood[i] < b.likelihood[i]; });
-  if (best->part[i] >= 0) hidden[static_cast<std::size_t>(best->part[i])] = true;
+      [i](const auto& a, const auto& b) { return a.fits[i].likelihood < b.fits[i].likelihood; });
+  const int part = best->fits[i].part;
+  if (part >= 0) hidden[static_cast<std::size_t>(part)] = true;
   return hidden;
 }
 
@@ -197,7 +195,7 @@ double associationWeight(const Object& object, const ObjectLook& look, std::size
   double made = 0.0, silent = 0.0;
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
     const HypothesisLook& h = look.hypotheses[i];
-    made += object.hypotheses[i].weight * h.detection * h.likelihood[box];
+    made += object.hypotheses[i].weight * h.detection * h.fits[box].likelihood;
     silent += object.hypotheses[i].weight * h.silent;
   }
   const double r = object.existence;

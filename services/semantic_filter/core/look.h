@@ -26,17 +26,22 @@ struct BoxErrors {
 };
 
 /// One hypothesis in one frame.
+/// How a hypothesis explains one box.
+struct BoxFit {
+  double likelihood = 0.0;  ///< L(z), 0 outside the gate
+  double nis = 0.0;         ///< per degree of freedom, where likelihood > 0
+  int part = -1;            ///< BoxScore::part
+};
+
 struct HypothesisLook {
   std::optional<ProjectedBox> box;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
-  double detection = 0.0;          ///< v P_D: probability that the network reports it
-  double missed = 0.0;             ///< v (1 - P_D): that it is in sight and not reported
-  double silent = 1.0;             ///< A without a box: 1 - v P_D, and what a primed answer says
-  std::vector<double> likelihood;  ///< L(z) for each box of the look, 0 outside the gate
-  std::vector<double> nis;         ///< per degree of freedom, where likelihood > 0
-  std::vector<int> part;           ///< BoxScore::part of each box
-  double expected = 0.0;           ///< v P_D of its class, whatever is known of the object itself
-  double late_looks = 0.0;         ///< earlier looks that share this view, if it is true
+  double detection = 0.0;    ///< v P_D: probability that the network reports it
+  double missed = 0.0;       ///< v (1 - P_D): that it is in sight and not reported
+  double silent = 1.0;       ///< A without a box: 1 - v P_D, and what a primed answer says
+  std::vector<BoxFit> fits;  ///< for each box of the look
+  double expected = 0.0;     ///< v P_D of its class, whatever is known of the object itself
+  double late_looks = 0.0;   ///< earlier looks that share this view, if it is true
 };
 
 struct ObjectLook {

@@ -15,9 +15,9 @@ const Evidence* boxOf(const ObjectLook& look, const std::vector<Evidence>& boxes
   const Evidence* found = nullptr;
   double least = 0.0;
   for (std::size_t i = 0; i < look.boxes.size(); ++i) {
-    if (best.likelihood[i] <= 0.0 || (found && best.nis[i] >= least)) continue;
+    if (best.fits[i].likelihood <= 0.0 || (found && best.fits[i].nis >= least)) continue;
     found = &boxes[look.boxes[i]];
-    least = best.nis[i];
+    least = best.fits[i].nis;
   }
   return found;
 }

@@ -87,7 +87,7 @@ Shares sharesOf(const HypothesisLook& h, const std::vector<std::size_t>& looked_
   shares.box.reserve(looked_at.size());
   for (std::size_t i = 0; i < looked_at.size(); ++i) {
     const double free = eta[static_cast<Eigen::Index>(looked_at[i])];
-    shares.box.push_back(h.detection * free * h.likelihood[i]);
+    shares.box.push_back(h.detection * free * h.fits[i].likelihood);
     shares.A += shares.box.back();
   }
   for (auto& b : shares.box) b /= shares.A;
@@ -105,7 +105,8 @@ void updateState(Hypothesis& h, const Shares& shares, const ObjectLook& look,
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[look.boxes[i]].z;
     auto hidden = look.sight.hidden;
-    if (seen.part[i] >= 0) hidden[static_cast<std::size_t>(seen.part[i])] = true;
+    const int part = seen.fits[i].part;
+    if (part >= 0) hidden[static_cast<std::size_t>(part)] = true;
     parts.push_back(updateWithBox(h, z, hidden, repeated, frame, at_prior));
     parts.back().weight = shares.box[i];
   }
@@ -199,7 +200,8 @@ void count(Object& object, double seen, const std::vector<Shares>& shares, const
   const auto& box = shares.front().box;
   const auto z = std::max_element(box.begin(), box.end()) - box.begin();
   if (!box.empty() && box[z] > 0.5) {
-    object.running_nis = 0.85 * object.running_nis + 0.15 * look.hypotheses.front().nis[z];
+    object.running_nis = 0.85 * object.running_nis +
+                         0.15 * look.hypotheses.front().fits[static_cast<std::size_t>(z)].nis;
   }
 }
 

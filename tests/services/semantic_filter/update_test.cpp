@@ -106,7 +106,7 @@ TEST_F(Update, TwoClassesFollowEquationFourByHand) {
     ASSERT_TRUE(score);
     const double g = k == 0 ? 1.5 : 0.5;
     const double L = std::exp(g + score->log_density - boxes[0].log_clutter);
-    EXPECT_NEAR(h.likelihood[0] / L, 1.0, 1e-9);
+    EXPECT_NEAR(h.fits[0].likelihood / L, 1.0, 1e-9);
     A[k] = 1.0 - 0.8 * P_D + 0.8 * P_D * eta * L;
   }
   const double mean = 0.7 * A[0] + 0.3 * A[1];
@@ -181,8 +181,8 @@ TEST_F(Update, AModeThatAllLooksHaveWeighedStaysUntilTheyAreAskedAgain) {
     for (auto& h : one.hypotheses) h.modes_sought = sought;
     std::swap(object, one);
     ObjectLook l = lookAt(boxes, 1.0);
-    const double A = 1.0 + l.hypotheses[0].detection * (l.hypotheses[0].likelihood[0] - 1.0);
-    l.hypotheses[1].likelihood[0] = 0.1 * l.hypotheses[0].likelihood[0];
+    const double A = 1.0 + l.hypotheses[0].detection * (l.hypotheses[0].fits[0].likelihood - 1.0);
+    l.hypotheses[1].fits[0].likelihood = 0.1 * l.hypotheses[0].fits[0].likelihood;
     EXPECT_GT(A, 10.0);
     for (int i = 0; i < 3; ++i) {
       update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
@@ -265,7 +265,7 @@ TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
   const ObjectLook l = lookAt(boxes, 1.0);
   double A[3];
   for (int i = 0; i < 3; ++i) {
-    A[i] = 1.0 - l.hypotheses[i].detection * (1.0 - l.hypotheses[i].likelihood[0]);
+    A[i] = 1.0 - l.hypotheses[i].detection * (1.0 - l.hypotheses[i].fits[0].likelihood);
   }
   update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
   double still = 0.0, moving = 0.0;
