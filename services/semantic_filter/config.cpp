@@ -49,6 +49,9 @@ void describeBox(BoxParameters& p, Fields& fields) {
   fields.number("box.assumed_sides", p.assumed_sides, atLeast(0),
                 {"sides of boxes that weigh as much as what is assumed here of a network's errors, "
                  "which are learned; 0: nothing is learned"});
+  fields.number("box.assumed_azimuths", p.assumed_azimuths, atLeast(0),
+                {"azimuths, each of another thing, that weigh as much as what is assumed of their "
+                 "errors (class_priors: azimuth_sigma), which are learned; 0: nothing is learned"});
   fields.integer("box.iterations", p.iterations, between(1, 20), {"of the iterated EKF"});
 }
 

@@ -85,8 +85,11 @@ void Node::beginWorld(const WorldId& world) {
     keepFormer();
   }
   world_ = world;
-  belief_ = {
-      .objects = {}, .gone = {}, .box_scales = belief_.box_scales, .evenness = belief_.evenness};
+  belief_ = {.objects = {},
+             .gone = {},
+             .box_scales = belief_.box_scales,
+             .azimuth_scales = belief_.azimuth_scales,
+             .evenness = belief_.evenness};
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
@@ -351,11 +354,16 @@ std::optional<ComingFrame> Node::comingFrame(const Entry& entry) const {
 std::string Node::note() const {
   constexpr double kWorthSaying = 1.1;
   std::string note = former_.note();
-  const double assumed = config_.filter.box.assumed_sides;
-  const double times = std::sqrt(belief_.box_scales.ratio(models_.used(), assumed));
-  if (std::max(times, 1.0 / times) < kWorthSaying) return note;
-  if (!note.empty()) note += "; ";
-  return note + fmt::format("boxes err {:.2f} times as far as was assumed", times);
+  const BoxParameters& assumed = config_.filter.box;
+  const auto say = [&](const char* what, double ratio) {
+    const double times = std::sqrt(ratio);
+    if (std::max(times, 1.0 / times) < kWorthSaying) return;
+    if (!note.empty()) note += "; ";
+    note += fmt::format("{} err {:.2f} times as far as was assumed", what, times);
+  };
+  say("boxes", belief_.box_scales.ratio(models_.used(), assumed.assumed_sides));
+  say("azimuths", belief_.azimuth_scales.ratio(models_.used(), assumed.assumed_azimuths));
+  return note;
 }
 
 void Node::publishPredictions(const Entry& entry, const std::optional<ComingFrame>& coming) {

@@ -267,6 +267,22 @@ double BatchModel::logHead(const State& x) const {
   return sum * azimuthWorth();
 }
 
+Leftover BatchModel::leftoverOfAzimuths(const State& x, double yaw_variance) const {
+  const double worth = azimuthWorth();
+  double squares = 0.0, count = 0.0, information = 0.0;
+  for (const auto& k : looks_.keyframes()) {
+    if (!prior_.has_yaw || !k->azimuth) continue;
+    const double variance = azimuthVariance(*k);
+    const auto look = azimuthLook(*k->azimuth, x, k->from->view, variance + yaw_variance);
+    const double share = worth * look.inlier;
+    squares += share * std::pow(look.residual / azimuthSigma(k->azimuth_sigma, prior_), 2);
+    count += share;
+    information += share / variance;
+  }
+  const double free = count - information * yaw_variance;
+  return free > 0.0 ? Leftover{squares / free, free} : Leftover{};
+}
+
 double BatchModel::logSpeedPrior() const {
   return moving() ? std::log(speed_information_.determinant()) - 3.0 * std::log(2.0 * M_PI) : 0.0;
 }
@@ -345,14 +361,15 @@ std::vector<AzimuthLook> BatchModel::azimuths(const State& x) const {
   std::vector<AzimuthLook> looks;
   for (const auto& k : looks_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
-    const double sigma = azimuthSigma(*k);
-    looks.push_back(azimuthLook(*k->azimuth, x, k->from->view, sigma * sigma));
+    looks.push_back(azimuthLook(*k->azimuth, x, k->from->view, azimuthVariance(*k)));
   }
   return looks;
 }
 
-double BatchModel::azimuthSigma(const Keyframe& k) const {
-  return std::max(k.azimuth_sigma, prior_.azimuth_sigma);
+double BatchModel::azimuthVariance(const Keyframe& k) const {
+  const BoxErrors &then = k.from->errors, &now = frame_.errors;
+  const double assumed = azimuthSigma(k.azimuth_sigma, prior_);
+  return (then.model == now.model ? now : then).azimuth * assumed * assumed;
 }
 
 /// What each azimuth counts, since their errors are alike.
@@ -367,7 +384,7 @@ void BatchModel::addAzimuths(const State& x, Quadratic& q) const {
   const double worth = azimuthWorth();
   for (const auto& k : looks_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
-    const double variance = std::pow(azimuthSigma(*k), 2);
+    const double variance = azimuthVariance(*k);
     const double residual = azimuthLook(*k->azimuth, x, k->from->view, variance).residual;
     const double nis = residual * residual / variance;
     const double information = worth * (kAzimuthTail + 1.0) / (kAzimuthTail + nis) / variance;

@@ -9,6 +9,7 @@
 
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/azimuth.h"
+#include "services/semantic_filter/core/error_scale.h"
 #include "services/semantic_filter/core/keyframe.h"
 
 namespace perdure::semantic_filter {
@@ -113,6 +114,9 @@ class BatchModel {
   double logAzimuths(const State& x) const;
   /// Log-odds that the azimuths mean the yaw of x and not the one turned by 180°.
   double logHead(const State& x) const;
+  /// Of the azimuths that say something, beside what was assumed of their errors at first.
+  /// `yaw_variance`: of the fit that x is of.
+  Leftover leftoverOfAzimuths(const State& x, double yaw_variance) const;
   /// log |Λ / 2π| of the velocity's prior, which only what moves has.
   double logSpeedPrior() const;
   /// log |Λ| of the size's prior.
@@ -133,7 +137,7 @@ class BatchModel {
   Eigen::Vector4d lasting(const Keyframe& k) const;
   Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
   std::vector<AzimuthLook> azimuths(const State& x) const;
-  double azimuthSigma(const Keyframe& k) const;
+  double azimuthVariance(const Keyframe& k) const;  ///< as the network is known now
   double azimuthWorth() const;
   void addAzimuths(const State& x, Quadratic& q) const;
 

@@ -162,7 +162,7 @@ void addMovingTwin(Object& object, const Hypothesis& still, const ClassPrior& pr
 void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
                     const ClassPrior& prior, const FrameContext& frame) {
   if (!evidence.azimuth || !prior.has_yaw) return;
-  const double sigma = std::max(evidence.azimuth_sigma, prior.azimuth_sigma);
+  const double sigma = azimuthSigma(evidence.azimuth_sigma, prior);
   double before = 0.0, after = 0.0;
   for (auto& h : fits) {
     before += h.weight;

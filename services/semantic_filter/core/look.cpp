@@ -142,6 +142,10 @@ double shareFound(const Object& object, double elusive_found) {
   return 1.0 - object.screened - (1.0 - elusive_found) * object.elusive;
 }
 
+double azimuthSigma(double told, const ClassPrior& prior) {
+  return std::max(told, prior.azimuth_sigma);
+}
+
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {
   const BoxParameters& box = frame.parameters->box;
   double half = box.min_size_px;

@@ -16,10 +16,11 @@ namespace perdure::semantic_filter {
 struct KeyView;
 class Ground;
 
-/// Of the boxes of one network, beside what is assumed of them.
+/// Of the boxes of one network and their azimuths, beside what is assumed of them.
 struct BoxErrors {
   std::uint64_t model = 0;
-  double noise = 1.0;  ///< of variances: BoxScales::ratio
+  double noise = 1.0;    ///< of the sides' variances: ErrorScales::ratio
+  double azimuth = 1.0;  ///< of the azimuths'
   /// The same of b. What the looks at one thing have in common passes for its place and size: what
   /// is left over of fits tells of b by half only, as networks go.
   double lasting() const { return std::sqrt(noise); }
@@ -83,6 +84,9 @@ double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
 /// By what P_D and what is visible are to be multiplied: what is screened is not found, what is
 /// elusive seldom.
 double shareFound(const Object& object, double elusive_found);
+
+/// Of an azimuth of which the network says `told`, rad, as is assumed at first.
+double azimuthSigma(double told, const ClassPrior& prior);
 
 /// P_D of a class for an instance of this size in pixels (√ of its box's area), fully visible.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);

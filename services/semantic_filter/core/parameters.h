@@ -20,6 +20,7 @@ struct BoxParameters {
   double part = 0.05;             ///< share of boxes that show a part of a thing alone
   std::int64_t iterations = 3;    ///< of the iterated EKF
   double assumed_sides = 200.0;   ///< seen ones that weigh as much as these assumptions
+  double assumed_azimuths = 10.0;  ///< the same of what the classes and the network say of these
   /// The error of a side is noise and, for this share of its variance, the object's b, which stays
   /// while the view stays; b falls to 1/e after a change of
   double bias_share = 0.3;

@@ -101,7 +101,9 @@ void IdBook::forgetBefore(std::uint64_t frame_sequence) {
 
 BoxErrors SemanticFilter::errorsOf(const Belief& belief, const FrameInput& input) const {
   const std::uint64_t model = input.model.hash;
-  return {model, belief.box_scales.ratio(model, parameters_.box.assumed_sides)};
+  const BoxParameters& assumed = parameters_.box;
+  return {model, belief.box_scales.ratio(model, assumed.assumed_sides),
+          belief.azimuth_scales.ratio(model, assumed.assumed_azimuths)};
 }
 
 FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& input) const {
@@ -223,7 +225,10 @@ void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, Belief& belie
   if (objects.size() > most) objects.resize(most);
   for (Object* object : objects) {
     const double share = object->fresh_keyframes / static_cast<double>(object->keyframes.size());
-    if (const auto over = smooth(*object, frame)) belief.box_scales.hear(frame.errors.model, *over);
+    if (const auto over = smooth(*object, frame)) {
+      belief.box_scales.hear(frame.errors.model, over->sides);
+      belief.azimuth_scales.hear(frame.errors.model, over->azimuths);
+    }
     frame.ground->tell(belief.evenness, *object, share);
   }
 }

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "services/semantic_filter/core/birth.h"
-#include "services/semantic_filter/core/box_scale.h"
 #include "services/semantic_filter/core/drift_watch.h"
+#include "services/semantic_filter/core/error_scale.h"
 #include "services/semantic_filter/core/ground.h"
 #include "services/semantic_filter/core/merge.h"
 #include "services/semantic_filter/core/tend.h"
@@ -31,7 +31,8 @@ struct FrameInput {
 struct Belief {
   std::vector<Object> objects;  ///< in order of id
   std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
-  BoxScales box_scales = {};
+  ErrorScales box_scales{4000.0};     ///< sides
+  ErrorScales azimuth_scales{200.0};  ///< azimuths, each of another thing
   Evenness evenness = {};
   Path path = {};  ///< of the body
 };

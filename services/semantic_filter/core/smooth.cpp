@@ -178,8 +178,8 @@ std::optional<Fitted> driveFrom(Object& object, const Fitted& at_rest, const Loo
 }
 
 /// What the best fit of a thing of the class at rest leaves over.
-std::optional<Leftover> smoothClass(Object& object, const std::string& name, const Looks& looks,
-                                    const FrameContext& frame, bool seek, Verdicts& verdicts) {
+std::optional<Leftovers> smoothClass(Object& object, const std::string& name, const Looks& looks,
+                                     const FrameContext& frame, bool seek, Verdicts& verdicts) {
   const auto& p = frame.parameters->smooth;
   Fits still, moving;
   for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
@@ -200,7 +200,10 @@ std::optional<Leftover> smoothClass(Object& object, const std::string& name, con
   weighModes(object.hypotheses.write(), still, p.least_weight);
   weighModes(object.hypotheses.write(), moving, p.least_weight);
   auto at_rest = heaviest(object.hypotheses.read(), std::move(still));
-  const auto over = at_rest ? std::optional(at_rest->smoothed.leftover()) : std::nullopt;
+  std::optional<Leftovers> over;
+  if (at_rest) {
+    over = Leftovers{at_rest->smoothed.leftover(), at_rest->smoothed.leftoverOfAzimuths()};
+  }
   auto driving = heaviest(object.hypotheses.read(), std::move(moving));
   if (!driving && at_rest) driving = driveFrom(object, *at_rest, looks, frame);
   if (!driving) return over;
@@ -298,7 +301,7 @@ double smoothingNeed(const Object& object, double fresh) {
          (fresh * static_cast<double>(object.keyframes.size()) * object.smoothing_patience);
 }
 
-std::optional<Leftover> smooth(Object& object, const FrameContext& frame) {
+std::optional<Leftovers> smooth(Object& object, const FrameContext& frame) {
   const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smooth.patience);
   constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
   const auto& p = *frame.parameters;
@@ -311,7 +314,7 @@ std::optional<Leftover> smooth(Object& object, const FrameContext& frame) {
   const bool seek = object.remembered >= object.seek_modes_at;
   if (seek) object.seek_modes_at = 2 * object.remembered;
   Verdicts verdicts;
-  std::map<std::string, Leftover> over;
+  std::map<std::string, Leftovers> over;
   for (const auto& name : names) {
     const auto left = smoothClass(object, name, looks, frame, seek, verdicts);
     if (left) over[name] = *left;
@@ -326,7 +329,9 @@ std::optional<Leftover> smooth(Object& object, const FrameContext& frame) {
   object.smoothing_patience = settled ? std::min(2 * object.smoothing_patience, most_patience) : 1;
   const auto told = over.find(object.best().class_name);
   if (told == over.end() || !tellsOfBoxes(object, frame)) return std::nullopt;
-  return Leftover{told->second.ratio, told->second.sides * std::min(fresh, 1.0)};
+  Leftovers result = told->second;
+  for (Leftover* one : {&result.sides, &result.azimuths}) one->count *= std::min(fresh, 1.0);
+  return result;
 }
 
 }  // namespace perdure::semantic_filter

@@ -2,7 +2,7 @@
 // it is, and whether it moves.
 #pragma once
 
-#include "services/semantic_filter/core/box_scale.h"
+#include "services/semantic_filter/core/error_scale.h"
 #include "services/semantic_filter/core/evidence.h"
 #include "services/semantic_filter/core/keyframe.h"
 
@@ -15,8 +15,12 @@ bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>
 /// How much there is to gain, where `fresh` is the share of new looks that is waited for: 1 and
 /// more is worth it.
 double smoothingNeed(const Object& object, double fresh);
-/// Smooths the object's hypotheses and weighs within each class whether it moves. What the fit of a
-/// thing that surely stands leaves over of the boxes that are new.
-std::optional<Leftover> smooth(Object& object, const FrameContext& frame);
+/// What the fit of a thing leaves over of its looks.
+struct Leftovers {
+  Leftover sides, azimuths;
+};
+/// Smooths the object's hypotheses and weighs within each class whether it moves. Of a thing that
+/// surely stands, what is left over of the looks that are new.
+std::optional<Leftovers> smooth(Object& object, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

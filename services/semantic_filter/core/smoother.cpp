@@ -264,6 +264,10 @@ Leftover Smoothed::leftover() const {
   return {frame_->errors.noise * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
 }
 
+Leftover Smoothed::leftoverOfAzimuths() const {
+  return modelOf().leftoverOfAzimuths(fit_->x, hypothesis_.P(kYaw, kYaw));
+}
+
 double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }
 
 double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/batch_model.h"
-#include "services/semantic_filter/core/box_scale.h"
+#include "services/semantic_filter/core/error_scale.h"
 
 namespace perdure::semantic_filter {
 
@@ -38,6 +38,8 @@ class Smoothed {
   /// What it leaves over of the boxes, beside what was assumed of their errors at first; of as many
   /// sides as it has degrees of freedom.
   Leftover leftover() const;
+  /// The same of the azimuths.
+  Leftover leftoverOfAzimuths() const;
   /// Sides that count as measured, of all looks.
   std::size_t sides() const;
   /// 1 for each look that does.

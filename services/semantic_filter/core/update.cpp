@@ -149,7 +149,7 @@ void updateAzimuths(Object& object, const std::vector<Shares>& shares, double wo
     for (std::size_t b = 0; b < looked_at.size(); ++b) {
       const Evidence& box = boxes[looked_at[b]];
       if (!box.azimuth || shares[i].box[b] < 0.2) continue;
-      const double sigma = std::max(box.azimuth_sigma, prior.azimuth_sigma);
+      const double sigma = azimuthSigma(box.azimuth_sigma, prior);
       const double weight = shares[i].box[b] * std::sqrt(worth);
       likelihood[i] *= std::pow(
           updateWithAzimuth(object.hypotheses[i], *box.azimuth, sigma, weight, frame), weight);

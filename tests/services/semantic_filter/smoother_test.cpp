@@ -156,8 +156,8 @@ TEST(Smoother, LeavesOverWhatTheBoxesErrMoreThanAssumed) {
     const Looks looks(scene.keyframes(), frame.pose_error);
     const auto s = Smoothed::make(scene.start(false), looks, frame);
     ASSERT_TRUE(s) << seed;
-    left += s->leftover().sides * s->leftover().ratio;
-    sides += s->leftover().sides;
+    left += s->leftover().count * s->leftover().ratio;
+    sides += s->leftover().count;
   }
   EXPECT_NEAR(left / sides, 1.0, 0.15);
 }

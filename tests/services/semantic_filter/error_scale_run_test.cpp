@@ -1,6 +1,8 @@
-// How far a network's boxes err, learned while driving past parked cars.
+// How far a network's boxes and azimuths err, learned while driving past parked cars.
 #include <gtest/gtest.h>
 
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/cuboid.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -26,8 +28,9 @@ std::vector<TrueObject> parkedCars() {
   return cars;
 }
 
-/// Boxes whose sides err `noise` times as far as is assumed.
-Detections boxesAt(std::uint64_t k, double noise) {
+/// Boxes whose sides err `noise` times as far as is assumed, with azimuths if `azimuth_sigma` is
+/// not 0.
+Detections boxesAt(std::uint64_t k, double noise, double azimuth_sigma = 0.0) {
   static const CameraModel camera{testing::makeCamera()};
   static const std::vector<TrueObject> cars = parkedCars();
   std::mt19937 random(static_cast<std::uint32_t>(k) + 77);
@@ -35,7 +38,14 @@ Detections boxesAt(std::uint64_t k, double noise) {
   std::vector<Detection> list;
   for (const TrueObject& car : cars) {
     if ((car.x.head<3>() - view.T_WB.p).norm() > 40.0) continue;
-    if (auto d = detect(car, view, BoxParameters{}, noise, 3.0, random)) list.push_back(*d);
+    auto d = detect(car, view, BoxParameters{}, noise, 3.0, random);
+    if (!d) continue;
+    if (azimuth_sigma > 0.0) {
+      std::normal_distribution<double> error(0.0, azimuth_sigma);
+      const double straight = yawFromAzimuth(0.0, car.x.head<3>(), view);
+      d->azimuth = wrapAngle(straight - car.x[kYaw] + error(random));
+    }
+    list.push_back(*d);
   }
   return detectionsAt(k, std::move(list));
 }
@@ -54,7 +64,7 @@ double learnedFrom(double noise) {
   return learned(h);
 }
 
-TEST(BoxScaleRun, LearnsHowFarBoxesErr) {
+TEST(ErrorScaleRun, LearnsHowFarBoxesErr) {
   // The errors are drawn anew at each look: of what is assumed to stay with the thing nothing does.
   const double third = learnedFrom(0.35), once = learnedFrom(1.0), twice = learnedFrom(1.6);
   EXPECT_GT(third, 0.08);
@@ -65,7 +75,31 @@ TEST(BoxScaleRun, LearnsHowFarBoxesErr) {
   EXPECT_LT(twice, 4.5);
 }
 
-TEST(BoxScaleRun, LearnsTheSameFromLateBoxes) {
+double azimuthsLearnedFrom(double sigma, double assumed = Parameters{}.box.assumed_azimuths) {
+  Config config;
+  config.filter.box.assumed_azimuths = assumed;
+  Harness h(config);
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    h.node.onDetections(boxesAt(k, 0.35, sigma));
+  }
+  return h.node.belief().azimuth_scales.ratio(testing::makeModelInfo().hash, assumed);
+}
+
+TEST(ErrorScaleRun, LearnsHowFarAzimuthsErr) {
+  const double assumed = 0.35;
+  const double third = azimuthsLearnedFrom(assumed / 3.0), once = azimuthsLearnedFrom(assumed),
+               twice = azimuthsLearnedFrom(1.8 * assumed);
+  EXPECT_GT(third, 0.08);
+  EXPECT_LT(third, 0.5);
+  EXPECT_GT(once, 0.7);
+  EXPECT_LT(once, 1.3);
+  EXPECT_GT(twice, 1.4);
+  EXPECT_LT(twice, 4.0);
+  EXPECT_EQ(azimuthsLearnedFrom(assumed / 3.0, 0.0), 1.0);  // nothing is to be learned
+}
+
+TEST(ErrorScaleRun, LearnsTheSameFromLateBoxes) {
   Harness on_time, late;
   constexpr std::uint64_t kLate = 2;
   for (std::uint64_t k = 0; k < kFrames; ++k) {
@@ -80,7 +114,7 @@ TEST(BoxScaleRun, LearnsTheSameFromLateBoxes) {
   EXPECT_NEAR(learned(late), learned(on_time), 1e-9);
 }
 
-TEST(BoxScaleRun, SaysWhatItMakesOfTheBoxes) {
+TEST(ErrorScaleRun, SaysWhatItMakesOfTheBoxes) {
   Harness h;
   EXPECT_EQ(h.node.note(), "");
   for (std::uint64_t k = 0; k < kFrames; ++k) {
@@ -88,19 +122,23 @@ TEST(BoxScaleRun, SaysWhatItMakesOfTheBoxes) {
     h.node.onDetections(boxesAt(k, 0.35));
   }
   EXPECT_NE(h.node.note().find("boxes err 0."), std::string::npos) << h.node.note();
+  EXPECT_EQ(h.node.note().find("azimuths"), std::string::npos) << h.node.note();
 }
 
-TEST(BoxScaleRun, KeepsItWhenOdometryBeginsAnew) {
+TEST(ErrorScaleRun, KeepsItWhenOdometryBeginsAnew) {
   Harness h;
   for (std::uint64_t k = 0; k < kFrames; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    h.node.onDetections(boxesAt(k, 0.35));
+    h.node.onDetections(boxesAt(k, 0.35, 0.1));
   }
+  EXPECT_NE(h.node.note().find("azimuths err 0."), std::string::npos) << h.node.note();
   const double before = learned(h);
+  const std::string note = h.node.note();
   Odometry anew = odometryAt(kFrames, driveTo(0, kMetres));
   anew.world = {6, 1};
   h.node.onOdometry(anew);
   EXPECT_EQ(learned(h), before);
+  EXPECT_NE(h.node.note().find(note), std::string::npos) << h.node.note();
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/box_scale.h"
+#include "services/semantic_filter/core/error_scale.h"
 
 #include <gtest/gtest.h>
 
@@ -10,31 +10,31 @@ namespace {
 constexpr std::uint64_t kNetwork = 17, kOther = 18;
 constexpr double kAssumed = 200.0;
 
-TEST(BoxScales, AreAsAssumedUntilSomethingIsHeard) {
-  BoxScales scales;
+TEST(ErrorScales, AreAsAssumedUntilSomethingIsHeard) {
+  ErrorScales scales(4000.0);
   EXPECT_EQ(scales.ratio(kNetwork, kAssumed), 1.0);
   scales.hear(kOther, {4.0, 1000.0});
   EXPECT_EQ(scales.ratio(kNetwork, kAssumed), 1.0);
   EXPECT_EQ(scales.ratio(kOther, 0.0), 1.0);  // nothing is to be learned
 }
 
-TEST(BoxScales, TheAssumptionWeighsAsManySides) {
-  BoxScales scales;
+TEST(ErrorScales, TheAssumptionWeighsAsManySides) {
+  ErrorScales scales(4000.0);
   scales.hear(kNetwork, {0.2, kAssumed});
   EXPECT_NEAR(scales.ratio(kNetwork, kAssumed), 0.6, 1e-12);
   for (int i = 0; i < 100; ++i) scales.hear(kNetwork, {0.2, 30.0});
   EXPECT_NEAR(scales.ratio(kNetwork, kAssumed), 0.25, 0.01);
 }
 
-TEST(BoxScales, FollowANetworkThatGetsWorse) {
-  BoxScales scales;
+TEST(ErrorScales, FollowANetworkThatGetsWorse) {
+  ErrorScales scales(4000.0);
   for (int i = 0; i < 2000; ++i) scales.hear(kNetwork, {0.2, 50.0});
   for (int i = 0; i < 400; ++i) scales.hear(kNetwork, {2.0, 50.0});
   EXPECT_GT(scales.ratio(kNetwork, kAssumed), 1.7);
 }
 
-TEST(BoxScales, StayWithinReason) {
-  BoxScales scales;
+TEST(ErrorScales, StayWithinReason) {
+  ErrorScales scales(4000.0);
   for (int i = 0; i < 1000; ++i) scales.hear(kNetwork, {0.0, 50.0});
   EXPECT_GE(scales.ratio(kNetwork, kAssumed), 0.04);
   for (int i = 0; i < 1000; ++i) scales.hear(kOther, {1e6, 50.0});
