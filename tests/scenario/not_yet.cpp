@@ -9,83 +9,91 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"toy",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.986, 0.978, 0.902: the car at 40 m is 16 px high and found in six looks of ten; "
-            "it is believed a little later"},
+            "0.986, 0.978, 0.902: the car at 40 m is 16 px high and found in six looks of ten; it "
+            "is believed a little later"},
        }},
       {"occlusion",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "1, 2, 0: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
+            "2, 1, 1: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"vanish",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "3, 0, 2: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
+            "2, 0, 0: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"room",
        {
            {"looks that showed a claimed thing and made it less sure",
-            "3, 2, 1: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
+            "3, 4, 4: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"row",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "9, 9, 7: of 90 cars (nine seeds) 14 err by more, along the road, or were lost to a "
+            "9, 8, 6: of 90 cars (nine seeds) 14 err by more, along the road, or were lost to a "
             "neighbour"},
            {"looks that showed a claimed thing and made it less sure",
-            "2, 2, 0: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
+            "1, 4, 1: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"roll",
        {
            {"change of yaw meanwhile, deg, nine in ten",
-            "13.7, 27.9, 5.49: not by the roll alone: the estimate still settles as the camera "
+            "12.7, 4.15, 5.34: not by the roll alone: the estimate still settles as the camera "
             "comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.1, 0.0587, 0.0659: not by the roll alone: the estimate still settles as the "
+            "0.0836, 0.0439, 0.0615: not by the roll alone: the estimate still settles as the "
             "camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.236, 0.719, 0.151: not by the roll alone: the estimate still settles as the "
-            "camera comes nearer"},
+            "0.375, 0.168, 0.186: not by the roll alone: the estimate still settles as the camera "
+            "comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "0, 0, 2: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
+            "1, 2, 1: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"traffic",
        {
            {"things in long-term memory where nothing stands",
-            "2, 2, 3: people who walk along the road, and a parked car that is misplaced; what "
+            "2, 2, 4: people who walk along the road, and a parked car that is misplaced; what "
             "drives leaves none"},
            {"standing things on the map where nothing is",
-            "2, 2, 3: people who walk along the road, and a parked car that is misplaced; what "
+            "2, 2, 4: people who walk along the road, and a parked car that is misplaced; what "
             "drives leaves none"},
            {"looks that showed a claimed thing and made it less sure",
-            "3, 3, 4: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
-           {"merges that lost existence", "1, 0, 0: a merge in the frame of a miss"},
+            "3, 2, 2: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
        }},
       {"street",
        {
-           {"second lap: share that keeps the id of the first",
-            "0.982, 0.971, 0.982: two beliefs in one thing, of which the older survives where "
-            "the younger was told of more often"},
            {"flicker: claims in full sight that ceased and came back",
-            "3, 4, 3: some misses in a row, or a place lost for a few frames"},
+            "2, 2, 3: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "1, 1, 1: young ones, of five to sixteen looks, that are something or somewhere "
-            "else after all"},
+            "2, 0, 1: young ones, of five to sixteen looks, that are something or somewhere else "
+            "after all"},
            {"looks that showed a claimed thing and made it less sure",
-            "1, 2, 3: looks whose box another thing may have made, or a belief of odd size "
-            "given up"},
+            "3, 3, 3: looks whose box another thing may have made, or a belief of odd size given "
+            "up"},
+           {"merges that lost existence", "0, 0, 1: a merge in the frame of a miss"},
+       }},
+      {"street recalled",
+       {
+           {"second lap: share that keeps the id of the first",
+            "0.964: .953 in the mean of twelve seeds; two beliefs in one thing, as without the "
+            "map"},
+           {"flicker: claims in full sight that ceased and came back",
+            "1: some misses in a row, or a place lost for a few frames"},
+           {"claims at rest that jump by more than 3 m from one frame to the next",
+            "2: young ones, of five to sixteen looks, that are something or somewhere else after "
+            "all"},
        }},
       {"toy vio",
        {
            {"P(car, exists) of the real cars, 40 frames after first sight",
-            "0.502: the car at 40 m is 16 px high and found in six looks of ten; it is believed "
-            "a little later"},
+            "0.502: the car at 40 m is 16 px high and found in six looks of ten; it is believed a "
+            "little later"},
            {"P(car, exists) of the real cars at the end",
             "0.914: the car at 43 m is 16 px high and found in six looks of ten"},
            {"share of the far ones that is accepted at the end", "0.5: the car at 43 m, as above"},
@@ -98,9 +106,10 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"occlusion vio",
        {
            {"share of the predictions whose interval holds the return",
-            "0.826: a body that turns back is taken for one whose velocity wanders"},
+            "0.719: a body that turns back is taken for one whose velocity wanders"},
            {"looks that showed a claimed thing and made it less sure",
-            "3: looks whose box another thing may have made, or a belief of odd size given up"},
+            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+           {"merges that lost existence", "1: a merge in the frame of a miss"},
        }},
       {"vanish vio",
        {
@@ -115,44 +124,43 @@ std::map<std::string, std::string> notYet(const std::string& scene) {
       {"row vio",
        {
            {"cars of the row that are on the map within 0.5 m",
-            "5: placed along the line of sight to a metre"},
+            "6: placed along the line of sight to a metre"},
            {"looks that showed a claimed thing and made it less sure",
             "4: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"roll vio",
        {
+           {"change of yaw meanwhile, deg, nine in ten",
+            "19.4: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, median",
-            "0.0746: not by the roll alone: the estimate still settles as the camera comes "
-            "nearer"},
+            "0.112: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"change of a length, width or height, share, nine in ten",
-            "0.186: not by the roll alone: the estimate still settles as the camera comes nearer"},
-           {"recall under 1 m", "0.798: not yet looked into; with true poses it passes"},
+            "0.33: not by the roll alone: the estimate still settles as the camera comes nearer"},
            {"looks that showed a claimed thing and made it less sure",
-            "2: looks whose box another thing may have made, or a belief of odd size given up"},
-           {"merges that lost existence", "1: not yet looked into; with true poses it passes"},
+            "3: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"traffic vio",
        {
            {"things in long-term memory where nothing stands",
-            "4: people who walk along the road, and a parked car that is misplaced; what drives "
+            "2: people who walk along the road, and a parked car that is misplaced; what drives "
             "leaves none"},
            {"standing things on the map where nothing is",
-            "4: people who walk along the road, and a parked car that is misplaced; what drives "
+            "2: people who walk along the road, and a parked car that is misplaced; what drives "
             "leaves none"},
            {"looks that showed a claimed thing and made it less sure",
-            "5: looks whose box another thing may have made, or a belief of odd size given up"},
+            "10: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
       {"street vio",
        {
            {"second lap: share that keeps the id of the first",
-            "0.889: not yet looked into; with true poses it passes"},
+            "0.963: not yet looked into; with true poses it passes"},
            {"flicker: claims in full sight that ceased and came back",
-            "5: some misses in a row, or a place lost for a few frames"},
+            "4: some misses in a row, or a place lost for a few frames"},
            {"claims at rest that jump by more than 3 m from one frame to the next",
-            "4: young ones, of five to sixteen looks, that are something or somewhere else "
-            "after all"},
+            "2: young ones, of five to sixteen looks, that are something or somewhere else after "
+            "all"},
            {"looks that showed a claimed thing and made it less sure",
-            "7: looks whose box another thing may have made, or a belief of odd size given up"},
+            "6: looks whose box another thing may have made, or a belief of odd size given up"},
        }},
   };
   const auto found = all.find(scene);

@@ -19,10 +19,10 @@ struct ClassPrior {
   double detection_probability = 0.8;  ///< of a fully visible, large instance; (0, 1)
   double moving = 0.0;                 ///< prior probability that an instance moves, [0, 1)
   double speed_sigma = 0.0;            ///< of moving ones, along their length, m/s
-  double stands = 0.0;         ///< probability that an instance stands on the ground, [0, 1)
-  bool has_yaw = true;                 ///< false: too round for its yaw to show in a box
-  double azimuth_sigma = 0.35;         ///< radians, floor of what a network's azimuth deserves
-  Shape shape = cuboidShape();         ///< what its things fill of their cuboids
+  double stands = 0.0;          ///< probability that an instance stands on the ground, [0, 1)
+  bool has_yaw = true;          ///< false: too round for its yaw to show in a box
+  double azimuth_sigma = 0.35;  ///< radians, at least, until azimuths have shown less
+  Shape shape = cuboidShape();  ///< what its things fill of their cuboids
 };
 
 /// How often things of two classes stand near each other, learned from maps (core/context.h).
