@@ -26,7 +26,6 @@ struct BoxErrors {
   double lasting() const { return std::sqrt(noise); }
 };
 
-/// One hypothesis in one frame.
 /// How a hypothesis explains one box.
 struct BoxFit {
   double likelihood = 0.0;  ///< L(z), 0 outside the gate
@@ -34,6 +33,7 @@ struct BoxFit {
   int part = -1;            ///< BoxScore::part
 };
 
+/// One hypothesis in one frame.
 struct HypothesisLook {
   std::optional<ProjectedBox> box;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
