@@ -85,11 +85,7 @@ void Node::beginWorld(const WorldId& world) {
     keepFormer();
   }
   world_ = world;
-  belief_ = {.objects = {},
-             .gone = {},
-             .box_scales = belief_.box_scales,
-             .azimuth_scales = belief_.azimuth_scales,
-             .evenness = belief_.evenness};
+  belief_ = {.objects = {}, .gone = {}, .learned = belief_.learned};
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
@@ -361,8 +357,8 @@ std::string Node::note() const {
     if (!note.empty()) note += "; ";
     note += fmt::format("{} err {:.2f} times as far as was assumed", what, times);
   };
-  say("boxes", belief_.box_scales.ratio(models_.used(), assumed.assumed_sides));
-  say("azimuths", belief_.azimuth_scales.ratio(models_.used(), assumed.assumed_azimuths));
+  say("boxes", belief_.learned.sides.ratio(models_.used(), assumed.assumed_sides));
+  say("azimuths", belief_.learned.azimuths.ratio(models_.used(), assumed.assumed_azimuths));
   return note;
 }
 

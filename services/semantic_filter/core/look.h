@@ -20,7 +20,7 @@ class Ground;
 struct BoxErrors {
   std::uint64_t model = 0;
   double noise = 1.0;    ///< of the sides' variances: ErrorScales::ratio
-  double azimuth = 1.0;  ///< of the azimuths'
+  double azimuth = 1.0;  ///< of the azimuths'; heard by fits of many looks alone
   /// The same of b. What the looks at one thing have in common passes for its place and size: what
   /// is left over of fits tells of b by half only, as networks go.
   double lasting() const { return std::sqrt(noise); }

@@ -102,8 +102,8 @@ void IdBook::forgetBefore(std::uint64_t frame_sequence) {
 BoxErrors SemanticFilter::errorsOf(const Belief& belief, const FrameInput& input) const {
   const std::uint64_t model = input.model.hash;
   const BoxParameters& assumed = parameters_.box;
-  return {model, belief.box_scales.ratio(model, assumed.assumed_sides),
-          belief.azimuth_scales.ratio(model, assumed.assumed_azimuths)};
+  return {model, belief.learned.sides.ratio(model, assumed.assumed_sides),
+          belief.learned.azimuths.ratio(model, assumed.assumed_azimuths)};
 }
 
 FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& input) const {
@@ -116,7 +116,7 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
           std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
                                           input.model.styles, errors),
           errors,
-          std::make_shared<const Ground>(belief.objects, belief.path, belief.evenness,
+          std::make_shared<const Ground>(belief.objects, belief.path, belief.learned.evenness,
                                          input.view.up_W, priors_, parameters_.ground)};
 }
 
@@ -226,10 +226,10 @@ void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, Belief& belie
   for (Object* object : objects) {
     const double share = object->fresh_keyframes / static_cast<double>(object->keyframes.size());
     if (const auto over = smooth(*object, frame)) {
-      belief.box_scales.hear(frame.errors.model, over->sides);
-      belief.azimuth_scales.hear(frame.errors.model, over->azimuths);
+      belief.learned.sides.hear(frame.errors.model, over->sides);
+      belief.learned.azimuths.hear(frame.errors.model, over->azimuths);
     }
-    frame.ground->tell(belief.evenness, *object, share);
+    frame.ground->tell(belief.learned.evenness, *object, share);
   }
 }
 

@@ -28,12 +28,17 @@ struct FrameInput {
   Model model;                ///< that the boxes' classes refer to
 };
 
+/// What is true of the networks and of the streets, whatever the world: it outlives a world.
+struct Learned {
+  ErrorScales sides{4000.0};    ///< of boxes
+  ErrorScales azimuths{200.0};  ///< each of another thing
+  Evenness evenness = {};
+};
+
 struct Belief {
   std::vector<Object> objects;  ///< in order of id
   std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
-  ErrorScales box_scales{4000.0};     ///< sides
-  ErrorScales azimuth_scales{200.0};  ///< azimuths, each of another thing
-  Evenness evenness = {};
+  Learned learned = {};
   Path path = {};  ///< of the body
 };
 

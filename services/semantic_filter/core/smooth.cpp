@@ -34,6 +34,13 @@ struct Fitted {
 };
 using Fits = std::vector<Fitted>;
 
+/// A fit that none of the object's hypotheses had, with its own `h`.
+Fitted adopt(Object& object, Hypothesis h, Smoothed&& smoothed, const FrameContext& frame) {
+  const double ground = standOnGround(h, object.id, frame);
+  object.hypotheses.push_back(h);
+  return {object.hypotheses.size() - 1, std::move(smoothed), ground};
+}
+
 /// Of one class: whether it moves, by what all looks and the ground say.
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
                  const Fitted& driving, const FrameContext& frame) {
@@ -154,9 +161,7 @@ void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fi
     Hypothesis h = smoothed->hypothesis();
     h.head = smoothed->logHead();
     if (h.head < 0.0) h.head = -h.head, h.x[kYaw] = wrapAngle(h.x[kYaw] + M_PI);
-    const double ground = standOnGround(h, object.id, frame);
-    object.hypotheses.push_back(h);
-    fits.push_back({object.hypotheses.size() - 1, std::move(*smoothed), ground});
+    fits.push_back(adopt(object, std::move(h), std::move(*smoothed), frame));
   }
 }
 
@@ -172,9 +177,7 @@ std::optional<Fitted> driveFrom(Object& object, const Fitted& at_rest, const Loo
   if (!smoothed) return std::nullopt;
   Hypothesis h = smoothed->hypothesis();
   h.weight = 1e-3 * start.weight;
-  const double ground = standOnGround(h, object.id, frame);
-  object.hypotheses.push_back(h);
-  return Fitted{object.hypotheses.size() - 1, std::move(*smoothed), ground};
+  return adopt(object, std::move(h), std::move(*smoothed), frame);
 }
 
 /// What the best fit of a thing of the class at rest leaves over.
@@ -213,9 +216,7 @@ std::optional<Leftovers> smoothClass(Object& object, const std::string& name, co
     if (!smoothed) return over;
     Hypothesis h = smoothed->hypothesis();
     h.weight = 1e-3 * mover.weight;
-    const double ground = standOnGround(h, object.id, frame);
-    object.hypotheses.push_back(h);
-    at_rest.emplace(Fitted{object.hypotheses.size() - 1, std::move(*smoothed), ground});
+    at_rest.emplace(adopt(object, std::move(h), std::move(*smoothed), frame));
   }
   weighMotion(object.hypotheses.write(), name, *at_rest, *driving, frame);
   return over;

@@ -50,17 +50,21 @@ Detections boxesAt(std::uint64_t k, double noise, double azimuth_sigma = 0.0) {
   return detectionsAt(k, std::move(list));
 }
 
+void drive(Harness& h, double noise, double azimuth_sigma = 0.0) {
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
+    h.node.onDetections(boxesAt(k, noise, azimuth_sigma));
+  }
+}
+
 double learned(const Harness& h) {
-  return h.node.belief().box_scales.ratio(testing::makeModelInfo().hash,
-                                          Parameters{}.box.assumed_sides);
+  return h.node.belief().learned.sides.ratio(testing::makeModelInfo().hash,
+                                             Parameters{}.box.assumed_sides);
 }
 
 double learnedFrom(double noise) {
   Harness h;
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
-    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    h.node.onDetections(boxesAt(k, noise));
-  }
+  drive(h, noise);
   return learned(h);
 }
 
@@ -75,15 +79,16 @@ TEST(ErrorScaleRun, LearnsHowFarBoxesErr) {
   EXPECT_LT(twice, 4.5);
 }
 
+double azimuthsLearned(const Harness& h, double assumed = Parameters{}.box.assumed_azimuths) {
+  return h.node.belief().learned.azimuths.ratio(testing::makeModelInfo().hash, assumed);
+}
+
 double azimuthsLearnedFrom(double sigma, double assumed = Parameters{}.box.assumed_azimuths) {
   Config config;
   config.filter.box.assumed_azimuths = assumed;
   Harness h(config);
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
-    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    h.node.onDetections(boxesAt(k, 0.35, sigma));
-  }
-  return h.node.belief().azimuth_scales.ratio(testing::makeModelInfo().hash, assumed);
+  drive(h, 0.35, sigma);
+  return azimuthsLearned(h, assumed);
 }
 
 TEST(ErrorScaleRun, LearnsHowFarAzimuthsErr) {
@@ -104,33 +109,29 @@ TEST(ErrorScaleRun, LearnsTheSameFromLateBoxes) {
   constexpr std::uint64_t kLate = 2;
   for (std::uint64_t k = 0; k < kFrames; ++k) {
     on_time.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    on_time.node.onDetections(boxesAt(k, 0.35));
+    on_time.node.onDetections(boxesAt(k, 0.35, 0.1));
     late.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    if (k >= kLate) late.node.onDetections(boxesAt(k - kLate, 0.35));
+    if (k >= kLate) late.node.onDetections(boxesAt(k - kLate, 0.35, 0.1));
   }
   for (std::uint64_t k = kFrames - kLate; k < kFrames; ++k)
-    late.node.onDetections(boxesAt(k, 0.35));
+    late.node.onDetections(boxesAt(k, 0.35, 0.1));
   EXPECT_LT(learned(on_time), 0.9);
   EXPECT_NEAR(learned(late), learned(on_time), 1e-9);
+  EXPECT_LT(azimuthsLearned(on_time), 0.9);
+  EXPECT_NEAR(azimuthsLearned(late), azimuthsLearned(on_time), 1e-9);
 }
 
 TEST(ErrorScaleRun, SaysWhatItMakesOfTheBoxes) {
   Harness h;
   EXPECT_EQ(h.node.note(), "");
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
-    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    h.node.onDetections(boxesAt(k, 0.35));
-  }
+  drive(h, 0.35);
   EXPECT_NE(h.node.note().find("boxes err 0."), std::string::npos) << h.node.note();
   EXPECT_EQ(h.node.note().find("azimuths"), std::string::npos) << h.node.note();
 }
 
 TEST(ErrorScaleRun, KeepsItWhenOdometryBeginsAnew) {
   Harness h;
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
-    h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    h.node.onDetections(boxesAt(k, 0.35, 0.1));
-  }
+  drive(h, 0.35, 0.1);
   EXPECT_NE(h.node.note().find("azimuths err 0."), std::string::npos) << h.node.note();
   const double before = learned(h);
   const std::string note = h.node.note();
