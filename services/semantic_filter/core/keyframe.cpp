@@ -72,6 +72,22 @@ bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
   return true;
 }
 
+bool explains(const Hypothesis& h, const Keyframe& look, const BoxParameters& parameters) {
+  constexpr double kContradicted = 14.0;  // of four degrees of freedom, one in 140
+  const KeyView& from = *look.from;
+  State cuboid = h.x;
+  cuboid.segment<4>(kBias).setZero();
+  const auto box =
+      projectObserved(cuboid, from.projector, from.styles->of(h.class_name), h.facing());
+  if (!box) return false;
+  const auto H = box->H.leftCols<kGeometry>();
+  Eigen::Matrix4d S = H * h.P.topLeftCorner<kGeometry, kGeometry>() * H.transpose() +
+                      box->H_pose * from.error.covariance * box->H_pose.transpose();
+  S.diagonal() += look.z.lasting;
+  const auto score = scoreBox(look.z, *box, S, look.hidden, parameters);
+  return score && score->nis < kContradicted;
+}
+
 void joinKeyframes(Object& a, const Object& b, const ViewScales& scales,
                    const SmoothParameters& parameters) {
   Keyframes& all = a.keyframes.write();

@@ -56,6 +56,9 @@ struct Keyframe {
 bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
               const SmoothParameters& parameters);
 
+/// Whether the look may have been at `h`.
+bool explains(const Hypothesis& h, const Keyframe& look, const BoxParameters& parameters);
+
 /// What two objects that are one remember, in order of time.
 void joinKeyframes(Object& a, const Object& b, const ViewScales& scales,
                    const SmoothParameters& parameters);

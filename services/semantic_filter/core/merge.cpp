@@ -57,13 +57,25 @@ void keepBoth(Object& a, const Object& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-void absorb(Object& a, const Object& b, const FrameContext& frame) {
+/// The one that was hardly found of late where it should be was something else, as far as its looks
+/// do not fit the other.
+void forgetLooksAtOthers(Object& a, Object& b, const BoxParameters& parameters) {
+  constexpr double kHardlyFound = 0.2;
+  Object& lost = a.support < b.support ? a : b;
+  const Hypothesis& found = (a.support < b.support ? b : a).best();
+  if (lost.support >= kHardlyFound) return;
+  std::erase_if(lost.keyframes.write(),
+                [&](const auto& k) { return !explains(found, *k, parameters); });
+}
+
+void absorb(Object& a, Object& b, const FrameContext& frame) {
   if (isOther(a) != isOther(b)) {
     if (isOther(a) && knownAsWell(b, a)) {
       a.hypotheses = b.hypotheses;
       a.classes = b.classes;
     }
   } else if (contradict(a.best(), b.best())) {
+    forgetLooksAtOthers(a, b, frame.parameters->box);
     keepBoth(a, b);
   } else {
     const ClassPrior& prior = frame.priors->of(a.best().class_name);

@@ -162,6 +162,12 @@ std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6
   return sane ? std::optional(transition) : std::nullopt;
 }
 
+bool hangsTogether(const Hypothesis& h, const Matrix6d& P_pose) {
+  if (h.C.isZero(0.0)) return true;
+  Matrix6d L = P_pose;
+  return choleskyInPlace(L) && isExplained(h, L, 1.0);
+}
+
 void stop(Hypothesis& h) {
   const Eigen::Matrix3d S = h.P.bottomRightCorner<3, 3>();
   const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.rightCols<3>());

@@ -22,6 +22,9 @@ struct PoseError {
 /// products small, so that the inverse may lose its sense: then nothing.
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
+/// Whether [P C; Cᵀ P_pose] is a covariance.
+bool hangsTogether(const Hypothesis& h, const Matrix6d& P_pose);
+
 /// The hypothesis given that v = 0: what it took for motion was the error of its place.
 void stop(Hypothesis& h);
 /// When the object gets out of sight: what is more likely slower than `min_speed` may as well

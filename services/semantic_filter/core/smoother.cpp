@@ -6,6 +6,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/predict.h"
 #include "services/semantic_filter/core/tend.h"
 
 namespace perdure::semantic_filter {
@@ -231,8 +232,13 @@ std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& loo
   auto fit = fitLooks(model, x, looks, frame.parameters->box.tail,
                       like ? like->fit_.get() : nullptr, found);
   if (!fit) return std::nullopt;
-  const auto h = stateOf(model, *fit, start, frame);
+  auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
+  // Of another view what moves the thing together with the pose looks like information.
+  if (fit->covariance_at != fit->x && !hangsTogether(*h, frame.pose_error.covariance)) {
+    h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;
+    if (!h) return std::nullopt;
+  }
   Smoothed result(looks, frame);
   result.hypothesis_ = *h;
   result.start_ = start.x;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "services/semantic_filter/core/batch_model.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -102,6 +103,33 @@ TEST_F(Merging, OfBeliefsThatContradictEachOtherBothAreKept) {
   EXPECT_NEAR(one.best().x[kYaw], 0.5, 1e-12) << "that which was found more often";
   EXPECT_NEAR(one.best().weight, 0.75, 1e-9);
   EXPECT_NEAR(one.hypotheses[1].x[kYaw], 0.0, 1e-12);
+}
+
+TEST_F(Merging, WhatWasHardlyFoundOfLateForgetsItsLooksThatDoNotFitTheOther) {
+  const State was = makeState(24, 2, 0.7, 0.6, 4, 1.8, 1.5),
+              is = makeState(20, 0, 0.7, 0, 4, 1.8, 1.5);
+  const auto lookAt = [&](const State& x) {
+    const auto p = projectCuboid(x, frame.view);
+    Keyframe k;
+    k.z = measure({p->sides[0], p->sides[1], p->sides[2], p->sides[3]}, camera.width(),
+                  camera.height(), parameters.box);
+    k.from = std::make_shared<const KeyView>(frame.view, PoseError{}, fromNanoseconds(1),
+                                             std::make_shared<const BoxStyles>());
+    return std::make_shared<const Keyframe>(k);
+  };
+  const auto rememberedOf = [&](double support_of_first, double support_of_second) {
+    Object a = makeObject(1, "car", was, 0.01);
+    Object b = makeObject(2, "car", is, 0.01);
+    a.keyframes = Keyframes{lookAt(was), lookAt(was), lookAt(is)};
+    b.keyframes = Keyframes{lookAt(is), lookAt(is)};
+    a.support = support_of_first, b.support = support_of_second;
+    mergeTwo(a, b, frame);
+    EXPECT_EQ(a.hypotheses.size(), 2u) << "they contradict each other";
+    return a.keyframes.size();
+  };
+  EXPECT_EQ(rememberedOf(0.1, 0.9), 3u);
+  EXPECT_EQ(rememberedOf(0.9, 0.9), 5u) << "both are found: later looks tell";
+  EXPECT_EQ(rememberedOf(0.9, 0.1), 3u) << "its looks are at the other, and do not fit the first";
 }
 
 TEST_F(Merging, AGuessOfOneLookDoesNotOverruleWhatWasLookedAtForLong) {
