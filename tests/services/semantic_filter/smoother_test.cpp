@@ -162,6 +162,24 @@ TEST(Smoother, LeavesOverWhatTheBoxesErrMoreThanAssumed) {
   EXPECT_NEAR(left / sides, 1.0, 0.15);
 }
 
+TEST(Smoother, KnowsNoPlaceBetterThanThePosesThatItWasSeenFrom) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const Passing scene(seed, 0.0, 0.3);
+    const FrameContext frame = scene.frame();
+    const Looks looks(scene.keyframes(), frame.pose_error);
+    const auto mode = Smoothed::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(mode) << seed;
+    EXPECT_TRUE(hangsTogether(mode->hypothesis(), frame.pose_error.covariance)) << seed;
+    for (const double turn : {-0.8, 0.8, M_PI / 2}) {  // each begins with what the first one found
+      Hypothesis start = mode->hypothesis();
+      start.x[kYaw] += turn;
+      const auto other = Smoothed::make(start, looks, frame, &*mode);
+      if (!other) continue;
+      EXPECT_TRUE(hangsTogether(other->hypothesis(), frame.pose_error.covariance)) << seed;
+    }
+  }
+}
+
 TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {
   double nees = 0.0;
   constexpr int kRuns = 60;
