@@ -6,7 +6,7 @@
 namespace perdure::semantic_filter {
 
 struct BoxParameters {
-  double sigma_px = 0.8;          ///< floor of a side's standard deviation
+  double sigma_px = 0.4;          ///< floor of a side's standard deviation
   double sigma_network_px = 0.8;  ///< the same in pixels of the network's input, where known
   double sigma_relative = 0.045;  ///< of the box's width (x sides) or height (y sides)
   double sigma_doubt = 0.05;      ///< added to it in proportion to the probability of clutter

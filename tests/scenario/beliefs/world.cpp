@@ -229,6 +229,7 @@ void World::changeView(std::size_t thing, const State& x, const RigidTransform& 
     return e.last_T_WC ? std::exp(-viewChange(x.head<3>(), *e.last_T_WC, T_WC, scales)) : 0.0;
   };
   e.box.draw(dice_, keep({p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle}));
+  e.noise_stays *= keep({p.box.noise_view, p.box.noise_view, 0.5 * p.box.noise_view});
   e.looks.draw(dice_, keep({p.looks.angle, p.looks.log_distance, p.looks.image_angle}));
   const double stays = keep({p.visibility.screen_angle, p.visibility.screen_log_distance, kNever});
   if (!dice_.chance(stays)) {
@@ -261,7 +262,7 @@ std::vector<float> World::activations(std::size_t class_index, double size_px,
 }
 
 /// With the errors that filter and `measure` are told: b, which stays with the view, and noise.
-Box World::withErrors(const Box& box, const std::vector<float>& activations, const Errors& errors) {
+Box World::withErrors(const Box& box, const std::vector<float>& activations, Errors& errors) {
   const double W = camera_.width(), H = camera_.height();
   const BoxParameters& p = told_.config.filter.box;
   BoxNoise noise = boxNoise(read_model_, W);
@@ -280,10 +281,13 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, con
     const double variance = z.variance[i] + (options_.lasting_errors ? 0.0 : z.lasting[i]);
     const double lasting =
         options_.lasting_errors ? std::sqrt(z.lasting[i]) * errors.box.values[i] : 0.0;
-    const double error = lasting + scale * std::sqrt(variance) * dice_.normal();
+    const double stays = errors.noise_stays;
+    errors.noise[i] = stays * errors.noise[i] + std::sqrt(1.0 - stays * stays) * dice_.normal();
+    const double error = lasting + scale * std::sqrt(variance) * errors.noise[i];
     const double limit = i % 2 == 0 ? W : H;
     if (sides[i] > 0.0 && sides[i] < limit) sides[i] = std::clamp(sides[i] + error, 0.0, limit);
   }
+  errors.noise_stays = 1.0;
   return {sides[0], sides[1], sides[2], sides[3]};
 }
 
@@ -300,7 +304,7 @@ double World::azimuth(const Eigen::VectorXd& shared, double alpha) {
 
 std::optional<Detection> World::look(std::size_t thing, const State& x, const WorldFrame& frame) {
   const Sight& sight = frame.sights[thing];
-  const Errors& errors = errors_[thing];
+  Errors& errors = errors_[thing];
   const auto projected = projectCuboid(x, frame.true_view);
   if (sight.fraction <= 0.0 || !projected || !frame.outlines[thing]) return std::nullopt;
   if (errors.screened && options_.screens) return std::nullopt;

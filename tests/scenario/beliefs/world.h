@@ -91,6 +91,8 @@ class World {
   struct Errors {
     std::optional<RigidTransform> last_T_WC;
     Drift box, looks;
+    Eigen::Vector4d noise = Eigen::Vector4d::Zero();  ///< of the last box, unit Gaussians
+    double noise_stays = 0.0;                         ///< correlation of the next one with it
     bool screened = false, elusive = false, out = false;
   };
 
@@ -102,7 +104,7 @@ class World {
   void changeView(std::size_t thing, const semantic_filter::State& x, const RigidTransform& T_WC);
   std::optional<Detection> look(std::size_t thing, const semantic_filter::State& x,
                                 const WorldFrame& frame);
-  Box withErrors(const Box& box, const std::vector<float>& activations, const Errors& errors);
+  Box withErrors(const Box& box, const std::vector<float>& activations, Errors& errors);
   /// `class_index` is classes.size() for clutter; `shared` are errors of the thing's looks.
   std::vector<float> activations(std::size_t class_index, double size_px,
                                  const Eigen::VectorXd& shared);

@@ -79,7 +79,7 @@ TEST(Scenario, PositionsAreAsUncertainAsTheirCovarianceSays) {
   config.filter.box.part = 0.0;
   std::mt19937 random(21);
   std::normal_distribution<double> normal;
-  constexpr int kRuns = 50;
+  constexpr int kRuns = 600;
   double sum = 0.0;
   int counted = 0;
   for (int n = 0; n < kRuns; ++n) {
