@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "services/semantic_filter/core/priors.h"
+#include "services/semantic_filter/core/belief/class_prior.h"
 
 namespace perdure::semantic_filter {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/types/objects.h"
-#include "services/semantic_filter/core/merge.h"
+#include "services/semantic_filter/core/tracks/merge.h"
 
 namespace perdure::semantic_filter {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "services/semantic_filter/core/long_term.h"
-#include "services/semantic_filter/core/map_alignment.h"
+#include "services/semantic_filter/core/memory/archive.h"
+#include "services/semantic_filter/core/memory/map_alignment.h"
 
 namespace perdure::semantic_filter {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "common/base/result.h"
-#include "services/semantic_filter/core/evidence.h"
+#include "services/semantic_filter/core/measurement/detection.h"
 
 namespace perdure::semantic_filter {
 

@@ -8,8 +8,8 @@
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/context.h"
-#include "services/semantic_filter/core/expect.h"
+#include "services/semantic_filter/core/tracks/context.h"
+#include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <set>
 
-#include "services/semantic_filter/core/context.h"
+#include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/node.h"
 
 namespace perdure::semantic_filter {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/expect.h"
-#include "services/semantic_filter/core/foresee.h"
+#include "services/semantic_filter/core/visibility/predicted_box.h"
+#include "services/semantic_filter/core/visibility/return_time.h"
 
 namespace perdure::semantic_filter {
 

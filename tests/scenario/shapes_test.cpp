@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "services/semantic_filter/core/cuboid.h"
+#include "services/semantic_filter/core/measurement/cuboid_projection.h"
 #include "services/semantic_filter/priors.h"
 #include "tests/scenario/scenario.h"
 

@@ -5,7 +5,7 @@
 #include <set>
 #include <tuple>
 
-#include "services/semantic_filter/core/context.h"
+#include "services/semantic_filter/core/tracks/context.h"
 
 namespace perdure::tools {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "services/map_store/core/map_database.h"
-#include "services/semantic_filter/core/priors.h"
+#include "services/semantic_filter/core/belief/class_prior.h"
 
 namespace perdure::tools {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/look.h"
+#include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/pipeline/settings.h"
 

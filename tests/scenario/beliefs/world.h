@@ -16,10 +16,10 @@
 #include "common/sim/detector.h"
 #include "common/sim/dice.h"
 #include "services/semantic_filter/config.h"
-#include "services/semantic_filter/core/evidence.h"
-#include "services/semantic_filter/core/predict.h"
-#include "services/semantic_filter/core/priors.h"
-#include "services/semantic_filter/core/visibility.h"
+#include "services/semantic_filter/core/measurement/detection.h"
+#include "services/semantic_filter/core/update/predict.h"
+#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/visibility/occlusion.h"
 
 namespace perdure::test {
 

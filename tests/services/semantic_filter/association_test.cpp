@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/association.h"
+#include "services/semantic_filter/core/association/joint_association.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/box_likelihood.h"
+#include "services/semantic_filter/core/measurement/box_likelihood.h"
 
 #include <gtest/gtest.h>
 

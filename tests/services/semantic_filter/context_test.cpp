@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/context.h"
+#include "services/semantic_filter/core/tracks/context.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

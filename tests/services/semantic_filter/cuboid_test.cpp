@@ -1,10 +1,10 @@
-#include "services/semantic_filter/core/cuboid.h"
+#include "services/semantic_filter/core/measurement/cuboid_projection.h"
 
 #include <gtest/gtest.h>
 
 #include "common/math/numeric_jacobian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/box_likelihood.h"
+#include "services/semantic_filter/core/measurement/box_likelihood.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,5 +1,5 @@
 // What things of an earlier visit say of the pose they are seen from.
-#include "services/semantic_filter/core/drift_watch.h"
+#include "services/semantic_filter/core/memory/drift.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/cuboid.h"
+#include "services/semantic_filter/core/measurement/cuboid_projection.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

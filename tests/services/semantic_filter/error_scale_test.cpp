@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/error_scale.h"
+#include "services/semantic_filter/core/belief/noise_scale.h"
 
 #include <gtest/gtest.h>
 

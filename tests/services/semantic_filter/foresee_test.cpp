@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/foresee.h"
+#include "services/semantic_filter/core/visibility/return_time.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/found_rate.h"
+#include "services/semantic_filter/core/belief/detection_rate.h"
 
 #include <gtest/gtest.h>
 

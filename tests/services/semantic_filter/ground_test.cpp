@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/ground.h"
+#include "services/semantic_filter/core/belief/ground_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,5 +1,5 @@
 // Which objects leave the working set for the map, and what is asked of it.
-#include "services/semantic_filter/core/long_term.h"
+#include "services/semantic_filter/core/memory/archive.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/batch_model.h"
+#include "services/semantic_filter/core/smoothing/batch_problem.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

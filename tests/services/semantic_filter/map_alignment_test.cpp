@@ -1,5 +1,5 @@
 // Where the map of before lies: towns that are seen again, other towns, rows that repeat.
-#include "services/semantic_filter/core/map_alignment.h"
+#include "services/semantic_filter/core/memory/map_alignment.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "services/semantic_filter/core/merge.h"
+#include "services/semantic_filter/core/tracks/merge.h"
 
 #include <gtest/gtest.h>
 
-#include "services/semantic_filter/core/batch_model.h"
+#include "services/semantic_filter/core/smoothing/batch_problem.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

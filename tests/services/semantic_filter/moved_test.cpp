@@ -1,8 +1,8 @@
-#include "services/semantic_filter/core/moved.h"
+#include "services/semantic_filter/core/tracks/reidentify.h"
 
 #include <gtest/gtest.h>
 
-#include "services/semantic_filter/core/keyframe.h"
+#include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

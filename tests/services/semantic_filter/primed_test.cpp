@@ -1,14 +1,14 @@
 // Primed answers: what they may do to an object, and what they may not.
-#include "services/semantic_filter/core/primed.h"
+#include "services/semantic_filter/core/association/top_down.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "services/semantic_filter/core/expect.h"
-#include "services/semantic_filter/core/tend.h"
-#include "services/semantic_filter/core/update.h"
+#include "services/semantic_filter/core/visibility/predicted_box.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/update/track_update.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "services/semantic_filter/core/semantic_filter.h"
+#include "services/semantic_filter/core/filter.h"
 #include "services/semantic_filter/node.h"
 
 namespace perdure::semantic_filter::testing {

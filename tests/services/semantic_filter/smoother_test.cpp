@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/smoother.h"
+#include "services/semantic_filter/core/smoothing/map_fit.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/ground.h"
-#include "services/semantic_filter/core/smooth.h"
-#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/belief/ground_surface.h"
+#include "services/semantic_filter/core/smoothing/refit.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,12 +1,12 @@
-#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "services/semantic_filter/core/rebirth.h"
-#include "services/semantic_filter/core/semantic_filter.h"
+#include "services/semantic_filter/core/tracks/reinitialise.h"
+#include "services/semantic_filter/core/filter.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,11 +1,11 @@
-#include "services/semantic_filter/core/update.h"
+#include "services/semantic_filter/core/update/track_update.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "services/semantic_filter/core/association.h"
-#include "services/semantic_filter/core/tend.h"
+#include "services/semantic_filter/core/association/joint_association.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/visibility.h"
+#include "services/semantic_filter/core/visibility/occlusion.h"
 
 #include <gtest/gtest.h>
 

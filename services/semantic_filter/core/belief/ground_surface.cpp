@@ -1,0 +1,227 @@
+#include "services/semantic_filter/core/belief/ground_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr std::size_t kNearest = 12, kLeast = 3;
+constexpr double kLevelSigma = 10.0;   // m, of the ground beside the mean of those that tell
+constexpr double kOutlier = 12.0;      // squared deviations from what the others say
+constexpr double kBounce = 0.03;       // m, of the body beside its height, as it goes
+constexpr double kSurelyStands = 0.9;  // of a class whose things may tell
+
+using Row = Eigen::Matrix<double, 1, kStateDim>;
+
+double underside(const State& x, const Eigen::Vector3d& up) {
+  return up.dot(x.head<3>()) - 0.5 * std::exp(x[kSize + 2]);
+}
+
+Row byState(const State& x, const Eigen::Vector3d& up) {
+  Row a = Row::Zero();
+  a.head<3>() = up.transpose();
+  a[kSize + 2] = -0.5 * std::exp(x[kSize + 2]);
+  return a;
+}
+
+/// Of a height at `place`, as it is believed, by the pose's error (core/birth.cpp, addPoseError).
+Eigen::Matrix<double, 1, 6> byPose(const Eigen::Vector3d& place, const View& view) {
+  Eigen::Matrix<double, 1, 6> a;
+  const Eigen::Vector3d p_B = view.T_WB.inverse() * place;
+  a.head<3>() = -view.up_W.transpose() * view.T_WB.R() * skew(p_B);
+  a.tail<3>() = view.up_W.transpose();
+  return a;
+}
+
+/// What the looks alone say of the underside, given the pose; nothing of what is not placed by
+/// parallax: sizes of one class err alike.
+Footing footingOf(const Hypothesis& h, const FrameContext& frame) {
+  const Matrix6d& P_pose = frame.pose_error.covariance;
+  const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
+  if (placeSigma(h, P_pose) > frame.parameters->ground.resolved * distance) return {};
+  const Row a = byState(h.x, frame.view.up_W);
+  Eigen::Matrix<double, 1, 6> shared = a * h.C;
+  Matrix6d L = P_pose;
+  if (choleskyInPlace(L)) {
+    whitenRows(L, shared);
+  } else {
+    shared.setZero();
+  }
+  return {0.0, std::max(a * h.P * a.transpose() - shared.squaredNorm(), 1e-6)};
+}
+
+}  // namespace
+
+double Evenness::ratio(double assumed) const {
+  constexpr double kLeast = 0.01, kMost = 9.0;
+  return std::clamp((assumed + squares_) / (assumed + things_), kLeast, kMost);
+}
+
+void Evenness::hear(double above, const GroundHeight& others, double own_variance, double ratio,
+                    double share) {
+  constexpr double kMost = 9.0;
+  const double rest = others.variance - others.uneven + own_variance;
+  const double tells = others.uneven / (others.uneven + rest);
+  const double weight = share * tells * tells;
+  if (!(weight > 1e-6)) return;
+  const double square = std::min(above * above, kMost * (others.uneven + rest));
+  squares_ += weight * ratio * (square - rest) / others.uneven;
+  things_ += weight;
+}
+
+void Path::go(const Eigen::Vector3d& body) {
+  constexpr double kApart = 4.0;  // m
+  if (!places_.empty() && (body - places_[places_.size() - 1]).norm() < kApart) return;
+  if (places_.size() == kPlaces) {
+    std::copy(places_.begin() + 1, places_.end(), places_.begin());
+    places_.resize(kPlaces - 1);
+  }
+  places_.push_back(body);
+}
+
+Ground::Ground(const std::vector<Object>& objects, const Path& path, const Evenness& evenness,
+               const Eigen::Vector3d& up_W, const ClassPriors& priors,
+               const GroundParameters& parameters)
+    : parameters_(parameters),
+      ratio_(evenness.ratio(parameters.assumed)),
+      axes_(levelling(up_W).toRotationMatrix().topRows<2>()),
+      up_(up_W.normalized()) {
+  constexpr double kSure = 0.8, kHalf = 0.5;
+  if (!parameters.use) return;
+  if (parameters.body_height_m > 0.0) {
+    for (const Eigen::Vector3d& p : path) {
+      path_.push_back({0, horizontal(p), up_.dot(p) - parameters.body_height_m, kBounce * kBounce});
+    }
+  }
+  for (const Object& o : objects) {
+    const Hypothesis& best = o.best();
+    if (best.footing.variance <= 0.0 || best.moving || best.weight < kHalf) continue;
+    if (o.existence < kSure || priors.of(best.class_name).stands < kSurelyStands) continue;
+    stands_.push_back({o.id, horizontal(best.x.head<3>()),
+                       underside(best.x, up_) + best.footing.above,
+                       best.footing.variance + parameters.sigma_m * parameters.sigma_m});
+  }
+}
+
+void Ground::tell(Evenness& evenness, const Object& object, double share) const {
+  const Hypothesis& best = object.best();
+  if (best.footing.variance <= 0.0 || best.moving) return;
+  const auto others = below(best.x.head<3>(), object.id);
+  if (!others) return;
+  const double own = best.footing.variance + parameters_.sigma_m * parameters_.sigma_m;
+  evenness.hear(underside(best.x, up_) + best.footing.above - others->mean, *others, own, ratio_,
+                std::min(share, 1.0));
+}
+
+std::vector<Ground::Near> Ground::around(const std::vector<Stand>& stands,
+                                         const Eigen::Vector2d& here, ObjectId except,
+                                         std::size_t most) const {
+  std::vector<Near> nearest;
+  for (const Stand& s : stands) {
+    const double apart = (s.place - here).squaredNorm();
+    const bool reaches = apart <= parameters_.reach_m * parameters_.reach_m;
+    if (reaches && (s.id == 0 || s.id != except)) nearest.push_back({apart, &s});
+  }
+  std::sort(nearest.begin(), nearest.end(), [](const Near& a, const Near& b) {
+    return a.apart < b.apart || (a.apart == b.apart && a.stand->id < b.stand->id);
+  });
+  if (nearest.size() > most) nearest.resize(most);
+  return nearest;
+}
+
+std::optional<GroundHeight> Ground::below(const Eigen::Vector3d& place, ObjectId except) const {
+  const Eigen::Vector2d here = horizontal(place);
+  std::vector<Near> tell = around(path_, here, except, Path::kPlaces);
+  const std::size_t on_path = tell.size(), least = on_path > 0 ? 1 : kLeast;
+  const std::vector<Near> things = around(stands_, here, except, kNearest);
+  tell.insert(tell.end(), things.begin(), things.end());
+  if (tell.size() < least) return std::nullopt;
+  double level = 0.0;
+  for (const Near& near : tell) level += near.stand->height / static_cast<double>(tell.size());
+  const double slope = ratio_ * std::pow(parameters_.slope, 2);
+  const double rough = ratio_ * std::pow(parameters_.roughness, 2);
+  const double body = std::pow(parameters_.body_height_sigma_m, 2);
+  while (tell.size() >= least) {
+    const auto n = static_cast<Eigen::Index>(tell.size()), m = static_cast<Eigen::Index>(on_path);
+    Eigen::MatrixXd K(n, n);
+    Eigen::VectorXd z(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Stand& a = *tell[static_cast<std::size_t>(i)].stand;
+      const Eigen::Vector2d da = a.place - here;
+      z[i] = a.height - level;
+      for (Eigen::Index j = 0; j <= i; ++j) {
+        const Eigen::Vector2d db = tell[static_cast<std::size_t>(j)].stand->place - here;
+        K(i, j) = K(j, i) = kLevelSigma * kLevelSigma + slope * da.dot(db) +
+                            0.5 * rough * (da.norm() + db.norm() - (da - db).norm());
+      }
+      K(i, i) += a.variance;
+    }
+    K.topLeftCorner(m, m).array() += body;
+    const Cholesky S(K);
+    if (!S.positive()) return std::nullopt;
+    const Eigen::MatrixXd J = S.solve(Eigen::MatrixXd::Identity(n, n));
+    const Eigen::VectorXd weighed = J * z;
+    // Each thing beside what the others say of it.
+    Eigen::Index worst = 0;
+    double most_off = 0.0;
+    for (Eigen::Index i = m; i < n; ++i) {
+      const double off = weighed[i] * weighed[i] / J(i, i);
+      if (off > most_off) worst = i, most_off = off;
+    }
+    if (most_off > kOutlier) {
+      tell.erase(tell.begin() + worst);
+      continue;
+    }
+    const double prior = kLevelSigma * kLevelSigma;
+    const Eigen::VectorXd shares = prior * J.rowwise().sum();
+    double noise = body * std::pow(shares.head(m).sum(), 2);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      noise += shares[i] * shares[i] * tell[static_cast<std::size_t>(i)].stand->variance;
+    }
+    const double variance = std::max(prior * (1.0 - shares.sum()), noise);
+    return GroundHeight{level + prior * weighed.sum(), variance, variance - noise};
+  }
+  return std::nullopt;
+}
+
+double standOnGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
+  const GroundParameters& p = frame.parameters->ground;
+  const double stands = frame.priors->of(h.class_name).stands;
+  h.footing = {};
+  if (!frame.ground || stands <= 0.0) return 0.0;
+  if (!h.moving) h.footing = footingOf(h, frame);
+  const auto ground = frame.ground->below(h.x.head<3>(), id);
+  if (!ground) return 0.0;
+  const Eigen::Vector3d up = frame.view.up_W.normalized();
+  const Row a = byState(h.x, up);
+  const Eigen::Matrix<double, 1, 6> g = byPose(h.x.head<3>(), frame.view);
+  const Matrix6d& P_pose = frame.pose_error.covariance;
+  const double e = ground->mean - underside(h.x, up);
+  const double own = ground->variance + p.sigma_m * p.sigma_m;
+  const State with_e = h.C * g.transpose() - h.P * a.transpose();
+  const Eigen::Matrix<double, 1, 6> pose_with_e = g * P_pose - a * h.C;
+  const double variance = own + (g * P_pose).dot(g) - 2.0 * (a * h.C).dot(g) + (a * h.P).dot(a);
+  if (!(variance > own * 0.5)) return 0.0;
+  const double density = std::exp(-0.5 * e * e / variance) / std::sqrt(2.0 * M_PI * variance);
+  const double on = stands * density, off = (1.0 - stands) / p.span_m;
+  const double inlier = on / (on + off);
+  if (inlier > 0.5) {
+    const double before = underside(h.x, up);
+    const double widened = variance + own * (1.0 / inlier - 1.0);
+    h.x -= with_e * (e / widened);
+    h.x[kYaw] = wrapAngle(h.x[kYaw]);
+    h.P -= with_e * with_e.transpose() / widened;
+    makeSymmetric(h.P);
+    h.C -= with_e * pose_with_e / widened;
+    h.footing.above = before - underside(h.x, up);
+  }
+  return std::log((on + off) * p.span_m);
+}
+
+}  // namespace perdure::semantic_filter

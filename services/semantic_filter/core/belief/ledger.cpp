@@ -1,0 +1,137 @@
+#include "services/semantic_filter/core/belief/ledger.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace perdure::semantic_filter {
+namespace {
+
+double sumOf(const auto& nats) { return std::accumulate(nats.begin(), nats.end(), 0.0); }
+
+/// What is hardly possible stays a number.
+double logOf(double probability) { return std::log(std::max(probability, 1e-300)); }
+
+/// Kinds that this program does not know are left out: they are not explained by the others.
+template <std::size_t N>
+void copyKnown(const std::vector<double>& from, std::array<double, N>& to) {
+  std::copy_n(from.begin(), std::min(from.size(), N), to.begin());
+}
+
+/// What came back from elsewhere may have later times: the last never lies before the first.
+void count(LedgerEntry& entry, const LedgerEntry& more) {
+  if (entry.count == 0) entry.first = entry.last = more.first;
+  entry.count += more.count;
+  entry.last = std::max(entry.last, more.last);
+}
+
+const ClassNumber* find(const std::vector<ClassNumber>& numbers, const std::string& name) {
+  const auto it =
+      std::find_if(numbers.begin(), numbers.end(), [&](const auto& n) { return n.name == name; });
+  return it == numbers.end() ? nullptr : &*it;
+}
+
+}  // namespace
+
+Existence::Existence(double r, const std::vector<LedgerEntry>& known, ExistenceEvidence why,
+                     TimePoint at) {
+  std::copy_n(known.begin(), std::min(known.size(), entries_.size()), entries_.begin());
+  become(r, why, at);
+}
+
+void Existence::become(double r, ExistenceEvidence why, TimePoint at) {
+  double sum = 0.0;
+  for (const LedgerEntry& e : entries_) sum += e.log_odds;
+  LedgerEntry& entry = entries_[static_cast<std::size_t>(why)];
+  entry.log_odds += logOdds(r) - sum;
+  count(entry, {0.0, 1, at, at});
+  r_ = r;
+}
+
+void Existence::shift(ExistenceEvidence from, ExistenceEvidence to, double nats, TimePoint at) {
+  if (nats == 0.0) return;
+  entries_[static_cast<std::size_t>(from)].log_odds -= nats;
+  LedgerEntry& entry = entries_[static_cast<std::size_t>(to)];
+  entry.log_odds += nats;
+  count(entry, {0.0, 1, at, at});
+}
+
+void Existence::note(ExistenceEvidence why, const LedgerEntry& looks) {
+  if (looks.count > 0) count(entries_[static_cast<std::size_t>(why)], looks);
+}
+
+ClassAccount::ClassAccount(const std::vector<ClassLedger>& known,
+                           const std::vector<OustedClass>& ousted) {
+  for (const ClassLedger& c : known) copyKnown(c.log_odds, rowOf(c.name).nats);
+  if (ousted.empty()) return;
+  const OustedClass& o = ousted.front();
+  ousted_ = {o.name, o.by, o.at, {}};
+  copyKnown(o.log_odds, ousted_->nats);
+}
+
+ClassAccount::Row& ClassAccount::rowOf(const std::string& name) {
+  const auto it =
+      std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.name == name; });
+  if (it != rows_.end()) return *it;
+  rows_.push_back({name, {}});
+  return rows_.back();
+}
+
+void ClassAccount::oust(const std::vector<ClassNumber>& pmf, TimePoint at) {
+  const auto best = std::max_element(
+      pmf.begin(), pmf.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+  if (best == pmf.end()) return;
+  const Nats winner = rowOf(best->name).nats;
+  for (const Row& row : rows_) {
+    if (find(pmf, row.name)) continue;
+    const double behind = sumOf(winner) - sumOf(row.nats);
+    if (ousted_ && ousted_->by == best->name && sumOf(ousted_->nats) <= behind) continue;
+    ousted_ = {row.name, best->name, at, {}};
+    for (std::size_t i = 0; i < kClassEvidences; ++i) ousted_->nats[i] = winner[i] - row.nats[i];
+  }
+  std::erase_if(rows_, [&](const Row& row) { return !find(pmf, row.name); });
+}
+
+void ClassAccount::book(const std::vector<ClassNumber>& pmf, ClassEvidence why, TimePoint at) {
+  oust(pmf, at);
+  for (const ClassNumber& c : pmf) {
+    Nats& nats = rowOf(c.name).nats;
+    nats[static_cast<std::size_t>(why)] += logOf(c.value) - sumOf(nats);
+  }
+}
+
+void ClassAccount::shift(ClassEvidence from, ClassEvidence to,
+                         const std::vector<ClassNumber>& nats) {
+  for (Row& row : rows_) {
+    const ClassNumber* c = find(nats, row.name);
+    if (!c) continue;
+    row.nats[static_cast<std::size_t>(from)] -= c->value;
+    row.nats[static_cast<std::size_t>(to)] += c->value;
+  }
+}
+
+std::vector<ClassLedger> ClassAccount::published() const {
+  std::vector<ClassLedger> classes;
+  for (const Row& row : rows_) classes.push_back({row.name, {row.nats.begin(), row.nats.end()}});
+  return classes;
+}
+
+std::vector<OustedClass> ClassAccount::ousted() const {
+  if (!ousted_) return {};
+  return {{ousted_->name, ousted_->by, ousted_->at, {ousted_->nats.begin(), ousted_->nats.end()}}};
+}
+
+std::vector<ClassNumber> gains(const std::vector<ClassNumber>& pmf,
+                               const std::vector<ClassNumber>& log_likelihood) {
+  double most = -1e300, evidence = 0.0;
+  for (const ClassNumber& c : log_likelihood) most = std::max(most, c.value);
+  for (const ClassNumber& c : log_likelihood) {
+    const ClassNumber* prior = find(pmf, c.name);
+    evidence += prior ? prior->value * std::exp(c.value - most) : 0.0;
+  }
+  std::vector<ClassNumber> result = log_likelihood;
+  for (ClassNumber& c : result) c.value -= most + logOf(evidence);
+  return result;
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,32 @@
+#include "services/semantic_filter/core/measurement/azimuth.h"
+
+#include <cmath>
+
+#include "common/math/so3.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kOutlier = 0.2;  // share of azimuths that say nothing
+constexpr double kFlip = 0.1;     // share of azimuths that are turned by 180°
+
+}  // namespace
+
+AzimuthLook azimuthLook(double azimuth, const State& x, const View& view, double variance) {
+  const double full = wrapAngle(yawFromAzimuth(azimuth, x.head<3>(), view) - x[kYaw]);
+  AzimuthLook look;
+  look.same_head = std::abs(full) <= M_PI / 2;
+  look.residual = look.same_head ? full : wrapAngle(full + M_PI);
+  const double density =
+      std::exp(-0.5 * look.residual * look.residual / variance) / std::sqrt(2.0 * M_PI * variance);
+  look.likelihood = (1.0 - kOutlier) * density + kOutlier / M_PI;
+  look.inlier = (1.0 - kOutlier) * density / look.likelihood;
+  return look;
+}
+
+double headOdds(const AzimuthLook& look) {
+  const double nats = std::log((1.0 - kFlip) / kFlip) * look.inlier;
+  return look.same_head ? nats : -nats;
+}
+
+}  // namespace perdure::semantic_filter

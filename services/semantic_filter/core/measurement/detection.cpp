@@ -1,0 +1,135 @@
+#include "services/semantic_filter/core/measurement/detection.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace perdure::semantic_filter {
+
+namespace {
+
+BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors) {
+  BoxStyles styles;
+  if (info.boxes == BoxExtent::kOutline) {
+    for (const ClassPrior& prior : priors.classes) styles.by_class[prior.name].shape = prior.shape;
+  }
+  if (info.side_insets.size() != 4 * info.classes.size() || info.classes.empty()) return styles;
+  std::map<std::string, Eigen::Vector4d> offsets;
+  for (std::size_t k = 0; k < info.classes.size(); ++k) {
+    const Eigen::Vector4d inset(&info.side_insets[4 * k]);
+    // Left and top move to larger coordinates, right and bottom to smaller ones.
+    const Eigen::Vector4d offset(inset[0], inset[1], -inset[2], -inset[3]);
+    offsets[info.classes[k]] = offset;
+    styles.rest.offset += offset / static_cast<double>(info.classes.size());
+  }
+  for (auto& [name, style] : styles.by_class) style.offset = styles.rest.offset;
+  for (const auto& [name, offset] : offsets) styles.by_class[name].offset = offset;
+  return styles;
+}
+
+}  // namespace
+
+Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
+  Model model;
+  model.hash = info.hash;
+  model.classes = info.classes;
+  model.names = std::make_shared<const ClassNames>(info.classes.begin(), info.classes.end());
+  for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
+  model.input_width = info.input_width;
+  model.box_sigma = info.box_sigma;
+  model.styles = std::make_shared<const BoxStyles>(stylesOf(info, priors));
+  return model;
+}
+
+BoxNoise boxNoise(const Model& model, double image_width) {
+  return {model.box_sigma, model.input_width > 0.0 ? image_width / model.input_width : 0.0};
+}
+
+const char* flawOf(const Detection& detection, const Model& model) {
+  const Box& b = detection.box;
+  if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return "detections_not_finite";
+  if (b.x1 >= b.x2 || b.y1 >= b.y2) return "detections_box_inside_out";
+  if (detection.activations.size() != model.classes.size() + 1) {
+    return "detections_classes_mismatch";
+  }
+  for (const float a : detection.activations) {
+    if (std::isnan(a - detection.activations[0])) return "detections_not_finite";
+  }
+  for (const double sigma : detection.side_sigma) {
+    if (!std::isfinite(sigma)) return "detections_not_finite";
+  }
+  if (!detection.azimuth) return nullptr;
+  if (!std::isfinite(*detection.azimuth + detection.azimuth_sigma)) return "detections_not_finite";
+  return detection.azimuth_sigma > 0.0 ? nullptr : "detections_azimuth_without_sigma";
+}
+
+namespace {
+
+/// A thing of no known class looks to the network like clutter, or like one of its classes.
+double logRatioOfOther(const Evidence& e, double alike) {
+  const double share = alikeProbability(e.lookalike, alike);
+  return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
+}
+
+}  // namespace
+
+std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
+                                     double height, const BoxParameters& box,
+                                     const ClutterParameters& clutter) {
+  const Box& b = detection.box;
+  if (flawOf(detection, model)) return std::nullopt;
+  Evidence e;
+  const double zero = detection.activations[0];
+  double best = -clutter.max_log_ratio, odds = 0.0;
+  for (std::size_t k = 0; k < model.classes.size(); ++k) {
+    const double ratio = detection.activations[k + 1] - zero;
+    e.log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
+    best = std::max(best, e.log_ratio.back());
+    odds += std::exp(e.log_ratio.back());
+  }
+  BoxNoise noise = boxNoise(model, width);
+  noise.sides = detection.side_sigma;
+  noise.doubt = 1.0 / (1.0 + odds);
+  e.z = measure(b, width, height, box, noise);
+  if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
+  e.log_clutter = logClutter(e.z, width, height, clutter);
+  e.log_ratio_best = best;
+  e.lookalike = clutter.other_lookalike;
+  e.log_ratio_other = logRatioOfOther(e, 0.0);
+  e.azimuth = detection.azimuth;
+  e.azimuth_sigma = detection.azimuth_sigma;
+  return e;
+}
+
+std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
+                                                const ClutterParameters& clutter) {
+  if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < model.classes.size(); ++k) {
+    const double ratio = detection.activations[k + 1] - detection.activations[0];
+    if (std::isnan(ratio)) return std::nullopt;
+    ratios.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
+  }
+  return ratios;
+}
+
+std::string classSeenIn(const Evidence& evidence, const Model& model) {
+  const auto& ratios = evidence.log_ratio;
+  const auto most = std::max_element(ratios.begin(), ratios.end());
+  if (most == ratios.end() || *most <= 0.0) return {};
+  return model.classes[static_cast<std::size_t>(most - ratios.begin())];
+}
+
+double alikeProbability(double prior, double alike) {
+  constexpr double kMost = 0.5;  // from another side it may look like nothing
+  const double looks_alike = prior * std::exp(std::min(alike, 100.0));
+  return std::min(looks_alike / (1.0 - prior + looks_alike), std::max(kMost, prior));
+}
+
+double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name,
+                double alike) {
+  const auto it = model.index.find(class_name);
+  if (it != model.index.end()) return evidence.log_ratio[it->second];
+  return alike == 0.0 ? evidence.log_ratio_other : logRatioOfOther(evidence, alike);
+}
+
+}  // namespace perdure::semantic_filter

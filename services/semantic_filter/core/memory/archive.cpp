@@ -1,0 +1,122 @@
+#include "services/semantic_filter/core/memory/archive.h"
+
+#include <utility>
+
+#include "services/semantic_filter/core/update/predict.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kPatience_s = 1.0;       // for an answer
+constexpr double kAgain_s = 0.5;          // between questions whether what waits is on the disk
+constexpr double kStepShare = 1.0 / 3.0;  // of the margin: way between questions
+constexpr std::size_t kMostReferences = 20000;  // about 8 MB
+
+/// It is on the map, or will be with the next commit. One whose place beside the body is no longer
+/// known is no claim now, and yet what the map has of it is worth keeping.
+bool onTheMap(const Object& object) {
+  return object.confirmed || (object.once_confirmed && object.existence >= 0.5);
+}
+
+bool mayMove(const Object& object, double min_speed) {
+  return movingProbability(object, min_speed) > 0.5;
+}
+
+/// Half of what it extends: an object is near when any of it is.
+double extentOf(const Object& object) {
+  return 0.5 * object.best().x.segment<3>(kSize).array().exp().maxCoeff();
+}
+
+}  // namespace
+
+bool LongTerm::farAndUnseen(const Object& object, const Eigen::Vector3d& p_WB, TimePoint now,
+                            TimePoint oldest) const {
+  if (object.last_seen >= oldest || toSeconds(now - object.last_seen) < parameters_.after_s) {
+    return false;
+  }
+  const State x = stateAt(object.best(), toSeconds(now - object.as_of));
+  return (x.head<3>() - p_WB).norm() - extentOf(object) >
+         parameters_.recall_m + parameters_.margin_m;
+}
+
+LongTerm::Leaving LongTerm::leaving(const std::vector<Object>& objects, const Eigen::Vector3d& p_WB,
+                                    TimePoint now, TimePoint oldest) {
+  Leaving result;
+  if (!parameters_.archive) return result;
+  std::map<ObjectId, TimePoint> waiting;
+  for (const Object& o : objects) {
+    if (!farAndUnseen(o, p_WB, now, oldest)) continue;
+    if (!onTheMap(o) || mayMove(o, min_speed_)) {
+      result.forgotten.push_back(o.id);
+      continue;
+    }
+    const auto before = waiting_.find(o.id);
+    const TimePoint since = before == waiting_.end() ? now : before->second;
+    if (kept_ >= since) {
+      result.archived.push_back(o.id);
+    } else {
+      waiting[o.id] = since;
+    }
+  }
+  waiting_ = std::move(waiting);
+  return result;
+}
+
+bool LongTerm::due(const Eigen::Vector3d& p_WB, TimePoint now) const {
+  if (!asked_at_) return true;
+  const double since_s = toSeconds(now - *asked_at_);
+  if (open_) return since_s > kPatience_s || since_s < 0.0;
+  if (!known_around_) return true;
+  if ((p_WB - *known_around_).norm() > kStepShare * parameters_.margin_m) return true;
+  return !waiting_.empty() && since_s > kAgain_s;
+}
+
+std::optional<LongTerm::Question> LongTerm::ask(const Eigen::Vector3d& p_WB, TimePoint now) {
+  if (!parameters_.archive || !due(p_WB, now)) return std::nullopt;
+  asked_at_ = now;
+  if (open_) {
+    ++unanswered_;
+    return open_;
+  }
+  // What comes near before the next question is answered is asked for as well.
+  open_ = {++requests_, p_WB, parameters_.recall_m + kStepShare * parameters_.margin_m};
+  return open_;
+}
+
+bool LongTerm::answered(std::uint64_t request, TimePoint kept, bool truncated) {
+  if (!open_ || open_->request != request) return false;
+  kept_ = std::max(kept_, kept);
+  if (truncated) {
+    known_around_.reset();  // the rest comes with the next answer
+  } else {
+    known_around_ = open_->centre_W;
+  }
+  open_.reset();
+  return true;
+}
+
+bool LongTerm::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) const {
+  return (p_WO - p_WB).norm() <= parameters_.recall_m + parameters_.margin_m;
+}
+
+void LongTerm::rememberReference(const Object& object, const std::optional<RigidTransform>& T_MW) {
+  references_[object.as_of] = {object.pose_product, T_MW};
+  if (references_.size() > kMostReferences) references_.erase(references_.begin());
+}
+
+std::optional<LongTerm::Reference> LongTerm::referenceAt(TimePoint as_of) const {
+  const auto found = references_.find(as_of);
+  if (found == references_.end()) return std::nullopt;
+  return found->second;
+}
+
+void LongTerm::clear() {
+  waiting_.clear();
+  open_.reset();
+  asked_at_.reset();
+  known_around_.reset();
+  references_.clear();
+  kept_ = {};
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,303 @@
+#include "services/semantic_filter/core/smoothing/map_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/update/predict.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr int kRounds = 12;
+constexpr double kContradicted = 25.0;  // of about four degrees of freedom
+constexpr double kEnough = 0.02;        // squared deviations that a further step is worth
+
+}  // namespace
+
+struct Smoothed::Fit {
+  State x;
+  Stack stack;
+  std::shared_ptr<const SideCovariance> covariance;  ///< shared by fits of the same looks
+  State covariance_at;                               ///< the x that it is of
+  Eigen::VectorXd doubts;
+  Eigen::ArrayXi contradicted;
+  std::shared_ptr<const Cholesky> R;
+  Eigen::MatrixXd whitened;  ///< the rows of the stack by R
+
+  double squaredResidual() const { return whitened.rightCols<1>().squaredNorm(); }
+};
+
+namespace {
+
+using Fit = Smoothed::Fit;
+
+/// Weights of a t distribution for whole looks, and which of them contradict x. Whether the weights
+/// changed enough to matter.
+bool doubtLooks(Fit& fit, double tail) {
+  constexpr double kMatters = 0.1;
+  const Eigen::VectorXd residual = fit.covariance->withoutPose(
+      fit.stack.residual(), fit.R->unwhiten(fit.whitened.rightCols<1>()));
+  fit.contradicted.resize(fit.doubts.size());
+  bool matters = false;
+  for (Eigen::Index i = 0; i < fit.doubts.size(); ++i) {
+    const double nis = fit.covariance->deviation(residual, i);
+    const auto& counts = fit.stack.counts[static_cast<std::size_t>(i)];
+    const auto n = static_cast<double>(std::count(counts.begin(), counts.end(), true));
+    const double doubt = std::max(1.0, (tail + nis) / (tail + n));
+    matters = matters || std::abs(doubt - fit.doubts[i]) > kMatters * fit.doubts[i];
+    fit.doubts[i] = doubt;
+    fit.contradicted[i] = nis > kContradicted ? 1 : 0;
+  }
+  return matters;
+}
+
+/// The covariance changes little with x: it is taken anew where the thing has moved in the view.
+bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
+  constexpr double kLittle = 0.02;  // of the distance
+  const double distance = (fit.x.head<3>() - from).norm();
+  return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance;
+}
+
+bool factorise(const BatchModel& model, Fit& fit, bool anew) {
+  if (anew) {
+    auto covariance = std::make_shared<SideCovariance>();
+    model.covariance(fit.x, fit.stack, *covariance);
+    fit.covariance = std::move(covariance);
+    fit.covariance_at = fit.x;
+  }
+  fit.R = std::make_shared<const Cholesky>(fit.covariance->with(fit.doubts));
+  if (!fit.R->positive()) return false;
+  fit.whitened = fit.R->whiten(fit.stack.rows);
+  return true;
+}
+
+/// Damping of Levenberg and Marquardt's steps, less by what the last one gained of what it was to
+/// gain (Nielsen 1999). Where an extreme corner gives way to another the cost has a kink, at which
+/// a damping that falls after each success fails at every other step.
+class Damping {
+ public:
+  double value() const { return value_; }
+  void failed() { value_ = std::max(5.0 * value_, kFelt); }
+  void succeeded(double share) {
+    value_ = std::max(value_ * std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * share - 1.0, 3)), 1e-6);
+  }
+
+ private:
+  static constexpr double kFelt = 0.03;  // a lesser one hardly changes a step
+  double value_ = 1e-4;
+};
+
+/// One step, and what it was to gain (squared deviations). False where none lowers the cost.
+bool descend(const BatchModel& model, Fit& fit, Damping& damping, double& gained) {
+  const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
+  const double cost = fit.squaredResidual() + model.priorCost(fit.x);
+  for (int attempt = 0; attempt < 6; ++attempt) {
+    FreeMatrix damped = q.G;
+    damped.diagonal() *= 1.0 + damping.value();
+    const FreeVector step = solveSymmetric(damped, q.g);
+    const State next = model.at(fit.x, step);
+    auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
+    if (stack) {
+      auto whitened = fit.R->whiten(stack->rows);
+      const double then = whitened.rightCols<1>().squaredNorm() + model.priorCost(next);
+      if (then <= cost * (1.0 + 1e-3) + 1e-6) {
+        gained = q.g.dot(step);
+        fit.x = next;
+        fit.stack = std::move(*stack);
+        fit.whitened = std::move(whitened);
+        damping.succeeded(gained > 1e-9 ? (cost - then) / gained : 1.0);
+        return true;
+      }
+    }
+    damping.failed();
+  }
+  return false;
+}
+
+bool isOneOf(const std::vector<const Hypothesis*>& found, const State& x) {
+  constexpr double kSame = 0.25;  // squared deviations
+  return std::any_of(found.begin(), found.end(), [&](const Hypothesis* mode) {
+    Hypothesis h = *mode;
+    h.x = x;
+    return distance2(*mode, h) < kSame;
+  });
+}
+
+/// `like` has the covariance and the doubts to begin with: those of another mode of the same looks.
+std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const Looks& looks,
+                            double tail, const Fit* like,
+                            const std::vector<const Hypothesis*>& found) {
+  Fit fit;
+  fit.x = start;
+  fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
+  auto stack = model.linearise(fit.x);
+  if (!stack) return std::nullopt;
+  fit.stack = std::move(*stack);
+  if (like && like->stack.counts == fit.stack.counts) {
+    fit.covariance = like->covariance;
+    fit.covariance_at = like->covariance_at;
+    fit.doubts = like->doubts;
+    fit.R = like->R;
+    fit.whitened = fit.R->whiten(fit.stack.rows);
+  } else if (!factorise(model, fit, true)) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d from = looks.keyframes().back()->from->T_WC.p;
+  Damping damping;
+  double before = 0.0;
+  for (int round = 0; round < kRounds; ++round) {
+    double gained = 0.0;
+    const bool better = descend(model, fit, damping, gained);
+    if (isOneOf(found, fit.x)) return std::nullopt;
+    const bool doubted = doubtLooks(fit, tail);
+    const bool elsewhere = movedInView(fit, from);
+    if ((doubted || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
+    if (round > 0 && (!better || gained < kEnough)) break;
+    const bool converges = !doubted && !elsewhere && gained < 0.5 * before;
+    if (round > 0 && converges && gained * gained < kEnough * before) break;
+    before = gained;
+  }
+  return fit;
+}
+
+/// The filter's state, with b and C, from the fit.
+std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const Hypothesis& start,
+                                  const FrameContext& frame) {
+  const auto Jw = fit.whitened.leftCols(model.dim());
+  const auto rw = fit.whitened.rightCols<1>();
+  const Cholesky information(model.quadratic(fit.x, gramOf(fit.whitened)).G);
+  if (!information.positive()) return std::nullopt;
+  const Eigen::MatrixXd P = information.solve(Eigen::MatrixXd::Identity(model.dim(), model.dim()));
+  const double distance = (fit.x.head<3>() - frame.view.T_WC().p).norm();
+  if (!P.allFinite()) return std::nullopt;
+  const auto now = projectCuboid(fit.x, frame.projector());
+  if (!now) return std::nullopt;
+  const Eigen::Vector4d sigma =
+      biasSigma(viewWalkOf(frame).lasting, std::max(now->sides[2] - now->sides[0], 1.0),
+                std::max(now->sides[3] - now->sides[1], 1.0))
+          .cwiseMax(1e-6);
+  const Eigen::MatrixXd Bw =
+      fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
+  const Eigen::MatrixXd Ew = fit.R->whiten(model.poseNow(fit.stack).transpose());
+  // Tall and narrow: to pack them for Eigen's product costs more than the sums.
+  const Eigen::MatrixXd BJ = Bw.transpose().lazyProduct(Jw);
+  const Eigen::MatrixXd C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
+
+  // State order: geometry, b, velocity.
+  const int g = kGeometry;
+  Hypothesis h = start;
+  h.moving = model.moving();
+  h.x = fit.x;
+  h.x.segment<4>(kBias) = Bw.transpose().lazyProduct(rw);
+  h.P.setZero();
+  h.P.topLeftCorner(g, g) = P.topLeftCorner(g, g);
+  h.P.block<4, 4>(kBias, kBias) =
+      BJ.lazyProduct(P.lazyProduct(BJ.transpose()).eval()) - Bw.transpose().lazyProduct(Bw);
+  h.P.block<4, 4>(kBias, kBias).diagonal() += sigma.cwiseAbs2();
+  const Eigen::MatrixXd cross = -BJ.lazyProduct(P);
+  h.P.block(kBias, 0, 4, g) = cross.leftCols(g);
+  h.P.block(0, kBias, g, 4) = cross.leftCols(g).transpose();
+  h.C.setZero();
+  h.C.topRows(g) = C.topRows(g);
+  h.C.middleRows<4>(kBias) = -Bw.transpose().lazyProduct(Ew) - BJ.lazyProduct(C);
+  if (model.moving()) {
+    h.P.bottomRightCorner<3, 3>() = P.bottomRightCorner<3, 3>();
+    h.P.block(kVelocity, 0, 3, g) = P.bottomLeftCorner(3, g);
+    h.P.block(0, kVelocity, g, 3) = P.topRightCorner(g, 3);
+    h.P.block<3, 4>(kVelocity, kBias) = cross.rightCols<3>().transpose();
+    h.P.block<4, 3>(kBias, kVelocity) = cross.rightCols<3>();
+    h.C.bottomRows<3>() = C.bottomRows(3);
+  }
+  makeSymmetric(h.P);
+  const int n = model.moving() ? kStateDim : kVelocity;
+  if (!h.x.allFinite() || !isCovariance(h.P.topLeftCorner(n, n))) return std::nullopt;
+  if (placeSigma(h, frame.pose_error.covariance) > frame.parameters->smooth.place * distance) {
+    return std::nullopt;
+  }
+  return h;
+}
+
+}  // namespace
+
+std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& looks,
+                                       const FrameContext& frame, const Smoothed* like,
+                                       const std::vector<const Hypothesis*>& found) {
+  const BatchModel model(looks, start.moving, start.class_name, start.x, frame);
+  State x = start.x;
+  x.segment<4>(kBias).setZero();
+  auto fit = fitLooks(model, x, looks, frame.parameters->box.tail,
+                      like ? like->fit_.get() : nullptr, found);
+  if (!fit) return std::nullopt;
+  auto h = stateOf(model, *fit, start, frame);
+  if (!h) return std::nullopt;
+  // Of another view what moves the thing together with the pose looks like information.
+  if (fit->covariance_at != fit->x && !hangsTogether(*h, frame.pose_error.covariance)) {
+    h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;
+    if (!h) return std::nullopt;
+  }
+  Smoothed result(looks, frame);
+  result.hypothesis_ = *h;
+  result.start_ = start.x;
+  result.fit_ = std::make_shared<const Fit>(std::move(*fit));
+  return result;
+}
+
+BatchModel Smoothed::modelOf() const {
+  return {*looks_, hypothesis_.moving, hypothesis_.class_name, start_, *frame_};
+}
+
+const Eigen::VectorXd& Smoothed::doubts() const { return fit_->doubts; }
+
+const Eigen::ArrayXi& Smoothed::contradictions() const { return fit_->contradicted; }
+
+std::size_t Smoothed::sides() const {
+  std::size_t sum = 0;
+  for (const auto& counts : fit_->stack.counts) {
+    sum += static_cast<std::size_t>(std::count(counts.begin(), counts.end(), true));
+  }
+  return sum;
+}
+
+Leftover Smoothed::leftover() const {
+  // Of a Gaussian residual of four dimensions: a doubt is never less than one.
+  constexpr double kShareLeftByDoubts = 0.83;
+  const double free = static_cast<double>(sides()) - modelOf().dim();
+  if (free <= 0.0) return {};
+  return {frame_->errors.noise * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
+}
+
+Leftover Smoothed::leftoverOfAzimuths() const {
+  return modelOf().leftoverOfAzimuths(fit_->x, hypothesis_.P(kYaw, kYaw));
+}
+
+double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }
+
+double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
+  constexpr double kImpossible = -1e6;
+  const BatchModel model = modelOf();
+  const Stack& stack = fit_->stack;
+  // At this very state: a determinant of a hundred dimensions forgives no other.
+  thread_local SideCovariance covariance;
+  thread_local Eigen::MatrixXd storage;
+  model.covariance(fit_->x, stack, covariance);
+  Cholesky R = covariance.with(doubts, std::move(storage));
+  if (!R.positive()) return kImpossible;
+  const Gram gram = gramOf(R.whiten(stack.rows));
+  const Quadratic q = model.quadratic(fit_->x, gram);
+  const Cholesky G(q.G);
+  if (!G.positive()) return kImpossible;
+  const double cost =
+      gram(model.dim(), model.dim()) + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
+  const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
+  const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
+  const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);
+  storage = std::move(R).release();
+  const double priors = model.logSpeedPrior() + model.logSizePrior();
+  return yaw + 0.5 * (free + priors - cost - volume - G.logDeterminant());
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,304 @@
+#include "services/semantic_filter/core/tracks/merge.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/measurement/polygon.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kSurelyOne = 0.6;    // overlap that two boxes of one frame do not make two things
+constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
+
+bool isOther(const Object& o) { return o.best().class_name == kOtherClass; }
+
+/// Weights of a's hypotheses once b's PMF is taken in as well.
+void multiplyPmf(Object& a, const Object& b) {
+  for (auto& h : a.hypotheses) {
+    h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
+  }
+  normalise(a, ClassEvidence::kMerge);
+}
+
+/// A guess of a moment, as the border of the image makes them, says nothing against a thing that
+/// was looked at for long.
+bool knownAsWell(const Object& guess, const Object& thing) {
+  constexpr std::uint32_t kFewer = 4;  // looks
+  return guess.once_confirmed || kFewer * guess.hits >= thing.hits;
+}
+
+/// They contradict each other: their mean would be wrong with more certainty than either, and of
+/// cuboids that are turned against each other it is of no thing's shape.
+bool contradict(const Hypothesis& a, const Hypothesis& b) {
+  constexpr double kBeyond = 24.3;  // of a squared deviation in seven dimensions, one in a thousand
+  constexpr double kTurned = 0.35;  // rad
+  if (a.moving) return false;
+  const Vector7d d = geometryDifference(a, b);
+  if (std::abs(d[kYaw]) > kTurned) return true;
+  const Cholesky P(a.P.topLeftCorner<kGeometry, kGeometry>() +
+                   b.P.topLeftCorner<kGeometry, kGeometry>());
+  return !P.positive() || P.whiten(d).squaredNorm() > kBeyond;
+}
+
+/// As many as both have, weighed by how often each was found: later looks will tell.
+void keepBoth(Object& a, const Object& b) {
+  const double share = static_cast<double>(b.hits) / std::max(1.0, double(a.hits) + double(b.hits));
+  for (auto& h : a.hypotheses) h.weight *= 1.0 - share;
+  for (Hypothesis h : b.hypotheses) {
+    h.weight *= share;
+    a.hypotheses.push_back(std::move(h));
+  }
+  normalise(a, ClassEvidence::kMerge);
+}
+
+/// The one that was hardly found of late where it should be was something else, as far as its looks
+/// do not fit the other.
+void forgetLooksAtOthers(Object& a, Object& b, const BoxParameters& parameters) {
+  constexpr double kHardlyFound = 0.2;
+  Object& lost = a.support < b.support ? a : b;
+  const Hypothesis& found = (a.support < b.support ? b : a).best();
+  if (lost.support >= kHardlyFound) return;
+  std::erase_if(lost.keyframes.write(),
+                [&](const auto& k) { return !explains(found, *k, parameters); });
+}
+
+void absorb(Object& a, Object& b, const FrameContext& frame) {
+  if (isOther(a) != isOther(b)) {
+    if (isOther(a) && knownAsWell(b, a)) {
+      a.hypotheses = b.hypotheses;
+      a.classes = b.classes;
+    }
+  } else if (contradict(a.best(), b.best())) {
+    forgetLooksAtOthers(a, b, frame.parameters->box);
+    keepBoth(a, b);
+  } else {
+    const ClassPrior& prior = frame.priors->of(a.best().class_name);
+    const double weight = a.best().weight;
+    if (!a.best().moving) {  // velocities are not fused: a moving one keeps its own state
+      a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
+    }
+    a.hypotheses.front().weight = weight;
+    multiplyPmf(a, b);
+  }
+  a.found_again = a.found_again || b.found_again;
+  a.existence.become(std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence),
+                              certainty(a, frame.parameters->tend)),
+                     ExistenceEvidence::kMerge, a.as_of);
+  a.hits += b.hits;
+  a.confirmed = a.confirmed || b.confirmed;
+  a.once_confirmed = a.once_confirmed || b.once_confirmed;
+  a.last_seen = std::max(a.last_seen, b.last_seen);
+  if (b.first_box && (!a.first_box || b.first_box->time < a.first_box->time)) {
+    a.first_box = b.first_box;
+  }
+  if (b.last_box && (!a.last_box || b.last_box->time > a.last_box->time)) a.last_box = b.last_box;
+  a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
+  a.late_view.looks += b.late_view.looks;
+  a.support = std::max(a.support, b.support);
+  a.found_rate.join(b.found_rate, screenScales(frame.parameters->visibility));
+  a.sightings.in_sight |= b.sightings.in_sight;
+  a.sightings.found |= b.sightings.found;
+  a.remembers_all = a.remembers_all && b.remembers_all;
+  const auto& box = frame.parameters->box;
+  joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
+                frame.parameters->smooth);
+}
+
+/// Two things that the image shows side by side are two, however near their estimated depths are.
+bool sameInImage(const State& a, const State& b, const Projector& from) {
+  const auto box_a = projectCuboid(a, from), box_b = projectCuboid(b, from);
+  if (!box_a || !box_b) return true;
+  const auto toBox = [](const Eigen::Vector4d& s) { return Box{s[0], s[1], s[2], s[3]}; };
+  return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
+}
+
+bool bothSeen(const Object& a, const Object& b) {
+  return a.visible_fraction > 0.0 && b.visible_fraction > 0.0;
+}
+
+/// Whether b is hidden by a, which is seen: two solid things cannot share their space, so that a
+/// copy behind its original is no thing of its own.
+bool hides(const Object& a, const Object& b) {
+  return a.visible_fraction > 0.0 && b.visibility == Visibility::kOccluded && b.blocked_by == a.id;
+}
+
+/// A hidden one waits at the time when it was last seen; what is merged is of one time.
+void bringUpToDate(Object& a, Object& b, const FrameContext& frame) {
+  const TimePoint now = std::max(a.as_of, b.as_of);
+  for (Object* o : {&a, &b}) {
+    if (o->visible_fraction > 0.0) continue;
+    predict(*o, now, frame.pose_error, frame.parameters->motion, viewWalkOf(frame));
+  }
+}
+
+/// Whose id survives: that which was claimed, whatever guesses at it are older.
+bool older(const Object& a, const Object& b) {
+  if (a.once_confirmed != b.once_confirmed) return a.once_confirmed;
+  return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
+}
+
+struct Shared {
+  double of_joint = 0.0, of_lesser = 0.0;  ///< volume in common over that of both, of the lesser
+};
+
+Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+  const Eigen::Vector3d size_a = a.segment<3>(kSize).array().exp();
+  const Eigen::Vector3d size_b = b.segment<3>(kSize).array().exp();
+  const Eigen::Vector3d offset =
+      uprightRotation(a[kYaw], up_W).transpose() * (b.head<3>() - a.head<3>());
+  const double turn = b[kYaw] - a[kYaw];
+  const Eigen::Matrix2d R = rotationAboutZ(turn).topLeftCorner<2, 2>();
+  Polygon footprint;
+  constexpr double kSigns[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+  for (const auto& s : kSigns) {
+    footprint.push_back(offset.head<2>() +
+                        R * Eigen::Vector2d(0.5 * s[0] * size_b.x(), 0.5 * s[1] * size_b.y()));
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    footprint = clip(footprint, axis, -0.5 * size_a[axis], true);
+    footprint = clip(footprint, axis, 0.5 * size_a[axis], false);
+  }
+  const double top = std::min(0.5 * size_a.z(), offset.z() + 0.5 * size_b.z());
+  const double bottom = std::max(-0.5 * size_a.z(), offset.z() - 0.5 * size_b.z());
+  const double shared = polygonArea(footprint) * std::max(top - bottom, 0.0);
+  return {shared / (size_a.prod() + size_b.prod() - shared),
+          shared / std::min(size_a.prod(), size_b.prod())};
+}
+
+/// Two boxes of one frame are of two things.
+bool foundTogether(const Object& a, const Object& b) {
+  return (a.sightings.found & b.sightings.found) != 0;
+}
+
+/// In sight both, each frame's box went to the one or to the other: so do two beliefs share the
+/// boxes of one thing.
+bool takeTurns(const Object& a, const Object& b) {
+  constexpr int kTurns = 4;
+  const Sightings &of_a = a.sightings, &of_b = b.sightings;
+  if (foundTogether(a, b) || a.hits < 2 || b.hits < 2) return false;
+  return std::popcount((of_a.found ^ of_b.found) & of_a.in_sight & of_b.in_sight) >= kTurns;
+}
+
+/// Two beliefs about one thing: they overlap in space and in the image, or less and take turns; or
+/// one is of no known class and lies in the other, since two solid things cannot share their space.
+bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
+  const State &x = a.best().x, &y = b.best().x;
+  const TendParameters& tend = frame.parameters->tend;
+  const Shared shared = sharedVolume(x, y, frame.view.up_W);
+  if (isOther(a) != isOther(b)) {
+    if (shared.of_lesser > tend.merge_inside) return true;
+  } else {
+    if (shared.of_joint < kSurelyOne && foundTogether(a, b)) return false;
+    if (shared.of_joint >= tend.merge_turns && takeTurns(a, b)) return true;
+  }
+  return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.projector());
+}
+
+/// Of an object's best hypothesis: where it stands, and half the diagonal of its cuboid. Of all
+/// pairs few touch, and to see that is most of the work: it is laid out apart from the beliefs.
+struct Ball {
+  Eigen::Vector3d centre;
+  double radius;
+  bool seen;
+};
+
+Ball ballOf(const Object& object) {
+  const State& x = object.best().x;
+  return {x.head<3>(), 0.5 * x.segment<3>(kSize).array().exp().matrix().norm(),
+          object.visible_fraction > 0.0};
+}
+
+bool touch(const Ball& a, const Ball& b) {
+  const double reach = a.radius + b.radius;
+  return (a.seen || b.seen) && (a.centre - b.centre).squaredNorm() <= reach * reach;
+}
+
+bool oneHasBeenSeen(const Object& a, const Object& b) {
+  return bothSeen(a, b) || hides(a, b) || hides(b, a);
+}
+
+}  // namespace
+
+/// "other" is no class of its own: it may turn out to be the known thing in the same place.
+bool sameKind(const Object& a, const Object& b) {
+  if (a.best().moving != b.best().moving) return false;
+  return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
+}
+
+double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+  return sharedVolume(a, b, up_W).of_joint;
+}
+
+Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
+                const Matrix6d& P_pose) {
+  // Given the pose error g the beliefs are x | g ~ N(x̂ + B g, P - B P_g Bᵀ) with B = C P_g⁻¹.
+  const Eigen::Matrix<double, 7, 6> B_a = regressOn(P_pose, a.C.topRows<7>());
+  const Eigen::Matrix<double, 7, 6> B_b = regressOn(P_pose, b.C.topRows<7>());
+  const Matrix7d P_a = a.P.topLeftCorner<7, 7>() - B_a * P_pose * B_a.transpose();
+  const Matrix7d P_b = b.P.topLeftCorner<7, 7>() - B_b * P_pose * B_b.transpose();
+  if (!isCovariance(P_a) || !isCovariance(P_b)) return a;
+  const Matrix7d J_a = inverseSymmetric(P_a);
+  const Matrix7d J_b = inverseSymmetric(P_b);
+  Matrix7d J_prior = Matrix7d::Zero();
+  J_prior.block<3, 3>(kSize, kSize) = inverseSymmetric(prior.log_size_covariance);
+  Matrix7d J_new = J_b - J_prior;  // what b knows beyond the prior that a has used already
+  if (eigenvalues(J_new).minCoeff() < 0.0) {
+    J_new = 0.5 * J_b;  // its own information is not separable: count half of it
+    J_prior = 0.5 * J_b;
+  }
+  const Matrix7d P = inverseSymmetric(J_a + J_new);
+  Vector7d prior_mean = Vector7d::Zero();  // relative to a
+  prior_mean.segment<3>(kSize) = prior.log_size - a.x.segment<3>(kSize);
+  const Vector7d d = geometryDifference(b, a);
+  const Vector7d pull =
+      J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d) : Vector7d(J_b * d - J_prior * prior_mean);
+  Hypothesis fused = a;
+  fused.footing = {};
+  fused.x.head<7>() += P * pull;
+  fused.x[kYaw] = wrapAngle(fused.x[kYaw]);
+  const Eigen::Matrix<double, 7, 6> B = P * (J_a * B_a + J_new * B_b);
+  const Eigen::Matrix4d bias = a.P.block<4, 4>(kBias, kBias);
+  fused.P.setZero();
+  fused.P.block<4, 4>(kBias, kBias) = bias;
+  fused.C.middleRows<4>(kBias).setZero();
+  fused.P.topLeftCorner<7, 7>() = P + B * P_pose * B.transpose();
+  fused.C.topRows<7>() = B * P_pose;
+  makeSymmetric(fused.P);
+  return isCovariance(fused.P.topLeftCorner<7, 7>()) && fused.x.allFinite() ? fused : a;
+}
+
+void mergeTwo(Object& a, Object& b, const FrameContext& frame) {
+  bringUpToDate(a, b, frame);
+  absorb(a, b, frame);
+}
+
+std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
+  std::vector<MergeRecord> merges;
+  std::vector<Ball> balls;
+  for (const Object& o : objects) balls.push_back(ballOf(o));
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    for (std::size_t j = i + 1; j < objects.size();) {
+      Object &a = objects[i], &b = objects[j];
+      if (!touch(balls[i], balls[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
+          !sameSpace(a, b, frame)) {
+        ++j;
+        continue;
+      }
+      if (older(b, a)) std::swap(a, b);
+      mergeTwo(a, b, frame);
+      merges.push_back({a.id, b.id});
+      objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+      balls.erase(balls.begin() + static_cast<std::ptrdiff_t>(j));
+      balls[i] = ballOf(objects[i]);
+    }
+  }
+  return merges;
+}
+
+}  // namespace perdure::semantic_filter

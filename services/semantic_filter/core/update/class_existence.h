@@ -1,0 +1,17 @@
+// Weigh: what a look makes of π, of r, and of how well the object can be seen from here, from the
+// same A (eq. 7, DESIGN 5, items 3 and 5).
+#pragma once
+
+#include <vector>
+
+#include "services/semantic_filter/core/update/attribution.h"
+
+namespace perdure::semantic_filter {
+
+/// `shares` are of each hypothesis, in order; `worth` of the look beside earlier ones is within
+/// 0 … 1; `seen`: it more probably shows the object than not. Hypotheses' weights are left
+/// unnormalised. Returns existence as it is to become, at most `certainty`.
+double weigh(Object& object, const std::vector<Shares>& shares, double worth, bool seen,
+             const Parameters& parameters);
+
+}  // namespace perdure::semantic_filter

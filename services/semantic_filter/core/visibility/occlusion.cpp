@@ -1,0 +1,355 @@
+#include "services/semantic_filter/core/visibility/occlusion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <utility>
+
+#include "services/semantic_filter/core/measurement/polygon.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+struct Cell {
+  double transmittance = 1.0;              ///< probability that nothing nearer stands here
+  double distance_m = 0.0, sigma_m = 0.0;  ///< of the blocker that hides most
+  double strongest = 0.0;
+  ObjectId blocker = 0;
+};
+
+/// Cells side by side in a row; x and y of the centre of the first one.
+struct Span {
+  std::size_t first;
+  int cells;
+  double x, y;
+};
+
+/// Its cells are kept from one painting to the next, of other grids too: to clear them all, or to
+/// make them anew, costs more than to use some. Most are blank, and are told by their stamps alone.
+class DepthBuffer {
+ public:
+  void begin(double width, double height, double cell_px) {
+    cell_ = cell_px;
+    columns_ = static_cast<int>(std::ceil(width / cell_px));
+    rows_ = static_cast<int>(std::ceil(height / cell_px));
+    const std::size_t cells = static_cast<std::size_t>(columns_) * rows_;
+    if (cells > cells_.size()) cells_.resize(cells), painted_.resize(cells, 0);
+    if (++painting_ == 0) {
+      std::fill(painted_.begin(), painted_.end(), 0);
+      painting_ = 1;
+    }
+  }
+
+  /// Nothing where nothing was painted.
+  const Cell* find(std::size_t i) const { return painted_[i] == painting_ ? &cells_[i] : nullptr; }
+  Cell& at(std::size_t i) {
+    if (std::exchange(painted_[i], painting_) != painting_) cells_[i] = {};
+    return cells_[i];
+  }
+  double cell() const { return cell_; }
+
+  /// Cells side by side whose centres lie in the polygon, row by row; at least one cell of a
+  /// polygon that is smaller than the grid. Until this is asked again.
+  const std::vector<Span>& spansOf(const Polygon& hull) {
+    spans_.clear();
+    if (hull.empty()) return spans_;
+    double low = 1e30, high = -1e30;
+    for (const auto& p : hull) low = std::min(low, p.y()), high = std::max(high, p.y());
+    const int top = rowOf(low);
+    edges_.assign(static_cast<std::size_t>(rowOf(high) - top + 1), {1e30, -1e30});
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+      const auto& a = hull[i];
+      cross(a, hull[i + 1 < hull.size() ? i + 1 : 0], top);
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const auto [left, right] = edges_[i];
+      if (left > right) continue;
+      const int row = top + static_cast<int>(i);
+      const int first = std::max(0, static_cast<int>(std::ceil(left / cell_ - 0.5)));
+      const int last = std::min(columns_ - 1, static_cast<int>(std::floor(right / cell_ - 0.5)));
+      if (first > last) continue;
+      spans_.push_back(
+          {indexOf(row, first), last - first + 1, (first + 0.5) * cell_, centreOf(row)});
+    }
+    if (!spans_.empty()) return spans_;
+    const Eigen::Vector2d centre =
+        std::accumulate(hull.begin(), hull.end(), Eigen::Vector2d(0, 0)) / double(hull.size());
+    spans_.push_back({indexOf(rowOf(centre.y()), columnOf(centre.x())), 1, centre.x(), centre.y()});
+    return spans_;
+  }
+
+ private:
+  struct Edges {
+    double left, right;
+  };
+
+  int rowOf(double y) const { return std::clamp(static_cast<int>(y / cell_), 0, rows_ - 1); }
+  int columnOf(double x) const { return std::clamp(static_cast<int>(x / cell_), 0, columns_ - 1); }
+  double centreOf(int row) const { return (row + 0.5) * cell_; }
+  std::size_t indexOf(int row, int column) const {
+    return static_cast<std::size_t>(row) * columns_ + column;
+  }
+  /// Puts the line from a to b into the edges of the rows whose centres it crosses.
+  void cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, int top) {
+    const double low = std::min(a.y(), b.y()), high = std::max(a.y(), b.y());
+    if (!(low < high)) return;
+    const double slope = (b.x() - a.x()) / (b.y() - a.y());
+    const int end = top + static_cast<int>(edges_.size());
+    for (int row = std::max(top, static_cast<int>(std::ceil(low / cell_ - 0.5))); row < end;
+         ++row) {
+      const double y = centreOf(row);
+      if (y >= high) break;
+      Edges& edges = edges_[static_cast<std::size_t>(row - top)];
+      const double x = a.x() + (y - a.y()) * slope;
+      edges.left = std::min(edges.left, x), edges.right = std::max(edges.right, x);
+    }
+  }
+
+  double cell_ = 1.0;
+  int columns_ = 0, rows_ = 0;
+  std::vector<Cell> cells_;
+  std::vector<std::uint32_t> painted_;  ///< which painting each cell is of
+  std::uint32_t painting_ = 0;
+  std::vector<Span> spans_;
+  std::vector<Edges> edges_;  ///< of a polygon, by row
+};
+
+/// P(the blocker in the cell stands nearer than the object).
+double nearer(const Cell& cell, const Outline& o) {
+  const double sigma = std::hypot(cell.sigma_m, o.depth_sigma_m) + 1e-3;
+  return 0.5 * std::erfc((cell.distance_m - o.distance_m) / (std::sqrt(2.0) * sigma));
+}
+
+/// What an object's cells hold of one that may hide it.
+struct Blocked {
+  ObjectId by;
+  double nearer;  ///< probability that this stands nearer than the object
+  double hidden = 0.0;
+};
+
+class Blockers {
+ public:
+  explicit Blockers(const Outline& outline) : o_(outline) {}
+
+  /// Few hide one thing, and cells side by side mostly show the same.
+  Blocked& of(const Cell& cell) {
+    for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
+      if (b->by == cell.blocker) return *b;
+    }
+    all_.push_back({cell.blocker, nearer(cell, o_)});
+    return all_.back();
+  }
+  const std::vector<Blocked>& all() const { return all_; }
+
+ private:
+  const Outline& o_;
+  std::vector<Blocked> all_;
+};
+
+struct Tally {
+  explicit Tally(const Outline& outline) : o(outline), blockers(outline) {
+    const auto& s = o.box->sides;
+    const double band_x = 0.15 * (s[2] - s[0]), band_y = 0.15 * (s[3] - s[1]);
+    inner = {s[0] + band_x, s[1] + band_y, s[2] - band_x, s[3] - band_y};
+  }
+
+  /// A row of cells that nothing hides as yet.
+  void add(const Span& span, double cell_px) {
+    const double cells = span.cells;
+    const auto upTo = [&](double limit) {  // cells with a centre below it
+      return std::clamp(std::ceil((limit - span.x) / cell_px), 0.0, cells);
+    };
+    total += cells;
+    side_total[0] += upTo(inner[0]);
+    side_total[2] += cells - upTo(std::nextafter(inner[2], 1e30));
+    if (span.y < inner[1]) side_total[1] += cells;
+    if (span.y > inner[3]) side_total[3] += cells;
+  }
+  /// One of them, which something was painted in.
+  void hide(const Cell& cell, double x, double y) {
+    Blocked& blocked = blockers.of(cell);
+    const double share = (1.0 - cell.transmittance) * blocked.nearer;
+    blocked.hidden += share;
+    hidden += share;
+    if (x < inner[0]) side_hidden[0] += share;
+    if (y < inner[1]) side_hidden[1] += share;
+    if (x > inner[2]) side_hidden[2] += share;
+    if (y > inner[3]) side_hidden[3] += share;
+  }
+
+  const Outline& o;
+  std::array<double, 4> inner;  ///< where the bands along the four sides end
+  double total = 0.0, hidden = 0.0;
+  Blockers blockers;
+  std::array<double, 4> side_total{}, side_hidden{};
+};
+
+void paint(Cell& cell, const Outline& o) {
+  if (o.solidity > cell.strongest) {
+    cell.strongest = o.solidity;
+    cell.blocker = o.id;
+    cell.distance_m = o.distance_m;
+    cell.sigma_m = o.depth_sigma_m;
+  }
+  cell.transmittance *= 1.0 - o.solidity;
+}
+
+/// Share of the outline's landmarks that stand in front of the object (nearer than its surface);
+/// those seen through it speak against (paper, line 190: the co-visibility cue).
+double hiddenByPoints(const Outline& o, const Polygon& hull,
+                      const std::vector<SightPoint>& points) {
+  double before = 0.0, through = 0.0;
+  const double surface = o.distance_m - o.extent_m;
+  for (const auto& p : points) {
+    bool inside = !hull.empty();
+    for (std::size_t i = 0; i < hull.size() && inside; ++i) {
+      inside = cross(hull[i], hull[(i + 1) % hull.size()], p.pixel) >= 0;
+    }
+    if (!inside) continue;
+    const double margin = 2.0 * std::hypot(p.sigma_m, o.depth_sigma_m) + 0.1 * surface;
+    (p.distance_m < surface - margin ? before : through) += 1.0;
+  }
+  return before / (before + through + 3.0);  // three pseudo-points of "free" keep a few from ruling
+}
+
+Sight classify(const Tally& tally, double in_image, double by_points,
+               const VisibilityParameters& parameters) {
+  Sight sight;
+  const double free = tally.total > 0.0 ? 1.0 - tally.hidden / tally.total : 0.0;
+  sight.fraction = in_image * free * (1.0 - by_points);
+  double most = 0.0;
+  for (const Blocked& b : tally.blockers.all()) {
+    const bool older = b.hidden == most && b.by < sight.blocked_by;
+    if (b.hidden > most || older) most = b.hidden, sight.blocked_by = b.by;
+  }
+  if (most < 0.1 * tally.total) sight.blocked_by = 0;
+  for (int i = 0; i < 4; ++i) {
+    sight.hidden[i] = tally.side_total[i] > 0.0 && tally.side_hidden[i] > 0.5 * tally.side_total[i];
+  }
+  if (sight.fraction < parameters.minimum) {
+    sight.remnant = sight.fraction;
+    sight.fraction = 0.0;
+    sight.visibility =
+        in_image < parameters.minimum ? Visibility::kOutOfView : Visibility::kOccluded;
+  } else {
+    sight.visibility =
+        sight.fraction >= parameters.full ? Visibility::kVisible : Visibility::kPartial;
+  }
+  return sight;
+}
+
+}  // namespace
+
+Outline outlineOf(const Object& object, const State& x, const Projector& from, const Shape& shape) {
+  const Hypothesis& h = object.best();
+  const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
+  Outline o;
+  o.id = object.id;
+  o.solidity = object.existence * object.support;
+  o.distance_m = ray.norm();
+  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
+  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
+  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
+  o.box = projectOutline(x, from, shape);
+  return o;
+}
+
+namespace {
+
+/// What the image shows of an outline, and its share of the whole.
+struct InImage {
+  Polygon inside;
+  double share;
+};
+
+InImage inImage(const Outline& o, double width, double height) {
+  const Polygon hull = convexHull(o.box->points);
+  InImage result;
+  result.inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
+  result.inside = clip(clip(result.inside, 1, 0.0, true), 1, height, false);
+  result.share = polygonArea(result.inside) / std::max(polygonArea(hull), 1e-9);
+  return result;
+}
+
+void paint(DepthBuffer& buffer, const std::vector<Span>& spans, const Outline& o) {
+  for (const Span& span : spans) {
+    for (int i = 0; i < span.cells; ++i) {
+      paint(buffer.at(span.first + static_cast<std::size_t>(i)), o);
+    }
+  }
+}
+
+Tally tallyOf(const DepthBuffer& buffer, const std::vector<Span>& spans, const Outline& o) {
+  Tally tally(o);
+  for (const Span& span : spans) {
+    tally.add(span, buffer.cell());
+    for (int i = 0; i < span.cells; ++i) {
+      const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+      if (cell) tally.hide(*cell, span.x + i * buffer.cell(), span.y);
+    }
+  }
+  return tally;
+}
+
+DepthBuffer& begin(double width, double height, const VisibilityParameters& parameters) {
+  thread_local DepthBuffer kept;
+  kept.begin(width, height, static_cast<double>(parameters.cell_px));
+  return kept;
+}
+
+}  // namespace
+
+double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
+                    const VisibilityParameters& parameters) {
+  const Outline& first = outlines.front();
+  if (!first.box) return 0.0;
+  std::vector<const Outline*> hiding;
+  for (const Outline& o : outlines) {
+    const bool hides = o.box && o.distance_m < first.distance_m && o.solidity >= parameters.solid;
+    if (hides) hiding.push_back(&o);
+  }
+  const InImage in_image = inImage(first, width, height);
+  if (in_image.inside.empty()) return 0.0;
+  if (hiding.empty()) return in_image.share;
+  std::stable_sort(hiding.begin(), hiding.end(),
+                   [](const auto* a, const auto* b) { return a->distance_m < b->distance_m; });
+  DepthBuffer& buffer = begin(width, height, parameters);
+  for (const Outline* o : hiding) {
+    paint(buffer, buffer.spansOf(inImage(*o, width, height).inside), *o);
+  }
+  double cells = 0.0, hidden = 0.0;
+  Blockers blockers(first);
+  for (const Span& span : buffer.spansOf(in_image.inside)) {
+    cells += span.cells;
+    for (int i = 0; i < span.cells; ++i) {
+      const Cell* cell = buffer.find(span.first + static_cast<std::size_t>(i));
+      if (cell) hidden += (1.0 - cell->transmittance) * blockers.of(*cell).nearer;
+    }
+  }
+  return cells > 0.0 ? in_image.share * (1.0 - hidden / cells) : 0.0;
+}
+
+std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
+                       double width, double height, const VisibilityParameters& parameters) {
+  std::vector<std::size_t> order(outlines.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return outlines[a].distance_m < outlines[b].distance_m;
+  });
+  DepthBuffer& buffer = begin(width, height, parameters);
+  std::vector<Sight> sights(outlines.size());
+  for (const std::size_t j : order) {
+    const Outline& o = outlines[j];
+    if (!o.box) continue;
+    const InImage in_image = inImage(o, width, height);
+    const std::vector<Span>& spans = buffer.spansOf(in_image.inside);
+    const Tally tally = tallyOf(buffer, spans, o);
+    const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, in_image.inside, points);
+    sights[j] = classify(tally, in_image.share, by_points, parameters);
+    if (o.solidity >= parameters.solid) paint(buffer, spans, o);
+  }
+  return sights;
+}
+
+}  // namespace perdure::semantic_filter

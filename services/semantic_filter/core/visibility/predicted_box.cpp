@@ -1,0 +1,46 @@
+#include "services/semantic_filter/core/visibility/predicted_box.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/semantic_filter/core/update/predict.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not primed
+constexpr double kFastest = 1e5;           // pixels a second; what is faster passes the lens
+constexpr double kLeastSigma = 1;          // pixels
+constexpr double kFarthest = 1e5;          // pixels; a side beyond is of a thing beside the camera
+
+}  // namespace
+
+std::optional<Prediction> predictionOf(const Object& object, const FrameInput& now,
+                                       const std::optional<ComingFrame>& coming) {
+  const Hypothesis& best = object.best();
+  const double probability =
+      object.existence * classProbability(object, best.class_name) * object.visible_fraction;
+  if (probability < kPredictionFloor) return std::nullopt;
+  const double since = toSeconds(now.stamp.time - object.as_of);
+  const BoxStyle& style = now.model.styles->of(best.class_name);
+  const auto box = projectObserved(stateAt(best, since), now.view, style, best.facing());
+  if (!box || !(box->sides.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
+  if (box->sides[0] >= box->sides[2] || box->sides[1] >= box->sides[3]) return std::nullopt;
+  const Eigen::Vector4d& s = box->sides;
+  Prediction prediction{object.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability};
+  const Eigen::Matrix4d S = predictedCovariance(best, *box, now.pose_error.covariance);
+  for (int i = 0; i < 4; ++i) {
+    prediction.side_sigma[i] = std::max(kLeastSigma, std::sqrt(std::max(S(i, i), 0.0)));
+  }
+  if (!coming) return prediction;
+  const auto next =
+      projectObserved(stateAt(best, since + coming->seconds), coming->view, style, best.facing());
+  if (!next || !next->sides.allFinite()) return prediction;
+  for (int i = 0; i < 4; ++i) {
+    const double speed = (next->sides[i] - box->sides[i]) / coming->seconds;
+    prediction.velocity[i] = std::clamp(speed, -kFastest, kFastest);
+  }
+  return prediction;
+}
+
+}  // namespace perdure::semantic_filter

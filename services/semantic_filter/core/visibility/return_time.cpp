@@ -1,0 +1,231 @@
+#include "services/semantic_filter/core/visibility/return_time.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/semantic_filter/core/update/predict.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+constexpr double kHorizon_s = 10.0;
+constexpr double kStride_s = 0.25;        // what is in sight for less may be passed over
+constexpr std::size_t kMostBlockers = 6;  // those next to it in the image
+constexpr double kCellsAcross = 16.0;     // of a depth buffer's cells, across a thing
+constexpr double kMayBeFound = 0.5;       // of the share below which a miss says nothing
+constexpr double kSliver = 0.01;          // share in sight that nothing is found by
+constexpr double kNineInTen = 1.645;      // deviations of a Gaussian
+
+using Walk = std::vector<View>;  // one a frame, the present one first
+
+/// `pace`: of the translation, relative.
+Walk walkOn(const View& now, const Way& way, double pace) {
+  Walk walk{now};
+  const RigidTransform step(way.step.q, pace * way.step.p);
+  const auto frames = static_cast<std::size_t>(std::ceil(kHorizon_s / way.seconds));
+  while (walk.size() <= frames) {
+    walk.push_back(walk.back());
+    walk.back().T_WB = walk.back().T_WB * step;
+  }
+  return walk;
+}
+
+struct Standing {
+  const Object* object;
+  State x;
+  const Shape* shape;
+};
+
+const Shape& shapeOf(const Object& object, const FrameInput& now) {
+  return now.model.styles->of(object.best().class_name).shape;
+}
+
+/// What may hide it on the way: solid, nearer, and next to it in the image.
+std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Object& hidden,
+                                 const FrameInput& now, const VisibilityParameters& parameters) {
+  const Eigen::Vector3d eye = now.view.T_WC().p;
+  const Eigen::Vector3d ray = hidden.best().x.head<3>() - eye;
+  std::vector<std::pair<double, Standing>> near;
+  for (const Object& o : objects) {
+    if (o.id == hidden.id || o.existence * o.support < parameters.solid) continue;
+    const State x = stateAt(o.best(), toSeconds(now.stamp.time - o.as_of));
+    const Eigen::Vector3d other = x.head<3>() - eye;
+    if (other.norm() > ray.norm()) continue;
+    const double apart = std::atan2(ray.cross(other).norm(), ray.dot(other));
+    near.push_back({o.id == hidden.blocked_by ? 0.0 : apart, {&o, x, &shapeOf(o, now)}});
+  }
+  const std::size_t kept = std::min(near.size(), kMostBlockers);
+  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(kept), near.end(),
+                    [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Standing> result;
+  for (std::size_t i = 0; i < kept; ++i) result.push_back(near[i].second);
+  return result;
+}
+
+bool apart(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+  return a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
+}
+
+/// What lies within `sides` of a convex hull's points.
+Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
+  Polygon part = clip(clip(convexHull(points), 0, sides[0], true), 0, sides[2], false);
+  return clip(clip(part, 1, sides[1], true), 1, sides[3], false);
+}
+
+/// Of the first of `things`, as the others leave it. Finer than a frame's own depth buffer: which
+/// frame it is hangs on a tenth of a small thing.
+double shareInSight(const std::vector<Standing>& things, const View& view,
+                    VisibilityParameters parameters) {
+  const Projector from(view);
+  const Standing& first = things.front();
+  thread_local std::vector<Outline> outlines;
+  outlines.clear();
+  outlines.push_back(outlineOf(*first.object, first.x, from, *first.shape));
+  if (!outlines.front().box) return 0.0;
+  const Eigen::Vector4d sides = outlines.front().box->sides;
+  const CameraModel& camera = *view.camera;
+  if (apart(sides, {0.0, 0.0, camera.width(), camera.height()})) return 0.0;
+  for (auto s = things.begin() + 1; s != things.end(); ++s) {
+    Outline blocker = outlineOf(*s->object, s->x, from, *s->shape);
+    if (!blocker.box || apart(blocker.box->sides, sides)) continue;
+    blocker.box->points = within(sides, blocker.box->points);
+    outlines.push_back(std::move(blocker));
+  }
+  const double side = std::min(sides[2] - sides[0], sides[3] - sides[1]);
+  parameters.cell_px = std::clamp(static_cast<std::int64_t>(side / kCellsAcross), std::int64_t{1},
+                                  parameters.cell_px);
+  return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
+}
+
+/// Of the first of `things`, from which on it may be found. What shows as much already and was not
+/// found is found when a miss would say that it is gone.
+double shareToBeFound(const std::vector<Standing>& things, const View& now,
+                      const VisibilityParameters& parameters) {
+  const double sure = std::max(parameters.minimum, kSliver), least = kMayBeFound * sure;
+  return shareInSight(things, now, parameters) < least ? least : sure;
+}
+
+/// The first frame after the present one from which `share` of the first of `things` is seen.
+std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, const Walk& walk,
+                                        double share, double frame_s,
+                                        const VisibilityParameters& parameters) {
+  const auto inSight = [&](std::size_t n) {
+    return shareInSight(things, walk[n], parameters) >= share;
+  };
+  const auto stride = static_cast<std::size_t>(std::max(1.0, std::floor(kStride_s / frame_s)));
+  for (std::size_t n = stride; n < walk.size(); n += stride) {
+    if (!inSight(n)) continue;
+    std::size_t first = n - stride + 1;
+    while (first < n && !inSight(first)) ++first;
+    return first;
+  }
+  return std::nullopt;
+}
+
+/// Frames after `first` in which it is all but surely found; what shows little is found late.
+std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, std::size_t first,
+                         const VisibilityParameters& parameters) {
+  constexpr double kMissed = 0.05;
+  double missed = 1.0;
+  std::size_t n = first;
+  for (; n < walk.size() && missed > kMissed; ++n) {
+    missed *= 1.0 - shareInSight(things, walk[n], parameters);
+  }
+  return n - first;
+}
+
+/// By one deviation each: what moves the edges that hide it.
+std::vector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
+  const StateCovariance& P = thing.object->best().P;
+  const Eigen::Vector3d ray = (thing.x.head<3>() - eye).normalized();
+  Eigen::Vector3d across = ray.cross(Eigen::Vector3d::UnitZ());
+  across = across.norm() > 1e-6 ? Eigen::Vector3d(across.normalized()) : Eigen::Vector3d::UnitX();
+  std::vector<State> deviations;
+  for (const Eigen::Vector3d& axis : {ray, across}) {
+    State d = State::Zero();
+    d.head<3>() = std::sqrt(std::max(axis.dot(P.topLeftCorner<3, 3>() * axis), 0.0)) * axis;
+    deviations.push_back(d);
+  }
+  State grown = State::Zero();
+  for (int i = kSize; i < kSize + 3; ++i) grown[i] = std::sqrt(std::max(P(i, i), 0.0));
+  deviations.push_back(grown);
+  return deviations;
+}
+
+/// How far the ends of the interval are from what is expected, squared. A body that slows down may
+/// not come round at all: the two ends are not alike.
+struct Spread {
+  Spread(double expected_s, double frame_s)
+      : expected(expected_s), early(frame_s * frame_s), late(early) {}
+  void add(double one_s, double other_s) {
+    const auto [first, last] = std::minmax(one_s, other_s);
+    early += std::pow(std::max(expected - first, 0.0), 2);
+    late += std::pow(std::max(last - expected, 0.0), 2);
+  }
+  double expected, early, late;
+};
+
+bool goes(const Way& way) { return way.seconds > 0.0 && way.step.p.allFinite(); }
+
+std::vector<Standing> inPlay(const std::vector<Object>& objects, const Object& hidden,
+                             const FrameInput& now, const VisibilityParameters& parameters) {
+  std::vector<Standing> things{{&hidden,
+                                stateAt(hidden.best(), toSeconds(now.stamp.time - hidden.as_of)),
+                                &shapeOf(hidden, now)}};
+  const auto blockers = blockersOf(objects, hidden, now, parameters);
+  things.insert(things.end(), blockers.begin(), blockers.end());
+  return things;
+}
+
+}  // namespace
+
+std::optional<double> expectReturn(const std::vector<Object>& objects, const Object& hidden,
+                                   const FrameInput& now, const Way& way,
+                                   const VisibilityParameters& parameters) {
+  if (!goes(way)) return std::nullopt;
+  const auto things = inPlay(objects, hidden, now, parameters);
+  const auto n =
+      firstInSight(things, walkOn(now.view, way, 1.0), shareToBeFound(things, now.view, parameters),
+                   way.seconds, parameters);
+  return n ? std::optional(way.seconds * static_cast<double>(*n)) : std::nullopt;
+}
+
+std::optional<Foreseen> foreseeReturn(const std::vector<Object>& objects, const Object& hidden,
+                                      const FrameInput& now, const Way& way,
+                                      const VisibilityParameters& parameters) {
+  if (!goes(way)) return std::nullopt;
+  const double speed = way.step.p.norm() / way.seconds;
+  auto things = inPlay(objects, hidden, now, parameters);
+  const Walk walk = walkOn(now.view, way, 1.0);
+  const double share = shareToBeFound(things, now.view, parameters);
+  const auto expected = firstInSight(things, walk, share, way.seconds, parameters);
+  if (!expected) return std::nullopt;
+  const auto at = [&](const Walk& on) {
+    const auto n = firstInSight(things, on, share, way.seconds, parameters).value_or(walk.size());
+    return way.seconds * static_cast<double>(n);
+  };
+  Foreseen result;
+  result.expected = way.seconds * static_cast<double>(*expected);
+  Spread spread(result.expected, way.seconds);
+  const std::size_t found = framesToFind(things, walk, *expected, parameters);
+  spread.add(result.expected + way.seconds * static_cast<double>(found), result.expected);
+  const double walked = way.speed_walk * std::sqrt(result.expected / 3.0) / std::max(speed, 1e-3);
+  const double pace = kNineInTen * walked;
+  const double slower = pace < 1.0 ? at(walkOn(now.view, way, 1.0 - pace)) : kHorizon_s;
+  spread.add(slower, at(walkOn(now.view, way, 1.0 + pace)));
+  for (std::size_t i = 0; i < std::min<std::size_t>(things.size(), 2); ++i) {
+    const State x = things[i].x;
+    for (const State& d : deviationsOf(things[i], now.view.T_WC().p)) {
+      things[i].x = x + kNineInTen * d;
+      const double one = at(walk);
+      things[i].x = x - kNineInTen * d;
+      spread.add(one, at(walk));
+    }
+    things[i].x = x;
+  }
+  result.earliest = std::max(0.0, result.expected - std::sqrt(spread.early));
+  result.latest = result.expected + std::sqrt(spread.late);
+  return result;
+}
+
+}  // namespace perdure::semantic_filter
