@@ -1,4 +1,5 @@
 #include "services/semantic_filter/former_map.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 
 #include <fmt/format.h>
 

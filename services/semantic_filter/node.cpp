@@ -10,6 +10,8 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/node.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -16,9 +16,9 @@
 namespace perdure::semantic_filter {
 namespace {
 
-class Reader {
+class PriorsReader {
  public:
-  explicit Reader(std::string file) : file_(std::move(file)) {}
+  explicit PriorsReader(std::string file) : file_(std::move(file)) {}
 
   void complain(const YAML::Node& node, const std::string& message) {
     const auto mark = node.Mark();
@@ -153,7 +153,7 @@ ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
                                                      ":" + std::to_string(e.mark.column + 1) +
                                                      ": " + e.msg);
   }
-  Reader reader(file);
+  PriorsReader reader(file);
   ClassPriors priors;
   if (!root.IsMap() || !root["fallback"] || !root["other"] || !root["classes"] ||
       !root["classes"].IsMap()) {

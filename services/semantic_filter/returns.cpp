@@ -1,4 +1,5 @@
 #include "services/semantic_filter/returns.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,15 +5,23 @@
 #include <limits>
 
 #include "services/semantic_filter/core/association/joint_association.h"
-#include "services/semantic_filter/core/tracks/context.h"
-#include "services/semantic_filter/core/tracks/reidentify.h"
-#include "services/semantic_filter/core/tracks/new_classes.h"
+#include "services/semantic_filter/core/association/occlusion_revision.h"
 #include "services/semantic_filter/core/association/top_down.h"
-#include "services/semantic_filter/core/tracks/reinitialise.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/refit.h"
+#include "services/semantic_filter/core/tracks/context.h"
+#include "services/semantic_filter/core/tracks/initiation.h"
+#include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/tracks/mixture_reduction.h"
+#include "services/semantic_filter/core/tracks/new_classes.h"
+#include "services/semantic_filter/core/tracks/reidentify.h"
+#include "services/semantic_filter/core/tracks/reinitialise.h"
+#include "services/semantic_filter/core/update/predict.h"
 #include "services/semantic_filter/core/update/track_update.h"
 
 namespace perdure::semantic_filter {
+
 namespace {
 
 /// A look that says nothing about the object, for its ledger.
@@ -25,79 +33,7 @@ void noteUnused(Object& object, Visibility why, TimePoint now, double min_speed)
   entry.last = now;
 }
 
-/// How much another look of the same detector at one object may overlap with its box.
-bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
-  const Box box_a{a.sides[0], a.sides[1], a.sides[2], a.sides[3]};
-  const Box box_b{b.sides[0], b.sides[1], b.sides[2], b.sides[3]};
-  return intersectionOverUnion(box_a, box_b) > 0.65;
-}
-
-constexpr double kMisjudged = 3.0;  // nats, against that the blocker is not where it was thought
-
 }  // namespace
-
-/// What a frame expects of each object's best hypothesis; worked out when first asked for.
-class Expected {
- public:
-  Expected(const Belief& belief, const FrameInput& input, const Parameters& parameters)
-      : belief_(belief),
-        input_(input),
-        from_(input.view),
-        parameters_(parameters.box),
-        clutter_(parameters.clutter),
-        at_(belief.objects.size()) {}
-
-  bool matches(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
-    return fit(j, hidden, box).has_value();
-  }
-
-  /// log of how well it explains the box, sides and class, against clutter.
-  std::optional<double> fit(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
-    const Entry& e = entryOf(j);
-    if (!e.box || !mayOverlap(box.z, *e.box, e.covariance)) return std::nullopt;
-    const auto score = scoreBox(box.z, *e.box, e.covariance, hidden, parameters_);
-    if (!score) return std::nullopt;
-    const Object& object = belief_.objects[j];
-    return score->log_density - logClutterOf(box, *score, input_.view, clutter_) +
-           logRatio(box, input_.model, object.best().class_name, object.alike);
-  }
-
- private:
-  struct Entry {
-    bool known = false;
-    std::optional<ProjectedBox> box;
-    Eigen::Matrix4d covariance;
-  };
-
-  const Entry& entryOf(std::size_t j) {
-    Entry& e = at_[j];
-    if (e.known) return e;
-    e.known = true;
-    const Object& object = belief_.objects[j];
-    const Hypothesis& best = object.best();
-    const State x = stateAt(best, toSeconds(input_.stamp.time - object.as_of));
-    e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name), best.facing());
-    if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
-    return e;
-  }
-
-  const Belief& belief_;
-  const FrameInput& input_;
-  Projector from_;
-  const BoxParameters& parameters_;
-  const ClutterParameters& clutter_;
-  std::vector<Entry> at_;
-};
-
-ObjectId IdBook::idFor(std::uint64_t frame_sequence, std::size_t box) {
-  const auto [it, fresh] = given_.try_emplace({frame_sequence, box}, next_);
-  if (fresh) ++next_;
-  return it->second;
-}
-
-void IdBook::forgetBefore(std::uint64_t frame_sequence) {
-  given_.erase(given_.begin(), given_.lower_bound({frame_sequence, 0}));
-}
 
 BoxErrors SemanticFilter::errorsOf(const Belief& belief, const FrameInput& input) const {
   const std::uint64_t model = input.model.hash;
@@ -214,132 +150,6 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
   return association.claimed;
 }
 
-/// As many as a frame has time for; the others wait.
-void SemanticFilter::smoothNeediest(std::vector<Object*>& objects, Belief& belief,
-                                    const FrameContext& frame) {
-  const double fresh = frame.parameters->smooth.fresh;
-  std::stable_sort(objects.begin(), objects.end(), [fresh](const Object* a, const Object* b) {
-    return smoothingNeed(*a, fresh) > smoothingNeed(*b, fresh);
-  });
-  const auto most = static_cast<std::size_t>(frame.parameters->smooth.per_frame);
-  if (objects.size() > most) objects.resize(most);
-  for (Object* object : objects) {
-    const double share = object->fresh_keyframes / static_cast<double>(object->keyframes.size());
-    if (const auto over = smooth(*object, frame)) {
-      belief.learned.sides.hear(frame.errors.model, over->sides);
-      belief.learned.azimuths.hear(frame.errors.model, over->azimuths);
-    }
-    frame.ground->tell(belief.learned.evenness, *object, share);
-  }
-}
-
-void SemanticFilter::reveal(Belief& belief, std::vector<Sight>& sights,
-                            const FrameInput& input) const {
-  std::vector<std::size_t> hidden;
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    const bool solid = belief.objects[j].existence >= parameters_.visibility.solid;
-    if (solid && sights[j].visibility == Visibility::kOccluded) hidden.push_back(j);
-  }
-  if (hidden.empty()) return;
-  Expected expected(belief, input, parameters_);
-  for (const auto& e : *input.boxes) {
-    std::vector<std::size_t> may_be;
-    double best_hidden = -std::numeric_limits<double>::infinity();
-    for (const std::size_t j : hidden) {
-      const auto fit = expected.fit(j, {}, e);
-      if (!fit) continue;
-      may_be.push_back(j);
-      best_hidden = std::max(best_hidden, *fit);
-    }
-    bool others = may_be.empty();
-    for (std::size_t j = 0; j < sights.size() && !others; ++j) {
-      if (sights[j].fraction <= 0.0) continue;
-      const auto fit = expected.fit(j, sights[j].hidden, e);
-      others = fit && *fit > best_hidden - kMisjudged;
-    }
-    if (others) continue;
-    for (const std::size_t j : may_be) {
-      sights[j].hidden = {};
-      sights[j].fraction = parameters_.visibility.minimum;
-      sights[j].visibility = Visibility::kPartial;
-      belief.objects[j].visibility = Visibility::kPartial;
-      belief.objects[j].visible_fraction = sights[j].fraction;
-    }
-  }
-}
-
-void SemanticFilter::explainRemnants(const Belief& belief, const std::vector<Sight>& sights,
-                                     FrameInput& input) const {
-  std::vector<std::pair<std::size_t, double>> remnants;  // and how surely each is found
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    if (sights[j].remnant <= 0.0) continue;
-    const Object& o = belief.objects[j];
-    const double found = priors_.of(o.best().class_name).detection_probability;
-    remnants.emplace_back(j, o.existence * sights[j].remnant * found);
-  }
-  if (remnants.empty()) return;
-  Expected expected(belief, input, parameters_);
-  for (Evidence& box : *input.boxes) {
-    double boxes = 0.0;
-    for (const auto& [j, found] : remnants) {
-      const auto fit = expected.fit(j, sights[j].hidden, box);
-      if (fit) boxes += found * std::exp(*fit);
-    }
-    box.log_remnants = std::log1p(boxes);
-  }
-}
-
-bool SemanticFilter::leavesView(Expected& expected, const Belief& belief,
-                                const std::vector<Sight>& sights, const Evidence& box) {
-  if (box.z.count() == 4) return false;  // what leaves is cut by the border
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    if (sights[j].visibility != Visibility::kOutOfView || !belief.objects[j].confirmed) continue;
-    if (expected.matches(j, sights[j].hidden, box)) return true;
-  }
-  return false;
-}
-
-void SemanticFilter::births(Belief& belief, const std::vector<Sight>& sights,
-                            const Eigen::VectorXd& claimed, const FrameInput& input,
-                            const FrameContext& frame, IdBook& ids) const {
-  const auto& boxes = *input.boxes;
-  std::vector<Object> born;
-  Expected expected(belief, input, parameters_);
-  std::vector<std::size_t> accepted;
-  for (std::size_t z = 0; z < boxes.size(); ++z) {
-    if (claimed[static_cast<Eigen::Index>(z)] > parameters_.birth.claimed) accepted.push_back(z);
-  }
-  for (std::size_t z = 0; z < boxes.size(); ++z) {
-    const Evidence& e = boxes[z];
-    if (claimed[static_cast<Eigen::Index>(z)] > parameters_.birth.claimed) continue;
-    if (logBirthRatio(e, frame) - std::log(parameters_.birth.odds) <
-        parameters_.birth.min_log_ratio) {
-      continue;
-    }
-    const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
-      return sameThing(boxes[other].z, e.z);
-    });
-    if (doubled || leavesView(expected, belief, sights, e)) continue;
-    auto object =
-        bear(e, rangeFromLandmarks(e, input.points, parameters_.birth), input.stamp.time, frame);
-    if (!object) continue;
-    object->id = ids.idFor(input.stamp.sequence, z);
-    if (const double share = claimed[static_cast<Eigen::Index>(z)]; share > 0.0) {
-      object->existence.become(object->existence * (1.0 - share), ExistenceEvidence::kShared,
-                               input.stamp.time);
-    }
-    tendHypotheses(*object, priors_, parameters_);
-    if (object->hypotheses.empty()) continue;
-    born.push_back(std::move(*object));
-    accepted.push_back(z);
-  }
-  std::move(born.begin(), born.end(), std::back_inserter(belief.objects));
-  const auto older = [](const auto& a, const auto& b) { return a.id < b.id; };
-  if (!std::is_sorted(belief.objects.begin(), belief.objects.end(), older)) {
-    std::stable_sort(belief.objects.begin(), belief.objects.end(), older);
-  }
-}
-
 Object SemanticFilter::untilLook(const Object& was, const Object& now, const Seen& seen,
                                  const FrameInput& input, const FrameContext& frame) const {
   Object object = was;
@@ -402,9 +212,9 @@ StepReport SemanticFilter::step(const Belief& before, Belief& belief, const Fram
     box.z.variance *= errors.noise;
     box.z.lasting *= errors.lasting();
   }
-  explainRemnants(belief, sights, input);
+  explainRemnants(belief, sights, input, parameters_, priors_);
   const FrameContext frame = contextOf(belief, input);
-  reveal(belief, sights, input);
+  reveal(belief, sights, input, parameters_);
   auto seen = score(belief, sights, input, frame);
   StepReport report;
   const auto claimed = associateAndUpdate(belief, seen, input, frame);

@@ -7,6 +7,7 @@
 
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/association/score.h"
+#include "services/semantic_filter/core/visibility/detectability.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/pipeline/settings.h"
 

@@ -1,3 +1,5 @@
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/tracks/context.h"
 
 #include <gmock/gmock.h>

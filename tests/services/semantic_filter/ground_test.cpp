@@ -1,12 +1,12 @@
-#include "services/semantic_filter/core/belief/ground_surface.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
 
 #include "common/math/gaussian.h"
+#include "services/semantic_filter/core/belief/ground_surface.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/tracks/mixture_reduction.h"
+#include "services/semantic_filter/core/update/ground_contact.h"
+#include <cmath>
+#include <gtest/gtest.h>
+#include <random>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,11 +1,11 @@
 // Single bookings: who is credited with what.
+
 #include "services/semantic_filter/core/belief/ledger.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/update/track_update.h"
+#include <cmath>
+#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

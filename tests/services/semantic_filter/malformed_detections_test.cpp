@@ -9,6 +9,7 @@
 
 #include "common/wire/codec.h"
 #include "tests/services/semantic_filter/scene.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
 
 namespace perdure::semantic_filter {
 namespace {

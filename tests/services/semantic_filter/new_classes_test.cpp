@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tests/services/semantic_filter/scene.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "tests/services/semantic_filter/scene.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 
 namespace perdure::semantic_filter {
 namespace {

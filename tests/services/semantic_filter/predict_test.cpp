@@ -1,10 +1,10 @@
-#include "services/semantic_filter/core/update/predict.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
+#include "services/semantic_filter/core/belief/motion_model.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/update/predict.h"
+#include <cmath>
+#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

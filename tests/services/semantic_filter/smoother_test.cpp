@@ -1,14 +1,14 @@
-#include "services/semantic_filter/core/smoothing/map_fit.h"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/ground_surface.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "services/semantic_filter/core/belief/track_message.h"
+#include "services/semantic_filter/core/smoothing/map_fit.h"
 #include "services/semantic_filter/core/smoothing/refit.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

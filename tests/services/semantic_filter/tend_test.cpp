@@ -1,12 +1,15 @@
+
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "services/semantic_filter/core/belief/track_message.h"
+#include "services/semantic_filter/core/filter.h"
+#include "services/semantic_filter/core/tracks/cuboid_fit.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
-
-#include <gtest/gtest.h>
-
+#include "services/semantic_filter/core/tracks/mixture_reduction.h"
+#include "services/semantic_filter/core/tracks/reinitialise.h"
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-
-#include "services/semantic_filter/core/tracks/reinitialise.h"
-#include "services/semantic_filter/core/filter.h"
+#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

@@ -1,11 +1,11 @@
-#include "services/semantic_filter/core/update/track_update.h"
-
-#include <gtest/gtest.h>
-
-#include <cstring>
 
 #include "services/semantic_filter/core/association/joint_association.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/update/ekf.h"
+#include "services/semantic_filter/core/update/track_update.h"
+#include <cstring>
+#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

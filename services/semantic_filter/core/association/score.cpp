@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/association/tempering.h"
+#include "services/semantic_filter/core/visibility/detectability.h"
 
 namespace perdure::semantic_filter {
+
 namespace {
 
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kMostFound = 0.98;
-constexpr double kNever = 1e9;  // a change of view that never counts
 
 void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
                 const ObjectLook& look, const std::vector<Evidence>& boxes,
@@ -26,27 +27,6 @@ void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
     h.fits[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), score->nis / score->dof,
                  score->part};
   }
-}
-
-/// What is of no known class and looks like one is found as often as those of that class.
-double foundAs(const Hypothesis& hypothesis, const Object& object, double size_px,
-               const FrameContext& frame) {
-  const double own = detectionProbability(frame.priors->of(hypothesis.class_name), size_px, frame);
-  if (hypothesis.class_name != kOtherClass) return own;
-  const auto named = std::find_if(object.hypotheses.begin(), object.hypotheses.end(),
-                                  [](const auto& h) { return h.class_name != kOtherClass; });
-  if (named == object.hypotheses.end()) return own;
-  const double alike = alikeProbability(frame.parameters->clutter.other_lookalike, object.alike);
-  const ClassPrior& like = frame.priors->of(named->class_name);
-  return (1.0 - alike) * own + alike * detectionProbability(like, size_px, frame);
-}
-
-/// How often the object is found from here, beside P_D.
-double rateOf(const Object& object, const FrameContext& frame) {
-  if (object.best().moving) return 1.0;
-  return object.found_rate.factor(aspectOf(object.best().x.head<3>(), frame.view.T_WC()),
-                                  frame.parameters->looks.found_prior,
-                                  screenScales(frame.parameters->visibility));
 }
 
 HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double rate,
@@ -116,45 +96,6 @@ double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
          logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
 }
 
-Projector FrameContext::projector() const { return key_view ? key_view->projector : view; }
-
-ViewScales screenScales(const VisibilityParameters& visibility) {
-  return {visibility.screen_angle, visibility.screen_log_distance, kNever};
-}
-
-ViewWalk viewWalkOf(const FrameContext& frame) {
-  const BoxParameters& box = frame.parameters->box;
-  const VisibilityParameters& visibility = frame.parameters->visibility;
-  ViewWalk walk;
-  walk.T_WC = frame.view.T_WC();
-  walk.focal = frame.view.camera->fx();
-  const BoxNoise noise =
-      frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{};
-  walk.lasting = lastingError(box, noise) * std::sqrt(frame.errors.lasting());
-  walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
-  walk.screened = visibility.screened;
-  walk.elusive = visibility.elusive;
-  walk.screen = screenScales(visibility);
-  return walk;
-}
-
-double shareFound(const Object& object, double elusive_found) {
-  return 1.0 - object.screened - (1.0 - elusive_found) * object.elusive;
-}
-
-double azimuthSigma(double told, const ClassPrior& prior) {
-  return std::max(told, prior.azimuth_sigma);
-}
-
-double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {
-  const BoxParameters& box = frame.parameters->box;
-  double half = box.min_size_px;
-  if (frame.model && frame.model->input_width > 0.0) {
-    half = box.min_network_px * frame.view.camera->width() / frame.model->input_width;
-  }
-  return prior.detection_probability / (1.0 + std::exp(-(size_px - half) / (0.2 * half)));
-}
-
 ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
                 const FrameContext& frame) {
   ObjectLook result;
@@ -204,20 +145,6 @@ double associationWeight(const Object& object, const ObjectLook& look, std::size
   }
   const double r = object.existence;
   return r * made / std::max(1.0 - r + r * silent, 1e-12);
-}
-
-double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
-                   const LooksParameters& parameters) {
-  if (last.looks <= 0.0) return 0.0;
-  const double change =
-      viewChange(position, last.T_WC, view.T_WC(),
-                 {parameters.angle, parameters.log_distance, parameters.image_angle});
-  return last.looks * std::exp(-change);
-}
-
-double worthOfLook(double looks, double correlation) {
-  const auto information = [&](double n) { return n / (correlation * n + 1.0 - correlation); };
-  return information(looks + 1.0) - information(looks);
 }
 
 }  // namespace perdure::semantic_filter

@@ -6,25 +6,12 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/measurement/detection.h"
-#include "services/semantic_filter/core/update/predict.h"
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/measurement/cuboid_projection.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 #include "services/semantic_filter/core/visibility/occlusion.h"
 
 namespace perdure::semantic_filter {
-
-struct KeyView;
-class Ground;
-
-/// Of the boxes of one network and their azimuths, beside what is assumed of them.
-struct BoxErrors {
-  std::uint64_t model = 0;
-  double noise = 1.0;    ///< of the sides' variances: ErrorScales::ratio
-  double azimuth = 1.0;  ///< of the azimuths'; heard by fits of many looks alone
-  /// The same of b. What the looks at one thing have in common passes for its place and size: what
-  /// is left over of fits tells of b by half only, as networks go.
-  double lasting() const { return std::sqrt(noise); }
-};
 
 /// How a hypothesis explains one box.
 struct BoxFit {
@@ -52,44 +39,9 @@ struct ObjectLook {
   std::vector<HypothesisLook> hypotheses;
 };
 
-/// Everything about one frame that scoring, updating and birth need.
-struct FrameContext {
-  View view;
-  PoseError pose_error;
-  const Model* model = nullptr;
-  const ClassPriors* priors = nullptr;
-  const Parameters* parameters = nullptr;
-  std::shared_ptr<const KeyView> key_view = {};  ///< of this frame, for what is remembered
-  BoxErrors errors = {};
-  std::shared_ptr<const Ground> ground = {};  ///< before this frame; none: nothing is known of it
-
-  /// Of `view`.
-  Projector projector() const;
-  /// How the network draws its boxes about things of a class, as projectObserved takes it.
-  const BoxStyle& styleOf(const std::string& class_name) const {
-    static const BoxStyle plain;
-    return model ? model->styles->of(class_name) : plain;
-  }
-};
-
-/// Changes of view after which what hides a thing, or makes the network miss it, is another.
-ViewScales screenScales(const VisibilityParameters& visibility);
-/// What changes at an object with the view of this frame.
-ViewWalk viewWalkOf(const FrameContext& frame);
-
 /// log of the density of clutter, of the sides that were compared: one of fewer is of other units.
 double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters);
-
-/// By what P_D and what is visible are to be multiplied: what is screened is not found, what is
-/// elusive seldom.
-double shareFound(const Object& object, double elusive_found);
-
-/// Of an azimuth of which the network says `told`, rad, as is assumed at first.
-double azimuthSigma(double told, const ClassPrior& prior);
-
-/// P_D of a class for an instance of this size in pixels (√ of its box's area), fully visible.
-double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
 ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
                 const FrameContext& frame);
@@ -100,12 +52,5 @@ std::array<bool, 4> hiddenSides(const ObjectLook& look, std::size_t box);
 
 /// "Object made this box of the look" against "object made none, or is not there".
 double associationWeight(const Object& object, const ObjectLook& look, std::size_t box);
-
-/// Earlier looks that a look at `position` from here shares its errors with.
-double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
-                   const LooksParameters& parameters);
-/// Information of one more look after n correlated ones, in units of the first:
-/// I(n) = n / (ρ n + 1 - ρ), worth = I(n+1) - I(n).
-double worthOfLook(double looks, double correlation);
 
 }  // namespace perdure::semantic_filter

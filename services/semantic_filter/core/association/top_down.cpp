@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/semantic_filter/core/association/tempering.h"
+
 namespace perdure::semantic_filter {
 
 void hearPrimed(ObjectLook& look, const Object& object, const std::vector<double>& log_ratio,

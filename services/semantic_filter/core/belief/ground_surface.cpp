@@ -6,9 +6,8 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/tracks/lifecycle.h"
-
 namespace perdure::semantic_filter {
+
 namespace {
 
 constexpr std::size_t kNearest = 12, kLeast = 3;
@@ -16,45 +15,6 @@ constexpr double kLevelSigma = 10.0;   // m, of the ground beside the mean of th
 constexpr double kOutlier = 12.0;      // squared deviations from what the others say
 constexpr double kBounce = 0.03;       // m, of the body beside its height, as it goes
 constexpr double kSurelyStands = 0.9;  // of a class whose things may tell
-
-using Row = Eigen::Matrix<double, 1, kStateDim>;
-
-double underside(const State& x, const Eigen::Vector3d& up) {
-  return up.dot(x.head<3>()) - 0.5 * std::exp(x[kSize + 2]);
-}
-
-Row byState(const State& x, const Eigen::Vector3d& up) {
-  Row a = Row::Zero();
-  a.head<3>() = up.transpose();
-  a[kSize + 2] = -0.5 * std::exp(x[kSize + 2]);
-  return a;
-}
-
-/// Of a height at `place`, as it is believed, by the pose's error (core/birth.cpp, addPoseError).
-Eigen::Matrix<double, 1, 6> byPose(const Eigen::Vector3d& place, const View& view) {
-  Eigen::Matrix<double, 1, 6> a;
-  const Eigen::Vector3d p_B = view.T_WB.inverse() * place;
-  a.head<3>() = -view.up_W.transpose() * view.T_WB.R() * skew(p_B);
-  a.tail<3>() = view.up_W.transpose();
-  return a;
-}
-
-/// What the looks alone say of the underside, given the pose; nothing of what is not placed by
-/// parallax: sizes of one class err alike.
-Footing footingOf(const Hypothesis& h, const FrameContext& frame) {
-  const Matrix6d& P_pose = frame.pose_error.covariance;
-  const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
-  if (placeSigma(h, P_pose) > frame.parameters->ground.resolved * distance) return {};
-  const Row a = byState(h.x, frame.view.up_W);
-  Eigen::Matrix<double, 1, 6> shared = a * h.C;
-  Matrix6d L = P_pose;
-  if (choleskyInPlace(L)) {
-    whitenRows(L, shared);
-  } else {
-    shared.setZero();
-  }
-  return {0.0, std::max(a * h.P * a.transpose() - shared.squaredNorm(), 1e-6)};
-}
 
 }  // namespace
 
@@ -190,38 +150,8 @@ std::optional<GroundHeight> Ground::below(const Eigen::Vector3d& place, ObjectId
   return std::nullopt;
 }
 
-double standOnGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
-  const GroundParameters& p = frame.parameters->ground;
-  const double stands = frame.priors->of(h.class_name).stands;
-  h.footing = {};
-  if (!frame.ground || stands <= 0.0) return 0.0;
-  if (!h.moving) h.footing = footingOf(h, frame);
-  const auto ground = frame.ground->below(h.x.head<3>(), id);
-  if (!ground) return 0.0;
-  const Eigen::Vector3d up = frame.view.up_W.normalized();
-  const Row a = byState(h.x, up);
-  const Eigen::Matrix<double, 1, 6> g = byPose(h.x.head<3>(), frame.view);
-  const Matrix6d& P_pose = frame.pose_error.covariance;
-  const double e = ground->mean - underside(h.x, up);
-  const double own = ground->variance + p.sigma_m * p.sigma_m;
-  const State with_e = h.C * g.transpose() - h.P * a.transpose();
-  const Eigen::Matrix<double, 1, 6> pose_with_e = g * P_pose - a * h.C;
-  const double variance = own + (g * P_pose).dot(g) - 2.0 * (a * h.C).dot(g) + (a * h.P).dot(a);
-  if (!(variance > own * 0.5)) return 0.0;
-  const double density = std::exp(-0.5 * e * e / variance) / std::sqrt(2.0 * M_PI * variance);
-  const double on = stands * density, off = (1.0 - stands) / p.span_m;
-  const double inlier = on / (on + off);
-  if (inlier > 0.5) {
-    const double before = underside(h.x, up);
-    const double widened = variance + own * (1.0 / inlier - 1.0);
-    h.x -= with_e * (e / widened);
-    h.x[kYaw] = wrapAngle(h.x[kYaw]);
-    h.P -= with_e * with_e.transpose() / widened;
-    makeSymmetric(h.P);
-    h.C -= with_e * pose_with_e / widened;
-    h.footing.above = before - underside(h.x, up);
-  }
-  return std::log((on + off) * p.span_m);
+double underside(const State& x, const Eigen::Vector3d& up) {
+  return up.dot(x.head<3>()) - 0.5 * std::exp(x[kSize + 2]);
 }
 
 }  // namespace perdure::semantic_filter

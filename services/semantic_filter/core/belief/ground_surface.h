@@ -14,8 +14,9 @@
 #include <vector>
 
 #include "common/base/inplace_vector.h"
-#include "services/semantic_filter/core/association/score.h"
+#include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 
@@ -91,10 +92,7 @@ class Ground {
   std::vector<Stand> stands_, path_;  ///< those on the path have the body's height in common
 };
 
-/// Keeps what the hypothesis, as the looks alone have it, says of the ground (Footing), and then
-/// makes it stand there as far as its class does: a consider update. Returns
-/// log p(underside | the ground) against undersides anywhere within ground.span_m: 0 where nothing
-/// is known.
-double standOnGround(Hypothesis& h, ObjectId id, const FrameContext& frame);
+/// Height of the underside of a cuboid, m.
+double underside(const State& x, const Eigen::Vector3d& up);
 
 }  // namespace perdure::semantic_filter

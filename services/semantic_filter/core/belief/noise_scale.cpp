@@ -6,7 +6,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kLeast = 0.04, kMost = 9.0;
+constexpr double kLeastRatio = 0.04, kMostRatio = 9.0;
 
 }  // namespace
 
@@ -15,7 +15,7 @@ double ErrorScales::ratio(std::uint64_t model, double assumed) const {
   for (const auto& [of, heard] : heard_) {
     if (of != model) continue;
     const double ratio = (assumed + heard.squares) / (assumed + heard.count);
-    return std::clamp(ratio, kLeast, kMost);
+    return std::clamp(ratio, kLeastRatio, kMostRatio);
   }
   return 1.0;
 }
@@ -26,7 +26,7 @@ void ErrorScales::hear(std::uint64_t model, const Leftover& over) {
                          [model](const auto& entry) { return entry.first == model; });
   if (it == heard_.end()) it = heard_.insert(heard_.end(), {model, {}});
   Heard& heard = it->second;
-  heard.squares += over.count * std::min(over.ratio, kMost);
+  heard.squares += over.count * std::min(over.ratio, kMostRatio);
   heard.count += over.count;
   if (heard.count <= remembered_) return;
   heard.squares *= remembered_ / heard.count;

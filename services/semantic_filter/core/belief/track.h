@@ -16,42 +16,10 @@
 #include "common/types/odometry.h"
 #include "services/semantic_filter/core/belief/detection_rate.h"
 #include "services/semantic_filter/core/belief/ledger.h"
-#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/belief/state.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
-
-/// x = [p_WO, yaw about gravity, log l, log w, log h, b, v_W]. b is the detector's own error at
-/// this object: how far it puts each side of the box (x1, y1, x2, y2) from the cuboid's image, in
-/// widths and heights of the box; it stays while the view stays (DESIGN 5, item 7). v and its
-/// covariance are zero while the hypothesis is a static one.
-inline constexpr int kStateDim = 14;
-using State = Eigen::Matrix<double, kStateDim, 1>;
-using StateCovariance = Eigen::Matrix<double, kStateDim, kStateDim>;
-using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< P_xg with the pose error [θ, p]
-inline constexpr int kYaw = 3, kSize = 4, kBias = 7, kVelocity = 11;
-inline constexpr int kGeometry = kBias;  ///< dimensions of the cuboid alone
-
-/// What the looks at a thing alone say of the ground that it stands on (core/ground.h).
-struct Footing {
-  double above = 0.0;     ///< m, beside the underside of the hypothesis
-  double variance = 0.0;  ///< m², given the pose; 0: they say nothing
-};
-
-struct Hypothesis {
-  std::string class_name;
-  bool moving = false;
-  double weight = 0.0;  ///< of this hypothesis given that the object exists; they sum to 1
-  State x = State::Zero();
-  StateCovariance P = StateCovariance::Identity();
-  CrossPose C = CrossPose::Zero();
-  double head = 0.0;  ///< log-odds that the yaw is not turned by 180°
-  double pace = 1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
-  bool modes_sought = false;  ///< of yaw, and weighed by all looks that are remembered
-  Footing footing = {};
-
-  /// Shape::corner's, in expectation.
-  double facing() const { return facingOf(head); }
-};
 
 /// From where the object was last looked at, for the correlation of looks (DESIGN 5, item 7).
 struct ViewPoint {
@@ -132,28 +100,7 @@ struct Object {
   const Hypothesis& best() const { return hypotheses.front(); }
 };
 
-/// π of a class: the sum of its hypotheses' weights.
-double classProbability(const Object& object, const std::string& class_name);
-/// Probability that a moving hypothesis is faster than `speed`, m/s.
-double fasterThan(const Hypothesis& h, double speed);
-/// Probability that the object moves faster than `min_speed`, given that it exists.
-double movingProbability(const Object& object, double min_speed);
-/// All numbers are finite and some weight is left.
-bool sound(const Object& object);
-/// π of each class, in the order of its heaviest hypothesis.
-std::vector<ClassNumber> classShares(const Object& object);
-/// Books the weights as they are now, whatever their sum.
-void book(Object& object, ClassEvidence why);
-/// Divides the weights by their sum, puts the heaviest first (stable), and books them.
-void normalise(Object& object, ClassEvidence why);
-/// a - b of the cuboids, yaw modulo 180°: a cuboid is the same turned by that.
-Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b);
-/// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.
-void mergeInto(Hypothesis& a, const Hypothesis& b);
-/// The published belief: per class its hypotheses as one Gaussian around the heaviest one.
-ObjectBelief toBelief(const Object& object, double min_speed);
-/// A belief that came back as an object with one hypothesis for each class. `back` is kRestore or
-/// kRecall.
-Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
+/// The most that is believed of its existence.
+double certainty(const Object& object, const TendParameters& parameters);
 
 }  // namespace perdure::semantic_filter

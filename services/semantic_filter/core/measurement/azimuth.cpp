@@ -5,6 +5,7 @@
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
+
 namespace {
 
 constexpr double kOutlier = 0.2;  // share of azimuths that say nothing
@@ -27,6 +28,10 @@ AzimuthLook azimuthLook(double azimuth, const State& x, const View& view, double
 double headOdds(const AzimuthLook& look) {
   const double nats = std::log((1.0 - kFlip) / kFlip) * look.inlier;
   return look.same_head ? nats : -nats;
+}
+
+double azimuthSigma(double told, const ClassPrior& prior) {
+  return std::max(told, prior.azimuth_sigma);
 }
 
 }  // namespace perdure::semantic_filter

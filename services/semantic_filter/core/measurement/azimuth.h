@@ -2,6 +2,7 @@
 // from that, of where its head is. Some azimuths say nothing, some are turned by 180°.
 #pragma once
 
+#include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
 
 namespace perdure::semantic_filter {
@@ -18,5 +19,8 @@ AzimuthLook azimuthLook(double azimuth, const State& x, const View& view, double
 
 /// Nats for the head that one such azimuth speaks for.
 double headOdds(const AzimuthLook& look);
+
+/// Of an azimuth of which the network says `told`, rad, as is assumed at first.
+double azimuthSigma(double told, const ClassPrior& prior);
 
 }  // namespace perdure::semantic_filter

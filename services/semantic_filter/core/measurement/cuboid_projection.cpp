@@ -8,6 +8,7 @@
 #include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
+
 namespace {
 
 constexpr double kNear = 0.2;  // metres
@@ -223,17 +224,6 @@ void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
 }
 
 }  // namespace
-
-Projector::Projector(const View& view)
-    : camera(view.camera),
-      T_WC(view.T_WC()),
-      R_CW(T_WC.q.conjugate().toRotationMatrix()),
-      R_BC(view.camera->T_BC().R()),
-      R_WL(levelling(view.up_W).conjugate().toRotationMatrix()) {}
-
-Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
-  return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
-}
 
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from, const Shape& shape,
                                           double facing) {

@@ -8,30 +8,11 @@
 #include <optional>
 
 #include "common/camera/camera_model.h"
-#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/belief/state.h"
 #include "services/semantic_filter/core/measurement/polygon.h"
-#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/measurement/view.h"
 
 namespace perdure::semantic_filter {
-
-/// From where the scene is seen: everything that a projection needs.
-struct View {
-  const CameraModel* camera = nullptr;
-  RigidTransform T_WB;
-  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
-
-  RigidTransform T_WC() const { return T_WB * camera->T_BC(); }
-};
-
-/// A view with what all projections from it share; a View where there is but one.
-struct Projector {
-  Projector(const View& view);  // NOLINT(google-explicit-constructor)
-
-  const CameraModel* camera;
-  RigidTransform T_WC;
-  Eigen::Matrix3d R_CW, R_BC;
-  Eigen::Matrix3d R_WL;  ///< from W turned so that z is against gravity
-};
 
 struct ProjectedBox {
   Eigen::Vector4d sides = Eigen::Vector4d::Zero();  ///< x1, y1, x2, y2; may lie outside the image
@@ -46,8 +27,6 @@ struct ProjectedOutline {
   Polygon points;         ///< images of corners and cuts by the near plane, in no order
 };
 
-/// R_WO of an upright cuboid.
-Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
 /// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
 /// The box is of `shape` within the cuboid, or of all of it where that reaches the near plane.
 /// `facing` as in Shape::corner.

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "common/types/detections.h"
-#include "services/semantic_filter/core/measurement/box_likelihood.h"
 #include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/measurement/box_likelihood.h"
 
 namespace perdure::semantic_filter {
 

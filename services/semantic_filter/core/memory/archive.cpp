@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "services/semantic_filter/core/update/predict.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "common/math/rigid_transform.h"
 #include "services/semantic_filter/core/measurement/box_likelihood.h"
-#include "services/semantic_filter/core/update/predict.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
 

@@ -6,6 +6,7 @@
 #include "common/math/dense_kernels.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/measurement/azimuth.h"
 #include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/measurement/azimuth.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 
 namespace perdure::semantic_filter {

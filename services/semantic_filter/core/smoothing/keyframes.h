@@ -9,47 +9,10 @@
 
 #include "common/camera/camera_model.h"
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/association/score.h"
+#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
-
-/// From where a frame's looks were taken; shared by all of them, and owner of its camera.
-struct KeyView {
-  KeyView(const View& of, const PoseError& pose_error, TimePoint at,
-          std::shared_ptr<const BoxStyles> of_model, BoxErrors box_errors = {})
-      : camera(*of.camera),
-        view(of),
-        error(pose_error),
-        product_inverse(inverse(pose_error.product)),
-        time(at),
-        T_WC(of.T_WC()),
-        projector(of),
-        styles(std::move(of_model)),
-        errors(box_errors) {
-    view.camera = projector.camera = &camera;
-  }
-  KeyView(const KeyView&) = delete;
-  KeyView& operator=(const KeyView&) = delete;
-
-  CameraModel camera;
-  View view;
-  PoseError error;
-  Matrix6d product_inverse;  ///< of error.product; not finite where there is none
-  TimePoint time;
-  RigidTransform T_WC;
-  Projector projector;
-  std::shared_ptr<const BoxStyles> styles;  ///< of the network that looked
-  BoxErrors errors;                         ///< of its boxes, as they were thought to be
-};
-
-/// One box that was surely the object's.
-struct Keyframe {
-  std::shared_ptr<const KeyView> from;
-  BoxMeasurement z;
-  std::array<bool, 4> hidden{};  ///< sides that something nearer hides
-  std::optional<double> azimuth;
-  double azimuth_sigma = 0.35;
-};
 
 /// Takes the look in if it shows the object from where no remembered one does. Where there are
 /// `limit` already, the one that tells least beside its neighbours goes. Whether anything changed.

@@ -6,8 +6,8 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/update/predict.h"
-#include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {
 namespace {

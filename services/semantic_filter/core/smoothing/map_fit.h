@@ -12,8 +12,8 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/smoothing/batch_problem.h"
 #include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/smoothing/batch_problem.h"
 
 namespace perdure::semantic_filter {
 

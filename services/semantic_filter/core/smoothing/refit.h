@@ -2,8 +2,7 @@
 // it is, and whether it moves.
 #pragma once
 
-#include "services/semantic_filter/core/belief/noise_scale.h"
-#include "services/semantic_filter/core/measurement/detection.h"
+#include "services/semantic_filter/core/belief/belief.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 
 namespace perdure::semantic_filter {
@@ -22,5 +21,8 @@ struct Leftovers {
 /// Smooths the object's hypotheses and weighs within each class whether it moves. Of a thing that
 /// surely stands, what is left over of the looks that are new.
 std::optional<Leftovers> smooth(Object& object, const FrameContext& frame);
+
+/// Smooths the objects that need it most: as many as a frame has time for; the others wait.
+void smoothNeediest(std::vector<Object*>& objects, Belief& belief, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

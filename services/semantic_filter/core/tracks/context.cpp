@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+
 namespace perdure::semantic_filter {
 namespace {
 

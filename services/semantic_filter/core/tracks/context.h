@@ -11,8 +11,8 @@
 
 #include <vector>
 
-#include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {
 

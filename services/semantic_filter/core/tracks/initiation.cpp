@@ -7,126 +7,16 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/belief/ground_surface.h"
-#include "services/semantic_filter/core/update/track_update.h"
+#include "services/semantic_filter/core/association/box_explanation.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/measurement/azimuth.h"
+#include "services/semantic_filter/core/tracks/mixture_reduction.h"
+#include "services/semantic_filter/core/update/azimuth_update.h"
+#include "services/semantic_filter/core/update/ground_contact.h"
 
 namespace perdure::semantic_filter {
+
 namespace {
-
-constexpr int kFree = kVelocity;  // dimensions of the fit: geometry and bias
-using VectorFit = Eigen::Matrix<double, kFree, 1>;
-
-/// Residuals where nothing is before the camera: the solver reads them of a step whose cost cannot
-/// be told, and must not take it.
-constexpr double kNoStep = 1e100;
-
-/// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range,
-/// four of bias.
-class BirthCost {
- public:
-  using Scalar = double;
-  enum { NUM_RESIDUALS = 16, NUM_PARAMETERS = kFree };
-  using Residuals = Eigen::Matrix<double, NUM_RESIDUALS, 1>;
-  using Jacobian = Eigen::Matrix<double, NUM_RESIDUALS, NUM_PARAMETERS>;
-
-  BirthCost(const Evidence& evidence, const ClassPrior& prior, double yaw, double yaw_sigma,
-            const std::optional<RangeHint>& range, const FrameContext& frame,
-            const Eigen::Vector3d& start)
-      : z_(evidence.z),
-        from_(frame.projector()),
-        yaw_(yaw),
-        yaw_sigma_(yaw_sigma),
-        range_(range),
-        log_size_(prior.log_size),
-        start_(start),
-        style_(frame.styleOf(prior.name)) {
-    bias_sigma_ = biasSigma(viewWalkOf(frame).lasting, z_.width(), z_.height()).cwiseMax(1e-6);
-    position_weight_ = 1.0 / std::max((start - from_.T_WC.p).norm(), 1.0);
-    size_whitening_ = Cholesky(prior.log_size_covariance).whiten(Eigen::Matrix3d::Identity());
-  }
-
-  bool operator()(const double* parameters, double* residuals, double* jacobian) const {
-    State x = State::Zero();
-    x.head<kFree>() = Eigen::Map<const VectorFit>(parameters);
-    const auto box = projectObserved(x, from_, style_);
-    Eigen::Map<Residuals> r(residuals);
-    if (!box) {
-      r.setConstant(kNoStep);
-      return false;
-    }
-    Jacobian J = Jacobian::Zero();
-    r.setZero();
-    sides(*box, r, J);
-    r.segment<3>(4) = position_weight_ * (x.head<3>() - start_);
-    J.block<3, 3>(4, 0).diagonal().setConstant(position_weight_);
-    r[7] = wrapAngle(x[kYaw] - yaw_) / yaw_sigma_;
-    J(7, kYaw) = 1.0 / yaw_sigma_;
-    r.segment<3>(8) = size_whitening_ * (x.segment<3>(kSize) - log_size_);
-    J.block<3, 3>(8, kSize) = size_whitening_;
-    if (range_) {
-      const Eigen::Vector3d ray = x.head<3>() - from_.T_WC.p;
-      r[11] = (ray.norm() - range_->distance_m) / range_->sigma_m;
-      J.block<1, 3>(11, 0) = ray.normalized().transpose() / range_->sigma_m;
-    }
-    r.segment<4>(12) = x.segment<4>(kBias).cwiseQuotient(bias_sigma_);
-    J.block<4, 4>(12, kBias).diagonal() = bias_sigma_.cwiseInverse();
-    if (jacobian) std::copy(J.data(), J.data() + J.size(), jacobian);
-    return r.allFinite();
-  }
-
- private:
-  void sides(const ProjectedBox& box, Eigen::Map<Residuals>& r, Jacobian& J) const {
-    for (int i = 0; i < 4; ++i) {
-      const double inside = i < 2 ? box.sides[i] - z_.sides[i] : z_.sides[i] - box.sides[i];
-      if (!box.exact[i] || (!z_.measured[i] && inside <= 0.0)) continue;
-      const double weight = 1.0 / std::sqrt(z_.variance[i]);
-      r[i] = weight * (box.sides[i] - z_.sides[i]);
-      J.row(i) = weight * box.H.row(i).head<kFree>();
-    }
-  }
-
-  const BoxMeasurement& z_;
-  Projector from_;
-  double yaw_, yaw_sigma_;
-  std::optional<RangeHint> range_;
-  Eigen::Vector3d log_size_, start_;
-  const BoxStyle& style_;
-  double position_weight_ = 1.0;
-  Eigen::Vector4d bias_sigma_;
-  Eigen::Matrix3d size_whitening_;
-};
-
-/// Unit ray in W through the box's centre.
-std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view) {
-  const Eigen::Vector2d centre(0.5 * (z.sides[0] + z.sides[2]), 0.5 * (z.sides[1] + z.sides[3]));
-  const auto normalised = view.camera->unproject(centre);
-  if (!normalised) return std::nullopt;
-  const Eigen::Vector3d ray(normalised->x(), normalised->y(), 1.0);
-  return Eigen::Vector3d(view.T_WC().R() * ray);  // its length is per metre of depth
-}
-
-/// Depth at which an object of the prior's size has the box's height, or else its width.
-std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& prior,
-                                    const CameraModel& camera) {
-  if (z.measured[1] && z.measured[3]) return camera.fy() * std::exp(prior.log_size[2]) / z.height();
-  if (z.measured[0] && z.measured[2]) {
-    return camera.fx() * std::exp(0.5 * (prior.log_size[0] + prior.log_size[1])) / z.width();
-  }
-  return std::nullopt;
-}
-
-/// The pose error enters what was seen from the body: δp = δp_B + R [·]x θ, δψ = up · R θ.
-void addPoseError(Hypothesis& h, const FrameContext& frame) {
-  Eigen::Matrix<double, kStateDim, 6> A = Eigen::Matrix<double, kStateDim, 6>::Zero();
-  const Eigen::Matrix3d R_WB = frame.view.T_WB.R();
-  const Eigen::Vector3d p_B = frame.view.T_WB.inverse() * Eigen::Vector3d(h.x.head<3>());
-  A.block<3, 3>(0, 0) = -R_WB * skew(p_B);
-  A.block<3, 3>(0, 3).setIdentity();
-  A.block<1, 3>(kYaw, 0) = frame.view.up_W.transpose() * R_WB;
-  h.C = A * frame.pose_error.covariance;
-  h.P += A * frame.pose_error.covariance * A.transpose();
-  makeSymmetric(h.P);
-}
 
 struct YawStart {
   double yaw, sigma, weight;
@@ -174,7 +64,7 @@ void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
 
 /// How much better the box's shape (its aspect) fits what was assumed than clutter, whose extents
 /// are log-uniform. Where sides are cut it has none.
-double logShapeRatio(const Fit& fit, const ClassPrior& prior, double yaw_sigma,
+double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_sigma,
                      const Evidence& evidence, const FrameContext& frame) {
   const auto& z = evidence.z;
   const auto box = projectObserved(fit.hypothesis.x, frame.projector(),
@@ -301,30 +191,25 @@ void bookBirth(Object& object, const std::vector<Candidate>& kept, const Evidenc
   object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, said);
 }
 
-}  // namespace
-
-std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
-                                            const std::vector<SightPoint>& points,
-                                            const BirthParameters& parameters) {
-  const auto& z = evidence.z;
-  const Eigen::Vector2d centre(0.5 * (z.sides[0] + z.sides[2]), 0.5 * (z.sides[1] + z.sides[3]));
-  double sum = 0.0, mean = 0.0, square = 0.0;
-  std::int64_t n = 0;
-  for (const auto& p : points) {
-    const double u = (p.pixel.x() - centre.x()) / (0.5 * z.width());
-    const double v = (p.pixel.y() - centre.y()) / (0.5 * z.height());
-    if (std::abs(u) > 1.0 || std::abs(v) > 1.0 || p.distance_m <= 0.0) continue;
-    const double weight = std::exp(-std::hypot(u, v) / parameters.landmark_decay) /
-                          (1.0 + p.sigma_m * p.sigma_m / (p.distance_m * p.distance_m));
-    const double inverse = 1.0 / p.distance_m;  // the mean of the inverse: far points pull less
-    sum += weight, mean += weight * inverse, square += weight * inverse * inverse;
-    ++n;
-  }
-  if (n < parameters.min_landmarks) return std::nullopt;
-  mean /= sum;
-  const double spread = std::sqrt(std::max(square / sum - mean * mean, 0.0)) / mean;
-  return RangeHint{1.0 / mean, (0.1 + spread) / mean};
+/// How much another look of the same detector at one object may overlap with its box.
+bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
+  const Box box_a{a.sides[0], a.sides[1], a.sides[2], a.sides[3]};
+  const Box box_b{b.sides[0], b.sides[1], b.sides[2], b.sides[3]};
+  return intersectionOverUnion(box_a, box_b) > 0.65;
 }
+
+/// The rest of an object that is almost out of the image is no new object.
+bool leavesView(Expected& expected, const Belief& belief,
+                                const std::vector<Sight>& sights, const Evidence& box) {
+  if (box.z.count() == 4) return false;  // what leaves is cut by the border
+  for (std::size_t j = 0; j < sights.size(); ++j) {
+    if (sights[j].visibility != Visibility::kOutOfView || !belief.objects[j].confirmed) continue;
+    if (expected.matches(j, sights[j].hidden, box)) return true;
+  }
+  return false;
+}
+
+}  // namespace
 
 double logBirthRatio(const Evidence& evidence, const FrameContext& frame) {
   const auto& p = *frame.parameters;
@@ -336,40 +221,6 @@ double logBirthRatio(const Evidence& evidence, const FrameContext& frame) {
   return std::log(p.birth.odds) - evidence.log_remnants +
          std::log((1.0 - p.clutter.other_prior) * named +
                   p.clutter.other_prior * std::exp(evidence.log_ratio_other));
-}
-
-std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, double yaw,
-                             double yaw_sigma, const std::optional<RangeHint>& range,
-                             const FrameContext& frame) {
-  const auto depth = depthFromSize(evidence.z, prior, *frame.view.camera);
-  const auto ray = centreRay(evidence.z, frame.view);
-  if (!depth || !ray) return std::nullopt;
-  const double minimum = frame.parameters->birth.min_distance_m;
-  const double start_depth = range ? range->distance_m / ray->norm() : *depth;
-  const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
-  const BirthCost cost(evidence, prior, yaw, yaw_sigma, range, frame, start);
-  VectorFit x = VectorFit::Zero();
-  x.head<7>() << start, yaw, prior.log_size;
-  BirthCost::Residuals r;
-  BirthCost::Jacobian J;
-  if (!cost(x.data(), r.data(), J.data())) return std::nullopt;  // the solver would not ask
-  ceres::TinySolver<BirthCost> solver;
-  solver.options.max_num_iterations = 15;
-  solver.Solve(cost, &x);
-  if (!x.allFinite() || !cost(x.data(), r.data(), J.data())) return std::nullopt;
-  const Cholesky hessian(J.transpose() * J);
-  if (!hessian.positive()) return std::nullopt;
-  Fit fit;
-  fit.cost = 0.5 * r.squaredNorm();
-  fit.hypothesis.class_name = prior.name;
-  fit.hypothesis.x.head<kFree>() = x;
-  fit.hypothesis.x[kYaw] = wrapAngle(x[kYaw]);
-  fit.hypothesis.P.setZero();
-  fit.hypothesis.P.topLeftCorner<kFree, kFree>() =
-      hessian.solve(Eigen::MatrixXd::Identity(kFree, kFree));
-  addPoseError(fit.hypothesis, frame);
-  if (!fit.hypothesis.P.allFinite()) return std::nullopt;
-  return fit;
 }
 
 std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHint>& range,
@@ -396,6 +247,47 @@ std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHi
   object.hit_view = object.late_view = {frame.view.T_WC(), 1.0};
   object.last_view = frame.view.T_WC();
   return object;
+}
+
+void births(Belief& belief, const std::vector<Sight>& sights,
+                            const Eigen::VectorXd& claimed, const FrameInput& input,
+                            const FrameContext& frame, IdBook& ids) {
+  const auto& boxes = *input.boxes;
+  std::vector<Object> born;
+  Expected expected(belief, input, *frame.parameters);
+  std::vector<std::size_t> accepted;
+  for (std::size_t z = 0; z < boxes.size(); ++z) {
+    if (claimed[static_cast<Eigen::Index>(z)] > frame.parameters->birth.claimed) accepted.push_back(z);
+  }
+  for (std::size_t z = 0; z < boxes.size(); ++z) {
+    const Evidence& e = boxes[z];
+    if (claimed[static_cast<Eigen::Index>(z)] > frame.parameters->birth.claimed) continue;
+    if (logBirthRatio(e, frame) - std::log(frame.parameters->birth.odds) <
+        frame.parameters->birth.min_log_ratio) {
+      continue;
+    }
+    const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
+      return sameThing(boxes[other].z, e.z);
+    });
+    if (doubled || leavesView(expected, belief, sights, e)) continue;
+    auto object =
+        bear(e, rangeFromLandmarks(e, input.points, frame.parameters->birth), input.stamp.time, frame);
+    if (!object) continue;
+    object->id = ids.idFor(input.stamp.sequence, z);
+    if (const double share = claimed[static_cast<Eigen::Index>(z)]; share > 0.0) {
+      object->existence.become(object->existence * (1.0 - share), ExistenceEvidence::kShared,
+                               input.stamp.time);
+    }
+    tendHypotheses(*object, *frame.priors, *frame.parameters);
+    if (object->hypotheses.empty()) continue;
+    born.push_back(std::move(*object));
+    accepted.push_back(z);
+  }
+  std::move(born.begin(), born.end(), std::back_inserter(belief.objects));
+  const auto older = [](const auto& a, const auto& b) { return a.id < b.id; };
+  if (!std::is_sorted(belief.objects.begin(), belief.objects.end(), older)) {
+    std::stable_sort(belief.objects.begin(), belief.objects.end(), older);
+  }
 }
 
 }  // namespace perdure::semantic_filter

@@ -10,20 +10,12 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/association/score.h"
+#include "services/semantic_filter/core/belief/belief.h"
+#include "services/semantic_filter/core/belief/id_book.h"
+#include "services/semantic_filter/core/tracks/cuboid_fit.h"
+#include "services/semantic_filter/core/visibility/occlusion.h"
 
 namespace perdure::semantic_filter {
-
-/// Range (and its spread) of what is inside a box, from landmarks.
-struct RangeHint {
-  double distance_m = 0.0, sigma_m = 0.0;
-};
-
-/// Centroid along the ray of the landmarks inside the box; weights fall exponentially from its
-/// centre. Nothing with fewer than birth.min_landmarks.
-std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
-                                            const std::vector<SightPoint>& points,
-                                            const BirthParameters& parameters);
 
 /// Log of the ratio "new object" to clutter for this box, all classes together.
 double logBirthRatio(const Evidence& evidence, const FrameContext& frame);
@@ -32,13 +24,8 @@ double logBirthRatio(const Evidence& evidence, const FrameContext& frame);
 std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHint>& range,
                            TimePoint now, const FrameContext& frame);
 
-/// One hypothesis for a class and a yaw start. `cost` is half the squared whitened residual.
-struct Fit {
-  Hypothesis hypothesis;
-  double cost = 0.0;
-};
-std::optional<Fit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, double yaw,
-                             double yaw_sigma, const std::optional<RangeHint>& range,
-                             const FrameContext& frame);
+/// Objects from the boxes that nobody claims; `claimed` is Association::claimed.
+void births(Belief& belief, const std::vector<Sight>& sights, const Eigen::VectorXd& claimed,
+            const FrameInput& input, const FrameContext& frame, IdBook& ids);
 
 }  // namespace perdure::semantic_filter

@@ -6,9 +6,10 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/measurement/polygon.h"
-#include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/update/predict.h"
 
 namespace perdure::semantic_filter {
 namespace {

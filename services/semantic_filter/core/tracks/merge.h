@@ -3,7 +3,8 @@
 
 #include <vector>
 
-#include "services/semantic_filter/core/association/score.h"
+#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
 

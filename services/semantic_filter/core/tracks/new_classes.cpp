@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 

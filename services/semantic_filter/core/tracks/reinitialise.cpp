@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+
 namespace perdure::semantic_filter {
 
 bool bearAgain(Object& object, const std::vector<ClassNumber>& pmf, const Evidence& evidence,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+
 namespace perdure::semantic_filter {
 namespace {
 

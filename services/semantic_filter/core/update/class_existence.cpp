@@ -4,9 +4,10 @@
 #include <cmath>
 #include <map>
 
-#include "services/semantic_filter/core/tracks/lifecycle.h"
+#include "services/semantic_filter/core/visibility/detectability.h"
 
 namespace perdure::semantic_filter {
+
 namespace {
 
 /// Of A over the hypotheses, by a look's worth and in full.
@@ -65,17 +66,6 @@ void keepModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares, d
     const Class& c = classes[h.class_name];
     if (c.after > c.before) h.weight *= c.before / c.after;
   }
-}
-
-/// A frame that does not show the object says that it is screened, too, or elusive. With A' where
-/// it is neither, A is 1 where it is screened and 1 + q (A' - 1), q the share of P_D, where it is
-/// elusive.
-void hearFromHere(Object& object, double mean_A, double elusive_found) {
-  const double open = shareFound(object, elusive_found);
-  const double found = open > 0.0 ? elusive_found / open : 0.0;
-  const double elusive = object.elusive * std::max(1.0 + found * (mean_A - 1.0), 0.0);
-  object.screened = std::min(1.0, object.screened / mean_A);
-  object.elusive = std::min(1.0 - object.screened, elusive / mean_A);
 }
 
 /// Existence has two accounts. "It is a real thing": looks from one place share the network's

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/update/attribution.h"
+#include "services/semantic_filter/core/association/score.h"
 
 namespace perdure::semantic_filter {
 
@@ -22,17 +22,5 @@ std::optional<std::size_t> update(Object& object, const ObjectLook& look,
 
 /// The object after the same look, had none of its boxes been the object's.
 Object missed(Object object, ObjectLook look, const FrameContext& frame);
-
-/// One hypothesis against one box: the iterated consider-EKF. The box's variance counts `repeated`
-/// times, and more where the box is an outlier. `at_prior` is the projection of the prior where it
-/// is known already.
-Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
-                         const std::array<bool, 4>& hidden, double repeated,
-                         const FrameContext& frame, const ProjectedBox* at_prior = nullptr);
-
-/// A network's azimuth as a weak measurement of yaw modulo 180°, with `weight` in (0, 1]; head or
-/// tail is kept as log-odds. Returns the likelihood of the azimuth, for weighing yaw modes only.
-double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
-                         const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

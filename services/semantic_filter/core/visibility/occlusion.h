@@ -5,8 +5,9 @@
 #include <array>
 #include <vector>
 
+#include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
-#include "services/semantic_filter/core/parameters.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
 
@@ -26,13 +27,6 @@ struct Sight {
   double remnant = 0.0;   ///< what is to be seen of one whose v is 0, less than visibility.minimum
   ObjectId blocked_by = 0;
   std::array<bool, 4> hidden{};  ///< sides (x1, y1, x2, y2) that lie behind a nearer object
-};
-
-/// A landmark in the image: what stands between the camera and an object, or behind it.
-struct SightPoint {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  double distance_m = 0.0;
-  double sigma_m = 0.0;
 };
 
 /// Of the object in its cuboid `x`, as it is seen `from` there.

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/semantic_filter/core/update/predict.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -5,7 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/filter.h"
+#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
 

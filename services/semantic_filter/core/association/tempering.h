@@ -1,0 +1,16 @@
+// Looks that share a viewpoint share the errors of the network: how much one more is worth.
+#pragma once
+
+#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/measurement/frame.h"
+
+namespace perdure::semantic_filter {
+
+/// Earlier looks that a look at `position` from here shares its errors with.
+double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
+                   const LooksParameters& parameters);
+/// Information of one more look after n correlated ones, in units of the first:
+/// I(n) = n / (ρ n + 1 - ρ), worth = I(n+1) - I(n).
+double worthOfLook(double looks, double correlation);
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,26 @@
+// All that the filter believes, as one plain value.
+#pragma once
+
+#include <vector>
+
+#include "services/semantic_filter/core/belief/ground_surface.h"
+#include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/track.h"
+
+namespace perdure::semantic_filter {
+
+/// What is true of the networks and of the streets, whatever the world: it outlives a world.
+struct Learned {
+  ErrorScales sides{4000.0};    ///< of boxes
+  ErrorScales azimuths{200.0};  ///< each of another thing
+  Evenness evenness = {};
+};
+
+struct Belief {
+  std::vector<Object> objects;  ///< in order of id
+  std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
+  Learned learned = {};
+  Path path = {};  ///< of the body
+};
+
+}  // namespace perdure::semantic_filter

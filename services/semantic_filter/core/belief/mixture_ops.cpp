@@ -1,0 +1,128 @@
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/base/check.h"
+#include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
+#include "common/math/so3.h"
+namespace perdure::semantic_filter {
+
+namespace {
+
+State difference(const State& a, const State& b) {
+  State d = a - b;
+  d[kYaw] = wrapAngle(d[kYaw]);
+  return d;
+}
+
+/// A hypothesis turned by 180° describes the same cuboid: choose the turn that is nearer.
+State nearestTurn(const State& x, const State& reference) {
+  State y = x;
+  if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2)
+    y[kYaw] = wrapAngle(x[kYaw] + M_PI);
+  return y;
+}
+
+template <int N>
+double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<double, N, N>& P) {
+  Eigen::Matrix<double, N, N> L = P;
+  if (!choleskyInPlace(L)) return std::numeric_limits<double>::infinity();
+  Eigen::Matrix<double, N, 1> whitened = d;
+  whiten(L, whitened);
+  return whitened.squaredNorm();
+}
+
+}  // namespace
+
+double classProbability(const Object& object, const std::string& class_name) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) sum += h.class_name == class_name ? h.weight : 0.0;
+  return sum;
+}
+
+bool sound(const Object& object) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) {
+    // A sum is finite where all that it is of is.
+    if (!std::isfinite(h.x.sum() + h.P.sum() + h.C.sum())) return false;
+    sum += h.weight;
+  }
+  return std::isfinite(sum) && sum > 0.0 && std::isfinite(object.existence);
+}
+
+std::vector<ClassNumber> classShares(const Object& object) {
+  std::vector<ClassNumber> pmf;
+  pmf.reserve(object.hypotheses.size());
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses) {
+    const auto same = [&](const ClassNumber& c) { return c.name == h.class_name; };
+    const auto it = std::find_if(pmf.begin(), pmf.end(), same);
+    if (it == pmf.end()) {
+      pmf.push_back({h.class_name, h.weight});
+    } else {
+      it->value += h.weight;
+    }
+    sum += h.weight;
+  }
+  for (auto& c : pmf) c.value /= sum;
+  return pmf;
+}
+
+void book(Object& object, ClassEvidence why) {
+  object.classes.book(classShares(object), why, object.as_of);
+}
+
+void normalise(Object& object, ClassEvidence why) {
+  double sum = 0.0;
+  for (const auto& h : object.hypotheses.read()) sum += h.weight;
+  check(sum > 0.0, "an object keeps a hypothesis of positive weight");
+  auto& hs = object.hypotheses.write();
+  for (auto& h : hs) h.weight /= sum;
+  const auto heavier = [](const auto& a, const auto& b) { return a.weight > b.weight; };
+  // Few, and nearly in order: std::stable_sort would ask for memory for as many again.
+  for (auto next = hs.begin(); next != hs.end(); ++next) {
+    const auto at = std::upper_bound(hs.begin(), next, *next, heavier);
+    if (at != next) std::rotate(at, next, next + 1);
+  }
+  book(object, why);
+}
+
+void mergeInto(Hypothesis& a, const Hypothesis& b) {
+  const double weight = a.weight + b.weight;
+  const double wa = a.weight / weight, wb = b.weight / weight;
+  const State delta = difference(nearestTurn(b.x, a.x), a.x);
+  a.x += wb * delta;
+  a.x[kYaw] = wrapAngle(a.x[kYaw]);
+  a.P = (wa * a.P + wb * b.P + wa * wb * delta * delta.transpose()).eval();
+  makeSymmetric(a.P);
+  a.C = wa * a.C + wb * b.C;
+  a.head = wa * a.head + wb * b.head;
+  a.weight = weight;
+}
+
+Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
+  Vector7d d = (a.x - b.x).head<kGeometry>();
+  d[kYaw] = wrapAngle(d[kYaw]);
+  if (std::abs(d[kYaw]) > M_PI / 2) d[kYaw] = wrapAngle(d[kYaw] + M_PI);
+  return d;
+}
+
+double distance2(const Hypothesis& a, const Hypothesis& b) {
+  const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();
+  double result = deviation2<kGeometry>(geometryDifference(a, b), P);
+  if (a.moving) {
+    const Eigen::Matrix3d P_v = a.P.bottomRightCorner<3, 3>();
+    result += deviation2<3>((a.x - b.x).tail<3>(), P_v);
+  }
+  return result;
+}
+
+bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate) {
+  const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
+  return !(deviation2<3>(d, prior.log_size_covariance) < size_gate * size_gate);
+}
+
+}  // namespace perdure::semantic_filter

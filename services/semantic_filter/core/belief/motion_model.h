@@ -1,0 +1,33 @@
+// How a hypothesis moves: at rest with a random walk, or at constant velocity.
+#pragma once
+
+#include <optional>
+
+#include "services/semantic_filter/core/belief/track.h"
+#include "services/semantic_filter/core/parameters.h"
+
+namespace perdure::semantic_filter {
+
+/// Probability that a moving hypothesis is faster than `speed`, m/s.
+double fasterThan(const Hypothesis& h, double speed);
+/// Probability that the object moves faster than `min_speed`, given that it exists.
+double movingProbability(const Object& object, double min_speed);
+
+/// Process noise and motion over `dt` seconds.
+void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m);
+
+/// The hypothesis given that v = 0: what it took for motion was the error of its place.
+void stop(Hypothesis& h);
+/// When the object gets out of sight: what is more likely slower than `min_speed` may as well
+/// stand, and then it stays where it was. Divides such hypotheses by their speed.
+void letSlowOnesStand(Object& object, double min_speed);
+/// x at a later time: static ones stay, moving ones go on at constant velocity.
+State stateAt(const Hypothesis& h, double dt);
+/// Where its motion alone will have brought it by `time`, as_of left as it was: for what is said of
+/// it between two looks. Not kept, so that the belief itself depends on its looks only.
+Object movedOn(Object object, TimePoint time, const MotionParameters& parameters);
+
+/// One at rest as it may just be driving off.
+Hypothesis drivingOff(Hypothesis at_rest);
+
+}  // namespace perdure::semantic_filter

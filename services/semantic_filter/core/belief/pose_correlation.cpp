@@ -1,0 +1,96 @@
+#include "services/semantic_filter/core/belief/pose_correlation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
+#include "common/math/small_products.h"
+namespace perdure::semantic_filter {
+
+namespace {
+
+/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see. L_pose
+/// is P_pose's Cholesky factor.
+bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
+  CrossPose B = h.C;
+  whitenRows(L_pose, B);
+  StateCovariance rest = h.P - lowerTimesTransposed(B) / share;
+  if (h.moving) return choleskyInPlace(rest);
+  Eigen::Matrix<double, kVelocity, kVelocity> still = rest.topLeftCorner<kVelocity, kVelocity>();
+  return choleskyInPlace(still);
+}
+
+/// Of the pose's covariance; nothing where that is not positive definite.
+std::optional<Matrix6d> factorOf(const Matrix6d& P_pose) {
+  std::optional<Matrix6d> L = P_pose;
+  if (!choleskyInPlace(*L)) L.reset();
+  return L;
+}
+
+double sigmaGivenPose(const Hypothesis& h, const std::optional<Matrix6d>& L_pose) {
+  Eigen::Matrix<double, 3, 6> shared = Eigen::Matrix<double, 3, 6>::Zero();
+  if (L_pose) {
+    shared = h.C.topRows<3>();
+    whitenRows(*L_pose, shared);
+  }
+  return std::sqrt(std::max(h.P.topLeftCorner<3, 3>().trace() - shared.squaredNorm(), 0.0));
+}
+
+}  // namespace
+
+std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later) {
+  constexpr double kLargest = 10.0;
+  if (earlier == later) return Matrix6d::Identity();
+  // Most objects of a frame were brought up to date at the same frame before.
+  thread_local Matrix6d product = Matrix6d::Identity(), inverted = Matrix6d::Identity();
+  if (earlier != product) {
+    product = earlier;
+    inverted = inverse(earlier);
+  }
+  const Matrix6d transition = later.lazyProduct(inverted);
+  const bool sane = transition.allFinite() && transition.cwiseAbs().maxCoeff() < kLargest;
+  return sane ? std::optional(transition) : std::nullopt;
+}
+
+bool hangsTogether(const Hypothesis& h, const Matrix6d& P_pose) {
+  if (h.C.isZero(0.0)) return true;
+  Matrix6d L = P_pose;
+  return choleskyInPlace(L) && isExplained(h, L, 1.0);
+}
+
+/// [P C; Cᵀ P_pose] must stay a covariance. Transitions are approximate, and vio's own updates
+/// shrink P_pose: C is scaled down where the pose would explain more of P than there is. (Much of
+/// P may well be the pose: a limit of .9 here costs half of the recall on KITTI.)
+void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose) {
+  constexpr double kExplained = 0.9999;
+  if (h.C.isZero(0.0) || (L_pose && isExplained(h, *L_pose, kExplained))) return;
+  const Eigen::Index n = h.moving ? kStateDim : kVelocity;
+  const Cholesky P(h.P.topLeftCorner(n, n));
+  const Cholesky pose(P_pose);
+  if (!P.positive() || !pose.positive()) {
+    h.C.setZero();
+    return;
+  }
+  const Eigen::MatrixXd whitened = pose.whiten(P.whiten(h.C.topRows(n)).transpose());
+  const double explained = eigenvalues(whitened * whitened.transpose()).maxCoeff();
+  if (explained > kExplained) h.C *= std::sqrt(kExplained / explained);
+}
+
+double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
+  return sigmaGivenPose(h, factorOf(P_pose));
+}
+
+double placeSigma(const Object& object, const Matrix6d& P_pose) {
+  const auto L_pose = factorOf(P_pose);
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& h : object.hypotheses) mean += h.weight * h.x.head<3>();
+  double variance = 0.0;
+  for (const auto& h : object.hypotheses) {
+    const double own = sigmaGivenPose(h, L_pose);
+    variance += h.weight * (own * own + (h.x.head<3>() - mean).squaredNorm());
+  }
+  return std::sqrt(variance);
+}
+
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,140 @@
+#include "services/semantic_filter/core/belief/track_message.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/small_cholesky.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
+
+namespace perdure::semantic_filter {
+
+namespace {
+
+/// Rounding may leave a covariance whose parts differ by many orders with a pivot just below zero.
+/// No reader takes such a message: its correlations get the least eigenvalues that are definite.
+Matrix7d definite(const Matrix7d& P) {
+  constexpr double kLeastEigenvalue = 1e-9;  // of correlations; and m², rad² for a variance
+  constexpr double kRounding = 1e-12;
+  Matrix7d L = P;
+  // A pivot's share of its variance is that of the correlations, which is what a reader looks at.
+  if (choleskyInPlace(L) &&
+      (L.diagonal().array().square() > kRounding * P.diagonal().array()).all()) {
+    return P;
+  }
+  const Vector7d sigma = P.diagonal().cwiseMax(kLeastEigenvalue).cwiseSqrt();
+  const Vector7d inverse = sigma.cwiseInverse();
+  const Matrix7d correlations = inverse.asDiagonal() * P * inverse.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix7d> parts(correlations);
+  const Matrix7d& V = parts.eigenvectors();
+  const Vector7d values = parts.eigenvalues().cwiseMax(kLeastEigenvalue);
+  Matrix7d result =
+      sigma.asDiagonal() * (V * values.asDiagonal() * V.transpose()) * sigma.asDiagonal();
+  makeSymmetric(result);
+  return result;
+}
+
+/// The Gaussian of the heaviest hypothesis, its covariance widened to what the others of the class
+/// say: second moments about its mean.
+ClassBelief classBelief(const Object& object, const std::string& name) {
+  ClassBelief belief;
+  belief.name = name;
+  const Hypothesis* heaviest = nullptr;
+  Matrix7d moments = Matrix7d::Zero();
+  Eigen::Matrix<double, 7, 6> cross = Eigen::Matrix<double, 7, 6>::Zero();
+  double weight = 0.0;
+  for (const auto& h : object.hypotheses) {
+    if (h.class_name != name) continue;
+    belief.probability += h.weight;
+    if (!heaviest) heaviest = &h;
+    if (h.moving != heaviest->moving) continue;
+    const Vector7d d = geometryDifference(h, *heaviest);
+    moments += h.weight * (h.P.topLeftCorner<7, 7>() + d * d.transpose());
+    cross += h.weight * h.C.topRows<7>();
+    weight += h.weight;
+  }
+  belief.mean = heaviest->x.head<7>();
+  belief.covariance = definite(moments / weight);
+  if (name == kOtherClass && !heaviest->modes_sought) {
+    constexpr double kAnyYaw = M_PI * M_PI / 12.0;  // modulo 180 degrees
+    belief.covariance(kYaw, kYaw) = std::max(belief.covariance(kYaw, kYaw), kAnyYaw);
+  }
+  belief.cross_pose = cross / weight;
+  return belief;
+}
+
+}  // namespace
+
+ObjectBelief toBelief(const Object& object, double min_speed) {
+  ObjectBelief belief;
+  belief.id = object.id;
+  belief.existence = object.existence;
+  belief.confirmed = object.confirmed;
+  std::vector<const std::string*> names;
+  names.reserve(object.hypotheses.size());
+  for (const auto& h : object.hypotheses) {
+    const auto same = [&](const std::string* name) { return *name == h.class_name; };
+    if (std::none_of(names.begin(), names.end(), same)) names.push_back(&h.class_name);
+  }
+  belief.classes.reserve(names.size());
+  for (const std::string* name : names) belief.classes.push_back(classBelief(object, *name));
+  const auto likelier = [](const auto& a, const auto& b) { return a.probability > b.probability; };
+  if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
+    std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
+  }
+  belief.visibility = object.visibility;
+  belief.visible_fraction = object.visible_fraction;
+  belief.blocked_by = object.blocked_by;
+  belief.first_seen = object.first_seen;
+  belief.last_seen = object.last_seen;
+  belief.as_of = object.as_of;
+  belief.hits = object.hits;
+  belief.visible_misses = object.visible_misses;
+  belief.moving = movingProbability(object, min_speed);
+  if (object.best().moving) belief.velocity = object.best().x.tail<3>();
+  belief.recalled = object.recalled;
+  belief.why = {object.existence.published(), object.classes.published(), object.classes.ousted()};
+  return belief;
+}
+
+Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product,
+                  ExistenceEvidence back) {
+  Object object;
+  object.id = belief.id;
+  object.existence = {belief.existence, belief.why.existence, back, belief.as_of};
+  object.classes = {belief.why.classes, belief.why.ousted};
+  object.confirmed = belief.confirmed;
+  object.once_confirmed = belief.confirmed || back == ExistenceEvidence::kRecall;
+  for (const auto& c : belief.classes) {
+    Hypothesis h;
+    h.class_name = c.name;
+    h.weight = c.probability;
+    h.x.head<7>() = c.mean;
+    h.P.setZero();
+    h.P.topLeftCorner<7, 7>() = c.covariance;
+    h.C.topRows<7>() = c.cross_pose;
+    h.moving = belief.moving > 0.5;
+    if (h.moving) {
+      h.x.tail<3>() = belief.velocity;
+      h.P.diagonal().tail<3>().setConstant(1.0);  // the message does not carry it: (1 m/s)²
+    }
+    object.hypotheses.push_back(h);
+  }
+  object.first_seen = belief.first_seen;
+  object.last_seen = belief.last_seen;
+  object.as_of = belief.as_of;
+  object.pose_product = pose_product;
+  object.hits = belief.hits;
+  object.visible_misses = belief.visible_misses;
+  object.visibility = belief.visibility;
+  object.visible_fraction = belief.visible_fraction;
+  object.blocked_by = belief.blocked_by;
+  object.recalled = true;
+  object.remembers_all = false;
+  normalise(object, ClassEvidence::kRestore);
+  return object;
+}
+
+}  // namespace perdure::semantic_filter
