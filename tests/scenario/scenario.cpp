@@ -4,17 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <sstream>
-#include <stdexcept>
 
 #include "common/base/check.h"
 #include "common/base/ids.h"
 #include "common/math/so3.h"
 #include "common/types/objects.h"
+#include "tests/scenario/scene_cache.h"
 #include "tools/pipeline/pipeline.h"
 #include "tools/pipeline/report.h"
 #include "tools/simulate/simulate.h"
@@ -29,41 +28,6 @@ std::string textOf(const fs::path& file) {
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
-}
-
-fs::path folderIn(const char* variable) {
-  const char* value = std::getenv(variable);
-  if (value == nullptr) throw std::runtime_error(std::string(variable) + " is not set; use ctest");
-  return value;
-}
-
-/// Of all that a scene depends on.
-std::string sourcesDigest() {
-  const fs::path root = folderIn("PERDURE_SOURCE");
-  std::vector<fs::path> files;
-  for (const char* folder : {"common/sim", "common/math", "common/camera", "tools/simulate"}) {
-    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
-      const auto extension = entry.path().extension();
-      if (extension == ".cpp" || extension == ".h") files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  std::string all;
-  for (const auto& file : files) all += toHex(digest(textOf(file)));
-  return toHex(digest(all));
-}
-
-/// Scenes of other sources than these are removed.
-fs::path cacheFolder() {
-  const fs::path all = folderIn("PERDURE_BIN").parent_path() / "tests" / "scenes";
-  const fs::path own = all / sourcesDigest();
-  std::error_code ignored;
-  if (fs::create_directories(own, ignored)) {
-    for (const auto& entry : fs::directory_iterator(all)) {
-      if (entry.path() != own) fs::remove_all(entry.path(), ignored);
-    }
-  }
-  return own;
 }
 
 Journal runPipeline(const Setting& setting, const fs::path& folder, const fs::path& out) {
@@ -220,10 +184,11 @@ fs::path sceneFolder(const Setting& setting) {
   options.format = tools::ImageFormat::kJpeg;
   options.world.rate_hz = setting.rate_hz;
   if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
-  options.out = cacheFolder() / (setting.scene + "-" + std::to_string(setting.seed) + "-" +
-                                 std::to_string(static_cast<int>(setting.seconds)) + "-" +
-                                 std::to_string(static_cast<int>(setting.rate_hz)) +
-                                 (setting.images ? "-images" : ""));
+  options.out = cachedScene({.scene = setting.scene,
+                             .seed = setting.seed,
+                             .seconds = setting.seconds,
+                             .rate_hz = setting.rate_hz,
+                             .images = setting.images});
   tools::simulate(options, {});
   return options.out;
 }
