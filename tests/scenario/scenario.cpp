@@ -1,20 +1,14 @@
 #include "tests/scenario/scenario.h"
 
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <numeric>
 #include <sstream>
-#include <stdexcept>
 
-#include "common/base/check.h"
 #include "common/base/ids.h"
 #include "common/math/so3.h"
 #include "common/types/objects.h"
+#include "tests/scenario/scene_cache.h"
 #include "tools/pipeline/pipeline.h"
 #include "tools/pipeline/report.h"
 #include "tools/simulate/simulate.h"
@@ -29,41 +23,6 @@ std::string textOf(const fs::path& file) {
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
-}
-
-fs::path folderIn(const char* variable) {
-  const char* value = std::getenv(variable);
-  if (value == nullptr) throw std::runtime_error(std::string(variable) + " is not set; use ctest");
-  return value;
-}
-
-/// Of all that a scene depends on.
-std::string sourcesDigest() {
-  const fs::path root = folderIn("PERDURE_SOURCE");
-  std::vector<fs::path> files;
-  for (const char* folder : {"common/sim", "common/math", "common/camera", "tools/simulate"}) {
-    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
-      const auto extension = entry.path().extension();
-      if (extension == ".cpp" || extension == ".h") files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  std::string all;
-  for (const auto& file : files) all += toHex(digest(textOf(file)));
-  return toHex(digest(all));
-}
-
-/// Scenes of other sources than these are removed.
-fs::path cacheFolder() {
-  const fs::path all = folderIn("PERDURE_BIN").parent_path() / "tests" / "scenes";
-  const fs::path own = all / sourcesDigest();
-  std::error_code ignored;
-  if (fs::create_directories(own, ignored)) {
-    for (const auto& entry : fs::directory_iterator(all)) {
-      if (entry.path() != own) fs::remove_all(entry.path(), ignored);
-    }
-  }
-  return own;
 }
 
 Journal runPipeline(const Setting& setting, const fs::path& folder, const fs::path& out) {
@@ -220,10 +179,11 @@ fs::path sceneFolder(const Setting& setting) {
   options.format = tools::ImageFormat::kJpeg;
   options.world.rate_hz = setting.rate_hz;
   if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
-  options.out = cacheFolder() / (setting.scene + "-" + std::to_string(setting.seed) + "-" +
-                                 std::to_string(static_cast<int>(setting.seconds)) + "-" +
-                                 std::to_string(static_cast<int>(setting.rate_hz)) +
-                                 (setting.images ? "-images" : ""));
+  options.out = cachedScene({.scene = setting.scene,
+                             .seed = setting.seed,
+                             .seconds = setting.seconds,
+                             .rate_hz = setting.rate_hz,
+                             .images = setting.images});
   tools::simulate(options, {});
   return options.out;
 }
@@ -256,78 +216,5 @@ Outcome runScene(const Setting& setting) {
   takeToTruth(run, trajectory);
   return run;
 }
-
-Bars operator+(Bars bars, const Bars& more) {
-  bars.insert(bars.end(), more.begin(), more.end());
-  return bars;
-}
-
-bool Verdict::meets() const {
-  return bar.sense == Sense::kAtLeast ? bar.measured >= bar.limit : bar.measured <= bar.limit;
-}
-
-std::vector<Verdict> judge(const std::vector<Bars>& by_seed) {
-  std::vector<Verdict> verdicts;
-  for (const Bars& bars : by_seed) {
-    for (std::size_t i = 0; i < bars.size(); ++i) {
-      if (verdicts.size() <= i) verdicts.push_back({bars[i], {}});
-      check(verdicts[i].bar.what == bars[i].what, "seeds are asked the same");
-      verdicts[i].by_seed.push_back(bars[i].measured);
-    }
-  }
-  for (Verdict& v : verdicts) {
-    const auto [least, most] = std::minmax_element(v.by_seed.begin(), v.by_seed.end());
-    v.bar.measured = v.bar.sense == Sense::kAtLeast ? *least : *most;
-    if (v.bar.of == Of::kWorst) continue;
-    v.bar.measured = std::accumulate(v.by_seed.begin(), v.by_seed.end(), 0.0) /
-                     static_cast<double>(v.by_seed.size());
-  }
-  return verdicts;
-}
-
-void print(const std::vector<Verdict>& verdicts) {
-  for (const Verdict& v : verdicts) {
-    std::string seeds;
-    for (const double value : v.by_seed) seeds += fmt::format(" {:.3g}", value);
-    const bool one = v.by_seed.size() == 1;
-    fmt::print("{:<76} {} {:<5.3g} {:5} {:<8.3g} {}{}\n", v.bar.what,
-               v.bar.sense == Sense::kAtLeast ? ">=" : "<=", v.bar.limit,
-               one                     ? ""
-               : v.bar.of == Of::kMean ? "mean"
-                                       : "worst",
-               v.bar.measured,
-               v.meets()               ? "passes"
-               : v.bar.not_yet.empty() ? "FAILS"
-                                       : v.bar.not_yet,
-               one ? "" : "; by seed" + seeds);
-  }
-}
-
-void holdSeeds(std::vector<Bars> by_seed, const std::map<std::string, std::string>& not_yet) {
-  std::set<std::string> unasked;
-  for (const auto& [what, reason] : not_yet) unasked.insert(what);
-  for (Bars& bars : by_seed) {
-    for (Bar& bar : bars) {
-      const auto reason = not_yet.find(bar.what);
-      if (reason == not_yet.end()) continue;
-      bar.not_yet = reason->second;
-      unasked.erase(bar.what);
-    }
-  }
-  for (const auto& what : unasked) ADD_FAILURE() << "no bar is called: " << what;
-  const auto verdicts = judge(by_seed);
-  print(verdicts);
-  for (const Verdict& v : verdicts) {
-    if (v.bar.not_yet.empty()) {
-      EXPECT_TRUE(v.meets()) << v.bar.what << " is " << v.bar.measured;
-    } else {
-      EXPECT_FALSE(v.meets()) << v.bar.what << " is " << v.bar.measured
-                              << " and passes now: take the reason out of the table ("
-                              << v.bar.not_yet << ")";
-    }
-  }
-}
-
-void hold(const Bars& bars) { holdSeeds({bars}); }
 
 }  // namespace perdure::test

@@ -1,9 +1,6 @@
 // Scenes with exact truth, run through the pipeline with true poses and simulated detections, so
-// that what is measured is the filter (or with vio over rendered images); and tables of the bars
-// that it is held to.
-//
-// A bar that is not passed yet is an expected failure: it says why, and the test fails
-// when it begins to pass, so that the table stays true.
+// that what is measured is the filter (or with vio over rendered images). What it is held to:
+// verdict.h.
 #pragma once
 
 #include <filesystem>
@@ -14,6 +11,7 @@
 #include <vector>
 
 #include "tests/scenario/journal.h"
+#include "tests/scenario/verdict.h"
 #include "tools/evaluate/object_score.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/evaluate/trajectory_score.h"
@@ -79,43 +77,5 @@ std::filesystem::path sceneFolder(const Setting& setting);
 /// Generates the scene (once: it is kept in the build folder while the simulator's sources stay as
 /// they are) and runs the pipeline over it.
 Outcome runScene(const Setting& setting);
-
-enum class Sense { kAtLeast, kAtMost };
-/// Of several seeds: the worst, or (of shares and rates) the mean.
-enum class Of { kWorst, kMean };
-struct Bar {
-  std::string what;
-  double measured = 0.0;
-  Sense sense = Sense::kAtLeast;
-  double limit = 0.0;
-  std::string not_yet = {};  ///< why the filter does not pass it, with the figure; empty: it does
-  Of of = Of::kWorst;
-};
-using Bars = std::vector<Bar>;
-inline Bar atLeast(double limit, std::string what, double measured, std::string not_yet = "") {
-  return {std::move(what), measured, Sense::kAtLeast, limit, std::move(not_yet)};
-}
-inline Bar atMost(double limit, std::string what, double measured, std::string not_yet = "") {
-  return {std::move(what), measured, Sense::kAtMost, limit, std::move(not_yet)};
-}
-inline Bar onAverage(Bar bar) {
-  bar.of = Of::kMean;
-  return bar;
-}
-Bars operator+(Bars bars, const Bars& more);
-
-/// A bar over several seeds.
-struct Verdict {
-  Bar bar;  ///< with what is held against the limit
-  std::vector<double> by_seed;
-  bool meets() const;
-};
-/// The same bars of each seed as one table.
-std::vector<Verdict> judge(const std::vector<Bars>& by_seed);
-void print(const std::vector<Verdict>& verdicts);
-/// Prints the table, and fails for each bar that is not as it says.
-void hold(const Bars& bars);
-/// Of several seeds. `not_yet` says by a bar's name why the filter does not pass it.
-void holdSeeds(std::vector<Bars> by_seed, const std::map<std::string, std::string>& not_yet = {});
 
 }  // namespace perdure::test

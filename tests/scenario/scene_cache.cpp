@@ -1,0 +1,63 @@
+#include "tests/scenario/scene_cache.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "common/base/ids.h"
+
+namespace perdure::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string textOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// Of all that a scene depends on.
+std::string sourcesDigest() {
+  const char* root = std::getenv("PERDURE_SOURCE");
+  if (root == nullptr) throw std::runtime_error("PERDURE_SOURCE is not set; use ctest");
+  std::vector<fs::path> files;
+  for (const char* folder : {"common/sim", "common/math", "common/camera", "tools/simulate"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(root) / folder)) {
+      const auto extension = entry.path().extension();
+      if (extension == ".cpp" || extension == ".h") files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::string all;
+  for (const auto& file : files) all += toHex(digest(textOf(file)));
+  return toHex(digest(all));
+}
+
+/// Programs lie one folder below the build folder.
+fs::path cacheFolder() {
+  const fs::path build = fs::read_symlink("/proc/self/exe").parent_path().parent_path();
+  const fs::path all = build / "tests" / "scenes", own = all / sourcesDigest();
+  std::error_code ignored;
+  if (fs::create_directories(own, ignored)) {
+    for (const auto& entry : fs::directory_iterator(all)) {
+      if (entry.path() != own) fs::remove_all(entry.path(), ignored);
+    }
+  }
+  return own;
+}
+
+}  // namespace
+
+fs::path cachedScene(const SceneName& name) {
+  return cacheFolder() /
+         (name.scene + "-" + std::to_string(name.seed) + "-" +
+          std::to_string(static_cast<int>(name.seconds)) + "-" +
+          std::to_string(static_cast<int>(name.rate_hz)) + (name.images ? "-images" : ""));
+}
+
+}  // namespace perdure::test
