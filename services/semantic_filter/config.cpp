@@ -69,11 +69,11 @@ void describeClutter(ClutterParameters& p, Fields& fields) {
                 {"probability of \"other\" at birth"});
 }
 
-void describeBirth(BirthParameters& p, Fields& fields) {
+void describeBirth(InitiationParameters& p, Fields& fields) {
   fields.number("birth.odds", p.odds, positive(), {"new objects in a box against false alarms"});
   fields.number("birth.min_log_ratio", p.min_log_ratio, {},
                 {"weaker boxes support objects that are there, and give no birth", "nats"});
-  fields.number("birth.claimed", p.claimed, between(0, 1),
+  fields.number("birth.claimed", p.explained, between(0, 1),
                 {"a box claimed with more than this gives no birth"});
   fields.integer("birth.max_classes", p.max_classes, between(1, 1000),
                  {"classes of the network kept for an object, \"other\" beside them"});
@@ -123,19 +123,19 @@ void describeMotion(Parameters& p, Fields& fields) {
       {"random walk of odometry, in place of the covariance that it says; 0: that", "m/√m"});
   fields.number("pose.drift_rotation", p.pose.drift_rotation, atLeast(0),
                 {"the same of its rotation", "rad/√m"});
-  fields.number("looks.correlation", p.looks.correlation, between(0, 1),
+  fields.number("looks.correlation", p.tempering.correlation, between(0, 1),
                 {"of the errors of two looks from the same place"});
-  fields.number("looks.angle", p.looks.angle, positive(),
+  fields.number("looks.angle", p.tempering.angle, positive(),
                 {"change of aspect after which that has fallen to 1/e", "rad"});
-  fields.number("looks.log_distance", p.looks.log_distance, positive(),
+  fields.number("looks.log_distance", p.tempering.log_distance, positive(),
                 {"the same for the logarithm of the distance"});
-  fields.number("looks.image_angle", p.looks.image_angle, positive(),
+  fields.number("looks.image_angle", p.tempering.image_angle, positive(),
                 {"the same for the place in the image", "rad"});
-  fields.number("looks.found_prior", p.looks.found_prior, positive(),
+  fields.number("looks.found_prior", p.tempering.found_prior, positive(),
                 {"what P_D is worth beside how often an object was found from there, in looks"});
 }
 
-void describeSmooth(SmoothParameters& p, Fields& fields) {
+void describeSmooth(SmoothingParameters& p, Fields& fields) {
   fields.integer("smooth.keyframes", p.keyframes, between(0, 100),
                  {"looks that are remembered of an object; 0: nothing is estimated from them"});
   fields.integer("smooth.least", p.least, between(3, 100), {"fewer are not estimated from"});
@@ -218,19 +218,19 @@ void describeTend(Parameters& p, Fields& fields) {
   fields.number("visibility.minimum", v.minimum, between(0, 1),
                 {"visible fraction below which a frame says nothing"});
   fields.number("visibility.full", v.full, between(0, 1), {"fraction that is called visible"});
-  fields.number("visibility.screened", v.screened, between(0, 0.99),
+  fields.number("visibility.screened", v.unmapped_occluder, between(0, 0.99),
                 {"that something not on the map hides an object from a view not yet tried"});
-  fields.number("visibility.elusive", v.elusive, between(0, 0.9),
+  fields.number("visibility.elusive", v.hard_to_detect, between(0, 0.9),
                 {"that the network finds an object but seldom from a view not yet tried"});
-  fields.number("visibility.elusive_found", v.elusive_found, between(0, 1),
+  fields.number("visibility.elusive_found", v.hard_detection_share, between(0, 1),
                 {"at this share of how often it finds others"});
-  fields.number("visibility.screen_angle", v.screen_angle, positive(),
+  fields.number("visibility.screen_angle", v.detectability_angle, positive(),
                 {"change of aspect after which what is known of that has fallen to 1/e", "rad"});
-  fields.number("visibility.screen_log_distance", v.screen_log_distance, positive(),
+  fields.number("visibility.screen_log_distance", v.detectability_log_distance, positive(),
                 {"the same for the logarithm of the distance"});
   fields.number("visibility.solid", v.solid, between(0, 1),
                 {"existence from which an object hides others"});
-  auto& t = p.tend;
+  auto& t = p.tracks;
   fields.number("tend.confirm", t.confirm, between(0, 1), {"existence that confirms an object"});
   fields.integer("tend.confirm_hits", t.confirm_hits, between(1, 1000),
                  {"and the looks at it that it takes"});
@@ -261,7 +261,7 @@ void describeTend(Parameters& p, Fields& fields) {
                 {"shared over joint volume at which two objects are one"});
   fields.number("tend.merge_turns", t.merge_turns, between(0, 1),
                 {"the same of two that were in sight together and never found in one frame"});
-  fields.number("tend.merge_inside", p.tend.merge_inside, positive(),
+  fields.number("tend.merge_inside", p.tracks.merge_inside, positive(),
                 {"share of a thing of no known class that lies in a known one and makes it that"});
   fields.integer("tend.max_objects", t.max_objects, between(1, 1000000),
                  {"in the working set; the least likely go"});
@@ -283,10 +283,10 @@ void describe(Config& c, Fields& fields) {
                 {"wait so long at the start for the working set of an earlier run", "s"});
   describeBox(c.filter.box, fields);
   describeClutter(c.filter.clutter, fields);
-  describeBirth(c.filter.birth, fields);
+  describeBirth(c.filter.initiation, fields);
   describeMotion(c.filter, fields);
   describeTend(c.filter, fields);
-  describeSmooth(c.filter.smooth, fields);
+  describeSmooth(c.filter.smoothing, fields);
   describeGround(c.filter.ground, fields);
   describeMemory(c.filter.memory, fields);
   describeAlignment(c.filter.alignment, fields);

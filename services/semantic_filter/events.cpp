@@ -85,7 +85,7 @@ std::vector<Event> EventTracker::update(const Objects& objects,
   std::vector<Event> events;
   for (const auto& m : merges) {
     const auto it = known_.find(m.absorbed);
-    if (it == known_.end()) continue;  // born and merged within one frame: never published
+    if (it == known_.end()) continue;  // initiated and merged within one frame: never published
     Event e = blank;
     e.kind = EventKind::kMerged;
     e.object_id = m.survivor;

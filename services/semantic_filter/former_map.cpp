@@ -1,11 +1,11 @@
 #include "services/semantic_filter/former_map.h"
-#include "services/semantic_filter/core/belief/track_message.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -16,9 +16,9 @@ constexpr std::size_t kLastSeen = 16;  // things that say where the map lies abo
 
 bool stands(const ObjectBelief& belief) { return belief.confirmed && belief.moving < 0.5; }
 
-std::vector<PlacedThing> standing(const std::vector<Object>& objects, double min_speed) {
+std::vector<PlacedThing> standing(const std::vector<Track>& objects, double min_speed) {
   std::vector<PlacedThing> result;
-  for (const Object& o : objects) {
+  for (const Track& o : objects) {
     if (!o.confirmed || o.recalled) continue;
     const ObjectBelief belief = toBelief(o, min_speed);
     if (stands(belief)) result.push_back(placedOf(belief));
@@ -52,7 +52,7 @@ std::string FormerMap::note() const {
   return fmt::format("looks for {} things of the map of before", lookout_->size());
 }
 
-const FrameAlignment* FormerMap::look(const std::vector<Object>& objects,
+const FrameAlignment* FormerMap::look(const std::vector<Track>& objects,
                                       const Eigen::Vector3d& p_WB, TimePoint now) {
   if (!lookout_) return nullptr;
   if (looked_from_ && toSeconds(now - looked_at_) < kPause_s) return nullptr;
@@ -78,10 +78,10 @@ std::vector<ObjectBelief> FormerMap::takeKept() {
   return result;
 }
 
-void FormerMap::refine(const std::vector<Object>& objects) {
+void FormerMap::refine(const std::vector<Track>& objects) {
   if (!alignment_) return;
   std::vector<std::pair<TimePoint, std::pair<PlacedThing, PlacedThing>>> seen_again;
-  for (const Object& o : objects) {
+  for (const Track& o : objects) {
     const auto there = laid_.find(o.id);
     if (there == laid_.end() || o.recalled || o.hits <= there->second.second) continue;
     const ObjectBelief belief = toBelief(o, parameters_.motion.min_speed);
@@ -102,7 +102,7 @@ ObjectBelief FormerMap::laid(const ObjectBelief& belief) {
   return laidInto(*alignment_, belief);
 }
 
-std::optional<LongTerm::Question> FormerMap::ask(const Eigen::Vector3d& p_WB, TimePoint now) {
+std::optional<Archive::Question> FormerMap::ask(const Eigen::Vector3d& p_WB, TimePoint now) {
   if (!alignment_) return std::nullopt;
   return questions_.ask(rotationAboutZ(alignment_->yaw).transpose() * (p_WB - alignment_->p), now);
 }

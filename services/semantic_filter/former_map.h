@@ -28,18 +28,18 @@ class FormerMap {
   /// For people; empty where nothing is looked for.
   std::string note() const;
 
-  /// Looks for it where that is due. The alignment when it was found just now.
-  const FrameAlignment* look(const std::vector<Object>& objects, const Eigen::Vector3d& p_WB,
+  /// KeyframeBatch for it where that is due. The alignment when it was found just now.
+  const FrameAlignment* look(const std::vector<Track>& objects, const Eigen::Vector3d& p_WB,
                              TimePoint now);
   /// What waited, in W.
   std::vector<ObjectBelief> takeKept();
   /// What of it was seen again says better where it lies about here.
-  void refine(const std::vector<Object>& objects);
+  void refine(const std::vector<Track>& objects);
   /// A belief of that map, in W.
   ObjectBelief laid(const ObjectBelief& belief);
 
   /// What to ask the map store for, in its own frame.
-  std::optional<LongTerm::Question> ask(const Eigen::Vector3d& p_WB, TimePoint now);
+  std::optional<Archive::Question> ask(const Eigen::Vector3d& p_WB, TimePoint now);
   bool answered(std::uint64_t request, TimePoint kept, bool truncated) {
     return questions_.answered(request, kept, truncated);
   }
@@ -47,7 +47,7 @@ class FormerMap {
 
  private:
   Parameters parameters_;
-  LongTerm questions_;
+  Archive questions_;
   std::optional<WorldId> world_;
   std::vector<ObjectBelief> kept_;
   std::optional<MapAlignment> lookout_;

@@ -17,7 +17,7 @@ using namespace perdure;
 namespace topics = bus::topics;
 
 /// Holds messages back, in order, until the working set of an earlier run has been asked for: what
-/// was born before would get ids that were given out already.
+/// was initiated before would get ids that were given out already.
 class Gate {
  public:
   void pass(std::function<void()> message) {

@@ -8,10 +8,10 @@
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/tracks/context.h"
-#include "services/semantic_filter/core/visibility/predicted_box.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/track_message.h"
+#include "services/semantic_filter/core/tracks/context.h"
+#include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -28,7 +28,7 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       filter_(config.filter, priors),
       models_(priors),
       drift_(config.filter.drift),
-      long_term_(config.filter.memory, config.filter.motion.min_speed),
+      archive_(config.filter.memory, config.filter.motion.min_speed),
       former_(config.filter) {}
 
 void Node::onCalibration(const Calibration& calibration) {
@@ -87,16 +87,16 @@ void Node::beginWorld(const WorldId& world) {
     keepFormer();
   }
   world_ = world;
-  belief_ = {.objects = {}, .gone = {}, .learned = belief_.learned};
+  belief_ = {.tracks = {}, .recently_deleted = {}, .learned = belief_.learned};
   history_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
   T_MW_.reset();
   told_not_level_ = false;
-  drift_ = DriftWatch(config_.filter.drift);
+  drift_ = DriftEstimator(config_.filter.drift);
   events_.clear();
   returns_.clear();
-  long_term_.clear();
+  archive_.clear();
   if (const auto recalled = std::exchange(waiting_recalled_, std::nullopt)) {
     recalled->world == world ? insertRecalled(*recalled) : onRecalledOfFormer(*recalled);
   }
@@ -169,7 +169,7 @@ bool Node::attach(Entry& entry, const Detections& detections) {
     reasons_.add(refusal);
     return false;
   }
-  if (doubts(entry, detections)) return true;  // the frame stays without evidence
+  if (inflations(entry, detections)) return true;  // the frame stays without evidence
   return use(entry, detections);
 }
 
@@ -186,14 +186,14 @@ bool Node::use(Entry& entry, const Detections& detections) {
   entry.input.boxes.emplace();
   for (const auto& detection : detections.detections) {
     if (detection.primed) {
-      auto ratios = primedRatios(detection, entry.input.model, config_.filter.clutter);
-      if (ratios) entry.input.primed[detection.primed_for] = *std::move(ratios);
+      auto ratios = topDownRatios(detection, entry.input.model, config_.filter.clutter);
+      if (ratios) entry.input.top_down[detection.primed_for] = *std::move(ratios);
       if (!ratios) reasons_.add("primed_malformed");
       continue;
     }
     auto evidence =
-        makeEvidence(detection, entry.input.model, entry.camera->width(), entry.camera->height(),
-                     config_.filter.box, config_.filter.clutter);
+        makeBoxDetection(detection, entry.input.model, entry.camera->width(),
+                         entry.camera->height(), config_.filter.box, config_.filter.clutter);
     if (evidence) {
       entry.input.boxes->push_back(std::move(*evidence));
     } else {
@@ -249,16 +249,16 @@ bool Node::isLevel(const Entry& entry) {
 }
 
 void Node::stepEntry(Entry& entry) {
-  if (entry.before.objects.empty()) entry.before = std::exchange(spare_, {});
-  const std::size_t n = belief_.objects.size();
-  if (entry.before.objects.capacity() < n) entry.before.objects.reserve(n + n / 4);
+  if (entry.before.tracks.empty()) entry.before = std::exchange(spare_, {});
+  const std::size_t n = belief_.tracks.size();
+  if (entry.before.tracks.capacity() < n) entry.before.tracks.reserve(n + n / 4);
   entry.before = belief_;
   StepReport report = filter_.step(entry.before, belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
-  if (entry.input.boxes && !std::exchange(entry.told_pose, true) && !report.pose.empty() &&
+  if (entry.input.boxes && !std::exchange(entry.drift_measured_at, true) && !report.drift.empty() &&
       isLevel(entry)) {
-    drift_.hear(report.pose, entry.input.view.T_WB);
+    drift_.add(report.drift, entry.input.view.T_WB);
   }
   entry.stepped = true;
 }
@@ -288,13 +288,13 @@ void Node::correctDrift() {
   if (!correction) return;
   const Matrix6d F = regressOn(correction->before, correction->after);
   for (Entry& e : history_) {
-    for (Object& o : e.before.objects) follow(o, *correction, e.input.pose_error);
+    for (Track& o : e.before.tracks) applyCorrection(o, *correction, e.input.pose_error);
     e.input.view.T_WB = correction->step * e.input.view.T_WB;
     e.input.pose_error.product = (F * e.input.pose_error.product).eval();
     e.input.pose_error.covariance = correction->after;
   }
-  for (Object& o : belief_.objects) follow(o, *correction, pose_error_);
-  for (Object& o : belief_.gone) follow(o, *correction, pose_error_);
+  for (Track& o : belief_.tracks) applyCorrection(o, *correction, pose_error_);
+  for (Track& o : belief_.recently_deleted) applyCorrection(o, *correction, pose_error_);
   pose_error_.product = (F * pose_error_.product).eval();
   pose_error_.covariance = correction->after;
   T_MW_ = inM(RigidTransform());
@@ -310,11 +310,11 @@ void Node::publish(const Entry& entry) {
   objects.up_W = entry.input.view.up_W;
   objects.next_id = ids_.next();
   const MotionParameters& motion = config_.filter.motion;
-  objects.objects.reserve(belief_.objects.size());
-  for (const auto& object : belief_.objects) {
+  objects.objects.reserve(belief_.tracks.size());
+  for (const auto& object : belief_.tracks) {
     ObjectBelief& belief = objects.objects.emplace_back(toBelief(object, motion.min_speed));
     if (belief.moving > 0.5) {
-      const Object now = movedOn(object, entry.input.stamp.time, motion);
+      const Track now = extrapolated(object, entry.input.stamp.time, motion);
       belief.classes = toBelief(now, motion.min_speed).classes;
     }
     addContext(belief, object);
@@ -326,7 +326,7 @@ void Node::publish(const Entry& entry) {
   const auto coming = comingFrame(entry);
   Event blank;
   blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
-  const auto returns = returns_.update(belief_.objects, entry.input, coming, config_.filter, blank);
+  const auto returns = returns_.update(belief_.tracks, entry.input, coming, config_.filter, blank);
   events.insert(events.end(), returns.begin(), returns.end());
   if (outputs_.objects) outputs_.objects(objects);
   for (const auto& event : events) {
@@ -370,7 +370,7 @@ void Node::publishPredictions(const Entry& entry, const std::optional<ComingFram
   predictions.stamp = entry.input.stamp;
   predictions.instance = instance_;
   predictions.camera = camera_name_;
-  for (const auto& object : belief_.objects) {
+  for (const auto& object : belief_.tracks) {
     auto prediction = predictionOf(object, entry.input, coming);
     if (prediction) predictions.predictions.push_back(*std::move(prediction));
   }

@@ -15,9 +15,9 @@
 #include "common/base/sink.h"
 #include "common/types/map.h"
 #include "services/semantic_filter/config.h"
-#include "services/semantic_filter/core/visibility/predicted_box.h"
-#include "services/semantic_filter/core/memory/archive.h"
 #include "services/semantic_filter/core/filter.h"
+#include "services/semantic_filter/core/memory/archive.h"
+#include "services/semantic_filter/core/visibility/predicted_box.h"
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/former_map.h"
 #include "services/semantic_filter/model_book.h"
@@ -61,7 +61,7 @@ class Node {
     WorldId world;
     std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
     Belief before;
-    bool stepped = false, told_pose = false;
+    bool stepped = false, drift_measured_at = false;
     std::vector<MergeRecord> merges = {};
   };
 
@@ -87,12 +87,12 @@ class Node {
   void publishPredictions(const Entry& entry, const std::optional<ComingFrame>& coming);
   // In node_swap.cpp.
   void tellModelChange(const FrameStamp& stamp, const std::string& detail);
-  bool doubts(const Entry& entry, const Detections& detections);
+  bool inflations(const Entry& entry, const Detections& detections);
   void settleDoubts(bool believed);
   // In node_memory.cpp.
   std::vector<ObjectBelief> soundOf(std::vector<ObjectBelief> beliefs);
   void insertRecalled(const Recalled& recalled);
-  void insert(const Object& object);
+  void insert(const Track& object);
   void restore(const ObjectBelief& belief);
   void recall(const ObjectBelief& belief);
   bool isNear(const ObjectBelief& belief) const;
@@ -101,7 +101,7 @@ class Node {
   void letGo(const Entry& entry);
   void askTheMap(const Entry& entry);
   /// `centre` is the question's, in that frame of reference.
-  void ask(const LongTerm::Question& question, const Eigen::Vector3d& centre, const WorldId& world);
+  void ask(const Archive::Question& question, const Eigen::Vector3d& centre, const WorldId& world);
   void keepFormer();
   void rejoin(const Entry& entry);
 
@@ -118,7 +118,7 @@ class Node {
   std::optional<RigidTransform> last_T_WB_;
   /// Beliefs and views are in M: W less the drift that the map has shown. None: no such drift.
   std::optional<RigidTransform> T_MW_;
-  DriftWatch drift_;
+  DriftEstimator drift_;
   bool told_not_level_ = false;
   Belief belief_;
   Belief spare_;  ///< an old one, whose memory the next copy takes
@@ -128,8 +128,8 @@ class Node {
   std::vector<MergeRecord> late_merges_;
   std::optional<Recalled> waiting_recalled_;
   EventTracker events_;
-  ReturnWatch returns_;
-  LongTerm long_term_;
+  ReappearanceMonitor returns_;
+  Archive archive_;
   FormerMap former_;
   ReasonCounts reasons_;
 };

@@ -4,17 +4,17 @@
 #include <algorithm>
 #include <set>
 
+#include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/node.h"
-#include "services/semantic_filter/core/belief/track_message.h"
 
 namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::uint32_t kMostRecalled = 1000;  // by one answer
 
-void eraseFrom(std::vector<Object>& objects, const std::set<ObjectId>& ids) {
-  std::erase_if(objects, [&](const Object& o) { return ids.contains(o.id); });
+void eraseFrom(std::vector<Track>& objects, const std::set<ObjectId>& ids) {
+  std::erase_if(objects, [&](const Track& o) { return ids.contains(o.id); });
 }
 
 }  // namespace
@@ -23,35 +23,35 @@ void eraseFrom(std::vector<Object>& objects, const std::set<ObjectId>& ids) {
 /// detection does not bring it back.
 void Node::letGo(const Entry& entry) {
   const TimePoint now = entry.input.stamp.time, oldest = history_.front().input.stamp.time;
-  const auto leaving = long_term_.leaving(belief_.objects, entry.input.view.T_WB.p, now, oldest);
+  const auto leaving = archive_.leaving(belief_.tracks, entry.input.view.T_WB.p, now, oldest);
   if (leaving.archived.empty() && leaving.forgotten.empty()) return;
   std::set<ObjectId> ids(leaving.archived.begin(), leaving.archived.end());
-  for (const Object& o : belief_.objects) {
+  for (const Track& o : belief_.tracks) {
     if (!ids.contains(o.id)) continue;
-    long_term_.rememberReference(o, T_MW_);
+    archive_.rememberReference(o, T_MW_);
     events_.archived(o.id);
   }
   ids.insert(leaving.forgotten.begin(), leaving.forgotten.end());
-  eraseFrom(belief_.objects, ids);
-  for (Entry& e : history_) eraseFrom(e.before.objects, ids);
+  eraseFrom(belief_.tracks, ids);
+  for (Entry& e : history_) eraseFrom(e.before.tracks, ids);
 }
 
 void Node::askTheMap(const Entry& entry) {
   if (!outputs_.queries) return;
   const Eigen::Vector3d& p_WB = entry.input.view.T_WB.p;
   const TimePoint now = entry.input.stamp.time;
-  if (const auto question = long_term_.ask(p_WB, now)) {
+  if (const auto question = archive_.ask(p_WB, now)) {
     ask(*question, inW(RigidTransform(Eigen::Quaterniond::Identity(), question->centre_W)).p,
         entry.world);
   }
   if (const auto question = former_.ask(p_WB, now)) {
     ask(*question, question->centre_W, *former_.world());
   }
-  const auto silent = long_term_.takeUnanswered() + former_.takeUnanswered();
+  const auto silent = archive_.takeUnanswered() + former_.takeUnanswered();
   if (silent > 0) reasons_.add("map_store_silent", silent);
 }
 
-void Node::ask(const LongTerm::Question& question, const Eigen::Vector3d& centre,
+void Node::ask(const Archive::Question& question, const Eigen::Vector3d& centre,
                const WorldId& world) {
   MapQuery query;
   query.client = instance_;
@@ -67,7 +67,7 @@ void Node::ask(const LongTerm::Question& question, const Eigen::Vector3d& centre
 /// What was known when the frame of reference ended.
 void Node::keepFormer() {
   std::vector<ObjectBelief> objects;
-  for (const Object& o : belief_.objects) {
+  for (const Track& o : belief_.tracks) {
     objects.push_back(inW(toBelief(o, config_.filter.motion.min_speed)));
   }
   former_.keep(*world_, objects);
@@ -78,7 +78,7 @@ void Node::keepFormer() {
 void Node::rejoin(const Entry& entry) {
   if (!former_.waits() || !isLevel(entry)) return;
   const FrameInput& input = entry.input;
-  const FrameAlignment* found = former_.look(belief_.objects, input.view.T_WB.p, input.stamp.time);
+  const FrameAlignment* found = former_.look(belief_.tracks, input.view.T_WB.p, input.stamp.time);
   if (!found) return;
   for (const ObjectBelief& belief : former_.takeKept()) recallLaid(belief);
   for (const auto& [remembered, seen] : found->pairs) {
@@ -90,8 +90,8 @@ void Node::rejoin(const Entry& entry) {
 }
 
 void Node::recallLaid(const ObjectBelief& belief) {
-  const auto same = [&](const Object& o) { return o.id == belief.id; };
-  if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) return;
+  const auto same = [&](const Track& o) { return o.id == belief.id; };
+  if (std::any_of(belief_.tracks.begin(), belief_.tracks.end(), same)) return;
   if (!isNear(belief)) return;
   insert(fromBelief(belief, pose_error_.product, ExistenceEvidence::kRecall));
   events_.recalled(belief.id, false,
@@ -100,11 +100,11 @@ void Node::recallLaid(const ObjectBelief& belief) {
 }
 
 /// Into the newest belief and those that late detections may go back to, in order of id.
-void Node::insert(const Object& object) {
+void Node::insert(const Track& object) {
   const auto into = [&](Belief& b) {
-    const auto at = std::find_if(b.objects.begin(), b.objects.end(),
-                                 [&](const Object& o) { return o.id > object.id; });
-    b.objects.insert(at, object);
+    const auto at = std::find_if(b.tracks.begin(), b.tracks.end(),
+                                 [&](const Track& o) { return o.id > object.id; });
+    b.tracks.insert(at, object);
   };
   into(belief_);
   for (auto& entry : history_) into(entry.before);
@@ -129,7 +129,7 @@ void Node::restore(const ObjectBelief& belief) {
 
 void Node::recall(const ObjectBelief& belief) {
   if (belief.moving > 0.5) return reasons_.add("recalled_moving");
-  const auto reference = long_term_.referenceAt(belief.as_of);
+  const auto reference = archive_.referenceAt(belief.as_of);
   ObjectBelief there = belief;
   if (!reference) {
     there = inM(std::move(there));
@@ -137,8 +137,8 @@ void Node::recall(const ObjectBelief& belief) {
     there = turned(*reference->T_MW, std::move(there));
   }
   if (!isNear(there)) return;
-  Object object = fromBelief(there, reference ? reference->product : pose_error_.product,
-                             ExistenceEvidence::kRecall);
+  Track object = fromBelief(there, reference ? reference->product : pose_error_.product,
+                            ExistenceEvidence::kRecall);
   if (!reference) {  // of another run: how its error hangs together with this one's is not known
     for (auto& h : object.hypotheses) h.C.setZero();
   }
@@ -148,7 +148,7 @@ void Node::recall(const ObjectBelief& belief) {
 
 /// `belief` is in M.
 bool Node::isNear(const ObjectBelief& belief) const {
-  return !last_T_WB_ || long_term_.near(belief.best().mean.head<3>(), inM(*last_T_WB_).p);
+  return !last_T_WB_ || archive_.near(belief.best().mean.head<3>(), inM(*last_T_WB_).p);
 }
 
 /// What can be used of it, without its context; no id of it is given out again.
@@ -165,8 +165,8 @@ std::vector<ObjectBelief> Node::soundOf(std::vector<ObjectBelief> beliefs) {
 
 void Node::insertRecalled(const Recalled& recalled) {
   for (const ObjectBelief& belief : soundOf(recalled.objects)) {
-    const auto same = [&](const Object& o) { return o.id == belief.id; };
-    if (std::any_of(belief_.objects.begin(), belief_.objects.end(), same)) continue;
+    const auto same = [&](const Track& o) { return o.id == belief.id; };
+    if (std::any_of(belief_.tracks.begin(), belief_.tracks.end(), same)) continue;
     recalled.restore ? restore(belief) : recall(belief);
   }
 }
@@ -181,7 +181,7 @@ void Node::onRecalled(const Recalled& recalled) {
   }
   if (recalled.world != *world_) return onRecalledOfFormer(recalled);
   const bool asked = recalled.restore || for_all;
-  if (!asked && !long_term_.answered(recalled.request, recalled.kept, recalled.truncated)) {
+  if (!asked && !archive_.answered(recalled.request, recalled.kept, recalled.truncated)) {
     return reasons_.add("recalled_unasked");
   }
   insertRecalled(recalled);
@@ -195,7 +195,7 @@ void Node::onRecalledOfFormer(const Recalled& recalled) {
   if (!former_.answered(recalled.request, recalled.kept, recalled.truncated)) {
     return reasons_.add("recalled_unasked");
   }
-  former_.refine(belief_.objects);
+  former_.refine(belief_.tracks);
   for (const ObjectBelief& belief : soundOf(recalled.objects)) {
     if (belief.moving > 0.5) {
       reasons_.add("recalled_moving");

@@ -35,12 +35,13 @@ void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
 }
 
 /// Whether these detections of a newcomer are kept back. What was kept before is used as soon as it
-/// sees one of the things again, or has been in doubt for so long that the old one would have said.
-bool Node::doubts(const Entry& entry, const Detections& detections) {
+/// sees one of the things again, or has been in inflation for so long that the old one would have
+/// said.
+bool Node::inflations(const Entry& entry, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const Model* model = models_.find(detections.model_hash);
   std::vector<Prediction> expected;
-  for (const Object& object : (entry.stepped ? entry.before : belief_).objects) {
+  for (const Track& object : (entry.stepped ? entry.before : belief_).tracks) {
     if (!object.confirmed || !model->names->contains(object.best().class_name)) continue;
     if (auto prediction = predictionOf(object, entry.input, {})) expected.push_back(*prediction);
   }

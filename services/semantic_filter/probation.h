@@ -1,6 +1,6 @@
 // Detections of a newcomer among inference processes that are kept back: where it sees nothing of
-// what is known to be in sight, either it is blind or the things are gone, and the process that it
-// follows will soon say which (services/inference/README.md, roll-backs).
+// what is known to be in visibility, either it is blind or the things are gone, and the process
+// that it follows will soon say which (services/inference/README.md, roll-backs).
 #pragma once
 
 #include <cstddef>

@@ -1,9 +1,10 @@
 #include "services/semantic_filter/returns.h"
-#include "services/semantic_filter/core/belief/motion_model.h"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include "services/semantic_filter/core/belief/motion_model.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -16,26 +17,26 @@ TimePoint later(TimePoint time, double seconds) {
   return time + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
 }
 
-constexpr double kShortestPause_s = 0.2;  // in which what should be in sight is not said again
+constexpr double kShortestPause_s = 0.2;  // in which what should be in visibility is not said again
 
-bool inSight(const Object& o) { return o.visible_fraction > 0.0; }
+bool inSight(const Track& o) { return o.visible_fraction > 0.0; }
 
 }  // namespace
 
-/// Until it is detected again: that it should be in sight by now may be a misjudged edge.
-bool ReturnWatch::waits(const Object& o, const Parameters& parameters) const {
+/// Until it is detected again: that it should be in visibility by now may be a misjudged edge.
+bool ReappearanceMonitor::waits(const Track& o, const Parameters& parameters) const {
   if (!o.confirmed || movingProbability(o, parameters.motion.min_speed) >= 0.5) return false;
   if (o.visibility == Visibility::kOccluded) return true;
   const auto known = waiting_.find(o.id);
   return inSight(o) && known != waiting_.end() && o.hits == known->second.hits;
 }
 
-void ReturnWatch::clear() {
+void ReappearanceMonitor::clear() {
   waiting_.clear();
   velocities_.clear();
 }
 
-void ReturnWatch::remember(const FrameInput& now, const Way& way) {
+void ReappearanceMonitor::addKeyframe(const FrameInput& now, const Way& way) {
   velocities_.push_back({now.stamp.time, now.view.T_WB.R() * (way.step.p / way.seconds)});
   while (toSeconds(now.stamp.time - velocities_.front().time) > kRemembered_s) {
     velocities_.pop_front();
@@ -44,7 +45,7 @@ void ReturnWatch::remember(const FrameInput& now, const Way& way) {
 
 /// The largest that some lag shows: a body that sways wanders less in a second than by a random
 /// walk of its single steps, one that speeds up wanders more.
-double ReturnWatch::speedWalk() const {
+double ReappearanceMonitor::speedWalk() const {
   double most = 0.0;
   for (const double lag : {0.1, 0.5, 1.0, 2.0, 4.0}) {
     double sum = 0.0, pairs = 0.0;
@@ -61,29 +62,30 @@ double ReturnWatch::speedWalk() const {
   return std::sqrt(most);
 }
 
-bool ReturnWatch::isNews(const Waiting& waiting, TimePoint expected, double seconds,
-                         double frame_s) {
+bool ReappearanceMonitor::isNews(const Waiting& waiting, TimePoint expected, double seconds,
+                                 double frame_s) {
   if (!waiting.expected || seconds <= 0.5 * waiting.then_s) return true;
   const double change = std::abs(toSeconds(expected - *waiting.expected));
   return change > std::max(0.5 * frame_s, kNewShare * seconds);
 }
 
-std::vector<Event> ReturnWatch::update(const std::vector<Object>& objects, const FrameInput& now,
-                                       const std::optional<ComingFrame>& coming,
-                                       const Parameters& parameters, const Event& blank) {
+std::vector<Event> ReappearanceMonitor::update(const std::vector<Track>& objects,
+                                               const FrameInput& now,
+                                               const std::optional<ComingFrame>& coming,
+                                               const Parameters& parameters, const Event& blank) {
   if (!coming) return {};
   Way way{now.view.T_WB.inverse() * coming->view.T_WB, coming->seconds};
-  remember(now, way);
+  addKeyframe(now, way);
   std::set<ObjectId> hidden;
   std::vector<Event> events;
-  for (const Object& o : objects) {
+  for (const Track& o : objects) {
     if (!waits(o, parameters)) continue;
     hidden.insert(o.id);
     const auto [known, fresh] = waiting_.try_emplace(o.id);
     Waiting& waiting = known->second;
     if (fresh) waiting.hits = o.hits;
     if (now.stamp.time < waiting.asked_again) continue;
-    const auto seconds = expectReturn(objects, o, now, way, parameters.visibility);
+    const auto seconds = expectedReappearance(objects, o, now, way, parameters.visibility);
     const double pause = std::clamp(0.25 * seconds.value_or(kRemembered_s),
                                     inSight(o) ? kShortestPause_s : 0.0, kLongestPause_s);
     waiting.asked_again = later(now.stamp.time, pause);
@@ -91,7 +93,7 @@ std::vector<Event> ReturnWatch::update(const std::vector<Object>& objects, const
     const TimePoint expected = later(now.stamp.time, *seconds);
     if (!isNews(waiting, expected, *seconds, way.seconds)) continue;
     way.speed_walk = speedWalk();
-    const auto foreseen = foreseeReturn(objects, o, now, way, parameters.visibility);
+    const auto foreseen = reappearanceInterval(objects, o, now, way, parameters.visibility);
     if (!foreseen) continue;
     waiting.expected = expected;
     waiting.then_s = *seconds;

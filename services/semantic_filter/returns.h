@@ -12,10 +12,10 @@
 
 namespace perdure::semantic_filter {
 
-class ReturnWatch {
+class ReappearanceMonitor {
  public:
   /// Events of kind kPredictedReturn, for one published frame; `blank` has stamp and writer.
-  std::vector<Event> update(const std::vector<Object>& objects, const FrameInput& now,
+  std::vector<Event> update(const std::vector<Track>& objects, const FrameInput& now,
                             const std::optional<ComingFrame>& coming, const Parameters& parameters,
                             const Event& blank);
   void clear();
@@ -26,7 +26,7 @@ class ReturnWatch {
     Eigen::Vector3d v_W;
   };
 
-  void remember(const FrameInput& now, const Way& way);
+  void addKeyframe(const FrameInput& now, const Way& way);
   double speedWalk() const;
 
   struct Waiting {
@@ -36,7 +36,7 @@ class ReturnWatch {
     double then_s = 0.0;                ///< how far off it was
   };
 
-  bool waits(const Object& object, const Parameters& parameters) const;
+  bool waits(const Track& object, const Parameters& parameters) const;
   static bool isNews(const Waiting& waiting, TimePoint expected, double seconds, double frame_s);
 
   std::map<ObjectId, Waiting> waiting_;

@@ -47,7 +47,7 @@ class Field {
   Field(std::size_t in_view, std::uint32_t seed) : random_(seed) {
     density_ = 1.3 * static_cast<double>(in_view) / kAhead;
   }
-  /// What stands within sight of `x`, new things ahead.
+  /// What stands within visibility of `x`, new things ahead.
   const std::deque<TrueObject>& near(double x) {
     for (; planted_ < x + kAhead; planted_ += 1.0 / density_) plant();
     while (!things_.empty() && things_.front().x.x() < x - 2.0) things_.pop_front();

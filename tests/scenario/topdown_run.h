@@ -35,7 +35,7 @@ TopDownRun driveThrough(const TopDownSetting& setting);
 /// True objects that are hard to see and that the map holds: confirmed, within 1.5 m of the truth,
 /// of its class, in the frame before. Small: under 24 px of the network's input (√ of the box's
 /// area), and 10 px or more on the longer side. Half-hidden: .25 to .7 of what lies in the image
-/// is in sight.
+/// is in visibility.
 struct HardRecall {
   std::size_t small = 0, small_found = 0, hidden = 0, hidden_found = 0;
   std::size_t ordinary_found = 0;  ///< of all, by a box that is not primed

@@ -24,18 +24,19 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// A look that says nothing about the object, for its ledger.
-void noteUnused(Object& object, Visibility why, TimePoint now, double min_speed) {
-  if (object.hidden.count + object.away.count == 0) letSlowOnesStand(object, min_speed);
+/// A look that says nothing about the track, for its ledger.
+void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
+  if (track.occluded_frames.count + track.out_of_view_frames.count == 0)
+    stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
-  LedgerEntry& entry = away ? object.away : object.hidden;
+  LedgerEntry& entry = away ? track.out_of_view_frames : track.occluded_frames;
   if (entry.count++ == 0) entry.first = now;
   entry.last = now;
 }
 
 }  // namespace
 
-BoxErrors SemanticFilter::errorsOf(const Belief& belief, const FrameInput& input) const {
+NoiseScale SemanticFilter::noiseScaleOf(const Belief& belief, const FrameInput& input) const {
   const std::uint64_t model = input.model.hash;
   const BoxParameters& assumed = parameters_.box;
   return {model, belief.learned.sides.ratio(model, assumed.assumed_sides),
@@ -43,207 +44,209 @@ BoxErrors SemanticFilter::errorsOf(const Belief& belief, const FrameInput& input
 }
 
 FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& input) const {
-  const BoxErrors errors = errorsOf(belief, input);
+  const NoiseScale noise_scale = noiseScaleOf(belief, input);
   return {input.view,
           input.pose_error,
           &input.model,
           &priors_,
           &parameters_,
-          std::make_shared<const KeyView>(input.view, input.pose_error, input.stamp.time,
-                                          input.model.styles, errors),
-          errors,
-          std::make_shared<const Ground>(belief.objects, belief.path, belief.learned.evenness,
-                                         input.view.up_W, priors_, parameters_.ground)};
+          std::make_shared<const FrameView>(input.view, input.pose_error, input.stamp.time,
+                                            input.model.styles, noise_scale),
+          noise_scale,
+          std::make_shared<const GroundSurface>(belief.tracks, belief.path,
+                                                belief.learned.roughness_scale, input.view.up_W,
+                                                priors_, parameters_.ground)};
 }
 
-std::vector<Sight> SemanticFilter::seeAll(Belief& belief, const FrameInput& input) const {
+std::vector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
+                                                              const FrameInput& input) const {
   const Projector from(input.view);
   std::vector<Outline> outlines;
-  outlines.reserve(belief.objects.size());
-  for (const auto& o : belief.objects) {
+  outlines.reserve(belief.tracks.size());
+  for (const auto& o : belief.tracks) {
     outlines.push_back(
         outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), from));
   }
   const auto& camera = *input.view.camera;
-  auto sights =
-      see(outlines, input.points, camera.width(), camera.height(), parameters_.visibility);
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    Object& o = belief.objects[j];
-    o.visibility = sights[j].visibility;
-    o.visible_fraction = sights[j].fraction;
-    o.blocked_by = sights[j].blocked_by;
+  auto visibilities = computeVisibility(outlines, input.points, camera.width(), camera.height(),
+                                        parameters_.visibility);
+  for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    Track& o = belief.tracks[j];
+    o.visibility = visibilities[j].state;
+    o.visible_fraction = visibilities[j].fraction;
+    o.blocked_by = visibilities[j].blocked_by;
   }
-  return sights;
+  return visibilities;
 }
 
-std::vector<SemanticFilter::Seen> SemanticFilter::score(Belief& belief,
-                                                        const std::vector<Sight>& sights,
-                                                        const FrameInput& input,
-                                                        const FrameContext& frame) const {
-  std::vector<Seen> seen;
-  seen.reserve(static_cast<std::size_t>(std::count_if(
-      sights.begin(), sights.end(), [](const Sight& s) { return s.fraction > 0.0; })));
+std::vector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
+    Belief& belief, const std::vector<TrackVisibility>& visibilities, const FrameInput& input,
+    const FrameContext& frame) const {
+  std::vector<ScoredTrack> scored;
+  scored.reserve(static_cast<std::size_t>(
+      std::count_if(visibilities.begin(), visibilities.end(),
+                    [](const TrackVisibility& s) { return s.fraction > 0.0; })));
   const ViewWalk walk = viewWalkOf(frame);
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    if (sights[j].fraction <= 0.0) {
-      noteUnused(belief.objects[j], sights[j].visibility, input.stamp.time,
-                 parameters_.motion.min_speed);
+  for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    if (visibilities[j].fraction <= 0.0) {
+      noteNotVisible(belief.tracks[j], visibilities[j].state, input.stamp.time,
+                     parameters_.motion.min_speed);
       continue;
     }
-    predict(belief.objects[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
-    seen.push_back({j, look(belief.objects[j], sights[j], *input.boxes, frame)});
-    if (admitNewClasses(belief.objects[j], seen.back().look, *input.boxes, frame)) {
-      seen.back().look = look(belief.objects[j], sights[j], *input.boxes, frame);
+    predict(belief.tracks[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
+    scored.push_back({j, scoreTrack(belief.tracks[j], visibilities[j], *input.boxes, frame)});
+    if (admitNewClasses(belief.tracks[j], scored.back().score, *input.boxes, frame)) {
+      scored.back().score = scoreTrack(belief.tracks[j], visibilities[j], *input.boxes, frame);
     }
-    const auto primed = input.primed.find(belief.objects[j].id);
-    if (primed != input.primed.end()) {
-      hearPrimed(seen.back().look, belief.objects[j], primed->second, frame);
+    const auto primed = input.top_down.find(belief.tracks[j].id);
+    if (primed != input.top_down.end()) {
+      applyTopDown(scored.back().score, belief.tracks[j], primed->second, frame);
     }
   }
-  return seen;
+  return scored;
 }
 
-bool SemanticFilter::tellsPose(const Object& object, const FrameContext& frame) const {
-  if (object.came_back <= std::max(object.told_pose, object.first_seen)) return false;
-  const Hypothesis& best = object.best();
-  return object.confirmed && !best.moving && best.weight > 0.5 &&
+bool SemanticFilter::measuresDrift(const Track& track, const FrameContext& frame) const {
+  if (track.visit_began <= std::max(track.drift_measured_at, track.first_seen)) return false;
+  const Hypothesis& best = track.best();
+  return track.confirmed && !best.moving && best.weight > 0.5 &&
          (best.x.head<3>() - frame.view.T_WB.p).norm() < parameters_.drift.within_m;
 }
 
-Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
+Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<ScoredTrack>& scored,
                                                    const FrameInput& input,
                                                    const FrameContext& frame) const {
   const auto& boxes = *input.boxes;
-  const auto n = static_cast<Eigen::Index>(seen.size());
+  const auto n = static_cast<Eigen::Index>(scored.size());
   const auto m = static_cast<Eigen::Index>(boxes.size());
   Eigen::MatrixXd psi = Eigen::MatrixXd::Zero(n, m);
   Eigen::VectorXd fresh(m);
   for (Eigen::Index z = 0; z < m; ++z) {
-    fresh[z] = 1.0 + std::exp(logBirthRatio(boxes[static_cast<std::size_t>(z)], frame));
+    fresh[z] = 1.0 + std::exp(logInitiationRatio(boxes[static_cast<std::size_t>(z)], frame));
   }
   for (Eigen::Index j = 0; j < n; ++j) {
-    const Seen& s = seen[static_cast<std::size_t>(j)];
-    for (std::size_t i = 0; i < s.look.boxes.size(); ++i) {
-      psi(j, static_cast<Eigen::Index>(s.look.boxes[i])) =
-          associationWeight(belief.objects[s.object], s.look, i);
+    const ScoredTrack& s = scored[static_cast<std::size_t>(j)];
+    for (std::size_t i = 0; i < s.score.boxes.size(); ++i) {
+      psi(j, static_cast<Eigen::Index>(s.score.boxes[i])) =
+          associationWeight(belief.tracks[s.track], s.score, i);
     }
   }
   const Association association = associate(psi, fresh);
-  std::vector<Object*> to_smooth;
+  std::vector<Track*> to_refit;
   for (Eigen::Index j = 0; j < n; ++j) {
-    Seen& s = seen[static_cast<std::size_t>(j)];
-    Object& object = belief.objects[s.object];
-    const auto before = tellsPose(object, frame) ? std::optional(object.best()) : std::nullopt;
-    s.claimed = object.once_confirmed && !object.best().moving && !s.look.boxes.empty();
-    s.own = update(object, s.look, association.eta.row(j), boxes, frame);
-    if (before && s.own && s.look.hypotheses[0].box) {
-      object.told_pose = object.as_of;
-      s.told = poseEvidence(*before, *s.look.hypotheses[0].box, boxes[*s.own].z,
-                            hiddenSides(s.look, *s.own), frame.pose_error.covariance);
+    ScoredTrack& s = scored[static_cast<std::size_t>(j)];
+    Track& track = belief.tracks[s.track];
+    const auto before = measuresDrift(track, frame) ? std::optional(track.best()) : std::nullopt;
+    s.near_box = track.once_confirmed && !track.best().moving && !s.score.boxes.empty();
+    s.assigned = update(track, s.score, association.eta.row(j), boxes, frame);
+    if (before && s.assigned && s.score.hypotheses[0].box) {
+      track.drift_measured_at = track.as_of;
+      s.drift = driftMeasurement(*before, *s.score.hypotheses[0].box, boxes[*s.assigned].z,
+                                 hiddenSides(s.score, *s.assigned), frame.pose_error.covariance);
     }
-    if (s.own && sound(object) &&
-        rememberLook(object, boxes[*s.own], hiddenSides(s.look, *s.own), frame)) {
-      to_smooth.push_back(&object);
+    if (s.assigned && sound(track) &&
+        considerKeyframe(track, boxes[*s.assigned], hiddenSides(s.score, *s.assigned), frame)) {
+      to_refit.push_back(&track);
     }
   }
-  smoothNeediest(to_smooth, belief, frame);
-  return association.claimed;
+  refitNeediest(to_refit, belief, frame);
+  return association.explained;
 }
 
-Object SemanticFilter::untilLook(const Object& was, const Object& now, const Seen& seen,
-                                 const FrameInput& input, const FrameContext& frame) const {
-  Object object = was;
-  object.visibility = now.visibility;
-  object.visible_fraction = now.visible_fraction;
-  object.blocked_by = now.blocked_by;
-  predict(object, input.stamp.time, input.pose_error, parameters_.motion, viewWalkOf(frame));
-  const ObjectLook first = look(object, seen.look.sight, *input.boxes, frame);
-  admitNewClasses(object, first, *input.boxes, frame);
-  return object;
+Track SemanticFilter::asScored(const Track& was, const Track& now, const ScoredTrack& scored,
+                               const FrameInput& input, const FrameContext& frame) const {
+  Track track = was;
+  track.visibility = now.visibility;
+  track.visible_fraction = now.visible_fraction;
+  track.blocked_by = now.blocked_by;
+  predict(track, input.stamp.time, input.pose_error, parameters_.motion, viewWalkOf(frame));
+  const TrackScore first = scoreTrack(track, scored.score.visibility, *input.boxes, frame);
+  admitNewClasses(track, first, *input.boxes, frame);
+  return track;
 }
 
-void SemanticFilter::tend(Object& object, const Object& was, Seen& seen, const FrameInput& input,
-                          const FrameContext& frame) const {
-  const auto pmf = classShares(object);
-  tendHypotheses(object, priors_, parameters_);
-  if (object.hypotheses.empty() && seen.claimed) {
-    object = missed(untilLook(was, object, seen, input, frame), seen.look, frame);
-    seen.told.reset();
-    if (sound(object)) tendHypotheses(object, priors_, parameters_);
+void SemanticFilter::manage(Track& track, const Track& was, ScoredTrack& scored,
+                            const FrameInput& input, const FrameContext& frame) const {
+  const auto pmf = classShares(track);
+  reduceMixture(track, priors_, parameters_);
+  if (track.hypotheses.empty() && scored.near_box) {
+    track = updateAsMissed(asScored(was, track, scored, input, frame), scored.score, frame);
+    scored.drift.reset();
+    if (sound(track)) reduceMixture(track, priors_, parameters_);
   }
-  if (!object.hypotheses.empty()) return;
-  if (seen.own) {
-    const Evidence& box = (*input.boxes)[*seen.own];
-    const auto range = rangeFromLandmarks(box, input.points, parameters_.birth);
-    if (bearAgain(object, pmf, box, range, frame)) {
-      rememberLook(object, box, hiddenSides(seen.look, *seen.own), frame);
-      tendHypotheses(object, priors_, parameters_);
+  if (!track.hypotheses.empty()) return;
+  if (scored.assigned) {
+    const BoxDetection& box = (*input.boxes)[*scored.assigned];
+    const auto range = rangeFromLandmarks(box, input.points, parameters_.initiation);
+    if (reinitialise(track, pmf, box, range, frame)) {
+      considerKeyframe(track, box, hiddenSides(scored.score, *scored.assigned), frame);
+      reduceMixture(track, priors_, parameters_);
     }
   }
-  if (object.hypotheses.empty()) {
-    object.existence.become(0.0, ExistenceEvidence::kMisshapen, object.as_of);
+  if (track.hypotheses.empty()) {
+    track.existence.become(0.0, ExistenceEvidence::kMisshapen, track.as_of);
   }
 }
 
 std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, ObjectId absorbed,
                                                 const FrameInput& input) const {
   const auto find = [&](ObjectId wanted) {
-    return std::find_if(belief.objects.begin(), belief.objects.end(),
-                        [&](const Object& o) { return o.id == wanted; });
+    return std::find_if(belief.tracks.begin(), belief.tracks.end(),
+                        [&](const Track& o) { return o.id == wanted; });
   };
   const auto kept = find(id), other = find(absorbed);
-  if (kept == belief.objects.end() || other == belief.objects.end() || kept == other) {
+  if (kept == belief.tracks.end() || other == belief.tracks.end() || kept == other) {
     return std::nullopt;
   }
   if (!sameKind(*kept, *other)) return std::nullopt;
   mergeTwo(*kept, *other, contextOf(belief, input));
-  belief.objects.erase(other);
+  belief.tracks.erase(other);
   return MergeRecord{id, absorbed};
 }
 
 StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
                                 IdBook& ids) const {
   belief.path.go(heard.view.T_WB.p);
-  auto sights = seeAll(belief, heard);
+  auto visibilities = updateVisibility(belief, heard);
   if (!heard.boxes) return {};
   FrameInput input = heard;
-  const BoxErrors errors = errorsOf(belief, heard);
-  for (Evidence& box : *input.boxes) {
-    box.z.variance *= errors.noise;
-    box.z.lasting *= errors.lasting();
+  const NoiseScale noise_scale = noiseScaleOf(belief, heard);
+  for (BoxDetection& box : *input.boxes) {
+    box.z.variance *= noise_scale.noise;
+    box.z.lasting *= noise_scale.lasting();
   }
-  explainRemnants(belief, sights, input, parameters_, priors_);
+  explainPartialViews(belief, visibilities, input, parameters_, priors_);
   const FrameContext frame = contextOf(belief, input);
-  reveal(belief, sights, input, parameters_);
-  auto seen = score(belief, sights, input, frame);
+  reviseOcclusion(belief, visibilities, input, parameters_);
+  auto scored = scoreAll(belief, visibilities, input, frame);
   StepReport report;
-  const auto claimed = associateAndUpdate(belief, seen, input, frame);
-  std::vector<Object> lost;
-  for (auto& s : seen) {
-    Object& object = belief.objects[s.object];
-    const Object& was = before.objects[s.object];
-    if (sound(object)) tend(object, was, s, input, frame);
-    if (object.hypotheses.empty() && s.claimed) {
-      lost.push_back(untilLook(was, object, s, input, frame));
+  const auto explained = associateAndUpdate(belief, scored, input, frame);
+  std::vector<Track> lost;
+  for (auto& s : scored) {
+    Track& track = belief.tracks[s.track];
+    const Track& was = before.tracks[s.track];
+    if (sound(track)) manage(track, was, s, input, frame);
+    if (track.hypotheses.empty() && s.near_box) {
+      lost.push_back(asScored(was, track, s, input, frame));
     }
-    if (s.told) report.pose.push_back(*s.told);
+    if (s.drift) report.drift.push_back(*s.drift);
   }
-  rememberGone(belief.gone, std::move(lost), input.stamp.time, parameters_.tend);
-  births(belief, sights, claimed, input, frame, ids);
-  std::erase_if(belief.objects, [](const Object& o) { return o.hypotheses.empty(); });
-  report.broken = std::erase_if(belief.objects, [](const Object& o) { return !sound(o); });
-  for (Object& o : belief.objects) {
-    const bool in_sight = o.visible_fraction > 0.0;
-    o.sightings.add(in_sight, in_sight && o.last_seen == input.stamp.time);
+  keepDeleted(belief.recently_deleted, std::move(lost), input.stamp.time, parameters_.tracks);
+  initiateTracks(belief, visibilities, explained, input, frame, ids);
+  std::erase_if(belief.tracks, [](const Track& o) { return o.hypotheses.empty(); });
+  report.broken = std::erase_if(belief.tracks, [](const Track& o) { return !sound(o); });
+  for (Track& o : belief.tracks) {
+    const bool visible = o.visible_fraction > 0.0;
+    o.history.add(visible, visible && o.last_seen == input.stamp.time);
   }
-  report.merges = mergeObjects(belief.objects, frame);
-  const auto moved = reuniteMoved(belief.objects, frame);
+  report.merges = mergeObjects(belief.tracks, frame);
+  const auto moved = reidentifyMoved(belief.tracks, frame);
   report.merges.insert(report.merges.end(), moved.begin(), moved.end());
-  rememberGone(belief.gone, confirmAndBury(belief.objects, frame), input.stamp.time,
-               parameters_.tend);
-  const auto found = findAgain(belief.objects, belief.gone, frame);
+  keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), input.stamp.time,
+              parameters_.tracks);
+  const auto found = reidentifyDeleted(belief.tracks, belief.recently_deleted, frame);
   report.merges.insert(report.merges.end(), found.begin(), found.end());
-  contextualise(belief.objects, priors_.context);
+  contextualise(belief.tracks, priors_.context);
   return report;
 }
 

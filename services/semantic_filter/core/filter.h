@@ -18,9 +18,9 @@
 namespace perdure::semantic_filter {
 
 struct StepReport {
-  std::vector<PoseEvidence> pose;  ///< of things that came back from an earlier visit
+  std::vector<DriftMeasurement> drift;  ///< of things that came back from an earlier visit
   std::vector<MergeRecord> merges;
-  std::size_t broken = 0;  ///< objects whose numbers went bad, and which were dropped
+  std::size_t broken = 0;  ///< tracks whose numbers went bad, and which were dropped
 };
 
 class SemanticFilter {
@@ -30,7 +30,7 @@ class SemanticFilter {
 
   /// Makes `belief`, a copy of that `before` the frame, the one after it.
   StepReport step(const Belief& before, Belief& belief, const FrameInput& heard, IdBook& ids) const;
-  /// Of two objects that are known to be one, `id` goes on with what both knew, as of that frame.
+  /// Of two tracks that are known to be one, `id` goes on with what both knew, as of that frame.
   /// Nothing happens where one of them is not there, or their classes exclude each other.
   std::optional<MergeRecord> join(Belief& belief, ObjectId id, ObjectId absorbed,
                                   const FrameInput& input) const;
@@ -39,32 +39,33 @@ class SemanticFilter {
   const ClassPriors& priors() const { return priors_; }
 
  private:
-  struct Seen {
-    std::size_t object;
-    ObjectLook look;
-    std::optional<std::size_t> own = {};    ///< the box that is surely its own
-    bool claimed = false;                   ///< at rest, and a box lies near
-    std::optional<PoseEvidence> told = {};  ///< until the look is taken back
+  struct ScoredTrack {
+    std::size_t track;
+    TrackScore score;
+    std::optional<std::size_t> assigned = {};    ///< the box that is surely its own
+    bool near_box = false;                       ///< at rest, and a box lies near
+    std::optional<DriftMeasurement> drift = {};  ///< until the look is taken back
   };
 
-  BoxErrors errorsOf(const Belief& belief, const FrameInput& input) const;
+  NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input) const;
   FrameContext contextOf(const Belief& belief, const FrameInput& input) const;
-  /// Visibility of all objects, published with them; one Sight for each.
-  std::vector<Sight> seeAll(Belief& belief, const FrameInput& input) const;
-  std::vector<Seen> score(Belief& belief, const std::vector<Sight>& sights, const FrameInput& input,
-                          const FrameContext& frame) const;
-  /// Updates what is seen; returns for each box how much of it is claimed.
-  Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<Seen>& seen,
+  /// Visibility of all tracks, published with them; one TrackVisibility for each.
+  std::vector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput& input) const;
+  std::vector<ScoredTrack> scoreAll(Belief& belief,
+                                    const std::vector<TrackVisibility>& visibilities,
+                                    const FrameInput& input, const FrameContext& frame) const;
+  /// Updates what is scored; returns for each box how much of it is explained.
+  Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<ScoredTrack>& scored,
                                      const FrameInput& input, const FrameContext& frame) const;
   /// Whether a look at it will tell of the pose: once for each time that it comes back.
-  bool tellsPose(const Object& object, const FrameContext& frame) const;
+  bool measuresDrift(const Track& track, const FrameContext& frame) const;
   /// One as it was scored, until its look was heard: from `was`, as it was before the frame, and
   /// `now`, as it is.
-  Object untilLook(const Object& was, const Object& now, const Seen& seen, const FrameInput& input,
-                   const FrameContext& frame) const;
-  /// Of one object after its look; nothing may be left of it.
-  void tend(Object& object, const Object& was, Seen& seen, const FrameInput& input,
-            const FrameContext& frame) const;
+  Track asScored(const Track& was, const Track& now, const ScoredTrack& scored,
+                 const FrameInput& input, const FrameContext& frame) const;
+  /// Of one track after its look; nothing may be left of it.
+  void manage(Track& track, const Track& was, ScoredTrack& scored, const FrameInput& input,
+              const FrameContext& frame) const;
 
   Parameters parameters_;
   ClassPriors priors_;

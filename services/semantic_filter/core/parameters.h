@@ -19,9 +19,10 @@ struct BoxParameters {
   double amodal = 0.5;            ///< share of boxes that span what something hides of the thing
   double part = 0.05;             ///< share of boxes that show a part of a thing alone
   std::int64_t iterations = 3;    ///< of the iterated EKF
-  double assumed_sides = 200.0;   ///< seen ones that weigh as much as these assumptions
+  double assumed_sides =
+      200.0;  ///< seen ones that updateClassAndExistence as much as these assumptions
   double assumed_azimuths = 10.0;  ///< the same of what the classes and the network say of these
-  /// The error of a side is noise and, for this share of its variance, the object's b, which stays
+  /// The error of a side is noise and, for this share of its variance, the track's b, which stays
   /// while the view stays; b falls to 1/e after a change of
   double bias_share = 0.3;
   double bias_angle = 0.3;         ///< aspect, rad
@@ -38,10 +39,10 @@ struct ClutterParameters {
   double other_prior = 0.01;     ///< PMF of "other" at birth
 };
 
-struct BirthParameters {
-  double odds = 0.2;             ///< expected new objects in a box against false alarms
-  double min_log_ratio = 0.5;    ///< weaker boxes only support objects that are there
-  double claimed = 0.5;          ///< a box claimed with more than this gives no birth
+struct InitiationParameters {
+  double odds = 0.2;             ///< expected new tracks in a box against false alarms
+  double min_log_ratio = 0.5;    ///< weaker boxes only support tracks that are there
+  double explained = 0.5;        ///< a box claimed with more than this gives no birth
   std::int64_t max_classes = 4;  ///< kept of the network's list, "other" beside them
   double class_ratio = 0.01;     ///< classes below this share of the best are not kept
   double landmark_decay = 0.3;   ///< e-folding distance of a landmark's weight, in half boxes
@@ -59,7 +60,7 @@ struct MotionParameters {
   double slow_share = 0.25;         ///< of a class's deviation of speed: slower is creeping
   double creeping = 0.03;           ///< how likely that is against the Gaussian
   double lost_sigma_m = 10.0;       ///< a moving hypothesis less well placed than this is given up
-  double start_probability = 0.02;  ///< of a moving hypothesis that is added to a static object
+  double start_probability = 0.02;  ///< of a moving hypothesis that is added to a static track
   double misplaced_odds = 5.0;      ///< of having misplaced a thing against its having driven off
   double misplaced_sigma = 0.1;     ///< relative, of distance and size
   double start_nis = 3.0;           ///< running innovation above which it is added
@@ -73,39 +74,39 @@ struct PoseParameters {
   double drift_rotation = 0.0003;  ///< rad/√m
 };
 
-struct LooksParameters {
+struct TemperingParameters {
   double correlation = 0.5;   ///< of the errors of two looks from the same place
   double angle = 0.1;         ///< rad, change of aspect after which it has fallen to 1/e
   double log_distance = 0.1;  ///< the same for the logarithm of the distance
   double image_angle = 0.03;  ///< rad, the same for the place in the image
-  double found_prior = 3.0;   ///< looks; P_D beside how often an object was found from about here
+  double found_prior = 3.0;   ///< looks; P_D beside how often an track was found from about here
 };
 
 struct VisibilityParameters {
   std::int64_t cell_px = 8;
   double minimum = 0.25;  ///< v below this is 0: no evidence
   double full = 0.7;      ///< v from here on is called visible
-  /// That something not on the map hides an object from a view in which it was not yet seen; what
+  /// That something not on the map hides an track from a view in which it was not yet seen; what
   /// is known of that falls to 1/e after a change of
-  double screened = 0.2;
-  double elusive = 0.05;             ///< that nothing does, and the network seldom finds it:
-  double elusive_found = 0.3;        ///< this share of P_D
-  double screen_angle = 0.15;        ///< aspect, rad
-  double screen_log_distance = 0.3;  ///< logarithm of the distance
-  double solid = 0.4;  ///< existence (times its late hit rate) from which an object can hide others
+  double unmapped_occluder = 0.2;
+  double hard_to_detect = 0.05;             ///< that nothing does, and the network seldom finds it:
+  double hard_detection_share = 0.3;        ///< this share of P_D
+  double detectability_angle = 0.15;        ///< aspect, rad
+  double detectability_log_distance = 0.3;  ///< logarithm of the distance
+  double solid = 0.4;  ///< existence (times its late hit rate) from which an track can hide others
 };
 
-struct TendParameters {
+struct TrackParameters {
   double confirm = 0.95;
   std::int64_t confirm_hits = 3;
   double confirm_sigma_m =
       1.5;                ///< of its place beside the body; one that is not known is no claim
   double certain = 0.99;  ///< existence is kept below it, so that misses can still be heard
   double certain_again = 0.999;  ///< the same of what was found on another visit
-  double gone = 0.02;            ///< existence below which an object is forgotten
+  double gone = 0.02;            ///< existence below which an track is forgotten
   double gone_tentative = 0.05;
   double tentative_s =
-      10.0;  ///< out of sight, after which what confirm_hits did not confirm is too
+      10.0;  ///< out of visibility, after which what confirm_hits did not confirm is too
   double class_dominates = 0.995;
   double size_gate = 4.5;  ///< deviations of the class's size beyond which nothing is of the class
   double hypothesis_floor = 0.002;
@@ -119,11 +120,11 @@ struct TendParameters {
 };
 
 /// Of the estimate from all remembered looks at once; `keyframes` 0 switches it off.
-struct SmoothParameters {
-  std::int64_t keyframes = 24;  ///< remembered at most, of one object
+struct SmoothingParameters {
+  std::int64_t keyframes = 24;  ///< remembered at most, of one track
   std::int64_t least = 5;       ///< with fewer the filter's own state stays
-  double fresh = 0.3;           ///< share of the looks that is new when it is smoothed again
-  std::int64_t per_frame = 2;   ///< objects that are smoothed in one frame, those in most need
+  double fresh = 0.3;           ///< share of the looks that is new when it is map_fit again
+  std::int64_t per_frame = 2;   ///< tracks that are map_fit in one frame, those in most need
   std::int64_t patience = 3;    ///< times as many new looks that are waited for, at most
   double new_view = 0.12;       ///< change of view, in lengths of b's correlation, that is new
   double place = 0.2;           ///< relative to the distance: a place less well known is not taken
@@ -136,7 +137,7 @@ struct GroundParameters {
   bool use = true;
   double slope = 0.03;      ///< standard deviation
   double roughness = 0.04;  ///< m/√m
-  double assumed = 5.0;     ///< things that weigh as much as these assumptions
+  double assumed = 5.0;     ///< things that updateClassAndExistence as much as these assumptions
   double sigma_m = 0.05;    ///< of an underside beside the ground: kerbs, wheels
   double reach_m = 60.0;    ///< things further away say nothing of it
   double resolved = 0.06;   ///< relative deviation of the place of what tells, at most
@@ -173,13 +174,13 @@ struct DriftParameters {
 struct Parameters {
   BoxParameters box;
   ClutterParameters clutter;
-  BirthParameters birth;
+  InitiationParameters initiation;
   MotionParameters motion;
   PoseParameters pose;
-  LooksParameters looks;
+  TemperingParameters tempering;
   VisibilityParameters visibility;
-  TendParameters tend;
-  SmoothParameters smooth;
+  TrackParameters tracks;
+  SmoothingParameters smoothing;
   GroundParameters ground;
   MemoryParameters memory;
   AlignmentParameters alignment;

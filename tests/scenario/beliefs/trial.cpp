@@ -59,8 +59,9 @@ class Trial {
       node_.onOdometry(frame.odometry);
       node_.onDetections(frame.detections);
       node_.flush();
-      for (std::size_t i = 0; i < visible_.size(); ++i) visible_[i] += frame.sights[i].fraction > 0;
-      follow(frame);
+      for (std::size_t i = 0; i < visible_.size(); ++i)
+        visible_[i] += frame.visibilities[i].fraction > 0;
+      applyCorrection(frame);
       ask(k, frame.t_s);
     }
     compareGaussians();
@@ -87,7 +88,7 @@ class Trial {
   }
 
   /// Which thing an object is: that whose outline its image has most in common with, one to one.
-  void follow(const WorldFrame& frame) {
+  void applyCorrection(const WorldFrame& frame) {
     struct Pair {
       double apart;
       ObjectId id;

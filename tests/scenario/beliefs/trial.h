@@ -26,8 +26,8 @@ struct BeliefScores {
   /// The same, each object for itself.
   tools::Anees all_position{"position", 3, {}}, all_half_yaw{"yaw mod 180 deg", 1, {}},
       all_size{"log size", 3, {}};
-  /// Of each object one look at its belief, at an age that is drawn when it is born: later things
-  /// must not choose the moment, or those that live short are asked when they were young.
+  /// Of each object one look at its belief, at an age that is drawn when it is initiated: later
+  /// things must not choose the moment, or those that live short are asked when they were young.
   tools::Reliability existence{"existence", {}};
   tools::ClassReliability classes{"classes", {}};
   std::size_t things = 0, seen_things = 0, objects = 0, wrong_class = 0;

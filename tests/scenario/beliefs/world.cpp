@@ -197,7 +197,7 @@ Odometry World::odometry(std::uint64_t frame, double t_s) {
   return o;
 }
 
-void World::see(WorldFrame& frame) {
+void World::computeVisibility(WorldFrame& frame) {
   std::vector<Outline> outlines;
   const double W = camera_.width(), H = camera_.height();
   for (std::size_t i = 0; i < things_.size(); ++i) {
@@ -220,7 +220,8 @@ void World::see(WorldFrame& frame) {
     frame.outlines.push_back(inside);
     outlines.push_back(std::move(o));
   }
-  frame.sights = semantic_filter::see(outlines, {}, W, H, told_.config.filter.visibility);
+  frame.visibilities =
+      semantic_filter::computeVisibility(outlines, {}, W, H, told_.config.filter.visibility);
 }
 
 void World::changeView(std::size_t thing, const State& x, const RigidTransform& T_WC) {
@@ -231,11 +232,12 @@ void World::changeView(std::size_t thing, const State& x, const RigidTransform& 
   };
   e.box.draw(dice_, keep({p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle}));
   e.noise_stays *= keep({p.box.noise_view, p.box.noise_view, 0.5 * p.box.noise_view});
-  e.looks.draw(dice_, keep({p.looks.angle, p.looks.log_distance, p.looks.image_angle}));
-  const double stays = keep({p.visibility.screen_angle, p.visibility.screen_log_distance, kNever});
+  e.looks.draw(dice_, keep({p.tempering.angle, p.tempering.log_distance, p.tempering.image_angle}));
+  const double stays =
+      keep({p.visibility.detectability_angle, p.visibility.detectability_log_distance, kNever});
   if (!dice_.chance(stays)) {
-    e.screened = dice_.chance(p.visibility.screened);
-    e.elusive = elusive_dice_.chance(p.visibility.elusive);
+    e.unmapped_occluder = dice_.chance(p.visibility.unmapped_occluder);
+    e.hard_to_detect = elusive_dice_.chance(p.visibility.hard_to_detect);
   }
   e.last_T_WC = T_WC;
 }
@@ -243,7 +245,8 @@ void World::changeView(std::size_t thing, const State& x, const RigidTransform& 
 std::vector<float> World::activations(std::size_t class_index, double size_px,
                                       const Eigen::VectorXd& shared) {
   const sim::DetectorModel& d = told_.detector;
-  const double correlation = options_.shared_looks ? told_.config.filter.looks.correlation : 0.0;
+  const double correlation =
+      options_.shared_looks ? told_.config.filter.tempering.correlation : 0.0;
   const double ease = 1.0 / (1.0 + std::exp(-std::log2(size_px / d.half_size_px) / d.size_octaves));
   const double separation = d.separation * (d.least_separation + (1.0 - d.least_separation) * ease);
   Eigen::VectorXd feature(directions_.cols());
@@ -269,7 +272,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
   BoxNoise noise = boxNoise(read_model_, W);
   double odds = 0.0;
   for (std::size_t k = 1; k < activations.size(); ++k) odds += std::exp(double(activations[k]));
-  noise.doubt = 1.0 / (1.0 + odds);
+  noise.inflation = 1.0 / (1.0 + odds);
   const BoxMeasurement z = measure(box, W, H, p, noise);
   double scale = 1.0;  // of a Gaussian, in a draw of the t distribution
   if (options_.tail > 0.0) {
@@ -295,7 +298,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
 double World::azimuth(const Eigen::VectorXd& shared, double alpha) {
   const double sigma = told_.detector.azimuth_sigma;
   // Less alike from look to look than what else is shared (core/update.cpp).
-  const double correlation = std::pow(told_.config.filter.looks.correlation, 2.0);
+  const double correlation = std::pow(told_.config.filter.tempering.correlation, 2.0);
   const auto mixed = [&](Eigen::Index i) {
     return std::sqrt(correlation) * shared[i] + std::sqrt(1.0 - correlation) * dice_.normal();
   };
@@ -304,20 +307,21 @@ double World::azimuth(const Eigen::VectorXd& shared, double alpha) {
 }
 
 std::optional<Detection> World::look(std::size_t thing, const State& x, const WorldFrame& frame) {
-  const Sight& sight = frame.sights[thing];
+  const TrackVisibility& visibility = frame.visibilities[thing];
   Errors& errors = errors_[thing];
   const auto projected = projectCuboid(x, frame.true_view);
-  if (sight.fraction <= 0.0 || !projected || !frame.outlines[thing]) return std::nullopt;
-  if (errors.screened && options_.screens) return std::nullopt;
+  if (visibility.fraction <= 0.0 || !projected || !frame.outlines[thing]) return std::nullopt;
+  if (errors.unmapped_occluder && options_.screens) return std::nullopt;
   const ClassPrior prior = told_.priors.of(things_[thing].class_name);
   const FrameContext context{
       frame.true_view, {}, &read_model_, &told_.priors, &told_.config.filter};
   const double size_px = sizeOf(projected->sides);
-  if (!dice_.chance(sight.fraction * detectionProbability(prior, size_px, context))) {
+  if (!dice_.chance(visibility.fraction * detectionProbability(prior, size_px, context))) {
     return std::nullopt;
   }
-  const bool elusive = errors.elusive && options_.screens;
-  if (elusive && !elusive_dice_.chance(told_.config.filter.visibility.elusive_found)) {
+  const bool hard_to_detect = errors.hard_to_detect && options_.screens;
+  if (hard_to_detect &&
+      !elusive_dice_.chance(told_.config.filter.visibility.hard_detection_share)) {
     return std::nullopt;
   }
   const Box box = *frame.outlines[thing];
@@ -377,7 +381,7 @@ WorldFrame World::next() {
   frame.odometry = odometry(frame_, frame.t_s);
   frame.true_view.camera = &camera_;
   frame.true_view.T_WB = truePose(frame.t_s);
-  see(frame);
+  computeVisibility(frame);
   frame.detections.stamp = frame.odometry.stamp;
   frame.detections.camera = "cam0";
   frame.detections.instance = 3;

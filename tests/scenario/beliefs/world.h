@@ -5,8 +5,8 @@
 // sizes, what moves and how fast, how long things stay; how often a thing is found, what hides it,
 // how its looks and its boxes' errors are alike; false boxes; the walk of the poses. From the
 // simulated detector's: the classes and how well their features part. Stated nowhere, hence chosen
-// here: how dense things stand, at which size they come into sight, and how the camera drives. A
-// box is that of the whole cuboid, whatever hides part of it.
+// here: how dense things stand, at which size they come into visibility, and how the camera drives.
+// A box is that of the whole cuboid, whatever hides part of it.
 #pragma once
 
 #include <optional>
@@ -16,9 +16,9 @@
 #include "common/sim/detector.h"
 #include "common/sim/dice.h"
 #include "services/semantic_filter/config.h"
+#include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/measurement/detection.h"
 #include "services/semantic_filter/core/update/predict.h"
-#include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/visibility/occlusion.h"
 
 namespace perdure::test {
@@ -50,8 +50,8 @@ struct Thing {
   std::string class_name;
   semantic_filter::State x = semantic_filter::State::Zero();  ///< at t = 0; velocity with it
   double present_until_s = 1e9;
-  /// It comes into sight (round a corner) once its image is this large; sizes are log-uniform, as
-  /// those of false boxes are: `birth.odds` is told of boxes of any size.
+  /// It comes into visibility (round a corner) once its image is this large; sizes are log-uniform,
+  /// as those of false boxes are: `birth.odds` is told of boxes of any size.
   double comes_out_px = 0.0;
   bool moves() const { return x.tail<3>().squaredNorm() > 0.0; }
   semantic_filter::State at(double t_s) const;
@@ -62,10 +62,10 @@ struct WorldFrame {
   double t_s = 0.0;
   Odometry odometry;
   Detections detections;
-  semantic_filter::View true_view;             ///< with the true pose
-  std::vector<semantic_filter::Sight> sights;  ///< of each thing
-  std::vector<std::optional<Box>> outlines;    ///< the part within the image, whatever hides it
-  std::vector<int> origins;                    ///< of each box: the thing, or -1
+  semantic_filter::View true_view;                             ///< with the true pose
+  std::vector<semantic_filter::TrackVisibility> visibilities;  ///< of each thing
+  std::vector<std::optional<Box>> outlines;  ///< the part within the image, whatever hides it
+  std::vector<int> origins;                  ///< of each box: the thing, or -1
 };
 
 class World {
@@ -93,14 +93,14 @@ class World {
     Drift box, looks;
     Eigen::Vector4d noise = Eigen::Vector4d::Zero();  ///< of the last box, unit Gaussians
     double noise_stays = 0.0;                         ///< correlation of the next one with it
-    bool screened = false, elusive = false, out = false;
+    bool unmapped_occluder = false, hard_to_detect = false, out = false;
   };
 
   void place();
   std::optional<Thing> draw(const std::string& class_name, double x_m);
   RigidTransform truePose(double t_s) const;
   Odometry odometry(std::uint64_t frame, double t_s);
-  void see(WorldFrame& frame);
+  void computeVisibility(WorldFrame& frame);
   void changeView(std::size_t thing, const semantic_filter::State& x, const RigidTransform& T_WC);
   std::optional<Detection> look(std::size_t thing, const semantic_filter::State& x,
                                 const WorldFrame& frame);

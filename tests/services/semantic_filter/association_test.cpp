@@ -1,10 +1,10 @@
-#include "services/semantic_filter/core/association/joint_association.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "services/semantic_filter/core/association/joint_association.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -63,7 +63,7 @@ TEST(Association, IsExactForManyObjectsAndOneBox) {
   const Exact exact(psi, fresh);
   const Association a = associate(psi, fresh);
   EXPECT_LT((marginals(psi, a) - exact.made).cwiseAbs().maxCoeff(), 1e-8);
-  EXPECT_NEAR(a.claimed[0], exact.made.sum(), 1e-8);
+  EXPECT_NEAR(a.explained[0], exact.made.sum(), 1e-8);
 }
 
 TEST(Association, IsNearTheExactMarginalsOnSmallCases) {
@@ -86,13 +86,13 @@ TEST(Association, IsNearTheExactMarginalsOnSmallCases) {
 
 TEST(Association, NobodyClaimsABoxThatMatchesNothing) {
   const Association a = associate(Eigen::MatrixXd::Zero(2, 2), Eigen::Vector2d(1.0, 1.0));
-  EXPECT_EQ(a.claimed[0], 0.0);
+  EXPECT_EQ(a.explained[0], 0.0);
   EXPECT_EQ(a.eta(1, 1), 1.0);
 }
 
 TEST(Association, WorksWithoutObjectsAndWithoutBoxes) {
-  EXPECT_EQ(associate(Eigen::MatrixXd(0, 2), Eigen::Vector2d(1, 1)).claimed.size(), 2);
-  EXPECT_EQ(associate(Eigen::MatrixXd(2, 0), Eigen::VectorXd(0)).claimed.size(), 0);
+  EXPECT_EQ(associate(Eigen::MatrixXd(0, 2), Eigen::Vector2d(1, 1)).explained.size(), 2);
+  EXPECT_EQ(associate(Eigen::MatrixXd(2, 0), Eigen::VectorXd(0)).explained.size(), 0);
 }
 
 }  // namespace

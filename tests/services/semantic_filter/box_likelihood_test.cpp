@@ -86,8 +86,9 @@ TEST(BoxLikelihood, NoiseAndWhatStaysAreTheWholeError) {
 TEST(BoxLikelihood, WhatTheNetworkDoubtsItPlacesWorse) {
   BoxParameters parameters;
   parameters.sigma_doubt = 0.2;
-  const auto at = [&](double doubt) {
-    return measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {.doubt = doubt}).variance[0];
+  const auto at = [&](double inflation) {
+    return measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {.inflation = inflation})
+        .variance[0];
   };
   EXPECT_GT(at(0.5), at(0.0));
   EXPECT_GT(at(1.0), 1.5 * at(0.5));

@@ -1,5 +1,3 @@
-#include "services/semantic_filter/core/belief/mixture_ops.h"
-#include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/tracks/context.h"
 
 #include <gmock/gmock.h>
@@ -9,6 +7,8 @@
 
 #include "common/base/errors.h"
 #include "services/semantic_filter/context_file.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/track_message.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -26,8 +26,8 @@ ContextMatrix matrixOf(double car_car, double car_van, double van_van) {
   return matrix;
 }
 
-Object thingAt(ObjectId id, double x, double car, double r = 0.9) {
-  Object o;
+Track thingAt(ObjectId id, double x, double car, double r = 0.9) {
+  Track o;
   o.id = id;
   o.existence = {r, ExistenceEvidence::kPrior, o.as_of};
   for (const auto& [name, weight] : {std::pair("car", car), std::pair("van", 1.0 - car)}) {
@@ -41,7 +41,7 @@ Object thingAt(ObjectId id, double x, double car, double r = 0.9) {
   return o;
 }
 
-ObjectBelief published(const Object& o) {
+ObjectBelief published(const Track& o) {
   ObjectBelief belief = toBelief(o, 0.7);
   addContext(belief, o);
   return belief;
@@ -58,14 +58,14 @@ double logOddsOfCar(const ObjectBelief& belief) {
   return std::log(probabilityOf(belief, "car") / probabilityOf(belief, "van"));
 }
 
-double contextOfCar(const Object& o, const std::vector<Object>& all, const ContextMatrix& matrix) {
+double contextOfCar(const Track& o, const std::vector<Track>& all, const ContextMatrix& matrix) {
   const auto c = contextOf(o, all, matrix);
   return c.at(0).name == "car" ? c[0].value - c[1].value : c[1].value - c[0].value;
 }
 
 TEST(Context, IsTheMeanOverWhatTheNeighbourMayBe) {
   const auto matrix = matrixOf(0.4, -0.2, 0.1);
-  const std::vector<Object> objects = {thingAt(1, 0, 0.5), thingAt(2, 8, 0.7, 0.6)};
+  const std::vector<Track> objects = {thingAt(1, 0, 0.5), thingAt(2, 8, 0.7, 0.6)};
   const double car = std::log(0.4 + 0.6 * (0.7 * std::exp(0.4) + 0.3 * std::exp(-0.2)));
   const double van = std::log(0.4 + 0.6 * (0.7 * std::exp(-0.2) + 0.3 * std::exp(0.1)));
   EXPECT_NEAR(contextOfCar(objects[0], objects, matrix), car - van, 1e-12);
@@ -73,7 +73,7 @@ TEST(Context, IsTheMeanOverWhatTheNeighbourMayBe) {
 
 TEST(Context, ComesOnlyFromNearThingsThatStand) {
   const auto matrix = matrixOf(2.0, -2.0, 0.0);
-  std::vector<Object> objects = {thingAt(1, 0, 0.5), thingAt(2, 10.1, 0.9)};
+  std::vector<Track> objects = {thingAt(1, 0, 0.5), thingAt(2, 10.1, 0.9)};
   EXPECT_EQ(contextOfCar(objects[0], objects, matrix), 0.0);
   objects[1] = thingAt(2, 5, 0.9);
   EXPECT_GT(contextOfCar(objects[0], objects, matrix), 0.5);
@@ -82,13 +82,13 @@ TEST(Context, ComesOnlyFromNearThingsThatStand) {
 }
 
 TEST(Context, ChangesNoOddsByMoreThanOneNat) {
-  std::vector<Object> objects = {thingAt(1, 0, 0.5)};
+  std::vector<Track> objects = {thingAt(1, 0, 0.5)};
   for (ObjectId id = 2; id < 12; ++id)
     objects.push_back(thingAt(id, 0.5 * static_cast<double>(id), 0.99, 0.99));
   contextualise(objects, matrixOf(5.0, -5.0, 5.0));
   const double free = logOddsOfCar(toBelief(objects[0], 0.7));
   EXPECT_NEAR(logOddsOfCar(published(objects[0])) - free, kMostContext, 1e-9);
-  for (const Object& o : objects) {
+  for (const Track& o : objects) {
     const double change = logOddsOfCar(published(o)) - logOddsOfCar(toBelief(o, 0.7));
     EXPECT_LE(std::abs(change), kMostContext + 1e-9);
   }
@@ -96,7 +96,7 @@ TEST(Context, ChangesNoOddsByMoreThanOneNat) {
 
 TEST(Context, TwoThingsCannotRaiseEachOtherWithoutEnd) {
   const auto matrix = matrixOf(0.8, -0.8, 0.8);
-  std::vector<Object> objects = {thingAt(1, 0, 0.55), thingAt(2, 4, 0.55)};
+  std::vector<Track> objects = {thingAt(1, 0, 0.55), thingAt(2, 4, 0.55)};
   const double free = logOddsOfCar(published(objects[0]));
   contextualise(objects, matrix);
   const double once = logOddsOfCar(published(objects[0]));
@@ -108,7 +108,7 @@ TEST(Context, TwoThingsCannotRaiseEachOtherWithoutEnd) {
 
 TEST(Context, FollowsMaterialChangesOfWhatCanBeSeen) {
   const auto matrix = matrixOf(1.0, -1.0, 1.0);
-  std::vector<Object> objects = {thingAt(1, 0, 0.5), thingAt(2, 4, 0.8)};
+  std::vector<Track> objects = {thingAt(1, 0, 0.5), thingAt(2, 4, 0.8)};
   contextualise(objects, matrix);
   const double before = logOddsOfCar(published(objects[0]));
   objects[1] = thingAt(2, 4, 0.81);
@@ -124,7 +124,7 @@ TEST(Context, FollowsMaterialChangesOfWhatCanBeSeen) {
 }
 
 TEST(Context, IsTakenOffWhatComesBack) {
-  std::vector<Object> objects = {thingAt(1, 0, 0.45), thingAt(2, 4, 0.9)};
+  std::vector<Track> objects = {thingAt(1, 0, 0.45), thingAt(2, 4, 0.9)};
   contextualise(objects, matrixOf(1.5, -1.5, 1.5));
   ObjectBelief belief = published(objects[0]);
   EXPECT_EQ(belief.best().name, "car");  // the context made it so
@@ -166,11 +166,11 @@ TEST(Context, NeverEntersTheRecursion) {
       node->onDetections(testing::detectionsAt(k, boxes));
     }
   }
-  ASSERT_GE(without.belief().objects.size(), 3U);
-  ASSERT_EQ(with.belief().objects.size(), without.belief().objects.size());
+  ASSERT_GE(without.belief().tracks.size(), 3U);
+  ASSERT_EQ(with.belief().tracks.size(), without.belief().tracks.size());
   bool differs = false;
-  for (std::size_t j = 0; j < with.belief().objects.size(); ++j) {
-    const Object &a = with.belief().objects[j], &b = without.belief().objects[j];
+  for (std::size_t j = 0; j < with.belief().tracks.size(); ++j) {
+    const Track &a = with.belief().tracks[j], &b = without.belief().tracks[j];
     EXPECT_EQ(double{a.existence}, double{b.existence});
     ASSERT_EQ(a.hypotheses.size(), b.hypotheses.size());
     for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {

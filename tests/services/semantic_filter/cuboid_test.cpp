@@ -1,10 +1,9 @@
-#include "services/semantic_filter/core/measurement/cuboid_projection.h"
-
 #include <gtest/gtest.h>
 
 #include "common/math/numeric_jacobian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/measurement/box_likelihood.h"
+#include "services/semantic_filter/core/measurement/cuboid_projection.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -129,9 +128,9 @@ TEST_F(Cuboid, AShapeThatFacesTheOtherWayIsTheOneTurnedRound) {
   EXPECT_LT((backwards->sides - other->sides).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_GT((backwards->sides - forwards->sides).cwiseAbs().maxCoeff(), 1.0) << "pixels";
   EXPECT_EQ(either->sides, projectCuboid(turned, view, shape)->sides);
-  EXPECT_NEAR(facingOf(0.0), 0.0, 1e-12);
-  EXPECT_GT(facingOf(6.0), 0.99);
-  EXPECT_EQ(facingOf(-2.0), -facingOf(2.0));
+  EXPECT_NEAR(headingOf(0.0), 0.0, 1e-12);
+  EXPECT_GT(headingOf(6.0), 0.99);
+  EXPECT_EQ(headingOf(-2.0), -headingOf(2.0));
 }
 
 TEST_F(Cuboid, AShapeThatReachesTheNearPlaneIsItsCuboid) {

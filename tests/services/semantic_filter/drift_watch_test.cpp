@@ -1,6 +1,4 @@
 // What things of an earlier visit say of the pose they are seen from.
-#include "services/semantic_filter/core/memory/drift.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/memory/drift.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -46,10 +45,10 @@ struct Street {
 
   double noise(double sigma) { return sigma * std::normal_distribution<double>()(random); }
 
-  std::vector<PoseEvidence> looks(const RigidTransform& T_WB, double known_to) {
+  std::vector<DriftMeasurement> looks(const RigidTransform& T_WB, double known_to) {
     const CameraModel camera{makeCamera()};
     const Matrix6d P_pose = walked();
-    std::vector<PoseEvidence> result;
+    std::vector<DriftMeasurement> result;
     for (const State& x : truth) {
       const auto seen = projectCuboid(x, Projector(View{&camera, T_WB}));
       if (!seen) continue;
@@ -58,14 +57,14 @@ struct Street {
         z.sides[side] = seen->sides[side] + noise(2.0);
         z.variance[side] = 4.0;
       }
-      Object thing = makeObject(1, "car", x, 0.0);
+      Track thing = makeObject(1, "car", x, 0.0);
       Hypothesis& h = thing.hypotheses[0];
       h.P.setZero();
       h.P.topLeftCorner<3, 3>().diagonal().setConstant(known_to * known_to);
       for (int axis = 0; axis < 3; ++axis) h.x[axis] += noise(known_to);
       const auto expected = projectCuboid(h.x, Projector(View{&camera, kSaid}));
       if (!expected) continue;
-      if (const auto told = poseEvidence(h, *expected, z, {}, P_pose)) result.push_back(*told);
+      if (const auto told = driftMeasurement(h, *expected, z, {}, P_pose)) result.push_back(*told);
     }
     return result;
   }
@@ -74,8 +73,8 @@ struct Street {
   std::vector<State> truth;
 };
 
-DriftWatch driven() {
-  DriftWatch watch(kParameters);
+DriftEstimator driven() {
+  DriftEstimator watch(kParameters);
   for (int i = 0; i < 400; ++i) {  // to and fro: yaw alone does not carry it away
     const Eigen::Vector3d a(0.0, 0.0, 0.0), b(i % 2 == 0 ? 1.0 : -1.0, 0.0, 0.0);
     watch.predict(RigidTransform(Eigen::Quaterniond::Identity(), a),
@@ -96,14 +95,14 @@ RigidTransform truly(double yaw, const Eigen::Vector3d& p) {
   return boxPlus(kSaid, error);
 }
 
-TEST(DriftWatch, ThingsOfAnEarlierVisitSayWhereTheBodyIsAndHowSurely) {
+TEST(DriftEstimator, ThingsOfAnEarlierVisitSayWhereTheBodyIsAndHowSurely) {
   double squared = 0.0, corrected = 0.0;
   for (int run = 1; run <= 60; ++run) {
     Street street(static_cast<std::uint32_t>(run));
     const RigidTransform truth =
         truly(street.noise(0.57 * kDegree), {street.noise(0.4), street.noise(0.4), 0.0});
-    DriftWatch watch = driven();
-    watch.hear(street.looks(truth, 0.15), kSaid);
+    DriftEstimator watch = driven();
+    watch.add(street.looks(truth, 0.15), kSaid);
     const Matrix6d before = walked();
     const auto correction = watch.correct(kSaid, poseError());
     if (!correction) continue;  // by chance there is little to correct
@@ -121,27 +120,27 @@ TEST(DriftWatch, ThingsOfAnEarlierVisitSayWhereTheBodyIsAndHowSurely) {
   EXPECT_LT(squared / corrected, 1.5);
 }
 
-TEST(DriftWatch, WhatIsTooLittleOrTooUnsureOrOfTooFewThingsStays) {
+TEST(DriftEstimator, WhatIsTooLittleOrTooUnsureOrOfTooFewThingsStays) {
   Street street(3);
-  DriftWatch in_place = driven();
-  in_place.hear(street.looks(kSaid, 0.05), kSaid);
+  DriftEstimator in_place = driven();
+  in_place.add(street.looks(kSaid, 0.05), kSaid);
   EXPECT_FALSE(in_place.correct(kSaid, poseError()));
   const RigidTransform truth = truly(0.0, {0.4, -0.5, 0.0});
-  DriftWatch few = driven();
+  DriftEstimator few = driven();
   auto looks = street.looks(truth, 0.05);
   ASSERT_GE(looks.size(), 5u);
   looks.resize(static_cast<std::size_t>(kParameters.things) - 1);
-  few.hear(looks, kSaid);
+  few.add(looks, kSaid);
   EXPECT_FALSE(few.correct(kSaid, poseError()));
-  DriftWatch unsure = driven();
-  unsure.hear(street.looks(truth, 1.0), kSaid);
+  DriftEstimator unsure = driven();
+  unsure.add(street.looks(truth, 1.0), kSaid);
   EXPECT_FALSE(unsure.correct(kSaid, poseError()));
-  DriftWatch unmoved(kParameters);  // the pose has no error yet
-  unmoved.hear(street.looks(truth, 0.05), kSaid);
+  DriftEstimator unmoved(kParameters);  // the pose has no error yet
+  unmoved.add(street.looks(truth, 0.05), kSaid);
   EXPECT_FALSE(unmoved.correct(kSaid, poseError()));
 }
 
-/// Its place hangs together with the pose's error as that of a thing which was just born.
+/// Its place hangs together with the pose's error as that of a thing which was just initiated.
 CrossPose bornFrom(const RigidTransform& T_WB, const Eigen::Vector3d& place) {
   CrossPose B = CrossPose::Zero();
   B.topLeftCorner<3, 3>() = -skew(place - T_WB.p) * T_WB.R();
@@ -157,47 +156,47 @@ Hypothesis aCar() {
 }
 
 /// By a box that is off by so many pixels.
-std::optional<PoseEvidence> toldBy(const Hypothesis& h, double pixels) {
+std::optional<DriftMeasurement> toldBy(const Hypothesis& h, double pixels) {
   const CameraModel camera{makeCamera()};
   const auto predicted = projectCuboid(h.x, Projector(View{&camera, kSaid}));
   if (!predicted) return std::nullopt;
   BoxMeasurement z;
   z.sides = predicted->sides.array() + pixels;
   z.variance.setConstant(4.0);
-  return poseEvidence(h, *predicted, z, {}, walked());
+  return driftMeasurement(h, *predicted, z, {}, walked());
 }
 
-TEST(DriftWatch, WhatWasBornUnderTheSameErrorTellsNothingOfIt) {
+TEST(DriftEstimator, WhatWasBornUnderTheSameErrorTellsNothingOfIt) {
   Hypothesis h = aCar();
   const auto known = toldBy(h, 3.0);
   const CrossPose B = bornFrom(kSaid, h.x.head<3>());
   h.C = B * walked();
   h.P += B * walked() * B.transpose();
-  const auto born = toldBy(h, 3.0);
-  ASSERT_TRUE(known && born);
+  const auto initiated = toldBy(h, 3.0);
+  ASSERT_TRUE(known && initiated);
   const Eigen::Matrix<double, 4, 4> a = known->information.bottomRightCorner<4, 4>(),
-                                    b = born->information.bottomRightCorner<4, 4>();
+                                    b = initiated->information.bottomRightCorner<4, 4>();
   EXPECT_LT(b.norm(), 1e-6 * a.norm());
-  EXPECT_LT(born->pull.tail<4>().norm(), 1e-3 * known->pull.tail<4>().norm());
+  EXPECT_LT(initiated->pull.tail<4>().norm(), 1e-3 * known->pull.tail<4>().norm());
 }
 
-TEST(DriftWatch, NoOutlierIsHeard) {
+TEST(DriftEstimator, NoOutlierIsHeard) {
   EXPECT_TRUE(toldBy(aCar(), 3.0));
   EXPECT_FALSE(toldBy(aCar(), 150.0));
 }
 
-TEST(DriftWatch, WhatWasBornWithTheErrorGoesWithThePoseAndWhatIsOlderStays) {
+TEST(DriftEstimator, WhatWasBornWithTheErrorGoesWithThePoseAndWhatIsOlderStays) {
   Street street(5);
   const RigidTransform truth = truly(1.2 * kDegree, {0.5, -0.4, 0.0});
-  DriftWatch watch = driven();
-  watch.hear(street.looks(truth, 0.05), kSaid);
+  DriftEstimator watch = driven();
+  watch.add(street.looks(truth, 0.05), kSaid);
   const auto correction = watch.correct(kSaid, poseError());
   ASSERT_TRUE(correction);
   const State x = makeState(20, -3, 0.75, 0.4, 4.2, 1.75, 1.5);
-  Object old = makeObject(1, "car", x, 0.04), young = old;
+  Track old = makeObject(1, "car", x, 0.04), young = old;
   young.hypotheses[0].C = bornFrom(kSaid, x.head<3>()) * walked();
-  follow(old, *correction, poseError());
-  follow(young, *correction, poseError());
+  applyCorrection(old, *correction, poseError());
+  applyCorrection(young, *correction, poseError());
   EXPECT_EQ(old.best().x, x);
   const RigidTransform corrected = correction->step * kSaid;
   const Eigen::Vector3d before = kSaid.inverse() * Eigen::Vector3d(x.head<3>());

@@ -1,9 +1,8 @@
-#include "services/semantic_filter/core/visibility/return_time.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "services/semantic_filter/core/visibility/return_time.h"
 #include "services/semantic_filter/returns.h"
 #include "tests/services/semantic_filter/scene.h"
 
@@ -15,8 +14,8 @@ using testing::makeState;
 
 constexpr double kFrame_s = 0.1;
 
-Object standing(ObjectId id, const State& x, double sigma_m) {
-  Object object;
+Track standing(ObjectId id, const State& x, double sigma_m) {
+  Track object;
   object.id = id;
   object.existence.become(0.99, ExistenceEvidence::kPrior, {});
   object.confirmed = true;
@@ -43,26 +42,26 @@ class Foresight : public ::testing::Test {
     way.step.p = Eigen::Vector3d(0.0, 0.1, 0.0);
     way.seconds = kFrame_s;
   }
-  std::optional<Foreseen> foresee() const {
-    return foreseeReturn(objects, objects[1], now, way, VisibilityParameters{});
+  std::optional<ReappearanceInterval> foresee() const {
+    return reappearanceInterval(objects, objects[1], now, way, VisibilityParameters{});
   }
   /// When the car may be found by a body that does as foreseen, the things being where they are.
-  double seenAt(const std::vector<Object>& truth) const {
+  double seenAt(const std::vector<Track>& truth) const {
     View view = now.view;
     VisibilityParameters parameters;
     parameters.cell_px = 1;
     parameters.minimum *= 0.5;
     for (int n = 1; n < 100; ++n) {
       view.T_WB = view.T_WB * way.step;
-      const auto sights = see({outlineOf(truth[1], truth[1].best().x, view),
-                               outlineOf(truth[0], truth[0].best().x, view)},
-                              {}, camera.width(), camera.height(), parameters);
-      if (sights[0].fraction > 0.0) return n * kFrame_s;
+      const auto visibilities = computeVisibility({outlineOf(truth[1], truth[1].best().x, view),
+                                                   outlineOf(truth[0], truth[0].best().x, view)},
+                                                  {}, camera.width(), camera.height(), parameters);
+      if (visibilities[0].fraction > 0.0) return n * kFrame_s;
     }
     return 1e9;
   }
   CameraModel camera{makeCamera()};
-  std::vector<Object> objects;
+  std::vector<Track> objects;
   FrameInput now;
   Way way;
 };
@@ -138,7 +137,7 @@ TEST_F(DoubtfulPlaces, TheIntervalHoldsNineInTen) {
 }
 
 TEST_F(Foresight, AReturnIsSaidWhenTheThingIsHiddenAndAgainAsItComesNear) {
-  ReturnWatch watch;
+  ReappearanceMonitor watch;
   std::vector<Event> said;
   const double seen = seenAt(objects);
   for (double t = 0.0; t < seen - 0.5 * kFrame_s; t += kFrame_s) {
@@ -160,7 +159,7 @@ TEST_F(Foresight, AReturnIsSaidWhenTheThingIsHiddenAndAgainAsItComesNear) {
 }
 
 TEST_F(Foresight, WhatShouldBeInSightIsExpectedUntilItIsDetected) {
-  ReturnWatch watch;
+  ReappearanceMonitor watch;
   std::vector<double> said;
   const auto oneFrame = [&](double left_m) {
     View next = now.view;

@@ -153,7 +153,7 @@ TEST(FormerMap, ThingsStayWhereTheyAreBesideTheBodyWhileOdometryDrifts) {
   Config config = configWith(kMemory);
   config.filter.pose.walk_position = 0.03;
   config.filter.pose.walk_rotation = 0.0007;
-  config.filter.motion.position_walk = 0.002;  // things do not follow by themselves
+  config.filter.motion.position_walk = 0.002;  // things do not applyCorrection by themselves
   Config none = config;
   none.filter.drift.things = 1000000;
   double error = 0.0, without = 0.0;  // of one street chance decides by a fifth

@@ -1,8 +1,8 @@
-#include "services/semantic_filter/core/belief/detection_rate.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "services/semantic_filter/core/belief/detection_rate.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -11,19 +11,19 @@ constexpr ViewScales kScales{0.15, 0.3, 1e9};
 constexpr double kPrior = 3.0;
 
 /// From `distance` metres at a bearing.
-Aspect from(double bearing, double distance) {
+ViewRay from(double bearing, double distance) {
   const Eigen::Vector3d ray(std::cos(bearing), std::sin(bearing), 0.0);
   return {ray, Eigen::Vector3d::UnitZ(), std::log(distance)};
 }
 
-FoundRate afterLooks(double bearing, double distance, int looks, int found) {
-  FoundRate rate;
+DetectionRate afterLooks(double bearing, double distance, int looks, int found) {
+  DetectionRate rate;
   for (int i = 0; i < looks; ++i) rate.add(from(bearing, distance), 0.8, i < found, kScales);
   return rate;
 }
 
-TEST(FoundRate, WhatAnotherVisitFoundSpeaksForTheViewsAboutItsOwn) {
-  FoundRate missed = afterLooks(0.3, 20.0, 10, 2), found = afterLooks(0.3, 20.0, 10, 10);
+TEST(DetectionRate, WhatAnotherVisitFoundSpeaksForTheViewsAboutItsOwn) {
+  DetectionRate missed = afterLooks(0.3, 20.0, 10, 2), found = afterLooks(0.3, 20.0, 10, 10);
   missed.beginVisit(kScales);
   found.beginVisit(kScales);
   EXPECT_NEAR(missed.factor(from(0.3, 20.0), kPrior, kScales), (3.0 + 2.0) / (3.0 + 8.0), 1e-6);
@@ -35,27 +35,27 @@ TEST(FoundRate, WhatAnotherVisitFoundSpeaksForTheViewsAboutItsOwn) {
   EXPECT_NEAR(missed.factor(from(0.3, 150.0), kPrior, kScales), 1.0, 0.01);
 }
 
-TEST(FoundRate, MissesOfOneVisitDoNotExcuseEachOther) {
-  const FoundRate rate = afterLooks(0.3, 20.0, 10, 0);
+TEST(DetectionRate, MissesOfOneVisitDoNotExcuseEachOther) {
+  const DetectionRate rate = afterLooks(0.3, 20.0, 10, 0);
   EXPECT_EQ(rate.factor(from(0.3, 20.0), kPrior, kScales), 1.0);
-  EXPECT_EQ(FoundRate().factor(from(0.3, 20.0), kPrior, kScales), 1.0);
+  EXPECT_EQ(DetectionRate().factor(from(0.3, 20.0), kPrior, kScales), 1.0);
 }
 
-TEST(FoundRate, TwoBeliefsThatAreOneShareTheirLooks) {
-  FoundRate a = afterLooks(0.3, 20.0, 5, 0), b = afterLooks(0.3, 20.0, 5, 0);
+TEST(DetectionRate, TwoBeliefsThatAreOneShareTheirLooks) {
+  DetectionRate a = afterLooks(0.3, 20.0, 5, 0), b = afterLooks(0.3, 20.0, 5, 0);
   a.beginVisit(kScales);
   b.beginVisit(kScales);
   a.join(b, kScales);
   EXPECT_NEAR(a.factor(from(0.3, 20.0), kPrior, kScales), 3.0 / (3.0 + 8.0), 1e-6);
 }
 
-TEST(FoundRate, ALongLifeTakesNoMoreThanItsViews) {
-  FoundRate rate;
+TEST(DetectionRate, ALongLifeTakesNoMoreThanItsViews) {
+  DetectionRate rate;
   for (int lap = 0; lap < 50; ++lap) {
     for (int i = 0; i < 300; ++i) rate.add(from(0.02 * i, 10.0 + 0.3 * i), 0.8, true, kScales);
     rate.beginVisit(kScales);
   }
-  EXPECT_LE(rate.views(), 2 * FoundRate::kMostViews);
+  EXPECT_LE(rate.views(), 2 * DetectionRate::kMostViews);
   EXPECT_GT(rate.factor(from(3.0, 55.0), kPrior, kScales), 1.15);
 }
 

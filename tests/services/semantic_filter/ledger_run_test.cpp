@@ -67,7 +67,7 @@ class Restless {
  public:
   explicit Restless(std::uint32_t seed) : random_(seed) {
     Config config;
-    config.filter.birth.min_log_ratio = -1.0;
+    config.filter.initiation.min_log_ratio = -1.0;
     priors_ = testing::makePriors();
     priors_.classes[0].moving = 0.2;
     priors_.classes[0].speed_sigma = 6.0;

@@ -1,11 +1,14 @@
 // Single bookings: who is credited with what.
 
 #include "services/semantic_filter/core/belief/ledger.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/update/track_update.h"
-#include <cmath>
-#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -118,21 +121,21 @@ class Booking : public ::testing::Test {
     h.P.diagonal().head<7>() << 0.3, 0.3, 0.02, 0.03, 0.01, 0.01, 0.01;
     return h;
   }
-  std::vector<Evidence> boxOfTheCar(const std::vector<float>& activations = {0, 1.5, -2, -1,
-                                                                             0.5}) const {
+  std::vector<BoxDetection> boxOfTheCar(const std::vector<float>& activations = {0, 1.5, -2, -1,
+                                                                                 0.5}) const {
     const auto s = projectCuboid(object.hypotheses[0].x, frame.view)->sides;
     Detection d;
     d.box = {s[0], s[1], s[2], s[3]};
     d.activations = activations;
-    return {*makeEvidence(d, model, camera.width(), camera.height(), parameters.box,
-                          parameters.clutter)};
+    return {*makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box,
+                              parameters.clutter)};
   }
-  void see(const std::vector<Evidence>& boxes, double eta = 1.0) {
-    Sight sight;
-    sight.fraction = 1.0;
+  void computeVisibility(const std::vector<BoxDetection>& boxes, double eta = 1.0) {
+    TrackVisibility visibility;
+    visibility.fraction = 1.0;
     const auto n = static_cast<Eigen::Index>(boxes.size());
-    update(object, look(object, sight, boxes, frame), Eigen::VectorXd::Constant(n, eta), boxes,
-           frame);
+    update(object, scoreTrack(object, visibility, boxes, frame), Eigen::VectorXd::Constant(n, eta),
+           boxes, frame);
   }
 
   CameraModel camera{makeCamera()};
@@ -140,11 +143,11 @@ class Booking : public ::testing::Test {
   ClassPriors priors = makePriors();
   Parameters parameters;
   FrameContext frame;
-  Object object;
+  Track object;
 };
 
 TEST_F(Booking, AHitDividesIntoWhatTheNetworkSaidAndWhatTheGeometryDid) {
-  see(boxOfTheCar());
+  computeVisibility(boxOfTheCar());
   const auto of = [&](ClassEvidence kind) {
     return natsOf(object.classes, "car", kind) - natsOf(object.classes, "van", kind);
   };
@@ -160,14 +163,14 @@ TEST_F(Booking, AHitDividesIntoWhatTheNetworkSaidAndWhatTheGeometryDid) {
 TEST_F(Booking, WhatTheNetworkSaidIsWhatWouldBeMissingHadItSaidNothing) {
   // The box is shared with another object, so that the look is not surely a hit.
   parameters.box.sigma_doubt = 0.0;  // or the activations change the box's noise, too
-  Object silent = object;
+  Track silent = object;
   const double before = std::log(0.7 / 0.3), eta = 2e-6;
-  see(boxOfTheCar(), eta);
+  computeVisibility(boxOfTheCar(), eta);
   std::swap(silent, object);
-  see(boxOfTheCar({0, 0, 0, 0, 0}), eta);
+  computeVisibility(boxOfTheCar({0, 0, 0, 0, 0}), eta);
   std::swap(silent, object);
   ASSERT_EQ(object.existence.of(ExistenceEvidence::kHit).count, 1U);
-  const auto odds = [](const Object& o) {
+  const auto odds = [](const Track& o) {
     return std::log(classProbability(o, "car") / classProbability(o, "van"));
   };
   const double said = natsOf(object.classes, "car", ClassEvidence::kActivation) -
@@ -179,7 +182,7 @@ TEST_F(Booking, WhatTheNetworkSaidIsWhatWouldBeMissingHadItSaidNothing) {
 }
 
 TEST_F(Booking, TheSameLookAgainIsSaidToBeARepetition) {
-  for (int k = 0; k < 10; ++k) see(boxOfTheCar());
+  for (int k = 0; k < 10; ++k) computeVisibility(boxOfTheCar());
   EXPECT_EQ(object.hits, 10U);
   EXPECT_GE(object.existence.of(ExistenceEvidence::kRepeated).count, 5U);
   EXPECT_EQ(object.existence.of(ExistenceEvidence::kHit).count +
@@ -188,14 +191,14 @@ TEST_F(Booking, TheSameLookAgainIsSaidToBeARepetition) {
 }
 
 TEST_F(Booking, AScreenExcusesPartOfAMiss) {
-  Object open = object;
-  see({});
+  Track open = object;
+  computeVisibility({});
   const double miss = object.existence.of(ExistenceEvidence::kMiss).log_odds;
   EXPECT_LT(miss, -1.0);
   EXPECT_EQ(object.existence.of(ExistenceEvidence::kScreened).count, 0U);
   std::swap(open, object);
-  object.screened = 0.5;
-  see({});
+  object.unmapped_occluder = 0.5;
+  computeVisibility({});
   EXPECT_NEAR(object.existence.of(ExistenceEvidence::kMiss).log_odds, miss, 1e-9);
   EXPECT_GT(object.existence.of(ExistenceEvidence::kScreened).log_odds, 0.5);
   EXPECT_NEAR(object.existence.of(ExistenceEvidence::kScreened).log_odds + miss,
@@ -203,15 +206,15 @@ TEST_F(Booking, AScreenExcusesPartOfAMiss) {
 }
 
 TEST_F(Booking, WhatCameBackWithoutALedgerIsBookedAsThat) {
-  see(boxOfTheCar());
+  computeVisibility(boxOfTheCar());
   ObjectBelief belief = toBelief(object, 0.7);
-  const Object with = fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRestore);
+  const Track with = fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRestore);
   EXPECT_NEAR(with.existence.of(ExistenceEvidence::kRestore).log_odds, 0.0, 1e-12);
   EXPECT_EQ(with.existence.of(ExistenceEvidence::kRestore).count, 1U);
   EXPECT_EQ(with.existence.of(ExistenceEvidence::kHit),
             object.existence.of(ExistenceEvidence::kHit));
   belief.why = {};
-  const Object without = fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRecall);
+  const Track without = fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRecall);
   EXPECT_NEAR(without.existence.of(ExistenceEvidence::kRecall).log_odds, logOdds(belief.existence),
               1e-12);
   EXPECT_NEAR(natsOf(without.classes, "car", ClassEvidence::kRestore),

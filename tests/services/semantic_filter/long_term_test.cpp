@@ -1,10 +1,9 @@
 // Which objects leave the working set for the map, and what is asked of it.
-#include "services/semantic_filter/core/memory/archive.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "services/semantic_filter/core/memory/archive.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -17,8 +16,8 @@ constexpr double kStands = 0.7;  // m/s
 
 TimePoint at(double seconds) { return TimePoint(durationFromSeconds(seconds)); }
 
-Object thingAt(ObjectId id, double x, double seen_s) {
-  Object o;
+Track thingAt(ObjectId id, double x, double seen_s) {
+  Track o;
   o.id = id;
   o.confirmed = o.once_confirmed = true;
   o.existence = {0.97, ExistenceEvidence::kHit, at(seen_s)};
@@ -32,9 +31,9 @@ Object thingAt(ObjectId id, double x, double seen_s) {
 }
 
 struct Leavers {
-  LongTerm memory{kMemory, kStands};
+  Archive memory{kMemory, kStands};
   /// Of a filter at the origin that asks and is answered all along.
-  LongTerm::Leaving after(const std::vector<Object>& objects, double now_s = 20.0) {
+  Archive::Leaving after(const std::vector<Track>& objects, double now_s = 20.0) {
     (void)memory.leaving(objects, Eigen::Vector3d::Zero(), at(now_s), at(now_s - 3.0));
     const auto question = memory.ask(Eigen::Vector3d::Zero(), at(now_s));
     EXPECT_TRUE(question && memory.answered(question->request, at(now_s), false));
@@ -42,18 +41,18 @@ struct Leavers {
   }
 };
 
-TEST(LongTerm, OnlyWhatIsFarWasNotSeenForLongAndIsOnTheMapLeaves) {
+TEST(Archive, OnlyWhatIsFarWasNotSeenForLongAndIsOnTheMapLeaves) {
   const auto leaving = Leavers().after(
       {thingAt(1, 140, 10), thingAt(2, 125, 10), thingAt(3, 140, 16), thingAt(4, 140, 10)});
   EXPECT_EQ(leaving.archived, (std::vector<ObjectId>{1, 4}));
   EXPECT_TRUE(leaving.forgotten.empty());
 }
 
-TEST(LongTerm, WhatMovesIsNeverArchivedAndForgottenOnceItIsFar) {
-  Object driving = thingAt(1, 140, 10);
+TEST(Archive, WhatMovesIsNeverArchivedAndForgottenOnceItIsFar) {
+  Track driving = thingAt(1, 140, 10);
   driving.hypotheses[0].moving = true;
   driving.hypotheses[0].x.tail<3>() << 5, 0, 0;
-  Object near = driving;
+  Track near = driving;
   near.id = 2;
   near.hypotheses[0].x[0] = 10;
   const auto leaving = Leavers().after({driving, near});
@@ -61,20 +60,20 @@ TEST(LongTerm, WhatMovesIsNeverArchivedAndForgottenOnceItIsFar) {
   EXPECT_EQ(leaving.forgotten, (std::vector<ObjectId>{1}));
 }
 
-TEST(LongTerm, WhatIsSlowerThanWhatCountsAsMovingIsArchived) {
-  Object creeping = thingAt(1, 140, 10);
+TEST(Archive, WhatIsSlowerThanWhatCountsAsMovingIsArchived) {
+  Track creeping = thingAt(1, 140, 10);
   creeping.hypotheses[0].moving = true;
   creeping.hypotheses[0].x.tail<3>() << 0.2, 0, 0;
   const auto leaving = Leavers().after({creeping});
   EXPECT_EQ(leaving.archived, (std::vector<ObjectId>{1}));
 }
 
-TEST(LongTerm, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
-  Object guess = thingAt(1, 140, 10);
+TEST(Archive, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
+  Track guess = thingAt(1, 140, 10);
   guess.confirmed = guess.once_confirmed = false;
-  Object misplaced = thingAt(2, 140, 10);
+  Track misplaced = thingAt(2, 140, 10);
   misplaced.confirmed = false;
-  Object missing = misplaced;
+  Track missing = misplaced;
   missing.id = 3;
   missing.existence = {0.3, ExistenceEvidence::kMiss, at(10)};
   const auto leaving = Leavers().after({guess, misplaced, missing});
@@ -82,9 +81,9 @@ TEST(LongTerm, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
   EXPECT_EQ(leaving.forgotten, (std::vector<ObjectId>{1, 3}));
 }
 
-TEST(LongTerm, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
-  LongTerm memory{kMemory, kStands};
-  const std::vector<Object> things = {thingAt(1, 140, 10)};
+TEST(Archive, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
+  Archive memory{kMemory, kStands};
+  const std::vector<Track> things = {thingAt(1, 140, 10)};
   const auto question = memory.ask(Eigen::Vector3d::Zero(), at(14.0));
   ASSERT_TRUE(memory.answered(question->request, at(14.0), false));
   for (double now = 16.0; now < 18.0; now += 0.1) {
@@ -93,8 +92,8 @@ TEST(LongTerm, AnAnswerFromBeforeItCouldLeaveKeepsItHere) {
   }
 }
 
-TEST(LongTerm, AsksAsTheBodyMovesAndAgainWhereThereWasMoreThanOneAnswerHolds) {
-  LongTerm memory{kMemory, kStands};
+TEST(Archive, AsksAsTheBodyMovesAndAgainWhereThereWasMoreThanOneAnswerHolds) {
+  Archive memory{kMemory, kStands};
   std::size_t asked = 0;
   for (int k = 0; k < 1000; ++k) {  // 10 m/s for 100 s
     const Eigen::Vector3d here(k * 1.0, 0, 0);

@@ -22,8 +22,8 @@ class Walk {
       errors.push_back(error);
       const View view{&camera_, RigidTransform(), Eigen::Vector3d::UnitZ()};
       Keyframe look;
-      look.from = std::make_shared<const KeyView>(view, error, fromNanoseconds(1000 * k),
-                                                  std::make_shared<const BoxStyles>());
+      look.from = std::make_shared<const FrameView>(view, error, fromNanoseconds(1000 * k),
+                                                    std::make_shared<const BoxStyles>());
       keyframes.push_back(std::make_shared<const Keyframe>(look));
       J.push_back(PoseJacobian::NullaryExpr([&] { return normal_(random_); }));
       Matrix6d A = Matrix6d::Identity();
@@ -56,7 +56,7 @@ class Walk {
 
 /// Largest difference of the lower triangle, in shares of the largest number.
 double worstShare(const Walk& walk) {
-  const Looks looks(walk.keyframes, walk.now);
+  const KeyframeBatch looks(walk.keyframes, walk.now);
   Eigen::MatrixXd covariance;
   looks.poseCovariance(walk.J, covariance);
   double worst = 0.0, largest = 0.0;
@@ -76,17 +76,17 @@ double worstShare(const Walk& walk) {
   return worst / largest;
 }
 
-TEST(Looks, PoseErrorsHangTogetherAsTheirTransitionsSay) {
+TEST(KeyframeBatch, PoseErrorsHangTogetherAsTheirTransitionsSay) {
   for (unsigned seed = 1; seed <= 10; ++seed) EXPECT_LT(worstShare(Walk(seed, 1.0)), 1e-9) << seed;
 }
 
-TEST(Looks, WhatCorrectionsMadeSmallHangsTogetherToo) {
+TEST(KeyframeBatch, WhatCorrectionsMadeSmallHangsTogetherToo) {
   for (unsigned seed = 1; seed <= 10; ++seed) EXPECT_LT(worstShare(Walk(seed, 0.5)), 1e-9) << seed;
 }
 
-TEST(Looks, ThePresentPoseHangsTogetherWithEach) {
+TEST(KeyframeBatch, ThePresentPoseHangsTogetherWithEach) {
   const Walk walk(3, 1.0);
-  const Looks looks(walk.keyframes, walk.now);
+  const KeyframeBatch looks(walk.keyframes, walk.now);
   for (std::size_t i = 0; i < looks.size(); ++i) {
     const Matrix6d expected =
         walk.now.product * inverse(walk.errors[i].product) * walk.errors[i].covariance;
@@ -94,18 +94,18 @@ TEST(Looks, ThePresentPoseHangsTogetherWithEach) {
   }
 }
 
-TEST(Looks, ExactPosesAreToldAsSuch) {
+TEST(KeyframeBatch, ExactPosesAreToldAsSuch) {
   Walk walk(4, 1.0);
-  EXPECT_FALSE(Looks(walk.keyframes, walk.now).exactPoses());
+  EXPECT_FALSE(KeyframeBatch(walk.keyframes, walk.now).exactPoses());
   for (auto& k : walk.keyframes) {
     Keyframe exact = *k;
     PoseError error = k->from->error;
     error.covariance.setZero();
     exact.from =
-        std::make_shared<const KeyView>(k->from->view, error, k->from->time, k->from->styles);
+        std::make_shared<const FrameView>(k->from->view, error, k->from->time, k->from->styles);
     k = std::make_shared<const Keyframe>(exact);
   }
-  EXPECT_TRUE(Looks(walk.keyframes, walk.now).exactPoses());
+  EXPECT_TRUE(KeyframeBatch(walk.keyframes, walk.now).exactPoses());
 }
 
 }  // namespace

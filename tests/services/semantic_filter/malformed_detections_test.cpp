@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "common/wire/codec.h"
-#include "tests/services/semantic_filter/scene.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -134,10 +134,10 @@ std::vector<Attack> attacks() {
 }
 
 void expectSameBits(const Belief& a, const Belief& b) {
-  ASSERT_EQ(a.objects.size(), b.objects.size());
-  ASSERT_GE(a.objects.size(), 2u);
-  for (std::size_t j = 0; j < a.objects.size(); ++j) {
-    const Object &x = a.objects[j], &y = b.objects[j];
+  ASSERT_EQ(a.tracks.size(), b.tracks.size());
+  ASSERT_GE(a.tracks.size(), 2u);
+  for (std::size_t j = 0; j < a.tracks.size(); ++j) {
+    const Track &x = a.tracks[j], &y = b.tracks[j];
     EXPECT_EQ(x.id, y.id);
     EXPECT_EQ(double(x.existence), double(y.existence));
     EXPECT_EQ(x.hits, y.hits);

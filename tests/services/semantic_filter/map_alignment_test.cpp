@@ -70,7 +70,7 @@ class Town {
     return {normal(random_), normal(random_), normal(random_), normal(random_)};
   }
 
-  /// Worse along a line of sight than across it.
+  /// Worse along a line of visibility than across it.
   Eigen::Matrix4d covariance() {
     std::uniform_real_distribution<double> any(0.0, 1.0);
     const Eigen::Matrix3d R = rotationAboutZ(2.0 * std::numbers::pi * any(random_));
@@ -112,22 +112,22 @@ Eigen::Vector4d errorOf(const FrameAlignment& found) {
 }
 
 TEST(MapAlignment, ATownIsFoundAgainWhereItIsAndAsSurelyAsIsSaid) {
-  std::size_t found_again = 0;
+  std::size_t detected_on_revisit = 0;
   double squared = 0.0;
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     Town town(seed);
     const MapAlignment map(town.believed(town.truth()), kParameters);
     const auto found = map.align(in(kTurn, town.believed(town.near({10, -5}, 25.0))));
     if (!found) continue;
-    ++found_again;
+    ++detected_on_revisit;
     const Eigen::Vector4d error = errorOf(*found);
     EXPECT_LT(error.head<3>().norm(), 1.0) << seed;
     EXPECT_LT(std::abs(error[3]), 4.0 * kDegree) << seed;
     squared += squaredMahalanobis(error, found->covariance) / 4.0;
     for (const auto& [remembered, seen] : found->pairs) EXPECT_EQ(remembered + 1000, seen) << seed;
   }
-  EXPECT_GE(found_again, 54u);
-  const double mean = squared / static_cast<double>(found_again);
+  EXPECT_GE(detected_on_revisit, 54u);
+  const double mean = squared / static_cast<double>(detected_on_revisit);
   EXPECT_GT(mean, 0.5);
   EXPECT_LT(mean, 1.3);
 }
@@ -144,7 +144,7 @@ TEST(MapAlignment, AnotherTownOfTheSameKindIsNotTakenForIt) {
 }
 
 TEST(MapAlignment, WhatWasMovedOrIsNewSinceThenIsNoHindrance) {
-  std::size_t found_again = 0;
+  std::size_t detected_on_revisit = 0;
   for (std::uint32_t seed = 1; seed <= 30; ++seed) {
     Town town(seed), another(seed + 500);
     const MapAlignment map(town.believed(town.truth()), kParameters);
@@ -154,10 +154,10 @@ TEST(MapAlignment, WhatWasMovedOrIsNewSinceThenIsNoHindrance) {
     seen.insert(seen.end(), guests.begin(), guests.end());
     const auto found = map.align(in(kTurn, seen));
     if (!found) continue;
-    ++found_again;
+    ++detected_on_revisit;
     EXPECT_LT(errorOf(*found).head<3>().norm(), 1.0) << seed;
   }
-  EXPECT_GE(found_again, 20u);
+  EXPECT_GE(detected_on_revisit, 20u);
 }
 
 TEST(MapAlignment, ARowOfEqualThingsFitsInManyWaysAndIsNotFoundUntilSomethingIsOdd) {

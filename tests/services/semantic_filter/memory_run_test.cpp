@@ -70,7 +70,7 @@ TEST(LongTermMemory, ABeliefComesBackBitForBitAndItsLedgerSaysSo) {
     EXPECT_NEAR(b.why.logOdds(), logOdds(b.existence), 1e-9);
   }
   // And the correlation with the pose error refers to what it referred to.
-  EXPECT_NE(pair.filter.belief().objects[0].pose_product, Matrix6d::Identity());
+  EXPECT_NE(pair.filter.belief().tracks[0].pose_product, Matrix6d::Identity());
 }
 
 TEST(LongTermMemory, NothingOnTheMapIsLetGoWhileNoMapAnswersAndHealthCountsIt) {
@@ -116,7 +116,7 @@ TEST(LongTermMemory, LateDetectionsAcrossAnArchivingGiveThePosteriorOfThoseOnTim
   for (const auto& d : waiting) late.filter.onDetections(d);
   ASSERT_GT(late.filter.reasons().of("detections_late"), 100u);
   EXPECT_EQ(late.count(EventKind::kArchived), 3u);
-  const auto &a = on_time.filter.belief().objects, &b = late.filter.belief().objects;
+  const auto &a = on_time.filter.belief().tracks, &b = late.filter.belief().tracks;
   ASSERT_EQ(a.size(), b.size());
   ASSERT_GE(a.size(), 3u);
   for (std::size_t j = 0; j < a.size(); ++j) {
@@ -133,7 +133,7 @@ TEST(LongTermMemory, ANewbornWhereTheRecalledOneStandsBecomesTheRecalledOne) {
   const auto street = pair.confirmed();
   pair.driveTo(200, 2.0);
   ASSERT_TRUE(pair.confirmed().empty());
-  pair.deaf = true;  // the map is slow: the cars are born again
+  pair.deaf = true;  // the map is slow: the cars are initiated again
   pair.driveTo(-6, 2.0);
   pair.driveTo(4);
   const auto again = pair.confirmed();
@@ -187,7 +187,7 @@ TEST(LongTermMemory, AnswersThatNobodyAskedForAreCountedAndChangeNothing) {
   answer.request = 4711;
   answer.objects = pair.objects.back().objects;
   for (auto& o : answer.objects) o.id += 100;
-  const std::size_t size = pair.filter.belief().objects.size();
+  const std::size_t size = pair.filter.belief().tracks.size();
   pair.filter.onRecalled(answer);
   EXPECT_EQ(pair.filter.reasons().of("recalled_unasked"), 1u);
   answer.client = 77;
@@ -197,7 +197,7 @@ TEST(LongTermMemory, AnswersThatNobodyAskedForAreCountedAndChangeNothing) {
   answer.world = {6, 0};
   pair.filter.onRecalled(answer);
   EXPECT_EQ(pair.filter.reasons().of("recalled_of_other_world"), 1u);
-  EXPECT_EQ(pair.filter.belief().objects.size(), size);
+  EXPECT_EQ(pair.filter.belief().tracks.size(), size);
 }
 
 }  // namespace

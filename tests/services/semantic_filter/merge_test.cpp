@@ -22,7 +22,7 @@ TEST_F(Merging, OverlapIsSharedOverJointVolume) {
 }
 
 TEST_F(Merging, ACopyThatIsHiddenByItsOriginalIsNoThingOfItsOwn) {
-  std::vector<Object> objects = {
+  std::vector<Track> objects = {
       makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
       makeObject(5, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
   objects[1].visible_fraction = 0.0;
@@ -37,7 +37,7 @@ TEST_F(Merging, ACopyThatIsHiddenByItsOriginalIsNoThingOfItsOwn) {
 }
 
 TEST_F(Merging, OfTwoOfOneClassInOnePlaceTheOlderStays) {
-  std::vector<Object> objects = {
+  std::vector<Track> objects = {
       makeObject(5, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
       makeObject(2, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
   const auto merges = mergeObjects(objects, frame);
@@ -51,21 +51,21 @@ TEST_F(Merging, OfTwoOfOneClassInOnePlaceTheOlderStays) {
   EXPECT_GE(objects[0].existence, 0.9);
 }
 
-/// As many frames as `pattern` has letters: which of two things in sight was found ("a", "b",
+/// As many frames as `pattern` has letters: which of two things in visibility was found ("a", "b",
 /// "+" both, "-" none).
-void see(std::vector<Object>& two, const std::string& pattern) {
+void computeVisibility(std::vector<Track>& two, const std::string& pattern) {
   for (const char c : pattern) {
-    two[0].sightings.add(true, c == 'a' || c == '+');
-    two[1].sightings.add(true, c == 'b' || c == '+');
+    two[0].history.add(true, c == 'a' || c == '+');
+    two[1].history.add(true, c == 'b' || c == '+');
   }
 }
 
 TEST_F(Merging, WhatOverlapsALittleAndTakesTurnsIsOne) {
   const auto merged = [&](double apart_m, const std::string& pattern) {
-    std::vector<Object> objects = {
+    std::vector<Track> objects = {
         makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
         makeObject(2, "car", makeState(10 + apart_m, 0, 0.7, 0, 4, 1.8, 1.5), 0.1)};
-    see(objects, pattern);
+    computeVisibility(objects, pattern);
     return mergeObjects(objects, frame).size() == 1;
   };
   const double little = 3.0, touching = 3.8;  // IoU of 1/7 and of 1/39
@@ -80,23 +80,23 @@ TEST_F(Merging, WhatOverlapsALittleAndTakesTurnsIsOne) {
 }
 
 TEST_F(Merging, OneThatIsOutOfSightTakesNoTurns) {
-  std::vector<Object> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
-                                 makeObject(2, "car", makeState(13, 0, 0.7, 0, 4, 1.8, 1.5), 0.1)};
+  std::vector<Track> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
+                                makeObject(2, "car", makeState(13, 0, 0.7, 0, 4, 1.8, 1.5), 0.1)};
   for (int i = 0; i < 20; ++i) {
-    objects[0].sightings.add(i < 10, i < 10);
-    objects[1].sightings.add(i >= 10, i >= 10);
+    objects[0].history.add(i < 10, i < 10);
+    objects[1].history.add(i >= 10, i >= 10);
   }
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
 }
 
 TEST_F(Merging, OfBeliefsThatContradictEachOtherBothAreKept) {
   // A mean of cuboids that are turned against each other is of no thing.
-  std::vector<Object> objects = {
+  std::vector<Track> objects = {
       makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
       makeObject(2, "car", makeState(10, 0.1, 0.7, 0.5, 4, 1.8, 1.5), 0.1)};
   objects[0].hits = 3, objects[1].hits = 9;
   ASSERT_EQ(mergeObjects(objects, frame).size(), 1u);
-  const Object& one = objects[0];
+  const Track& one = objects[0];
   EXPECT_EQ(one.id, 1u);
   EXPECT_EQ(one.hits, 12u);
   ASSERT_EQ(one.hypotheses.size(), 2u);
@@ -108,21 +108,21 @@ TEST_F(Merging, OfBeliefsThatContradictEachOtherBothAreKept) {
 TEST_F(Merging, WhatWasHardlyFoundOfLateForgetsItsLooksThatDoNotFitTheOther) {
   const State was = makeState(24, 2, 0.7, 0.6, 4, 1.8, 1.5),
               is = makeState(20, 0, 0.7, 0, 4, 1.8, 1.5);
-  const auto lookAt = [&](const State& x) {
+  const auto scoreHypothesis = [&](const State& x) {
     const auto p = projectCuboid(x, frame.view);
     Keyframe k;
     k.z = measure({p->sides[0], p->sides[1], p->sides[2], p->sides[3]}, camera.width(),
                   camera.height(), parameters.box);
-    k.from = std::make_shared<const KeyView>(frame.view, PoseError{}, fromNanoseconds(1),
-                                             std::make_shared<const BoxStyles>());
+    k.from = std::make_shared<const FrameView>(frame.view, PoseError{}, fromNanoseconds(1),
+                                               std::make_shared<const BoxStyles>());
     return std::make_shared<const Keyframe>(k);
   };
   const auto rememberedOf = [&](double support_of_first, double support_of_second) {
-    Object a = makeObject(1, "car", was, 0.01);
-    Object b = makeObject(2, "car", is, 0.01);
-    a.keyframes = Keyframes{lookAt(was), lookAt(was), lookAt(is)};
-    b.keyframes = Keyframes{lookAt(is), lookAt(is)};
-    a.support = support_of_first, b.support = support_of_second;
+    Track a = makeObject(1, "car", was, 0.01);
+    Track b = makeObject(2, "car", is, 0.01);
+    a.keyframes = Keyframes{scoreHypothesis(was), scoreHypothesis(was), scoreHypothesis(is)};
+    b.keyframes = Keyframes{scoreHypothesis(is), scoreHypothesis(is)};
+    a.recent_detection_share = support_of_first, b.recent_detection_share = support_of_second;
     mergeTwo(a, b, frame);
     EXPECT_EQ(a.hypotheses.size(), 2u) << "they contradict each other";
     return a.keyframes.size();
@@ -137,8 +137,8 @@ TEST_F(Merging, AGuessOfOneLookDoesNotOverruleWhatWasLookedAtForLong) {
   const State toy = makeState(1.4, -0.4, 1.3, 0, 0.4, 0.2, 0.15);
   const State car = makeState(1.6, -0.4, 1.5, 0, 4, 1.8, 1.5);
   const auto merged = [&](std::uint32_t toy_hits, std::uint32_t car_hits) {
-    std::vector<Object> objects = {makeObject(1, kOtherClass, toy, 1e-4),
-                                   makeObject(2, "car", car, 0.01)};
+    std::vector<Track> objects = {makeObject(1, kOtherClass, toy, 1e-4),
+                                  makeObject(2, "car", car, 0.01)};
     objects[0].confirmed = objects[0].once_confirmed = true;
     objects[0].hits = toy_hits, objects[1].hits = car_hits;
     EXPECT_EQ(mergeObjects(objects, frame).size(), 1u);
@@ -152,7 +152,7 @@ TEST_F(Merging, AGuessOfOneLookDoesNotOverruleWhatWasLookedAtForLong) {
 }
 
 TEST_F(Merging, AChairUnderATableStaysTwoObjects) {
-  std::vector<Object> objects = {
+  std::vector<Track> objects = {
       makeObject(1, "dining table", makeState(3, 0, 0.4, 0, 1, 1.2, 0.75), 0.01),
       makeObject(2, "chair", makeState(3.1, 0.1, 0.45, 0, 0.9, 0.9, 0.9), 0.01)};
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
@@ -160,8 +160,8 @@ TEST_F(Merging, AChairUnderATableStaysTwoObjects) {
 }
 
 TEST_F(Merging, HiddenObjectsWaitWithMerging) {
-  std::vector<Object> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01),
-                                 makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01)};
+  std::vector<Track> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01),
+                                makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01)};
   objects[1].visible_fraction = 0.0;
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
 }

@@ -1,8 +1,7 @@
-#include "services/semantic_filter/core/tracks/reidentify.h"
-
 #include <gtest/gtest.h>
 
 #include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/tracks/reidentify.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -15,8 +14,8 @@ TimePoint at(double seconds) { return fromNanoseconds(static_cast<std::int64_t>(
 class Moved : public ::testing::Test, protected testing::UsualFrame {
  protected:
   /// Claimed, with five looks in the last half second, from the origin along x.
-  Object thing(ObjectId id, const std::string& name, const State& x, double first, double last) {
-    Object o;
+  Track thing(ObjectId id, const std::string& name, const State& x, double first, double last) {
+    Track o;
     o.id = id;
     o.existence = {0.95, ExistenceEvidence::kPrior, at(last)};
     o.confirmed = o.once_confirmed = true;
@@ -33,13 +32,13 @@ class Moved : public ::testing::Test, protected testing::UsualFrame {
     view.camera = &camera;
     for (int i = 0; i < 5; ++i) {
       Keyframe k;
-      k.from = std::make_shared<const KeyView>(view, PoseError{}, at(last - 0.1 * i), nullptr);
+      k.from = std::make_shared<const FrameView>(view, PoseError{}, at(last - 0.1 * i), nullptr);
       o.keyframes.push_back(std::make_shared<const Keyframe>(k));
     }
     return o;
   }
-  Object missing(ObjectId id, const std::string& name, const State& x, double last) {
-    Object o = thing(id, name, x, 1.0, last);
+  Track missing(ObjectId id, const std::string& name, const State& x, double last) {
+    Track o = thing(id, name, x, 1.0, last);
     o.existence = {0.2, ExistenceEvidence::kPrior, at(last)};
     o.confirmed = false;
     return o;
@@ -50,9 +49,9 @@ class Moved : public ::testing::Test, protected testing::UsualFrame {
 };
 
 TEST_F(Moved, AChairThatIsMissingAndOneThatIsNewBesideItAreOneThatWasMoved) {
-  std::vector<Object> objects = {missing(3, "chair", here, 8.0),
-                                 thing(9, "chair", beside, 18.0, 19.0)};
-  const auto merges = reuniteMoved(objects, frame);
+  std::vector<Track> objects = {missing(3, "chair", here, 8.0),
+                                thing(9, "chair", beside, 18.0, 19.0)};
+  const auto merges = reidentifyMoved(objects, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(merges[0].absorbed, 9u);
@@ -67,30 +66,30 @@ TEST_F(Moved, AChairThatIsMissingAndOneThatIsNewBesideItAreOneThatWasMoved) {
 }
 
 TEST_F(Moved, WhatIsThereStillOrOfAnotherClassOrWasSeenBeforeStaysTwo) {
-  for (const auto& pair : std::vector<std::vector<Object>>{
+  for (const auto& pair : std::vector<std::vector<Track>>{
            {thing(3, "chair", here, 1.0, 8.0), thing(9, "chair", beside, 18.0, 19.0)},
            {missing(3, "chair", here, 8.0), thing(9, "couch", beside, 18.0, 19.0)},
            {missing(3, "chair", here, 8.0), thing(9, "chair", beside, 6.0, 19.0)},
            {missing(3, "chair", here, 8.0),
             thing(9, "chair", makeState(5, 4.0, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)}}) {
     auto objects = pair;
-    EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+    EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
     EXPECT_EQ(objects.size(), 2u);
   }
 }
 
 TEST_F(Moved, WhatIsNewWhereNobodyLookedBeforeHasNotMoved) {
-  std::vector<Object> objects = {
+  std::vector<Track> objects = {
       missing(3, "chair", makeState(1.2, 0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
       thing(9, "chair", makeState(-0.6, 0.5, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)};
-  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
 }
 
 TEST_F(Moved, OfTwoMissingOnesTheNearestIsTheOneThatWasMoved) {
-  std::vector<Object> objects = {
-      missing(2, "chair", makeState(5, -1.0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
-      missing(3, "chair", here, 8.0), thing(9, "chair", beside, 18.0, 19.0)};
-  const auto merges = reuniteMoved(objects, frame);
+  std::vector<Track> objects = {missing(2, "chair", makeState(5, -1.0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
+                                missing(3, "chair", here, 8.0),
+                                thing(9, "chair", beside, 18.0, 19.0)};
+  const auto merges = reidentifyMoved(objects, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(objects.size(), 2u);
@@ -100,24 +99,24 @@ TEST_F(Moved, ACarThatDrivesFromWhereOneWasMissedIsThatCar) {
   const State parked = makeState(20, 3, 0.75, 0, 4.2, 1.75, 1.5);
   State driving = makeState(24, 3, 0.75, 0, 4.2, 1.75, 1.5);
   driving[kVelocity] = 4.0;
-  Object newcomer = thing(9, "car", driving, 8.2, 9.0);
+  Track newcomer = thing(9, "car", driving, 8.2, 9.0);
   newcomer.hypotheses[0].moving = true;
-  std::vector<Object> objects = {missing(3, "car", parked, 8.0), newcomer};
-  EXPECT_EQ(reuniteMoved(objects, frame).size(), 1u);
+  std::vector<Track> objects = {missing(3, "car", parked, 8.0), newcomer};
+  EXPECT_EQ(reidentifyMoved(objects, frame).size(), 1u);
   objects = {missing(3, "car", parked, 8.0), newcomer};
   objects[1].hypotheses[0].x[kVelocity] = -4.0;  // it comes from elsewhere
-  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
   objects = {missing(3, "car", parked, 4.0), newcomer};  // it has been missed for long
-  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
   objects = {missing(3, "car", parked, 8.0), newcomer};
   objects[1].as_of = at(12.0);  // it has driven since; what it did then its speed does not tell
   objects[1].hypotheses[0].x[0] = 36.0;
-  EXPECT_TRUE(reuniteMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
 }
 
 /// One that was believed to stand where it is not, and a newcomer that drives where it is.
 struct TakenOver {
-  Object past, now;
+  Track past, now;
 };
 
 class TookItsBox : public Moved {
@@ -127,15 +126,15 @@ class TookItsBox : public Moved {
                   thing(9, "car", makeState(20, 2, 0.75, 0, 4.2, 1.75, 1.5), 8.1, 8.6)};
     two.now.hypotheses[0].moving = true;
     two.now.hypotheses[0].x[kVelocity] = 4.0;
-    two.past.last_box = OwnBox{at(8.0), {100, 100, 180, 160}};
-    two.now.first_box = OwnBox{at(8.1), {104, 102, 182, 160}};
+    two.past.last_box = AssignedBox{at(8.0), {100, 100, 180, 160}};
+    two.now.first_box = AssignedBox{at(8.1), {104, 102, 182, 160}};
     return two;
   }
   std::vector<MergeRecord> reunited(const TakenOver& two) {
     objects = {two.past, two.now};
-    return reuniteMoved(objects, frame);
+    return reidentifyMoved(objects, frame);
   }
-  std::vector<Object> objects;
+  std::vector<Track> objects;
 };
 
 TEST_F(TookItsBox, WhatDrivesInTheBoxOfWhatIsMissingIsThatWhereverItWasBelievedToBe) {
@@ -167,40 +166,40 @@ TEST_F(TookItsBox, AnotherBoxOrALaterOneOrOneOfTheSameImageIsAnotherThing) {
 
 TEST_F(TookItsBox, OfWhatWasGivenUpAsWell) {
   const TakenOver two = pair();
-  std::vector<Object> gone;
-  rememberGone(gone, {two.past}, at(8.1), parameters.tend);
+  std::vector<Track> recently_deleted;
+  keepDeleted(recently_deleted, {two.past}, at(8.1), parameters.tracks);
   objects = {two.now};
   objects[0].visible_fraction = 1.0;
-  const auto merges = findAgain(objects, gone, frame);
+  const auto merges = reidentifyDeleted(objects, recently_deleted, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_TRUE(merges[0].moved);
   EXPECT_FALSE(merges[0].returned);
   EXPECT_EQ(objects[0].id, 3u);
   EXPECT_TRUE(objects[0].best().moving);
-  EXPECT_TRUE(gone.empty());
+  EXPECT_TRUE(recently_deleted.empty());
 }
 
 class FoundAgain : public Moved {
  protected:
   /// What was given up at 10 s, last seen at 8 s.
-  std::vector<Object> gone(const std::string& name, const State& x) {
-    Object o = missing(3, name, x, 8.0);
+  std::vector<Track> recently_deleted(const std::string& name, const State& x) {
+    Track o = missing(3, name, x, 8.0);
     o.as_of = at(10.0);
-    std::vector<Object> list;
-    rememberGone(list, {o}, at(10.0), parameters.tend);
+    std::vector<Track> list;
+    keepDeleted(list, {o}, at(10.0), parameters.tracks);
     return list;
   }
-  std::vector<MergeRecord> after(std::vector<Object> past, const Object& newcomer) {
+  std::vector<MergeRecord> after(std::vector<Track> past, const Track& newcomer) {
     objects = {newcomer};
     objects[0].visible_fraction = 1.0;
-    return findAgain(objects, past, frame);
+    return reidentifyDeleted(objects, past, frame);
   }
-  std::vector<Object> objects;
+  std::vector<Track> objects;
 };
 
 TEST_F(FoundAgain, InItsPlaceWhatWasGivenUpGoesOn) {
   const State almost = makeState(5.05, 0.05, 0.4, 0, 0.5, 0.5, 0.9);
-  const auto merges = after(gone("chair", here), thing(9, "chair", almost, 11.0, 12.0));
+  const auto merges = after(recently_deleted("chair", here), thing(9, "chair", almost, 11.0, 12.0));
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(merges[0].absorbed, 9u);
@@ -216,38 +215,38 @@ TEST_F(FoundAgain, InItsPlaceWhatWasGivenUpGoesOn) {
 }
 
 TEST_F(FoundAgain, WhatIsSurelyThereIsEnoughThoughItsPlaceIsNotYetAClaim) {
-  Object newcomer = thing(9, "chair", here, 11.0, 12.0);
+  Track newcomer = thing(9, "chair", here, 11.0, 12.0);
   newcomer.existence = {0.97, ExistenceEvidence::kPrior, at(12.0)};
   newcomer.confirmed = false;  // or else it is something larger, further off
   newcomer.hypotheses.push_back(
       thing(9, "dining table", makeState(12, 0, 0, 0, 2, 2, 2), 11.0, 12.0).best());
   newcomer.hypotheses[0].weight = 0.7, newcomer.hypotheses[1].weight = 0.3;
-  EXPECT_EQ(after(gone("chair", here), newcomer).size(), 1u);
+  EXPECT_EQ(after(recently_deleted("chair", here), newcomer).size(), 1u);
   newcomer.hits = 1;
-  EXPECT_TRUE(after(gone("chair", here), newcomer).empty());
+  EXPECT_TRUE(after(recently_deleted("chair", here), newcomer).empty());
 }
 
 TEST_F(FoundAgain, NothingElseIsTakenForIt) {
-  EXPECT_TRUE(after(gone("chair", here), thing(9, "chair", beside, 11.0, 12.0)).empty());
-  EXPECT_TRUE(after(gone("car", here), thing(9, "chair", here, 11.0, 12.0)).empty());
-  EXPECT_TRUE(after(gone("chair", here), thing(9, "chair", here, 7.0, 12.0)).empty())
+  EXPECT_TRUE(after(recently_deleted("chair", here), thing(9, "chair", beside, 11.0, 12.0)).empty());
+  EXPECT_TRUE(after(recently_deleted("car", here), thing(9, "chair", here, 11.0, 12.0)).empty());
+  EXPECT_TRUE(after(recently_deleted("chair", here), thing(9, "chair", here, 7.0, 12.0)).empty())
       << "both were seen";
-  EXPECT_TRUE(after(gone("chair", here), missing(9, "chair", here, 12.0)).empty());
+  EXPECT_TRUE(after(recently_deleted("chair", here), missing(9, "chair", here, 12.0)).empty());
 }
 
 TEST_F(FoundAgain, WhatWasNeverClaimedOrIsLongGoneIsForgotten) {
-  Object guess = missing(3, "chair", here, 8.0);
+  Track guess = missing(3, "chair", here, 8.0);
   guess.once_confirmed = false;
-  Object driver = missing(4, "car", here, 8.0);
+  Track driver = missing(4, "car", here, 8.0);
   driver.hypotheses[0].moving = true;
-  std::vector<Object> list;
-  rememberGone(list, {guess, driver}, at(10.0), parameters.tend);
+  std::vector<Track> list;
+  keepDeleted(list, {guess, driver}, at(10.0), parameters.tracks);
   EXPECT_TRUE(list.empty());
-  list = gone("chair", here);
+  list = recently_deleted("chair", here);
   ASSERT_EQ(list.size(), 1u);
-  rememberGone(list, {}, at(9.9 + parameters.tend.return_s), parameters.tend);
+  keepDeleted(list, {}, at(9.9 + parameters.tracks.return_s), parameters.tracks);
   EXPECT_EQ(list.size(), 1u);
-  rememberGone(list, {}, at(10.1 + parameters.tend.return_s), parameters.tend);
+  keepDeleted(list, {}, at(10.1 + parameters.tracks.return_s), parameters.tracks);
   EXPECT_TRUE(list.empty());
 }
 

@@ -5,8 +5,8 @@
 
 #include <numeric>
 
-#include "tests/services/semantic_filter/scene.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -21,14 +21,15 @@ using testing::TrueObject;
 const TrueObject kVan = {makeState(18, 3.5, 1.05, 0.1, 5.0, 1.9, 2.1), "van"};
 const TrueObject kChair = {makeState(9, -2.0, 0.45, 0.3, 0.5, 0.5, 0.9), "chair"};
 
-/// A network that calls each thing by its name where it knows it, else by another it resembles.
+/// A network that calls each thing by its name where it knows it, else by another it
+/// lookalike_class.
 struct Network {
   ModelInfo info;
   std::map<std::string, std::string> says;  ///< for things of classes that it does not know
 
   Network(std::uint64_t hash, const std::string& name, std::vector<std::string> classes,
-          std::map<std::string, std::string> resembles = {})
-      : says(std::move(resembles)) {
+          std::map<std::string, std::string> lookalike_class = {})
+      : says(std::move(lookalike_class)) {
     info.hash = hash;
     info.name = name;
     info.classes = std::move(classes);
@@ -64,12 +65,12 @@ void drive(Harness& h, const Network& network, const std::vector<TrueObject>& th
   }
 }
 
-const Object& only(const Harness& h) {
-  EXPECT_EQ(h.node.belief().objects.size(), 1u);
-  return h.node.belief().objects.front();
+const Track& only(const Harness& h) {
+  EXPECT_EQ(h.node.belief().tracks.size(), 1u);
+  return h.node.belief().tracks.front();
 }
 
-double sumOfWeights(const Object& o) {
+double sumOfWeights(const Track& o) {
   return std::accumulate(o.hypotheses.begin(), o.hypotheses.end(), 0.0,
                          [](double sum, const Hypothesis& h) { return sum + h.weight; });
 }
@@ -81,11 +82,11 @@ const Network kCarsOnly(103, "cars", {"car"}, {{"chair", "nothing"}});
 TEST(NewClasses, EnterAnObjectAtTheirPriorWhenItIsNextSeen) {
   Harness h;
   drive(h, kOld, {kVan}, 0, 8);
-  const Object before = only(h);
+  const Track before = only(h);
   ASSERT_TRUE(before.existence > 0.9);
   EXPECT_EQ(classProbability(before, "van"), 0.0);
   drive(h, kNew, {kVan}, 8, 9);
-  const Object& after = only(h);
+  const Track& after = only(h);
   EXPECT_EQ(after.id, before.id);
   EXPECT_GT(classProbability(after, "van"), 0.0);
   EXPECT_NEAR(sumOfWeights(after), 1.0, 1e-12);
@@ -117,8 +118,8 @@ TEST(NewClasses, WinWhereTheyAreRightAndTheObjectStaysTheSame) {
 TEST(NewClasses, AClassThatTheNewModelLacksIsKept) {
   Harness h;
   drive(h, kOld, {kVan, kChair}, 0, 12);
-  const auto chairOf = [](const Harness& harness) -> const Object* {
-    for (const auto& o : harness.node.belief().objects) {
+  const auto chairOf = [](const Harness& harness) -> const Track* {
+    for (const auto& o : harness.node.belief().tracks) {
       if ((o.best().x - kChair.x).head<3>().norm() < 1.0) return &o;
     }
     return nullptr;
@@ -135,7 +136,7 @@ TEST(NewClasses, AClassThatTheNewModelLacksIsKept) {
 TEST(NewClasses, AnObjectThatIsNotSeenKeepsEveryBitUntilItIs) {
   Harness h;
   drive(h, kOld, {kVan}, 0, 10);
-  const Object before = only(h);
+  const Track before = only(h);
   h.node.onModel(kNew.info);
   RigidTransform away = driveTo(9, 0.3);
   away.q = away.q * Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "tests/services/semantic_filter/scene.h"
 #include "services/semantic_filter/core/belief/track_message.h"
+#include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -46,10 +46,10 @@ void drive(Harness& h, std::uint64_t from, std::uint64_t to, double metres = 0.4
 }
 
 double distanceBetween(const Belief& a, const Belief& b) {
-  if (a.objects.size() != b.objects.size()) return 1e9;
+  if (a.tracks.size() != b.tracks.size()) return 1e9;
   double worst = 0.0;
-  for (std::size_t j = 0; j < a.objects.size(); ++j) {
-    const Object &x = a.objects[j], &y = b.objects[j];
+  for (std::size_t j = 0; j < a.tracks.size(); ++j) {
+    const Track &x = a.tracks[j], &y = b.tracks[j];
     if (x.hypotheses.size() != y.hypotheses.size()) return 1e9;
     worst = std::max(worst, std::abs(x.existence - y.existence));
     for (std::size_t i = 0; i < x.hypotheses.size(); ++i) {
@@ -110,7 +110,7 @@ TEST(Node, PrimedAnswersAloneBeginNoObject) {
     h.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
     h.node.onDetections(detectionsAt(k, boxes));
   }
-  EXPECT_TRUE(h.node.belief().objects.empty());
+  EXPECT_TRUE(h.node.belief().tracks.empty());
 }
 
 TEST(Node, LateAndDisorderedDetectionsGiveThePosteriorOfThoseOnTime) {
@@ -132,7 +132,7 @@ TEST(Node, LateAndDisorderedDetectionsGiveThePosteriorOfThoseOnTime) {
   late.node.onDetections(detections(29));
   ASSERT_GT(late.node.reasons().of("detections_late"), 20u);
   EXPECT_LT(distanceBetween(on_time.node.belief(), late.node.belief()), 1e-9);
-  EXPECT_GE(on_time.node.belief().objects.size(), 3u);
+  EXPECT_GE(on_time.node.belief().tracks.size(), 3u);
 }
 
 TEST(Node, IdsOfObjectsSurviveARollback) {
@@ -162,7 +162,7 @@ TEST(Node, AFrameWithoutDetectionsIsNoEvidenceAndAnEmptyListIs) {
   }
   silent.node.flush();
   EXPECT_EQ(distanceBetween(before, silent.node.belief()), 0.0);
-  const auto existence = [](const Harness& h) { return h.node.belief().objects.front().existence; };
+  const auto existence = [](const Harness& h) { return h.node.belief().tracks.front().existence; };
   EXPECT_LT(existence(empty), existence(silent));
 }
 
@@ -172,10 +172,10 @@ TEST(Node, WhatIsFoundAgainAfterTheCameraLookedAwayIsBelievedMore) {
     for (const auto& o : h.objects.back().objects) most = std::max(most, o.existence);
     return most;
   };
-  const TendParameters tend;
+  const TrackParameters parameters;
   Harness h;
   drive(h, 0, 20);
-  EXPECT_NEAR(surest(h), tend.certain, 1e-6);
+  EXPECT_NEAR(surest(h), parameters.certain, 1e-6);
   RigidTransform away = driveTo(20, 0.4);
   away.q = away.q * Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
   for (std::uint64_t k = 20; k < 50; ++k) {
@@ -184,15 +184,15 @@ TEST(Node, WhatIsFoundAgainAfterTheCameraLookedAwayIsBelievedMore) {
         detectionsAt(k, k < 40 ? std::vector<Detection>{}
                                : boxesAt(kStreet, 20, 0.4, static_cast<std::uint32_t>(k))));
   }
-  EXPECT_GT(surest(h), tend.certain);
-  EXPECT_LE(surest(h), tend.certain_again);
+  EXPECT_GT(surest(h), parameters.certain);
+  EXPECT_LE(surest(h), parameters.certain_again);
 }
 
 /// Sees the street, looks away, sees nothing of it for three seconds, and then all of it again.
 std::vector<ObjectId> missForAWhile(Harness& h) {
   drive(h, 0, 20);
   std::vector<ObjectId> ids;
-  for (const Object& o : h.node.belief().objects) {
+  for (const Track& o : h.node.belief().tracks) {
     if (o.confirmed) ids.push_back(o.id);
   }
   RigidTransform away = driveTo(20, 0.4);
@@ -226,7 +226,7 @@ TEST(Node, WhatWasGivenUpAndIsFoundInItsPlaceIsTheSameThing) {
   }
 
   Config forgets;
-  forgets.filter.tend.return_s = 0.5;
+  forgets.filter.tracks.return_s = 0.5;
   Harness short_memory(forgets);
   for (const ObjectId id : missForAWhile(short_memory)) {
     EXPECT_EQ(count(short_memory, EventKind::kReappeared, id), 0);
@@ -257,12 +257,12 @@ TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
     h.node.onOdometry(odometryAt(k, driveTo(20, 0.4)));
     h.node.onDetections(detectionsAt(k, boxesAt(kStreet, 20, 0.4)));
   }
-  ASSERT_EQ(h.node.belief().objects.size(), before.objects.size());
-  for (std::size_t j = 0; j < before.objects.size(); ++j) {
-    EXPECT_EQ(h.node.belief().objects[j].id, before.objects[j].id);
+  ASSERT_EQ(h.node.belief().tracks.size(), before.tracks.size());
+  for (std::size_t j = 0; j < before.tracks.size(); ++j) {
+    EXPECT_EQ(h.node.belief().tracks[j].id, before.tracks[j].id);
   }
-  const auto confirmed = std::count_if(before.objects.begin(), before.objects.end(),
-                                       [](const Object& o) { return o.confirmed; });
+  const auto confirmed = std::count_if(before.tracks.begin(), before.tracks.end(),
+                                       [](const Track& o) { return o.confirmed; });
   EXPECT_GE(confirmed, 2);
   EXPECT_EQ(reappeared(), confirmed);
 }
@@ -275,7 +275,7 @@ Recalled restored(const std::vector<TrueObject>& things, const std::vector<doubl
   recalled.client = 9;
   recalled.next_id = 10;
   for (std::size_t i = 0; i < things.size(); ++i) {
-    Object object = testing::makeObject(i + 1, things[i].class_name, things[i].x, variances[i]);
+    Track object = testing::makeObject(i + 1, things[i].class_name, things[i].x, variances[i]);
     object.confirmed = true;
     recalled.objects.push_back(toBelief(object, 0.7));
   }
@@ -304,8 +304,8 @@ TEST(Node, ABoxThatAHiddenThingExplainsFarBetterThanItsBlockerShowsItAndBearsNot
     h.node.onDetections(detectionsAt(k, boxes(k)));
   }
   h.node.flush();
-  ASSERT_EQ(h.node.belief().objects.size(), 2u);
-  EXPECT_GE(h.node.belief().objects[0].hits, 12u);
+  ASSERT_EQ(h.node.belief().tracks.size(), 2u);
+  EXPECT_GE(h.node.belief().tracks[0].hits, 12u);
 }
 
 TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt) {
@@ -323,19 +323,19 @@ TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt)
       ASSERT_EQ(seen.size(), 2u);
       ASSERT_EQ(seen[0].visibility, Visibility::kOutOfView);
       ASSERT_NE(seen[1].visibility, Visibility::kOutOfView);
-      before = h.node.belief().objects[0].existence;
+      before = h.node.belief().tracks[0].existence;
     }
     const auto boxes = boxesAt({at_border}, k, 0.0);
     ASSERT_EQ(boxes.size(), 1u);
     h.node.onDetections(detectionsAt(k, boxes));
   }
   h.node.flush();
-  const auto& objects = h.node.belief().objects;
+  const auto& objects = h.node.belief().tracks;
   ASSERT_FALSE(objects.empty());
   ASSERT_EQ(objects[0].id, 1u);
   EXPECT_EQ(objects[0].hits, 4u);
   EXPECT_EQ(objects[0].existence, before);
-  for (const Object& o : objects) {
+  for (const Track& o : objects) {
     if (o.id == 1) continue;
     EXPECT_EQ(o.id, 2u);
     EXPECT_EQ(o.hits, 4u);

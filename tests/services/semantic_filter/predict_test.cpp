@@ -1,10 +1,13 @@
 
+#include "services/semantic_filter/core/update/predict.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
-#include "services/semantic_filter/core/update/predict.h"
-#include <cmath>
-#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -18,7 +21,7 @@ RigidTransform viewFrom(double metres) {
 }
 
 /// A car 40 m ahead whose box is too large by two deviations, seen from 0 m.
-Object biasedCar(const ViewWalk& walk) {
+Track biasedCar(const ViewWalk& walk) {
   Hypothesis h;
   h.class_name = "car";
   h.weight = 1.0;
@@ -26,10 +29,10 @@ Object biasedCar(const ViewWalk& walk) {
   h.x.segment<3>(kSize) << std::log(4.0), std::log(1.7), std::log(1.5);
   h.P.setZero();
   h.x.segment<4>(kBias).setConstant(0.1);
-  Object object;
+  Track object;
   object.existence = {0.9, ExistenceEvidence::kPrior, object.as_of};
   object.hypotheses = {h};
-  object.last_view = walk.T_WC;
+  object.predicted_from = walk.T_WC;
   return object;
 }
 
@@ -44,7 +47,7 @@ ViewWalk walkWith(SideError lasting) {
 
 Hypothesis afterDriving(SideError lasting, double metres) {
   ViewWalk walk = walkWith(lasting);
-  Object object = biasedCar(walk);
+  Track object = biasedCar(walk);
   walk.T_WC = viewFrom(metres);
   predict(object, {}, {}, {}, walk);
   return object.best();
@@ -62,7 +65,7 @@ TEST(PredictBias, AShareOfTheBoxStaysOne) {
 
 TEST(PredictBias, WhatTheViewForgetsComesBackAsDeviation) {
   ViewWalk walk = walkWith({.pixels = 2.0, .relative = 0.03});
-  Object object = biasedCar(walk);
+  Track object = biasedCar(walk);
   walk.bias = {0.3, 0.01, 0.3};
   walk.T_WC = viewFrom(20.0);  // log 2 of distance at .01 a length: all is forgotten
   predict(object, {}, {}, {}, walk);
@@ -84,24 +87,24 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNone) {
 /// From where it was seen on an earlier visit nothing that stands can hide it.
 TEST(Predict, LooksOfAnEarlierVisitVouchThatNothingHidesWhatIsBackInThePicture) {
   ViewWalk walk = walkWith({});
-  walk.screened = 0.2;
+  walk.unmapped_occluder = 0.2;
   walk.screen = {0.15, 0.3, 1e9};
   const CameraModel camera{testing::makeCamera()};
   View view;
   view.camera = &camera;
   const auto screenedAt = [&](double metres_aside) {
-    Object object = biasedCar(walk);
+    Track object = biasedCar(walk);
     Keyframe seen;
-    seen.from = std::make_shared<const KeyView>(view, PoseError{}, fromNanoseconds(1), nullptr);
+    seen.from = std::make_shared<const FrameView>(view, PoseError{}, fromNanoseconds(1), nullptr);
     object.keyframes.assign(3, std::make_shared<const Keyframe>(seen));
     object.as_of = fromNanoseconds(2);
-    object.away.count = 20;  // frames in which it was out of the picture
-    object.last_view.reset();
+    object.out_of_view_frames.count = 20;  // frames in which it was out of the picture
+    object.predicted_from.reset();
     ViewWalk now = walk;
     now.T_WC = seen.from->T_WC;
     now.T_WC.p += now.T_WC.R() * Eigen::Vector3d(metres_aside, 0, 0);
     predict(object, object.as_of + std::chrono::seconds(5), PoseError{}, MotionParameters{}, now);
-    return object.screened;
+    return object.unmapped_occluder;
   };
   EXPECT_LT(screenedAt(0.0), 1e-6);
   EXPECT_LT(screenedAt(0.5), 0.01);
@@ -111,28 +114,28 @@ TEST(Predict, LooksOfAnEarlierVisitVouchThatNothingHidesWhatIsBackInThePicture) 
 /// What was found often, or seldom, from here says little of elsewhere.
 TEST(Predict, HowOftenItIsFoundFromElsewhereIsNotKnown) {
   ViewWalk walk = walkWith({});
-  walk.screened = 0.2;
-  walk.elusive = 0.05;
+  walk.unmapped_occluder = 0.2;
+  walk.hard_to_detect = 0.05;
   walk.screen = {0.15, 0.3, 1e9};
   for (const double now : {0.0, 0.7}) {
-    Object object = biasedCar(walk);
-    object.screened = 0.1;
-    object.elusive = now;
-    object.last_view = walk.T_WC;
+    Track object = biasedCar(walk);
+    object.unmapped_occluder = 0.1;
+    object.hard_to_detect = now;
+    object.predicted_from = walk.T_WC;
     ViewWalk moved = walk;
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
-    EXPECT_NEAR(object.elusive, now, 1e-12);
+    EXPECT_NEAR(object.hard_to_detect, now, 1e-12);
     moved.T_WC.p += moved.T_WC.R() * Eigen::Vector3d(40.0, 0, 0);
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
-    EXPECT_NEAR(object.elusive, 0.05, 0.02);
+    EXPECT_NEAR(object.hard_to_detect, 0.05, 0.02);
     object.hypotheses[0].moving = true;
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
-    EXPECT_EQ(object.elusive, 0.0) << "what drives and is not found is lost";
+    EXPECT_EQ(object.hard_to_detect, 0.0) << "what drives and is not found is lost";
   }
 }
 
 /// A car's place and speed after many looks: what is known of its yaw hangs on both.
-Object drivingCar() {
+Track drivingCar() {
   Hypothesis h;
   h.class_name = "car";
   h.weight = 1.0;
@@ -146,14 +149,14 @@ Object drivingCar() {
   h.P(0, kYaw) = h.P(kYaw, 0) = 0.032;
   h.P(kYaw, kVelocity) = h.P(kVelocity, kYaw) = -0.037;
   h.C(kVelocity, 4) = 0.01;
-  Object object;
+  Track object;
   object.existence = {0.9, ExistenceEvidence::kPrior, object.as_of};
   object.hypotheses = {h};
   return object;
 }
 
 TEST(MovedOn, CarriesTheCovarianceWithItsCorrelationsAndThePoseErrorWithIt) {
-  const Object before = drivingCar();
+  const Track before = drivingCar();
   const auto& P = before.best().P;
   ASSERT_EQ(Eigen::LLT<Eigen::MatrixXd>(P).info(), Eigen::Success);
   MotionParameters still;
@@ -162,7 +165,7 @@ TEST(MovedOn, CarriesTheCovarianceWithItsCorrelationsAndThePoseErrorWithIt) {
   Eigen::MatrixXd F = Eigen::MatrixXd::Identity(P.rows(), P.cols());
   F.block<3, 3>(0, kVelocity).diagonal().setConstant(kDt);
 
-  const Object later = movedOn(before, before.as_of + std::chrono::milliseconds(500), still);
+  const Track later = extrapolated(before, before.as_of + std::chrono::milliseconds(500), still);
   EXPECT_NEAR(later.best().x[0], 24.0, 1e-12);
   EXPECT_LT((later.best().P - F * P * F.transpose()).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_NEAR(later.best().C(0, 4), 0.005, 1e-12);
@@ -177,22 +180,22 @@ TEST(MovedOn, CarriesTheCovarianceWithItsCorrelationsAndThePoseErrorWithIt) {
 }
 
 TEST(MovedOn, WhatStandsOnlyBecomesLessCertain) {
-  Object object = drivingCar();
+  Track object = drivingCar();
   object.hypotheses[0].moving = false;
-  const Object later = movedOn(object, object.as_of + std::chrono::seconds(1), {});
+  const Track later = extrapolated(object, object.as_of + std::chrono::seconds(1), {});
   EXPECT_EQ(later.best().x, object.best().x);
   EXPECT_GT(later.best().P(0, 0), object.best().P(0, 0));
 }
 
 TEST(OutOfSight, WhatIsSaidToStandStaysWhereItWasAndWhatDrivesDoesNot) {
   const auto left = [](double speed) {
-    Object object = drivingCar();
+    Track object = drivingCar();
     object.hypotheses[0].x[kVelocity] = speed;
     object.hypotheses[0].P.bottomRightCorner<3, 3>().diagonal().setConstant(0.16);
-    letSlowOnesStand(object, 0.7);
+    stopSlowHypotheses(object, 0.7);
     return object;
   };
-  const Object slow = left(0.5);
+  const Track slow = left(0.5);
   ASSERT_EQ(slow.hypotheses.size(), 2u);
   EXPECT_FALSE(slow.best().moving);
   const double fast = fasterThan(slow.hypotheses[1], 0.7);
@@ -200,10 +203,10 @@ TEST(OutOfSight, WhatIsSaidToStandStaysWhereItWasAndWhatDrivesDoesNot) {
   EXPECT_NEAR(slow.hypotheses[1].weight, fast, 1e-12);
   // Its place is that of a thing at rest: nearer goes with slower.
   EXPECT_NEAR(slow.best().x[0], 20.0 + 0.03 / 0.16 * 0.5, 1e-9);
-  const Object later = movedOn(slow, slow.as_of + std::chrono::seconds(30), {});
+  const Track later = extrapolated(slow, slow.as_of + std::chrono::seconds(30), {});
   EXPECT_EQ(later.best().x, slow.best().x);
 
-  const Object driving = left(8.0);
+  const Track driving = left(8.0);
   ASSERT_EQ(driving.hypotheses.size(), 1u);
   EXPECT_TRUE(driving.best().moving);
   EXPECT_EQ(driving.best().x, drivingCar().best().x);

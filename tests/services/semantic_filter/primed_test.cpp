@@ -1,14 +1,13 @@
 // Primed answers: what they may do to an object, and what they may not.
-#include "services/semantic_filter/core/association/top_down.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "services/semantic_filter/core/visibility/predicted_box.h"
+#include "services/semantic_filter/core/association/top_down.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "services/semantic_filter/core/update/track_update.h"
+#include "services/semantic_filter/core/visibility/predicted_box.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -28,8 +27,8 @@ class Primed : public ::testing::Test {
     frame.priors = &priors;
     frame.parameters = &parameters;
   }
-  Object object(double existence) const {
-    Object o;
+  Track object(double existence) const {
+    Track o;
     o.id = 1;
     o.existence = {existence, ExistenceEvidence::kPrior, o.as_of};
     Hypothesis h;
@@ -42,11 +41,11 @@ class Primed : public ::testing::Test {
     return o;
   }
   /// A look that reported no box; `nats` of the primed answer, if there was one.
-  void lookWithoutBox(Object& o, std::optional<double> nats) const {
-    Sight sight;
-    sight.fraction = 1.0;
-    ObjectLook seen = look(o, sight, {}, frame);
-    if (nats) hearPrimed(seen, o, std::vector<double>(model.classes.size(), *nats), frame);
+  void lookWithoutBox(Track& o, std::optional<double> nats) const {
+    TrackVisibility visibility;
+    visibility.fraction = 1.0;
+    TrackScore seen = scoreTrack(o, visibility, {}, frame);
+    if (nats) applyTopDown(seen, o, std::vector<double>(model.classes.size(), *nats), frame);
     update(o, seen, Eigen::VectorXd(0), {}, frame);
   }
 
@@ -58,26 +57,26 @@ class Primed : public ::testing::Test {
 };
 
 TEST_F(Primed, EvidenceOfNoughtIsAPlainMiss) {
-  Object plain = object(0.9), asked = object(0.9);
+  Track plain = object(0.9), asked = object(0.9);
   lookWithoutBox(plain, {});
   lookWithoutBox(asked, 0.0);
   EXPECT_NEAR(plain.existence, asked.existence, 1e-12);
 }
 
 TEST_F(Primed, FollowsTheLikelihoodOfTheMissAndTheAnswerTogether) {
-  Object o = object(0.9);
-  o.seen_existence = 0.99;
-  Sight sight;
-  sight.fraction = 1.0;
-  const double D = look(o, sight, {}, frame).hypotheses[0].detection;
+  Track o = object(0.9);
+  o.existence_when_detected = 0.99;
+  TrackVisibility visibility;
+  visibility.fraction = 1.0;
+  const double D = scoreTrack(o, visibility, {}, frame).hypotheses[0].detection_probability;
   lookWithoutBox(o, std::log(3.0));
   const double A = (1.0 - D) * 3.0;  // v = 1: (1 - P_D) rho
   EXPECT_NEAR(o.existence, 0.9 * A / (0.1 + 0.9 * A), 1e-9);
 }
 
 TEST_F(Primed, AGhostDiesSoonerThanOfItsMissesAlone) {
-  Object plain = object(0.95), asked = object(0.95);
-  plain.screened = asked.screened = 0.2;
+  Track plain = object(0.95), asked = object(0.95);
+  plain.unmapped_occluder = asked.unmapped_occluder = 0.2;
   for (int i = 0; i < 4; ++i) {
     lookWithoutBox(plain, {});
     lookWithoutBox(asked, -0.3);
@@ -86,29 +85,29 @@ TEST_F(Primed, AGhostDiesSoonerThanOfItsMissesAlone) {
 }
 
 TEST_F(Primed, NeverRaisesExistenceOverWhatTheLastHitLeft) {
-  Object o = object(0.7);
+  Track o = object(0.7);
   for (int i = 0; i < 30; ++i) lookWithoutBox(o, 5.0);
   EXPECT_NEAR(o.existence, 0.7, 1e-9) << "it was never seen by itself";
   o = object(0.7);
-  o.seen_existence = 0.8;
+  o.existence_when_detected = 0.8;
   for (int i = 0; i < 30; ++i) lookWithoutBox(o, 5.0);
   EXPECT_LE(o.existence, 0.8 + 1e-9);
   EXPECT_GT(o.existence, 0.7) << "it gives back what misses took";
 }
 
 TEST_F(Primed, IsNoHitConfirmsNothingAndMovesNothing) {
-  Object o = object(0.94);
-  o.seen_existence = 0.98;
+  Track o = object(0.94);
+  o.existence_when_detected = 0.98;
   const Hypothesis before = o.best();
-  std::vector<Object> all;
+  std::vector<Track> all;
   for (int i = 0; i < 20; ++i) lookWithoutBox(o, 5.0);
-  EXPECT_GT(o.existence, parameters.tend.confirm);
+  EXPECT_GT(o.existence, parameters.tracks.confirm);
   EXPECT_EQ(o.hits, 0U);
   EXPECT_EQ(o.visible_misses, 20U);
   EXPECT_TRUE(o.best().x == before.x);
   EXPECT_TRUE(o.best().P == before.P);
   all.push_back(o);
-  confirmAndBury(all, frame);
+  confirmAndDelete(all, frame);
   ASSERT_EQ(all.size(), 1U);
   EXPECT_FALSE(all[0].confirmed);
 }
@@ -124,7 +123,7 @@ TEST_F(Primed, WhatIsExpectedIsFitToBeSentWhereverTheThingIs) {
   ComingFrame coming{frame.view, 0.1};
   int sent = 0;
   for (int i = 0; i < 5000; ++i) {
-    Object o = object(0.9);
+    Track o = object(0.9);
     o.hypotheses[0].x.head<3>() << 3.0 * u(random), 3.0 * u(random), 1.2 + u(random);
     coming.view.T_WB.p.x() = u(random);
     const auto prediction = predictionOf(o, now, coming);
@@ -139,7 +138,7 @@ TEST_F(Primed, WhatIsExpectedIsFitToBeSentWhereverTheThingIs) {
 }
 
 TEST_F(Primed, OfAClassThatTheModelDoesNotKnowSaysNothing) {
-  Object plain = object(0.9), asked = object(0.9);
+  Track plain = object(0.9), asked = object(0.9);
   plain.hypotheses[0].class_name = asked.hypotheses[0].class_name = "zeppelin";
   lookWithoutBox(plain, {});
   lookWithoutBox(asked, 5.0);
@@ -150,12 +149,12 @@ TEST_F(Primed, AnswersOfAWrongLengthOrNotANumberAreRefused) {
   Detection d;
   d.primed = true;
   d.activations = {0.0F, 1.0F};
-  EXPECT_FALSE(primedRatios(d, model, parameters.clutter));
+  EXPECT_FALSE(topDownRatios(d, model, parameters.clutter));
   d.activations.assign(model.classes.size() + 1, NAN);
-  EXPECT_FALSE(primedRatios(d, model, parameters.clutter));
+  EXPECT_FALSE(topDownRatios(d, model, parameters.clutter));
   d.activations.assign(model.classes.size() + 1, 99.0F);
   d.activations[0] = 0.0F;
-  const auto ratios = primedRatios(d, model, parameters.clutter);
+  const auto ratios = topDownRatios(d, model, parameters.clutter);
   ASSERT_TRUE(ratios);
   EXPECT_LE(ratios->front(), parameters.clutter.max_log_ratio);
 }

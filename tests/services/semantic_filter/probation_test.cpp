@@ -72,7 +72,7 @@ struct Watch : Harness {
   /// Existence of what is confirmed, by id.
   std::map<ObjectId, double> confirmed() const {
     std::map<ObjectId, double> all;
-    for (const Object& o : node.belief().objects) {
+    for (const Track& o : node.belief().tracks) {
       if (o.confirmed) all[o.id] = o.existence;
     }
     return all;
@@ -113,17 +113,16 @@ TEST(Probation, BoxesElsewhereAreKeptBackAndNothingIsBornOfThem) {
   w.frames(12, elsewhere, kNew);
   w.node.onSwap(notice(SwapStep::kRolledBack, kNew, 0));  // it gave up by itself
   EXPECT_EQ(w.confirmed().size(), 3U);
-  EXPECT_EQ(w.node.belief().objects.size(), 3U);
+  EXPECT_EQ(w.node.belief().tracks.size(), 3U);
 }
 
 TEST(Probation, WhatIsGoneIsBelievedGoneWhenTheNewcomerHasPassed) {
   Watch w, plain(false);
   w.frames(12, {}, kNew), plain.frames(12, {}, kNew);
   w.node.onSwap(notice(SwapStep::kPassed, kNew, kOld));
-  ASSERT_EQ(w.node.belief().objects.size(), plain.node.belief().objects.size());
-  for (std::size_t i = 0; i < w.node.belief().objects.size(); ++i) {
-    EXPECT_DOUBLE_EQ(w.node.belief().objects[i].existence,
-                     plain.node.belief().objects[i].existence);
+  ASSERT_EQ(w.node.belief().tracks.size(), plain.node.belief().tracks.size());
+  for (std::size_t i = 0; i < w.node.belief().tracks.size(); ++i) {
+    EXPECT_DOUBLE_EQ(w.node.belief().tracks[i].existence, plain.node.belief().tracks[i].existence);
   }
   EXPECT_EQ(w.node.reasons().of("detections_rolled_back"), 0U);
 }
@@ -143,7 +142,7 @@ TEST(Probation, WhoSeesTheOthersIsBelievedAboutTheOneThatIsMissing) {
   const std::vector<TrueObject> rest(kStreet.begin() + 1, kStreet.end());
   w.frames(10, rest, kNew), plain.frames(10, rest, kNew);
   EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), 0U);
-  ASSERT_EQ(w.node.belief().objects.size(), plain.node.belief().objects.size());
+  ASSERT_EQ(w.node.belief().tracks.size(), plain.node.belief().tracks.size());
   EXPECT_LT(w.confirmed().begin()->second, kDoubtful);
 }
 

@@ -75,7 +75,7 @@ TEST(Scenario, PositionsAreAsUncertainAsTheirCovarianceSays) {
   // quantile of χ², in a band that 600 draws have, and their mean may not be larger than its own. A
   // mean has no lower band here: one car of 600 that is wrong altogether makes up for the others.
   Config config;
-  config.filter.looks.correlation = 0.0;
+  config.filter.tempering.correlation = 0.0;
   config.filter.box.bias_share = 0.0;
   config.filter.box.part = 0.0;
   std::mt19937 random(21);

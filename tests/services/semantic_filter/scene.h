@@ -89,8 +89,8 @@ std::optional<Detection> detect(const TrueObject& object, const View& view,
 }
 
 /// Seen four times and certain in each of its seven numbers alike.
-inline Object makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
-  Object o;
+inline Track makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
+  Track o;
   o.id = id;
   o.existence = {0.9, ExistenceEvidence::kPrior, o.as_of};
   o.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));

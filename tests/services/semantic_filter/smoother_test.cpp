@@ -1,4 +1,9 @@
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/ground_surface.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
@@ -6,9 +11,6 @@
 #include "services/semantic_filter/core/smoothing/map_fit.h"
 #include "services/semantic_filter/core/smoothing/refit.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
-#include <algorithm>
-#include <cmath>
-#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -25,7 +27,7 @@ class Passing {
   explicit Passing(unsigned seed, double speed = 0.0, double pose_sigma = 0.0)
       : camera_(makeCamera()), random_(seed), priors_(makePriors()) {
     for (auto& c : priors_.classes) c.moving = 0.2, c.speed_sigma = 8.0, c.stands = 0.97;
-    parameters_.smooth.new_view = 0.01;
+    parameters_.smoothing.new_view = 0.01;
     truth_ = makeState(32.0, 5.0, 0.8, 0.15, 4.3, 1.8, 1.45);
     truth_[kVelocity] = speed;
     shift_ = Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_)) * pose_sigma;
@@ -79,9 +81,9 @@ class Passing {
                              0.5 * std::sqrt(keyframe.z.lasting[i]) * bias_[i];
       EXPECT_GT(size, 0.0);
     }
-    keyframe.from = std::make_shared<const KeyView>(View{&camera_, believed, seen.up_W}, error_,
-                                                    fromNanoseconds(std::int64_t{200'000'000} * k),
-                                                    std::make_shared<const BoxStyles>());
+    keyframe.from = std::make_shared<const FrameView>(
+        View{&camera_, believed, seen.up_W}, error_, fromNanoseconds(std::int64_t{200'000'000} * k),
+        std::make_shared<const BoxStyles>());
     keyframes_.push_back(std::make_shared<const Keyframe>(keyframe));
     if (k == 17) truth_.head<3>() += t * truth_.tail<3>();
   }
@@ -100,12 +102,12 @@ class Passing {
 
 /// The same looks, their boxes' noise `factor` times as it was, at a time when the errors of their
 /// network were taken for `then`.
-Keyframes lookedAs(const Keyframes& looks, double factor, const BoxErrors& then) {
+Keyframes lookedAs(const Keyframes& looks, double factor, const NoiseScale& then) {
   Keyframes result;
   for (const auto& look : looks) {
     Keyframe k = *look;
-    const KeyView& v = *look->from;
-    k.from = std::make_shared<const KeyView>(v.view, v.error, v.time, v.styles, then);
+    const FrameView& v = *look->from;
+    k.from = std::make_shared<const FrameView>(v.view, v.error, v.time, v.styles, then);
     k.z.variance *= factor;
     k.z.lasting *= std::sqrt(factor);
     result.push_back(std::make_shared<const Keyframe>(k));
@@ -113,7 +115,7 @@ Keyframes lookedAs(const Keyframes& looks, double factor, const BoxErrors& then)
   return result;
 }
 
-Eigen::Vector3d placeError(const Smoothed& s, const Passing& scene) {
+Eigen::Vector3d placeError(const MapFit& s, const Passing& scene) {
   return (s.hypothesis().x - scene.truth()).head<3>();
 }
 
@@ -121,8 +123,8 @@ TEST(Smoother, FindsThePlaceFromMetresAway) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Passing scene(seed);
     const FrameContext frame = scene.frame();
-    const Looks looks(scene.keyframes(), frame.pose_error);
-    const auto s = Smoothed::make(scene.start(false), looks, frame);
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), looks, frame);
     ASSERT_TRUE(s) << seed;
     EXPECT_LT(placeError(*s, scene).norm(), 0.7) << seed;
     EXPECT_LT(s->contradicted(), 0.1) << seed;
@@ -132,14 +134,14 @@ TEST(Smoother, FindsThePlaceFromMetresAway) {
 TEST(Smoother, OldLooksCountAsTheirNetworkIsKnownNow) {
   const Passing scene(3);
   FrameContext frame = scene.frame();
-  frame.errors = {17, 0.25};
+  frame.noise_scale = {17, 0.25};
   const Keyframes early = lookedAs(scene.keyframes(), 1.0, {17, 1.0});
   const Keyframes late = lookedAs(scene.keyframes(), 0.25, {17, 0.25});
   const Keyframes other = lookedAs(scene.keyframes(), 1.0, {18, 1.0});
   std::vector<Hypothesis> fits;
   for (const Keyframes* looks : {&early, &late, &other}) {
-    const Looks all(*looks, frame.pose_error);
-    const auto s = Smoothed::make(scene.start(false), all, frame);
+    const KeyframeBatch all(*looks, frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), all, frame);
     ASSERT_TRUE(s);
     fits.push_back(s->hypothesis());
   }
@@ -153,11 +155,11 @@ TEST(Smoother, LeavesOverWhatTheBoxesErrMoreThanAssumed) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Passing scene(seed);
     const FrameContext frame = scene.frame();
-    const Looks looks(scene.keyframes(), frame.pose_error);
-    const auto s = Smoothed::make(scene.start(false), looks, frame);
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), looks, frame);
     ASSERT_TRUE(s) << seed;
-    left += s->leftover().count * s->leftover().ratio;
-    sides += s->leftover().count;
+    left += s->residualRatio().count * s->residualRatio().ratio;
+    sides += s->residualRatio().count;
   }
   EXPECT_NEAR(left / sides, 1.0, 0.15);
 }
@@ -166,16 +168,16 @@ TEST(Smoother, KnowsNoPlaceBetterThanThePosesThatItWasSeenFrom) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Passing scene(seed, 0.0, 0.3);
     const FrameContext frame = scene.frame();
-    const Looks looks(scene.keyframes(), frame.pose_error);
-    const auto mode = Smoothed::make(scene.start(false), looks, frame);
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto mode = MapFit::make(scene.start(false), looks, frame);
     ASSERT_TRUE(mode) << seed;
-    EXPECT_TRUE(hangsTogether(mode->hypothesis(), frame.pose_error.covariance)) << seed;
+    EXPECT_TRUE(isJointCovariance(mode->hypothesis(), frame.pose_error.covariance)) << seed;
     for (const double turn : {-0.8, 0.8, M_PI / 2}) {  // each begins with what the first one found
       Hypothesis start = mode->hypothesis();
       start.x[kYaw] += turn;
-      const auto other = Smoothed::make(start, looks, frame, &*mode);
+      const auto other = MapFit::make(start, looks, frame, &*mode);
       if (!other) continue;
-      EXPECT_TRUE(hangsTogether(other->hypothesis(), frame.pose_error.covariance)) << seed;
+      EXPECT_TRUE(isJointCovariance(other->hypothesis(), frame.pose_error.covariance)) << seed;
     }
   }
 }
@@ -186,8 +188,8 @@ TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     const Passing scene(seed, 0.0, 0.3);
     const FrameContext frame = scene.frame();
-    const Looks looks(scene.keyframes(), frame.pose_error);
-    const auto s = Smoothed::make(scene.start(false), looks, frame);
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), looks, frame);
     ASSERT_TRUE(s) << seed;
     const Eigen::Vector3d e = placeError(*s, scene);
     nees += e.dot(s->hypothesis().P.topLeftCorner<3, 3>().ldlt().solve(e)) / kRuns;
@@ -201,8 +203,8 @@ TEST(Smoother, SaysTruthfullyHowWellItKnowsThePlace) {
 TEST(Smoother, CorrelatesThePlaceWithThePresentPoseError) {
   const Passing scene(3, 0.0, 0.3);
   const FrameContext frame = scene.frame();
-  const Looks looks(scene.keyframes(), frame.pose_error);
-  const auto s = Smoothed::make(scene.start(false), looks, frame);
+  const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+  const auto s = MapFit::make(scene.start(false), looks, frame);
   ASSERT_TRUE(s);
   // All poses share one error: beside the body the place is known far better than in W.
   EXPECT_LT(placeSigma(s->hypothesis(), frame.pose_error.covariance),
@@ -215,10 +217,10 @@ TEST(Smoother, OneBoxOfAnotherThingCountsLittle) {
   wrong.z.sides += Eigen::Vector4d(60, 5, 70, 8);
   scene.keyframes()[9] = std::make_shared<const Keyframe>(wrong);
   const FrameContext frame = scene.frame();
-  const Looks looks(scene.keyframes(), frame.pose_error);
-  const auto s = Smoothed::make(scene.start(false), looks, frame);
+  const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+  const auto s = MapFit::make(scene.start(false), looks, frame);
   ASSERT_TRUE(s);
-  EXPECT_GT(s->doubts()[9], 5.0);
+  EXPECT_GT(s->inflations()[9], 5.0);
   EXPECT_LT(placeError(*s, scene).norm(), 0.8);
 }
 
@@ -227,17 +229,17 @@ TEST(Smoother, TellsWhatMovesFromWhatStands) {
     for (const double speed : {0.0, 5.0}) {
       const Passing scene(seed, speed);
       const FrameContext frame = scene.frame();
-      const Looks looks(scene.keyframes(), frame.pose_error);
-      const auto still = Smoothed::make(scene.start(false), looks, frame);
-      const auto moving = Smoothed::make(scene.start(true), looks, frame);
+      const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+      const auto still = MapFit::make(scene.start(false), looks, frame);
+      const auto moving = MapFit::make(scene.start(true), looks, frame);
       ASSERT_TRUE(moving) << seed;
       if (speed > 0.0) {
         EXPECT_NEAR(moving->hypothesis().x[kVelocity], speed, 1.5) << seed;
         if (!still) continue;  // nothing that stands fits
       }
       ASSERT_TRUE(still) << seed;
-      const Eigen::VectorXd doubts = still->doubts().cwiseMin(moving->doubts());
-      const double odds = still->logEvidence(doubts) - moving->logEvidence(doubts);
+      const Eigen::VectorXd inflations = still->inflations().cwiseMin(moving->inflations());
+      const double odds = still->logEvidence(inflations) - moving->logEvidence(inflations);
       if (speed > 0.0) {
         EXPECT_LT(odds, -3.0) << seed;
       } else {
@@ -249,20 +251,20 @@ TEST(Smoother, TellsWhatMovesFromWhatStands) {
 
 TEST(Smoother, TakesNoPlaceThatTheLooksDoNotFix) {
   Passing scene(2);
-  scene.parameters().smooth.place = 1e-4;
+  scene.parameters().smoothing.place = 1e-4;
   const FrameContext frame = scene.frame();
-  const Looks looks(scene.keyframes(), frame.pose_error);
-  EXPECT_FALSE(Smoothed::make(scene.start(false), looks, frame));
+  const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+  EXPECT_FALSE(MapFit::make(scene.start(false), looks, frame));
 }
 
 /// One that took the wrong one of the starts of yaw, for which the boxes speak less.
-Object turnedBy(double angle, const Passing& scene) {
+Track turnedBy(double angle, const Passing& scene) {
   Hypothesis h = scene.start(false);
   h.x[kYaw] = wrapAngle(h.x[kYaw] + angle);
-  Object object;
+  Track object;
   object.hypotheses = {h};
   object.keyframes = scene.keyframes();
-  object.remembered = static_cast<std::uint32_t>(object.keyframes.size());
+  object.keyframes_seen = static_cast<std::uint32_t>(object.keyframes.size());
   return object;
 }
 
@@ -271,12 +273,12 @@ TEST(Smooth, SeeksTheYawThatTheFilterGaveUp) {
   constexpr int kRuns = 20;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     const Passing scene(seed);
-    Object object = turnedBy(M_PI / 2, scene);
-    smooth(object, scene.frame());
+    Track object = turnedBy(M_PI / 2, scene);
+    refit(object, scene.frame());
     const double error = std::remainder(object.best().x[kYaw] - scene.truth()[kYaw], M_PI);
     found += std::abs(error) < 0.2 ? 1 : 0;
     // It is not sought again before as many looks have come.
-    EXPECT_EQ(object.seek_modes_at, 2 * scene.keyframes().size());
+    EXPECT_EQ(object.mode_search_due, 2 * scene.keyframes().size());
   }
   EXPECT_GE(found, 17) << "of " << kRuns;
 }
@@ -284,14 +286,14 @@ TEST(Smooth, SeeksTheYawThatTheFilterGaveUp) {
 /// Whether anything of a car at rest moves after its smoothing, beside a ground at `height`.
 bool mayMoveOver(double height, const Passing& scene) {
   FrameContext frame = scene.frame();
-  Path path;
+  BodyPath path;
   for (double x = 0.0; x <= 24.0; x += 4.0) path.go({x, 0.0, 1.2});
   GroundParameters ground;
   ground.body_height_m = 1.2 - height;
-  frame.ground = std::make_shared<const Ground>(std::vector<Object>{}, path, Evenness{},
-                                                frame.view.up_W, *frame.priors, ground);
-  Object object = turnedBy(0.0, scene);
-  smooth(object, frame);
+  frame.ground = std::make_shared<const GroundSurface>(
+      std::vector<Track>{}, path, GroundRoughness{}, frame.view.up_W, *frame.priors, ground);
+  Track object = turnedBy(0.0, scene);
+  refit(object, frame);
   const auto& hs = object.hypotheses.read();
   return std::any_of(hs.begin(), hs.end(), [](const Hypothesis& h) { return h.moving; });
 }
@@ -306,12 +308,12 @@ TEST(Smooth, WhatStandsBelowTheGroundMayMoveInstead) {
 }
 
 /// What the looks at a car make of a thing of no known class that the network takes for a
-/// `resembles`.
-std::string classAfterAll(const Passing& scene, const std::string& resembles) {
-  Object object = turnedBy(0.0, scene);
+/// `lookalike_class`.
+std::string classAfterAll(const Passing& scene, const std::string& lookalike_class) {
+  Track object = turnedBy(0.0, scene);
   object.hypotheses.front().class_name = kOtherClass;
-  object.resembles = resembles;
-  smooth(object, scene.frame());
+  object.lookalike_class = lookalike_class;
+  refit(object, scene.frame());
   return object.best().class_name;
 }
 
@@ -329,7 +331,7 @@ TEST(Smooth, WhatIsOfNoKnownClassBecomesTheOneItResemblesWhereAllLooksAreOfIt) {
 
 TEST(Smooth, ModesThatTheLooksDoNotTellApartAreKeptAndPublishedAsOneWideGaussian) {
   const Passing scene(4);
-  Object object = turnedBy(0.0, scene);
+  Track object = turnedBy(0.0, scene);
   Hypothesis turned = object.hypotheses.front();
   object.hypotheses.front().weight = 0.6;
   turned.weight = 0.4;
@@ -348,8 +350,8 @@ Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimut
   Keyframes result;
   for (const auto& look : looks) {
     Keyframe k = *look;
-    const KeyView& v = *look->from;
-    k.from = std::make_shared<const KeyView>(v.view, v.error, v.time, styles, v.errors);
+    const FrameView& v = *look->from;
+    k.from = std::make_shared<const FrameView>(v.view, v.error, v.time, styles, v.noise_scale);
     k.z.sides = projectCuboid(truth, v.projector, styles->rest.shape, 1.0)->sides;
     if (with_azimuths) {
       k.azimuth = wrapAngle(yawFromAzimuth(0.0, truth.head<3>(), v.view) - truth[kYaw]);
@@ -359,24 +361,24 @@ Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimut
   return result;
 }
 
-TEST(Smoothed, BoxesOfWhatLeansAreExplainedIfAzimuthsSayWhereItFaces) {
+TEST(MapFit, BoxesOfWhatLeansAreExplainedIfAzimuthsSayWhereItFaces) {
   Passing scene(6);
   const auto left_over = [&](bool with_azimuths, double turned) {
     const Keyframes keyframes = ofLeaning(scene.keyframes(), scene.truth(), with_azimuths);
     FrameContext frame = scene.frame();
-    frame.key_view = keyframes.back()->from;
-    const Looks looks(keyframes, frame.pose_error);
+    frame.frame_view = keyframes.back()->from;
+    const KeyframeBatch looks(keyframes, frame.pose_error);
     Hypothesis start = scene.start(false);
     start.x[kYaw] = wrapAngle(start.x[kYaw] + turned);
-    const auto fit = Smoothed::make(start, looks, frame);
-    return fit ? fit->leftover().ratio : 1e9;
+    const auto fit = MapFit::make(start, looks, frame);
+    return fit ? fit->residualRatio().ratio : 1e9;
   };
   const double told = left_over(true, 0.0);
   EXPECT_NEAR(left_over(true, M_PI), told, 1e-3 * told) << "it began the other way round";
   EXPECT_GT(left_over(false, 0.0), 1.5 * told);
 }
 
-TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
+TEST(BatchProblem, WhetherACutSideCountsDoesNotChangeItsVolume) {
   Passing scene(6);
   const FrameContext frame = scene.frame();
   const auto volume = [&](double cut_at) {
@@ -386,15 +388,16 @@ TEST(BatchModel, WhetherACutSideCountsDoesNotChangeItsVolume) {
     cut.z.sides[2] = box->sides[2] + cut_at;
     Keyframes keyframes = scene.keyframes();
     keyframes[9] = std::make_shared<const Keyframe>(cut);
-    const Looks looks(keyframes, frame.pose_error);
-    const BatchModel model(looks, false, "car", scene.truth(), frame);
+    const KeyframeBatch looks(keyframes, frame.pose_error);
+    const BatchProblem model(looks, false, "car", scene.truth(), frame);
     const auto stack = model.linearise(scene.truth());
-    const Eigen::VectorXd doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
+    const Eigen::VectorXd inflations =
+        Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
     SideCovariance covariance;
     model.covariance(scene.truth(), *stack, covariance);
-    const Cholesky R(covariance.with(doubts));
+    const Cholesky R(covariance.with(inflations));
     EXPECT_EQ(stack->counts[9][2], cut_at > 0.0);
-    return std::pair(R.logDeterminant(), model.logVolumeOfCuts(*stack, doubts));
+    return std::pair(R.logDeterminant(), model.logVolumeOfCuts(*stack, inflations));
   };
   const auto beyond = volume(-1.0), inside = volume(1.0);
   EXPECT_GT(std::abs(beyond.first - inside.first), 10.0);
@@ -437,25 +440,25 @@ TEST(BoxStyles, AreThePriorsShapesWhereTheBoxesEncloseOutlines) {
 
 TEST(Keyframes, NewViewsAreRememberedAndTheMostAlikeForgotten) {
   const Passing scene(1);
-  SmoothParameters parameters;
+  SmoothingParameters parameters;
   parameters.keyframes = 6;
   parameters.new_view = 0.05;
   const ViewScales scales{0.3, 0.3, 0.3};
-  Object object;
+  Track object;
   Hypothesis h = scene.start(false);
   h.x = scene.truth();
   object.hypotheses = {h};
-  for (const auto& k : scene.keyframes()) remember(object, *k, scales, parameters);
+  for (const auto& k : scene.keyframes()) addKeyframe(object, *k, scales, parameters);
   ASSERT_EQ(object.keyframes.size(), 6U);
-  EXPECT_FALSE(remember(object, *scene.keyframes().back(), scales, parameters));
+  EXPECT_FALSE(addKeyframe(object, *scene.keyframes().back(), scales, parameters));
   EXPECT_TRUE(
       std::is_sorted(object.keyframes.begin(), object.keyframes.end(),
                      [](const auto& a, const auto& b) { return a->from->time < b->from->time; }));
   // They span the whole drive, not its end.
   EXPECT_LT(toSeconds(object.keyframes.front()->from->time), 1.5);
-  Object other = object;
+  Track other = object;
   other.keyframes = {scene.keyframes()[1], scene.keyframes()[2]};
-  joinKeyframes(object, other, scales, parameters);
+  mergeKeyframes(object, other, scales, parameters);
   EXPECT_LE(object.keyframes.size(), 6U);
 }
 

@@ -1,4 +1,9 @@
 
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/belief/track_message.h"
@@ -7,9 +12,6 @@
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
 #include "services/semantic_filter/core/tracks/reinitialise.h"
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -22,13 +24,13 @@ class Tending : public ::testing::Test, protected testing::UsualFrame {};
 
 TEST_F(Tending, WhatStandsStillWasWronglyPlacedNotMoving) {
   // Seen from far, the place along the ray and the speed along it are one error.
-  Object o = makeObject(1, "car", makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+  Track o = makeObject(1, "car", makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
   Hypothesis& h = o.hypotheses[0];
   h.moving = true;
   h.x[kVelocity] = 0.2;
   h.P.bottomRightCorner<3, 3>().diagonal() << 0.04, 0.01, 0.01;
   h.P(0, kVelocity) = h.P(kVelocity, 0) = 0.03;
-  tendHypotheses(o, priors, parameters);
+  reduceMixture(o, priors, parameters);
   ASSERT_FALSE(o.best().moving);
   EXPECT_NEAR(o.best().x[0], 20.0 - 0.03 / 0.04 * 0.2, 1e-9);
   EXPECT_NEAR(o.best().P(0, 0), 0.04 - 0.03 * 0.03 / 0.04, 1e-9);
@@ -36,26 +38,26 @@ TEST_F(Tending, WhatStandsStillWasWronglyPlacedNotMoving) {
 }
 
 TEST_F(Tending, WhatNoLongerHasTheSizeOfItsClassIsDropped) {
-  Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
+  Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
   Hypothesis half = o.hypotheses[0];
   half.x = makeState(5, 0, 0.4, 0, 2, 0.9, 0.75);
   o.hypotheses[0].weight = 0.4;
   half.weight = 0.6;
   o.hypotheses.push_back(half);
-  tendHypotheses(o, priors, parameters);
+  reduceMixture(o, priors, parameters);
   ASSERT_EQ(o.hypotheses.size(), 1u);
   EXPECT_NEAR(o.best().x[0], 10.0, 1e-9);
   EXPECT_NEAR(o.existence, 0.9 * 0.4, 1e-9);
 }
 
 TEST_F(Tending, ADominantClassEndsTheOthers) {
-  Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01);
+  Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01);
   Hypothesis van = o.best();
   van.class_name = "van";
   van.weight = 0.003;
   o.hypotheses.push_back(van);
   normalise(o, ClassEvidence::kPrior);
-  tendHypotheses(o, priors, parameters);
+  reduceMixture(o, priors, parameters);
   EXPECT_EQ(o.hypotheses.size(), 1u);
   EXPECT_EQ(classProbability(o, "car"), 1.0);
 }
@@ -67,7 +69,7 @@ TEST_F(Tending, BirthRecoversSizeAndPlaceFromAnExactBoxAtTheTrueYaw) {
   Detection d;
   d.box = {s[0], s[1], s[2], s[3]};
   d.activations = {0, 2, -2, -2, -2};
-  const auto e = *makeEvidence(d, model, camera.width(), camera.height(), parameters.box, {});
+  const auto e = *makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box, {});
   const auto fit = fitCuboid(e, priors.of("car"), 0.6, 0.05, std::nullopt, frame);
   ASSERT_TRUE(fit);
   EXPECT_LT((fit->hypothesis.x - truth).head<3>().norm(), 0.05);
@@ -85,16 +87,16 @@ TEST_F(Tending, WhatLostItsShapeBeginsAgainFromItsOwnBoxAsWhatItWas) {
   Detection d;
   d.box = {s[0], s[1], s[2], s[3]};
   d.activations = {0, 1.5F, -2, -2, 2};  // this once it looks more like a van
-  const auto e = *makeEvidence(d, model, camera.width(), camera.height(), parameters.box, {});
+  const auto e = *makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box, {});
 
-  Object o = makeObject(7, "car", makeState(7.0, 1.5, 0.9, 0.6, 2.1, 0.87, 0.75), 0.001);
+  Track o = makeObject(7, "car", makeState(7.0, 1.5, 0.9, 0.6, 2.1, 0.87, 0.75), 0.001);
   o.once_confirmed = true;
   o.hits = 40;
   const double existence = o.existence;
   const auto pmf = classShares(o);
-  tendHypotheses(o, priors, parameters);
+  reduceMixture(o, priors, parameters);
   ASSERT_TRUE(o.hypotheses.empty());
-  ASSERT_TRUE(bearAgain(o, pmf, e, std::nullopt, frame));
+  ASSERT_TRUE(reinitialise(o, pmf, e, std::nullopt, frame));
   EXPECT_EQ(o.id, 7u);
   EXPECT_EQ(o.hits, 40u);
   EXPECT_EQ(o.existence, existence);
@@ -105,7 +107,7 @@ TEST_F(Tending, WhatLostItsShapeBeginsAgainFromItsOwnBoxAsWhatItWas) {
 
   // Of what was of no known class the box says what it is.
   o.hypotheses.clear();
-  ASSERT_TRUE(bearAgain(o, {{kOtherClass, 1.0}}, e, std::nullopt, frame));
+  ASSERT_TRUE(reinitialise(o, {{kOtherClass, 1.0}}, e, std::nullopt, frame));
   EXPECT_GT(classProbability(o, "van"), classProbability(o, "car"));
 }
 
@@ -115,7 +117,7 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
   const Eigen::Vector3d sigma = priors.of("car").log_size_covariance.diagonal().cwiseSqrt();
   State x = makeState(14.0, 1.0, 0.75, 1.2, 4.2, 1.75, 1.5);
   x.segment<3>(kSize) << size[0] - 3.5 * sigma[0], size.tail<2>();
-  Object car = makeObject(3, "car", x, 0.05);
+  Track car = makeObject(3, "car", x, 0.05);
   car.existence = {0.99, ExistenceEvidence::kPrior, car.as_of};
   car.hits = 30;
   car.first_seen = car.last_seen = car.as_of = testing::stampOf(0).time;
@@ -128,23 +130,23 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
 
   const auto after = [&](bool claimed) {
     Belief belief{{car}, {}};
-    belief.objects[0].confirmed = belief.objects[0].once_confirmed = claimed;
+    belief.tracks[0].confirmed = belief.tracks[0].once_confirmed = claimed;
     FrameInput input;
     input.stamp = testing::stampOf(1);
     input.view = frame.view;
     input.model = model;
-    input.boxes = {{*makeEvidence(d, model, camera.width(), camera.height(), parameters.box,
-                                  parameters.clutter)}};
+    input.boxes = {{*makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box,
+                                      parameters.clutter)}};
     IdBook ids;
     ids.atLeast(10);
     const Belief before = belief;
     SemanticFilter(parameters, priors).step(before, belief, input, ids);
-    return belief.objects.at(0);
+    return belief.tracks.at(0);
   };
-  const Object guess = after(false);
+  const Track guess = after(false);
   ASSERT_EQ(guess.id, 3u);
   EXPECT_GT((guess.best().x - x).head<3>().norm(), 0.5) << "begins again from that box";
-  const Object o = after(true);
+  const Track o = after(true);
   ASSERT_EQ(o.id, 3u);
   EXPECT_LT((o.best().x - x).head<3>().norm(), 1e-3);
   EXPECT_LT(o.existence, 0.99);
@@ -155,14 +157,14 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
 TEST_F(Tending, WhatMayBeAtTwoPlacesIsNotClaimedAtEither) {
   // A large thing far off, or a small one near by: each of them well placed.
   const auto claimed = [&](double far_off, double weight) {
-    Object o = makeObject(1, "car", makeState(30, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    Track o = makeObject(1, "car", makeState(30, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
     o.existence = {0.97, ExistenceEvidence::kPrior, o.as_of};
     o.hypotheses.push_back(
         makeObject(1, kOtherClass, makeState(30 - far_off, 0, 1.0, 0, 2, 0.9, 0.8), 0.04).best());
     o.hypotheses[0].weight = 1.0 - weight;
     o.hypotheses[1].weight = weight;
-    std::vector<Object> objects{o};
-    confirmAndBury(objects, frame);
+    std::vector<Track> objects{o};
+    confirmAndDelete(objects, frame);
     return objects.at(0).confirmed;
   };
   EXPECT_TRUE(claimed(0.5, 0.4));
@@ -171,41 +173,41 @@ TEST_F(Tending, WhatMayBeAtTwoPlacesIsNotClaimedAtEither) {
 }
 
 TEST_F(Tending, WhatWasFoundOnAnotherVisitIsSurerThanWhatWasSeenOnce) {
-  Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
-  EXPECT_EQ(certainty(o, parameters.tend), parameters.tend.certain);
-  o.found_again = true;
-  EXPECT_EQ(certainty(o, parameters.tend), parameters.tend.certain_again);
-  EXPECT_GT(parameters.tend.certain_again, parameters.tend.certain);
+  Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
+  EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain);
+  o.detected_on_revisit = true;
+  EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain_again);
+  EXPECT_GT(parameters.tracks.certain_again, parameters.tracks.certain);
 }
 
 TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
-  Evidence e;
+  BoxDetection e;
   e.z.sides << 100, 100, 200, 200;
-  std::vector<SightPoint> points;
+  std::vector<LandmarkDepth> points;
   for (int i = 0; i < 30; ++i) {
     points.push_back({{140.0 + i % 6 * 4.0, 140.0 + i / 6 * 4.0}, 10.0, 0.2});
   }
   for (int i = 0; i < 12; ++i) points.push_back({{104.0, 104.0 + 8.0 * i}, 40.0, 0.2});
-  const auto hint = rangeFromLandmarks(e, points, parameters.birth);
+  const auto hint = rangeFromLandmarks(e, points, parameters.initiation);
   ASSERT_TRUE(hint);
   EXPECT_NEAR(hint->distance_m, 10.0, 0.6);
   points.resize(3);
-  EXPECT_FALSE(rangeFromLandmarks(e, points, parameters.birth));
+  EXPECT_FALSE(rangeFromLandmarks(e, points, parameters.initiation));
 }
 
 TEST_F(Tending, WhatWasSeenOnceAndIsOutOfSightIsForgottenAndWhatWasConfirmedIsKept) {
   const auto hiddenFor = [&](double seconds, std::uint32_t hits, bool confirmed) {
-    Object o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
     o.hits = hits;
     o.confirmed = o.once_confirmed = confirmed;
     o.visible_fraction = 0.0;
-    o.hidden.count = 5;
-    o.hidden.last = o.last_seen + Duration(static_cast<std::int64_t>(1e9 * seconds));
-    std::vector<Object> objects{o};
-    confirmAndBury(objects, frame);
+    o.occluded_frames.count = 5;
+    o.occluded_frames.last = o.last_seen + Duration(static_cast<std::int64_t>(1e9 * seconds));
+    std::vector<Track> objects{o};
+    confirmAndDelete(objects, frame);
     return objects.size();
   };
-  const double patience = parameters.tend.tentative_s;
+  const double patience = parameters.tracks.tentative_s;
   EXPECT_EQ(hiddenFor(patience + 1.0, 1, false), 0u);
   EXPECT_EQ(hiddenFor(patience - 1.0, 1, false), 1u);
   EXPECT_EQ(hiddenFor(patience + 1.0, 30, false), 1u) << "much is known of it";
@@ -215,8 +217,8 @@ TEST_F(Tending, WhatWasSeenOnceAndIsOutOfSightIsForgottenAndWhatWasConfirmedIsKe
 /// It begins from one yaw, and boxes of anything close at it.
 TEST(Published, TheYawOfWhatIsOfNoKnownClassIsUnknownUntilItsModesWereSought) {
   const auto sigmaYaw = [](const char* name, bool sought) {
-    Object object = makeObject(1, name, makeState(10, 0, 0.7, 0.3, 1, 1, 1), 0.004);
-    object.hypotheses[0].modes_sought = sought;
+    Track object = makeObject(1, name, makeState(10, 0, 0.7, 0.3, 1, 1, 1), 0.004);
+    object.hypotheses[0].modes_searched = sought;
     return std::sqrt(toBelief(object, 0.7).best().covariance(kYaw, kYaw));
   };
   const double any = M_PI / std::sqrt(12.0);
@@ -226,7 +228,7 @@ TEST(Published, TheYawOfWhatIsOfNoKnownClassIsUnknownUntilItsModesWereSought) {
 }
 
 TEST(Published, ACovarianceThatRoundingMadeIndefiniteIsMendedAndOthersAreLeftAlone) {
-  Object object = makeObject(1, "car", makeState(1, 2, 3, 0.1, 4, 1.8, 1.5), 0.04);
+  Track object = makeObject(1, "car", makeState(1, 2, 3, 0.1, 4, 1.8, 1.5), 0.04);
   Matrix7d P = object.hypotheses[0].P.topLeftCorner<7, 7>();
   EXPECT_EQ(toBelief(object, 0.7).best().covariance, P) << "to the bit";
   // Length and width are one number but for rounding, far finer than the place.

@@ -1,11 +1,13 @@
 
+#include <gtest/gtest.h>
+
+#include <cstring>
+
 #include "services/semantic_filter/core/association/joint_association.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "services/semantic_filter/core/update/ekf.h"
 #include "services/semantic_filter/core/update/track_update.h"
-#include <cstring>
-#include <gtest/gtest.h>
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -38,19 +40,19 @@ class Update : public ::testing::Test {
     h.P.diagonal().head<7>() << 0.3, 0.3, 0.02, 0.03, 0.01, 0.01, 0.01;
     return h;
   }
-  Evidence evidenceOf(const State& x, float shift = 0.0F) const {
+  BoxDetection evidenceOf(const State& x, float shift = 0.0F) const {
     const auto s = projectCuboid(x, frame.view)->sides;
     Detection d;
     d.box = {s[0], s[1], s[2], s[3]};
     for (const float a : {0.0F, 1.5F, -2.0F, -1.0F, 0.5F}) d.activations.push_back(a + shift);
-    return *makeEvidence(d, model, camera.width(), camera.height(), parameters.box,
-                         parameters.clutter);
+    return *makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box,
+                             parameters.clutter);
   }
-  ObjectLook lookAt(const std::vector<Evidence>& boxes, double v) const {
-    Sight sight;
-    sight.fraction = v;
-    sight.visibility = v > 0 ? Visibility::kVisible : Visibility::kOccluded;
-    return look(object, sight, boxes, frame);
+  TrackScore scoreHypothesis(const std::vector<BoxDetection>& boxes, double v) const {
+    TrackVisibility visibility;
+    visibility.fraction = v;
+    visibility.state = v > 0 ? Visibility::kVisible : Visibility::kOccluded;
+    return scoreTrack(object, visibility, boxes, frame);
   }
 
   CameraModel camera{makeCamera()};
@@ -58,15 +60,15 @@ class Update : public ::testing::Test {
   ClassPriors priors = makePriors();
   Parameters parameters;
   FrameContext frame;
-  Object object;
+  Track object;
 };
 
-bool sameBits(const Object& a, const Object& b) {
+bool sameBits(const Track& a, const Track& b) {
   if (a.hypotheses.size() != b.hypotheses.size()) return false;
   const double r_a = a.existence, r_b = b.existence;
   if (std::memcmp(&r_a, &r_b, sizeof(double)) != 0) return false;
-  if (std::memcmp(&a.screened, &b.screened, sizeof(double)) != 0) return false;
-  if (std::memcmp(&a.elusive, &b.elusive, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.unmapped_occluder, &b.unmapped_occluder, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.hard_to_detect, &b.hard_to_detect, sizeof(double)) != 0) return false;
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
     if (std::memcmp(&x.weight, &y.weight, sizeof(double)) != 0) return false;
@@ -79,17 +81,17 @@ bool sameBits(const Object& a, const Object& b) {
 }
 
 TEST_F(Update, AtVisibilityZeroTheBeliefKeepsEveryBit) {
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
-  const Object before = object;
-  update(object, lookAt(boxes, 0.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const Track before = object;
+  update(object, scoreHypothesis(boxes, 0.0), Eigen::VectorXd::Ones(1), boxes, frame);
   EXPECT_TRUE(sameBits(before, object));
-  update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
   EXPECT_FALSE(sameBits(before, object));
 }
 
 TEST_F(Update, TwoClassesFollowEquationFourByHand) {
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
-  const ObjectLook l = lookAt(boxes, 0.8);
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const TrackScore l = scoreHypothesis(boxes, 0.8);
   const double eta = 0.4;
   double A[2];
   for (int k = 0; k < 2; ++k) {
@@ -106,19 +108,19 @@ TEST_F(Update, TwoClassesFollowEquationFourByHand) {
     ASSERT_TRUE(score);
     const double g = k == 0 ? 1.5 : 0.5;
     const double L = std::exp(g + score->log_density - boxes[0].log_clutter);
-    EXPECT_NEAR(h.fits[0].likelihood / L, 1.0, 1e-9);
+    EXPECT_NEAR(h.matches[0].likelihood / L, 1.0, 1e-9);
     A[k] = 1.0 - 0.8 * P_D + 0.8 * P_D * eta * L;
   }
   const double mean = 0.7 * A[0] + 0.3 * A[1];
   update(object, l, Eigen::VectorXd::Constant(1, eta), boxes, frame);
   EXPECT_NEAR(classProbability(object, "car"), 0.7 * A[0] / mean, 1e-9);
   const double odds = 0.6 / 0.4 * mean;
-  EXPECT_NEAR(object.existence, std::min(odds / (1.0 + odds), parameters.tend.certain), 1e-12);
+  EXPECT_NEAR(object.existence, std::min(odds / (1.0 + odds), parameters.tracks.certain), 1e-12);
 }
 
 TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
-  const ObjectLook l = lookAt({}, 1.0);
-  const double P_D[2] = {l.hypotheses[0].detection, l.hypotheses[1].detection};
+  const TrackScore l = scoreHypothesis({}, 1.0);
+  const double P_D[2] = {l.hypotheses[0].detection_probability, l.hypotheses[1].detection_probability};
   const double mean = 0.7 * (1 - P_D[0]) + 0.3 * (1 - P_D[1]);
   const State before = object.best().x;
   update(object, l, Eigen::VectorXd(0), {}, frame);
@@ -128,42 +130,44 @@ TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
 
 TEST_F(Update, MissesFromOnePlaceSayAtMostThatItIsScreened) {
   object.existence = {0.99, ExistenceEvidence::kPrior, object.as_of};
-  object.screened = 0.25;
-  for (int k = 0; k < 100; ++k) update(object, lookAt({}, 1.0), Eigen::VectorXd(0), {}, frame);
-  EXPECT_GT(object.screened, 0.99);
+  object.unmapped_occluder = 0.25;
+  for (int k = 0; k < 100; ++k)
+    update(object, scoreHypothesis({}, 1.0), Eigen::VectorXd(0), {}, frame);
+  EXPECT_GT(object.unmapped_occluder, 0.99);
   const double odds = object.existence / (1.0 - object.existence);
-  EXPECT_NEAR(odds, 0.25 * 99.0, 0.3);  // all that is left is what was screened to begin with
+  EXPECT_NEAR(odds, 0.25 * 99.0,
+              0.3);  // all that is left is what was unmapped_occluder to begin with
 }
 
 TEST_F(Update, ASightOfItSaysThatItIsNotScreened) {
-  object.screened = 0.25;
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
-  update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
-  EXPECT_LT(object.screened, 0.01);
+  object.unmapped_occluder = 0.25;
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
+  update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_LT(object.unmapped_occluder, 0.01);
 }
 
 /// Found in one look of five: by the tenth look that is known.
 TEST_F(Update, WhatIsSeldomFoundFromHereIsElusiveAndStaysBelieved) {
-  const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
-  parameters.visibility.elusive_found = 0.3;
-  Object plain = object, asked = object;
-  asked.elusive = 0.1;
+  const std::vector<BoxDetection> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
+  parameters.visibility.hard_detection_share = 0.3;
+  Track plain = object, asked = object;
+  asked.hard_to_detect = 0.1;
   asked.existence = plain.existence = {0.99, ExistenceEvidence::kPrior, object.as_of};
   double least = 1.0, least_plain = 1.0;
   for (int i = 0; i < 60; ++i) {
     const auto& boxes = i % 5 == 0 ? box : nothing;
     const Eigen::VectorXd eta = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(boxes.size()));
     std::swap(object, asked);
-    update(object, lookAt(boxes, 1.0), eta, boxes, frame);
+    update(object, scoreHypothesis(boxes, 1.0), eta, boxes, frame);
     std::swap(object, asked);
     std::swap(object, plain);
-    update(object, lookAt(boxes, 1.0), eta, boxes, frame);
+    update(object, scoreHypothesis(boxes, 1.0), eta, boxes, frame);
     std::swap(object, plain);
     if (i < 10) continue;
     least = std::min<double>(least, asked.existence);
     least_plain = std::min<double>(least_plain, plain.existence);
   }
-  EXPECT_GT(asked.elusive, 0.9);
+  EXPECT_GT(asked.hard_to_detect, 0.9);
   EXPECT_GT(least, 0.5);
   EXPECT_LT(least_plain, 0.2);
 }
@@ -175,14 +179,15 @@ TEST_F(Update, AModeThatAllLooksHaveWeighedStaysUntilTheyAreAskedAgain) {
   turned.weight = 0.05;
   object.hypotheses = {object.hypotheses[0], turned};
   object.hypotheses[0].weight = 0.95;
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
   const auto turnedAfter = [&](bool sought) {
-    Object one = object;
-    for (auto& h : one.hypotheses) h.modes_sought = sought;
+    Track one = object;
+    for (auto& h : one.hypotheses) h.modes_searched = sought;
     std::swap(object, one);
-    ObjectLook l = lookAt(boxes, 1.0);
-    const double A = 1.0 + l.hypotheses[0].detection * (l.hypotheses[0].fits[0].likelihood - 1.0);
-    l.hypotheses[1].fits[0].likelihood = 0.1 * l.hypotheses[0].fits[0].likelihood;
+    TrackScore l = scoreHypothesis(boxes, 1.0);
+    const double A =
+        1.0 + l.hypotheses[0].detection_probability * (l.hypotheses[0].matches[0].likelihood - 1.0);
+    l.hypotheses[1].matches[0].likelihood = 0.1 * l.hypotheses[0].matches[0].likelihood;
     EXPECT_GT(A, 10.0);
     for (int i = 0; i < 3; ++i) {
       update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
@@ -193,35 +198,35 @@ TEST_F(Update, AModeThatAllLooksHaveWeighedStaysUntilTheyAreAskedAgain) {
     for (const auto& h : one.hypotheses) off += h.x[kYaw] > 1.0 ? h.weight : 0.0;
     return off;
   };
-  const double least = parameters.smooth.least_weight;
+  const double least = parameters.smoothing.least_weight;
   EXPECT_LT(turnedAfter(false), 1e-3);
   EXPECT_NEAR(turnedAfter(true), least, 0.1 * least);
 }
 
 TEST_F(Update, ALookWeighsHowOftenItIsFoundFromHere) {
-  parameters.visibility.elusive_found = 0.3;
+  parameters.visibility.hard_detection_share = 0.3;
   object.hypotheses.resize(1);
   object.hypotheses[0].weight = 1.0;
-  object.screened = 0.2;
-  object.elusive = 0.1;
-  const ObjectLook l = lookAt({}, 1.0);
-  const double P_D = l.hypotheses[0].detection / (0.7 + 0.3 * 0.1);
+  object.unmapped_occluder = 0.2;
+  object.hard_to_detect = 0.1;
+  const TrackScore l = scoreHypothesis({}, 1.0);
+  const double P_D = l.hypotheses[0].detection_probability / (0.7 + 0.3 * 0.1);
   const double A = 0.2 + 0.1 * (1.0 - 0.3 * P_D) + 0.7 * (1.0 - P_D);
-  EXPECT_NEAR(l.hypotheses[0].silent, A, 1e-12);
+  EXPECT_NEAR(l.hypotheses[0].no_box, A, 1e-12);
   update(object, l, Eigen::VectorXd(0), {}, frame);
-  EXPECT_NEAR(object.screened, 0.2 / A, 1e-12);
-  EXPECT_NEAR(object.elusive, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
+  EXPECT_NEAR(object.unmapped_occluder, 0.2 / A, 1e-12);
+  EXPECT_NEAR(object.hard_to_detect, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
 }
 
 /// One look in five does not show it, from a place where the camera stands.
 TEST_F(Update, ALookWhoseBoxIsRefusedIsAMiss) {
-  const std::vector<Evidence> boxes{evidenceOf(object.best().x)};
-  const ObjectLook seen = lookAt(boxes, 0.9);
-  Object hit = object, miss = object;
+  const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
+  const TrackScore seen = scoreHypothesis(boxes, 0.9);
+  Track hit = object, miss = object;
   update(hit, seen, Eigen::VectorXd::Ones(1), boxes, frame);
   ASSERT_EQ(hit.hits, object.hits + 1);
-  update(miss, lookAt({}, 0.9), Eigen::VectorXd(), {}, frame);
-  const Object refused = missed(object, seen, frame);
+  update(miss, scoreHypothesis({}, 0.9), Eigen::VectorXd(), {}, frame);
+  const Track refused = updateAsMissed(object, seen, frame);
   EXPECT_EQ(refused.existence, miss.existence);
   EXPECT_LT(refused.existence, object.existence);
   EXPECT_EQ(refused.hits, object.hits);
@@ -231,25 +236,25 @@ TEST_F(Update, ALookWhoseBoxIsRefusedIsAMiss) {
 }
 
 TEST_F(Update, WhatIsFoundAgainFromOnePlaceWasMissedByTheNetwork) {
-  const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
+  const std::vector<BoxDetection> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
   for (int i = 0; i < 100; ++i) {
     const auto& boxes = i % 5 == 4 ? nothing : box;
-    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+    update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
   }
   EXPECT_GT(object.existence, 0.9);
   EXPECT_GT(classProbability(object, "car"), 0.6);
 }
 
 TEST_F(Update, WhatIsNoLongerFoundFromWhereItWasFoundIsMissingAtOnce) {
-  const std::vector<Evidence> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
+  const std::vector<BoxDetection> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
   for (int i = 0; i < 30; ++i) {
-    update(object, lookAt(box, 1.0), Eigen::VectorXd::Ones(1), box, frame);
+    update(object, scoreHypothesis(box, 1.0), Eigen::VectorXd::Ones(1), box, frame);
   }
   ASSERT_GT(object.existence, 0.9);
-  object.screened = 0.0;  // nothing can be in the way
+  object.unmapped_occluder = 0.0;  // nothing can be in the way
   for (int i = 0; i < 4; ++i) {
-    update(object, lookAt(nothing, 1.0), Eigen::VectorXd::Ones(0), nothing, frame);
-    object.screened = 0.0;
+    update(object, scoreHypothesis(nothing, 1.0), Eigen::VectorXd::Ones(0), nothing, frame);
+    object.unmapped_occluder = 0.0;
   }
   EXPECT_LT(object.existence, 0.2);
 }
@@ -260,12 +265,12 @@ TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
   astray.x[1] += 0.8;
   object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
   object.hypotheses[0].weight = object.hypotheses[1].weight = 0.35;
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
-  object.late_view = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
-  const ObjectLook l = lookAt(boxes, 1.0);
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
+  object.observed_from = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
+  const TrackScore l = scoreHypothesis(boxes, 1.0);
   double A[3];
   for (int i = 0; i < 3; ++i) {
-    A[i] = 1.0 - l.hypotheses[i].detection * (1.0 - l.hypotheses[i].fits[0].likelihood);
+    A[i] = 1.0 - l.hypotheses[i].detection_probability * (1.0 - l.hypotheses[i].matches[0].likelihood);
   }
   update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
   double still = 0.0, moving = 0.0;
@@ -277,24 +282,24 @@ TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
 }
 
 TEST_F(Update, AConstantAddedToAllActivationsChangesNothing) {
-  const std::vector<Evidence> plain = {evidenceOf(object.hypotheses[0].x)};
-  const std::vector<Evidence> shifted = {evidenceOf(object.hypotheses[0].x, 64.0F)};
-  const ObjectLook a = lookAt(plain, 1.0), b = lookAt(shifted, 1.0);
-  Object other = object;
+  const std::vector<BoxDetection> plain = {evidenceOf(object.hypotheses[0].x)};
+  const std::vector<BoxDetection> shifted = {evidenceOf(object.hypotheses[0].x, 64.0F)};
+  const TrackScore a = scoreHypothesis(plain, 1.0), b = scoreHypothesis(shifted, 1.0);
+  Track other = object;
   update(object, a, Eigen::VectorXd::Ones(1), plain, frame);
   update(other, b, Eigen::VectorXd::Ones(1), shifted, frame);
   EXPECT_TRUE(sameBits(object, other));
 }
 
 TEST_F(Update, AzimuthNeverTouchesExistenceClassOrMotion) {
-  std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
   Hypothesis turned = object.hypotheses[0];
   turned.x[kYaw] += M_PI / 2;
   turned.weight = 0.2;
   object.hypotheses.push_back(turned);
   normalise(object, ClassEvidence::kPrior);
-  Object with = object;
-  const ObjectLook l = lookAt(boxes, 1.0);
+  Track with = object;
+  const TrackScore l = scoreHypothesis(boxes, 1.0);
   update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
   boxes[0].azimuth = 0.3;
   update(with, l, Eigen::VectorXd::Ones(1), boxes, frame);
@@ -307,21 +312,21 @@ TEST_F(Update, ConfidenceNeverFallsOnConsistentPositives) {
   double last = object.existence;
   for (int k = 0; k < 20; ++k) {
     frame.view.T_WB.p.x() += 0.3;
-    const std::vector<Evidence> boxes = {
+    const std::vector<BoxDetection> boxes = {
         evidenceOf(makeState(15.0, 2.0, 0.75, 0.5, 4.2, 1.75, 1.5))};
-    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+    update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
     EXPECT_GE(object.existence, last);
     last = object.existence;
   }
-  EXPECT_EQ(last, parameters.tend.certain);
+  EXPECT_EQ(last, parameters.tracks.certain);
 }
 
 TEST_F(Update, ManyLooksFromOnePlaceAddLittle) {
-  const std::vector<Evidence> boxes = {evidenceOf(object.hypotheses[0].x)};
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
   double first = 0.0, last = 0.0;
   for (int k = 0; k < 200; ++k) {
     const double before = object.best().P.trace();
-    update(object, lookAt(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+    update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
     last = before - object.best().P.trace();
     if (k == 0) first = last;
   }
@@ -334,7 +339,7 @@ TEST_F(Update, ManyLooksUnderOnePoseErrorDoNotBeatIt) {
     h.C.topRightCorner<3, 3>() = 0.04 * Eigen::Matrix3d::Identity();
     h.P.diagonal().head<3>().array() += 0.04;
   }
-  const Evidence box = evidenceOf(object.hypotheses[0].x);
+  const BoxDetection box = evidenceOf(object.hypotheses[0].x);
   Hypothesis h = object.hypotheses[0];
   const double before = h.P(1, 1);
   for (int k = 0; k < 100; ++k) h = updateWithBox(h, box.z, {}, 1.0, frame);

@@ -1,7 +1,6 @@
-#include "services/semantic_filter/core/visibility/occlusion.h"
-
 #include <gtest/gtest.h>
 
+#include "services/semantic_filter/core/visibility/occlusion.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -24,9 +23,9 @@ class Sighting : public ::testing::Test {
             0.5 * std::exp(x[4]),
             projectOutline(x, view)};
   }
-  std::vector<Sight> seeThem(const std::vector<Outline>& o,
-                             const std::vector<SightPoint>& points = {}) const {
-    return see(o, points, camera.width(), camera.height(), {});
+  std::vector<TrackVisibility> seeThem(const std::vector<Outline>& o,
+                                       const std::vector<LandmarkDepth>& points = {}) const {
+    return computeVisibility(o, points, camera.width(), camera.height(), {});
   }
   CameraModel camera{makeCamera()};
   View view;
@@ -35,21 +34,21 @@ class Sighting : public ::testing::Test {
 TEST_F(Sighting, OfTwoCarsInLineTheRearOneIsHiddenByTheFront) {
   const auto s = seeThem({outline(7, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5)),
                           outline(3, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7))});
-  EXPECT_EQ(s[0].visibility, Visibility::kOccluded);
+  EXPECT_EQ(s[0].state, Visibility::kOccluded);
   EXPECT_EQ(s[0].fraction, 0.0);
   EXPECT_EQ(s[0].blocked_by, 3u);
-  EXPECT_EQ(s[1].visibility, Visibility::kVisible);
+  EXPECT_EQ(s[1].state, Visibility::kVisible);
   EXPECT_EQ(s[1].fraction, 1.0);
 }
 
 TEST_F(Sighting, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
   const auto s = seeThem({outline(7, makeState(30, 1.5, 0.75, M_PI / 2, 4.2, 1.7, 1.5)),
                           outline(3, makeState(10, 1.3, 0.75, 0, 3.0, 1.8, 2.5))});
-  EXPECT_EQ(s[0].visibility, Visibility::kPartial);
+  EXPECT_EQ(s[0].state, Visibility::kPartial);
   EXPECT_GT(s[0].fraction, 0.2);
   EXPECT_LT(s[0].fraction, 0.8);
-  EXPECT_TRUE(s[0].hidden[0]);  // the body's left is the image's left
-  EXPECT_FALSE(s[0].hidden[2]);
+  EXPECT_TRUE(s[0].hidden_sides[0]);  // the body's left is the image's left
+  EXPECT_FALSE(s[0].hidden_sides[2]);
 }
 
 TEST_F(Sighting, PaintingsOnOtherGridsLeaveNothingBehind) {
@@ -58,7 +57,9 @@ TEST_F(Sighting, PaintingsOnOtherGridsLeaveNothingBehind) {
   const auto share = [&](const std::vector<Outline>& things, std::int64_t cell_px) {
     VisibilityParameters parameters;
     parameters.cell_px = cell_px;
-    return see(things, {}, camera.width(), camera.height(), parameters).front().fraction;
+    return computeVisibility(things, {}, camera.width(), camera.height(), parameters)
+        .front()
+        .fraction;
   };
   const double coarse = share({rear, front}, 8), fine = share({rear, front}, 2);
   ASSERT_NEAR(coarse, fine, 0.15);
@@ -80,8 +81,8 @@ TEST_F(Sighting, ADoubtfulObjectHidesNothing) {
 TEST_F(Sighting, BehindAndBesideAreToldApart) {
   const auto s = seeThem({outline(1, makeState(-25, 0, 0.75, 0, 4.2, 1.7, 1.5)),
                           outline(2, makeState(12, 30, 0.75, 0, 4.2, 1.7, 1.5))});
-  EXPECT_EQ(s[0].visibility, Visibility::kBehind);
-  EXPECT_EQ(s[1].visibility, Visibility::kOutOfView);
+  EXPECT_EQ(s[0].state, Visibility::kBehind);
+  EXPECT_EQ(s[1].state, Visibility::kOutOfView);
   EXPECT_EQ(s[1].fraction, 0.0);
 }
 
@@ -91,28 +92,28 @@ TEST_F(Sighting, TooLittleToAskForIsARemnant) {
                           outline(2, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7)),
                           outline(3, makeState(12, 11.0, 0.75, 0, 4.2, 1.7, 1.5)),
                           outline(4, makeState(12, 30, 0.75, 0, 4.2, 1.7, 1.5))});
-  EXPECT_EQ(s[0].visibility, Visibility::kOccluded);
-  EXPECT_EQ(s[2].visibility, Visibility::kOutOfView);
+  EXPECT_EQ(s[0].state, Visibility::kOccluded);
+  EXPECT_EQ(s[2].state, Visibility::kOutOfView);
   for (const int j : {0, 2}) {
     EXPECT_EQ(s[j].fraction, 0.0);
-    EXPECT_GT(s[j].remnant, 0.0) << "object " << j;
-    EXPECT_LT(s[j].remnant, least);
+    EXPECT_GT(s[j].residual_fraction, 0.0) << "object " << j;
+    EXPECT_LT(s[j].residual_fraction, least);
   }
-  EXPECT_EQ(s[1].remnant, 0.0);
-  EXPECT_EQ(s[3].remnant, 0.0);
+  EXPECT_EQ(s[1].residual_fraction, 0.0);
+  EXPECT_EQ(s[3].residual_fraction, 0.0);
 }
 
 TEST_F(Sighting, LandmarksInFrontHideAndLandmarksSeenThroughSpeakAgainst) {
   const Outline car = outline(1, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5));
   const auto& b = car.box->sides;
-  std::vector<SightPoint> points;
+  std::vector<LandmarkDepth> points;
   for (int i = 0; i < 40; ++i) {
     const double s = 0.2 + 0.6 * i / 40.0;
     points.push_back({{b[0] + s * (b[2] - b[0]), 0.5 * (b[1] + b[3])}, 6.0, 0.1});
   }
-  EXPECT_EQ(seeThem({car}, points)[0].visibility, Visibility::kOccluded);
+  EXPECT_EQ(seeThem({car}, points)[0].state, Visibility::kOccluded);
   for (auto& p : points) p.distance_m = 26.0;
-  EXPECT_EQ(seeThem({car}, points)[0].visibility, Visibility::kVisible);
+  EXPECT_EQ(seeThem({car}, points)[0].state, Visibility::kVisible);
 }
 
 }  // namespace

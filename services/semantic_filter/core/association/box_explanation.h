@@ -1,4 +1,4 @@
-// How well each object's best hypothesis explains a box, for whoever asks; projections are made when
+// How well each track's best hypothesis explains a box, for whoever asks; projections are made when
 // first asked for.
 #pragma once
 
@@ -12,30 +12,31 @@
 
 namespace perdure::semantic_filter {
 
-/// What a frame expects of each object's best hypothesis; worked out when first asked for.
-class Expected {
+/// What a frame expects of each track's best hypothesis; worked out when first asked for.
+class BoxExplanations {
  public:
-  Expected(const Belief& belief, const FrameInput& input, const Parameters& parameters)
+  BoxExplanations(const Belief& belief, const FrameInput& input, const Parameters& parameters)
       : belief_(belief),
         input_(input),
         from_(input.view),
         parameters_(parameters.box),
         clutter_(parameters.clutter),
-        at_(belief.objects.size()) {}
+        at_(belief.tracks.size()) {}
 
-  bool matches(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
+  bool matches(std::size_t j, const std::array<bool, 4>& hidden, const BoxDetection& box) {
     return fit(j, hidden, box).has_value();
   }
 
   /// log of how well it explains the box, sides and class, against clutter.
-  std::optional<double> fit(std::size_t j, const std::array<bool, 4>& hidden, const Evidence& box) {
+  std::optional<double> fit(std::size_t j, const std::array<bool, 4>& hidden,
+                            const BoxDetection& box) {
     const Entry& e = entryOf(j);
     if (!e.box || !mayOverlap(box.z, *e.box, e.covariance)) return std::nullopt;
     const auto score = scoreBox(box.z, *e.box, e.covariance, hidden, parameters_);
     if (!score) return std::nullopt;
-    const Object& object = belief_.objects[j];
+    const Track& track = belief_.tracks[j];
     return score->log_density - logClutterOf(box, *score, input_.view, clutter_) +
-           logRatio(box, input_.model, object.best().class_name, object.alike);
+           logRatio(box, input_.model, track.best().class_name, track.lookalike_nats);
   }
 
  private:
@@ -49,10 +50,10 @@ class Expected {
     Entry& e = at_[j];
     if (e.known) return e;
     e.known = true;
-    const Object& object = belief_.objects[j];
-    const Hypothesis& best = object.best();
-    const State x = stateAt(best, toSeconds(input_.stamp.time - object.as_of));
-    e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name), best.facing());
+    const Track& track = belief_.tracks[j];
+    const Hypothesis& best = track.best();
+    const State x = stateAt(best, toSeconds(input_.stamp.time - track.as_of));
+    e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name), best.heading());
     if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
     return e;
   }

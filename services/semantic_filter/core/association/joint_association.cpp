@@ -12,11 +12,11 @@ namespace {
 constexpr int kMaxIterations = 200;
 constexpr double kTolerance = 1e-9;
 
-/// Object j may have made box z.
+/// Track j may have made box z.
 struct Pair {
   Eigen::Index j, z;
   double psi, eta;
-  double mu = 0.0;  ///< what object j offers box z: psi / (1 + sum over its other boxes)
+  double mu = 0.0;  ///< what track j offers box z: psi / (1 + sum over its other boxes)
 };
 
 std::vector<Pair> pairsOf(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) {
@@ -60,7 +60,7 @@ Association associate(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) 
   const Eigen::VectorXd free = (fresh + to_box).cwiseInverse();
   result.eta = free.transpose().replicate(psi.rows(), 1);
   for (const Pair& p : pairs) result.eta(p.j, p.z) = p.eta;
-  result.claimed = to_box.cwiseProduct(free);
+  result.explained = to_box.cwiseProduct(free);
   return result;
 }
 

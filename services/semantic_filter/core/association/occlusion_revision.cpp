@@ -14,15 +14,15 @@ constexpr double kMisjudged = 3.0;  // nats, against that the blocker is not whe
 
 }  // namespace
 
-void reveal(Belief& belief, std::vector<Sight>& sights,
-                            const FrameInput& input, const Parameters& parameters) {
+void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
+                     const FrameInput& input, const Parameters& parameters) {
   std::vector<std::size_t> hidden;
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    const bool solid = belief.objects[j].existence >= parameters.visibility.solid;
-    if (solid && sights[j].visibility == Visibility::kOccluded) hidden.push_back(j);
+  for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    const bool solid = belief.tracks[j].existence >= parameters.visibility.solid;
+    if (solid && visibilities[j].state == Visibility::kOccluded) hidden.push_back(j);
   }
   if (hidden.empty()) return;
-  Expected expected(belief, input, parameters);
+  BoxExplanations expected(belief, input, parameters);
   for (const auto& e : *input.boxes) {
     std::vector<std::size_t> may_be;
     double best_hidden = -std::numeric_limits<double>::infinity();
@@ -33,40 +33,41 @@ void reveal(Belief& belief, std::vector<Sight>& sights,
       best_hidden = std::max(best_hidden, *fit);
     }
     bool others = may_be.empty();
-    for (std::size_t j = 0; j < sights.size() && !others; ++j) {
-      if (sights[j].fraction <= 0.0) continue;
-      const auto fit = expected.fit(j, sights[j].hidden, e);
+    for (std::size_t j = 0; j < visibilities.size() && !others; ++j) {
+      if (visibilities[j].fraction <= 0.0) continue;
+      const auto fit = expected.fit(j, visibilities[j].hidden_sides, e);
       others = fit && *fit > best_hidden - kMisjudged;
     }
     if (others) continue;
     for (const std::size_t j : may_be) {
-      sights[j].hidden = {};
-      sights[j].fraction = parameters.visibility.minimum;
-      sights[j].visibility = Visibility::kPartial;
-      belief.objects[j].visibility = Visibility::kPartial;
-      belief.objects[j].visible_fraction = sights[j].fraction;
+      visibilities[j].hidden_sides = {};
+      visibilities[j].fraction = parameters.visibility.minimum;
+      visibilities[j].state = Visibility::kPartial;
+      belief.tracks[j].visibility = Visibility::kPartial;
+      belief.tracks[j].visible_fraction = visibilities[j].fraction;
     }
   }
 }
 
-void explainRemnants(const Belief& belief, const std::vector<Sight>& sights,
-                                     FrameInput& input, const Parameters& parameters, const ClassPriors& priors) {
+void explainPartialViews(const Belief& belief, const std::vector<TrackVisibility>& visibilities,
+                         FrameInput& input, const Parameters& parameters,
+                         const ClassPriors& priors) {
   std::vector<std::pair<std::size_t, double>> remnants;  // and how surely each is found
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    if (sights[j].remnant <= 0.0) continue;
-    const Object& o = belief.objects[j];
+  for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    if (visibilities[j].residual_fraction <= 0.0) continue;
+    const Track& o = belief.tracks[j];
     const double found = priors.of(o.best().class_name).detection_probability;
-    remnants.emplace_back(j, o.existence * sights[j].remnant * found);
+    remnants.emplace_back(j, o.existence * visibilities[j].residual_fraction * found);
   }
   if (remnants.empty()) return;
-  Expected expected(belief, input, parameters);
-  for (Evidence& box : *input.boxes) {
+  BoxExplanations expected(belief, input, parameters);
+  for (BoxDetection& box : *input.boxes) {
     double boxes = 0.0;
     for (const auto& [j, found] : remnants) {
-      const auto fit = expected.fit(j, sights[j].hidden, box);
+      const auto fit = expected.fit(j, visibilities[j].hidden_sides, box);
       if (fit) boxes += found * std::exp(*fit);
     }
-    box.log_remnants = std::log1p(boxes);
+    box.log_partial_views = std::log1p(boxes);
   }
 }
 

@@ -8,14 +8,15 @@
 
 namespace perdure::semantic_filter {
 
-/// Of an object with v = 0 there may be a rest to see, which may be detected: its box is less
-/// likely to be clutter, new, or of anything else. The object itself stays as it is.
-void explainRemnants(const Belief& belief, const std::vector<Sight>& sights, FrameInput& input,
-                     const Parameters& parameters, const ClassPriors& priors);
+/// Of an track with v = 0 there may be a rest to see, which may be detected: its box is less
+/// likely to be clutter, new, or of anything else. The track itself stays as it is.
+void explainPartialViews(const Belief& belief, const std::vector<TrackVisibility>& visibilities,
+                         FrameInput& input, const Parameters& parameters,
+                         const ClassPriors& priors);
 
-/// A box that a hidden object explains far better than any that is in sight says that the blocker
-/// was misjudged: that object can be seen.
-void reveal(Belief& belief, std::vector<Sight>& sights, const FrameInput& input,
-            const Parameters& parameters);
+/// A box that a hidden track explains far better than any that is in visibility says that the
+/// blocker was misjudged: that track can be seen.
+void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
+                     const FrameInput& input, const Parameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -13,39 +13,42 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kMostFound = 0.98;
 
-void scoreBoxes(HypothesisLook& h, const std::string& class_name, double alike,
-                const ObjectLook& look, const std::vector<Evidence>& boxes,
+void scoreBoxes(HypothesisScore& h, const std::string& class_name, double lookalike_nats,
+                const TrackScore& score, const std::vector<BoxDetection>& boxes,
                 const FrameContext& frame) {
-  for (std::size_t i = 0; i < look.boxes.size(); ++i) {
-    const Evidence& e = boxes[look.boxes[i]];
+  for (std::size_t i = 0; i < score.boxes.size(); ++i) {
+    const BoxDetection& e = boxes[score.boxes[i]];
     if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
-    const auto score =
-        scoreBox(e.z, *h.box, h.covariance, look.sight.hidden, frame.parameters->box);
-    if (!score) continue;
-    const double log_l = logRatio(e, *frame.model, class_name, alike) + score->log_density -
-                         logClutterOf(e, *score, frame.view, frame.parameters->clutter);
-    h.fits[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), score->nis / score->dof,
-                 score->part};
+    const auto found =
+        scoreBox(e.z, *h.box, h.covariance, score.visibility.hidden_sides, frame.parameters->box);
+    if (!found) continue;
+    const double log_l = logRatio(e, *frame.model, class_name, lookalike_nats) +
+                         found->log_density -
+                         logClutterOf(e, *found, frame.view, frame.parameters->clutter);
+    h.matches[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), found->nis / found->dof,
+                    found->part};
   }
 }
 
-HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double rate,
-                      const Sight& sight, const Projector& from, const FrameContext& frame) {
-  HypothesisLook h;
+HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track, double rate,
+                                const TrackVisibility& visibility, const Projector& from,
+                                const FrameContext& frame) {
+  HypothesisScore h;
   h.box = projectObserved(hypothesis.x, from, frame.styleOf(hypothesis.class_name),
-                          hypothesis.facing());
-  h.late_looks =
-      sharedLooks(hypothesis.x.head<3>(), object.late_view, frame.view, frame.parameters->looks);
+                          hypothesis.heading());
+  h.correlated_observations = correlatedObservations(hypothesis.x.head<3>(), track.observed_from,
+                                                     frame.view, frame.parameters->tempering);
   if (!h.box) return h;
   h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
   const double size =
       std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
-  const double v = sight.fraction * (1.0 - object.screened);
-  h.expected = sight.fraction * shareFound(object, frame.parameters->visibility.elusive_found) *
-               foundAs(hypothesis, object, size, frame);
-  h.detection = std::min(h.expected * rate, kMostFound * v);
-  h.missed = v - h.detection;
-  h.silent = 1.0 - h.detection;
+  const double v = visibility.fraction * (1.0 - track.unmapped_occluder);
+  h.expected = visibility.fraction *
+               detectableShare(track, frame.parameters->visibility.hard_detection_share) *
+               detectionProbabilityOf(hypothesis, track, size, frame);
+  h.detection_probability = std::min(h.expected * rate, kMostFound * v);
+  h.undetected = v - h.detection_probability;
+  h.no_box = 1.0 - h.detection_probability;
   return h;
 }
 
@@ -54,7 +57,7 @@ HypothesisLook lookAt(const Hypothesis& hypothesis, const Object& object, double
 struct Reach {
   double least[2], most[2];
 
-  /// True where in doubt.
+  /// True where in inflation.
   bool touches(const BoxMeasurement& z) const {
     for (int axis = 0; axis < 2; ++axis) {
       if (z.sides[axis] > most[axis] || z.sides[axis + 2] < least[axis]) return false;
@@ -63,14 +66,15 @@ struct Reach {
   }
 };
 
-Reach reachOf(const std::vector<HypothesisLook>& hypotheses, const std::vector<Evidence>& boxes) {
+Reach reachOf(const std::vector<HypothesisScore>& hypotheses,
+              const std::vector<BoxDetection>& boxes) {
   constexpr double kFar = 1e30, kReach = 5.01;  // a little more than mayOverlap's deviations
   double noise[2] = {0.0, 0.0};
-  for (const Evidence& e : boxes) {
+  for (const BoxDetection& e : boxes) {
     for (int axis = 0; axis < 2; ++axis) noise[axis] = std::max(noise[axis], e.z.variance[axis]);
   }
   Reach reach{{kFar, kFar}, {-kFar, -kFar}};
-  for (const HypothesisLook& h : hypotheses) {
+  for (const HypothesisScore& h : hypotheses) {
     if (!h.box) continue;
     for (int axis = 0; axis < 2; ++axis) {
       const double variance = std::max(h.covariance(axis, axis), h.covariance(axis + 2, axis + 2));
@@ -86,64 +90,66 @@ Reach reachOf(const std::vector<HypothesisLook>& hypotheses, const std::vector<E
 
 }  // namespace
 
-double logClutterOf(const Evidence& e, const BoxScore& score, const View& view,
+double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters) {
   const auto& ignored = score.ignored;
   if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) {
-    return e.log_clutter + e.log_remnants;
+    return e.log_clutter + e.log_partial_views;
   }
-  return e.log_remnants +
+  return e.log_partial_views +
          logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
 }
 
-ObjectLook look(const Object& object, const Sight& sight, const std::vector<Evidence>& boxes,
-                const FrameContext& frame) {
-  ObjectLook result;
-  result.sight = sight;
-  result.hypotheses.reserve(object.hypotheses.size());
+TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
+                      const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
+  TrackScore result;
+  result.visibility = visibility;
+  result.hypotheses.reserve(track.hypotheses.size());
   const Projector from = frame.projector();
-  const double rate = rateOf(object, frame);
-  for (const auto& hypothesis : object.hypotheses) {
-    result.hypotheses.push_back(lookAt(hypothesis, object, rate, sight, from, frame));
+  const double rate = detectionRateFactor(track, frame);
+  for (const auto& hypothesis : track.hypotheses) {
+    result.hypotheses.push_back(scoreHypothesis(hypothesis, track, rate, visibility, from, frame));
   }
   const Reach reach = reachOf(result.hypotheses, boxes);
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (!reach.touches(boxes[z].z)) continue;
     const bool near = std::any_of(result.hypotheses.begin(), result.hypotheses.end(),
-                                  [&](const HypothesisLook& h) {
+                                  [&](const HypothesisScore& h) {
                                     return h.box && mayOverlap(boxes[z].z, *h.box, h.covariance);
                                   });
     if (near) result.boxes.push_back(z);
   }
   for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {
-    HypothesisLook& h = result.hypotheses[i];
-    h.fits.assign(result.boxes.size(), {});
-    if (h.box) scoreBoxes(h, object.hypotheses[i].class_name, object.alike, result, boxes, frame);
+    HypothesisScore& h = result.hypotheses[i];
+    h.matches.assign(result.boxes.size(), {});
+    if (h.box)
+      scoreBoxes(h, track.hypotheses[i].class_name, track.lookalike_nats, result, boxes, frame);
   }
   return result;
 }
 
-std::array<bool, 4> hiddenSides(const ObjectLook& look, std::size_t box) {
-  std::array<bool, 4> hidden = look.sight.hidden;
-  const auto at = std::find(look.boxes.begin(), look.boxes.end(), box) - look.boxes.begin();
+std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box) {
+  std::array<bool, 4> hidden = score.visibility.hidden_sides;
+  const auto at = std::find(score.boxes.begin(), score.boxes.end(), box) - score.boxes.begin();
   const auto i = static_cast<std::size_t>(at);
-  if (i == look.boxes.size()) return hidden;
-  const auto best = std::max_element(
-      look.hypotheses.begin(), look.hypotheses.end(),
-      [i](const auto& a, const auto& b) { return a.fits[i].likelihood < b.fits[i].likelihood; });
-  const int part = best->fits[i].part;
+  if (i == score.boxes.size()) return hidden;
+  const auto best = std::max_element(score.hypotheses.begin(), score.hypotheses.end(),
+                                     [i](const auto& a, const auto& b) {
+                                       return a.matches[i].likelihood < b.matches[i].likelihood;
+                                     });
+  const int part = best->matches[i].part;
   if (part >= 0) hidden[static_cast<std::size_t>(part)] = true;
   return hidden;
 }
 
-double associationWeight(const Object& object, const ObjectLook& look, std::size_t box) {
+double associationWeight(const Track& track, const TrackScore& score, std::size_t box) {
   double made = 0.0, silent = 0.0;
-  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
-    const HypothesisLook& h = look.hypotheses[i];
-    made += object.hypotheses[i].weight * h.detection * h.fits[box].likelihood;
-    silent += object.hypotheses[i].weight * h.silent;
+  for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
+    const HypothesisScore& h = score.hypotheses[i];
+    made += track.hypotheses[i].weight * h.detection_probability * h.matches[box].likelihood;
+    silent += track.hypotheses[i].weight * h.no_box;
   }
-  const double r = object.existence;
+  const double r = track.existence;
   return r * made / std::max(1.0 - r + r * silent, 1e-12);
 }
 

@@ -6,18 +6,18 @@
 
 namespace perdure::semantic_filter {
 
-double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
-                   const LooksParameters& parameters) {
-  if (last.looks <= 0.0) return 0.0;
+double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
+                              const View& view, const TemperingParameters& parameters) {
+  if (last.observations <= 0.0) return 0.0;
   const double change =
       viewChange(position, last.T_WC, view.T_WC(),
                  {parameters.angle, parameters.log_distance, parameters.image_angle});
-  return last.looks * std::exp(-change);
+  return last.observations * std::exp(-change);
 }
 
-double worthOfLook(double looks, double correlation) {
+double temperingExponent(double observations, double correlation) {
   const auto information = [&](double n) { return n / (correlation * n + 1.0 - correlation); };
-  return information(looks + 1.0) - information(looks);
+  return information(observations + 1.0) - information(observations);
 }
 
 }  // namespace perdure::semantic_filter

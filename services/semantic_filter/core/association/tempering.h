@@ -1,4 +1,4 @@
-// Looks that share a viewpoint share the errors of the network: how much one more is worth.
+// KeyframeBatch that share a viewpoint share the errors of the network: how much one more is worth.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"
@@ -6,11 +6,11 @@
 
 namespace perdure::semantic_filter {
 
-/// Earlier looks that a look at `position` from here shares its errors with.
-double sharedLooks(const Eigen::Vector3d& position, const ViewPoint& last, const View& view,
-                   const LooksParameters& parameters);
-/// Information of one more look after n correlated ones, in units of the first:
+/// Earlier looks that a score at `position` from here shares its errors with.
+double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
+                              const View& view, const TemperingParameters& parameters);
+/// Information of one more score after n correlated ones, in units of the first:
 /// I(n) = n / (ρ n + 1 - ρ), worth = I(n+1) - I(n).
-double worthOfLook(double looks, double correlation);
+double temperingExponent(double observations, double correlation);
 
 }  // namespace perdure::semantic_filter

@@ -7,20 +7,22 @@
 
 namespace perdure::semantic_filter {
 
-void hearPrimed(ObjectLook& look, const Object& object, const std::vector<double>& log_ratio,
-                const FrameContext& frame) {
-  const auto k = frame.model->index.find(object.best().class_name);
+void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
+                  const FrameContext& frame) {
+  const auto k = frame.model->index.find(track.best().class_name);
   if (k == frame.model->index.end() || k->second >= log_ratio.size()) return;
-  // Looks from one place share what the network mistakes: what speaks for the object counts by
-  // their worth. What speaks against it is held off by `screened`, as misses are.
+  // KeyframeBatch from one place share what the network mistakes: what speaks for the track counts
+  // by their worth. What speaks against it is held off by `unmapped_occluder`, as misses are.
   double nats = log_ratio[k->second];
   if (nats > 0.0) {
-    nats *= worthOfLook(look.hypotheses.front().late_looks, frame.parameters->looks.correlation);
+    nats *= temperingExponent(score.hypotheses.front().correlated_observations,
+                              frame.parameters->tempering.correlation);
   }
-  for (HypothesisLook& h : look.hypotheses) {
-    h.silent = std::max(1.0 - h.detection + h.missed * (std::exp(nats) - 1.0), 1e-6);
+  for (HypothesisScore& h : score.hypotheses) {
+    h.no_box =
+        std::max(1.0 - h.detection_probability + h.undetected * (std::exp(nats) - 1.0), 1e-6);
   }
-  look.primed = true;
+  score.top_down = true;
 }
 
 }  // namespace perdure::semantic_filter

@@ -11,16 +11,17 @@ namespace perdure::semantic_filter {
 
 /// What is true of the networks and of the streets, whatever the world: it outlives a world.
 struct Learned {
-  ErrorScales sides{4000.0};    ///< of boxes
-  ErrorScales azimuths{200.0};  ///< each of another thing
-  Evenness evenness = {};
+  NoiseScales sides{4000.0};    ///< of boxes
+  NoiseScales azimuths{200.0};  ///< each of another thing
+  GroundRoughness roughness_scale = {};
 };
 
 struct Belief {
-  std::vector<Object> objects;  ///< in order of id
-  std::vector<Object> gone;     ///< given up lately, for when they are found again (core/moved.h)
+  std::vector<Track> tracks;  ///< in order of id
+  std::vector<Track>
+      recently_deleted;  ///< given up lately, for when they are found again (core/moved.h)
   Learned learned = {};
-  Path path = {};  ///< of the body
+  BodyPath path = {};  ///< of the body
 };
 
 }  // namespace perdure::semantic_filter

@@ -16,7 +16,7 @@ double change(const Count& a, const Count& b, const ViewScales& scales) {
 
 }  // namespace
 
-void FoundRate::addTo(Counts& counts, const Count& count, const ViewScales& scales) {
+void DetectionRate::addTo(Counts& counts, const Count& count, const ViewScales& scales) {
   const auto same = std::find_if(counts.begin(), counts.end(), [&](const Count& c) {
     return change(c, count, scales) < kSameView;
   });
@@ -29,13 +29,14 @@ void FoundRate::addTo(Counts& counts, const Count& count, const ViewScales& scal
   counts.push_back(count);
 }
 
-void FoundRate::add(const Aspect& from, double expected, bool found, const ViewScales& scales) {
+void DetectionRate::add(const ViewRay& from, double expected, bool found,
+                        const ViewScales& scales) {
   const Count count{from.ray_W.cast<float>(), static_cast<float>(from.log_distance),
                     static_cast<float>(expected), found ? 1.0F : 0.0F};
   addTo(now_, count, scales);
 }
 
-void FoundRate::beginVisit(const ViewScales& scales) {
+void DetectionRate::beginVisit(const ViewScales& scales) {
   if (now_.empty()) return;
   Counts all = before_ ? *before_ : Counts{};
   for (const Count& c : now_) addTo(all, c, scales);
@@ -43,7 +44,7 @@ void FoundRate::beginVisit(const ViewScales& scales) {
   now_.clear();
 }
 
-double FoundRate::factor(const Aspect& from, double prior, const ViewScales& scales) const {
+double DetectionRate::factor(const ViewRay& from, double prior, const ViewScales& scales) const {
   if (!before_) return 1.0;
   const Count here{from.ray_W.cast<float>(), static_cast<float>(from.log_distance)};
   double expected = prior, found = prior;
@@ -55,7 +56,7 @@ double FoundRate::factor(const Aspect& from, double prior, const ViewScales& sca
   return found / expected;
 }
 
-void FoundRate::join(const FoundRate& other, const ViewScales& scales) {
+void DetectionRate::join(const DetectionRate& other, const ViewScales& scales) {
   if (other.before_) {
     Counts all = before_ ? *before_ : Counts{};
     for (const Count& c : *other.before_) addTo(all, c, scales);

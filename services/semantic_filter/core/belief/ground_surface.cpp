@@ -18,13 +18,13 @@ constexpr double kSurelyStands = 0.9;  // of a class whose things may tell
 
 }  // namespace
 
-double Evenness::ratio(double assumed) const {
+double GroundRoughness::ratio(double assumed) const {
   constexpr double kLeast = 0.01, kMost = 9.0;
   return std::clamp((assumed + squares_) / (assumed + things_), kLeast, kMost);
 }
 
-void Evenness::hear(double above, const GroundHeight& others, double own_variance, double ratio,
-                    double share) {
+void GroundRoughness::learn(double above, const GroundHeight& others, double own_variance,
+                            double ratio, double share) {
   constexpr double kMost = 9.0;
   const double rest = others.variance - others.uneven + own_variance;
   const double tells = others.uneven / (others.uneven + rest);
@@ -35,7 +35,7 @@ void Evenness::hear(double above, const GroundHeight& others, double own_varianc
   things_ += weight;
 }
 
-void Path::go(const Eigen::Vector3d& body) {
+void BodyPath::go(const Eigen::Vector3d& body) {
   constexpr double kApart = 4.0;  // m
   if (!places_.empty() && (body - places_[places_.size() - 1]).norm() < kApart) return;
   if (places_.size() == kPlaces) {
@@ -45,11 +45,11 @@ void Path::go(const Eigen::Vector3d& body) {
   places_.push_back(body);
 }
 
-Ground::Ground(const std::vector<Object>& objects, const Path& path, const Evenness& evenness,
-               const Eigen::Vector3d& up_W, const ClassPriors& priors,
-               const GroundParameters& parameters)
+GroundSurface::GroundSurface(const std::vector<Track>& tracks, const BodyPath& path,
+                             const GroundRoughness& roughness_scale, const Eigen::Vector3d& up_W,
+                             const ClassPriors& priors, const GroundParameters& parameters)
     : parameters_(parameters),
-      ratio_(evenness.ratio(parameters.assumed)),
+      ratio_(roughness_scale.ratio(parameters.assumed)),
       axes_(levelling(up_W).toRotationMatrix().topRows<2>()),
       up_(up_W.normalized()) {
   constexpr double kSure = 0.8, kHalf = 0.5;
@@ -59,29 +59,29 @@ Ground::Ground(const std::vector<Object>& objects, const Path& path, const Evenn
       path_.push_back({0, horizontal(p), up_.dot(p) - parameters.body_height_m, kBounce * kBounce});
     }
   }
-  for (const Object& o : objects) {
+  for (const Track& o : tracks) {
     const Hypothesis& best = o.best();
-    if (best.footing.variance <= 0.0 || best.moving || best.weight < kHalf) continue;
+    if (best.ground_contact.variance <= 0.0 || best.moving || best.weight < kHalf) continue;
     if (o.existence < kSure || priors.of(best.class_name).stands < kSurelyStands) continue;
     stands_.push_back({o.id, horizontal(best.x.head<3>()),
-                       underside(best.x, up_) + best.footing.above,
-                       best.footing.variance + parameters.sigma_m * parameters.sigma_m});
+                       underside(best.x, up_) + best.ground_contact.above,
+                       best.ground_contact.variance + parameters.sigma_m * parameters.sigma_m});
   }
 }
 
-void Ground::tell(Evenness& evenness, const Object& object, double share) const {
-  const Hypothesis& best = object.best();
-  if (best.footing.variance <= 0.0 || best.moving) return;
-  const auto others = below(best.x.head<3>(), object.id);
+void GroundSurface::tell(GroundRoughness& roughness_scale, const Track& track, double share) const {
+  const Hypothesis& best = track.best();
+  if (best.ground_contact.variance <= 0.0 || best.moving) return;
+  const auto others = below(best.x.head<3>(), track.id);
   if (!others) return;
-  const double own = best.footing.variance + parameters_.sigma_m * parameters_.sigma_m;
-  evenness.hear(underside(best.x, up_) + best.footing.above - others->mean, *others, own, ratio_,
-                std::min(share, 1.0));
+  const double own = best.ground_contact.variance + parameters_.sigma_m * parameters_.sigma_m;
+  roughness_scale.learn(underside(best.x, up_) + best.ground_contact.above - others->mean, *others,
+                        own, ratio_, std::min(share, 1.0));
 }
 
-std::vector<Ground::Near> Ground::around(const std::vector<Stand>& stands,
-                                         const Eigen::Vector2d& here, ObjectId except,
-                                         std::size_t most) const {
+std::vector<GroundSurface::Near> GroundSurface::around(const std::vector<Stand>& stands,
+                                                       const Eigen::Vector2d& here, ObjectId except,
+                                                       std::size_t most) const {
   std::vector<Near> nearest;
   for (const Stand& s : stands) {
     const double apart = (s.place - here).squaredNorm();
@@ -95,9 +95,10 @@ std::vector<Ground::Near> Ground::around(const std::vector<Stand>& stands,
   return nearest;
 }
 
-std::optional<GroundHeight> Ground::below(const Eigen::Vector3d& place, ObjectId except) const {
+std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
+                                                 ObjectId except) const {
   const Eigen::Vector2d here = horizontal(place);
-  std::vector<Near> tell = around(path_, here, except, Path::kPlaces);
+  std::vector<Near> tell = around(path_, here, except, BodyPath::kPlaces);
   const std::size_t on_path = tell.size(), least = on_path > 0 ? 1 : kLeast;
   const std::vector<Near> things = around(stands_, here, except, kNearest);
   tell.insert(tell.end(), things.begin(), things.end());

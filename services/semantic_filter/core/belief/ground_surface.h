@@ -27,20 +27,21 @@ struct GroundHeight {
 
 /// How uneven the ground is beside what ground.slope and ground.roughness assume of it, as those
 /// that stand on it say. Part of the belief.
-class Evenness {
+class GroundRoughness {
  public:
-  /// Of the variances, true by assumed. `assumed`: things that weigh as much as the assumption.
+  /// Of the variances, true by assumed. `assumed`: things that updateClassAndExistence as much as
+  /// the assumption.
   double ratio(double assumed) const;
   /// A thing stands by `above` (m) higher than the others say. `share`: of its looks that are new.
-  void hear(double above, const GroundHeight& others, double own_variance, double ratio,
-            double share);
+  void learn(double above, const GroundHeight& others, double own_variance, double ratio,
+             double share);
 
  private:
   double squares_ = 0.0, things_ = 0.0;
 };
 
 /// Where the body went lately, by places that are some metres apart. Part of the belief.
-class Path {
+class BodyPath {
  public:
   static constexpr std::size_t kPlaces = 6;
 
@@ -53,16 +54,16 @@ class Path {
   InplaceVector<Eigen::Vector3d, kPlaces> places_;  ///< the newest last
 };
 
-class Ground {
+class GroundSurface {
  public:
   /// Of all that stands surely, was seen from several sides and is of a class that does; and, where
   /// its height above the ground is known, of where the body went.
-  Ground(const std::vector<Object>& objects, const Path& path, const Evenness& evenness,
-         const Eigen::Vector3d& up_W, const ClassPriors& priors,
-         const GroundParameters& parameters);
+  GroundSurface(const std::vector<Track>& tracks, const BodyPath& path,
+                const GroundRoughness& roughness_scale, const Eigen::Vector3d& up_W,
+                const ClassPriors& priors, const GroundParameters& parameters);
 
-  /// What the object's footing says of how even it is.
-  void tell(Evenness& evenness, const Object& object, double share) const;
+  /// What the track's ground_contact says of how even it is.
+  void tell(GroundRoughness& roughness_scale, const Track& track, double share) const;
   /// Below `place`, without what `except` itself says; nothing where fewer than three tell and the
   /// body's height is not known.
   std::optional<GroundHeight> below(const Eigen::Vector3d& place, ObjectId except) const;

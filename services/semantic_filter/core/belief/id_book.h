@@ -1,4 +1,4 @@
-// Which ids are given to new objects.
+// Which ids are given to new tracks.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace perdure::semantic_filter {
 
-/// Gives ids to births. The same box of the same frame always gets the same id, so that stepping
-/// again after a late detection does not rename objects, and no id is ever used twice.
+/// Gives ids to initiateTracks. The same box of the same frame always gets the same id, so that
+/// stepping again after a late detection does not rename tracks, and no id is ever used twice.
 class IdBook {
  public:
   ObjectId idFor(std::uint64_t frame_sequence, std::size_t box);

@@ -56,8 +56,8 @@ void Existence::shift(ExistenceEvidence from, ExistenceEvidence to, double nats,
   count(entry, {0.0, 1, at, at});
 }
 
-void Existence::note(ExistenceEvidence why, const LedgerEntry& looks) {
-  if (looks.count > 0) count(entries_[static_cast<std::size_t>(why)], looks);
+void Existence::note(ExistenceEvidence why, const LedgerEntry& observations) {
+  if (observations.count > 0) count(entries_[static_cast<std::size_t>(why)], observations);
 }
 
 ClassAccount::ClassAccount(const std::vector<ClassLedger>& known,

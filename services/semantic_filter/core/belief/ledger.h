@@ -1,7 +1,7 @@
-// The ledger of an object: each change of its existence and of its PMF is booked under what caused
+// The ledger of an track: each change of its existence and of its PMF is booked under what caused
 // it, in nats. The entries of existence sum to log r / (1 - r), those of a class to log π.
 //
-// Existence changes by become() alone, and weights end in normalise() (object.h), which books: both
+// Existence changes by become() alone, and weights end in normalise() (track.h), which books: both
 // ask for the reason, so that nothing can change without one. Each booking is the difference
 // between what is believed now and the sum so far, so that rounding does not add up.
 #pragma once
@@ -15,7 +15,7 @@
 
 namespace perdure::semantic_filter {
 
-/// Probability that the object exists, with its reasons. A fresh one knows nothing: 1/2.
+/// Probability that the track exists, with its reasons. A fresh one knows nothing: 1/2.
 class Existence {
  public:
   Existence() = default;
@@ -27,8 +27,8 @@ class Existence {
   void become(double r, ExistenceEvidence why, TimePoint at);
   /// Books a part of `from` under `to` instead; counts it once there where it is not zero.
   void shift(ExistenceEvidence from, ExistenceEvidence to, double nats, TimePoint at);
-  /// Looks that changed nothing.
-  void note(ExistenceEvidence why, const LedgerEntry& looks);
+  /// KeyframeBatch that changed nothing.
+  void note(ExistenceEvidence why, const LedgerEntry& observations);
 
   const LedgerEntry& of(ExistenceEvidence why) const {
     return entries_[static_cast<std::size_t>(why)];
@@ -40,7 +40,7 @@ class Existence {
   std::array<LedgerEntry, kExistenceEvidences> entries_{};
 };
 
-/// A number for each of an object's classes.
+/// A number for each of an track's classes.
 struct ClassNumber {
   std::string name;
   double value = 0.0;

@@ -37,27 +37,27 @@ double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<doub
 
 }  // namespace
 
-double classProbability(const Object& object, const std::string& class_name) {
+double classProbability(const Track& track, const std::string& class_name) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) sum += h.class_name == class_name ? h.weight : 0.0;
+  for (const auto& h : track.hypotheses) sum += h.class_name == class_name ? h.weight : 0.0;
   return sum;
 }
 
-bool sound(const Object& object) {
+bool sound(const Track& track) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : track.hypotheses) {
     // A sum is finite where all that it is of is.
     if (!std::isfinite(h.x.sum() + h.P.sum() + h.C.sum())) return false;
     sum += h.weight;
   }
-  return std::isfinite(sum) && sum > 0.0 && std::isfinite(object.existence);
+  return std::isfinite(sum) && sum > 0.0 && std::isfinite(track.existence);
 }
 
-std::vector<ClassNumber> classShares(const Object& object) {
+std::vector<ClassNumber> classShares(const Track& track) {
   std::vector<ClassNumber> pmf;
-  pmf.reserve(object.hypotheses.size());
+  pmf.reserve(track.hypotheses.size());
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : track.hypotheses) {
     const auto same = [&](const ClassNumber& c) { return c.name == h.class_name; };
     const auto it = std::find_if(pmf.begin(), pmf.end(), same);
     if (it == pmf.end()) {
@@ -71,15 +71,15 @@ std::vector<ClassNumber> classShares(const Object& object) {
   return pmf;
 }
 
-void book(Object& object, ClassEvidence why) {
-  object.classes.book(classShares(object), why, object.as_of);
+void book(Track& track, ClassEvidence why) {
+  track.classes.book(classShares(track), why, track.as_of);
 }
 
-void normalise(Object& object, ClassEvidence why) {
+void normalise(Track& track, ClassEvidence why) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses.read()) sum += h.weight;
+  for (const auto& h : track.hypotheses.read()) sum += h.weight;
   check(sum > 0.0, "an object keeps a hypothesis of positive weight");
-  auto& hs = object.hypotheses.write();
+  auto& hs = track.hypotheses.write();
   for (auto& h : hs) h.weight /= sum;
   const auto heavier = [](const auto& a, const auto& b) { return a.weight > b.weight; };
   // Few, and nearly in order: std::stable_sort would ask for memory for as many again.
@@ -87,7 +87,7 @@ void normalise(Object& object, ClassEvidence why) {
     const auto at = std::upper_bound(hs.begin(), next, *next, heavier);
     if (at != next) std::rotate(at, next, next + 1);
   }
-  book(object, why);
+  book(track, why);
 }
 
 void mergeInto(Hypothesis& a, const Hypothesis& b) {
@@ -99,7 +99,7 @@ void mergeInto(Hypothesis& a, const Hypothesis& b) {
   a.P = (wa * a.P + wb * b.P + wa * wb * delta * delta.transpose()).eval();
   makeSymmetric(a.P);
   a.C = wa * a.C + wb * b.C;
-  a.head = wa * a.head + wb * b.head;
+  a.heading_log_odds = wa * a.heading_log_odds + wb * b.heading_log_odds;
   a.weight = weight;
 }
 

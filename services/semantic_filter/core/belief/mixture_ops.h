@@ -1,4 +1,4 @@
-// Operations on the mixture of one object: weights, PMF, moment matching, distances.
+// Operations on the mixture of one track: weights, PMF, moment matching, distances.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 namespace perdure::semantic_filter {
 
 /// π of a class: the sum of its hypotheses' weights.
-double classProbability(const Object& object, const std::string& class_name);
+double classProbability(const Track& track, const std::string& class_name);
 /// All numbers are finite and some weight is left.
-bool sound(const Object& object);
+bool sound(const Track& track);
 /// π of each class, in the order of its heaviest hypothesis.
-std::vector<ClassNumber> classShares(const Object& object);
+std::vector<ClassNumber> classShares(const Track& track);
 /// Books the weights as they are now, whatever their sum.
-void book(Object& object, ClassEvidence why);
+void book(Track& track, ClassEvidence why);
 /// Divides the weights by their sum, puts the heaviest first (stable), and books them.
-void normalise(Object& object, ClassEvidence why);
+void normalise(Track& track, ClassEvidence why);
 /// a - b of the cuboids, yaw modulo 180°: a cuboid is the same turned by that.
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b);
 /// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.

@@ -25,9 +25,9 @@ double fasterThan(const Hypothesis& h, double limit) {
   return 0.5 * (std::erfc((limit - speed) / scale) + std::erfc((limit + speed) / scale));
 }
 
-double movingProbability(const Object& object, double min_speed) {
+double movingProbability(const Track& track, double min_speed) {
   double sum = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : track.hypotheses) {
     if (h.moving) sum += h.weight * fasterThan(h, min_speed);
   }
   return std::min(sum, 1.0);
@@ -69,23 +69,22 @@ void stop(Hypothesis& h) {
   makeSymmetric(h.P);
 }
 
-void letSlowOnesStand(Object& object, double min_speed) {
-  const std::size_t count = object.hypotheses.size();
+void stopSlowHypotheses(Track& track, double min_speed) {
+  const std::size_t count = track.hypotheses.size();
   for (std::size_t i = 0; i < count; ++i) {
-    const Hypothesis& moving = object.hypotheses.read()[i];
+    const Hypothesis& moving = track.hypotheses.read()[i];
     if (!moving.moving) continue;
     const double fast = fasterThan(moving, min_speed);
     if (fast > 0.5) continue;
     Hypothesis rest = moving;
     stop(rest);
     rest.weight *= 1.0 - fast;
-    object.hypotheses[i].weight *= fast;
-    object.hypotheses.push_back(std::move(rest));
+    track.hypotheses[i].weight *= fast;
+    track.hypotheses.push_back(std::move(rest));
   }
-  if (object.hypotheses.size() == count) return;
-  std::erase_if(object.hypotheses.write(),
-                [](const Hypothesis& h) { return h.weight < kNoWeight; });
-  normalise(object, ClassEvidence::kMotion);
+  if (track.hypotheses.size() == count) return;
+  std::erase_if(track.hypotheses.write(), [](const Hypothesis& h) { return h.weight < kNoWeight; });
+  normalise(track, ClassEvidence::kMotion);
 }
 
 State stateAt(const Hypothesis& h, double dt) {
@@ -94,15 +93,15 @@ State stateAt(const Hypothesis& h, double dt) {
   return x;
 }
 
-Object movedOn(Object object, TimePoint time, const MotionParameters& parameters) {
-  const double dt = toSeconds(time - object.as_of);
-  if (dt <= 0.0) return object;
-  for (auto& h : object.hypotheses) predictHypothesis(h, dt, parameters);
-  return object;
+Track extrapolated(Track track, TimePoint time, const MotionParameters& parameters) {
+  const double dt = toSeconds(time - track.as_of);
+  if (dt <= 0.0) return track;
+  for (auto& h : track.hypotheses) predictHypothesis(h, dt, parameters);
+  return track;
 }
 
-Hypothesis drivingOff(Hypothesis at_rest) {
-  at_rest.footing = {};
+Hypothesis asMoving(Hypothesis at_rest) {
+  at_rest.ground_contact = {};
   at_rest.moving = true;
   at_rest.P.bottomRightCorner<3, 3>().diagonal() << 9.0, 9.0, 0.04;  // (3 m/s)²
   return at_rest;

@@ -10,9 +10,9 @@ constexpr double kLeastRatio = 0.04, kMostRatio = 9.0;
 
 }  // namespace
 
-double ErrorScales::ratio(std::uint64_t model, double assumed) const {
+double NoiseScales::ratio(std::uint64_t model, double assumed) const {
   if (assumed <= 0.0) return 1.0;
-  for (const auto& [of, heard] : heard_) {
+  for (const auto& [of, heard] : sums_) {
     if (of != model) continue;
     const double ratio = (assumed + heard.squares) / (assumed + heard.count);
     return std::clamp(ratio, kLeastRatio, kMostRatio);
@@ -20,12 +20,12 @@ double ErrorScales::ratio(std::uint64_t model, double assumed) const {
   return 1.0;
 }
 
-void ErrorScales::hear(std::uint64_t model, const Leftover& over) {
+void NoiseScales::learn(std::uint64_t model, const ResidualRatio& over) {
   if (!std::isfinite(over.ratio) || !(over.count > 0.0)) return;
-  auto it = std::find_if(heard_.begin(), heard_.end(),
+  auto it = std::find_if(sums_.begin(), sums_.end(),
                          [model](const auto& entry) { return entry.first == model; });
-  if (it == heard_.end()) it = heard_.insert(heard_.end(), {model, {}});
-  Heard& heard = it->second;
+  if (it == sums_.end()) it = sums_.insert(sums_.end(), {model, {}});
+  Sums& heard = it->second;
   heard.squares += over.count * std::min(over.ratio, kMostRatio);
   heard.count += over.count;
   if (heard.count <= remembered_) return;

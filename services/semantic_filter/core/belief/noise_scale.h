@@ -11,29 +11,29 @@
 namespace perdure::semantic_filter {
 
 /// What a fit leaves over of what was measured.
-struct Leftover {
+struct ResidualRatio {
   double ratio = 1.0;  ///< squared residuals by their variance, per degree of freedom
   double count = 0.0;  ///< of new ones that it is of; what comes again tells nothing new
 };
 
 /// Of the sides of boxes, or of azimuths.
-class ErrorScales {
+class NoiseScales {
  public:
   /// Of as many as are `remembered`: a network on another road has other errors.
-  explicit ErrorScales(double remembered) : remembered_(remembered) {}
+  explicit NoiseScales(double remembered) : remembered_(remembered) {}
 
-  /// Of the variances, true by assumed. `assumed`: as many as weigh as much as the assumption; 0:
-  /// it is believed for good.
+  /// Of the variances, true by assumed. `assumed`: as many as updateClassAndExistence as much as
+  /// the assumption; 0: it is believed for good.
   double ratio(std::uint64_t model, double assumed) const;
   /// `over` is beside what was assumed at first, not beside the ratio so far.
-  void hear(std::uint64_t model, const Leftover& over);
+  void learn(std::uint64_t model, const ResidualRatio& over);
 
  private:
-  struct Heard {
+  struct Sums {
     double squares = 0.0, count = 0.0;
   };
   double remembered_;
-  std::vector<std::pair<std::uint64_t, Heard>> heard_;  ///< few networks
+  std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< few networks
 };
 
 }  // namespace perdure::semantic_filter

@@ -42,7 +42,7 @@ double sigmaGivenPose(const Hypothesis& h, const std::optional<Matrix6d>& L_pose
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later) {
   constexpr double kLargest = 10.0;
   if (earlier == later) return Matrix6d::Identity();
-  // Most objects of a frame were brought up to date at the same frame before.
+  // Most tracks of a frame were brought up to date at the same frame before.
   thread_local Matrix6d product = Matrix6d::Identity(), inverted = Matrix6d::Identity();
   if (earlier != product) {
     product = earlier;
@@ -53,7 +53,7 @@ std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6
   return sane ? std::optional(transition) : std::nullopt;
 }
 
-bool hangsTogether(const Hypothesis& h, const Matrix6d& P_pose) {
+bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose) {
   if (h.C.isZero(0.0)) return true;
   Matrix6d L = P_pose;
   return choleskyInPlace(L) && isExplained(h, L, 1.0);
@@ -81,12 +81,12 @@ double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {
   return sigmaGivenPose(h, factorOf(P_pose));
 }
 
-double placeSigma(const Object& object, const Matrix6d& P_pose) {
+double placeSigma(const Track& track, const Matrix6d& P_pose) {
   const auto L_pose = factorOf(P_pose);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const auto& h : object.hypotheses) mean += h.weight * h.x.head<3>();
+  for (const auto& h : track.hypotheses) mean += h.weight * h.x.head<3>();
   double variance = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : track.hypotheses) {
     const double own = sigmaGivenPose(h, L_pose);
     variance += h.weight * (own * own + (h.x.head<3>() - mean).squaredNorm());
   }

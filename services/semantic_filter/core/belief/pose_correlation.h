@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
 /// Whether [P C; Cᵀ P_pose] is a covariance.
-bool hangsTogether(const Hypothesis& h, const Matrix6d& P_pose);
+bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose);
 
 /// [P C; Cᵀ P_pose] must stay a covariance: C is scaled down where the pose would explain more of P
 /// than there is. `L_pose`: Cholesky factor of P_pose, where it has one.
@@ -21,7 +21,7 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<M
 /// Standard deviation of the place relative to the body, metres: what the pose error does not
 /// share.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
-/// The same of an object: of its hypotheses, and by how far they are from each other.
-double placeSigma(const Object& object, const Matrix6d& P_pose);
+/// The same of an track: of its hypotheses, and by how far they are from each other.
+double placeSigma(const Track& track, const Matrix6d& P_pose);
 
 }  // namespace perdure::semantic_filter

@@ -26,14 +26,14 @@ struct Shape {
   bool is_cuboid = false;
 
   int corners() const { return static_cast<int>(along.size()); }
-  /// `facing`: 1, where its yaw says; -1, the other way; 0, either.
-  Eigen::Vector3d corner(int i, double facing) const {
-    return {along[i] + facing * forward[i], across[i], up[i]};
+  /// `heading`: 1, where its yaw says; -1, the other way; 0, either.
+  Eigen::Vector3d corner(int i, double heading) const {
+    return {along[i] + heading * forward[i], across[i], up[i]};
   }
 };
 
 /// What is expected where it faces as its yaw says by these log-odds.
-inline double facingOf(double head) { return std::tanh(0.5 * head); }
+inline double headingOf(double log_odds) { return std::tanh(0.5 * log_odds); }
 
 /// Bit i of a corner's number is set on the far side of axis i.
 const Shape& cuboidShape();

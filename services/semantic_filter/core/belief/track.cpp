@@ -2,8 +2,8 @@
 
 namespace perdure::semantic_filter {
 
-double certainty(const Object& object, const TendParameters& parameters) {
-  return object.found_again ? parameters.certain_again : parameters.certain;
+double existenceCeiling(const Track& track, const TrackParameters& parameters) {
+  return track.detected_on_revisit ? parameters.certain_again : parameters.certain;
 }
 
 }  // namespace perdure::semantic_filter

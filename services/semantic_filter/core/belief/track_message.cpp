@@ -38,14 +38,14 @@ Matrix7d definite(const Matrix7d& P) {
 
 /// The Gaussian of the heaviest hypothesis, its covariance widened to what the others of the class
 /// say: second moments about its mean.
-ClassBelief classBelief(const Object& object, const std::string& name) {
+ClassBelief classBelief(const Track& track, const std::string& name) {
   ClassBelief belief;
   belief.name = name;
   const Hypothesis* heaviest = nullptr;
   Matrix7d moments = Matrix7d::Zero();
   Eigen::Matrix<double, 7, 6> cross = Eigen::Matrix<double, 7, 6>::Zero();
   double weight = 0.0;
-  for (const auto& h : object.hypotheses) {
+  for (const auto& h : track.hypotheses) {
     if (h.class_name != name) continue;
     belief.probability += h.weight;
     if (!heaviest) heaviest = &h;
@@ -57,7 +57,7 @@ ClassBelief classBelief(const Object& object, const std::string& name) {
   }
   belief.mean = heaviest->x.head<7>();
   belief.covariance = definite(moments / weight);
-  if (name == kOtherClass && !heaviest->modes_sought) {
+  if (name == kOtherClass && !heaviest->modes_searched) {
     constexpr double kAnyYaw = M_PI * M_PI / 12.0;  // modulo 180 degrees
     belief.covariance(kYaw, kYaw) = std::max(belief.covariance(kYaw, kYaw), kAnyYaw);
   }
@@ -67,46 +67,45 @@ ClassBelief classBelief(const Object& object, const std::string& name) {
 
 }  // namespace
 
-ObjectBelief toBelief(const Object& object, double min_speed) {
+ObjectBelief toBelief(const Track& track, double min_speed) {
   ObjectBelief belief;
-  belief.id = object.id;
-  belief.existence = object.existence;
-  belief.confirmed = object.confirmed;
+  belief.id = track.id;
+  belief.existence = track.existence;
+  belief.confirmed = track.confirmed;
   std::vector<const std::string*> names;
-  names.reserve(object.hypotheses.size());
-  for (const auto& h : object.hypotheses) {
+  names.reserve(track.hypotheses.size());
+  for (const auto& h : track.hypotheses) {
     const auto same = [&](const std::string* name) { return *name == h.class_name; };
     if (std::none_of(names.begin(), names.end(), same)) names.push_back(&h.class_name);
   }
   belief.classes.reserve(names.size());
-  for (const std::string* name : names) belief.classes.push_back(classBelief(object, *name));
+  for (const std::string* name : names) belief.classes.push_back(classBelief(track, *name));
   const auto likelier = [](const auto& a, const auto& b) { return a.probability > b.probability; };
   if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
     std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
   }
-  belief.visibility = object.visibility;
-  belief.visible_fraction = object.visible_fraction;
-  belief.blocked_by = object.blocked_by;
-  belief.first_seen = object.first_seen;
-  belief.last_seen = object.last_seen;
-  belief.as_of = object.as_of;
-  belief.hits = object.hits;
-  belief.visible_misses = object.visible_misses;
-  belief.moving = movingProbability(object, min_speed);
-  if (object.best().moving) belief.velocity = object.best().x.tail<3>();
-  belief.recalled = object.recalled;
-  belief.why = {object.existence.published(), object.classes.published(), object.classes.ousted()};
+  belief.visibility = track.visibility;
+  belief.visible_fraction = track.visible_fraction;
+  belief.blocked_by = track.blocked_by;
+  belief.first_seen = track.first_seen;
+  belief.last_seen = track.last_seen;
+  belief.as_of = track.as_of;
+  belief.hits = track.hits;
+  belief.visible_misses = track.visible_misses;
+  belief.moving = movingProbability(track, min_speed);
+  if (track.best().moving) belief.velocity = track.best().x.tail<3>();
+  belief.recalled = track.recalled;
+  belief.why = {track.existence.published(), track.classes.published(), track.classes.ousted()};
   return belief;
 }
 
-Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product,
-                  ExistenceEvidence back) {
-  Object object;
-  object.id = belief.id;
-  object.existence = {belief.existence, belief.why.existence, back, belief.as_of};
-  object.classes = {belief.why.classes, belief.why.ousted};
-  object.confirmed = belief.confirmed;
-  object.once_confirmed = belief.confirmed || back == ExistenceEvidence::kRecall;
+Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back) {
+  Track track;
+  track.id = belief.id;
+  track.existence = {belief.existence, belief.why.existence, back, belief.as_of};
+  track.classes = {belief.why.classes, belief.why.ousted};
+  track.confirmed = belief.confirmed;
+  track.once_confirmed = belief.confirmed || back == ExistenceEvidence::kRecall;
   for (const auto& c : belief.classes) {
     Hypothesis h;
     h.class_name = c.name;
@@ -120,21 +119,21 @@ Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product,
       h.x.tail<3>() = belief.velocity;
       h.P.diagonal().tail<3>().setConstant(1.0);  // the message does not carry it: (1 m/s)²
     }
-    object.hypotheses.push_back(h);
+    track.hypotheses.push_back(h);
   }
-  object.first_seen = belief.first_seen;
-  object.last_seen = belief.last_seen;
-  object.as_of = belief.as_of;
-  object.pose_product = pose_product;
-  object.hits = belief.hits;
-  object.visible_misses = belief.visible_misses;
-  object.visibility = belief.visibility;
-  object.visible_fraction = belief.visible_fraction;
-  object.blocked_by = belief.blocked_by;
-  object.recalled = true;
-  object.remembers_all = false;
-  normalise(object, ClassEvidence::kRestore);
-  return object;
+  track.first_seen = belief.first_seen;
+  track.last_seen = belief.last_seen;
+  track.as_of = belief.as_of;
+  track.pose_product = pose_product;
+  track.hits = belief.hits;
+  track.visible_misses = belief.visible_misses;
+  track.visibility = belief.visibility;
+  track.visible_fraction = belief.visible_fraction;
+  track.blocked_by = belief.blocked_by;
+  track.recalled = true;
+  track.keyframes_complete = false;
+  normalise(track, ClassEvidence::kRestore);
+  return track;
 }
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,4 @@
-// The published belief of an object, and back.
+// The published belief of an track, and back.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"
@@ -6,10 +6,10 @@
 namespace perdure::semantic_filter {
 
 /// The published belief: per class its hypotheses as one Gaussian around the heaviest one.
-ObjectBelief toBelief(const Object& object, double min_speed);
+ObjectBelief toBelief(const Track& track, double min_speed);
 
-/// A belief that came back as an object with one hypothesis for each class. `back` is kRestore or
+/// A belief that came back as an track with one hypothesis for each class. `back` is kRestore or
 /// kRecall.
-Object fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
+Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
 
 }  // namespace perdure::semantic_filter

@@ -5,14 +5,14 @@
 
 namespace perdure::semantic_filter {
 
-Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC) {
+ViewRay viewRayOf(const Eigen::Vector3d& position, const RigidTransform& T_WC) {
   const Eigen::Vector3d ray = position - T_WC.p;
   const double distance = std::max(ray.norm(), 1e-3);
   const Eigen::Vector3d ray_W = ray / distance;
   return {ray_W, T_WC.q.conjugate() * ray_W, std::log(distance)};
 }
 
-double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales) {
+double viewChange(const ViewRay& a, const ViewRay& b, const ViewScales& scales) {
   return (a.ray_W - b.ray_W).norm() / scales.angle +
          (a.ray_C - b.ray_C).norm() / scales.image_angle +
          std::abs(a.log_distance - b.log_distance) / scales.log_distance;
@@ -20,7 +20,7 @@ double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales) {
 
 double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
                   const ViewScales& scales) {
-  return viewChange(aspectOf(position, a), aspectOf(position, b), scales);
+  return viewChange(viewRayOf(position, a), viewRayOf(position, b), scales);
 }
 
 }  // namespace perdure::semantic_filter

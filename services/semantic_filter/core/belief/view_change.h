@@ -13,12 +13,12 @@ struct ViewScales {
   double angle, log_distance, image_angle;
 };
 /// Of a point from one camera pose.
-struct Aspect {
+struct ViewRay {
   Eigen::Vector3d ray_W, ray_C;  ///< unit, from the camera to it
   double log_distance;
 };
-Aspect aspectOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);
-double viewChange(const Aspect& a, const Aspect& b, const ViewScales& scales);
+ViewRay viewRayOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);
+double viewChange(const ViewRay& a, const ViewRay& b, const ViewScales& scales);
 double viewChange(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
                   const RigidTransform& T_WC_b, const ViewScales& scales);
 

@@ -13,21 +13,21 @@ constexpr double kFlip = 0.1;     // share of azimuths that are turned by 180°
 
 }  // namespace
 
-AzimuthLook azimuthLook(double azimuth, const State& x, const View& view, double variance) {
+AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, double variance) {
   const double full = wrapAngle(yawFromAzimuth(azimuth, x.head<3>(), view) - x[kYaw]);
-  AzimuthLook look;
-  look.same_head = std::abs(full) <= M_PI / 2;
-  look.residual = look.same_head ? full : wrapAngle(full + M_PI);
-  const double density =
-      std::exp(-0.5 * look.residual * look.residual / variance) / std::sqrt(2.0 * M_PI * variance);
-  look.likelihood = (1.0 - kOutlier) * density + kOutlier / M_PI;
-  look.inlier = (1.0 - kOutlier) * density / look.likelihood;
-  return look;
+  AzimuthMatch match;
+  match.same_head = std::abs(full) <= M_PI / 2;
+  match.residual = match.same_head ? full : wrapAngle(full + M_PI);
+  const double density = std::exp(-0.5 * match.residual * match.residual / variance) /
+                         std::sqrt(2.0 * M_PI * variance);
+  match.likelihood = (1.0 - kOutlier) * density + kOutlier / M_PI;
+  match.inlier = (1.0 - kOutlier) * density / match.likelihood;
+  return match;
 }
 
-double headOdds(const AzimuthLook& look) {
-  const double nats = std::log((1.0 - kFlip) / kFlip) * look.inlier;
-  return look.same_head ? nats : -nats;
+double headingOdds(const AzimuthMatch& match) {
+  const double nats = std::log((1.0 - kFlip) / kFlip) * match.inlier;
+  return match.same_head ? nats : -nats;
 }
 
 double azimuthSigma(double told, const ClassPrior& prior) {

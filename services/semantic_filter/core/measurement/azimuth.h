@@ -7,7 +7,7 @@
 
 namespace perdure::semantic_filter {
 
-struct AzimuthLook {
+struct AzimuthMatch {
   double residual = 0.0;  ///< rad, of the turn (0 or 180°) that is nearer
   bool same_head = true;
   double likelihood = 0.0;  ///< of the azimuth, over a half turn, 1/rad
@@ -15,10 +15,10 @@ struct AzimuthLook {
 };
 
 /// `variance` is that of the azimuth and of the yaw together, rad².
-AzimuthLook azimuthLook(double azimuth, const State& x, const View& view, double variance);
+AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, double variance);
 
 /// Nats for the head that one such azimuth speaks for.
-double headOdds(const AzimuthLook& look);
+double headingOdds(const AzimuthMatch& match);
 
 /// Of an azimuth of which the network says `told`, rad, as is assumed at first.
 double azimuthSigma(double told, const ClassPrior& prior);

@@ -1,7 +1,7 @@
 // L_k(z): how much better a box is explained by a hypothesis than by clutter (eq. 6, 7).
 //
 // A side of a box is *measured* (a density in px⁻¹) or *censored*: cut by the image border or by a
-// nearer object, where only "the true side lies beyond" is known (a probability). Clutter is
+// nearer track, where only "the true side lies beyond" is known (a probability). Clutter is
 // measured in the same event, so that units agree (DESIGN 5, item 5).
 #pragma once
 
@@ -18,7 +18,7 @@ namespace perdure::semantic_filter {
 struct BoxMeasurement {
   Eigen::Vector4d sides = Eigen::Vector4d::Zero();     ///< x1, y1, x2, y2, pixels
   Eigen::Vector4d variance = Eigen::Vector4d::Ones();  ///< px², of each side
-  Eigen::Vector4d lasting = Eigen::Vector4d::Zero();   ///< px², of the object's b at each side
+  Eigen::Vector4d lasting = Eigen::Vector4d::Zero();   ///< px², of the track's b at each side
   std::array<bool, 4> measured{true, true, true, true};
 
   int count() const;
@@ -32,7 +32,8 @@ struct BoxNoise {
   double relative = 0.0;          ///< deviation of a side, in widths or heights of a large box
   double pixel = 0.0;             ///< a pixel of the network's input, in pixels of the image
   std::array<double, 4> sides{};  ///< of this box's sides, in pixels of the image
-  double doubt = 0.0;  ///< probability of clutter: what a network doubts it also places worse
+  double inflation =
+      0.0;  ///< probability of clutter: what a network inflations it also places worse
 };
 
 /// Standard deviation of a side of a box.
@@ -45,11 +46,11 @@ struct SideError {
 };
 /// Of noise and b together.
 SideError sideError(const BoxParameters& parameters, const BoxNoise& noise);
-/// The part of it that stays with the object while the view stays: b.
+/// The part of it that stays with the track while the view stays: b.
 SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise);
 
 /// The box of a detection, its sides cut at the border of a width × height image marked censored.
-/// The variance is that of the noise: the share that is the object's b is in its state. Where the
+/// The variance is that of the noise: the share that is the track's b is in its state. Where the
 /// network says how sure a side is, that is the whole of noise and b.
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
                        const BoxNoise& noise = {});
@@ -78,7 +79,7 @@ struct BoxScore {
 };
 
 /// log t(z; h(x), S) with `tail` degrees of freedom and with censoring. `hidden` are sides that a
-/// nearer object hides: the box shows the whole thing all the same (`amodal`), or ends anywhere
+/// nearer track hides: the box shows the whole thing all the same (`amodal`), or ends anywhere
 /// within it. It may do that at one side that nothing on the map hides, too (`part`). Nothing where
 /// no side can be compared, or outside the gate.
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,

@@ -19,7 +19,7 @@ using PerCorner = std::array<double, Shape::kMostCorners>;
 /// From the camera to the middle of a cuboid, and from there along half of each of its axes, in C.
 struct Frame {
   Eigen::Vector3d centre, along, across, up;
-  double facing;
+  double heading;
 };
 
 /// Of N coordinates.
@@ -35,7 +35,7 @@ PERDURE_ALSO_AVX2 void placeCorners(const Frame& frame, const Shape& shape, PerC
   double* const to[3] = {x.data(), y.data(), z.data()};
   for (int i = 0; i < shape.corners(); i += 4) {
     const simd::Four forward =
-        simd::four(shape.along.data() + i) + frame.facing * simd::four(shape.forward.data() + i);
+        simd::four(shape.along.data() + i) + frame.heading * simd::four(shape.forward.data() + i);
     const simd::Four across = simd::four(shape.across.data() + i);
     const simd::Four up = simd::four(shape.up.data() + i);
     for (int axis = 0; axis < 3; ++axis) {
@@ -81,12 +81,12 @@ struct Corners {
   Eigen::Matrix3d R_WO;
   Eigen::Vector3d half;  ///< of length, width, height
   const Shape* shape = nullptr;
-  double facing = 0.0;
+  double heading = 0.0;
   PerCorner x, y, z;       ///< in C
   bool all_before = true;  ///< the near plane
 
   /// From the centre, along the cuboid's axes.
-  Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, facing)); }
+  Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, heading)); }
   Eigen::Vector3d p_C(int i) const {
     const auto k = static_cast<std::size_t>(i);
     return {x[k], y[k], z[k]};
@@ -126,7 +126,7 @@ struct ImagePoints {
 
 /// False where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
 /// are cut there.
-bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double facing,
+bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double heading,
                          Corners& c) {
   Frame frame;
   frame.centre = from.R_CW * (x.head<3>() - from.T_WC.p);
@@ -134,7 +134,7 @@ bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& sha
   const double reach = c.half.norm();
   if (frame.centre.z() + reach < kNear) return false;
   c.shape = frame.centre.z() - reach < kNear ? &cuboidShape() : &shape;
-  c.facing = frame.facing = facing;
+  c.heading = frame.heading = heading;
   c.R_WO = from.R_WL * rotationAboutZ(x[kYaw]);
   const Eigen::Matrix3d R_CO = from.R_CW * c.R_WO;
   frame.along = c.half.x() * R_CO.col(0);
@@ -226,10 +226,10 @@ void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
 }  // namespace
 
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from, const Shape& shape,
-                                          double facing) {
+                                          double heading) {
   std::optional<ProjectedBox> result;
   Corners corners;
-  if (!cornersBeforeCamera(x, from, shape, facing, corners)) return result;
+  if (!cornersBeforeCamera(x, from, shape, heading, corners)) return result;
   ProjectedBox& box = result.emplace();
   ImagePoints points;
   project(corners, *from.camera, points);
@@ -258,8 +258,8 @@ std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& 
 }
 
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
-                                            const BoxStyle& style, double facing) {
-  auto box = projectCuboid(x, from, style.shape, facing);
+                                            const BoxStyle& style, double heading) {
+  auto box = projectCuboid(x, from, style.shape, heading);
   if (!box) return box;
   const double limit[2] = {2.0 * from.camera->width(), 2.0 * from.camera->height()};
   for (int low = 0; low < 2; ++low) {

@@ -29,9 +29,9 @@ struct ProjectedOutline {
 
 /// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
 /// The box is of `shape` within the cuboid, or of all of it where that reaches the near plane.
-/// `facing` as in Shape::corner.
+/// `heading` as in Shape::corner.
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
-                                          const Shape& shape = cuboidShape(), double facing = 0.0);
+                                          const Shape& shape = cuboidShape(), double heading = 0.0);
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
                                                const Shape& shape = cuboidShape());
 
@@ -44,7 +44,7 @@ struct BoxStyle {
 /// What a detector reports of it: the shape's box with the hypothesis's b and the style's offset
 /// added to its sides.
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
-                                            const BoxStyle& style, double facing = 0.0);
+                                            const BoxStyle& style, double heading = 0.0);
 
 /// Yaw in W from KITTI's alpha seen at `centre_W`: alpha = rotation_y - atan2(x, z) of the centre,
 /// in the gravity-levelled camera frame (DESIGN 5, item 8).

@@ -65,19 +65,19 @@ const char* flawOf(const Detection& detection, const Model& model) {
 namespace {
 
 /// A thing of no known class looks to the network like clutter, or like one of its classes.
-double logRatioOfOther(const Evidence& e, double alike) {
-  const double share = alikeProbability(e.lookalike, alike);
+double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
+  const double share = lookalikeProbability(e.lookalike, lookalike_nats);
   return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
 }
 
 }  // namespace
 
-std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
-                                     double height, const BoxParameters& box,
-                                     const ClutterParameters& clutter) {
+std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
+                                             double width, double height, const BoxParameters& box,
+                                             const ClutterParameters& clutter) {
   const Box& b = detection.box;
   if (flawOf(detection, model)) return std::nullopt;
-  Evidence e;
+  BoxDetection e;
   const double zero = detection.activations[0];
   double best = -clutter.max_log_ratio, odds = 0.0;
   for (std::size_t k = 0; k < model.classes.size(); ++k) {
@@ -88,7 +88,7 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
   }
   BoxNoise noise = boxNoise(model, width);
   noise.sides = detection.side_sigma;
-  noise.doubt = 1.0 / (1.0 + odds);
+  noise.inflation = 1.0 / (1.0 + odds);
   e.z = measure(b, width, height, box, noise);
   if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
   e.log_clutter = logClutter(e.z, width, height, clutter);
@@ -100,8 +100,8 @@ std::optional<Evidence> makeEvidence(const Detection& detection, const Model& mo
   return e;
 }
 
-std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
-                                                const ClutterParameters& clutter) {
+std::optional<std::vector<double>> topDownRatios(const Detection& detection, const Model& model,
+                                                 const ClutterParameters& clutter) {
   if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;
   std::vector<double> ratios;
   for (std::size_t k = 0; k < model.classes.size(); ++k) {
@@ -112,24 +112,25 @@ std::optional<std::vector<double>> primedRatios(const Detection& detection, cons
   return ratios;
 }
 
-std::string classSeenIn(const Evidence& evidence, const Model& model) {
-  const auto& ratios = evidence.log_ratio;
+std::string classSeenIn(const BoxDetection& detection, const Model& model) {
+  const auto& ratios = detection.log_ratio;
   const auto most = std::max_element(ratios.begin(), ratios.end());
   if (most == ratios.end() || *most <= 0.0) return {};
   return model.classes[static_cast<std::size_t>(most - ratios.begin())];
 }
 
-double alikeProbability(double prior, double alike) {
+double lookalikeProbability(double prior, double lookalike_nats) {
   constexpr double kMost = 0.5;  // from another side it may look like nothing
-  const double looks_alike = prior * std::exp(std::min(alike, 100.0));
+  const double looks_alike = prior * std::exp(std::min(lookalike_nats, 100.0));
   return std::min(looks_alike / (1.0 - prior + looks_alike), std::max(kMost, prior));
 }
 
-double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name,
-                double alike) {
+double logRatio(const BoxDetection& detection, const Model& model, const std::string& class_name,
+                double lookalike_nats) {
   const auto it = model.index.find(class_name);
-  if (it != model.index.end()) return evidence.log_ratio[it->second];
-  return alike == 0.0 ? evidence.log_ratio_other : logRatioOfOther(evidence, alike);
+  if (it != model.index.end()) return detection.log_ratio[it->second];
+  return lookalike_nats == 0.0 ? detection.log_ratio_other
+                               : logRatioOfOther(detection, lookalike_nats);
 }
 
 }  // namespace perdure::semantic_filter

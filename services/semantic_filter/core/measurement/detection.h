@@ -44,14 +44,14 @@ Model makeModel(const ModelInfo& info, const ClassPriors& priors = {});
 /// What the model says of all its boxes, in images of this width in pixels.
 BoxNoise boxNoise(const Model& model, double image_width);
 
-struct Evidence {
+struct BoxDetection {
   BoxMeasurement z;
   double log_clutter = 0.0;
   /// Nats by which things that show less than visibility.minimum make such a box commoner.
-  double log_remnants = 0.0;
+  double log_partial_views = 0.0;
   std::vector<double> log_ratio;  ///< by the model's class, clamped
   double log_ratio_best = 0.0;    ///< the most of them
-  double log_ratio_other = 0.0;   ///< of a real thing of no known class, at first sight
+  double log_ratio_other = 0.0;   ///< of a real thing of no known class, at first visibility
   double lookalike = 0.0;         ///< share of such things that look like one of a known class
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
@@ -59,31 +59,31 @@ struct Evidence {
 
 /// What no network can mean, as Health counts it: "detections_not_finite",
 /// "detections_box_inside_out", "detections_classes_mismatch", "detections_azimuth_without_sigma".
-/// A message that holds one such detection is no evidence: what is missing in it would be a miss.
+/// A message that holds one such detection is no detection: what is missing in it would be a miss.
 const char* flawOf(const Detection& detection, const Model& model);
 
 /// Nothing for a flawed detection, or one that leaves no pixel in the image.
-std::optional<Evidence> makeEvidence(const Detection& detection, const Model& model, double width,
-                                     double height, const BoxParameters& box,
-                                     const ClutterParameters& clutter);
+std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
+                                             double width, double height, const BoxParameters& box,
+                                             const ClutterParameters& clutter);
 
-/// What primed answers say: log-likelihood ratios by the model's class, by the object asked for.
-using PrimedAnswers = std::map<ObjectId, std::vector<double>>;
+/// What primed answers say: log-likelihood ratios by the model's class, by the track asked for.
+using TopDownAnswers = std::map<ObjectId, std::vector<double>>;
 /// Of one answer, clamped; nothing where it is not usable.
-std::optional<std::vector<double>> primedRatios(const Detection& detection, const Model& model,
-                                                const ClutterParameters& clutter);
+std::optional<std::vector<double>> topDownRatios(const Detection& detection, const Model& model,
+                                                 const ClutterParameters& clutter);
 
 /// The class that the network sees in it; "" where it is more like clutter than like any.
-std::string classSeenIn(const Evidence& evidence, const Model& model);
+std::string classSeenIn(const BoxDetection& detection, const Model& model);
 
 /// That a thing of no known class looks like one of a known class: `prior` is the share of such
-/// things, `alike` the nats by which its looks resembled one.
-double alikeProbability(double prior, double alike);
+/// things, `lookalike_nats` the nats by which its looks resembled one.
+double lookalikeProbability(double prior, double lookalike_nats);
 
-/// log g_k; classes that the model does not know are seen as "other". `alike`: nats by which its
-/// earlier looks resembled a known class, if it is of none (a toy looks like a car whenever it is
-/// looked at).
-double logRatio(const Evidence& evidence, const Model& model, const std::string& class_name,
-                double alike = 0.0);
+/// log g_k; classes that the model does not know are seen as "other". `lookalike_nats`: nats by
+/// which its earlier looks resembled a known class, if it is of none (a toy looks like a car
+/// whenever it is looked at).
+double logRatio(const BoxDetection& detection, const Model& model, const std::string& class_name,
+                double lookalike_nats = 0.0);
 
 }  // namespace perdure::semantic_filter

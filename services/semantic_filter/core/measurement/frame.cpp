@@ -10,10 +10,10 @@ constexpr double kNever = 1e9;  // a change of view that never counts
 
 }  // namespace
 
-Projector FrameContext::projector() const { return key_view ? key_view->projector : view; }
+Projector FrameContext::projector() const { return frame_view ? frame_view->projector : view; }
 
-ViewScales screenScales(const VisibilityParameters& visibility) {
-  return {visibility.screen_angle, visibility.screen_log_distance, kNever};
+ViewScales detectabilityScales(const VisibilityParameters& visibility) {
+  return {visibility.detectability_angle, visibility.detectability_log_distance, kNever};
 }
 
 ViewWalk viewWalkOf(const FrameContext& frame) {
@@ -24,11 +24,11 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   walk.focal = frame.view.camera->fx();
   const BoxNoise noise =
       frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{};
-  walk.lasting = lastingError(box, noise) * std::sqrt(frame.errors.lasting());
+  walk.lasting = lastingError(box, noise) * std::sqrt(frame.noise_scale.lasting());
   walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
-  walk.screened = visibility.screened;
-  walk.elusive = visibility.elusive;
-  walk.screen = screenScales(visibility);
+  walk.unmapped_occluder = visibility.unmapped_occluder;
+  walk.hard_to_detect = visibility.hard_to_detect;
+  walk.screen = detectabilityScales(visibility);
   return walk;
 }
 

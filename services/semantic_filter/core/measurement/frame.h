@@ -18,13 +18,13 @@ namespace perdure::semantic_filter {
 /// The error of the body's pose at one frame, [θ, p].
 struct PoseError {
   Matrix6d covariance = Matrix6d::Zero();
-  /// Product of the transitions of all frames so far: an object that was brought up to date at
+  /// Product of the transitions of all frames so far: an track that was brought up to date at
   /// product A has at product B the cross-covariance C (B A⁻¹)ᵀ.
   Matrix6d product = Matrix6d::Identity();
 };
 
-/// A landmark in the image: what stands between the camera and an object, or behind it.
-struct SightPoint {
+/// A landmark in the image: what stands between the camera and an track, or behind it.
+struct LandmarkDepth {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double distance_m = 0.0;
   double sigma_m = 0.0;
@@ -35,16 +35,16 @@ struct FrameInput {
   FrameStamp stamp;
   View view;
   PoseError pose_error;
-  std::vector<SightPoint> points;  ///< landmarks seen in this image
-  std::optional<std::vector<Evidence>> boxes;
-  PrimedAnswers primed = {};  ///< where predictions were asked for and no box met them
-  Model model;                ///< that the boxes' classes refer to
+  std::vector<LandmarkDepth> points;  ///< landmarks seen in this image
+  std::optional<std::vector<BoxDetection>> boxes;
+  TopDownAnswers top_down = {};  ///< where predictions were asked for and no box met them
+  Model model;                   ///< that the boxes' classes refer to
 };
 
 /// Of the boxes of one network and their azimuths, beside what is assumed of them.
-struct BoxErrors {
+struct NoiseScale {
   std::uint64_t model = 0;
-  double noise = 1.0;    ///< of the sides' variances: ErrorScales::ratio
+  double noise = 1.0;    ///< of the sides' variances: NoiseScales::ratio
   double azimuth = 1.0;  ///< of the azimuths'; heard by fits of many looks alone
   /// The same of b. What the looks at one thing have in common passes for its place and size: what
   /// is left over of fits tells of b by half only, as networks go.
@@ -52,9 +52,9 @@ struct BoxErrors {
 };
 
 /// From where a frame's looks were taken; shared by all of them, and owner of its camera.
-struct KeyView {
-  KeyView(const View& of, const PoseError& pose_error, TimePoint at,
-          std::shared_ptr<const BoxStyles> of_model, BoxErrors box_errors = {})
+struct FrameView {
+  FrameView(const View& of, const PoseError& pose_error, TimePoint at,
+            std::shared_ptr<const BoxStyles> of_model, NoiseScale scale = {})
       : camera(*of.camera),
         view(of),
         error(pose_error),
@@ -63,11 +63,11 @@ struct KeyView {
         T_WC(of.T_WC()),
         projector(of),
         styles(std::move(of_model)),
-        errors(box_errors) {
+        noise_scale(scale) {
     view.camera = projector.camera = &camera;
   }
-  KeyView(const KeyView&) = delete;
-  KeyView& operator=(const KeyView&) = delete;
+  FrameView(const FrameView&) = delete;
+  FrameView& operator=(const FrameView&) = delete;
 
   CameraModel camera;
   View view;
@@ -77,12 +77,12 @@ struct KeyView {
   RigidTransform T_WC;
   Projector projector;
   std::shared_ptr<const BoxStyles> styles;  ///< of the network that looked
-  BoxErrors errors;                         ///< of its boxes, as they were thought to be
+  NoiseScale noise_scale;                   ///< of its boxes, as they were thought to be
 };
 
-/// One box that was surely the object's.
+/// One box that was surely the track's.
 struct Keyframe {
-  std::shared_ptr<const KeyView> from;
+  std::shared_ptr<const FrameView> from;
   BoxMeasurement z;
   std::array<bool, 4> hidden{};  ///< sides that something nearer hides
   std::optional<double> azimuth;
@@ -96,9 +96,10 @@ struct FrameContext {
   const Model* model = nullptr;
   const ClassPriors* priors = nullptr;
   const Parameters* parameters = nullptr;
-  std::shared_ptr<const KeyView> key_view = {};  ///< of this frame, for what is remembered
-  BoxErrors errors = {};
-  std::shared_ptr<const Ground> ground = {};  ///< before this frame; none: nothing is known of it
+  std::shared_ptr<const FrameView> frame_view = {};  ///< of this frame, for what is remembered
+  NoiseScale noise_scale = {};
+  std::shared_ptr<const GroundSurface> ground =
+      {};  ///< before this frame; none: nothing is known of it
 
   /// Of `view`.
   Projector projector() const;
@@ -109,20 +110,20 @@ struct FrameContext {
   }
 };
 
-/// What changes at an object as the view of it changes, and goes back to where it began.
+/// What changes at an track as the view of it changes, and goes back to where it began.
 struct ViewWalk {
   RigidTransform T_WC;  ///< the new view
   double focal = 1.0;   ///< pixels
   SideError lasting;    ///< of b, stationary
   ViewScales bias{1, 1, 1};
-  double screened = 0.0;  ///< Object::screened, stationary
-  double elusive = 0.0;   ///< Object::elusive, stationary
+  double unmapped_occluder = 0.0;  ///< Track::unmapped_occluder, stationary
+  double hard_to_detect = 0.0;     ///< Track::hard_to_detect, stationary
   ViewScales screen{1, 1, 1};
 };
 
 /// Changes of view after which what hides a thing, or makes the network miss it, is another.
-ViewScales screenScales(const VisibilityParameters& visibility);
-/// What changes at an object with the view of this frame.
+ViewScales detectabilityScales(const VisibilityParameters& visibility);
+/// What changes at an track with the view of this frame.
 ViewWalk viewWalkOf(const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -14,37 +14,37 @@ constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
 /// It is on the map, or will be with the next commit. One whose place beside the body is no longer
 /// known is no claim now, and yet what the map has of it is worth keeping.
-bool onTheMap(const Object& object) {
-  return object.confirmed || (object.once_confirmed && object.existence >= 0.5);
+bool onTheMap(const Track& track) {
+  return track.confirmed || (track.once_confirmed && track.existence >= 0.5);
 }
 
-bool mayMove(const Object& object, double min_speed) {
-  return movingProbability(object, min_speed) > 0.5;
+bool mayMove(const Track& track, double min_speed) {
+  return movingProbability(track, min_speed) > 0.5;
 }
 
-/// Half of what it extends: an object is near when any of it is.
-double extentOf(const Object& object) {
-  return 0.5 * object.best().x.segment<3>(kSize).array().exp().maxCoeff();
+/// Half of what it extends: an track is near when any of it is.
+double extentOf(const Track& track) {
+  return 0.5 * track.best().x.segment<3>(kSize).array().exp().maxCoeff();
 }
 
 }  // namespace
 
-bool LongTerm::farAndUnseen(const Object& object, const Eigen::Vector3d& p_WB, TimePoint now,
-                            TimePoint oldest) const {
-  if (object.last_seen >= oldest || toSeconds(now - object.last_seen) < parameters_.after_s) {
+bool Archive::farAndUnseen(const Track& track, const Eigen::Vector3d& p_WB, TimePoint now,
+                           TimePoint oldest) const {
+  if (track.last_seen >= oldest || toSeconds(now - track.last_seen) < parameters_.after_s) {
     return false;
   }
-  const State x = stateAt(object.best(), toSeconds(now - object.as_of));
-  return (x.head<3>() - p_WB).norm() - extentOf(object) >
+  const State x = stateAt(track.best(), toSeconds(now - track.as_of));
+  return (x.head<3>() - p_WB).norm() - extentOf(track) >
          parameters_.recall_m + parameters_.margin_m;
 }
 
-LongTerm::Leaving LongTerm::leaving(const std::vector<Object>& objects, const Eigen::Vector3d& p_WB,
-                                    TimePoint now, TimePoint oldest) {
+Archive::Leaving Archive::leaving(const std::vector<Track>& tracks, const Eigen::Vector3d& p_WB,
+                                  TimePoint now, TimePoint oldest) {
   Leaving result;
   if (!parameters_.archive) return result;
   std::map<ObjectId, TimePoint> waiting;
-  for (const Object& o : objects) {
+  for (const Track& o : tracks) {
     if (!farAndUnseen(o, p_WB, now, oldest)) continue;
     if (!onTheMap(o) || mayMove(o, min_speed_)) {
       result.forgotten.push_back(o.id);
@@ -62,7 +62,7 @@ LongTerm::Leaving LongTerm::leaving(const std::vector<Object>& objects, const Ei
   return result;
 }
 
-bool LongTerm::due(const Eigen::Vector3d& p_WB, TimePoint now) const {
+bool Archive::due(const Eigen::Vector3d& p_WB, TimePoint now) const {
   if (!asked_at_) return true;
   const double since_s = toSeconds(now - *asked_at_);
   if (open_) return since_s > kPatience_s || since_s < 0.0;
@@ -71,7 +71,7 @@ bool LongTerm::due(const Eigen::Vector3d& p_WB, TimePoint now) const {
   return !waiting_.empty() && since_s > kAgain_s;
 }
 
-std::optional<LongTerm::Question> LongTerm::ask(const Eigen::Vector3d& p_WB, TimePoint now) {
+std::optional<Archive::Question> Archive::ask(const Eigen::Vector3d& p_WB, TimePoint now) {
   if (!parameters_.archive || !due(p_WB, now)) return std::nullopt;
   asked_at_ = now;
   if (open_) {
@@ -83,7 +83,7 @@ std::optional<LongTerm::Question> LongTerm::ask(const Eigen::Vector3d& p_WB, Tim
   return open_;
 }
 
-bool LongTerm::answered(std::uint64_t request, TimePoint kept, bool truncated) {
+bool Archive::answered(std::uint64_t request, TimePoint kept, bool truncated) {
   if (!open_ || open_->request != request) return false;
   kept_ = std::max(kept_, kept);
   if (truncated) {
@@ -95,22 +95,22 @@ bool LongTerm::answered(std::uint64_t request, TimePoint kept, bool truncated) {
   return true;
 }
 
-bool LongTerm::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) const {
+bool Archive::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) const {
   return (p_WO - p_WB).norm() <= parameters_.recall_m + parameters_.margin_m;
 }
 
-void LongTerm::rememberReference(const Object& object, const std::optional<RigidTransform>& T_MW) {
-  references_[object.as_of] = {object.pose_product, T_MW};
+void Archive::rememberReference(const Track& track, const std::optional<RigidTransform>& T_MW) {
+  references_[track.as_of] = {track.pose_product, T_MW};
   if (references_.size() > kMostReferences) references_.erase(references_.begin());
 }
 
-std::optional<LongTerm::Reference> LongTerm::referenceAt(TimePoint as_of) const {
+std::optional<Archive::Reference> Archive::referenceAt(TimePoint as_of) const {
   const auto found = references_.find(as_of);
   if (found == references_.end()) return std::nullopt;
   return found->second;
 }
 
-void LongTerm::clear() {
+void Archive::clear() {
   waiting_.clear();
   open_.reset();
   asked_at_.reset();

@@ -1,4 +1,4 @@
-// Which objects leave the working set for the map, and when the map is asked for those that may
+// Which tracks leave the working set for the map, and when the map is asked for those that may
 // come near the view (DESIGN 5, item 13; the paper's "semantic map").
 //
 // Nothing is let go before the map says that it has it on the disk: without a map, or with a slow
@@ -15,9 +15,9 @@
 
 namespace perdure::semantic_filter {
 
-class LongTerm {
+class Archive {
  public:
-  LongTerm(const MemoryParameters& parameters, double min_speed)
+  Archive(const MemoryParameters& parameters, double min_speed)
       : parameters_(parameters), min_speed_(min_speed) {}
 
   /// What is to leave the working set now; ids in order.
@@ -27,7 +27,7 @@ class LongTerm {
   };
   /// After the step of a frame at `now`, the body at p_WB. Frames from `oldest` on may be stepped
   /// again: what they showed stays.
-  Leaving leaving(const std::vector<Object>& objects, const Eigen::Vector3d& p_WB, TimePoint now,
+  Leaving leaving(const std::vector<Track>& tracks, const Eigen::Vector3d& p_WB, TimePoint now,
                   TimePoint oldest);
 
   /// What to ask the map for.
@@ -48,12 +48,12 @@ class LongTerm {
 
   /// Cross-covariances with the pose error refer to the product of its transitions at the time that
   /// the belief is of. The map does not hold that product.
-  /// Nor how W lay to M, in which nothing drifts, when the object went.
+  /// Nor how W lay to M, in which nothing drifts, when the track went.
   struct Reference {
     Matrix6d product;
     std::optional<RigidTransform> T_MW;
   };
-  void rememberReference(const Object& object, const std::optional<RigidTransform>& T_MW);
+  void rememberReference(const Track& track, const std::optional<RigidTransform>& T_MW);
   /// Nothing where the belief is of another run, or too much was archived since.
   std::optional<Reference> referenceAt(TimePoint as_of) const;
 
@@ -61,13 +61,13 @@ class LongTerm {
   void clear();
 
  private:
-  bool farAndUnseen(const Object& object, const Eigen::Vector3d& p_WB, TimePoint now,
+  bool farAndUnseen(const Track& track, const Eigen::Vector3d& p_WB, TimePoint now,
                     TimePoint oldest) const;
   bool due(const Eigen::Vector3d& p_WB, TimePoint now) const;
 
   MemoryParameters parameters_;
   double min_speed_;  ///< m/s; what is slower stands
-  /// Since when an object could leave; it may as soon as the map has a frame from then on.
+  /// Since when an track could leave; it may as soon as the map has a frame from then on.
   std::map<ObjectId, TimePoint> waiting_;
   TimePoint kept_;
   std::optional<Question> open_;

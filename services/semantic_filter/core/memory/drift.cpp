@@ -23,9 +23,10 @@ Eigen::Matrix<double, 6, 4> level(const RigidTransform& T_MB) {
 
 }  // namespace
 
-std::optional<PoseEvidence> poseEvidence(const Hypothesis& h, const ProjectedBox& predicted,
-                                         const BoxMeasurement& z, const std::array<bool, 4>& hidden,
-                                         const Matrix6d& P_pose) {
+std::optional<DriftMeasurement> driftMeasurement(const Hypothesis& h, const ProjectedBox& predicted,
+                                                 const BoxMeasurement& z,
+                                                 const std::array<bool, 4>& hidden,
+                                                 const Matrix6d& P_pose) {
   const auto use = comparableSides(z, predicted, hidden);
   const auto n = static_cast<Eigen::Index>(std::count(use.begin(), use.end(), true));
   if (n == 0) return std::nullopt;
@@ -46,11 +47,11 @@ std::optional<PoseEvidence> poseEvidence(const Hypothesis& h, const ProjectedBox
   if (!isCovariance(S)) return std::nullopt;
   if (squaredMahalanobis(residual, S + D * P_pose * D.transpose()) > kOutlier) return std::nullopt;
   const Eigen::MatrixXd W = solveSymmetric(S, D);
-  return PoseEvidence{D.transpose() * W, W.transpose() * residual};
+  return DriftMeasurement{D.transpose() * W, W.transpose() * residual};
 }
 
-void DriftWatch::predict(const RigidTransform& from, const RigidTransform& to, double rotation_walk,
-                         double position_walk) {
+void DriftEstimator::predict(const RigidTransform& from, const RigidTransform& to,
+                             double rotation_walk, double position_walk) {
   const Eigen::Vector3d way = to.p - from.p;
   Eigen::Matrix4d F = Eigen::Matrix4d::Identity();
   F(1, 0) = -way.y();
@@ -62,23 +63,24 @@ void DriftWatch::predict(const RigidTransform& from, const RigidTransform& to, d
   P_.diagonal().tail<3>().array() += metres * position_walk * position_walk;
 }
 
-void DriftWatch::hear(const std::vector<PoseEvidence>& looks, const RigidTransform& T_MB) {
-  if (looks.empty() || !isCovariance(P_)) return;
+void DriftEstimator::add(const std::vector<DriftMeasurement>& measurements,
+                         const RigidTransform& T_MB) {
+  if (measurements.empty() || !isCovariance(P_)) return;
   const Eigen::Matrix<double, 6, 4> G = level(T_MB);
   Eigen::Matrix4d information = inverseSymmetric(P_);
   Eigen::Vector4d pull = information * g_;
-  for (const PoseEvidence& look : looks) {
-    information += G.transpose() * look.information * G;
-    pull += G.transpose() * look.pull;
+  for (const DriftMeasurement& measurement : measurements) {
+    information += G.transpose() * measurement.information * G;
+    pull += G.transpose() * measurement.pull;
   }
   P_ = inverseSymmetric(information);
   makeSymmetric(P_);
   g_ = P_ * pull;
-  things_ += looks.size();
+  things_ += measurements.size();
 }
 
-std::optional<PoseCorrection> DriftWatch::correct(const RigidTransform& T_MB,
-                                                  const PoseError& pose_error) {
+std::optional<PoseCorrection> DriftEstimator::correct(const RigidTransform& T_MB,
+                                                      const PoseError& pose_error) {
   if (things_ < static_cast<std::size_t>(parameters_.things) || !isCovariance(P_)) {
     return std::nullopt;
   }
@@ -103,10 +105,10 @@ std::optional<PoseCorrection> DriftWatch::correct(const RigidTransform& T_MB,
   return correction;
 }
 
-void follow(Object& object, const PoseCorrection& correction, const PoseError& pose_error) {
-  const auto transition = transitionBetween(object.pose_product, pose_error.product);
+void applyCorrection(Track& track, const PoseCorrection& correction, const PoseError& pose_error) {
+  const auto transition = transitionBetween(track.pose_product, pose_error.product);
   if (!transition) return;
-  for (Hypothesis& h : object.hypotheses) {
+  for (Hypothesis& h : track.hypotheses) {
     const CrossPose C = h.C * transition->transpose();
     h.x += regressOn(correction.before, C) * correction.error;
     h.x[kYaw] = wrapAngle(h.x[kYaw]);

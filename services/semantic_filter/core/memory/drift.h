@@ -17,17 +17,18 @@ namespace perdure::semantic_filter {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// Of the pose's error g = [θ, p], true against said: log-likelihood pullᵀ g - ½ gᵀ information g.
-struct PoseEvidence {
+struct DriftMeasurement {
   Matrix6d information = Matrix6d::Zero();
   Vector6d pull = Vector6d::Zero();
 };
 
 /// What the box of a known thing says of the pose it is seen from, given what the thing's place has
-/// in common with that pose's error. `h` and `predicted` are of before the look. Nothing where no
-/// side can be compared, or the box is an outlier.
-std::optional<PoseEvidence> poseEvidence(const Hypothesis& h, const ProjectedBox& predicted,
-                                         const BoxMeasurement& z, const std::array<bool, 4>& hidden,
-                                         const Matrix6d& P_pose);
+/// in common with that pose's error. `h` and `predicted` are of before the measurement. Nothing
+/// where no side can be compared, or the box is an outlier.
+std::optional<DriftMeasurement> driftMeasurement(const Hypothesis& h, const ProjectedBox& predicted,
+                                                 const BoxMeasurement& z,
+                                                 const std::array<bool, 4>& hidden,
+                                                 const Matrix6d& P_pose);
 
 /// The pose is better known from one frame on.
 struct PoseCorrection {
@@ -36,15 +37,15 @@ struct PoseCorrection {
   Matrix6d before, after;             ///< covariance of the pose's error
 };
 
-class DriftWatch {
+class DriftEstimator {
  public:
-  explicit DriftWatch(const DriftParameters& parameters) : parameters_(parameters) {}
+  explicit DriftEstimator(const DriftParameters& parameters) : parameters_(parameters) {}
 
   /// The body went on; its pose's error walks by so much for each metre, rad/√m and m/√m.
   void predict(const RigidTransform& from, const RigidTransform& to, double rotation_walk,
                double position_walk);
-  /// Looks at things of earlier visits, from T_MB.
-  void hear(const std::vector<PoseEvidence>& looks, const RigidTransform& T_MB);
+  /// KeyframeBatch at things of earlier visits, from T_MB.
+  void add(const std::vector<DriftMeasurement>& measurements, const RigidTransform& T_MB);
   /// Where the error is significant and worth it: it is taken out, and no longer in here.
   std::optional<PoseCorrection> correct(const RigidTransform& T_MB, const PoseError& pose_error);
 
@@ -57,6 +58,6 @@ class DriftWatch {
 
 /// Its place as the corrected pose has it, as far as it hangs together with that pose's error.
 /// `pose_error` is of before the correction.
-void follow(Object& object, const PoseCorrection& correction, const PoseError& pose_error);
+void applyCorrection(Track& track, const PoseCorrection& correction, const PoseError& pose_error);
 
 }  // namespace perdure::semantic_filter

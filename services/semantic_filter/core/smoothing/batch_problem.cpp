@@ -25,7 +25,8 @@ Matrix6d transition(const PoseError& earlier, const PoseError& later) {
 
 }  // namespace
 
-Looks::Looks(const Keyframes& keyframes, const PoseError& now) : keyframes_(&keyframes) {
+KeyframeBatch::KeyframeBatch(const Keyframes& keyframes, const PoseError& now)
+    : keyframes_(&keyframes) {
   for (const auto& k : keyframes) exact_ = exact_ && k->from->error.covariance.isZero(0.0);
   if (exact_) {
     now_.assign(keyframes.size(), Matrix6d::Zero());
@@ -34,14 +35,14 @@ Looks::Looks(const Keyframes& keyframes, const PoseError& now) : keyframes_(&key
   }
 }
 
-bool Looks::chain(const PoseError& now) {
+bool KeyframeBatch::chain(const PoseError& now) {
   constexpr double kLargest = 10.0;
   const auto sane = [](const Matrix6d& m) {
     return m.allFinite() && m.cwiseAbs().maxCoeff() < kLargest;
   };
-  const KeyView& first = *keyframes_->front()->from;
+  const FrameView& first = *keyframes_->front()->from;
   for (const auto& k : *keyframes_) {
-    const KeyView& view = *k->from;
+    const FrameView& view = *k->from;
     const Matrix6d onto = view.error.product.lazyProduct(first.product_inverse);
     const Matrix6d back = first.error.product.lazyProduct(view.product_inverse);
     const Matrix6d on = now.product.lazyProduct(view.product_inverse);
@@ -56,7 +57,7 @@ bool Looks::chain(const PoseError& now) {
   return true;
 }
 
-void Looks::pairUp(const PoseError& now) {
+void KeyframeBatch::pairUp(const PoseError& now) {
   pairs_.resize(size() * (size() + 1) / 2);
   for (std::size_t j = 0; j < size(); ++j) {
     const PoseError& earlier = (*keyframes_)[j]->from->error;
@@ -68,7 +69,8 @@ void Looks::pairUp(const PoseError& now) {
   }
 }
 
-void Looks::poseCovariance(const std::vector<PoseJacobian>& J, Eigen::MatrixXd& result) const {
+void KeyframeBatch::poseCovariance(const std::vector<PoseJacobian>& J,
+                                   Eigen::MatrixXd& result) const {
   const auto n = static_cast<Eigen::Index>(size());
   result.resize(4 * n, 4 * n);
   if (pairs_.empty()) {
@@ -93,9 +95,9 @@ void Looks::poseCovariance(const std::vector<PoseJacobian>& J, Eigen::MatrixXd& 
   }
 }
 
-BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class_name,
-                       const State& start, const FrameContext& frame)
-    : looks_(looks),
+BatchProblem::BatchProblem(const KeyframeBatch& batch, bool moving, const std::string& class_name,
+                           const State& start, const FrameContext& frame)
+    : batch_(batch),
       frame_(frame),
       prior_(frame.priors->of(class_name)),
       class_name_(class_name),
@@ -106,7 +108,7 @@ BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class
   size_information_ = inverseSymmetric(prior_.log_size_covariance);
   const auto& box = frame.parameters->box;
   scales_ = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
-  facing_ = facingOf(logHead(start));
+  heading_ = headingOf(logHeading(start));
   if (!moving) return;
   const double s2 = std::max(prior_.speed_sigma * prior_.speed_sigma, 0.01);
   const Eigen::Vector3d along(std::cos(yaw_), std::sin(yaw_), 0.0);
@@ -116,7 +118,7 @@ BatchModel::BatchModel(const Looks& looks, bool moving, const std::string& class
   speed_information_ = inverseSymmetric(P);
 }
 
-State BatchModel::at(const State& x, const FreeVector& step) const {
+State BatchProblem::at(const State& x, const FreeVector& step) const {
   State y = x;
   y.head<kGeometry>() += step.head(kGeometry);
   y[kYaw] = wrapAngle(y[kYaw]);
@@ -124,23 +126,23 @@ State BatchModel::at(const State& x, const FreeVector& step) const {
   return y;
 }
 
-std::optional<Stack> BatchModel::linearise(const State& x) const {
-  const auto n = static_cast<Eigen::Index>(looks_.size());
+std::optional<Stack> BatchProblem::linearise(const State& x) const {
+  const auto n = static_cast<Eigen::Index>(batch_.size());
   Stack s;
   s.rows = Eigen::MatrixXd::Zero(4 * n, dim_ + 1);
-  s.J_pose.assign(looks_.size(), PoseJacobian::Zero());
-  s.counts.assign(looks_.size(), {});
+  s.J_pose.assign(batch_.size(), PoseJacobian::Zero());
+  s.counts.assign(batch_.size(), {});
   const BoxStyles* styles = nullptr;
   const BoxStyle* style = nullptr;
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
-    const Keyframe& k = *looks_.keyframes()[i];
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    const Keyframe& k = *batch_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    if (k.from->styles.get() != styles) {  // looks of one network are mostly side by side
+    if (k.from->styles.get() != styles) {  // batch of one network are mostly side by side
       styles = k.from->styles.get();
       style = &styles->of(class_name_);
     }
-    const auto box = projectObserved(then, k.from->projector, *style, facing_);
+    const auto box = projectObserved(then, k.from->projector, *style, heading_);
     if (!box) return std::nullopt;
     const auto use = comparableSides(k.z, *box, k.hidden);
     const auto row = static_cast<Eigen::Index>(4 * i);
@@ -158,31 +160,31 @@ std::optional<Stack> BatchModel::linearise(const State& x) const {
   return s;
 }
 
-void BatchModel::covariance(const State& x, const Stack& s, SideCovariance& result) const {
-  const auto n = static_cast<Eigen::Index>(4 * looks_.size());
+void BatchProblem::covariance(const State& x, const Stack& s, SideCovariance& result) const {
+  const auto n = static_cast<Eigen::Index>(4 * batch_.size());
   result.own.resize(n, n);
   result.pose.resize(0, 0);
-  if (!looks_.exactPoses()) looks_.poseCovariance(s.J_pose, result.pose);
-  std::vector<Aspect> aspects;
+  if (!batch_.exactPoses()) batch_.poseCovariance(s.J_pose, result.pose);
+  std::vector<ViewRay> rays;
   std::vector<Eigen::Vector4d> stays;  // deviations of b; 0 of a side that does not count
-  aspects.reserve(looks_.size());
-  stays.reserve(looks_.size());
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
-    const Keyframe& k = *looks_.keyframes()[i];
-    aspects.push_back(aspectOf(x.head<3>(), k.from->T_WC));
+  rays.reserve(batch_.size());
+  stays.reserve(batch_.size());
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    const Keyframe& k = *batch_.keyframes()[i];
+    rays.push_back(viewRayOf(x.head<3>(), k.from->T_WC));
     stays.push_back(lasting(k).cwiseSqrt());
     for (int side = 0; side < 4; ++side) stays.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
   }
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      const double alike = std::exp(-viewChange(aspects[i], aspects[j], scales_));
+      const double correlation = std::exp(-viewChange(rays[i], rays[j], scales_));
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
       Eigen::Matrix4d own =
           moving() ? acceleration(s, i, j) : Eigen::Matrix4d(Eigen::Matrix4d::Zero());
-      own.diagonal() += alike * stays[i].cwiseProduct(stays[j]);
+      own.diagonal() += correlation * stays[i].cwiseProduct(stays[j]);
       result.own.block<4, 4>(row, column) = own;
     }
-    const Eigen::Vector4d new_each_time = noise(*looks_.keyframes()[i]);
+    const Eigen::Vector4d new_each_time = noise(*batch_.keyframes()[i]);
     for (int side = 0; side < 4; ++side) {
       const auto row = static_cast<Eigen::Index>(4 * i) + side;
       result.own(row, row) += s.counts[i][side] ? new_each_time[side] : kNoInformation;
@@ -201,12 +203,12 @@ Gram gramOf(const Eigen::MatrixXd& whitened) {
   return gram;
 }
 
-Cholesky SideCovariance::with(const Eigen::VectorXd& doubts, Eigen::MatrixXd R) const {
+Cholesky SideCovariance::with(const Eigen::VectorXd& inflations, Eigen::MatrixXd R) const {
   R.resize(own.rows(), own.cols());
   const Eigen::Index n = own.rows();
-  for (Eigen::Index j = 0; j < doubts.size(); ++j) {
-    for (Eigen::Index i = j; i < doubts.size(); ++i) {
-      const double widening = std::sqrt(doubts[i] * doubts[j]);
+  for (Eigen::Index j = 0; j < inflations.size(); ++j) {
+    for (Eigen::Index i = j; i < inflations.size(); ++i) {
+      const double widening = std::sqrt(inflations[i] * inflations[j]);
       R.block<4, 4>(4 * i, 4 * j) = widening * own.block<4, 4>(4 * i, 4 * j);
     }
     if (pose.size() == 0) continue;
@@ -221,15 +223,15 @@ Eigen::VectorXd SideCovariance::withoutPose(const Eigen::VectorXd& residual,
   return residual - pose.selfadjointView<Eigen::Lower>() * explained;
 }
 
-double SideCovariance::deviation(const Eigen::VectorXd& residual, Eigen::Index look) const {
-  Eigen::Matrix4d L = own.block<4, 4>(4 * look, 4 * look);
-  Eigen::Vector4d r = residual.segment<4>(4 * look);
+double SideCovariance::deviation(const Eigen::VectorXd& residual, Eigen::Index keyframe) const {
+  Eigen::Matrix4d L = own.block<4, 4>(4 * keyframe, 4 * keyframe);
+  Eigen::Vector4d r = residual.segment<4>(4 * keyframe);
   if (!choleskyInPlace(L)) return 0.0;
   whiten(L, r);
   return r.squaredNorm();
 }
 
-Quadratic BatchModel::quadratic(const State& x, const Gram& gram) const {
+Quadratic BatchProblem::quadratic(const State& x, const Gram& gram) const {
   Quadratic q{gram.topLeftCorner(dim_, dim_), gram.col(dim_).head(dim_)};
   q.G.block<3, 3>(kSize, kSize) += size_information_;
   q.g.segment<3>(kSize) += size_information_ * (prior_.log_size - x.segment<3>(kSize));
@@ -244,112 +246,113 @@ Quadratic BatchModel::quadratic(const State& x, const Gram& gram) const {
   return q;
 }
 
-double BatchModel::priorCost(const State& x) const {
+double BatchProblem::priorCost(const State& x) const {
   const Eigen::Vector3d d = prior_.log_size - x.segment<3>(kSize);
   double cost = d.dot(size_information_ * d) + yawPriorCost(x);
   if (moving()) cost += x.tail<3>().dot(speed_information_ * x.tail<3>());
   return cost;
 }
 
-double BatchModel::yawPriorCost(const State& x) const {
+double BatchProblem::yawPriorCost(const State& x) const {
   const double yaw = wrapAngle(yaw_ - x[kYaw]) / kYawSpread;
   return yaw * yaw;
 }
 
-double BatchModel::logAzimuths(const State& x) const {
+double BatchProblem::logAzimuths(const State& x) const {
   double sum = 0.0;
-  for (const auto& look : azimuths(x)) sum += std::log(look.likelihood);
-  return sum * azimuthWorth();
+  for (const auto& match : azimuths(x)) sum += std::log(match.likelihood);
+  return sum * azimuthWeight();
 }
 
-double BatchModel::logHead(const State& x) const {
+double BatchProblem::logHeading(const State& x) const {
   double sum = 0.0;
-  for (const auto& look : azimuths(x)) sum += headOdds(look);
-  return sum * azimuthWorth();
+  for (const auto& match : azimuths(x)) sum += headingOdds(match);
+  return sum * azimuthWeight();
 }
 
-Leftover BatchModel::leftoverOfAzimuths(const State& x, double yaw_variance) const {
-  const double worth = azimuthWorth();
+ResidualRatio BatchProblem::azimuthResidualRatio(const State& x, double yaw_variance) const {
+  const double weight_of_each = azimuthWeight();
   double squares = 0.0, count = 0.0, information = 0.0;
-  for (const auto& k : looks_.keyframes()) {
+  for (const auto& k : batch_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
     const double variance = azimuthVariance(*k);
-    const auto look = azimuthLook(*k->azimuth, x, k->from->view, variance + yaw_variance);
-    const double share = worth * look.inlier;
-    squares += share * std::pow(look.residual / azimuthSigma(k->azimuth_sigma, prior_), 2);
+    const auto match = matchAzimuth(*k->azimuth, x, k->from->view, variance + yaw_variance);
+    const double share = weight_of_each * match.inlier;
+    squares += share * std::pow(match.residual / azimuthSigma(k->azimuth_sigma, prior_), 2);
     count += share;
     information += share / variance;
   }
   const double free = count - information * yaw_variance;
-  return free > 0.0 ? Leftover{squares / free, free} : Leftover{};
+  return free > 0.0 ? ResidualRatio{squares / free, free} : ResidualRatio{};
 }
 
-double BatchModel::logSpeedPrior() const {
+double BatchProblem::logSpeedPrior() const {
   return moving() ? std::log(speed_information_.determinant()) - 3.0 * std::log(2.0 * M_PI) : 0.0;
 }
 
-double BatchModel::logSizePrior() const { return std::log(size_information_.determinant()); }
+double BatchProblem::logSizePrior() const { return std::log(size_information_.determinant()); }
 
-double BatchModel::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& doubts) const {
+double BatchProblem::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& inflations) const {
   double sum = 0.0;
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
-    const Keyframe& k = *looks_.keyframes()[i];
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    const Keyframe& k = *batch_.keyframes()[i];
     for (int a = 0; a < 4; ++a) {
       const bool cut = !k.z.measured[a] || k.hidden[a];
       if (!cut && s.counts[i][a]) continue;
       const double own = noise(k)[a] + lasting(k)[a];
       sum += std::log(s.counts[i][a] ? own : kNoInformation);
-      sum += cut ? std::log(doubts[static_cast<Eigen::Index>(i)]) : -std::log(own);
+      sum += cut ? std::log(inflations[static_cast<Eigen::Index>(i)]) : -std::log(own);
     }
   }
   return sum;
 }
 
-Eigen::MatrixXd BatchModel::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
-                                    const Eigen::VectorXd& doubts) const {
+Eigen::MatrixXd BatchProblem::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
+                                      const Eigen::VectorXd& inflations) const {
   Eigen::MatrixXd c = Eigen::MatrixXd::Zero(4, s.rows.rows());
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
-    const Keyframe& k = *looks_.keyframes()[i];
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    const Keyframe& k = *batch_.keyframes()[i];
     const double rho =
         std::exp(-viewChange(x.head<3>(), k.from->T_WC, frame_.view.T_WC(), scales_));
     for (int a = 0; a < 4; ++a) {
       if (!s.counts[i][a]) continue;
       const auto row = static_cast<Eigen::Index>(4 * i) + a;
-      c(a, row) = rho * sigma[a] * std::sqrt(lasting(k)[a] * doubts[static_cast<Eigen::Index>(i)]);
+      c(a, row) =
+          rho * sigma[a] * std::sqrt(lasting(k)[a] * inflations[static_cast<Eigen::Index>(i)]);
     }
   }
   return c;
 }
 
-Eigen::MatrixXd BatchModel::poseNow(const Stack& s) const {
+Eigen::MatrixXd BatchProblem::poseNow(const Stack& s) const {
   Eigen::MatrixXd c = Eigen::MatrixXd::Zero(6, s.rows.rows());
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
     c.middleCols<4>(static_cast<Eigen::Index>(4 * i)) =
-        looks_.poseNow(i).lazyProduct(s.J_pose[i].transpose());
+        batch_.poseNow(i).lazyProduct(s.J_pose[i].transpose());
   }
   return c;
 }
 
-Eigen::Vector4d BatchModel::noise(const Keyframe& k) const {
-  const BoxErrors &then = k.from->errors, &now = frame_.errors;
+Eigen::Vector4d BatchProblem::noise(const Keyframe& k) const {
+  const NoiseScale &then = k.from->noise_scale, &now = frame_.noise_scale;
   return (then.model == now.model ? now.noise / then.noise : 1.0) * k.z.variance;
 }
 
-Eigen::Vector4d BatchModel::lasting(const Keyframe& k) const {
-  const BoxErrors &then = k.from->errors, &now = frame_.errors;
+Eigen::Vector4d BatchProblem::lasting(const Keyframe& k) const {
+  const NoiseScale &then = k.from->noise_scale, &now = frame_.noise_scale;
   return (then.model == now.model ? now.lasting() / then.lasting() : 1.0) * k.z.lasting;
 }
 
 /// Seconds from the look to the newest one, which the position is of.
-double BatchModel::age(std::size_t i) const {
+double BatchProblem::age(std::size_t i) const {
   return moving()
-             ? toSeconds(looks_.keyframes().back()->from->time - looks_.keyframes()[i]->from->time)
+             ? toSeconds(batch_.keyframes().back()->from->time - batch_.keyframes()[i]->from->time)
              : 0.0;
 }
 
 /// Covariance of the sides of look i (the later one) and j of what moves, by white acceleration
 /// since then: the later look is the nearer to the newest one.
-Eigen::Matrix4d BatchModel::acceleration(const Stack& s, std::size_t i, std::size_t j) const {
+Eigen::Matrix4d BatchProblem::acceleration(const Stack& s, std::size_t i, std::size_t j) const {
   const double near = age(i), far = age(j);
   const double q = std::pow(frame_.parameters->motion.acceleration, 2);
   const double variance = q * near * near * (3.0 * far - near) / 6.0;
@@ -358,37 +361,38 @@ Eigen::Matrix4d BatchModel::acceleration(const Stack& s, std::size_t i, std::siz
              .lazyProduct(s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0).transpose());
 }
 
-std::vector<AzimuthLook> BatchModel::azimuths(const State& x) const {
-  std::vector<AzimuthLook> looks;
-  for (const auto& k : looks_.keyframes()) {
+std::vector<AzimuthMatch> BatchProblem::azimuths(const State& x) const {
+  std::vector<AzimuthMatch> matches;
+  for (const auto& k : batch_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
-    looks.push_back(azimuthLook(*k->azimuth, x, k->from->view, azimuthVariance(*k)));
+    matches.push_back(matchAzimuth(*k->azimuth, x, k->from->view, azimuthVariance(*k)));
   }
-  return looks;
+  return matches;
 }
 
-double BatchModel::azimuthVariance(const Keyframe& k) const {
-  const BoxErrors &then = k.from->errors, &now = frame_.errors;
+double BatchProblem::azimuthVariance(const Keyframe& k) const {
+  const NoiseScale &then = k.from->noise_scale, &now = frame_.noise_scale;
   const double assumed = azimuthSigma(k.azimuth_sigma, prior_);
   return (then.model == now.model ? now : then).azimuth * assumed * assumed;
 }
 
-/// What each azimuth counts, since their errors are alike.
-double BatchModel::azimuthWorth() const {
-  const auto looks =
-      static_cast<double>(std::count_if(looks_.keyframes().begin(), looks_.keyframes().end(),
+/// What each azimuth counts, since their errors are correlation.
+double BatchProblem::azimuthWeight() const {
+  const auto batch =
+      static_cast<double>(std::count_if(batch_.keyframes().begin(), batch_.keyframes().end(),
                                         [](const auto& k) { return k->azimuth.has_value(); }));
-  return 1.0 / (1.0 + std::max(looks - 1.0, 0.0) * kAzimuthCorrelation);
+  return 1.0 / (1.0 + std::max(batch - 1.0, 0.0) * kAzimuthCorrelation);
 }
 
-void BatchModel::addAzimuths(const State& x, Quadratic& q) const {
-  const double worth = azimuthWorth();
-  for (const auto& k : looks_.keyframes()) {
+void BatchProblem::addAzimuths(const State& x, Quadratic& q) const {
+  const double weight_of_each = azimuthWeight();
+  for (const auto& k : batch_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
     const double variance = azimuthVariance(*k);
-    const double residual = azimuthLook(*k->azimuth, x, k->from->view, variance).residual;
+    const double residual = matchAzimuth(*k->azimuth, x, k->from->view, variance).residual;
     const double nis = residual * residual / variance;
-    const double information = worth * (kAzimuthTail + 1.0) / (kAzimuthTail + nis) / variance;
+    const double information =
+        weight_of_each * (kAzimuthTail + 1.0) / (kAzimuthTail + nis) / variance;
     q.G(kYaw, kYaw) += information;
     q.g[kYaw] += information * residual;
   }

@@ -9,33 +9,33 @@ namespace {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
-/// What one look shows of a thing, as far as other looks may differ.
-struct Glimpse {
-  Aspect aspect;
+/// What one keyframe shows of a thing, as far as other batch may differ.
+struct KeyframeAspect {
+  ViewRay aspect;
   Eigen::Vector2d centre;  ///< of the box, rad
   double log_height;
 };
 
-Glimpse glimpseOf(const Eigen::Vector3d& place, const Keyframe& k) {
+KeyframeAspect keyframeAspectOf(const Eigen::Vector3d& place, const Keyframe& k) {
   const Eigen::Vector2d centre(k.z.sides[0] + k.z.sides[2], k.z.sides[1] + k.z.sides[3]);
-  return {aspectOf(place, k.from->T_WC), 0.5 * centre / k.from->camera.fx(),
+  return {viewRayOf(place, k.from->T_WC), 0.5 * centre / k.from->camera.fx(),
           std::log(k.z.height())};
 }
 
 /// By the view from the two places, or by the boxes where the thing itself moves.
-double changeBetween(const Glimpse& a, const Glimpse& b, const ViewScales& scales) {
+double changeBetween(const KeyframeAspect& a, const KeyframeAspect& b, const ViewScales& scales) {
   return std::max(viewChange(a.aspect, b.aspect, scales),
                   (a.centre - b.centre).norm() / scales.image_angle +
                       std::abs(a.log_height - b.log_height) / scales.log_distance);
 }
 
-/// The look that is least apart from the nearest other one. The newest stays: what moves is
+/// The keyframe that is least apart from the nearest other one. The newest stays: what moves is
 /// estimated at its time.
 std::size_t leastApart(const Eigen::Vector3d& place, const Keyframes& all,
                        const ViewScales& scales) {
-  std::vector<Glimpse> glimpses;
+  std::vector<KeyframeAspect> glimpses;
   glimpses.reserve(all.size());
-  for (const auto& k : all) glimpses.push_back(glimpseOf(place, *k));
+  for (const auto& k : all) glimpses.push_back(keyframeAspectOf(place, *k));
   std::vector<double> apart(all.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -56,40 +56,40 @@ void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales
 
 }  // namespace
 
-bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
-              const SmoothParameters& parameters) {
-  const Eigen::Vector3d place = object.best().x.head<3>();
-  const Glimpse now = glimpseOf(place, keyframe);
+bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
+                 const SmoothingParameters& parameters) {
+  const Eigen::Vector3d place = track.best().x.head<3>();
+  const KeyframeAspect now = keyframeAspectOf(place, keyframe);
   const auto same = [&](const auto& other) {
-    return changeBetween(glimpseOf(place, *other), now, scales) < parameters.new_view;
+    return changeBetween(keyframeAspectOf(place, *other), now, scales) < parameters.new_view;
   };
-  // The late ones first: they are the most alike.
-  const Keyframes& known = object.keyframes.read();
+  // The late ones first: they are the most correlation.
+  const Keyframes& known = track.keyframes.read();
   if (std::any_of(known.rbegin(), known.rend(), same)) return false;
-  Keyframes& all = object.keyframes.write();
+  Keyframes& all = track.keyframes.write();
   all.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
   thin(place, all, scales, static_cast<std::size_t>(parameters.keyframes));
   return true;
 }
 
-bool explains(const Hypothesis& h, const Keyframe& look, const BoxParameters& parameters) {
+bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters) {
   constexpr double kContradicted = 14.0;  // of four degrees of freedom, one in 140
-  const KeyView& from = *look.from;
+  const FrameView& from = *keyframe.from;
   State cuboid = h.x;
   cuboid.segment<4>(kBias).setZero();
   const auto box =
-      projectObserved(cuboid, from.projector, from.styles->of(h.class_name), h.facing());
+      projectObserved(cuboid, from.projector, from.styles->of(h.class_name), h.heading());
   if (!box) return false;
   const auto H = box->H.leftCols<kGeometry>();
   Eigen::Matrix4d S = H * h.P.topLeftCorner<kGeometry, kGeometry>() * H.transpose() +
                       box->H_pose * from.error.covariance * box->H_pose.transpose();
-  S.diagonal() += look.z.lasting;
-  const auto score = scoreBox(look.z, *box, S, look.hidden, parameters);
+  S.diagonal() += keyframe.z.lasting;
+  const auto score = scoreBox(keyframe.z, *box, S, keyframe.hidden, parameters);
   return score && score->nis < kContradicted;
 }
 
-void joinKeyframes(Object& a, const Object& b, const ViewScales& scales,
-                   const SmoothParameters& parameters) {
+void mergeKeyframes(Track& a, const Track& b, const ViewScales& scales,
+                    const SmoothingParameters& parameters) {
   Keyframes& all = a.keyframes.write();
   all.insert(all.end(), b.keyframes.begin(), b.keyframes.end());
   std::stable_sort(all.begin(), all.end(),

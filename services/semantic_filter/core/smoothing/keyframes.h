@@ -1,4 +1,4 @@
-// The looks at an object that are remembered, so that a static thing can be estimated again from
+// The batch at an track that are remembered, so that a static thing can be estimated again from
 // all of them at once: a filter that linearised at a wrong first depth, or that took the visible
 // part of a thing for the whole, stays wrong; the batch does not.
 #pragma once
@@ -14,16 +14,16 @@
 
 namespace perdure::semantic_filter {
 
-/// Takes the look in if it shows the object from where no remembered one does. Where there are
+/// Takes the keyframe in if it shows the track from where no remembered one does. Where there are
 /// `limit` already, the one that tells least beside its neighbours goes. Whether anything changed.
-bool remember(Object& object, Keyframe keyframe, const ViewScales& scales,
-              const SmoothParameters& parameters);
+bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
+                 const SmoothingParameters& parameters);
 
-/// Whether the look may have been at `h`.
-bool explains(const Hypothesis& h, const Keyframe& look, const BoxParameters& parameters);
+/// Whether the keyframe may have been at `h`.
+bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters);
 
-/// What two objects that are one remember, in order of time.
-void joinKeyframes(Object& a, const Object& b, const ViewScales& scales,
-                   const SmoothParameters& parameters);
+/// What two tracks that are one addKeyframe, in order of time.
+void mergeKeyframes(Track& a, const Track& b, const ViewScales& scales,
+                    const SmoothingParameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -18,12 +18,12 @@ constexpr double kEnough = 0.02;        // squared deviations that a further ste
 
 }  // namespace
 
-struct Smoothed::Fit {
+struct MapFit::Fit {
   State x;
   Stack stack;
-  std::shared_ptr<const SideCovariance> covariance;  ///< shared by fits of the same looks
+  std::shared_ptr<const SideCovariance> covariance;  ///< shared by fits of the same batch
   State covariance_at;                               ///< the x that it is of
-  Eigen::VectorXd doubts;
+  Eigen::VectorXd inflations;
   Eigen::ArrayXi contradicted;
   std::shared_ptr<const Cholesky> R;
   Eigen::MatrixXd whitened;  ///< the rows of the stack by R
@@ -33,23 +33,23 @@ struct Smoothed::Fit {
 
 namespace {
 
-using Fit = Smoothed::Fit;
+using Fit = MapFit::Fit;
 
-/// Weights of a t distribution for whole looks, and which of them contradict x. Whether the weights
+/// Weights of a t distribution for whole batch, and which of them contradict x. Whether the weights
 /// changed enough to matter.
-bool doubtLooks(Fit& fit, double tail) {
+bool inflateKeyframes(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
   const Eigen::VectorXd residual = fit.covariance->withoutPose(
       fit.stack.residual(), fit.R->unwhiten(fit.whitened.rightCols<1>()));
-  fit.contradicted.resize(fit.doubts.size());
+  fit.contradicted.resize(fit.inflations.size());
   bool matters = false;
-  for (Eigen::Index i = 0; i < fit.doubts.size(); ++i) {
+  for (Eigen::Index i = 0; i < fit.inflations.size(); ++i) {
     const double nis = fit.covariance->deviation(residual, i);
     const auto& counts = fit.stack.counts[static_cast<std::size_t>(i)];
     const auto n = static_cast<double>(std::count(counts.begin(), counts.end(), true));
-    const double doubt = std::max(1.0, (tail + nis) / (tail + n));
-    matters = matters || std::abs(doubt - fit.doubts[i]) > kMatters * fit.doubts[i];
-    fit.doubts[i] = doubt;
+    const double inflation = std::max(1.0, (tail + nis) / (tail + n));
+    matters = matters || std::abs(inflation - fit.inflations[i]) > kMatters * fit.inflations[i];
+    fit.inflations[i] = inflation;
     fit.contradicted[i] = nis > kContradicted ? 1 : 0;
   }
   return matters;
@@ -62,14 +62,14 @@ bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
   return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance;
 }
 
-bool factorise(const BatchModel& model, Fit& fit, bool anew) {
+bool factorise(const BatchProblem& model, Fit& fit, bool anew) {
   if (anew) {
     auto covariance = std::make_shared<SideCovariance>();
     model.covariance(fit.x, fit.stack, *covariance);
     fit.covariance = std::move(covariance);
     fit.covariance_at = fit.x;
   }
-  fit.R = std::make_shared<const Cholesky>(fit.covariance->with(fit.doubts));
+  fit.R = std::make_shared<const Cholesky>(fit.covariance->with(fit.inflations));
   if (!fit.R->positive()) return false;
   fit.whitened = fit.R->whiten(fit.stack.rows);
   return true;
@@ -92,7 +92,7 @@ class Damping {
 };
 
 /// One step, and what it was to gain (squared deviations). False where none lowers the cost.
-bool descend(const BatchModel& model, Fit& fit, Damping& damping, double& gained) {
+bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& gained) {
   const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
   const double cost = fit.squaredResidual() + model.priorCost(fit.x);
   for (int attempt = 0; attempt < 6; ++attempt) {
@@ -127,37 +127,38 @@ bool isOneOf(const std::vector<const Hypothesis*>& found, const State& x) {
   });
 }
 
-/// `like` has the covariance and the doubts to begin with: those of another mode of the same looks.
-std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const Looks& looks,
-                            double tail, const Fit* like,
+/// `like` has the covariance and the inflations to begin with: those of another mode of the same
+/// batch.
+std::optional<Fit> fitLooks(const BatchProblem& model, const State& start,
+                            const KeyframeBatch& batch, double tail, const Fit* like,
                             const std::vector<const Hypothesis*>& found) {
   Fit fit;
   fit.x = start;
-  fit.doubts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
+  fit.inflations = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(batch.size()));
   auto stack = model.linearise(fit.x);
   if (!stack) return std::nullopt;
   fit.stack = std::move(*stack);
   if (like && like->stack.counts == fit.stack.counts) {
     fit.covariance = like->covariance;
     fit.covariance_at = like->covariance_at;
-    fit.doubts = like->doubts;
+    fit.inflations = like->inflations;
     fit.R = like->R;
     fit.whitened = fit.R->whiten(fit.stack.rows);
   } else if (!factorise(model, fit, true)) {
     return std::nullopt;
   }
-  const Eigen::Vector3d from = looks.keyframes().back()->from->T_WC.p;
+  const Eigen::Vector3d from = batch.keyframes().back()->from->T_WC.p;
   Damping damping;
   double before = 0.0;
   for (int round = 0; round < kRounds; ++round) {
     double gained = 0.0;
     const bool better = descend(model, fit, damping, gained);
     if (isOneOf(found, fit.x)) return std::nullopt;
-    const bool doubted = doubtLooks(fit, tail);
+    const bool inflated = inflateKeyframes(fit, tail);
     const bool elsewhere = movedInView(fit, from);
-    if ((doubted || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
+    if ((inflated || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
     if (round > 0 && (!better || gained < kEnough)) break;
-    const bool converges = !doubted && !elsewhere && gained < 0.5 * before;
+    const bool converges = !inflated && !elsewhere && gained < 0.5 * before;
     if (round > 0 && converges && gained * gained < kEnough * before) break;
     before = gained;
   }
@@ -165,8 +166,8 @@ std::optional<Fit> fitLooks(const BatchModel& model, const State& start, const L
 }
 
 /// The filter's state, with b and C, from the fit.
-std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const Hypothesis& start,
-                                  const FrameContext& frame) {
+std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
+                                  const Hypothesis& start, const FrameContext& frame) {
   const auto Jw = fit.whitened.leftCols(model.dim());
   const auto rw = fit.whitened.rightCols<1>();
   const Cholesky information(model.quadratic(fit.x, gramOf(fit.whitened)).G);
@@ -181,7 +182,7 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
                 std::max(now->sides[3] - now->sides[1], 1.0))
           .cwiseMax(1e-6);
   const Eigen::MatrixXd Bw =
-      fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.doubts).transpose());
+      fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.inflations).transpose());
   const Eigen::MatrixXd Ew = fit.R->whiten(model.poseNow(fit.stack).transpose());
   // Tall and narrow: to pack them for Eigen's product costs more than the sums.
   const Eigen::MatrixXd BJ = Bw.transpose().lazyProduct(Jw);
@@ -215,7 +216,7 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
   makeSymmetric(h.P);
   const int n = model.moving() ? kStateDim : kVelocity;
   if (!h.x.allFinite() || !isCovariance(h.P.topLeftCorner(n, n))) return std::nullopt;
-  if (placeSigma(h, frame.pose_error.covariance) > frame.parameters->smooth.place * distance) {
+  if (placeSigma(h, frame.pose_error.covariance) > frame.parameters->smoothing.place * distance) {
     return std::nullopt;
   }
   return h;
@@ -223,38 +224,38 @@ std::optional<Hypothesis> stateOf(const BatchModel& model, const Fit& fit, const
 
 }  // namespace
 
-std::optional<Smoothed> Smoothed::make(const Hypothesis& start, const Looks& looks,
-                                       const FrameContext& frame, const Smoothed* like,
-                                       const std::vector<const Hypothesis*>& found) {
-  const BatchModel model(looks, start.moving, start.class_name, start.x, frame);
+std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch& batch,
+                                   const FrameContext& frame, const MapFit* like,
+                                   const std::vector<const Hypothesis*>& found) {
+  const BatchProblem model(batch, start.moving, start.class_name, start.x, frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
-  auto fit = fitLooks(model, x, looks, frame.parameters->box.tail,
+  auto fit = fitLooks(model, x, batch, frame.parameters->box.tail,
                       like ? like->fit_.get() : nullptr, found);
   if (!fit) return std::nullopt;
   auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
-  // Of another view what moves the thing together with the pose looks like information.
-  if (fit->covariance_at != fit->x && !hangsTogether(*h, frame.pose_error.covariance)) {
+  // Of another view what moves the thing together with the pose batch like information.
+  if (fit->covariance_at != fit->x && !isJointCovariance(*h, frame.pose_error.covariance)) {
     h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;
     if (!h) return std::nullopt;
   }
-  Smoothed result(looks, frame);
+  MapFit result(batch, frame);
   result.hypothesis_ = *h;
   result.start_ = start.x;
   result.fit_ = std::make_shared<const Fit>(std::move(*fit));
   return result;
 }
 
-BatchModel Smoothed::modelOf() const {
-  return {*looks_, hypothesis_.moving, hypothesis_.class_name, start_, *frame_};
+BatchProblem MapFit::modelOf() const {
+  return {*batch_, hypothesis_.moving, hypothesis_.class_name, start_, *frame_};
 }
 
-const Eigen::VectorXd& Smoothed::doubts() const { return fit_->doubts; }
+const Eigen::VectorXd& MapFit::inflations() const { return fit_->inflations; }
 
-const Eigen::ArrayXi& Smoothed::contradictions() const { return fit_->contradicted; }
+const Eigen::ArrayXi& MapFit::contradictions() const { return fit_->contradicted; }
 
-std::size_t Smoothed::sides() const {
+std::size_t MapFit::sides() const {
   std::size_t sum = 0;
   for (const auto& counts : fit_->stack.counts) {
     sum += static_cast<std::size_t>(std::count(counts.begin(), counts.end(), true));
@@ -262,29 +263,29 @@ std::size_t Smoothed::sides() const {
   return sum;
 }
 
-Leftover Smoothed::leftover() const {
-  // Of a Gaussian residual of four dimensions: a doubt is never less than one.
+ResidualRatio MapFit::residualRatio() const {
+  // Of a Gaussian residual of four dimensions: a inflation is never less than one.
   constexpr double kShareLeftByDoubts = 0.83;
   const double free = static_cast<double>(sides()) - modelOf().dim();
   if (free <= 0.0) return {};
-  return {frame_->errors.noise * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
+  return {frame_->noise_scale.noise * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
 }
 
-Leftover Smoothed::leftoverOfAzimuths() const {
-  return modelOf().leftoverOfAzimuths(fit_->x, hypothesis_.P(kYaw, kYaw));
+ResidualRatio MapFit::azimuthResidualRatio() const {
+  return modelOf().azimuthResidualRatio(fit_->x, hypothesis_.P(kYaw, kYaw));
 }
 
-double Smoothed::logHead() const { return modelOf().logHead(fit_->x); }
+double MapFit::logHeading() const { return modelOf().logHeading(fit_->x); }
 
-double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
+double MapFit::logEvidence(const Eigen::VectorXd& inflations, bool of_yaw) const {
   constexpr double kImpossible = -1e6;
-  const BatchModel model = modelOf();
+  const BatchProblem model = modelOf();
   const Stack& stack = fit_->stack;
   // At this very state: a determinant of a hundred dimensions forgives no other.
   thread_local SideCovariance covariance;
   thread_local Eigen::MatrixXd storage;
   model.covariance(fit_->x, stack, covariance);
-  Cholesky R = covariance.with(doubts, std::move(storage));
+  Cholesky R = covariance.with(inflations, std::move(storage));
   if (!R.positive()) return kImpossible;
   const Gram gram = gramOf(R.whiten(stack.rows));
   const Quadratic q = model.quadratic(fit_->x, gram);
@@ -294,7 +295,7 @@ double Smoothed::logEvidence(const Eigen::VectorXd& doubts, bool of_yaw) const {
       gram(model.dim(), model.dim()) + model.priorCost(fit_->x) - G.whiten(q.g).squaredNorm();
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
-  const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, doubts);
+  const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, inflations);
   storage = std::move(R).release();
   const double priors = model.logSpeedPrior() + model.logSizePrior();
   return yaw + 0.5 * (free + priors - cost - volume - G.logDeterminant());

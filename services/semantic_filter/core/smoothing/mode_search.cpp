@@ -33,18 +33,18 @@ std::vector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& pr
 
 }  // namespace
 
-std::optional<Smoothed> fit(const Hypothesis& start, const Looks& looks, const FrameContext& frame,
-                            const Smoothed* like,
-                            const std::vector<const Hypothesis*>& found) {
-  auto smoothed = Smoothed::make(start, looks, frame, like, found);
-  const bool taken = smoothed && smoothed->contradicted() <= frame.parameters->smooth.contradicted;
-  return taken ? std::move(smoothed) : std::nullopt;
+std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
+                          const FrameContext& frame, const MapFit* like,
+                          const std::vector<const Hypothesis*>& found) {
+  auto map_fit = MapFit::make(start, batch, frame, like, found);
+  const bool taken = map_fit && map_fit->contradicted() <= frame.parameters->smoothing.contradicted;
+  return taken ? std::move(map_fit) : std::nullopt;
 }
 
-Fitted adopt(Object& object, Hypothesis h, Smoothed&& smoothed, const FrameContext& frame) {
-  const double ground = standOnGround(h, object.id, frame);
-  object.hypotheses.push_back(h);
-  return {object.hypotheses.size() - 1, std::move(smoothed), ground};
+Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame) {
+  const double ground = updateWithGround(h, track.id, frame);
+  track.hypotheses.push_back(h);
+  return {track.hypotheses.size() - 1, std::move(map_fit), ground};
 }
 
 Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
@@ -54,25 +54,25 @@ Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
   h.x.head<3>() -= age * h.x.tail<3>();
   h.x.tail<3>().setZero();
   h.moving = false;
-  h.head = moving.head;
+  h.heading_log_odds = moving.heading_log_odds;
   h.weight = 0.0;
   return h;
 }
 
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
                  const Fitted& driving, const FrameContext& frame) {
-  const Smoothed &still = at_rest.smoothed, &moving = driving.smoothed;
+  const MapFit &still = at_rest.map_fit, &moving = driving.map_fit;
   constexpr double kSurest = 15.0;  // nats
   const ClassPrior& prior = frame.priors->of(name);
   const auto& motion = frame.parameters->motion;
-  const Eigen::VectorXd doubts = still.doubts().cwiseMin(moving.doubts());
-  const double pace =
+  const Eigen::VectorXd inflations = still.inflations().cwiseMin(moving.inflations());
+  const double speed_prior_ratio =
       motion.creeping + (1.0 - motion.creeping) *
                             fasterThan(moving.hypothesis(), motion.slow_share * prior.speed_sigma);
-  const double log_odds =
-      std::clamp(still.logEvidence(doubts) - moving.logEvidence(doubts) + at_rest.ground -
-                     driving.ground + std::log((1.0 - prior.moving) / prior.moving / pace),
-                 -kSurest, kSurest);
+  const double log_odds = std::clamp(
+      still.logEvidence(inflations) - moving.logEvidence(inflations) + at_rest.ground -
+          driving.ground + std::log((1.0 - prior.moving) / prior.moving / speed_prior_ratio),
+      -kSurest, kSurest);
   const double rests = 1.0 / (1.0 + std::exp(-log_odds));
   double weight[2] = {0.0, 0.0};
   for (const auto& h : hs) {
@@ -82,31 +82,31 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
   for (auto& h : hs) {
     if (h.class_name != name || weight[h.moving] <= 0.0) continue;
     h.weight *= all * (h.moving ? 1.0 - rests : rests) / weight[h.moving];
-    if (h.moving) h.pace = pace;
+    if (h.moving) h.speed_prior_ratio = speed_prior_ratio;
   }
 }
 
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
   if (fits.size() < 2) return;
-  Eigen::VectorXd doubts = fits.front().smoothed.doubts();
-  for (const auto& f : fits) doubts = doubts.cwiseMin(f.smoothed.doubts());
+  Eigen::VectorXd inflations = fits.front().map_fit.inflations();
+  for (const auto& f : fits) inflations = inflations.cwiseMin(f.map_fit.inflations());
   constexpr double kNone = -1e9;
-  std::vector<double> evidence;
+  std::vector<double> log_evidence;
   double most = kNone, all = 0.0, sum = 0.0;
   for (auto f = fits.begin(); f != fits.end(); ++f) {
     all += hs[f->index].weight;
     const bool twin = std::any_of(
         fits.begin(), f, [&](const Fitted& g) { return oneMode(hs[g.index], hs[f->index]); });
-    evidence.push_back(twin ? kNone : f->smoothed.logEvidence(doubts, true) + f->ground);
-    most = std::max(most, evidence.back());
+    log_evidence.push_back(twin ? kNone : f->map_fit.logEvidence(inflations, true) + f->ground);
+    most = std::max(most, log_evidence.back());
   }
-  for (auto& e : evidence) {
+  for (auto& e : log_evidence) {
     e = std::exp(e - most);
     if (e < least) e = 0.0;
     sum += e;
   }
   for (std::size_t i = 0; i < fits.size(); ++i) {
-    hs[fits[i].index].weight = all * evidence[i] / sum;
+    hs[fits[i].index].weight = all * log_evidence[i] / sum;
   }
 }
 
@@ -117,78 +117,79 @@ std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits) {
   return best == fits.end() ? std::nullopt : std::optional(std::move(*best));
 }
 
-void seekModes(Object& object, const Looks& looks, const FrameContext& frame, Fits& fits) {
-  const Hypothesis best = object.hypotheses[fits.front().index];
+void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits) {
+  const Hypothesis best = track.hypotheses[fits.front().index];
   for (const auto& start : otherStarts(best, frame.priors->of(best.class_name))) {
     std::vector<const Hypothesis*> found;
-    for (const Fitted& f : fits) found.push_back(&f.smoothed.hypothesis());
-    auto smoothed = fit(start, looks, frame, &fits.front().smoothed, found);
-    if (!smoothed) continue;
-    Hypothesis h = smoothed->hypothesis();
-    h.head = smoothed->logHead();
-    if (h.head < 0.0) h.head = -h.head, h.x[kYaw] = wrapAngle(h.x[kYaw] + M_PI);
-    fits.push_back(adopt(object, std::move(h), std::move(*smoothed), frame));
+    for (const Fitted& f : fits) found.push_back(&f.map_fit.hypothesis());
+    auto map_fit = fit(start, batch, frame, &fits.front().map_fit, found);
+    if (!map_fit) continue;
+    Hypothesis h = map_fit->hypothesis();
+    h.heading_log_odds = map_fit->logHeading();
+    if (h.heading_log_odds < 0.0)
+      h.heading_log_odds = -h.heading_log_odds, h.x[kYaw] = wrapAngle(h.x[kYaw] + M_PI);
+    fits.push_back(adopt(track, std::move(h), std::move(*map_fit), frame));
   }
 }
 
-std::optional<Fitted> driveFrom(Object& object, const Fitted& at_rest, const Looks& looks,
+std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const KeyframeBatch& batch,
                                 const FrameContext& frame) {
   constexpr double kContradicted = -1.0;  // nats
   if (at_rest.ground > kContradicted) return std::nullopt;
-  const Hypothesis start = drivingOff(object.hypotheses[at_rest.index]);
+  const Hypothesis start = asMoving(track.hypotheses[at_rest.index]);
   if (frame.priors->of(start.class_name).moving <= 0.0) return std::nullopt;
-  auto smoothed = fit(start, looks, frame, &at_rest.smoothed);
-  if (!smoothed) return std::nullopt;
-  Hypothesis h = smoothed->hypothesis();
+  auto map_fit = fit(start, batch, frame, &at_rest.map_fit);
+  if (!map_fit) return std::nullopt;
+  Hypothesis h = map_fit->hypothesis();
   h.weight = 1e-3 * start.weight;
-  return adopt(object, std::move(h), std::move(*smoothed), frame);
+  return adopt(track, std::move(h), std::move(*map_fit), frame);
 }
 
-void tryWhatItResembles(Object& object, const Looks& looks, const FrameContext& frame) {
+void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameContext& frame) {
   constexpr double kLeastOdds = -6.0, kSurest = 15.0;  // nats
-  const Hypothesis other = object.best();
-  if (other.class_name != kOtherClass || other.moving || object.resembles.empty()) return;
-  if (classProbability(object, object.resembles) > 0.0) return;
+  const Hypothesis other = track.best();
+  if (other.class_name != kOtherClass || other.moving || track.lookalike_class.empty()) return;
+  if (classProbability(track, track.lookalike_class) > 0.0) return;
   const Parameters& p = *frame.parameters;
-  const ClassPrior& prior = frame.priors->of(object.resembles);
-  if (prior.name != object.resembles) return;
-  const auto as_other = fit(other, looks, frame);
+  const ClassPrior& prior = frame.priors->of(track.lookalike_class);
+  if (prior.name != track.lookalike_class) return;
+  const auto as_other = fit(other, batch, frame);
   if (!as_other) return;
   const Hypothesis& whole = as_other->hypothesis();
   const double distance = (whole.x.head<3>() - frame.view.T_WC().p).norm();
   const double place = std::sqrt(whole.P.topLeftCorner<3, 3>().trace());
-  if (place > p.tend.scale_resolved * distance) return;
+  if (place > p.tracks.scale_resolved * distance) return;
   Hypothesis start = other;
-  start.class_name = object.resembles;
+  start.class_name = track.lookalike_class;
   start.x.segment<3>(kSize) = prior.log_size;
   std::vector<Hypothesis> starts = otherStarts(start, prior);
   starts.push_back(start);
-  std::vector<Smoothed> fits;
+  std::vector<MapFit> fits;
   for (const Hypothesis& one : starts) {
     std::vector<const Hypothesis*> found;
-    for (const Smoothed& f : fits) found.push_back(&f.hypothesis());
-    auto smoothed = fit(one, looks, frame, fits.empty() ? nullptr : &fits.front(), found);
+    for (const MapFit& f : fits) found.push_back(&f.hypothesis());
+    auto map_fit = fit(one, batch, frame, fits.empty() ? nullptr : &fits.front(), found);
     // What the image's border cuts on all sides fits any box.
-    if (smoothed && smoothed->sides() >= as_other->sides() &&
-        !misshapen(smoothed->hypothesis(), prior, p.tend.size_gate)) {
-      fits.push_back(std::move(*smoothed));
+    if (map_fit && map_fit->sides() >= as_other->sides() &&
+        !misshapen(map_fit->hypothesis(), prior, p.tracks.size_gate)) {
+      fits.push_back(std::move(*map_fit));
     }
   }
   if (fits.empty()) return;
-  Eigen::VectorXd doubts = as_other->doubts();
-  for (const Smoothed& one : fits) doubts = doubts.cwiseMin(one.doubts());
-  const double most = as_other->logEvidence(doubts);
+  Eigen::VectorXd inflations = as_other->inflations();
+  for (const MapFit& one : fits) inflations = inflations.cwiseMin(one.inflations());
+  const double most = as_other->logEvidence(inflations);
   const double at_birth = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -
                           std::log(std::max(p.clutter.other_lookalike, 1e-3));
-  for (const Smoothed& one : fits) {
+  for (const MapFit& one : fits) {
     Hypothesis h = one.hypothesis();
-    const double ground = standOnGround(h, object.id, frame);
-    const double odds = one.logEvidence(doubts) - most + at_birth + ground;
+    const double ground = updateWithGround(h, track.id, frame);
+    const double odds = one.logEvidence(inflations) - most + at_birth + ground;
     if (odds < kLeastOdds) continue;
-    object.hypotheses.push_back(h);
-    object.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kSurest));
+    track.hypotheses.push_back(h);
+    track.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kSurest));
   }
-  normalise(object, ClassEvidence::kGeometry);
+  normalise(track, ClassEvidence::kGeometry);
 }
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,4 @@
-// The verb "smooth": an object's hypotheses again from all its remembered looks; which mode of yaw
+// The verb "smooth": an track's hypotheses again from all its remembered batch; which mode of yaw
 // it is, and whether it moves.
 #pragma once
 
@@ -7,22 +7,22 @@
 
 namespace perdure::semantic_filter {
 
-/// Remembers this box of the object's where it shows something new. Whether the object is then to
-/// be smoothed.
-bool rememberLook(Object& object, const Evidence& box, const std::array<bool, 4>& hidden,
-                  const FrameContext& frame);
-/// How much there is to gain, where `fresh` is the share of new looks that is waited for: 1 and
+/// Remembers this box of the track's where it shows something new. Whether the track is then to
+/// be map_fit.
+bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bool, 4>& hidden,
+                      const FrameContext& frame);
+/// How much there is to gain, where `fresh` is the share of new batch that is waited for: 1 and
 /// more is worth it.
-double smoothingNeed(const Object& object, double fresh);
-/// What the fit of a thing leaves over of its looks.
-struct Leftovers {
-  Leftover sides, azimuths;
+double refitNeed(const Track& track, double fresh);
+/// What the fit of a thing leaves over of its batch.
+struct ResidualRatios {
+  ResidualRatio sides, azimuths;
 };
-/// Smooths the object's hypotheses and weighs within each class whether it moves. Of a thing that
-/// surely stands, what is left over of the looks that are new.
-std::optional<Leftovers> smooth(Object& object, const FrameContext& frame);
+/// Smooths the track's hypotheses and weighs within each class whether it moves. Of a thing that
+/// surely stands, what is left over of the batch that are new.
+std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame);
 
-/// Smooths the objects that need it most: as many as a frame has time for; the others wait.
-void smoothNeediest(std::vector<Object*>& objects, Belief& belief, const FrameContext& frame);
+/// Smooths the tracks that need it most: as many as a frame has time for; the others wait.
+void refitNeediest(std::vector<Track*>& tracks, Belief& belief, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -11,7 +11,7 @@ namespace {
 
 constexpr auto kEntry = static_cast<std::size_t>(ClassEvidence::kContext);
 
-/// What the context needs of an object.
+/// What the context needs of an track.
 struct Neighbour {
   ObjectId id = 0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
@@ -19,10 +19,10 @@ struct Neighbour {
   std::vector<ClassNumber> pmf;
 };
 
-/// Of the objects at rest: what drives past is no neighbour.
-std::vector<Neighbour> neighboursOf(const std::vector<Object>& objects) {
+/// Of the tracks at rest: what drives past is no neighbour.
+std::vector<Neighbour> neighboursOf(const std::vector<Track>& tracks) {
   std::vector<Neighbour> result;
-  for (const Object& o : objects) {
+  for (const Track& o : tracks) {
     if (o.best().moving) continue;
     result.push_back({o.id, o.best().x.head<3>(), o.existence, classShares(o)});
   }
@@ -36,14 +36,14 @@ double expected(const std::string& class_name, const Neighbour& n, const Context
   return sum;
 }
 
-std::vector<ClassNumber> contextFrom(const Object& object, const std::vector<Neighbour>& all,
+std::vector<ClassNumber> contextFrom(const Track& track, const std::vector<Neighbour>& all,
                                      const ContextMatrix& matrix) {
-  std::vector<ClassNumber> context = classShares(object);
+  std::vector<ClassNumber> context = classShares(track);
   for (ClassNumber& c : context) {
     c.value = 0.0;
     for (const Neighbour& n : all) {
-      if (n.id == object.id) continue;
-      if ((n.p - object.best().x.head<3>()).norm() > matrix.radius_m) continue;
+      if (n.id == track.id) continue;
+      if ((n.p - track.best().x.head<3>()).norm() > matrix.radius_m) continue;
       c.value += std::log(1.0 - n.r + n.r * expected(c.name, n, matrix));
     }
   }
@@ -85,27 +85,27 @@ ClassLedger* ledgerOf(ObjectBelief& belief, const std::string& name) {
 
 }  // namespace
 
-std::vector<ClassNumber> contextOf(const Object& object, const std::vector<Object>& objects,
+std::vector<ClassNumber> contextOf(const Track& track, const std::vector<Track>& tracks,
                                    const ContextMatrix& matrix) {
-  return contextFrom(object, neighboursOf(objects), matrix);
+  return contextFrom(track, neighboursOf(tracks), matrix);
 }
 
-void contextualise(std::vector<Object>& objects, const ContextMatrix& matrix) {
+void contextualise(std::vector<Track>& tracks, const ContextMatrix& matrix) {
   if (matrix.empty()) return;
-  const auto all = neighboursOf(objects);
-  for (Object& o : objects) {
+  const auto all = neighboursOf(tracks);
+  for (Track& o : tracks) {
     if (o.visible_fraction <= 0.0 || o.best().moving) continue;
     auto fresh = contextFrom(o, all, matrix);
     if (differs(fresh, o.context)) o.context = std::move(fresh);
   }
 }
 
-void addContext(ObjectBelief& belief, const Object& object) {
-  if (object.context.empty()) return;
+void addContext(ObjectBelief& belief, const Track& track) {
+  if (track.context.empty()) return;
   std::vector<ClassNumber> pmf, context;
   for (const ClassBelief& c : belief.classes) {
     pmf.push_back({c.name, c.probability});
-    context.push_back({c.name, valueOf(object.context, c.name)});
+    context.push_back({c.name, valueOf(track.context, c.name)});
   }
   const auto gained = gains(pmf, context);
   for (std::size_t i = 0; i < gained.size(); ++i) {

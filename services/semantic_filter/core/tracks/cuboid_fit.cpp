@@ -1,6 +1,7 @@
 #include "services/semantic_filter/core/tracks/cuboid_fit.h"
 
 #include <ceres/tiny_solver.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -16,17 +17,17 @@ constexpr double kNoStep = 1e100;
 
 /// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range,
 /// four of bias.
-class BirthCost {
+class CuboidCost {
  public:
   using Scalar = double;
   enum { NUM_RESIDUALS = 16, NUM_PARAMETERS = kFree };
   using Residuals = Eigen::Matrix<double, NUM_RESIDUALS, 1>;
   using Jacobian = Eigen::Matrix<double, NUM_RESIDUALS, NUM_PARAMETERS>;
 
-  BirthCost(const Evidence& evidence, const ClassPrior& prior, double yaw, double yaw_sigma,
-            const std::optional<RangeHint>& range, const FrameContext& frame,
-            const Eigen::Vector3d& start)
-      : z_(evidence.z),
+  CuboidCost(const BoxDetection& detection, const ClassPrior& prior, double yaw, double yaw_sigma,
+             const std::optional<RangeHint>& range, const FrameContext& frame,
+             const Eigen::Vector3d& start)
+      : z_(detection.z),
         from_(frame.projector()),
         yaw_(yaw),
         yaw_sigma_(yaw_sigma),
@@ -90,7 +91,7 @@ class BirthCost {
   Eigen::Matrix3d size_whitening_;
 };
 
-/// Depth at which an object of the prior's size has the box's height, or else its width.
+/// Depth at which an track of the prior's size has the box's height, or else its width.
 std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& prior,
                                     const CameraModel& camera) {
   if (z.measured[1] && z.measured[3]) return camera.fy() * std::exp(prior.log_size[2]) / z.height();
@@ -124,10 +125,10 @@ std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& vi
   return Eigen::Vector3d(view.T_WC().R() * ray);  // its length is per metre of depth
 }
 
-std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
-                                            const std::vector<SightPoint>& points,
-                                            const BirthParameters& parameters) {
-  const auto& z = evidence.z;
+std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
+                                            const std::vector<LandmarkDepth>& points,
+                                            const InitiationParameters& parameters) {
+  const auto& z = detection.z;
   const Eigen::Vector2d centre(0.5 * (z.sides[0] + z.sides[2]), 0.5 * (z.sides[1] + z.sides[3]));
   double sum = 0.0, mean = 0.0, square = 0.0;
   std::int64_t n = 0;
@@ -147,22 +148,23 @@ std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
   return RangeHint{1.0 / mean, (0.1 + spread) / mean};
 }
 
-std::optional<CuboidFit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, double yaw,
-                             double yaw_sigma, const std::optional<RangeHint>& range,
-                             const FrameContext& frame) {
-  const auto depth = depthFromSize(evidence.z, prior, *frame.view.camera);
-  const auto ray = centreRay(evidence.z, frame.view);
+std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPrior& prior,
+                                   double yaw, double yaw_sigma,
+                                   const std::optional<RangeHint>& range,
+                                   const FrameContext& frame) {
+  const auto depth = depthFromSize(detection.z, prior, *frame.view.camera);
+  const auto ray = centreRay(detection.z, frame.view);
   if (!depth || !ray) return std::nullopt;
-  const double minimum = frame.parameters->birth.min_distance_m;
+  const double minimum = frame.parameters->initiation.min_distance_m;
   const double start_depth = range ? range->distance_m / ray->norm() : *depth;
   const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
-  const BirthCost cost(evidence, prior, yaw, yaw_sigma, range, frame, start);
+  const CuboidCost cost(detection, prior, yaw, yaw_sigma, range, frame, start);
   VectorFit x = VectorFit::Zero();
   x.head<7>() << start, yaw, prior.log_size;
-  BirthCost::Residuals r;
-  BirthCost::Jacobian J;
+  CuboidCost::Residuals r;
+  CuboidCost::Jacobian J;
   if (!cost(x.data(), r.data(), J.data())) return std::nullopt;  // the solver would not ask
-  ceres::TinySolver<BirthCost> solver;
+  ceres::TinySolver<CuboidCost> solver;
   solver.options.max_num_iterations = 15;
   solver.Solve(cost, &x);
   if (!x.allFinite() || !cost(x.data(), r.data(), J.data())) return std::nullopt;

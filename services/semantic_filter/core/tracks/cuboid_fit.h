@@ -18,18 +18,19 @@ struct RangeHint {
 
 /// Centroid along the ray of the landmarks inside the box; weights fall exponentially from its
 /// centre. Nothing with fewer than birth.min_landmarks.
-std::optional<RangeHint> rangeFromLandmarks(const Evidence& evidence,
-                                            const std::vector<SightPoint>& points,
-                                            const BirthParameters& parameters);
+std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
+                                            const std::vector<LandmarkDepth>& points,
+                                            const InitiationParameters& parameters);
 
 /// One hypothesis for a class and a yaw start. `cost` is half the squared whitened residual.
 struct CuboidFit {
   Hypothesis hypothesis;
   double cost = 0.0;
 };
-std::optional<CuboidFit> fitCuboid(const Evidence& evidence, const ClassPrior& prior, double yaw,
-                             double yaw_sigma, const std::optional<RangeHint>& range,
-                             const FrameContext& frame);
+std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPrior& prior,
+                                   double yaw, double yaw_sigma,
+                                   const std::optional<RangeHint>& range,
+                                   const FrameContext& frame);
 
 /// Unit ray in W through the box's centre.
 std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view);

@@ -33,10 +33,10 @@ std::vector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& fra
   return starts;
 }
 
-void addMovingTwin(Object& object, const Hypothesis& still, const ClassPrior& prior) {
+void addMovingTwin(Track& track, const Hypothesis& still, const ClassPrior& prior) {
   if (prior.moving <= 0.0 || prior.speed_sigma <= 0.0) return;
   Hypothesis twin = still;
-  object.hypotheses.back().weight *= 1.0 - prior.moving;
+  track.hypotheses.back().weight *= 1.0 - prior.moving;
   twin.weight *= prior.moving;
   twin.moving = true;
   const Eigen::Vector2d along(std::cos(twin.x[kYaw]), std::sin(twin.x[kYaw]));
@@ -44,19 +44,19 @@ void addMovingTwin(Object& object, const Hypothesis& still, const ClassPrior& pr
   twin.P.block<2, 2>(kVelocity, kVelocity) =
       s2 * along * along.transpose() + 0.04 * s2 * Eigen::Matrix2d::Identity();
   twin.P(kVelocity + 2, kVelocity + 2) = 0.04;
-  object.hypotheses.push_back(twin);
+  track.hypotheses.push_back(twin);
 }
 
 /// One azimuth alone may be far off: it counts half. It weighs the yaw starts
 /// of a class among each other; the class's own weight does not change.
-void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
+void weighByAzimuth(std::vector<Hypothesis>& fits, const BoxDetection& detection,
                     const ClassPrior& prior, const FrameContext& frame) {
-  if (!evidence.azimuth || !prior.has_yaw) return;
-  const double sigma = azimuthSigma(evidence.azimuth_sigma, prior);
+  if (!detection.azimuth || !prior.has_yaw) return;
+  const double sigma = azimuthSigma(detection.azimuth_sigma, prior);
   double before = 0.0, after = 0.0;
   for (auto& h : fits) {
     before += h.weight;
-    h.weight *= updateWithAzimuth(h, *evidence.azimuth, sigma, 0.5, frame);
+    h.weight *= updateWithAzimuth(h, *detection.azimuth, sigma, 0.5, frame);
     after += h.weight;
   }
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
@@ -65,8 +65,8 @@ void weighByAzimuth(std::vector<Hypothesis>& fits, const Evidence& evidence,
 /// How much better the box's shape (its aspect) fits what was assumed than clutter, whose extents
 /// are log-uniform. Where sides are cut it has none.
 double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_sigma,
-                     const Evidence& evidence, const FrameContext& frame) {
-  const auto& z = evidence.z;
+                     const BoxDetection& detection, const FrameContext& frame) {
+  const auto& z = detection.z;
   const auto box = projectObserved(fit.hypothesis.x, frame.projector(),
                                    frame.styleOf(fit.hypothesis.class_name));
   const bool whole = z.count() == 4 && box &&
@@ -92,7 +92,7 @@ double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_s
 /// How much better the thing's underside fits the ground than that of clutter does, whose boxes are
 /// as likely anywhere in the image: 1 where nothing is known of the ground.
 double groundRatio(Hypothesis& h, const FrameContext& frame) {
-  const double log_ratio = standOnGround(h, 0, frame);
+  const double log_ratio = updateWithGround(h, 0, frame);
   if (log_ratio == 0.0) return 1.0;
   const CameraModel& camera = *frame.view.camera;
   const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
@@ -100,36 +100,36 @@ double groundRatio(Hypothesis& h, const FrameContext& frame) {
   return std::exp(log_ratio) * std::max(span / frame.parameters->ground.span_m, 1.0);
 }
 
-void addClass(Object& object, const ClassPrior& prior, double ratio, const Evidence& evidence,
+void addClass(Track& track, const ClassPrior& prior, double ratio, const BoxDetection& detection,
               const std::vector<YawStart>& starts, const std::optional<RangeHint>& range,
               const FrameContext& frame) {
   std::vector<Hypothesis> fits;
   for (const auto& start : starts) {
-    const auto fit = fitCuboid(evidence, prior, start.yaw, start.sigma, range, frame);
+    const auto fit = fitCuboid(detection, prior, start.yaw, start.sigma, range, frame);
     if (!fit) continue;
     fits.push_back(fit->hypothesis);
     const double part = frame.parameters->box.part;
-    const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, evidence, frame));
+    const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, detection, frame));
     const double ground = groundRatio(fits.back(), frame);
     fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape) * ground;
   }
-  weighByAzimuth(fits, evidence, prior, frame);
+  weighByAzimuth(fits, detection, prior, frame);
   for (const auto& h : fits) {
     if (h.weight < 1e-15) continue;
-    object.hypotheses.push_back(h);
-    addMovingTwin(object, h, prior);
+    track.hypotheses.push_back(h);
+    addMovingTwin(track, h, prior);
   }
 }
 
 /// "other" has three starts of size, so that each Gaussian is narrow enough to be linear in depth.
-void addOther(Object& object, double ratio, const Evidence& evidence, const Eigen::Vector3d& ray,
+void addOther(Track& track, double ratio, const BoxDetection& detection, const Eigen::Vector3d& ray,
               const std::optional<RangeHint>& range, const FrameContext& frame) {
   constexpr double kScales[3] = {-1.2, 0.0, 1.2};
   ClassPrior prior = frame.priors->other;
   const Eigen::Vector3d middle = prior.log_size;
   for (const double scale : kScales) {
     prior.log_size = middle.array() + scale;
-    addClass(object, prior, ratio / 3.0, evidence, yawStarts(prior, frame, ray), range, frame);
+    addClass(track, prior, ratio / 3.0, detection, yawStarts(prior, frame, ray), range, frame);
   }
 }
 
@@ -138,16 +138,16 @@ struct Candidate {
   double log_weight;
 };
 
-std::vector<Candidate> candidates(const Evidence& evidence, const FrameContext& frame) {
+std::vector<Candidate> candidates(const BoxDetection& detection, const FrameContext& frame) {
   std::vector<Candidate> all;
   for (const auto& name : frame.model->classes) {
     ClassPrior prior = frame.priors->of(name);
     prior.name = name;
-    all.push_back({prior, std::log(prior.frequency) + logRatio(evidence, *frame.model, name)});
+    all.push_back({prior, std::log(prior.frequency) + logRatio(detection, *frame.model, name)});
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& a, const auto& b) { return a.log_weight > b.log_weight; });
-  const auto& birth = frame.parameters->birth;
+  const auto& birth = frame.parameters->initiation;
   const auto limit = static_cast<std::size_t>(birth.max_classes);
   if (all.size() > limit) all.resize(limit);
   const double floor = all.empty() ? 0.0 : all.front().log_weight + std::log(birth.class_ratio);
@@ -165,19 +165,19 @@ double frequencies(const FrameContext& frame) {
 
 /// Sets existence by the weights, normalises them, and books both: what was expected before the
 /// box, what the network says, and for the classes what the fits make of that.
-void bookBirth(Object& object, const std::vector<Candidate>& kept, const Evidence& evidence,
-               const FrameContext& frame) {
-  const double odds = frame.parameters->birth.odds;
+void bookInitiation(Track& track, const std::vector<Candidate>& kept, const BoxDetection& detection,
+                    const FrameContext& frame) {
+  const double odds = frame.parameters->initiation.odds;
   double ratio = 0.0;
-  for (const auto& h : object.hypotheses) ratio += h.weight;
+  for (const auto& h : track.hypotheses) ratio += h.weight;
   ratio *= odds;
-  object.existence = {odds / (1.0 + odds), ExistenceEvidence::kPrior, object.as_of};
-  object.existence.become(ratio / (1.0 + ratio), ExistenceEvidence::kHit, object.as_of);
+  track.existence = {odds / (1.0 + odds), ExistenceEvidence::kPrior, track.as_of};
+  track.existence.become(ratio / (1.0 + ratio), ExistenceEvidence::kHit, track.as_of);
   const double other = frame.parameters->clutter.other_prior;
   double frequency = 0.0, said_of_all = 0.0;
   for (const auto& c : kept) frequency += c.prior.frequency;
   std::vector<ClassNumber> prior = {{kOtherClass, std::log(other)}};
-  std::vector<ClassNumber> said = {{kOtherClass, evidence.log_ratio_other}};
+  std::vector<ClassNumber> said = {{kOtherClass, detection.log_ratio_other}};
   for (const auto& c : kept) {
     prior.push_back({c.prior.name, std::log((1.0 - other) * c.prior.frequency / frequency)});
     said.push_back({c.prior.name, c.log_weight - std::log(c.prior.frequency)});
@@ -186,107 +186,108 @@ void bookBirth(Object& object, const std::vector<Candidate>& kept, const Evidenc
     said_of_all += std::exp(prior[i].value + said[i].value);
   }
   for (auto& s : said) s.value -= std::log(said_of_all);
-  normalise(object, ClassEvidence::kGeometry);
-  object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kPrior, prior);
-  object.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, said);
+  normalise(track, ClassEvidence::kGeometry);
+  track.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kPrior, prior);
+  track.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, said);
 }
 
-/// How much another look of the same detector at one object may overlap with its box.
+/// How much another look of the same detector at one track may overlap with its box.
 bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
   const Box box_a{a.sides[0], a.sides[1], a.sides[2], a.sides[3]};
   const Box box_b{b.sides[0], b.sides[1], b.sides[2], b.sides[3]};
   return intersectionOverUnion(box_a, box_b) > 0.65;
 }
 
-/// The rest of an object that is almost out of the image is no new object.
-bool leavesView(Expected& expected, const Belief& belief,
-                                const std::vector<Sight>& sights, const Evidence& box) {
+/// The rest of an track that is almost out of the image is no new track.
+bool leavesView(BoxExplanations& expected, const Belief& belief,
+                const std::vector<TrackVisibility>& visibilities, const BoxDetection& box) {
   if (box.z.count() == 4) return false;  // what leaves is cut by the border
-  for (std::size_t j = 0; j < sights.size(); ++j) {
-    if (sights[j].visibility != Visibility::kOutOfView || !belief.objects[j].confirmed) continue;
-    if (expected.matches(j, sights[j].hidden, box)) return true;
+  for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].confirmed) continue;
+    if (expected.matches(j, visibilities[j].hidden_sides, box)) return true;
   }
   return false;
 }
 
 }  // namespace
 
-double logBirthRatio(const Evidence& evidence, const FrameContext& frame) {
+double logInitiationRatio(const BoxDetection& detection, const FrameContext& frame) {
   const auto& p = *frame.parameters;
   double sum = 0.0;
   for (const auto& name : frame.model->classes) {
-    sum += frame.priors->of(name).frequency * std::exp(logRatio(evidence, *frame.model, name));
+    sum += frame.priors->of(name).frequency * std::exp(logRatio(detection, *frame.model, name));
   }
   const double named = sum / frequencies(frame);
-  return std::log(p.birth.odds) - evidence.log_remnants +
+  return std::log(p.initiation.odds) - detection.log_partial_views +
          std::log((1.0 - p.clutter.other_prior) * named +
-                  p.clutter.other_prior * std::exp(evidence.log_ratio_other));
+                  p.clutter.other_prior * std::exp(detection.log_ratio_other));
 }
 
-std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHint>& range,
-                           TimePoint now, const FrameContext& frame) {
-  const auto ray = centreRay(evidence.z, frame.view);
+std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
+                              TimePoint now, const FrameContext& frame) {
+  const auto ray = centreRay(detection.z, frame.view);
   if (!ray) return std::nullopt;
-  const auto kept = candidates(evidence, frame);
-  Object object;
+  const auto kept = candidates(detection, frame);
+  Track track;
   const double other = frame.parameters->clutter.other_prior;
   const double named = (1.0 - other) / frequencies(frame);
   for (const auto& c : kept) {
-    addClass(object, c.prior, named * std::exp(c.log_weight), evidence,
+    addClass(track, c.prior, named * std::exp(c.log_weight), detection,
              yawStarts(c.prior, frame, *ray), range, frame);
   }
-  addOther(object, other * std::exp(evidence.log_ratio_other), evidence, *ray, range, frame);
-  if (object.hypotheses.empty()) return std::nullopt;
-  object.first_seen = object.last_seen = object.as_of = now;
-  object.pose_product = frame.pose_error.product;
-  object.first_box = object.last_box = OwnBox{now, evidence.z.box()};
-  object.hits = 1;
-  object.asked = frame.model->names;
-  bookBirth(object, kept, evidence, frame);
-  object.alike = evidence.log_ratio_best;
-  object.hit_view = object.late_view = {frame.view.T_WC(), 1.0};
-  object.last_view = frame.view.T_WC();
-  return object;
+  addOther(track, other * std::exp(detection.log_ratio_other), detection, *ray, range, frame);
+  if (track.hypotheses.empty()) return std::nullopt;
+  track.first_seen = track.last_seen = track.as_of = now;
+  track.pose_product = frame.pose_error.product;
+  track.first_box = track.last_box = AssignedBox{now, detection.z.box()};
+  track.hits = 1;
+  track.classes_considered = frame.model->names;
+  bookInitiation(track, kept, detection, frame);
+  track.lookalike_nats = detection.log_ratio_best;
+  track.detected_from = track.observed_from = {frame.view.T_WC(), 1.0};
+  track.predicted_from = frame.view.T_WC();
+  return track;
 }
 
-void births(Belief& belief, const std::vector<Sight>& sights,
-                            const Eigen::VectorXd& claimed, const FrameInput& input,
-                            const FrameContext& frame, IdBook& ids) {
+void initiateTracks(Belief& belief, const std::vector<TrackVisibility>& visibilities,
+                    const Eigen::VectorXd& explained, const FrameInput& input,
+                    const FrameContext& frame, IdBook& ids) {
   const auto& boxes = *input.boxes;
-  std::vector<Object> born;
-  Expected expected(belief, input, *frame.parameters);
+  std::vector<Track> initiated;
+  BoxExplanations expected(belief, input, *frame.parameters);
   std::vector<std::size_t> accepted;
   for (std::size_t z = 0; z < boxes.size(); ++z) {
-    if (claimed[static_cast<Eigen::Index>(z)] > frame.parameters->birth.claimed) accepted.push_back(z);
+    if (explained[static_cast<Eigen::Index>(z)] > frame.parameters->initiation.explained)
+      accepted.push_back(z);
   }
   for (std::size_t z = 0; z < boxes.size(); ++z) {
-    const Evidence& e = boxes[z];
-    if (claimed[static_cast<Eigen::Index>(z)] > frame.parameters->birth.claimed) continue;
-    if (logBirthRatio(e, frame) - std::log(frame.parameters->birth.odds) <
-        frame.parameters->birth.min_log_ratio) {
+    const BoxDetection& e = boxes[z];
+    if (explained[static_cast<Eigen::Index>(z)] > frame.parameters->initiation.explained) continue;
+    if (logInitiationRatio(e, frame) - std::log(frame.parameters->initiation.odds) <
+        frame.parameters->initiation.min_log_ratio) {
       continue;
     }
     const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
       return sameThing(boxes[other].z, e.z);
     });
-    if (doubled || leavesView(expected, belief, sights, e)) continue;
-    auto object =
-        bear(e, rangeFromLandmarks(e, input.points, frame.parameters->birth), input.stamp.time, frame);
-    if (!object) continue;
-    object->id = ids.idFor(input.stamp.sequence, z);
-    if (const double share = claimed[static_cast<Eigen::Index>(z)]; share > 0.0) {
-      object->existence.become(object->existence * (1.0 - share), ExistenceEvidence::kShared,
-                               input.stamp.time);
+    if (doubled || leavesView(expected, belief, visibilities, e)) continue;
+    auto track = initiate(e, rangeFromLandmarks(e, input.points, frame.parameters->initiation),
+                          input.stamp.time, frame);
+    if (!track) continue;
+    track->id = ids.idFor(input.stamp.sequence, z);
+    if (const double share = explained[static_cast<Eigen::Index>(z)]; share > 0.0) {
+      track->existence.become(track->existence * (1.0 - share), ExistenceEvidence::kShared,
+                              input.stamp.time);
     }
-    tendHypotheses(*object, *frame.priors, *frame.parameters);
-    if (object->hypotheses.empty()) continue;
-    born.push_back(std::move(*object));
+    reduceMixture(*track, *frame.priors, *frame.parameters);
+    if (track->hypotheses.empty()) continue;
+    initiated.push_back(std::move(*track));
     accepted.push_back(z);
   }
-  std::move(born.begin(), born.end(), std::back_inserter(belief.objects));
+  std::move(initiated.begin(), initiated.end(), std::back_inserter(belief.tracks));
   const auto older = [](const auto& a, const auto& b) { return a.id < b.id; };
-  if (!std::is_sorted(belief.objects.begin(), belief.objects.end(), older)) {
-    std::stable_sort(belief.objects.begin(), belief.objects.end(), older);
+  if (!std::is_sorted(belief.tracks.begin(), belief.tracks.end(), older)) {
+    std::stable_sort(belief.tracks.begin(), belief.tracks.end(), older);
   }
 }
 

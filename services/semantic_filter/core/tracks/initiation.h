@@ -1,4 +1,4 @@
-// Birth of an object from a box that nobody claims (paper, "Initialization"; DESIGN 5, item 10).
+// Birth of an track from a box that nobody claims (paper, "Initialization"; DESIGN 5, item 10).
 //
 // Position, yaw and size minimise the reprojection error of the box under the class's size prior
 // (Ceres' TinySolver); the covariance is the inverse of the Gauss-Newton Hessian there, so that a
@@ -18,14 +18,15 @@
 namespace perdure::semantic_filter {
 
 /// Log of the ratio "new object" to clutter for this box, all classes together.
-double logBirthRatio(const Evidence& evidence, const FrameContext& frame);
+double logInitiationRatio(const BoxDetection& detection, const FrameContext& frame);
 
-/// An object without id, or nothing where the box cannot fix one (too few sides measured).
-std::optional<Object> bear(const Evidence& evidence, const std::optional<RangeHint>& range,
-                           TimePoint now, const FrameContext& frame);
+/// An track without id, or nothing where the box cannot fix one (too few sides measured).
+std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
+                              TimePoint now, const FrameContext& frame);
 
-/// Objects from the boxes that nobody claims; `claimed` is Association::claimed.
-void births(Belief& belief, const std::vector<Sight>& sights, const Eigen::VectorXd& claimed,
-            const FrameInput& input, const FrameContext& frame, IdBook& ids);
+/// Objects from the boxes that nobody claims; `explained` is Association::explained.
+void initiateTracks(Belief& belief, const std::vector<TrackVisibility>& visibilities,
+                    const Eigen::VectorXd& explained, const FrameInput& input,
+                    const FrameContext& frame, IdBook& ids);
 
 }  // namespace perdure::semantic_filter

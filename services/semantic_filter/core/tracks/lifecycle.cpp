@@ -15,25 +15,25 @@ namespace {
 
 /// Detected a few times and then no more, where nothing can be asked of it: what nobody was told
 /// of, and what is mostly not there, is not kept for it to come back.
-bool forgettable(const Object& o, const TendParameters& parameters) {
+bool forgettable(const Track& o, const TrackParameters& parameters) {
   if (o.once_confirmed || o.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;
-  const TimePoint last = std::max(o.hidden.last, o.away.last);
-  const bool unasked = o.hidden.count + o.away.count > 0;
+  const TimePoint last = std::max(o.occluded_frames.last, o.out_of_view_frames.last);
+  const bool unasked = o.occluded_frames.count + o.out_of_view_frames.count > 0;
   return unasked && toSeconds(last - o.last_seen) > parameters.tentative_s;
 }
 
 }  // namespace
 
-bool established(const Object& object, const FrameContext& frame) {
-  const TendParameters& tend = frame.parameters->tend;
-  return object.existence >= tend.confirm && object.hits >= tend.confirm_hits &&
-         placeSigma(object.best(), frame.pose_error.covariance) < tend.confirm_sigma_m;
+bool established(const Track& track, const FrameContext& frame) {
+  const TrackParameters& tend = frame.parameters->tracks;
+  return track.existence >= tend.confirm && track.hits >= tend.confirm_hits &&
+         placeSigma(track.best(), frame.pose_error.covariance) < tend.confirm_sigma_m;
 }
 
-std::vector<Object> confirmAndBury(std::vector<Object>& objects, const FrameContext& frame) {
-  const TendParameters& parameters = frame.parameters->tend;
-  for (auto& o : objects) {
+std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame) {
+  const TrackParameters& parameters = frame.parameters->tracks;
+  for (auto& o : tracks) {
     if (o.visible_fraction <= 0.0) continue;
     const double sigma = placeSigma(o, frame.pose_error.covariance);
     if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) {
@@ -44,19 +44,19 @@ std::vector<Object> confirmAndBury(std::vector<Object>& objects, const FrameCont
       o.confirmed = o.once_confirmed = true;
     }
   }
-  std::vector<Object> buried;
-  std::erase_if(objects, [&](Object& o) {
+  std::vector<Track> deleted;
+  std::erase_if(tracks, [&](Track& o) {
     if (forgettable(o, parameters)) return true;
     if (o.existence >= (o.hits > 1 ? parameters.gone : parameters.gone_tentative)) return false;
-    buried.push_back(std::move(o));
+    deleted.push_back(std::move(o));
     return true;
   });
   const auto limit = static_cast<std::size_t>(parameters.max_objects);
-  if (objects.size() <= limit) return buried;
-  std::stable_sort(objects.begin(), objects.end(),
+  if (tracks.size() <= limit) return deleted;
+  std::stable_sort(tracks.begin(), tracks.end(),
                    [](const auto& a, const auto& b) { return a.existence > b.existence; });
-  objects.resize(limit);
-  return buried;
+  tracks.resize(limit);
+  return deleted;
 }
 
 }  // namespace perdure::semantic_filter

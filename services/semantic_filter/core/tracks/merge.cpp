@@ -17,10 +17,10 @@ namespace {
 constexpr double kSurelyOne = 0.6;    // overlap that two boxes of one frame do not make two things
 constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
 
-bool isOther(const Object& o) { return o.best().class_name == kOtherClass; }
+bool isOther(const Track& o) { return o.best().class_name == kOtherClass; }
 
 /// Weights of a's hypotheses once b's PMF is taken in as well.
-void multiplyPmf(Object& a, const Object& b) {
+void multiplyPmf(Track& a, const Track& b) {
   for (auto& h : a.hypotheses) {
     h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
   }
@@ -29,13 +29,13 @@ void multiplyPmf(Object& a, const Object& b) {
 
 /// A guess of a moment, as the border of the image makes them, says nothing against a thing that
 /// was looked at for long.
-bool knownAsWell(const Object& guess, const Object& thing) {
+bool knownAsWell(const Track& guess, const Track& thing) {
   constexpr std::uint32_t kFewer = 4;  // looks
   return guess.once_confirmed || kFewer * guess.hits >= thing.hits;
 }
 
-/// They contradict each other: their mean would be wrong with more certainty than either, and of
-/// cuboids that are turned against each other it is of no thing's shape.
+/// They contradict each other: their mean would be wrong with more existenceCeiling than either,
+/// and of cuboids that are turned against each other it is of no thing's shape.
 bool contradict(const Hypothesis& a, const Hypothesis& b) {
   constexpr double kBeyond = 24.3;  // of a squared deviation in seven dimensions, one in a thousand
   constexpr double kTurned = 0.35;  // rad
@@ -48,7 +48,7 @@ bool contradict(const Hypothesis& a, const Hypothesis& b) {
 }
 
 /// As many as both have, weighed by how often each was found: later looks will tell.
-void keepBoth(Object& a, const Object& b) {
+void keepBoth(Track& a, const Track& b) {
   const double share = static_cast<double>(b.hits) / std::max(1.0, double(a.hits) + double(b.hits));
   for (auto& h : a.hypotheses) h.weight *= 1.0 - share;
   for (Hypothesis h : b.hypotheses) {
@@ -60,16 +60,16 @@ void keepBoth(Object& a, const Object& b) {
 
 /// The one that was hardly found of late where it should be was something else, as far as its looks
 /// do not fit the other.
-void forgetLooksAtOthers(Object& a, Object& b, const BoxParameters& parameters) {
+void forgetLooksAtOthers(Track& a, Track& b, const BoxParameters& parameters) {
   constexpr double kHardlyFound = 0.2;
-  Object& lost = a.support < b.support ? a : b;
-  const Hypothesis& found = (a.support < b.support ? b : a).best();
-  if (lost.support >= kHardlyFound) return;
+  Track& lost = a.recent_detection_share < b.recent_detection_share ? a : b;
+  const Hypothesis& found = (a.recent_detection_share < b.recent_detection_share ? b : a).best();
+  if (lost.recent_detection_share >= kHardlyFound) return;
   std::erase_if(lost.keyframes.write(),
                 [&](const auto& k) { return !explains(found, *k, parameters); });
 }
 
-void absorb(Object& a, Object& b, const FrameContext& frame) {
+void absorb(Track& a, Track& b, const FrameContext& frame) {
   if (isOther(a) != isOther(b)) {
     if (isOther(a) && knownAsWell(b, a)) {
       a.hypotheses = b.hypotheses;
@@ -87,9 +87,9 @@ void absorb(Object& a, Object& b, const FrameContext& frame) {
     a.hypotheses.front().weight = weight;
     multiplyPmf(a, b);
   }
-  a.found_again = a.found_again || b.found_again;
+  a.detected_on_revisit = a.detected_on_revisit || b.detected_on_revisit;
   a.existence.become(std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence),
-                              certainty(a, frame.parameters->tend)),
+                              existenceCeiling(a, frame.parameters->tracks)),
                      ExistenceEvidence::kMerge, a.as_of);
   a.hits += b.hits;
   a.confirmed = a.confirmed || b.confirmed;
@@ -99,16 +99,17 @@ void absorb(Object& a, Object& b, const FrameContext& frame) {
     a.first_box = b.first_box;
   }
   if (b.last_box && (!a.last_box || b.last_box->time > a.last_box->time)) a.last_box = b.last_box;
-  a.hit_view.looks = std::max(a.hit_view.looks, b.hit_view.looks);
-  a.late_view.looks += b.late_view.looks;
-  a.support = std::max(a.support, b.support);
-  a.found_rate.join(b.found_rate, screenScales(frame.parameters->visibility));
-  a.sightings.in_sight |= b.sightings.in_sight;
-  a.sightings.found |= b.sightings.found;
-  a.remembers_all = a.remembers_all && b.remembers_all;
+  a.detected_from.observations =
+      std::max(a.detected_from.observations, b.detected_from.observations);
+  a.observed_from.observations += b.observed_from.observations;
+  a.recent_detection_share = std::max(a.recent_detection_share, b.recent_detection_share);
+  a.detection_rate.join(b.detection_rate, detectabilityScales(frame.parameters->visibility));
+  a.history.visible |= b.history.visible;
+  a.history.detected |= b.history.detected;
+  a.keyframes_complete = a.keyframes_complete && b.keyframes_complete;
   const auto& box = frame.parameters->box;
-  joinKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
-                frame.parameters->smooth);
+  mergeKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
+                 frame.parameters->smoothing);
 }
 
 /// Two things that the image shows side by side are two, however near their estimated depths are.
@@ -119,27 +120,27 @@ bool sameInImage(const State& a, const State& b, const Projector& from) {
   return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
 }
 
-bool bothSeen(const Object& a, const Object& b) {
+bool bothSeen(const Track& a, const Track& b) {
   return a.visible_fraction > 0.0 && b.visible_fraction > 0.0;
 }
 
 /// Whether b is hidden by a, which is seen: two solid things cannot share their space, so that a
 /// copy behind its original is no thing of its own.
-bool hides(const Object& a, const Object& b) {
+bool hides(const Track& a, const Track& b) {
   return a.visible_fraction > 0.0 && b.visibility == Visibility::kOccluded && b.blocked_by == a.id;
 }
 
 /// A hidden one waits at the time when it was last seen; what is merged is of one time.
-void bringUpToDate(Object& a, Object& b, const FrameContext& frame) {
+void bringUpToDate(Track& a, Track& b, const FrameContext& frame) {
   const TimePoint now = std::max(a.as_of, b.as_of);
-  for (Object* o : {&a, &b}) {
+  for (Track* o : {&a, &b}) {
     if (o->visible_fraction > 0.0) continue;
     predict(*o, now, frame.pose_error, frame.parameters->motion, viewWalkOf(frame));
   }
 }
 
 /// Whose id survives: that which was claimed, whatever guesses at it are older.
-bool older(const Object& a, const Object& b) {
+bool older(const Track& a, const Track& b) {
   if (a.once_confirmed != b.once_confirmed) return a.once_confirmed;
   return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
 }
@@ -173,24 +174,24 @@ Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W)
 }
 
 /// Two boxes of one frame are of two things.
-bool foundTogether(const Object& a, const Object& b) {
-  return (a.sightings.found & b.sightings.found) != 0;
+bool foundTogether(const Track& a, const Track& b) {
+  return (a.history.detected & b.history.detected) != 0;
 }
 
-/// In sight both, each frame's box went to the one or to the other: so do two beliefs share the
-/// boxes of one thing.
-bool takeTurns(const Object& a, const Object& b) {
+/// In visibility both, each frame's box went to the one or to the other: so do two beliefs share
+/// the boxes of one thing.
+bool takeTurns(const Track& a, const Track& b) {
   constexpr int kTurns = 4;
-  const Sightings &of_a = a.sightings, &of_b = b.sightings;
+  const DetectionHistory &of_a = a.history, &of_b = b.history;
   if (foundTogether(a, b) || a.hits < 2 || b.hits < 2) return false;
-  return std::popcount((of_a.found ^ of_b.found) & of_a.in_sight & of_b.in_sight) >= kTurns;
+  return std::popcount((of_a.detected ^ of_b.detected) & of_a.visible & of_b.visible) >= kTurns;
 }
 
 /// Two beliefs about one thing: they overlap in space and in the image, or less and take turns; or
 /// one is of no known class and lies in the other, since two solid things cannot share their space.
-bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
+bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
   const State &x = a.best().x, &y = b.best().x;
-  const TendParameters& tend = frame.parameters->tend;
+  const TrackParameters& tend = frame.parameters->tracks;
   const Shared shared = sharedVolume(x, y, frame.view.up_W);
   if (isOther(a) != isOther(b)) {
     if (shared.of_lesser > tend.merge_inside) return true;
@@ -201,7 +202,7 @@ bool sameSpace(const Object& a, const Object& b, const FrameContext& frame) {
   return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.projector());
 }
 
-/// Of an object's best hypothesis: where it stands, and half the diagonal of its cuboid. Of all
+/// Of an track's best hypothesis: where it stands, and half the diagonal of its cuboid. Of all
 /// pairs few touch, and to see that is most of the work: it is laid out apart from the beliefs.
 struct Ball {
   Eigen::Vector3d centre;
@@ -209,10 +210,10 @@ struct Ball {
   bool seen;
 };
 
-Ball ballOf(const Object& object) {
-  const State& x = object.best().x;
+Ball ballOf(const Track& track) {
+  const State& x = track.best().x;
   return {x.head<3>(), 0.5 * x.segment<3>(kSize).array().exp().matrix().norm(),
-          object.visible_fraction > 0.0};
+          track.visible_fraction > 0.0};
 }
 
 bool touch(const Ball& a, const Ball& b) {
@@ -220,14 +221,14 @@ bool touch(const Ball& a, const Ball& b) {
   return (a.seen || b.seen) && (a.centre - b.centre).squaredNorm() <= reach * reach;
 }
 
-bool oneHasBeenSeen(const Object& a, const Object& b) {
+bool oneHasBeenSeen(const Track& a, const Track& b) {
   return bothSeen(a, b) || hides(a, b) || hides(b, a);
 }
 
 }  // namespace
 
 /// "other" is no class of its own: it may turn out to be the known thing in the same place.
-bool sameKind(const Object& a, const Object& b) {
+bool sameKind(const Track& a, const Track& b) {
   if (a.best().moving != b.best().moving) return false;
   return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
 }
@@ -260,7 +261,7 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   const Vector7d pull =
       J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d) : Vector7d(J_b * d - J_prior * prior_mean);
   Hypothesis fused = a;
-  fused.footing = {};
+  fused.ground_contact = {};
   fused.x.head<7>() += P * pull;
   fused.x[kYaw] = wrapAngle(fused.x[kYaw]);
   const Eigen::Matrix<double, 7, 6> B = P * (J_a * B_a + J_new * B_b);
@@ -274,18 +275,18 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   return isCovariance(fused.P.topLeftCorner<7, 7>()) && fused.x.allFinite() ? fused : a;
 }
 
-void mergeTwo(Object& a, Object& b, const FrameContext& frame) {
+void mergeTwo(Track& a, Track& b, const FrameContext& frame) {
   bringUpToDate(a, b, frame);
   absorb(a, b, frame);
 }
 
-std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame) {
+std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
   std::vector<Ball> balls;
-  for (const Object& o : objects) balls.push_back(ballOf(o));
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    for (std::size_t j = i + 1; j < objects.size();) {
-      Object &a = objects[i], &b = objects[j];
+  for (const Track& o : tracks) balls.push_back(ballOf(o));
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    for (std::size_t j = i + 1; j < tracks.size();) {
+      Track &a = tracks[i], &b = tracks[j];
       if (!touch(balls[i], balls[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
           !sameSpace(a, b, frame)) {
         ++j;
@@ -294,9 +295,9 @@ std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameC
       if (older(b, a)) std::swap(a, b);
       mergeTwo(a, b, frame);
       merges.push_back({a.id, b.id});
-      objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+      tracks.erase(tracks.begin() + static_cast<std::ptrdiff_t>(j));
       balls.erase(balls.begin() + static_cast<std::ptrdiff_t>(j));
-      balls[i] = ballOf(objects[i]);
+      balls[i] = ballOf(tracks[i]);
     }
   }
   return merges;

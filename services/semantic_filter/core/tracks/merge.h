@@ -1,4 +1,4 @@
-// Two objects that are one (paper, "Merge"; DESIGN 5, item 12): which are, and what is then known.
+// Two tracks that are one (paper, "Merge"; DESIGN 5, item 12): which are, and what is then known.
 #pragma once
 
 #include <vector>
@@ -17,18 +17,18 @@ struct MergeRecord {
 /// Shared volume over joint volume of two upright cuboids.
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 
-/// Merges objects of the same best class that occupy the same space; the older survives. Both are
+/// Merges tracks of the same best class that occupy the same space; the older survives. Both are
 /// seen, or one hides the other; the rest waits: a frame that does not see them does not change
 /// them.
-std::vector<MergeRecord> mergeObjects(std::vector<Object>& objects, const FrameContext& frame);
+std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame);
 
 /// Neither class nor motion forbids that they are one.
-bool sameKind(const Object& a, const Object& b);
+bool sameKind(const Track& a, const Track& b);
 
-/// Takes b, which is the same object, into a.
-void mergeTwo(Object& a, Object& b, const FrameContext& frame);
+/// Takes b, which is the same track, into a.
+void mergeTwo(Track& a, Track& b, const FrameContext& frame);
 
-/// The state of two beliefs about one object whose errors are independent but for the size prior
+/// The state of two beliefs about one track whose errors are independent but for the size prior
 /// and the pose error, both of which are counted once.
 Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
                 const Matrix6d& P_pose);

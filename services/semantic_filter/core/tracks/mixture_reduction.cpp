@@ -10,14 +10,14 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-bool hasMoving(const Object& object) {
-  return std::any_of(object.hypotheses.begin(), object.hypotheses.end(),
+bool hasMoving(const Track& track) {
+  return std::any_of(track.hypotheses.begin(), track.hypotheses.end(),
                      [](const auto& h) { return h.moving; });
 }
 
-void settleSlowOnes(Object& object, double min_speed) {
-  if (!hasMoving(object)) return;
-  for (auto& h : object.hypotheses) {
+void settleSlowHypotheses(Track& track, double min_speed) {
+  if (!hasMoving(track)) return;
+  for (auto& h : track.hypotheses) {
     if (!h.moving) continue;
     const Eigen::Matrix2d P = h.P.block<2, 2>(kVelocity, kVelocity);
     const double sigma = std::sqrt(std::max(P.trace(), 0.0));
@@ -28,25 +28,26 @@ void settleSlowOnes(Object& object, double min_speed) {
 
 /// What moves seldom creeps: the Gaussian prior of a moving one's velocity has a hole around zero.
 /// Without it a parked car of unusual size is one of usual size that creeps.
-void weighPace(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
-  if (!hasMoving(object)) return;
-  for (auto& h : object.hypotheses) {
+void applySpeedPrior(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
+  if (!hasMoving(track)) return;
+  for (auto& h : track.hypotheses) {
     if (!h.moving) continue;
     const double slow = motion.slow_share * priors.of(h.class_name).speed_sigma;
-    const double pace = motion.creeping + (1.0 - motion.creeping) * fasterThan(h, slow);
-    h.weight *= pace / h.pace;
-    h.pace = pace;
+    const double speed_prior_ratio =
+        motion.creeping + (1.0 - motion.creeping) * fasterThan(h, slow);
+    h.weight *= speed_prior_ratio / h.speed_prior_ratio;
+    h.speed_prior_ratio = speed_prior_ratio;
   }
 }
 
-/// Two beliefs about one place of very different certainty are two explanations.
+/// Two beliefs about one place of very different existenceCeiling are two explanations.
 bool wider(const Hypothesis& a, const Hypothesis& b) {
   const double va = a.P.topLeftCorner<3, 3>().trace(), vb = b.P.topLeftCorner<3, 3>().trace();
   return std::max(va, vb) > 4.0 * std::min(va, vb);
 }
 
-void mergeNearOnes(Object& object, double threshold) {
-  auto& hs = object.hypotheses.write();
+void mergeNearHypotheses(Track& track, double threshold) {
+  auto& hs = track.hypotheses.write();
   for (std::size_t i = 0; i < hs.size(); ++i) {
     for (std::size_t j = hs.size() - 1; j > i; --j) {
       if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
@@ -59,73 +60,73 @@ void mergeNearOnes(Object& object, double threshold) {
 }
 
 /// Without parallax nobody can tell a toy from a car: until the distance is known, "other" stays.
-bool scaleIsOpen(const Object& object, const TendParameters& tend) {
-  const double distance = (object.best().x.head<3>() - object.hit_view.T_WC.p).norm();
-  const double variance = object.best().P.topLeftCorner<3, 3>().trace();
+bool scaleIsOpen(const Track& track, const TrackParameters& tend) {
+  const double distance = (track.best().x.head<3>() - track.detected_from.T_WC.p).norm();
+  const double variance = track.best().P.topLeftCorner<3, 3>().trace();
   return std::sqrt(variance) > tend.scale_resolved * distance;
 }
 
 /// A car half as high as cars are is none: what has drifted there has lost its way. Whatever is
-/// left of the object is as likely as it was.
-void pruneMisshapen(Object& object, const ClassPriors& priors, double size_gate) {
+/// left of the track is as likely as it was.
+void pruneMisshapen(Track& track, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
-  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
+  std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
     if (!misshapen(h, priors.of(h.class_name), size_gate)) return false;
     lost += h.weight;
     return true;
   });
-  if (lost <= 0.0 || object.hypotheses.empty()) return;
-  object.existence.become(object.existence * (1.0 - std::min(lost, 1.0)),
-                          ExistenceEvidence::kMisshapen, object.as_of);
+  if (lost <= 0.0 || track.hypotheses.empty()) return;
+  track.existence.become(track.existence * (1.0 - std::min(lost, 1.0)),
+                         ExistenceEvidence::kMisshapen, track.as_of);
 }
 
-void pruneLightOnes(Object& object, const TendParameters& tend) {
-  const std::string best_class = object.best().class_name;
+void pruneLightHypotheses(Track& track, const TrackParameters& tend) {
+  const std::string best_class = track.best().class_name;
   const bool dominant =
-      object.hits >= 3 && classProbability(object, best_class) > tend.class_dominates;
-  const bool open = scaleIsOpen(object, tend);
-  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
+      track.hits >= 3 && classProbability(track, best_class) > tend.class_dominates;
+  const bool open = scaleIsOpen(track, tend);
+  std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
     if (open && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
     return h.weight < tend.hypothesis_floor || (dominant && h.class_name != best_class);
   });
 }
 
-void addMovingTwin(Object& object, const ClassPriors& priors, const MotionParameters& motion) {
-  if (object.running_nis < motion.start_nis || hasMoving(object)) return;
-  const ClassPrior& prior = priors.of(object.best().class_name);
-  if (prior.moving <= 0.0 || object.hits < 3) return;
-  Hypothesis twin = drivingOff(object.best());
+void addMovingTwin(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
+  if (track.running_nis < motion.start_nis || hasMoving(track)) return;
+  const ClassPrior& prior = priors.of(track.best().class_name);
+  if (prior.moving <= 0.0 || track.hits < 3) return;
+  Hypothesis twin = asMoving(track.best());
   twin.weight *= motion.start_probability;
   twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
   // Or it stands where we are wrong about it: the same thing along the ray, near and far.
-  Hypothesis wide = object.best();
-  wide.footing = {};
+  Hypothesis wide = track.best();
+  wide.ground_contact = {};
   wide.weight *= motion.start_probability * motion.misplaced_odds;
-  const Eigen::Vector3d ray = wide.x.head<3>() - object.hit_view.T_WC.p;
+  const Eigen::Vector3d ray = wide.x.head<3>() - track.detected_from.T_WC.p;
   const double relative = motion.misplaced_sigma;
   Eigen::Matrix<double, kStateDim, 1> g = Eigen::Matrix<double, kStateDim, 1>::Zero();
   g.head<3>() = ray;
   g.segment<3>(kSize).setOnes();
   wide.P += relative * relative * g * g.transpose();
-  object.hypotheses.push_back(wide);
-  object.hypotheses.push_back(twin);
-  object.running_nis = 1.0;
+  track.hypotheses.push_back(wide);
+  track.hypotheses.push_back(twin);
+  track.running_nis = 1.0;
 }
 
 }  // namespace
 
-void tendHypotheses(Object& object, const ClassPriors& priors, const Parameters& parameters) {
-  weighPace(object, priors, parameters.motion);
-  settleSlowOnes(object, parameters.motion.min_speed);
-  mergeNearOnes(object, parameters.tend.hypothesis_merge);
-  normalise(object, ClassEvidence::kMotion);
-  pruneMisshapen(object, priors, parameters.tend.size_gate);
-  if (object.hypotheses.empty()) return;
-  normalise(object, ClassEvidence::kGeometry);
-  pruneLightOnes(object, parameters.tend);
-  book(object, ClassEvidence::kPruning);
-  addMovingTwin(object, priors, parameters.motion);
-  normalise(object, ClassEvidence::kMotion);
+void reduceMixture(Track& track, const ClassPriors& priors, const Parameters& parameters) {
+  applySpeedPrior(track, priors, parameters.motion);
+  settleSlowHypotheses(track, parameters.motion.min_speed);
+  mergeNearHypotheses(track, parameters.tracks.hypothesis_merge);
+  normalise(track, ClassEvidence::kMotion);
+  pruneMisshapen(track, priors, parameters.tracks.size_gate);
+  if (track.hypotheses.empty()) return;
+  normalise(track, ClassEvidence::kGeometry);
+  pruneLightHypotheses(track, parameters.tracks);
+  book(track, ClassEvidence::kPruning);
+  addMovingTwin(track, priors, parameters.motion);
+  normalise(track, ClassEvidence::kMotion);
 }
 
 }  // namespace perdure::semantic_filter

@@ -9,35 +9,35 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// The box inside the gate that fits the object's place best, whatever it is said to be.
-const Evidence* boxOf(const ObjectLook& look, const std::vector<Evidence>& boxes) {
-  const HypothesisLook& best = look.hypotheses.front();
-  const Evidence* found = nullptr;
+/// The box inside the gate that fits the track's place best, whatever it is said to be.
+const BoxDetection* boxOf(const TrackScore& score, const std::vector<BoxDetection>& boxes) {
+  const HypothesisScore& best = score.hypotheses.front();
+  const BoxDetection* found = nullptr;
   double least = 0.0;
-  for (std::size_t i = 0; i < look.boxes.size(); ++i) {
-    if (best.fits[i].likelihood <= 0.0 || (found && best.fits[i].nis >= least)) continue;
-    found = &boxes[look.boxes[i]];
-    least = best.fits[i].nis;
+  for (std::size_t i = 0; i < score.boxes.size(); ++i) {
+    if (best.matches[i].likelihood <= 0.0 || (found && best.matches[i].nis >= least)) continue;
+    found = &boxes[score.boxes[i]];
+    least = best.matches[i].nis;
   }
   return found;
 }
 
-std::vector<std::string> missing(const ClassNames& known, const ClassNames& asked) {
+std::vector<std::string> missing(const ClassNames& known, const ClassNames& considered) {
   std::vector<std::string> names;
-  std::set_difference(known.begin(), known.end(), asked.begin(), asked.end(),
+  std::set_difference(known.begin(), known.end(), considered.begin(), considered.end(),
                       std::back_inserter(names));
   return names;
 }
 
 /// Of the new ones those that a birth from this box would keep.
-std::vector<ClassPrior> candidatesOf(const std::vector<std::string>& names, const Evidence& box,
+std::vector<ClassPrior> candidatesOf(const std::vector<std::string>& names, const BoxDetection& box,
                                      const FrameContext& frame) {
   const auto weight = [&](const std::string& name) {
     return std::log(frame.priors->of(name).frequency) + logRatio(box, *frame.model, name);
   };
   double best = -1e300;
   for (const auto& name : frame.model->classes) best = std::max(best, weight(name));
-  const auto& birth = frame.parameters->birth;
+  const auto& birth = frame.parameters->initiation;
   std::vector<std::pair<double, std::string>> kept;
   for (const auto& name : names) {
     const double w = weight(name);
@@ -62,7 +62,7 @@ double logSizeDensity(const Hypothesis& h, const ClassPrior& prior) {
 /// The hypothesis as one of another class: its geometry, given that class's size prior.
 Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   h.class_name = prior.name;
-  h.footing = {};
+  h.ground_contact = {};
   const Eigen::Matrix3d S = h.P.block<3, 3>(kSize, kSize) + prior.log_size_covariance;
   const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.middleCols<3>(kSize));
   h.x += K * (prior.log_size - Eigen::Vector3d(h.x.segment<3>(kSize)));
@@ -72,24 +72,24 @@ Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   return h;
 }
 
-/// Frequencies of the classes that the object has.
-double frequencyOf(const Object& object, const ClassPriors& priors) {
+/// Frequencies of the classes that the track has.
+double frequencyOf(const Track& track, const ClassPriors& priors) {
   double sum = 0.0;
-  for (const auto& c : classShares(object)) {
+  for (const auto& c : classShares(track)) {
     if (c.name != kOtherClass) sum += priors.of(c.name).frequency;
   }
   return sum;
 }
 
-/// The class by the object's best one: each way of standing (mode, motion) that this one has.
-std::vector<Hypothesis> recastAll(const Object& object, const ClassPrior& prior,
+/// The class by the track's best one: each way of standing (mode, motion) that this one has.
+std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
                                   const FrameContext& frame) {
   std::vector<Hypothesis> all;
   double weight = 0.0;
-  for (const auto& h : object.hypotheses) {
-    if (h.class_name != object.best().class_name || (h.moving && prior.moving <= 0.0)) continue;
+  for (const auto& h : track.hypotheses) {
+    if (h.class_name != track.best().class_name || (h.moving && prior.moving <= 0.0)) continue;
     Hypothesis twin = recast(h, prior);
-    if (misshapen(twin, prior, frame.parameters->tend.size_gate) || !twin.x.allFinite()) continue;
+    if (misshapen(twin, prior, frame.parameters->tracks.size_gate) || !twin.x.allFinite()) continue;
     weight += twin.weight;
     all.push_back(twin);
   }
@@ -105,56 +105,57 @@ struct Entrants {
   double share = 0.0;  ///< sum of the weights
 };
 
-Entrants entrantsOf(const Object& object, const std::vector<ClassPrior>& entering,
+Entrants entrantsOf(const Track& track, const std::vector<ClassPrior>& entering,
                     const FrameContext& frame) {
   Entrants result;
-  double frequency = frequencyOf(object, *frame.priors);
+  double frequency = frequencyOf(track, *frame.priors);
   for (const auto& prior : entering) frequency += prior.frequency;
   const double named = 1.0 - frame.parameters->clutter.other_prior;
-  const double usual = logSizeDensity(object.best(), frame.priors->of(object.best().class_name));
+  const double usual = logSizeDensity(track.best(), frame.priors->of(track.best().class_name));
   for (const auto& prior : entering) {
-    auto twins = recastAll(object, prior, frame);
+    auto twins = recastAll(track, prior, frame);
     if (twins.empty()) continue;
     const double share = named * prior.frequency / frequency;
     result.share += share;
     for (auto& h : twins) h.weight *= share;
-    const double fit = logSizeDensity(object.best(), prior) - usual;
+    const double fit = logSizeDensity(track.best(), prior) - usual;
     result.fits.push_back({prior.name, std::exp(std::min(fit, 0.0))});
     result.hypotheses.insert(result.hypotheses.end(), twins.begin(), twins.end());
   }
   return result;
 }
 
-void enter(Object& object, const Entrants& entrants) {
-  for (auto& h : object.hypotheses) h.weight *= 1.0 - entrants.share;
-  auto& hs = object.hypotheses.write();
+void enter(Track& track, const Entrants& entrants) {
+  for (auto& h : track.hypotheses) h.weight *= 1.0 - entrants.share;
+  auto& hs = track.hypotheses.write();
   hs.insert(hs.end(), entrants.hypotheses.begin(), entrants.hypotheses.end());
-  normalise(object, ClassEvidence::kPrior);
-  for (auto& h : object.hypotheses) {
+  normalise(track, ClassEvidence::kPrior);
+  for (auto& h : track.hypotheses) {
     for (const auto& fit : entrants.fits) h.weight *= fit.name == h.class_name ? fit.value : 1.0;
   }
-  normalise(object, ClassEvidence::kGeometry);
+  normalise(track, ClassEvidence::kGeometry);
 }
 
 }  // namespace
 
-bool admitNewClasses(Object& object, const ObjectLook& look, const std::vector<Evidence>& boxes,
+bool admitNewClasses(Track& track, const TrackScore& score, const std::vector<BoxDetection>& boxes,
                      const FrameContext& frame) {
   const auto& known = frame.model->names;
-  if (object.asked == known) return false;
-  if (!object.asked || *object.asked == *known) {  // one that came back: nobody knows what by
-    object.asked = known;
+  if (track.classes_considered == known) return false;
+  if (!track.classes_considered ||
+      *track.classes_considered == *known) {  // one that came back: nobody knows what by
+    track.classes_considered = known;
     return false;
   }
-  const auto names = missing(*known, *object.asked);
-  const Evidence* box = names.empty() ? nullptr : boxOf(look, boxes);
+  const auto names = missing(*known, *track.classes_considered);
+  const BoxDetection* box = names.empty() ? nullptr : boxOf(score, boxes);
   if (!box) return false;
-  ClassNames all = *object.asked;
+  ClassNames all = *track.classes_considered;
   all.insert(names.begin(), names.end());
-  object.asked = std::make_shared<const ClassNames>(std::move(all));
-  const Entrants entrants = entrantsOf(object, candidatesOf(names, *box, frame), frame);
+  track.classes_considered = std::make_shared<const ClassNames>(std::move(all));
+  const Entrants entrants = entrantsOf(track, candidatesOf(names, *box, frame), frame);
   if (entrants.hypotheses.empty()) return false;
-  enter(object, entrants);
+  enter(track, entrants);
   return true;
 }
 

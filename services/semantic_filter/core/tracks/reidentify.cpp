@@ -15,30 +15,30 @@ constexpr double kOverlap_s = 0.5;  // both may have been seen for so long
 constexpr double kDriven_s = 2.0;   // and for so long nobody knows it
 constexpr double kTraced_s = 3.0;   // for which a speed tells where something came from
 constexpr double kCarried_m = 2.5;  // by which things are carried without leaving
-constexpr int kLooks = 3;           // at the empty place
+constexpr int kLeastKeyframes = 3;  // at the empty place
 constexpr double kTooFar = std::numeric_limits<double>::infinity();
 
-bool isMissing(const Object& o) { return o.once_confirmed && o.existence < kMissing; }
+bool isMissing(const Track& o) { return o.once_confirmed && o.existence < kMissing; }
 
-/// Whether most looks that showed the one had the other's place in the picture, and nothing was
+/// Whether most keyframes that showed the one had the other's place in the picture, and nothing was
 /// there: what is new only because nobody looked there before has not moved.
-bool wasLookedAt(const Eigen::Vector3d& place, const Object& missing) {
-  const auto& looks = missing.keyframes;
-  const auto count = std::count_if(looks.begin(), looks.end(), [&](const auto& k) {
+bool wasLookedAt(const Eigen::Vector3d& place, const Track& missing) {
+  const auto& keyframes = missing.keyframes;
+  const auto count = std::count_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
     const CameraModel& camera = k->from->camera;
     const auto pixel = camera.project(k->from->T_WC.inverse() * place);
     return pixel && camera.inImage(*pixel);
   });
-  return count >= kLooks && 2 * count >= static_cast<std::ptrdiff_t>(looks.size());
+  return count >= kLeastKeyframes && 2 * count >= static_cast<std::ptrdiff_t>(keyframes.size());
 }
 
-bool isThere(const Object& o, const FrameContext& frame) {
+bool isThere(const Track& o, const FrameContext& frame) {
   return o.confirmed || established(o, frame);
 }
 
 /// The one was seen in a box, and from then on the other in almost the same: they are one thing,
 /// though it was not believed to be where it was, or, bent to what no car is, not what it was.
-bool takesOver(const Object& found, const Object& missing) {
+bool takesOver(const Track& found, const Track& missing) {
   constexpr double kAtOnce_s = 0.5, kAlike = 0.5;
   if (!found.best().moving || !found.first_box || !missing.last_box) return false;
   const std::string& was = missing.best().class_name;
@@ -50,7 +50,7 @@ bool takesOver(const Object& found, const Object& missing) {
 
 /// Metres between where the one stood and where the other must have been then; infinite where they
 /// cannot be one.
-double apart(const Object& missing, const Object& found, const FrameContext& frame) {
+double apart(const Track& missing, const Track& found, const FrameContext& frame) {
   const Hypothesis& h = found.best();
   if (!isThere(found, frame) || h.class_name == kOtherClass) return kTooFar;
   if (takesOver(found, missing)) return 0.0;
@@ -69,21 +69,21 @@ double apart(const Object& missing, const Object& found, const FrameContext& fra
   return metres < (h.moving ? 0.75 * length : kCarried_m) ? metres : kTooFar;
 }
 
-std::size_t nearest(const std::vector<Object>& objects, std::size_t of, bool among_missing,
+std::size_t nearest(const std::vector<Track>& tracks, std::size_t of, bool among_missing,
                     const FrameContext& frame) {
-  std::size_t best = objects.size();
+  std::size_t best = tracks.size();
   double least = kTooFar;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (i == of || isMissing(objects[i]) != among_missing) continue;
-    const double d = among_missing ? apart(objects[i], objects[of], frame)
-                                   : apart(objects[of], objects[i], frame);
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (i == of || isMissing(tracks[i]) != among_missing) continue;
+    const double d =
+        among_missing ? apart(tracks[i], tracks[of], frame) : apart(tracks[of], tracks[i], frame);
     if (d < least) least = d, best = i;
   }
   return best;
 }
 
 /// What is known of the thing is what the newcomer shows.
-void takeUp(Object& past, Object&& now) {
+void takeOverIdentity(Track& past, Track&& now) {
   now.id = past.id;
   now.first_seen = past.first_seen;
   now.first_box = past.first_box;
@@ -94,14 +94,14 @@ void takeUp(Object& past, Object&& now) {
 }
 
 /// What was known of it stays; how it is seen now is what the newcomer shows.
-void resume(Object& past, Object& now, const FrameContext& frame) {
+void resumeTrack(Track& past, Track& now, const FrameContext& frame) {
   mergeTwo(past, now, frame);
-  past.lead = now.lead;
-  past.hit_view = now.hit_view;
-  past.late_view = now.late_view;
-  past.screened = now.screened;
-  past.elusive = now.elusive;
-  past.seen_existence = now.seen_existence;
+  past.real_over_present = now.real_over_present;
+  past.detected_from = now.detected_from;
+  past.observed_from = now.observed_from;
+  past.unmapped_occluder = now.unmapped_occluder;
+  past.hard_to_detect = now.hard_to_detect;
+  past.existence_when_detected = now.existence_when_detected;
   past.visibility = now.visibility;
   past.visible_fraction = now.visible_fraction;
   past.blocked_by = now.blocked_by;
@@ -109,25 +109,25 @@ void resume(Object& past, Object& now, const FrameContext& frame) {
 
 }  // namespace
 
-std::vector<MergeRecord> reuniteMoved(std::vector<Object>& objects, const FrameContext& frame) {
+std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (!isMissing(objects[i])) continue;
-    const std::size_t j = nearest(objects, i, false, frame);
-    if (j == objects.size() || nearest(objects, j, true, frame) != i) continue;
-    merges.push_back({objects[i].id, objects[j].id, true, false});
-    takeUp(objects[i], std::move(objects[j]));
-    objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(j));
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (!isMissing(tracks[i])) continue;
+    const std::size_t j = nearest(tracks, i, false, frame);
+    if (j == tracks.size() || nearest(tracks, j, true, frame) != i) continue;
+    merges.push_back({tracks[i].id, tracks[j].id, true, false});
+    takeOverIdentity(tracks[i], std::move(tracks[j]));
+    tracks.erase(tracks.begin() + static_cast<std::ptrdiff_t>(j));
     if (j < i) --i;
   }
   return merges;
 }
 
-void rememberGone(std::vector<Object>& gone, std::vector<Object> buried, TimePoint now,
-                  const TendParameters& parameters) {
+void keepDeleted(std::vector<Track>& gone, std::vector<Track> deleted, TimePoint now,
+                 const TrackParameters& parameters) {
   std::erase_if(gone,
-                [&](const Object& o) { return toSeconds(now - o.as_of) > parameters.return_s; });
-  for (Object& o : buried) {
+                [&](const Track& o) { return toSeconds(now - o.as_of) > parameters.return_s; });
+  for (Track& o : deleted) {
     const Hypothesis& best = o.best();
     if (!o.once_confirmed || best.moving || best.class_name == kOtherClass) continue;
     o.visible_fraction = 0.0;
@@ -135,37 +135,37 @@ void rememberGone(std::vector<Object>& gone, std::vector<Object> buried, TimePoi
   }
 }
 
-std::vector<MergeRecord> findAgain(std::vector<Object>& objects, std::vector<Object>& gone,
-                                   const FrameContext& frame) {
+std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks, std::vector<Track>& gone,
+                                           const FrameContext& frame) {
   std::vector<MergeRecord> merges;
-  for (Object& o : objects) {
+  for (Track& o : tracks) {
     if (gone.empty()) break;
     if (!isThere(o, frame) || o.visible_fraction <= 0.0) continue;
     const bool drives = o.best().moving;
     std::size_t found = gone.size();
-    double most = frame.parameters->tend.merge_overlap;
+    double most = frame.parameters->tracks.merge_overlap;
     for (std::size_t i = 0; i < gone.size(); ++i) {
-      const Object& past = gone[i];
+      const Track& past = gone[i];
       if (o.first_seen <= past.last_seen) continue;
-      const bool alike = past.best().class_name == o.best().class_name;
-      const double shared = drives  ? (takesOver(o, past) ? 1.0 : 0.0)
-                            : alike ? overlap(past.best().x, o.best().x, frame.view.up_W)
-                                    : 0.0;
+      const bool lookalike_nats = past.best().class_name == o.best().class_name;
+      const double shared = drives           ? (takesOver(o, past) ? 1.0 : 0.0)
+                            : lookalike_nats ? overlap(past.best().x, o.best().x, frame.view.up_W)
+                                             : 0.0;
       if (shared >= most) most = shared, found = i;
     }
     if (found == gone.size()) continue;
     merges.push_back({gone[found].id, o.id, drives, !drives});
     if (drives) {
-      takeUp(gone[found], std::move(o));
+      takeOverIdentity(gone[found], std::move(o));
     } else {
-      resume(gone[found], o, frame);
+      resumeTrack(gone[found], o, frame);
     }
     o = std::move(gone[found]);
     gone.erase(gone.begin() + static_cast<std::ptrdiff_t>(found));
   }
   if (merges.empty()) return merges;
-  std::stable_sort(objects.begin(), objects.end(),
-                   [](const Object& a, const Object& b) { return a.id < b.id; });
+  std::stable_sort(tracks.begin(), tracks.end(),
+                   [](const Track& a, const Track& b) { return a.id < b.id; });
   return merges;
 }
 

@@ -7,11 +7,11 @@
 
 namespace perdure::semantic_filter {
 
-bool bearAgain(Object& object, const std::vector<ClassNumber>& pmf, const Evidence& evidence,
-               const std::optional<RangeHint>& range, const FrameContext& frame) {
-  auto born = bear(evidence, range, object.as_of, frame);
-  if (!born) return false;
-  const auto shares = classShares(*born);
+bool reinitialise(Track& track, const std::vector<ClassNumber>& pmf, const BoxDetection& detection,
+                  const std::optional<RangeHint>& range, const FrameContext& frame) {
+  auto initiated = initiate(detection, range, track.as_of, frame);
+  if (!initiated) return false;
+  const auto shares = classShares(*initiated);
   std::vector<Hypothesis> known;
   double of_known = 0.0;
   for (const auto& c : pmf) {
@@ -19,23 +19,23 @@ bool bearAgain(Object& object, const std::vector<ClassNumber>& pmf, const Eviden
                                   [&](const ClassNumber& s) { return s.name == c.name; });
     if (c.name == kOtherClass || now == shares.end()) continue;
     of_known += c.value;
-    for (const auto& h : born->hypotheses) {
+    for (const auto& h : initiated->hypotheses) {
       if (h.class_name != c.name) continue;
       known.push_back(h);
       known.back().weight *= c.value / now->value;
     }
   }
   if (of_known > 0.5) {
-    object.hypotheses = std::move(known);
+    track.hypotheses = std::move(known);
   } else {
-    object.hypotheses = std::move(born->hypotheses);
+    track.hypotheses = std::move(initiated->hypotheses);
   }
-  object.keyframes.clear();
-  object.remembers_all = true;
-  object.fresh_keyframes = object.remembered = object.seek_modes_at = 0;
-  object.smoothing_patience = 1;
-  object.running_nis = 1.0;
-  normalise(object, ClassEvidence::kGeometry);
+  track.keyframes.clear();
+  track.keyframes_complete = true;
+  track.new_keyframes = track.keyframes_seen = track.mode_search_due = 0;
+  track.refit_patience = 1;
+  track.running_nis = 1.0;
+  normalise(track, ClassEvidence::kGeometry);
   return true;
 }
 

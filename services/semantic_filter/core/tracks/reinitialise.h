@@ -10,8 +10,8 @@
 namespace perdure::semantic_filter {
 
 /// Id, existence and known classes (`pmf`, of before the loss) stay; geometry and motion are those
-/// of a birth. False, and the object left as it is, where the box cannot fix one.
-bool bearAgain(Object& object, const std::vector<ClassNumber>& pmf, const Evidence& evidence,
-               const std::optional<RangeHint>& range, const FrameContext& frame);
+/// of a birth. False, and the track left as it is, where the box cannot fix one.
+bool reinitialise(Track& track, const std::vector<ClassNumber>& pmf, const BoxDetection& detection,
+                  const std::optional<RangeHint>& range, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

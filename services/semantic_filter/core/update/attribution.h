@@ -21,19 +21,19 @@ struct Shares {
 struct LookReasons {
   ExistenceEvidence kind = ExistenceEvidence::kHit;
   double excused = 0.0;  ///< nats of a miss that a screen explains, >= 0
-  /// Of a look that shows the object: what the network's activations add to log π of each class.
+  /// Of a look that shows the track: what the network's activations add to log π of each class.
   std::vector<ClassNumber> activation;
 };
 
-/// `looked_at` are the look's boxes; `seen` is the probability that one of the boxes is the
-/// object's, `worth` the look's where one is, `exponent` that of A between classes (update.h).
-LookReasons reasonsOf(const Object& object, const std::vector<Shares>& shares, double seen,
-                      double worth, double exponent, const std::vector<std::size_t>& looked_at,
-                      const std::vector<Evidence>& boxes, const FrameContext& frame);
+/// `looked_at` are the look's boxes; `detected` is the probability that one of the boxes is the
+/// track's, `tempering` the look's where one is, `exponent` that of A between classes (update.h).
+LookReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
+                      double tempering, double exponent, const std::vector<std::size_t>& looked_at,
+                      const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
 /// Sets existence and books it.
-void bookExistence(Object& object, double r, const LookReasons& reasons);
+void bookExistence(Track& track, double r, const LookReasons& reasons);
 /// Divides the weights by their sum and books the classes. The numbers are sound.
-void bookClasses(Object& object, const LookReasons& reasons);
+void bookClasses(Track& track, const LookReasons& reasons);
 
 }  // namespace perdure::semantic_filter

@@ -14,18 +14,18 @@ namespace {
 
 constexpr double kMaxHead = 6.0;  // nats
 
-/// Within each (class, static or moving) the azimuth may weigh the yaw modes; never across, so that
-/// neither existence nor class nor motion can learn from it.
-void weighYawModes(Object& object, const std::vector<double>& likelihood) {
+/// Within each (class, static or moving) the azimuth may updateClassAndExistence the yaw modes;
+/// never across, so that neither existence nor class nor motion can learn from it.
+void weighYawModes(Track& track, const std::vector<double>& likelihood) {
   std::map<std::pair<std::string, bool>, std::pair<double, double>> totals;
-  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
-    const auto& h = object.hypotheses[i];
+  for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
+    const auto& h = track.hypotheses[i];
     auto& [before, after] = totals[{h.class_name, h.moving}];
     before += h.weight;
     after += h.weight * likelihood[i];
   }
-  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
-    auto& h = object.hypotheses[i];
+  for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
+    auto& h = track.hypotheses[i];
     const auto& [before, after] = totals[{h.class_name, h.moving}];
     if (after > 0.0) h.weight *= likelihood[i] * before / after;
   }
@@ -33,45 +33,47 @@ void weighYawModes(Object& object, const std::vector<double>& likelihood) {
 
 }  // namespace
 
-void updateAzimuths(Object& object, const std::vector<Shares>& shares, double worth,
-                    const std::vector<std::size_t>& looked_at, const std::vector<Evidence>& boxes,
-                    const FrameContext& frame) {
+void updateAzimuths(Track& track, const std::vector<Shares>& shares, double tempering,
+                    const std::vector<std::size_t>& looked_at,
+                    const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
   const bool any = std::any_of(looked_at.begin(), looked_at.end(),
                                [&](std::size_t z) { return boxes[z].azimuth.has_value(); });
   if (!any) return;
-  std::vector<double> likelihood(object.hypotheses.size(), 1.0);
-  for (std::size_t i = 0; i < object.hypotheses.size(); ++i) {
-    const ClassPrior& prior = frame.priors->of(object.hypotheses[i].class_name);
+  std::vector<double> likelihood(track.hypotheses.size(), 1.0);
+  for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
+    const ClassPrior& prior = frame.priors->of(track.hypotheses[i].class_name);
     if (!prior.has_yaw) continue;
     for (std::size_t b = 0; b < looked_at.size(); ++b) {
-      const Evidence& box = boxes[looked_at[b]];
+      const BoxDetection& box = boxes[looked_at[b]];
       if (!box.azimuth || shares[i].box[b] < 0.2) continue;
       const double sigma = azimuthSigma(box.azimuth_sigma, prior);
-      const double weight = shares[i].box[b] * std::sqrt(worth);
+      const double weight = shares[i].box[b] * std::sqrt(tempering);
       likelihood[i] *= std::pow(
-          updateWithAzimuth(object.hypotheses[i], *box.azimuth, sigma, weight, frame), weight);
+          updateWithAzimuth(track.hypotheses[i], *box.azimuth, sigma, weight, frame), weight);
     }
   }
-  weighYawModes(object, likelihood);
+  weighYawModes(track, likelihood);
 }
 
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame) {
-  const AzimuthLook look = azimuthLook(azimuth, h.x, frame.view, sigma * sigma + h.P(kYaw, kYaw));
-  h.head = std::clamp(h.head + weight * headOdds(look), -kMaxHead, kMaxHead);
-  const double R = sigma * sigma / std::max(weight * look.inlier, 1e-9);
+  const AzimuthMatch match =
+      matchAzimuth(azimuth, h.x, frame.view, sigma * sigma + h.P(kYaw, kYaw));
+  h.heading_log_odds =
+      std::clamp(h.heading_log_odds + weight * headingOdds(match), -kMaxHead, kMaxHead);
+  const double R = sigma * sigma / std::max(weight * match.inlier, 1e-9);
   const double S = h.P(kYaw, kYaw) + R;
   const State K = h.P.col(kYaw) / S;
-  h.x += K * look.residual;
+  h.x += K * match.residual;
   h.P = (h.P - S * K * K.transpose()).eval();
   h.C = (h.C - K * h.C.row(kYaw)).eval();
-  if (h.head < 0.0) {
-    h.head = -h.head;
+  if (h.heading_log_odds < 0.0) {
+    h.heading_log_odds = -h.heading_log_odds;
     h.x[kYaw] += M_PI;
   }
   h.x[kYaw] = wrapAngle(h.x[kYaw]);
   makeSymmetric(h.P);
-  return look.likelihood;
+  return match.likelihood;
 }
 
 }  // namespace perdure::semantic_filter

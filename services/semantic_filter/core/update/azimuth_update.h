@@ -12,10 +12,11 @@ namespace perdure::semantic_filter {
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame);
 
-/// By the azimuths of the boxes that may be the object's. The errors of azimuths are less alike from
-/// look to look than those of boxes: their exponent is the square root of the look's worth.
-void updateAzimuths(Object& object, const std::vector<Shares>& shares, double worth,
-                    const std::vector<std::size_t>& looked_at, const std::vector<Evidence>& boxes,
-                    const FrameContext& frame);
+/// By the azimuths of the boxes that may be the track's. The errors of azimuths are less
+/// lookalike_nats from look to look than those of boxes: their exponent is the square root of the
+/// look's tempering.
+void updateAzimuths(Track& track, const std::vector<Shares>& shares, double tempering,
+                    const std::vector<std::size_t>& looked_at,
+                    const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -10,31 +10,31 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Of A over the hypotheses, by a look's worth and in full.
+/// Of A over the hypotheses, by a look's tempering and in full.
 struct MeanA {
   double tempered = 0.0, full = 0.0;
 };
 
 /// π ∝ π A. Within a class the hypotheses differ by geometry alone, whose shared errors are in the
 /// state: A counts in full there. Between classes, and for existence, looks share what the network
-/// mistakes: A counts by the look's worth. Returns the mean of A over the prior.
-MeanA weighHypotheses(Object& object, const std::vector<Shares>& shares, double worth) {
+/// mistakes: A counts by the look's tempering. Returns the mean of A over the prior.
+MeanA updateWeights(Track& track, const std::vector<Shares>& shares, double tempering) {
   std::map<std::string, std::pair<double, double>> classes;  // weight, Σ w A
   double mean_A = 0.0, tempered_A = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    auto& [weight, sum] = classes[object.hypotheses[i].class_name];
-    weight += object.hypotheses[i].weight;
-    sum += object.hypotheses[i].weight * shares[i].A;
+    auto& [weight, sum] = classes[track.hypotheses[i].class_name];
+    weight += track.hypotheses[i].weight;
+    sum += track.hypotheses[i].weight * shares[i].A;
   }
   for (const auto& [name, c] : classes) {
     if (c.first <= 0.0) continue;
     mean_A += c.second;
-    tempered_A += c.first * std::pow(c.second / c.first, worth);
+    tempered_A += c.first * std::pow(c.second / c.first, tempering);
   }
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    const auto& [weight, sum] = classes[object.hypotheses[i].class_name];
+    const auto& [weight, sum] = classes[track.hypotheses[i].class_name];
     if (weight > 0.0) {
-      object.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, worth - 1.0);
+      track.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, tempering - 1.0);
     }
   }
   return {tempered_A, mean_A};
@@ -44,7 +44,8 @@ MeanA weighHypotheses(Object& object, const std::vector<Shares>& shares, double 
 /// and by the looks since then the filter would give up true ones before all looks are asked again.
 /// One that explains this look about as well as the best keeps `least` of its class until then; the
 /// class's own weight stays.
-void keepModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares, double least) {
+void keepSearchedModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares,
+                       double least) {
   constexpr double kAsWell = 0.05;  // of the best one's A
   struct Class {
     double before = 0.0, after = 0.0, best_A = 0.0;
@@ -58,7 +59,7 @@ void keepModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares, d
   for (std::size_t i = 0; i < hs.size(); ++i) {
     Hypothesis& h = hs[i];
     Class& c = classes[h.class_name];
-    const bool kept = h.modes_sought && !h.moving && shares[i].A > kAsWell * c.best_A;
+    const bool kept = h.modes_searched && !h.moving && shares[i].A > kAsWell * c.best_A;
     if (kept) h.weight = std::max(h.weight, least * c.before);
     c.after += h.weight;
   }
@@ -69,26 +70,29 @@ void keepModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares, d
 }
 
 /// Existence has two accounts. "It is a real thing": looks from one place share the network's
-/// mistakes, hits and misses alike, so that A counts by the look's worth. "It is there still": a
-/// patch of wall that passes for a chair does not go away, so that A counts in full, and one hit
-/// tells that the misses before it were the network's. The lower of the two is believed.
-double existenceAfter(Object& object, const MeanA& mean_A, double certain) {
+/// mistakes, hits and misses lookalike_nats, so that A counts by the look's tempering. "It is there
+/// still": a patch of wall that passes for a chair does not go away, so that A counts in full, and
+/// one hit tells that the misses before it were the network's. The lower of the two is believed.
+double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
   const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
-  const double most = logOdds(certain), now = logOdds(std::min<double>(object.existence, certain));
-  const double real = std::min(now + std::max(object.lead, 0.0) + std::log(mean_A.tempered), most);
-  const double still = std::min(now - std::min(object.lead, 0.0) + std::log(mean_A.full), most);
-  object.lead = real - still;
+  const double most = logOdds(certain), now = logOdds(std::min<double>(track.existence, certain));
+  const double real =
+      std::min(now + std::max(track.real_over_present, 0.0) + std::log(mean_A.tempered), most);
+  const double still =
+      std::min(now - std::min(track.real_over_present, 0.0) + std::log(mean_A.full), most);
+  track.real_over_present = real - still;
   return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 
 }  // namespace
 
-double weigh(Object& object, const std::vector<Shares>& shares, double worth, bool seen,
-             const Parameters& parameters) {
-  const MeanA mean_A = weighHypotheses(object, shares, worth);
-  if (seen) keepModes(object.hypotheses.write(), shares, parameters.smooth.least_weight);
-  hearFromHere(object, mean_A.full, parameters.visibility.elusive_found);
-  return existenceAfter(object, mean_A, certainty(object, parameters.tend));
+double updateClassAndExistence(Track& track, const std::vector<Shares>& shares, double tempering,
+                               bool detected, const Parameters& parameters) {
+  const MeanA mean_A = updateWeights(track, shares, tempering);
+  if (detected)
+    keepSearchedModes(track.hypotheses.write(), shares, parameters.smoothing.least_weight);
+  updateDetectability(track, mean_A.full, parameters.visibility.hard_detection_share);
+  return existenceAfter(track, mean_A, existenceCeiling(track, parameters.tracks));
 }
 
 }  // namespace perdure::semantic_filter

@@ -57,7 +57,7 @@ std::optional<Gain> gainOf(const Gains& PHt, const Eigen::Matrix4d& S,
 }
 
 /// How much the noise of an outlier is widened: the weight of a t distribution, inverted.
-double doubtOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
+double inflationOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
   Eigen::Vector4d whitened = y.residual;
   whiten(L, whitened);
   return std::max(1.0, (tail + whitened.squaredNorm()) / (tail + y.count));
@@ -82,26 +82,26 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const FrameContext& frame, const ProjectedBox* at_prior) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   State x = prior.x;
-  double doubt = 1.0;
+  double inflation = 1.0;
   Eigen::Matrix<double, 4, 6> pose, pose_of_gain;
   std::optional<Gain> gain;
   for (std::int64_t i = 0; i < frame.parameters->box.iterations; ++i) {
     std::optional<ProjectedBox> box;
     if (i > 0 || !at_prior) {
-      box = projectObserved(x, frame.projector(), frame.styleOf(prior.class_name), prior.facing());
+      box = projectObserved(x, frame.projector(), frame.styleOf(prior.class_name), prior.heading());
       if (!box) break;
     }
     Innovation now = innovation(z, box ? *box : *at_prior, hidden);
     if (now.count == 0) break;
-    now.variance *= repeated * doubt;
+    now.variance *= repeated * inflation;
     const Gains PHt = leftTimesTransposed(prior.P, now.H) + timesTransposed(prior.C, now.H_pose);
     pose = timesTop<6>(now.H, prior.C) + timesTop<6>(now.H_pose, P_pose);
     const Eigen::Matrix4d S = timesTop<4>(now.H, PHt) + timesTransposed(now.H_pose, pose);
     auto next_gain = gainOf(PHt, S, now.variance);
     if (i == 0 && next_gain) {
-      doubt = doubtOf(now, next_gain->L, frame.parameters->box.tail);
-      now.variance *= doubt;
-      if (doubt > 1.0) next_gain = gainOf(PHt, S, now.variance);
+      inflation = inflationOf(now, next_gain->L, frame.parameters->box.tail);
+      now.variance *= inflation;
+      if (inflation > 1.0) next_gain = gainOf(PHt, S, now.variance);
     }
     if (!next_gain) break;
     State back = prior.x - x;

@@ -31,8 +31,8 @@ Eigen::Matrix<double, 1, 6> byPose(const Eigen::Vector3d& place, const View& vie
 }
 
 /// What the looks alone say of the underside, given the pose; nothing of what is not placed by
-/// parallax: sizes of one class err alike.
-Footing footingOf(const Hypothesis& h, const FrameContext& frame) {
+/// parallax: sizes of one class err lookalike_nats.
+GroundContact groundContactOf(const Hypothesis& h, const FrameContext& frame) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
   if (placeSigma(h, P_pose) > frame.parameters->ground.resolved * distance) return {};
@@ -49,12 +49,12 @@ Footing footingOf(const Hypothesis& h, const FrameContext& frame) {
 
 }  // namespace
 
-double standOnGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
+double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
   const GroundParameters& p = frame.parameters->ground;
   const double stands = frame.priors->of(h.class_name).stands;
-  h.footing = {};
+  h.ground_contact = {};
   if (!frame.ground || stands <= 0.0) return 0.0;
-  if (!h.moving) h.footing = footingOf(h, frame);
+  if (!h.moving) h.ground_contact = groundContactOf(h, frame);
   const auto ground = frame.ground->below(h.x.head<3>(), id);
   if (!ground) return 0.0;
   const Eigen::Vector3d up = frame.view.up_W.normalized();
@@ -78,7 +78,7 @@ double standOnGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
     h.P -= with_e * with_e.transpose() / widened;
     makeSymmetric(h.P);
     h.C -= with_e * pose_with_e / widened;
-    h.footing.above = before - underside(h.x, up);
+    h.ground_contact.above = before - underside(h.x, up);
   }
   return std::log((on + off) * p.span_m);
 }

@@ -6,10 +6,9 @@
 
 namespace perdure::semantic_filter {
 
-/// Keeps what the hypothesis, as the looks alone have it, says of the ground (Footing), and then
-/// makes it stand there as far as its class does: a consider update. Returns
-/// log p(underside | the ground) against undersides anywhere within ground.span_m: 0 where nothing
-/// is known.
-double standOnGround(Hypothesis& h, ObjectId id, const FrameContext& frame);
+/// Keeps what the hypothesis, as the looks alone have it, says of the ground (GroundContact), and
+/// then makes it stand there as far as its class does: a consider update. Returns log p(underside |
+/// the ground) against undersides anywhere within ground.span_m: 0 where nothing is known.
+double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -16,7 +16,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Stationary deviation of b from this view, by the mean extent of the cuboid over all aspects.
+/// Stationary deviation of b from this view, by the mean extent of the cuboid over all rays.
 Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const ViewWalk& walk) {
   const double scale = walk.focal / std::max((x.head<3>() - T_WC.p).norm(), 1.0);
   const Eigen::Vector3d size = x.segment<3>(kSize).array().exp();
@@ -25,7 +25,7 @@ Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const
 }
 
 /// b forgets with the change of the view: an Ornstein-Uhlenbeck process along the way. Its pixels
-/// become a lesser share of the box as the object comes nearer.
+/// become a lesser share of the box as the track comes nearer.
 void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const ViewWalk& walk) {
   const Eigen::Vector4d sigma = stationaryBias(h.x, walk.T_WC, walk);
   Eigen::Vector4d keep = Eigen::Vector4d::Zero();
@@ -41,70 +41,71 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
-/// What drove off unseen could be anywhere: it would claim any box. The object lives on as far as
+/// What drove off unseen could be anywhere: it would claim any box. The track lives on as far as
 /// it may have stayed.
-void giveUpLostOnes(Object& object, TimePoint now, double lost_sigma_m) {
+void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
-  for (const auto& h : object.hypotheses.read()) {
+  for (const auto& h : track.hypotheses.read()) {
     const double sigma = std::sqrt(h.P.topLeftCorner<2, 2>().trace());
     if (!h.moving || sigma < lost_sigma_m) kept += h.weight;
   }
   if (kept >= 1.0 - 1e-9) return;
-  object.existence.become(object.existence * kept, ExistenceEvidence::kLost, now);
-  if (kept <= 1e-9) return;  // nothing is left of it; it will be buried
-  std::erase_if(object.hypotheses.write(), [&](const Hypothesis& h) {
+  track.existence.become(track.existence * kept, ExistenceEvidence::kLost, now);
+  if (kept <= 1e-9) return;  // nothing is left of it; it will be deleted
+  std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
     return h.moving && std::sqrt(h.P.topLeftCorner<2, 2>().trace()) >= lost_sigma_m;
   });
-  normalise(object, ClassEvidence::kMotion);
+  normalise(track, ClassEvidence::kMotion);
 }
 
 /// What drives and is not seen turns off, parks or leaves.
-void loseMovers(Object& object, double dt, double survival_s) {
+void decayUnseenMoving(Track& track, double dt, double survival_s) {
   const double stays = std::exp(-dt / survival_s);
   double kept = 0.0;
-  for (auto& h : object.hypotheses) {
+  for (auto& h : track.hypotheses) {
     if (h.moving) h.weight *= stays;
     kept += h.weight;
   }
   if (kept >= 1.0 - 1e-9 || kept <= 0.0) return;
-  object.existence.become(object.existence * kept, ExistenceEvidence::kLost, object.as_of);
-  normalise(object, ClassEvidence::kMotion);
+  track.existence.become(track.existence * kept, ExistenceEvidence::kLost, track.as_of);
+  normalise(track, ClassEvidence::kMotion);
 }
 
 }  // namespace
 
-void predict(Object& object, TimePoint now, const PoseError& pose_error,
+void predict(Track& track, TimePoint now, const PoseError& pose_error,
              const MotionParameters& parameters, const ViewWalk& walk) {
-  const double dt = toSeconds(now - object.as_of);
+  const double dt = toSeconds(now - track.as_of);
   // Where the transition is lost nothing is left of C.
   const Matrix6d transition =
-      transitionBetween(object.pose_product, pose_error.product).value_or(Matrix6d::Zero());
+      transitionBetween(track.pose_product, pose_error.product).value_or(Matrix6d::Zero());
   std::optional<Matrix6d> L_pose = pose_error.covariance;
   if (!choleskyInPlace(*L_pose)) L_pose.reset();
-  for (auto& h : object.hypotheses) {
+  for (auto& h : track.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
-    predictBias(h, object.last_view, walk);
+    predictBias(h, track.predicted_from, walk);
     h.C = timesTransposed(h.C, transition);
     keepConsistent(h, pose_error.covariance, L_pose);
   }
-  const bool unseen =
-      object.last_seen < object.as_of || object.hidden.count + object.away.count > 0;
-  if (unseen && dt > 0.0) loseMovers(object, dt, parameters.mover_survival_s);
-  giveUpLostOnes(object, now, parameters.lost_sigma_m);
+  const bool unseen = track.last_seen < track.as_of ||
+                      track.occluded_frames.count + track.out_of_view_frames.count > 0;
+  if (unseen && dt > 0.0) decayUnseenMoving(track, dt, parameters.mover_survival_s);
+  dropLostHypotheses(track, now, parameters.lost_sigma_m);
   if (dt > 0.0) {
-    object.existence.become(object.existence * std::exp(-dt / parameters.survival_s),
-                            ExistenceEvidence::kTime, now);
+    track.existence.become(track.existence * std::exp(-dt / parameters.survival_s),
+                           ExistenceEvidence::kTime, now);
   }
-  if (dt > kAnotherVisit_s && object.away.count > 0 && object.hidden.count == 0) {
-    object.came_back = now;
-    object.found_rate.beginVisit(walk.screen);
+  if (dt > kAnotherVisit_s && track.out_of_view_frames.count > 0 &&
+      track.occluded_frames.count == 0) {
+    track.visit_began = now;
+    track.detection_rate.beginVisit(walk.screen);
   }
-  object.existence.note(ExistenceEvidence::kHidden, std::exchange(object.hidden, {}));
-  object.existence.note(ExistenceEvidence::kAway, std::exchange(object.away, {}));
-  object.as_of = now;
-  predictScreen(object, walk);
-  object.last_view = walk.T_WC;
-  object.pose_product = pose_error.product;
+  track.existence.note(ExistenceEvidence::kHidden, std::exchange(track.occluded_frames, {}));
+  track.existence.note(ExistenceEvidence::kAway, std::exchange(track.out_of_view_frames, {}));
+  track.as_of = now;
+  predictDetectability(track, walk);
+  track.predicted_from = walk.T_WC;
+  track.pose_product = pose_error.product;
 }
 
 }  // namespace perdure::semantic_filter

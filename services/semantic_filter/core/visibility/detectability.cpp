@@ -10,21 +10,22 @@ namespace perdure::semantic_filter {
 namespace {
 
 /// That something which stands, and is not on the map, hides it from here. When it comes back into
-/// the picture, each look that is remembered from before vouches by itself for the views about its
-/// own: what is not found where it was found then is gone rather than screened.
-double screenedFromHere(const Object& object, const Eigen::Vector3d& place, const ViewWalk& walk) {
-  double screened = walk.screened;
-  for (const auto& k : object.keyframes.read()) {
-    if (k->from->time >= object.came_back) break;  // they are in order of time
-    screened *= 1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.screen));
+/// the picture, each score that is remembered from before vouches by itself for the views about its
+/// own: what is not found where it was found then is gone rather than unmapped_occluder.
+double unmappedOccluderFromHere(const Track& track, const Eigen::Vector3d& place,
+                                const ViewWalk& walk) {
+  double unmapped_occluder = walk.unmapped_occluder;
+  for (const auto& k : track.keyframes.read()) {
+    if (k->from->time >= track.visit_began) break;  // they are in order of time
+    unmapped_occluder *= 1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.screen));
   }
-  return screened;
+  return unmapped_occluder;
 }
 
 }  // namespace
 
-double shareFound(const Object& object, double elusive_found) {
-  return 1.0 - object.screened - (1.0 - elusive_found) * object.elusive;
+double detectableShare(const Track& track, double hard_detection_share) {
+  return 1.0 - track.unmapped_occluder - (1.0 - hard_detection_share) * track.hard_to_detect;
 }
 
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {
@@ -37,50 +38,54 @@ double detectionProbability(const ClassPrior& prior, double size_px, const Frame
 }
 
 /// What is of no known class and looks like one is found as often as those of that class.
-double foundAs(const Hypothesis& hypothesis, const Object& object, double size_px,
-               const FrameContext& frame) {
+double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
+                              const FrameContext& frame) {
   const double own = detectionProbability(frame.priors->of(hypothesis.class_name), size_px, frame);
   if (hypothesis.class_name != kOtherClass) return own;
-  const auto named = std::find_if(object.hypotheses.begin(), object.hypotheses.end(),
+  const auto named = std::find_if(track.hypotheses.begin(), track.hypotheses.end(),
                                   [](const auto& h) { return h.class_name != kOtherClass; });
-  if (named == object.hypotheses.end()) return own;
-  const double alike = alikeProbability(frame.parameters->clutter.other_lookalike, object.alike);
+  if (named == track.hypotheses.end()) return own;
+  const double lookalike_nats =
+      lookalikeProbability(frame.parameters->clutter.other_lookalike, track.lookalike_nats);
   const ClassPrior& like = frame.priors->of(named->class_name);
-  return (1.0 - alike) * own + alike * detectionProbability(like, size_px, frame);
+  return (1.0 - lookalike_nats) * own + lookalike_nats * detectionProbability(like, size_px, frame);
 }
 
-/// How often the object is found from here, beside P_D.
-double rateOf(const Object& object, const FrameContext& frame) {
-  if (object.best().moving) return 1.0;
-  return object.found_rate.factor(aspectOf(object.best().x.head<3>(), frame.view.T_WC()),
-                                  frame.parameters->looks.found_prior,
-                                  screenScales(frame.parameters->visibility));
+/// How often the track is found from here, beside P_D.
+double detectionRateFactor(const Track& track, const FrameContext& frame) {
+  if (track.best().moving) return 1.0;
+  return track.detection_rate.factor(viewRayOf(track.best().x.head<3>(), frame.view.T_WC()),
+                                     frame.parameters->tempering.found_prior,
+                                     detectabilityScales(frame.parameters->visibility));
 }
 
 /// What may hide it from elsewhere is not known until it is seen from there.
-void predictScreen(Object& object, const ViewWalk& walk) {
-  const Eigen::Vector3d place = object.best().x.head<3>();
-  const double keep = object.last_view
-                          ? std::exp(-viewChange(place, *object.last_view, walk.T_WC, walk.screen))
-                          : 0.0;
-  const double here = screenedFromHere(object, place, walk);
-  object.screened = here + keep * (object.screened - here);
+void predictDetectability(Track& track, const ViewWalk& walk) {
+  const Eigen::Vector3d place = track.best().x.head<3>();
+  const double keep =
+      track.predicted_from
+          ? std::exp(-viewChange(place, *track.predicted_from, walk.T_WC, walk.screen))
+          : 0.0;
+  const double here = unmappedOccluderFromHere(track, place, walk);
+  track.unmapped_occluder = here + keep * (track.unmapped_occluder - here);
   // What drives and is not found is lost rather than seldom found: it would take the boxes of what
   // stands where it was lost.
-  object.elusive =
-      object.best().moving ? 0.0 : walk.elusive + keep * (object.elusive - walk.elusive);
-  object.elusive = std::min(object.elusive, 1.0 - object.screened);
+  track.hard_to_detect =
+      track.best().moving
+          ? 0.0
+          : walk.hard_to_detect + keep * (track.hard_to_detect - walk.hard_to_detect);
+  track.hard_to_detect = std::min(track.hard_to_detect, 1.0 - track.unmapped_occluder);
 }
 
-/// A frame that does not show the object says that it is screened, too, or elusive. With A' where
-/// it is neither, A is 1 where it is screened and 1 + q (A' - 1), q the share of P_D, where it is
-/// elusive.
-void hearFromHere(Object& object, double mean_A, double elusive_found) {
-  const double open = shareFound(object, elusive_found);
-  const double found = open > 0.0 ? elusive_found / open : 0.0;
-  const double elusive = object.elusive * std::max(1.0 + found * (mean_A - 1.0), 0.0);
-  object.screened = std::min(1.0, object.screened / mean_A);
-  object.elusive = std::min(1.0 - object.screened, elusive / mean_A);
+/// A frame that does not show the track says that it is unmapped_occluder, too, or hard_to_detect.
+/// With A' where it is neither, A is 1 where it is unmapped_occluder and 1 + q (A' - 1), q the
+/// share of P_D, where it is hard_to_detect.
+void updateDetectability(Track& track, double mean_A, double hard_detection_share) {
+  const double open = detectableShare(track, hard_detection_share);
+  const double found = open > 0.0 ? hard_detection_share / open : 0.0;
+  const double hard_to_detect = track.hard_to_detect * std::max(1.0 + found * (mean_A - 1.0), 0.0);
+  track.unmapped_occluder = std::min(1.0, track.unmapped_occluder / mean_A);
+  track.hard_to_detect = std::min(1.0 - track.unmapped_occluder, hard_to_detect / mean_A);
 }
 
 }  // namespace perdure::semantic_filter

@@ -115,16 +115,16 @@ class DepthBuffer {
   std::vector<Edges> edges_;  ///< of a polygon, by row
 };
 
-/// P(the blocker in the cell stands nearer than the object).
+/// P(the blocker in the cell stands nearer than the track).
 double nearer(const Cell& cell, const Outline& o) {
   const double sigma = std::hypot(cell.sigma_m, o.depth_sigma_m) + 1e-3;
   return 0.5 * std::erfc((cell.distance_m - o.distance_m) / (std::sqrt(2.0) * sigma));
 }
 
-/// What an object's cells hold of one that may hide it.
+/// What an track's cells hold of one that may hide it.
 struct Blocked {
   ObjectId by;
-  double nearer;  ///< probability that this stands nearer than the object
+  double nearer;  ///< probability that this stands nearer than the track
   double hidden = 0.0;
 };
 
@@ -195,10 +195,10 @@ void paint(Cell& cell, const Outline& o) {
   cell.transmittance *= 1.0 - o.solidity;
 }
 
-/// Share of the outline's landmarks that stand in front of the object (nearer than its surface);
+/// Share of the outline's landmarks that stand in front of the track (nearer than its surface);
 /// those seen through it speak against (paper, line 190: the co-visibility cue).
 double hiddenByPoints(const Outline& o, const Polygon& hull,
-                      const std::vector<SightPoint>& points) {
+                      const std::vector<LandmarkDepth>& points) {
   double before = 0.0, through = 0.0;
   const double surface = o.distance_m - o.extent_m;
   for (const auto& p : points) {
@@ -213,40 +213,41 @@ double hiddenByPoints(const Outline& o, const Polygon& hull,
   return before / (before + through + 3.0);  // three pseudo-points of "free" keep a few from ruling
 }
 
-Sight classify(const Tally& tally, double in_image, double by_points,
-               const VisibilityParameters& parameters) {
-  Sight sight;
+TrackVisibility classify(const Tally& tally, double in_image, double by_points,
+                         const VisibilityParameters& parameters) {
+  TrackVisibility visibility;
   const double free = tally.total > 0.0 ? 1.0 - tally.hidden / tally.total : 0.0;
-  sight.fraction = in_image * free * (1.0 - by_points);
+  visibility.fraction = in_image * free * (1.0 - by_points);
   double most = 0.0;
   for (const Blocked& b : tally.blockers.all()) {
-    const bool older = b.hidden == most && b.by < sight.blocked_by;
-    if (b.hidden > most || older) most = b.hidden, sight.blocked_by = b.by;
+    const bool older = b.hidden == most && b.by < visibility.blocked_by;
+    if (b.hidden > most || older) most = b.hidden, visibility.blocked_by = b.by;
   }
-  if (most < 0.1 * tally.total) sight.blocked_by = 0;
+  if (most < 0.1 * tally.total) visibility.blocked_by = 0;
   for (int i = 0; i < 4; ++i) {
-    sight.hidden[i] = tally.side_total[i] > 0.0 && tally.side_hidden[i] > 0.5 * tally.side_total[i];
+    visibility.hidden_sides[i] =
+        tally.side_total[i] > 0.0 && tally.side_hidden[i] > 0.5 * tally.side_total[i];
   }
-  if (sight.fraction < parameters.minimum) {
-    sight.remnant = sight.fraction;
-    sight.fraction = 0.0;
-    sight.visibility =
+  if (visibility.fraction < parameters.minimum) {
+    visibility.residual_fraction = visibility.fraction;
+    visibility.fraction = 0.0;
+    visibility.state =
         in_image < parameters.minimum ? Visibility::kOutOfView : Visibility::kOccluded;
   } else {
-    sight.visibility =
-        sight.fraction >= parameters.full ? Visibility::kVisible : Visibility::kPartial;
+    visibility.state =
+        visibility.fraction >= parameters.full ? Visibility::kVisible : Visibility::kPartial;
   }
-  return sight;
+  return visibility;
 }
 
 }  // namespace
 
-Outline outlineOf(const Object& object, const State& x, const Projector& from, const Shape& shape) {
-  const Hypothesis& h = object.best();
+Outline outlineOf(const Track& track, const State& x, const Projector& from, const Shape& shape) {
+  const Hypothesis& h = track.best();
   const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
   Outline o;
-  o.id = object.id;
-  o.solidity = object.existence * object.support;
+  o.id = track.id;
+  o.solidity = track.existence * track.recent_detection_share;
   o.distance_m = ray.norm();
   const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
   o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
@@ -330,15 +331,17 @@ double shareOfFirst(const std::vector<Outline>& outlines, double width, double h
   return cells > 0.0 ? in_image.share * (1.0 - hidden / cells) : 0.0;
 }
 
-std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<SightPoint>& points,
-                       double width, double height, const VisibilityParameters& parameters) {
+std::vector<TrackVisibility> computeVisibility(const std::vector<Outline>& outlines,
+                                               const std::vector<LandmarkDepth>& points,
+                                               double width, double height,
+                                               const VisibilityParameters& parameters) {
   std::vector<std::size_t> order(outlines.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
   DepthBuffer& buffer = begin(width, height, parameters);
-  std::vector<Sight> sights(outlines.size());
+  std::vector<TrackVisibility> visibilities(outlines.size());
   for (const std::size_t j : order) {
     const Outline& o = outlines[j];
     if (!o.box) continue;
@@ -346,10 +349,10 @@ std::vector<Sight> see(const std::vector<Outline>& outlines, const std::vector<S
     const std::vector<Span>& spans = buffer.spansOf(in_image.inside);
     const Tally tally = tallyOf(buffer, spans, o);
     const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, in_image.inside, points);
-    sights[j] = classify(tally, in_image.share, by_points, parameters);
+    visibilities[j] = classify(tally, in_image.share, by_points, parameters);
     if (o.solidity >= parameters.solid) paint(buffer, spans, o);
   }
-  return sights;
+  return visibilities;
 }
 
 }  // namespace perdure::semantic_filter

@@ -16,26 +16,26 @@ constexpr double kFarthest = 1e5;          // pixels; a side beyond is of a thin
 
 }  // namespace
 
-std::optional<Prediction> predictionOf(const Object& object, const FrameInput& now,
+std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming) {
-  const Hypothesis& best = object.best();
+  const Hypothesis& best = track.best();
   const double probability =
-      object.existence * classProbability(object, best.class_name) * object.visible_fraction;
+      track.existence * classProbability(track, best.class_name) * track.visible_fraction;
   if (probability < kPredictionFloor) return std::nullopt;
-  const double since = toSeconds(now.stamp.time - object.as_of);
+  const double since = toSeconds(now.stamp.time - track.as_of);
   const BoxStyle& style = now.model.styles->of(best.class_name);
-  const auto box = projectObserved(stateAt(best, since), now.view, style, best.facing());
+  const auto box = projectObserved(stateAt(best, since), now.view, style, best.heading());
   if (!box || !(box->sides.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
   if (box->sides[0] >= box->sides[2] || box->sides[1] >= box->sides[3]) return std::nullopt;
   const Eigen::Vector4d& s = box->sides;
-  Prediction prediction{object.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability};
+  Prediction prediction{track.id, best.class_name, Box{s[0], s[1], s[2], s[3]}, probability};
   const Eigen::Matrix4d S = predictedCovariance(best, *box, now.pose_error.covariance);
   for (int i = 0; i < 4; ++i) {
     prediction.side_sigma[i] = std::max(kLeastSigma, std::sqrt(std::max(S(i, i), 0.0)));
   }
   if (!coming) return prediction;
   const auto next =
-      projectObserved(stateAt(best, since + coming->seconds), coming->view, style, best.facing());
+      projectObserved(stateAt(best, since + coming->seconds), coming->view, style, best.heading());
   if (!next || !next->sides.allFinite()) return prediction;
   for (int i = 0; i < 4; ++i) {
     const double speed = (next->sides[i] - box->sides[i]) / coming->seconds;

@@ -1,4 +1,4 @@
-// Where objects should be seen: what primes inference (eq. 7: b = π(g s), a Gaussian in the four
+// Where tracks should be seen: what primes inference (eq. 7: b = π(g s), a Gaussian in the four
 // sides of the box).
 #pragma once
 
@@ -15,9 +15,9 @@ struct ComingFrame {
   double seconds = 0.0;  ///< after the present one
 };
 
-/// The box that the network should report of the object in this frame, with how its sides move
+/// The box that the network should report of the track in this frame, with how its sides move
 /// towards `coming`; nothing where r·π·v is under 0.05, or nothing of it lies before the camera.
-std::optional<Prediction> predictionOf(const Object& object, const FrameInput& now,
+std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming);
 
 }  // namespace perdure::semantic_filter

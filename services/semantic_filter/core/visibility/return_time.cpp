@@ -10,11 +10,11 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kHorizon_s = 10.0;
-constexpr double kStride_s = 0.25;        // what is in sight for less may be passed over
+constexpr double kStride_s = 0.25;        // what is in visibility for less may be passed over
 constexpr std::size_t kMostBlockers = 6;  // those next to it in the image
 constexpr double kCellsAcross = 16.0;     // of a depth buffer's cells, across a thing
 constexpr double kMayBeFound = 0.5;       // of the share below which a miss says nothing
-constexpr double kSliver = 0.01;          // share in sight that nothing is found by
+constexpr double kSliver = 0.01;          // share in visibility that nothing is found by
 constexpr double kNineInTen = 1.645;      // deviations of a Gaussian
 
 using Walk = std::vector<View>;  // one a frame, the present one first
@@ -32,23 +32,23 @@ Walk walkOn(const View& now, const Way& way, double pace) {
 }
 
 struct Standing {
-  const Object* object;
+  const Track* track;
   State x;
   const Shape* shape;
 };
 
-const Shape& shapeOf(const Object& object, const FrameInput& now) {
-  return now.model.styles->of(object.best().class_name).shape;
+const Shape& shapeOf(const Track& track, const FrameInput& now) {
+  return now.model.styles->of(track.best().class_name).shape;
 }
 
 /// What may hide it on the way: solid, nearer, and next to it in the image.
-std::vector<Standing> blockersOf(const std::vector<Object>& objects, const Object& hidden,
+std::vector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& hidden,
                                  const FrameInput& now, const VisibilityParameters& parameters) {
   const Eigen::Vector3d eye = now.view.T_WC().p;
   const Eigen::Vector3d ray = hidden.best().x.head<3>() - eye;
   std::vector<std::pair<double, Standing>> near;
-  for (const Object& o : objects) {
-    if (o.id == hidden.id || o.existence * o.support < parameters.solid) continue;
+  for (const Track& o : tracks) {
+    if (o.id == hidden.id || o.existence * o.recent_detection_share < parameters.solid) continue;
     const State x = stateAt(o.best(), toSeconds(now.stamp.time - o.as_of));
     const Eigen::Vector3d other = x.head<3>() - eye;
     if (other.norm() > ray.norm()) continue;
@@ -81,13 +81,13 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
   const Standing& first = things.front();
   thread_local std::vector<Outline> outlines;
   outlines.clear();
-  outlines.push_back(outlineOf(*first.object, first.x, from, *first.shape));
+  outlines.push_back(outlineOf(*first.track, first.x, from, *first.shape));
   if (!outlines.front().box) return 0.0;
   const Eigen::Vector4d sides = outlines.front().box->sides;
   const CameraModel& camera = *view.camera;
   if (apart(sides, {0.0, 0.0, camera.width(), camera.height()})) return 0.0;
   for (auto s = things.begin() + 1; s != things.end(); ++s) {
-    Outline blocker = outlineOf(*s->object, s->x, from, *s->shape);
+    Outline blocker = outlineOf(*s->track, s->x, from, *s->shape);
     if (!blocker.box || apart(blocker.box->sides, sides)) continue;
     blocker.box->points = within(sides, blocker.box->points);
     outlines.push_back(std::move(blocker));
@@ -137,7 +137,7 @@ std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, 
 
 /// By one deviation each: what moves the edges that hide it.
 std::vector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
-  const StateCovariance& P = thing.object->best().P;
+  const StateCovariance& P = thing.track->best().P;
   const Eigen::Vector3d ray = (thing.x.head<3>() - eye).normalized();
   Eigen::Vector3d across = ray.cross(Eigen::Vector3d::UnitZ());
   across = across.norm() > 1e-6 ? Eigen::Vector3d(across.normalized()) : Eigen::Vector3d::UnitX();
@@ -168,35 +168,36 @@ struct Spread {
 
 bool goes(const Way& way) { return way.seconds > 0.0 && way.step.p.allFinite(); }
 
-std::vector<Standing> inPlay(const std::vector<Object>& objects, const Object& hidden,
+std::vector<Standing> inPlay(const std::vector<Track>& tracks, const Track& hidden,
                              const FrameInput& now, const VisibilityParameters& parameters) {
   std::vector<Standing> things{{&hidden,
                                 stateAt(hidden.best(), toSeconds(now.stamp.time - hidden.as_of)),
                                 &shapeOf(hidden, now)}};
-  const auto blockers = blockersOf(objects, hidden, now, parameters);
+  const auto blockers = blockersOf(tracks, hidden, now, parameters);
   things.insert(things.end(), blockers.begin(), blockers.end());
   return things;
 }
 
 }  // namespace
 
-std::optional<double> expectReturn(const std::vector<Object>& objects, const Object& hidden,
-                                   const FrameInput& now, const Way& way,
-                                   const VisibilityParameters& parameters) {
+std::optional<double> expectedReappearance(const std::vector<Track>& tracks, const Track& hidden,
+                                           const FrameInput& now, const Way& way,
+                                           const VisibilityParameters& parameters) {
   if (!goes(way)) return std::nullopt;
-  const auto things = inPlay(objects, hidden, now, parameters);
+  const auto things = inPlay(tracks, hidden, now, parameters);
   const auto n =
       firstInSight(things, walkOn(now.view, way, 1.0), shareToBeFound(things, now.view, parameters),
                    way.seconds, parameters);
   return n ? std::optional(way.seconds * static_cast<double>(*n)) : std::nullopt;
 }
 
-std::optional<Foreseen> foreseeReturn(const std::vector<Object>& objects, const Object& hidden,
-                                      const FrameInput& now, const Way& way,
-                                      const VisibilityParameters& parameters) {
+std::optional<ReappearanceInterval> reappearanceInterval(const std::vector<Track>& tracks,
+                                                         const Track& hidden, const FrameInput& now,
+                                                         const Way& way,
+                                                         const VisibilityParameters& parameters) {
   if (!goes(way)) return std::nullopt;
   const double speed = way.step.p.norm() / way.seconds;
-  auto things = inPlay(objects, hidden, now, parameters);
+  auto things = inPlay(tracks, hidden, now, parameters);
   const Walk walk = walkOn(now.view, way, 1.0);
   const double share = shareToBeFound(things, now.view, parameters);
   const auto expected = firstInSight(things, walk, share, way.seconds, parameters);
@@ -205,7 +206,7 @@ std::optional<Foreseen> foreseeReturn(const std::vector<Object>& objects, const 
     const auto n = firstInSight(things, on, share, way.seconds, parameters).value_or(walk.size());
     return way.seconds * static_cast<double>(n);
   };
-  Foreseen result;
+  ReappearanceInterval result;
   result.expected = way.seconds * static_cast<double>(*expected);
   Spread spread(result.expected, way.seconds);
   const std::size_t found = framesToFind(things, walk, *expected, parameters);

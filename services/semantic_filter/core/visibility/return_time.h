@@ -18,21 +18,22 @@ struct Way {
 };
 
 /// Seconds after the frame.
-struct Foreseen {
+struct ReappearanceInterval {
   double expected = 0.0;
   double earliest = 0.0, latest = 0.0;  ///< of nine in ten
 };
 
-/// Seconds after the frame in which `hidden`, one of `objects` at rest, comes out from behind what
+/// Seconds after the frame in which `hidden`, one of `tracks` at rest, comes out from behind what
 /// hides it; nothing where it does not within ten seconds.
-std::optional<double> expectReturn(const std::vector<Object>& objects, const Object& hidden,
-                                   const FrameInput& now, const Way& way,
-                                   const VisibilityParameters& parameters);
+std::optional<double> expectedReappearance(const std::vector<Track>& tracks, const Track& hidden,
+                                           const FrameInput& now, const Way& way,
+                                           const VisibilityParameters& parameters);
 
 /// The same with an interval, at fifteen times the cost: how well it and what hides it are placed,
 /// and how the body's velocity wanders.
-std::optional<Foreseen> foreseeReturn(const std::vector<Object>& objects, const Object& hidden,
-                                      const FrameInput& now, const Way& way,
-                                      const VisibilityParameters& parameters);
+std::optional<ReappearanceInterval> reappearanceInterval(const std::vector<Track>& tracks,
+                                                         const Track& hidden, const FrameInput& now,
+                                                         const Way& way,
+                                                         const VisibilityParameters& parameters);
 
 }  // namespace perdure::semantic_filter
