@@ -12,16 +12,24 @@ target_compile_options(perdure_options INTERFACE
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-Wno-maybe-uninitialized -Wno-array-bounds
     -Wno-stringop-overflow -Wno-stringop-overread -Wno-null-dereference -Wno-restrict>)
 
+# Compiles the files of a target in batches: where many small files read the same large headers
+# that takes a third of the time. Names of unnamed namespaces must then differ within the target.
+function(perdure_together name)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  # GCC takes a file of a batch for a header, and a struct defined there for one that others see.
+  target_compile_options(${name} PRIVATE
+    $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-Wno-subobject-linkage>)
+endfunction()
+
 # perdure_library(NAME SOURCES … DEPENDS … [TOGETHER]): a static library; NAME is the folder with
-# underscores. TOGETHER compiles its files in batches: where many small files read the same large
-# headers that halves the time.
+# underscores. TOGETHER compiles its files in batches.
 function(perdure_library name)
   cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;DEPENDS" ${ARGN})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC perdure_options ${ARG_DEPENDS})
     if(ARG_TOGETHER)
-      set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+      perdure_together(${name})
     endif()
   else()
     add_library(${name} INTERFACE)
@@ -37,15 +45,18 @@ function(perdure_program name)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 endfunction()
 
-# perdure_test(NAME SOURCES … DEPENDS … [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest program,
-# one ctest entry. Labels: unit (default), process, scenario, golden, data, long.
+# perdure_test(NAME SOURCES … DEPENDS … [TOGETHER] [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest
+# program, one ctest entry. Labels: unit (default), process, scenario, golden, data, long.
 function(perdure_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
+  cmake_parse_arguments(ARG "TOGETHER" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
   if(NOT PERDURE_BUILD_TESTS)
     return()
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
+  if(ARG_TOGETHER)
+    perdure_together(${name})
+  endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
   add_test(NAME ${name} COMMAND ${name} ${ARG_ARGS} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   if(NOT ARG_LABELS)

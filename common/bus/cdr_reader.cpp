@@ -3,13 +3,12 @@
 #include <array>
 
 #include "common/bus/dds.h"
+#include "common/bus/sample.h"
 //
 #include <dds/ddsi/ddsi_serdata.h>
 
 namespace perdure::bus {
 namespace {
-
-constexpr std::size_t kBatch = 64;
 
 /// Cyclone's own copy, in one piece.
 class Serialised {

@@ -12,8 +12,6 @@
 namespace perdure::bus {
 namespace {
 
-constexpr std::size_t kBatch = 64;
-
 dds_duration_t duration(double seconds) {
   return seconds > 0 ? static_cast<dds_duration_t>(seconds * 1e9) : DDS_INFINITY;
 }

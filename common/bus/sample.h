@@ -2,6 +2,7 @@
 // common/bus.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,6 +11,8 @@
 #include "common/bus/domain.h"
 
 namespace perdure::bus {
+
+inline constexpr std::size_t kBatch = 64;  ///< messages taken at once
 
 struct RawSample {
   std::span<const std::uint8_t> cdr;  ///< without header, native byte order

@@ -12,7 +12,7 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr double kLongestPair = 0.25;  ///< s between two views whose rotation is compared
-constexpr double kStep = 0.0025;       ///< s, of the search for the time offset
+constexpr double kTimeStep = 0.0025;   ///< s, of the search for the time offset
 constexpr double kLeastSpread = 0.02;  ///< rad/s: less rotation about a second axis is none
 
 struct Turn {
@@ -121,9 +121,9 @@ Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
   }
   const GyroMean gyro(readings);
   std::optional<Alignment> best;
-  const int steps = static_cast<int>(std::ceil(widest_s / kStep));
+  const int steps = static_cast<int>(std::ceil(widest_s / kTimeStep));
   for (int i = -steps; i <= steps; ++i) {
-    const auto at = alignAt(turns, gyro, i * kStep);
+    const auto at = alignAt(turns, gyro, i * kTimeStep);
     if (at && (!best || at->rms < best->rms)) best = at;
   }
   if (!best) {
@@ -136,7 +136,7 @@ Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                 "three, by 20 degrees and about once a second");
   }
   const double moved = best->rate_rms_B.norm();
-  if (best->rms > 0.5 * moved || std::abs(best->time_offset_s) > widest_s - 1.5 * kStep) {
+  if (best->rms > 0.5 * moved || std::abs(best->time_offset_s) > widest_s - 1.5 * kTimeStep) {
     return fail("calibrate_time_offset",
                 fmt::format("the gyroscope does not turn as the camera does at any offset within "
                             "±{} s; check the clocks and that both are on one rigid body, or widen "

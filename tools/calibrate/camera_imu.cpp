@@ -11,9 +11,9 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr std::size_t kLeastViews = 60;
+constexpr std::size_t kLeastSightings = 60;
 constexpr int kRounds = 4;  ///< of solving, weighing and leaving out
-constexpr double kOutlierSigma = 5.0;
+constexpr double kGateSigma = 5.0;
 constexpr double kLeastPx = 0.02;
 constexpr double kSettled = 1e-5;  ///< s: the time offset stays in its segments
 
@@ -99,11 +99,11 @@ class CameraImuRun {
       poses_.push_back({t, T_CT->inverse()});
     }
     problem_.sightings = longestStretch(all, options_.longest_gap_s);
-    if (problem_.sightings.size() < kLeastViews) {
+    if (problem_.sightings.size() < kLeastSightings) {
       return fail("calibrate_few_views",
                   fmt::format("the board is in view without a break in only {} images; at least {} "
                               "in a row are needed, and 20 s or more are good",
-                              problem_.sightings.size(), kLeastViews));
+                              problem_.sightings.size(), kLeastSightings));
     }
     const double from = problem_.sightings.front().time_s, to = problem_.sightings.back().time_s;
     std::erase_if(poses_, [&](const auto& p) { return p.time_s < from || p.time_s > to; });
@@ -238,7 +238,7 @@ class CameraImuRun {
     std::nth_element(sizes.begin(), middle, sizes.end());
     constexpr double kRayleighMedian = 1.1774;
     const double typical = std::max(kLeastPx, *middle / kRayleighMedian);
-    problem_.gateCorners(std::max(kOutlierSigma * typical, 10.0 * kLeastPx));
+    problem_.gateCorners(std::max(kGateSigma * typical, 10.0 * kLeastPx));
     problem_.sigma.px = std::max(kLeastPx, cornerRms());
     const auto left = problem_.imuResiduals();
     const double freed = freedomOf(left.size());

@@ -27,7 +27,7 @@ did not see (five unbroken folds). Writes model.json and keeps the old one as mo
   perdure model calibrate net.onnx --frames ROOT --sequence 0001      KITTI tracking with image_02
   perdure model calibrate net.onnx --frames *_sync --labels label_02/0000.txt      KITTI raw)";
 
-struct Request {
+struct CalibrateRequest {
   CalibrateOptions options;
   std::vector<fs::path> folders;
   std::string sequence;
@@ -95,7 +95,7 @@ fs::path descriptionOf(const inference::Config& config) {
   return inference::findDescription(config.model.path, inference::standardModelFolders());
 }
 
-void run(const Request& request) {
+void run(const CalibrateRequest& request) {
   CalibrateOptions options = request.options;
   for (const fs::path& folder : request.folders) {
     options.data.push_back({folder, request.sequence, request.labels, request.every});
@@ -123,7 +123,7 @@ void run(const Request& request) {
 }  // namespace
 
 void addCalibrate(CLI::App& model) {
-  auto request = std::make_shared<Request>();
+  auto request = std::make_shared<CalibrateRequest>();
   CLI::App* command =
       model.add_subcommand("calibrate", "Fit what a network's activations are worth, on labels");
   command->footer(kHelp);

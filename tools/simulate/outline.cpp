@@ -8,7 +8,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kNear = 0.05;  ///< triangles are cut here, metres before the camera
+constexpr double kNearPlane = 0.05;  ///< triangles are cut here, metres before the camera
 /// Cells along the longer side of an outline's raster: four a pixel, within these limits.
 constexpr double kMinCells = 24.0, kMaxCells = 112.0;
 
@@ -20,9 +20,9 @@ void cutNear(const std::array<Eigen::Vector3d, 3>& triangle, Polygon& out) {
   out.clear();
   for (std::size_t i = 0; i < 3; ++i) {
     const Eigen::Vector3d &a = triangle[i], &b = triangle[(i + 1) % 3];
-    if (a.z() >= kNear) out.push_back(a);
-    if ((a.z() >= kNear) != (b.z() >= kNear)) {
-      out.push_back(a + (b - a) * ((kNear - a.z()) / (b.z() - a.z())));
+    if (a.z() >= kNearPlane) out.push_back(a);
+    if ((a.z() >= kNearPlane) != (b.z() >= kNearPlane)) {
+      out.push_back(a + (b - a) * ((kNearPlane - a.z()) / (b.z() - a.z())));
     }
   }
 }
@@ -105,7 +105,7 @@ Projected projectSurface(const Surface& surface, const RigidTransform& T_CO, con
   bool whole = true;
   for (const auto& position : surface.positions) {
     points.emplace_back(R * position.cast<double>() + T_CO.p);
-    const bool before = points.back().z() >= kNear;
+    const bool before = points.back().z() >= kNearPlane;
     result.pixels.push_back(before ? lens.projectBeyond(points.back()) : Eigen::Vector2d::Zero());
     whole = whole && before;
   }

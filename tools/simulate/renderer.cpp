@@ -9,8 +9,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr int kTile = 32;
-constexpr float kNear = 0.02F, kSunOffset = 2e-3F;
+constexpr float kRayStart = 0.02F, kSunOffset = 2e-3F;
 
 /// -1 for the lanes in use; aligned as Embree wants it.
 struct alignas(32) Lanes {
@@ -105,7 +104,7 @@ void Renderer::follow(Packet& packet) const {
   Lanes lanes;
   for (unsigned i = 0; i < packet.count; ++i) {
     lanes.valid[i] = -1;
-    setRay(rays.ray, i, packet.origins[i], packet.directions[i], kNear);
+    setRay(rays.ray, i, packet.origins[i], packet.directions[i], kRayStart);
     rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }

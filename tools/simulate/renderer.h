@@ -16,6 +16,8 @@
 
 namespace perdure::tools {
 
+inline constexpr int kTile = 32;  ///< pixels; a task draws a square of this side
+
 /// Where a camera is while it takes one image. Rolling shutter: the middle row is exposed at
 /// `time_s`, the first and last half the readout before and after; objects stand as at `time_s`.
 struct Shot {

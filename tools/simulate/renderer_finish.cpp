@@ -8,7 +8,6 @@
 namespace perdure::tools {
 namespace {
 
-constexpr int kTile = 32;
 constexpr float kMinSmear = 0.6F;   ///< pixels; less is not to be seen
 constexpr float kLongSmear = 3.0F;  ///< pixels; a tap each pixel need not be between pixels
 constexpr int kMaxTaps = 16;

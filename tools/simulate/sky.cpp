@@ -9,7 +9,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kSize = 768;  ///< of the sky's map
-constexpr float kCeilingHeight = 3.2F, kTile = 0.6F;
+constexpr float kCeilingHeight = 3.2F, kCeilingTile = 0.6F;
 
 float lattice(std::uint64_t seed, int x, int y) {
   const auto cell = static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32 |
@@ -95,14 +95,14 @@ Eigen::Vector3f Sky::ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3
   const Eigen::Vector3f plain = Eigen::Vector3f(0.75F, 0.74F, 0.72F) * (0.8F * strength_);
   if (d.z() < 0.02F) return plain;
   const Eigen::Vector3f at = origin + d * ((kCeilingHeight - origin.z()) / d.z());
-  const float x = at.x() / kTile, y = at.y() / kTile;
+  const float x = at.x() / kCeilingTile, y = at.y() / kCeilingTile;
   const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
   if ((column % 5 + 5) % 5 == 2 && (row % 4 + 4) % 4 == 1) return plain * 6.0F;
   const float edge = std::min(std::min(x - std::floor(x), std::ceil(x) - x),
                               std::min(y - std::floor(y), std::ceil(y) - y));
   const float tone = 0.92F + 0.08F * lattice(0x7117, column, row);
   // Far away a pixel is wider than a line: it sees a mixture.
-  const float blur = 0.0025F * (at - origin).norm() / (d.z() * kTile) + 1e-3F;
+  const float blur = 0.0025F * (at - origin).norm() / (d.z() * kCeilingTile) + 1e-3F;
   const float line =
       std::clamp((0.03F + 0.5F * blur - edge) / blur, 0.0F, 1.0F) * std::min(1.0F, 0.06F / blur);
   return plain * (tone + (0.45F - tone) * line);

@@ -26,7 +26,8 @@ LevelView together(const ModelDescription& model, const float* data, std::size_t
   return {data, data + sides * channel_step, channel_step, cell_step};
 }
 
-std::vector<LevelView> viewsOf(const ModelDescription& model, const std::vector<Tensor>& tensors) {
+std::vector<LevelView> levelViewsOf(const ModelDescription& model,
+                                    const std::vector<Tensor>& tensors) {
   const std::size_t row = model.classes.size() + 4 * static_cast<std::size_t>(model.bins);
   std::vector<LevelView> views;
   std::size_t next = 0, offset = 0;
@@ -67,7 +68,7 @@ Box boxOf(const ModelDescription& model, double x, double y, double s, const Lev
 
 void decodeDistances(const ModelDescription& model, const DecodeOptions& options,
                      const std::vector<Tensor>& tensors, std::vector<Candidate>& out) {
-  const auto views = viewsOf(model, tensors);
+  const auto views = levelViewsOf(model, tensors);
   for (std::size_t l = 0; l < model.levels.size(); ++l) {
     const Level& level = model.levels[l];
     const LevelView& view = views[l];

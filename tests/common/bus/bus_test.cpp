@@ -10,6 +10,7 @@
 #include "common/bus/discovery.h"
 #include "common/bus/wait_loop.h"
 #include "tests/common/bus/isolation.h"
+#include "tests/common/bus/run_until.h"
 
 namespace perdure::bus {
 namespace {
@@ -24,14 +25,6 @@ class Isolation : public testing::Environment {
 const auto* const kIsolation = testing::AddGlobalTestEnvironment(new Isolation);
 
 constexpr std::chrono::milliseconds kStep{20};
-
-/// Steps the loop until `done`, or gives up after ten seconds.
-template <class Done>
-bool runUntil(WaitLoop& loop, Done done) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (!done() && std::chrono::steady_clock::now() < end) loop.runOnce(kStep);
-  return done();
-}
 
 ReasonCounts reportOf(const auto& endpoint) {
   ReasonCounts counts;

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "common/bus/wait_loop.h"
+#include "tests/common/bus/run_until.h"
 
 extern char** environ;
 
@@ -57,15 +58,6 @@ class Peer {
   pid_t pid_ = 0;
   int output_ = -1;
 };
-
-template <class Done>
-bool runUntil(WaitLoop& loop, Done done) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!done() && std::chrono::steady_clock::now() < end) {
-    loop.runOnce(std::chrono::milliseconds(20));
-  }
-  return done();
-}
 
 class Processes : public testing::Test {
  protected:

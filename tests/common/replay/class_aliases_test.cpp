@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string errorOf(const std::string& yaml) {
+std::string errorOfAliases(const std::string& yaml) {
   const auto file = freshFolder("aliases") / "a.yaml";
   writeText(file, yaml);
   return startupErrorOf([&] { ClassAliases::load(file); });
@@ -28,10 +28,11 @@ TEST(ClassAliases, TheShippedFileKnowsCommonNamesInAnyCase) {
 }
 
 TEST(ClassAliases, WhatIsWrongIsLocated) {
-  EXPECT_THAT(errorOf("car: [a]\nvan: [A]\n"), HasSubstr("a.yaml:2:7: a: is an alias of car"));
-  EXPECT_THAT(errorOf("car: auto\n"), HasSubstr("a.yaml:1:6: car: write a list"));
-  EXPECT_THAT(errorOf("- car\n"), HasSubstr("write `name: [alias, …]`"));
-  EXPECT_THAT(errorOf("car: [a\n"), HasSubstr("a.yaml:"));
+  EXPECT_THAT(errorOfAliases("car: [a]\nvan: [A]\n"),
+              HasSubstr("a.yaml:2:7: a: is an alias of car"));
+  EXPECT_THAT(errorOfAliases("car: auto\n"), HasSubstr("a.yaml:1:6: car: write a list"));
+  EXPECT_THAT(errorOfAliases("- car\n"), HasSubstr("write `name: [alias, …]`"));
+  EXPECT_THAT(errorOfAliases("car: [a\n"), HasSubstr("a.yaml:"));
   EXPECT_THAT(startupErrorOf([] { ClassAliases::load("/nowhere.yaml"); }),
               HasSubstr("PERDURE_CONFIG_DIR"));
 }

@@ -19,7 +19,7 @@ DetectionFile readCsv(const std::string& text, DetectionFileOptions options = {}
   writeText(options.file, text);
   return DetectionFile::read(options, ClassAliases());
 }
-std::string errorOf(const std::string& text) {
+std::string errorOfCsv(const std::string& text) {
   return startupErrorOf([&] { readCsv(text); });
 }
 constexpr char kHeader[] = "frame,class,x1,y1,x2,y2,score,alpha_semisynthetic\n";
@@ -95,7 +95,7 @@ TEST(DetectionFile, ClassesAreKnownFromTheFrameInWhichTheyFirstAppear) {
 
 TEST(DetectionFile, RrcWithoutHeaderNeedsAClassAndIsShiftedOnlyWhenAsked) {
   const std::string rrc = "0,296.021000,160.173000,452.297000,288.372000,0.529230\n";
-  EXPECT_THAT(errorOf(rrc), HasSubstr("--class"));
+  EXPECT_THAT(errorOfCsv(rrc), HasSubstr("--class"));
   DetectionFileOptions options;
   options.class_name = "Car";
   const auto as_is = readCsv(rrc, options);
@@ -107,24 +107,25 @@ TEST(DetectionFile, RrcWithoutHeaderNeedsAClassAndIsShiftedOnlyWhenAsked) {
 
 TEST(DetectionFile, EveryWrongLineIsLocated) {
   const std::string h = kHeader;
-  EXPECT_THAT(errorOf(h + "0,car,1,2,3,4,0.5,\n0,car,9,2,3,4,0.5,\n"),
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,0.5,\n0,car,9,2,3,4,0.5,\n"),
               HasSubstr("d.csv:3: x1 < x2"));
-  EXPECT_THAT(errorOf(h + "0,car,1,2,3,4,1.5,\n"), HasSubstr(":2: score"));
-  EXPECT_THAT(errorOf(h + "-1,car,1,2,3,4,0.5,\n"), HasSubstr(":2: frame"));
-  EXPECT_THAT(errorOf(h + "0,,1,2,3,4,0.5,\n"), HasSubstr(":2: class is empty"));
-  EXPECT_THAT(errorOf(h + "0,car,1,2,nan,4,0.5,\n"), HasSubstr(":2: x1, y1"));
-  EXPECT_THAT(errorOf(h + "0,car,1,2,3,4,0.5,90\n"), HasSubstr(":2: azimuth is in radians"));
-  EXPECT_THAT(errorOf(h + "0,car,1,2,3\n"), HasSubstr(":2: 5 fields; 8 are expected"));
-  EXPECT_THAT(errorOf("frame,class,x1,y1,x2,score\n"), HasSubstr(":1: column y2 is missing"));
-  EXPECT_THAT(errorOf("frame,frame,class,x1,y1,x2,y2,score\n"), HasSubstr("frame is there twice"));
-  EXPECT_THAT(errorOf("frame,class,x1,y1,x2,y2,score,logit:car\n0,car,1,2,3,4,.5,?\n"),
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,1.5,\n"), HasSubstr(":2: score"));
+  EXPECT_THAT(errorOfCsv(h + "-1,car,1,2,3,4,0.5,\n"), HasSubstr(":2: frame"));
+  EXPECT_THAT(errorOfCsv(h + "0,,1,2,3,4,0.5,\n"), HasSubstr(":2: class is empty"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,nan,4,0.5,\n"), HasSubstr(":2: x1, y1"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,0.5,90\n"), HasSubstr(":2: azimuth is in radians"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3\n"), HasSubstr(":2: 5 fields; 8 are expected"));
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,score\n"), HasSubstr(":1: column y2 is missing"));
+  EXPECT_THAT(errorOfCsv("frame,frame,class,x1,y1,x2,y2,score\n"),
+              HasSubstr("frame is there twice"));
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,y2,score,logit:car\n0,car,1,2,3,4,.5,?\n"),
               HasSubstr(":2: logit:car"));
-  EXPECT_THAT(errorOf("frame,class,x1,y1,x2,y2,score,sigma_x1\n"),
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,y2,score,sigma_x1\n"),
               HasSubstr("sigma_y1 is missing"));
-  EXPECT_THAT(errorOf("frame,class,x1,y1,x2,y2,score,sigma_x1,sigma_y1,sigma_x2,sigma_y2\n"
-                      "0,car,1,2,3,4,.5,1,1,-1,1\n"),
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,y2,score,sigma_x1,sigma_y1,sigma_x2,sigma_y2\n"
+                         "0,car,1,2,3,4,.5,1,1,-1,1\n"),
               HasSubstr("sigma_x1 to sigma_y2 are 0 or more"));
-  EXPECT_THAT(errorOf(""), HasSubstr("is empty"));
+  EXPECT_THAT(errorOfCsv(""), HasSubstr("is empty"));
 }
 
 }  // namespace

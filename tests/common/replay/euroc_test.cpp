@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
 std::unique_ptr<Dataset> open(const fs::path& path) { return Dataset::open({.path = path}); }
-std::string errorOf(const fs::path& path) {
+std::string errorOfEuroc(const fs::path& path) {
   return startupErrorOf([&] { open(path); });
 }
 
@@ -88,7 +88,7 @@ TEST(Euroc, ASimulatedVehiclesSpeedComesWithItsSigma) {
   EXPECT_EQ(toNanoseconds(speed[1].time), 1'020'000'000);
   EXPECT_EQ(dataset->reasons().of("speed_malformed"), 2U);
   fs::remove(root / "mav0/speed0/sensor.yaml");
-  EXPECT_THAT(errorOf(root), HasSubstr("speed0/sensor.yaml"));
+  EXPECT_THAT(errorOfEuroc(root), HasSubstr("speed0/sensor.yaml"));
 }
 
 TEST(Euroc, ImagesMayBeJpegByTheNamesInTheTable) {
@@ -143,16 +143,16 @@ TEST(Euroc, TruthIsInterpolated) {
 TEST(Euroc, MissingPartsAreNamed) {
   auto root = tinyEuroc("missing");
   fs::remove(root / "mav0/imu0/sensor.yaml");
-  EXPECT_THAT(errorOf(root), HasSubstr("imu0/sensor.yaml"));
+  EXPECT_THAT(errorOfEuroc(root), HasSubstr("imu0/sensor.yaml"));
   root = tinyEuroc("missing");
   fs::remove(root / "mav0/cam0/sensor.yaml");
-  EXPECT_THAT(errorOf(root), HasSubstr("cam0/sensor.yaml"));
+  EXPECT_THAT(errorOfEuroc(root), HasSubstr("cam0/sensor.yaml"));
   root = tinyEuroc("missing");
   fs::remove(root / "mav0/imu0/data.csv");
-  EXPECT_THAT(errorOf(root), HasSubstr("imu0/data.csv"));
+  EXPECT_THAT(errorOfEuroc(root), HasSubstr("imu0/data.csv"));
   root = tinyEuroc("missing");
   fs::remove_all(root / "mav0/cam0/data");
-  EXPECT_THAT(errorOf(root), HasSubstr("unpack the images"));
+  EXPECT_THAT(errorOfEuroc(root), HasSubstr("unpack the images"));
 }
 
 TEST(Euroc, CalibrationThatMakesNoSenseIsRefusedByKey) {
@@ -163,7 +163,7 @@ TEST(Euroc, CalibrationThatMakesNoSenseIsRefusedByKey) {
     std::string yaml = good;
     yaml.replace(yaml.find(from), from.size(), to);
     writeText(file, yaml);
-    return errorOf(root);
+    return errorOfEuroc(root);
   };
   EXPECT_THAT(errorWith("[20.0, 21.0, 16.0, 12.0]", "[20.0, -21.0, 16.0, 12.0]"),
               HasSubstr("intrinsics have a focal length"));

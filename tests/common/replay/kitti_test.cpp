@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-std::string errorOf(const DatasetOptions& options) {
+std::string errorOfKitti(const DatasetOptions& options) {
   return startupErrorOf([&] { Dataset::open(options); });
 }
 
@@ -125,18 +125,18 @@ TEST(KittiRaw, CalibrationBesideOrAboveTheDriveIsFoundAndItsAbsenceNamed) {
   }
   EXPECT_EQ(Dataset::open({.path = drive})->calibration().cameras[0].fx, 700.0);
   fs::remove(drive / "calib_imu_to_velo.txt");
-  EXPECT_THAT(errorOf({.path = drive}), HasSubstr("calib_imu_to_velo.txt"));
+  EXPECT_THAT(errorOfKitti({.path = drive}), HasSubstr("calib_imu_to_velo.txt"));
   fs::remove(drive / "calib_cam_to_cam.txt");
-  EXPECT_THAT(errorOf({.path = drive}), HasSubstr("unpack KITTI's calibration of that day"));
+  EXPECT_THAT(errorOfKitti({.path = drive}), HasSubstr("unpack KITTI's calibration of that day"));
 }
 
 TEST(KittiRaw, MissingPartsAreNamed) {
   auto drive = tinyKittiRaw("parts");
   fs::remove_all(drive / "oxts");
-  EXPECT_THAT(errorOf({.path = drive}), HasSubstr("oxts/data"));
+  EXPECT_THAT(errorOfKitti({.path = drive}), HasSubstr("oxts/data"));
   drive = tinyKittiRaw("parts");
   fs::remove(drive / "image_02/timestamps.txt");
-  EXPECT_THAT(errorOf({.path = drive}), HasSubstr("image_02/timestamps.txt"));
+  EXPECT_THAT(errorOfKitti({.path = drive}), HasSubstr("image_02/timestamps.txt"));
   drive = tinyKittiRaw("parts");
   fs::remove_all(drive / "image_03");
   EXPECT_EQ(Dataset::open({.path = drive})->calibration().cameras.size(), 1U) << "mono is enough";
@@ -178,13 +178,13 @@ TEST(KittiTracking, WithoutImagesFramesCarryStampAndSizeOnly) {
 
 TEST(KittiTracking, WhatIsMissingIsNamed) {
   const auto root = tinyKittiTracking("tracking_missing");
-  EXPECT_THAT(errorOf({.path = root}), HasSubstr("name one with --sequence (0000, 0001)"));
-  EXPECT_THAT(errorOf({.path = root, .sequence = "0042"}), HasSubstr("there are 0000, 0001"));
+  EXPECT_THAT(errorOfKitti({.path = root}), HasSubstr("name one with --sequence (0000, 0001)"));
+  EXPECT_THAT(errorOfKitti({.path = root, .sequence = "0042"}), HasSubstr("there are 0000, 0001"));
   fs::remove_all(root / "label_02");
-  EXPECT_THAT(errorOf({.path = root, .sequence = "0001"}), HasSubstr("one line a frame"));
+  EXPECT_THAT(errorOfKitti({.path = root, .sequence = "0001"}), HasSubstr("one line a frame"));
   fs::remove_all(root / "calib");
   fs::create_directories(root / "label_02");
-  EXPECT_THAT(errorOf({.path = root, .sequence = "0000"}),
+  EXPECT_THAT(errorOfKitti({.path = root, .sequence = "0000"}),
               HasSubstr("unpack KITTI tracking's calib"));
 }
 

@@ -18,7 +18,7 @@ PoseFile readPoses(const std::string& text) {
   writeText(file, text);
   return PoseFile::read(file);
 }
-std::string errorOf(const std::string& text) {
+std::string errorOfPoses(const std::string& text) {
   return startupErrorOf([&] { readPoses(text); });
 }
 TimePoint at(double seconds) { return TimePoint(durationFromSeconds(seconds)); }
@@ -60,15 +60,17 @@ TEST(PoseFile, KittiLinesOfTwelveAndSixteenNumbersAreByFrame) {
 }
 
 TEST(PoseFile, EveryWrongLineIsLocated) {
-  EXPECT_THAT(errorOf("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 0.5\n"), HasSubstr("poses.txt:2: the quat"));
-  EXPECT_THAT(errorOf("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"), HasSubstr(":2: the time does not"));
-  EXPECT_THAT(errorOf("1 0 0 0 0 2 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
-  EXPECT_THAT(errorOf("1 0 0 0 0 1 0 0 0 0 -1 0\n"), HasSubstr("right-handed"));
-  EXPECT_THAT(errorOf("1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\n"), HasSubstr("0 0 0 1"));
-  EXPECT_THAT(errorOf("0 0 0 nan 0 0 0 1\n"), HasSubstr(":1: write eight finite numbers"));
-  EXPECT_THAT(errorOf("1 2 3\n"), HasSubstr(":1: 3 numbers; write 8"));
-  EXPECT_THAT(errorOf("0 0 0 0 0 0 0 1\n1 0 0 0\n"), HasSubstr(":2: 4 numbers"));
-  EXPECT_THAT(errorOf("# nothing\n"), HasSubstr("holds no poses"));
+  EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 0.5\n"),
+              HasSubstr("poses.txt:2: the quat"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"),
+              HasSubstr(":2: the time does not"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 2 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 -1 0\n"), HasSubstr("right-handed"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\n"), HasSubstr("0 0 0 1"));
+  EXPECT_THAT(errorOfPoses("0 0 0 nan 0 0 0 1\n"), HasSubstr(":1: write eight finite numbers"));
+  EXPECT_THAT(errorOfPoses("1 2 3\n"), HasSubstr(":1: 3 numbers; write 8"));
+  EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0\n"), HasSubstr(":2: 4 numbers"));
+  EXPECT_THAT(errorOfPoses("# nothing\n"), HasSubstr("holds no poses"));
   EXPECT_THAT(startupErrorOf([] { PoseFile::read("/nowhere.txt"); }), HasSubstr("--odometry"));
 }
 

@@ -8,7 +8,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr TimePoint kEpoch = fromNanoseconds(1'000'000'000'000);
+constexpr TimePoint kStart = fromNanoseconds(1'000'000'000'000);
 const ImuCalibration kCalibration{2e-3, 3e-4, 2e-2, 5e-3, 200.0};
 
 struct Reckoned {
@@ -38,7 +38,7 @@ Reckoned integrate(const std::vector<ImuRecord>& imu, Reckoned state) {
 
 std::vector<ImuRecord> record(const Scene& scene, double seconds) {
   return simulateImu(scene.body, *scene.rig.calibration.imu, scene.rig.imu, scene.seed, seconds,
-                     kEpoch);
+                     kStart);
 }
 
 TEST(Imu, WithoutNoiseLeadsBackToTheTruthWithinAMillimetre) {
@@ -59,7 +59,7 @@ TEST(Imu, WithoutNoiseLeadsBackToTheTruthWithinAMillimetre) {
 TEST(Imu, AtRestFeelsGravityOnly) {
   ImuErrors errors;
   errors.noise = false;
-  const auto imu = simulateImu(Trajectory(RigidTransform{}), kCalibration, errors, 1, 0.1, kEpoch);
+  const auto imu = simulateImu(Trajectory(RigidTransform{}), kCalibration, errors, 1, 0.1, kStart);
   ASSERT_EQ(imu.size(), 21u);
   EXPECT_EQ(imu[3].sample.accel, Eigen::Vector3d(0, 0, kGravity));
   EXPECT_EQ(imu[3].sample.gyro, Eigen::Vector3d::Zero());
@@ -69,7 +69,7 @@ TEST(Imu, AtRestFeelsGravityOnly) {
 
 TEST(Imu, NoiseHasTheDensitiesOfItsCalibration) {
   const auto imu =
-      simulateImu(Trajectory(RigidTransform{}), kCalibration, ImuErrors{}, 3, 500.0, kEpoch);
+      simulateImu(Trajectory(RigidTransform{}), kCalibration, ImuErrors{}, 3, 500.0, kStart);
   const double n = static_cast<double>(imu.size()), rate = kCalibration.rate_hz;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = gyro, gyro_walk = gyro, accel_walk = gyro;
   for (std::size_t i = 0; i < imu.size(); ++i) {
@@ -97,7 +97,7 @@ TEST(Imu, AllanDeviationAtOneSecondIsTheDensityAtAnyRate) {
   for (const double rate : {100.0, 400.0}) {
     ImuCalibration calibration{2e-3, 0.0, 2e-2, 0.0, rate};
     const auto imu =
-        simulateImu(Trajectory(RigidTransform{}), calibration, ImuErrors{}, 5, 2000.0, kEpoch);
+        simulateImu(Trajectory(RigidTransform{}), calibration, ImuErrors{}, 5, 2000.0, kStart);
     const auto per_second = static_cast<std::size_t>(rate);
     double sum = 0.0, last = 0.0;
     for (std::size_t second = 0; second < 2000; ++second) {
@@ -118,10 +118,10 @@ TEST(Imu, ScalesMisalignsAndSaturates) {
   errors.accel_scale << 1, 0, 0.02, 0, 1, 0, 0, 0, 1.01;
   errors.accel_bias = {0, 0.5, 0};
   const Trajectory still{RigidTransform{}};
-  EXPECT_TRUE(simulateImu(still, kCalibration, errors, 1, 0.0, kEpoch)[0].sample.accel.isApprox(
+  EXPECT_TRUE(simulateImu(still, kCalibration, errors, 1, 0.0, kStart)[0].sample.accel.isApprox(
       Eigen::Vector3d(0.02 * kGravity, 0.5, 1.01 * kGravity)));
   errors.accel_limit = 5.0;
-  EXPECT_EQ(simulateImu(still, kCalibration, errors, 1, 0.0, kEpoch)[0].sample.accel.z(), 5.0);
+  EXPECT_EQ(simulateImu(still, kCalibration, errors, 1, 0.0, kStart)[0].sample.accel.z(), 5.0);
 }
 
 TEST(Imu, APrefixIsTheSameAndAnotherSeedIsNot) {
@@ -133,18 +133,18 @@ TEST(Imu, APrefixIsTheSameAndAnotherSeedIsNot) {
     EXPECT_EQ(part[i].sample.accel, whole[i].sample.accel);
   }
   const auto other =
-      simulateImu(scene.body, *scene.rig.calibration.imu, scene.rig.imu, 8, 1.0, kEpoch);
+      simulateImu(scene.body, *scene.rig.calibration.imu, scene.rig.imu, 8, 1.0, kStart);
   EXPECT_NE(other[5].sample.gyro, whole[5].sample.gyro);
 }
 
 TEST(Speed, IsTheBodysOwnAlongItsAxisWithItsDeviation) {
   const Scene scene = makeScene("street", 7, {});
   ASSERT_TRUE(scene.rig.speed);
-  const auto samples = simulateSpeed(scene.body, *scene.rig.speed, 7, 60.0, kEpoch);
+  const auto samples = simulateSpeed(scene.body, *scene.rig.speed, 7, 60.0, kStart);
   ASSERT_EQ(samples.size(), 3001u);
   double sum = 0.0;
   for (const SpeedSample& sample : samples) {
-    const MotionState state = scene.body.at(toSeconds(sample.time - kEpoch));
+    const MotionState state = scene.body.at(toSeconds(sample.time - kStart));
     // A vehicle does not skid: its speed along its axis is its speed.
     EXPECT_NEAR(state.velocity_W.norm(), state.velocity_W.dot(state.T_WB.R().col(0)), 0.05);
     const double error = sample.speed - state.velocity_W.dot(state.T_WB.R().col(0));

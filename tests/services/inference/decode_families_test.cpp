@@ -56,7 +56,7 @@ Values randomValues(std::size_t count, unsigned seed, float spread = 2.0F) {
   return values;
 }
 
-double sigma(double x) { return 1.0 / (1.0 + std::exp(-x)); }
+double logistic(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 double logOdds(double p) { return std::log(p / (1 - p)); }
 
 void expectBox(const Box& box, double x1, double y1, double x2, double y2) {
@@ -81,13 +81,13 @@ TEST(DecodeYolov5, DoublesTheSigmoidsOfItsRawHeads) {
     for (std::size_t cell = 0; cell < 2; ++cell) {
       const float* t = rows.data() + (a * 2 + cell) * 7;
       const Candidate& c = out[a * 2 + cell];
-      const double x = (2 * sigma(t[0]) - 0.5 + static_cast<double>(cell)) * 16;
-      const double y = (2 * sigma(t[1]) - 0.5) * 16;
-      const double w = std::pow(2 * sigma(t[2]), 2) * (a == 0 ? 10 : 30);
-      const double h = std::pow(2 * sigma(t[3]), 2) * (a == 0 ? 20 : 5);
+      const double x = (2 * logistic(t[0]) - 0.5 + static_cast<double>(cell)) * 16;
+      const double y = (2 * logistic(t[1]) - 0.5) * 16;
+      const double w = std::pow(2 * logistic(t[2]), 2) * (a == 0 ? 10 : 30);
+      const double h = std::pow(2 * logistic(t[3]), 2) * (a == 0 ? 20 : 5);
       expectBox(c.box, x - w / 2, y - h / 2, x + w / 2, y + h / 2);
-      EXPECT_NEAR(c.activations[1], logOdds(sigma(t[4]) * sigma(t[5])), 1e-5);
-      EXPECT_NEAR(c.activations[2], logOdds(sigma(t[4]) * sigma(t[6])), 1e-5);
+      EXPECT_NEAR(c.activations[1], logOdds(logistic(t[4]) * logistic(t[5])), 1e-5);
+      EXPECT_NEAR(c.activations[2], logOdds(logistic(t[4]) * logistic(t[6])), 1e-5);
     }
   }
 }

@@ -17,7 +17,7 @@ namespace {
 using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-constexpr Duration kLease = milliseconds(100);
+constexpr Duration kShortLease = milliseconds(100);
 constexpr auto kPeriod = milliseconds(33);
 
 /// What a process answers to a frame; nothing: it is stopped, or dead.
@@ -49,8 +49,9 @@ struct Bus {
   void setClasses(const std::vector<std::string>& old, const std::vector<std::string>& fresh) {
     constexpr double kProbation = 2.0;
     processes.clear();
-    processes.try_emplace(kOld, Swap({kOld, "old", 0.0, kLease}), sees(kOld, kStreet), 10);
-    processes.try_emplace(kNew, Swap({kNew, "new", kProbation, kLease}), sees(kNew, kStreet), -1);
+    processes.try_emplace(kOld, Swap({kOld, "old", 0.0, kShortLease}), sees(kOld, kStreet), 10);
+    processes.try_emplace(kNew, Swap({kNew, "new", kProbation, kShortLease}), sees(kNew, kStreet),
+                          -1);
     for (auto& [id, p] : processes) {
       p.swap.learn(modelOf(kOld, old));
       p.swap.learn(modelOf(kNew, fresh));
@@ -62,7 +63,7 @@ struct Bus {
   InstanceId owner() const {
     InstanceId best = 0;
     for (const auto& [id, p] : processes) {
-      const bool lives = !p.silent && !p.ended && now - p.wrote <= kLease;
+      const bool lives = !p.silent && !p.ended && now - p.wrote <= kShortLease;
       if (lives && (best == 0 || p.strength > processes.at(best).strength)) best = id;
     }
     return best;
@@ -285,7 +286,7 @@ TEST(Swap, APassOfOneThatIsNotHeardRetiresNobody) {
 }
 
 TEST(Swap, WhatASpareSaysWhileReadersLearnOfItIsSaidAgain) {
-  Swap spare({kNew, "spare", 0.0, kLease});
+  Swap spare({kNew, "spare", 0.0, kShortLease});
   Swap::Time now{std::chrono::hours(1)};
   const auto sequences = [&] {
     std::vector<std::uint64_t> all;
@@ -301,12 +302,12 @@ TEST(Swap, WhatASpareSaysWhileReadersLearnOfItIsSaidAgain) {
   }
   spare.tick(now);
   EXPECT_THAT(sequences(), ElementsAre(2, 3, 4, 5)) << "other readers may have heard none of them";
-  spare.tick(now + kLease);
+  spare.tick(now + kShortLease);
   EXPECT_THAT(sequences(), ElementsAre());
 }
 
 TEST(Swap, WhatASpareMadeBeforeItHeardItselfIsSaidAgainToo) {
-  Swap spare({kNew, "spare", 0.0, kLease});
+  Swap spare({kNew, "spare", 0.0, kShortLease});
   Swap::Time now{std::chrono::hours(1)};
   spare.ownResult(listOf(kNew, 0, kStreet), true, now);
   spare.heard(listOf(kOld, 0, kStreet), now);
@@ -315,7 +316,7 @@ TEST(Swap, WhatASpareMadeBeforeItHeardItselfIsSaidAgainToo) {
   }
   spare.heard(listOf(kNew, 2, kStreet), now);  // it comes back after frame 3 was written
   (void)spare.take();
-  spare.tick(now + kLease);
+  spare.tick(now + kShortLease);
   const auto said = spare.take().again;
   EXPECT_TRUE(std::any_of(said.begin(), said.end(), [](const Detections& d) {
     return d.stamp.sequence == 2;

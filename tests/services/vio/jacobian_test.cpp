@@ -15,7 +15,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-Nav someNav() {
+Nav someMotion() {
   Nav nav;
   nav.q_WB = expQuaternion(Vector3d(0.3, -0.2, 0.9));
   nav.p_WB = {0.4, -0.3, 0.2};
@@ -28,7 +28,7 @@ Nav someNav() {
 State someState(int clones) {
   test::SimulatedDrive drive({});
   State state(drive.T_BC(), 0.003, clones + 1, 5);
-  state.nav = state.nav_linear = someNav();
+  state.nav = state.nav_linear = someMotion();
   Eigen::MatrixXd A = Eigen::MatrixXd::Random(state.size(), state.size());
   state.P() = 1e-4 * (A * A.transpose() + Eigen::MatrixXd::Identity(A.rows(), A.cols()));
   return state;
@@ -58,7 +58,7 @@ TEST(VisualJacobians, APointBehindTheCameraIsRefused) {
 }
 
 TEST(SpeedJacobian, AgreesWithTheNumericOne) {
-  const Nav nav = someNav();
+  const Nav nav = someMotion();
   Eigen::Matrix<double, 3, 6> J;
   bodyVelocity(nav, &J);
   const auto f = [&](const VectorXd& d) -> VectorXd {
@@ -71,7 +71,7 @@ TEST(SpeedJacobian, AgreesWithTheNumericOne) {
 }
 
 TEST(RestJacobian, AgreesWithTheNumericOne) {
-  const Nav nav = someNav();
+  const Nav nav = someMotion();
   Eigen::Matrix<double, 6, 9> J;
   restPrediction(nav, 9.81, &J);
   const auto f = [&](const VectorXd& d) -> VectorXd {

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 
-Frame at(std::int64_t ms) {
+Frame frameAt(std::int64_t ms) {
   Frame frame;
   frame.stamp.time = fromNanoseconds(ms * kMs);
   return frame;
@@ -19,44 +19,44 @@ std::string codeOf(const Result<void>& result) { return result ? "" : result.err
 
 TEST(WaitingFrames, AreTakenInOrderWithTheirPartners) {
   WaitingFrames waiting(0.01);
-  EXPECT_EQ(codeOf(waiting.addSecond(at(104))), "");  // before its partner
-  EXPECT_EQ(codeOf(waiting.addFirst(at(100))), "");
-  EXPECT_EQ(codeOf(waiting.addFirst(at(200))), "");
-  EXPECT_EQ(codeOf(waiting.addFirst(at(150))), "frame_reordered");
-  EXPECT_EQ(codeOf(waiting.addFirst(at(150))), "frame_duplicate");
-  EXPECT_EQ(codeOf(waiting.addSecond(at(191))), "");
+  EXPECT_EQ(codeOf(waiting.addSecond(frameAt(104))), "");  // before its partner
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(100))), "");
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(200))), "");
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(150))), "frame_reordered");
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(150))), "frame_duplicate");
+  EXPECT_EQ(codeOf(waiting.addSecond(frameAt(191))), "");
   ASSERT_EQ(waiting.size(), 3u);
   const FramePair first = waiting.take(), middle = waiting.take(), last = waiting.take();
-  EXPECT_EQ(first.first.stamp.time, at(100).stamp.time);
+  EXPECT_EQ(first.first.stamp.time, frameAt(100).stamp.time);
   ASSERT_TRUE(first.second);
-  EXPECT_EQ(first.second->stamp.time, at(104).stamp.time);
+  EXPECT_EQ(first.second->stamp.time, frameAt(104).stamp.time);
   EXPECT_FALSE(middle.second);
   ASSERT_TRUE(last.second);
-  EXPECT_EQ(last.second->stamp.time, at(191).stamp.time);
+  EXPECT_EQ(last.second->stamp.time, frameAt(191).stamp.time);
   EXPECT_TRUE(waiting.empty());
 }
 
 TEST(WaitingFrames, ALaterFrameSaysThatNoPartnerWillCome) {
   WaitingFrames waiting(0.01);
-  EXPECT_TRUE(waiting.addFirst(at(100)));
+  EXPECT_TRUE(waiting.addFirst(frameAt(100)));
   EXPECT_TRUE(waiting.frontMayBePaired());
-  EXPECT_TRUE(waiting.addFirst(at(150)));
+  EXPECT_TRUE(waiting.addFirst(frameAt(150)));
   EXPECT_TRUE(waiting.frontMayBePaired());
-  EXPECT_TRUE(waiting.addSecond(at(150)));
+  EXPECT_TRUE(waiting.addSecond(frameAt(150)));
   EXPECT_FALSE(waiting.frontMayBePaired()) << "the next one has its own";
   WaitingFrames alone(0.01);
-  EXPECT_TRUE(alone.addFirst(at(100)));
-  EXPECT_TRUE(alone.addSecond(at(115)));
+  EXPECT_TRUE(alone.addFirst(frameAt(100)));
+  EXPECT_TRUE(alone.addSecond(frameAt(115)));
   EXPECT_FALSE(alone.frontMayBePaired()) << "the second camera is past it";
 }
 
 TEST(WaitingFrames, SecondsWithoutPartnersDoNotPileUp) {
   WaitingFrames waiting(0.01);
-  for (int i = 0; i < 4; ++i) EXPECT_TRUE(waiting.addSecond(at(100 * i)));
-  EXPECT_EQ(codeOf(waiting.addSecond(at(400))), "stereo_unpaired");
-  EXPECT_TRUE(waiting.addFirst(at(0)));
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(waiting.addSecond(frameAt(100 * i)));
+  EXPECT_EQ(codeOf(waiting.addSecond(frameAt(400))), "stereo_unpaired");
+  EXPECT_TRUE(waiting.addFirst(frameAt(0)));
   EXPECT_FALSE(waiting.take().second) << "given up";
-  EXPECT_TRUE(waiting.addFirst(at(400)));
+  EXPECT_TRUE(waiting.addFirst(frameAt(400)));
   EXPECT_TRUE(waiting.take().second);
 }
 

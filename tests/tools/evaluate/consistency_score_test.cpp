@@ -13,8 +13,6 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 sim::TruthObject chairAt(std::uint64_t id, double x) {
   sim::TruthObject chair;
   chair.id = id;
@@ -88,7 +86,7 @@ TEST(Consistency, AChairTheWrongWayRoundIsWrongInYawButNotInItsHalfTurn) {
   sim::Truth truth;
   truth.objects = {chairAt(1, 10.0)};
   MapBelief belief = beliefOf(truth.objects[0], 0.1);
-  belief.mean[3] += kPi - 0.05;
+  belief.mean[3] += std::numbers::pi - 0.05;
   const auto score = scoreConsistency({belief}, truth, RigidTransform(), 3.0);
   EXPECT_GT(score.yaw.mean(), 900.0);
   EXPECT_NEAR(score.half_yaw.mean(), 0.25, 1e-9);
@@ -112,7 +110,7 @@ TEST(Consistency, OnlyTheNearestStandingBeliefOfTheClassIsCompared) {
 
 /// A body that circles with its x axis upwards, where yaw by that axis means nothing.
 RigidTransform circling(double t) {
-  const Eigen::Matrix3d up = expSo3(Eigen::Vector3d(0, -0.5 * kPi, 0));
+  const Eigen::Matrix3d up = expSo3(Eigen::Vector3d(0, -0.5 * std::numbers::pi, 0));
   return {rotationAboutZ(0.3 * t) * up,
           Eigen::Vector3d(5 * std::cos(0.3 * t), 5 * std::sin(0.3 * t), 1)};
 }

@@ -7,8 +7,6 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 /// W is the rectified camera: x right, y down, z forward, so a row's yaw turns about z. Good enough
 /// for what does not look at orientation.
 replay::KittiCalibration camera() {
@@ -60,12 +58,12 @@ TEST(ObjectScore, DistanceDecidesTheCell) {
 
 TEST(ObjectScore, AngleIsModuloAFullTurnAndAnyMeansAny) {
   auto label = labelAt(0, 20);
-  for (const double turn : {0.0, 2 * kPi - 0.4}) {
+  for (const double turn : {0.0, 2 * std::numbers::pi - 0.4}) {
     label.heading = turn;  // the estimate's is 0
     const auto s = score({rowAt(0, 20)}, {{.counted = {label}, .ignored = {}, .dont_care = {}}});
     EXPECT_EQ(s.cells[2][0].matched, 1U) << turn;
   }
-  label.heading = kPi;
+  label.heading = std::numbers::pi;
   const auto s = score({rowAt(0, 20)}, {{.counted = {label}, .ignored = {}, .dont_care = {}}});
   EXPECT_EQ(s.cells[2][1].matched, 0U);
   EXPECT_EQ(s.cells[2][1].false_alarms, 1U);
@@ -167,8 +165,8 @@ TEST(ObjectScore, YawInWBecomesRotationAboutTheCamerasVertical) {
   EstimateRow row;
   row.centre_W = Eigen::Vector3d(20, 0, 0);
   row.length = 4, row.width = 2, row.height = 1.5;
-  EXPECT_NEAR(toCamera(row, T_RW, camera())->heading, -kPi / 2, 1e-12);
-  row.yaw = -kPi / 2;
+  EXPECT_NEAR(toCamera(row, T_RW, camera())->heading, -std::numbers::pi / 2, 1e-12);
+  row.yaw = -std::numbers::pi / 2;
   const auto seen = toCamera(row, T_RW, camera());
   EXPECT_NEAR(seen->heading, 0.0, 1e-12);
   EXPECT_NEAR(seen->box.width(), 700 * 4.0 / 19.0, 1e-9) << "the near face, 1 m before the centre";

@@ -15,8 +15,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr double kPi = std::numbers::pi;
-
 /// A body at (100, 50), heading north, that looks at the given objects in its only frame.
 SimulatedTruth lookingNorth() {
   CameraCalibration camera;
@@ -25,7 +23,7 @@ SimulatedTruth lookingNorth() {
   Eigen::Matrix3d R_BC;
   R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d(0.5, 0, 0));
-  const RigidTransform T_WB(rotationAboutZ(kPi / 2), Eigen::Vector3d(100, 50, 1));
+  const RigidTransform T_WB(rotationAboutZ(std::numbers::pi / 2), Eigen::Vector3d(100, 50, 1));
   return {{},
           replay::PoseFile(replay::PoseFormat::kTum, {{fromNanoseconds(0), T_WB}}),
           CameraModel(camera),
@@ -40,7 +38,7 @@ void addObject(SimulatedTruth& truth, std::uint64_t id, const std::string& class
   object.class_name = object.looks_like = class_name;
   object.size = Eigen::Vector3d(4, 1.7, 1.5);
   object.present_from = TimePoint::min(), object.present_until = TimePoint::max();
-  object.keys = {{fromNanoseconds(0), Eigen::Vector3d(100 - left, 60, 1), kPi / 2}};
+  object.keys = {{fromNanoseconds(0), Eigen::Vector3d(100 - left, 60, 1), std::numbers::pi / 2}};
   truth.truth.objects.push_back(object);
   const double x = 320 - 50 * left;
   truth.truth.views[0].push_back({id, 1.0, Box{x - 40, 220, x + 40, 260}});
@@ -69,7 +67,7 @@ TEST(SimulatedTruth, TruthAndEstimateMeetInTheCameraWhateverTheirWorlds) {
   EXPECT_EQ(s.cells[0][0].matched, 1U) << "under 0.5 m and 30 degrees";
   EXPECT_NEAR(s.position_error_m, 0.0, 1e-9);
   auto turned = rowAt(2.0);
-  turned.yaw = kPi;
+  turned.yaw = std::numbers::pi;
   EXPECT_EQ(score(truth, {turned}).cells[0][0].matched, 0U);
   EXPECT_EQ(score(truth, {turned}).cells[0][2].matched, 1U);
 }

@@ -19,7 +19,7 @@ LedgerEntry& entryOf(ObjectBelief& o, ExistenceEvidence kind) {
   return o.why.existence[static_cast<std::size_t>(kind)];
 }
 
-ObjectBelief car() {
+ObjectBelief carBelief() {
   ObjectBelief o;
   o.id = 17;
   o.first_seen = at(101.3);
@@ -46,7 +46,7 @@ ObjectBelief car() {
 
 TEST(Why, TellsAnObjectEntryByEntry) {
   EXPECT_EQ(
-      toWhy(car()),
+      toWhy(carBelief()),
       R"(Object 17 exists with probability 0.999; if it does, it is a car with probability 0.930.
 It was first seen at 101.300 s, and last 12.400 s later.
 
@@ -75,7 +75,7 @@ That it is a van was given up at 104.100 s; a car was the better one, 200.3 to 1
 }
 
 TEST(Why, SaysThatThereIsNoLedger) {
-  ObjectBelief o = car();
+  ObjectBelief o = carBelief();
   o.why = {};
   EXPECT_THAT(toWhy(o), HasSubstr("Its ledger is empty"));
   EXPECT_THAT(toWhy(o), Not(HasSubstr("together")));
@@ -83,17 +83,17 @@ TEST(Why, SaysThatThereIsNoLedger) {
 }
 
 TEST(Why, SaysWhereALedgerDoesNotAddUp) {
-  EXPECT_THAT(toWhy(car()), Not(HasSubstr("faulty")));
-  ObjectBelief o = car();
+  EXPECT_THAT(toWhy(carBelief()), Not(HasSubstr("faulty")));
+  ObjectBelief o = carBelief();
   entryOf(o, ExistenceEvidence::kHit).log_odds += 1e-4;
   EXPECT_THAT(toWhy(o), HasSubstr("the ledger is faulty"));
-  o = car();
+  o = carBelief();
   o.why.classes.pop_back();
   EXPECT_THAT(toWhy(o), HasSubstr("The ledger does not say why"));
 }
 
 TEST(Why, ShowsEvidenceOfKindsThatItDoesNotKnow) {
-  ObjectBelief o = car();
+  ObjectBelief o = carBelief();
   o.why.existence.push_back({1.5, 2, at(102.0), at(103.0)});
   o.existence = 1.0 / (1.0 + std::exp(-o.why.logOdds()));
   EXPECT_THAT(toWhy(o), HasSubstr("+1.50  evidence of a kind that this program does not know"));
@@ -101,7 +101,7 @@ TEST(Why, ShowsEvidenceOfKindsThatItDoesNotKnow) {
 }
 
 TEST(Why, NamesKindsInJson) {
-  const auto json = toJson(car().why);
+  const auto json = toJson(carBelief().why);
   EXPECT_EQ(json["existence"]["hit"]["log_odds"], 9.2);
   EXPECT_EQ(json["existence"]["hit"]["count"], 31);
   EXPECT_EQ(json["existence"]["hit"]["first_ns"], 101'300'000'000);
