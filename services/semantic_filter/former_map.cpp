@@ -19,7 +19,7 @@ bool stands(const ObjectBelief& belief) { return belief.confirmed && belief.movi
 std::vector<PlacedThing> standing(const std::vector<Track>& objects, double min_speed) {
   std::vector<PlacedThing> result;
   for (const Track& o : objects) {
-    if (!o.confirmed || o.recalled) continue;
+    if (!o.life.confirmed || o.life.recalled) continue;
     const ObjectBelief belief = toBelief(o, min_speed);
     if (stands(belief)) result.push_back(placedOf(belief));
   }
@@ -83,10 +83,10 @@ void FormerMap::refine(const std::vector<Track>& objects) {
   std::vector<std::pair<TimePoint, std::pair<PlacedThing, PlacedThing>>> seen_again;
   for (const Track& o : objects) {
     const auto there = laid_.find(o.id);
-    if (there == laid_.end() || o.recalled || o.hits <= there->second.second) continue;
+    if (there == laid_.end() || o.life.recalled || o.life.hits <= there->second.second) continue;
     const ObjectBelief belief = toBelief(o, parameters_.motion.min_speed);
     if (stands(belief)) {
-      seen_again.push_back({o.last_seen, {there->second.first, placedOf(belief)}});
+      seen_again.push_back({o.life.last_seen, {there->second.first, placedOf(belief)}});
     }
   }
   std::stable_sort(seen_again.begin(), seen_again.end(),

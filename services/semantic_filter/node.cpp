@@ -256,7 +256,7 @@ void Node::stepEntry(Entry& entry) {
   StepReport report = filter_.step(entry.before, belief_, entry.input, ids_);
   entry.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
-  if (entry.input.boxes && !std::exchange(entry.drift_measured_at, true) && !report.drift.empty() &&
+  if (entry.input.boxes && !std::exchange(entry.drift_measured, true) && !report.drift.empty() &&
       isLevel(entry)) {
     drift_.add(report.drift, entry.input.view.T_WB);
   }

@@ -61,7 +61,7 @@ class Node {
     WorldId world;
     std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
     Belief before;
-    bool stepped = false, drift_measured_at = false;
+    bool stepped = false, drift_measured = false;
     std::vector<MergeRecord> merges = {};
   };
 

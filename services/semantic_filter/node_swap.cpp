@@ -42,7 +42,7 @@ bool Node::inflations(const Entry& entry, const Detections& detections) {
   const Model* model = models_.find(detections.model_hash);
   std::vector<Prediction> expected;
   for (const Track& object : (entry.stepped ? entry.before : belief_).tracks) {
-    if (!object.confirmed || !model->names->contains(object.best().class_name)) continue;
+    if (!object.life.confirmed || !model->names->contains(object.best().class_name)) continue;
     if (auto prediction = predictionOf(object, entry.input, {})) expected.push_back(*prediction);
   }
   const bool blind = missesAll(expected, detections);

@@ -19,16 +19,16 @@ TimePoint later(TimePoint time, double seconds) {
 
 constexpr double kShortestPause_s = 0.2;  // in which what should be in visibility is not said again
 
-bool inSight(const Track& o) { return o.visible_fraction > 0.0; }
+bool inSight(const Track& o) { return o.visibility.fraction > 0.0; }
 
 }  // namespace
 
 /// Until it is detected again: that it should be in visibility by now may be a misjudged edge.
 bool ReappearanceMonitor::waits(const Track& o, const Parameters& parameters) const {
-  if (!o.confirmed || movingProbability(o, parameters.motion.min_speed) >= 0.5) return false;
-  if (o.visibility == Visibility::kOccluded) return true;
+  if (!o.life.confirmed || movingProbability(o, parameters.motion.min_speed) >= 0.5) return false;
+  if (o.visibility.state == Visibility::kOccluded) return true;
   const auto known = waiting_.find(o.id);
-  return inSight(o) && known != waiting_.end() && o.hits == known->second.hits;
+  return inSight(o) && known != waiting_.end() && o.life.hits == known->second.hits;
 }
 
 void ReappearanceMonitor::clear() {
@@ -83,7 +83,7 @@ std::vector<Event> ReappearanceMonitor::update(const std::vector<Track>& objects
     hidden.insert(o.id);
     const auto [known, fresh] = waiting_.try_emplace(o.id);
     Waiting& waiting = known->second;
-    if (fresh) waiting.hits = o.hits;
+    if (fresh) waiting.hits = o.life.hits;
     if (now.stamp.time < waiting.asked_again) continue;
     const auto seconds = expectedReappearance(objects, o, now, way, parameters.visibility);
     const double pause = std::clamp(0.25 * seconds.value_or(kRemembered_s),
@@ -100,7 +100,7 @@ std::vector<Event> ReappearanceMonitor::update(const std::vector<Track>& objects
     Event e = blank;
     e.kind = EventKind::kPredictedReturn;
     e.object_id = o.id;
-    e.other_id = o.blocked_by;
+    e.other_id = o.visibility.blocked_by;
     e.class_name = o.best().class_name;
     e.probability = o.existence;
     e.returns_in_s = {foreseen->expected, foreseen->earliest, foreseen->latest};

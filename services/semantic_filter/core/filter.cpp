@@ -26,10 +26,10 @@ namespace {
 
 /// A look that says nothing about the track, for its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
-  if (track.occluded_frames.count + track.out_of_view_frames.count == 0)
+  if (track.unused.occluded.count + track.unused.out_of_view.count == 0)
     stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
-  LedgerEntry& entry = away ? track.out_of_view_frames : track.occluded_frames;
+  LedgerEntry& entry = away ? track.unused.out_of_view : track.unused.occluded;
   if (entry.count++ == 0) entry.first = now;
   entry.last = now;
 }
@@ -72,9 +72,9 @@ std::vector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
                                         parameters_.visibility);
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     Track& o = belief.tracks[j];
-    o.visibility = visibilities[j].state;
-    o.visible_fraction = visibilities[j].fraction;
-    o.blocked_by = visibilities[j].blocked_by;
+    o.visibility.state = visibilities[j].state;
+    o.visibility.fraction = visibilities[j].fraction;
+    o.visibility.blocked_by = visibilities[j].blocked_by;
   }
   return visibilities;
 }
@@ -107,9 +107,9 @@ std::vector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
 }
 
 bool SemanticFilter::measuresDrift(const Track& track, const FrameContext& frame) const {
-  if (track.visit_began <= std::max(track.drift_measured_at, track.first_seen)) return false;
+  if (track.life.visit_began <= std::max(track.pose.drift_measured_at, track.life.first_seen)) return false;
   const Hypothesis& best = track.best();
-  return track.confirmed && !best.moving && best.weight > 0.5 &&
+  return track.life.confirmed && !best.moving && best.weight > 0.5 &&
          (best.x.head<3>() - frame.view.T_WB.p).norm() < parameters_.drift.within_m;
 }
 
@@ -137,10 +137,10 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
     ScoredTrack& s = scored[static_cast<std::size_t>(j)];
     Track& track = belief.tracks[s.track];
     const auto before = measuresDrift(track, frame) ? std::optional(track.best()) : std::nullopt;
-    s.near_box = track.once_confirmed && !track.best().moving && !s.score.boxes.empty();
+    s.near_box = track.life.once_confirmed && !track.best().moving && !s.score.boxes.empty();
     s.assigned = update(track, s.score, association.eta.row(j), boxes, frame);
     if (before && s.assigned && s.score.hypotheses[0].box) {
-      track.drift_measured_at = track.as_of;
+      track.pose.drift_measured_at = track.as_of;
       s.drift = driftMeasurement(*before, *s.score.hypotheses[0].box, boxes[*s.assigned].z,
                                  hiddenSides(s.score, *s.assigned), frame.pose_error.covariance);
     }
@@ -156,9 +156,9 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
 Track SemanticFilter::asScored(const Track& was, const Track& now, const ScoredTrack& scored,
                                const FrameInput& input, const FrameContext& frame) const {
   Track track = was;
-  track.visibility = now.visibility;
-  track.visible_fraction = now.visible_fraction;
-  track.blocked_by = now.blocked_by;
+  track.visibility.state = now.visibility.state;
+  track.visibility.fraction = now.visibility.fraction;
+  track.visibility.blocked_by = now.visibility.blocked_by;
   predict(track, input.stamp.time, input.pose_error, parameters_.motion, viewWalkOf(frame));
   const TrackScore first = scoreTrack(track, scored.score.visibility, *input.boxes, frame);
   admitNewClasses(track, first, *input.boxes, frame);
@@ -236,8 +236,8 @@ StepReport SemanticFilter::step(const Belief& before, Belief& belief, const Fram
   std::erase_if(belief.tracks, [](const Track& o) { return o.hypotheses.empty(); });
   report.broken = std::erase_if(belief.tracks, [](const Track& o) { return !sound(o); });
   for (Track& o : belief.tracks) {
-    const bool visible = o.visible_fraction > 0.0;
-    o.history.add(visible, visible && o.last_seen == input.stamp.time);
+    const bool visible = o.visibility.fraction > 0.0;
+    o.history.add(visible, visible && o.life.last_seen == input.stamp.time);
   }
   report.merges = mergeObjects(belief.tracks, frame);
   const auto moved = reidentifyMoved(belief.tracks, frame);

@@ -9,7 +9,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kIterations = 10;
+constexpr int kSteps = 10;
 constexpr float kSettled = 0.01F;        // px
 constexpr float kLeastDeviation = 2.0F;  // grey levels: a plainer patch is noise
 constexpr float kFarthest = 4.0F;        // px from the seed
@@ -124,7 +124,7 @@ std::optional<Patch::Found> Patch::find(const std::vector<cv::Mat>& levels,
   const Eigen::Vector2f from = Eigen::Vector2f(seed.x, seed.y) / scale;
   Eigen::Vector2f at = from;
   Values now;
-  for (int k = 0; k < kIterations; ++k) {
+  for (int k = 0; k < kSteps; ++k) {
     if (!sample(image, warp, at, now)) return std::nullopt;
     const float norm = centre(now);
     if (!(norm > 0)) return std::nullopt;

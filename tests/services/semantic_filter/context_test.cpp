@@ -115,10 +115,10 @@ TEST(Context, FollowsMaterialChangesOfWhatCanBeSeen) {
   contextualise(objects, matrix);
   EXPECT_EQ(logOddsOfCar(published(objects[0])), before);
   objects[1] = thingAt(2, 4, 0.2);
-  objects[0].visible_fraction = 0.0;
+  objects[0].visibility.fraction = 0.0;
   contextualise(objects, matrix);
   EXPECT_EQ(logOddsOfCar(published(objects[0])), before);
-  objects[0].visible_fraction = 1.0;
+  objects[0].visibility.fraction = 1.0;
   contextualise(objects, matrix);
   EXPECT_LT(logOddsOfCar(published(objects[0])), -0.1);
 }

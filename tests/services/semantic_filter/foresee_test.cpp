@@ -18,7 +18,7 @@ Track standing(ObjectId id, const State& x, double sigma_m) {
   Track object;
   object.id = id;
   object.existence.become(0.99, ExistenceEvidence::kPrior, {});
-  object.confirmed = true;
+  object.life.confirmed = true;
   Hypothesis h;
   h.class_name = "car";
   h.weight = 1.0;
@@ -35,8 +35,8 @@ class Foresight : public ::testing::Test {
   explicit Foresight(double sigma_m = 0.0) {
     objects = {standing(3, makeState(10, 0, 1.0, 0, 4.2, 1.8, 2.0), sigma_m),
                standing(7, makeState(25, 0, 0.75, 0, 4.2, 1.7, 1.5), sigma_m)};
-    objects[1].blocked_by = 3;
-    objects[1].visibility = Visibility::kOccluded;
+    objects[1].visibility.blocked_by = 3;
+    objects[1].visibility.state = Visibility::kOccluded;
     now.view.camera = &camera;
     now.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.0));
     way.step.p = Eigen::Vector3d(0.0, 0.1, 0.0);
@@ -173,8 +173,8 @@ TEST_F(Foresight, WhatShouldBeInSightIsExpectedUntilItIsDetected) {
   };
   oneFrame(0.1);
   ASSERT_EQ(said.size(), 1u);
-  objects[1].visibility = Visibility::kPartial;  // so it is believed, and no box says so
-  objects[1].visible_fraction = 0.3;
+  objects[1].visibility.state = Visibility::kPartial;  // so it is believed, and no box says so
+  objects[1].visibility.fraction = 0.3;
   now.view.T_WB.p.y() = 3.0;
   said.clear();
   for (int i = 0; i < 10; ++i) oneFrame(0.1);
@@ -182,7 +182,7 @@ TEST_F(Foresight, WhatShouldBeInSightIsExpectedUntilItIsDetected) {
   EXPECT_LE(said.size(), 5u) << "not with every frame";
   for (const double s : said) EXPECT_NEAR(s, kFrame_s, 1e-9);
   said.clear();
-  objects[1].hits += 1;
+  objects[1].life.hits += 1;
   for (int i = 0; i < 10; ++i) oneFrame(0.1);
   EXPECT_TRUE(said.empty());
 }

@@ -257,8 +257,8 @@ TEST_F(Standing, KeepsWhatTheLooksAloneSaid) {
 /// Its underside is not the one that the looks told.
 TEST_F(Standing, WhatATwinOfItDoesIsNotToldByItsLooks) {
   Track o = testing::makeObject(1, "car", testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
-  o.hits = 3;
-  o.running_nis = 2.0 * usual_.parameters.motion.start_nis;
+  o.life.hits = 3;
+  o.history.running_nis = 2.0 * usual_.parameters.motion.start_nis;
   o.hypotheses[0].ground_contact = {0.1, 0.01};
   for (ClassPrior& c : usual_.priors.classes) c.moving = 0.3;
   reduceMixture(o, usual_.priors, usual_.parameters);

@@ -183,7 +183,7 @@ TEST_F(Booking, WhatTheNetworkSaidIsWhatWouldBeMissingHadItSaidNothing) {
 
 TEST_F(Booking, TheSameLookAgainIsSaidToBeARepetition) {
   for (int k = 0; k < 10; ++k) computeVisibility(boxOfTheCar());
-  EXPECT_EQ(object.hits, 10U);
+  EXPECT_EQ(object.life.hits, 10U);
   EXPECT_GE(object.existence.of(ExistenceEvidence::kRepeated).count, 5U);
   EXPECT_EQ(object.existence.of(ExistenceEvidence::kHit).count +
                 object.existence.of(ExistenceEvidence::kRepeated).count,
@@ -197,7 +197,7 @@ TEST_F(Booking, AScreenExcusesPartOfAMiss) {
   EXPECT_LT(miss, -1.0);
   EXPECT_EQ(object.existence.of(ExistenceEvidence::kScreened).count, 0U);
   std::swap(open, object);
-  object.unmapped_occluder = 0.5;
+  object.detectability.unmapped_occluder = 0.5;
   computeVisibility({});
   EXPECT_NEAR(object.existence.of(ExistenceEvidence::kMiss).log_odds, miss, 1e-9);
   EXPECT_GT(object.existence.of(ExistenceEvidence::kScreened).log_odds, 0.5);

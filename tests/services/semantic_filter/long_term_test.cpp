@@ -19,9 +19,9 @@ TimePoint at(double seconds) { return TimePoint(durationFromSeconds(seconds)); }
 Track thingAt(ObjectId id, double x, double seen_s) {
   Track o;
   o.id = id;
-  o.confirmed = o.once_confirmed = true;
+  o.life.confirmed = o.life.once_confirmed = true;
   o.existence = {0.97, ExistenceEvidence::kHit, at(seen_s)};
-  o.last_seen = o.as_of = at(seen_s);
+  o.life.last_seen = o.as_of = at(seen_s);
   Hypothesis h;
   h.class_name = "car";
   h.weight = 1.0;
@@ -70,9 +70,9 @@ TEST(Archive, WhatIsSlowerThanWhatCountsAsMovingIsArchived) {
 
 TEST(Archive, GuessesAreForgottenAndDoubtsAboutAThingOnTheMapAreNot) {
   Track guess = thingAt(1, 140, 10);
-  guess.confirmed = guess.once_confirmed = false;
+  guess.life.confirmed = guess.life.once_confirmed = false;
   Track misplaced = thingAt(2, 140, 10);
-  misplaced.confirmed = false;
+  misplaced.life.confirmed = false;
   Track missing = misplaced;
   missing.id = 3;
   missing.existence = {0.3, ExistenceEvidence::kMiss, at(10)};

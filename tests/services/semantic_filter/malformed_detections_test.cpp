@@ -140,7 +140,7 @@ void expectSameBits(const Belief& a, const Belief& b) {
     const Track &x = a.tracks[j], &y = b.tracks[j];
     EXPECT_EQ(x.id, y.id);
     EXPECT_EQ(double(x.existence), double(y.existence));
-    EXPECT_EQ(x.hits, y.hits);
+    EXPECT_EQ(x.life.hits, y.life.hits);
     ASSERT_EQ(x.hypotheses.size(), y.hypotheses.size());
     for (std::size_t i = 0; i < x.hypotheses.size(); ++i) {
       EXPECT_EQ(x.hypotheses[i].class_name, y.hypotheses[i].class_name);

@@ -70,7 +70,7 @@ TEST(LongTermMemory, ABeliefComesBackBitForBitAndItsLedgerSaysSo) {
     EXPECT_NEAR(b.why.logOdds(), logOdds(b.existence), 1e-9);
   }
   // And the correlation with the pose error refers to what it referred to.
-  EXPECT_NE(pair.filter.belief().tracks[0].pose_product, Matrix6d::Identity());
+  EXPECT_NE(pair.filter.belief().tracks[0].pose.product, Matrix6d::Identity());
 }
 
 TEST(LongTermMemory, NothingOnTheMapIsLetGoWhileNoMapAnswersAndHealthCountsIt) {

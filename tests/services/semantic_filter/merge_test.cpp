@@ -25,11 +25,11 @@ TEST_F(Merging, ACopyThatIsHiddenByItsOriginalIsNoThingOfItsOwn) {
   std::vector<Track> objects = {
       makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004),
       makeObject(5, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
-  objects[1].visible_fraction = 0.0;
-  objects[1].visibility = Visibility::kOccluded;
-  objects[1].blocked_by = 7;  // something else: it waits
+  objects[1].visibility.fraction = 0.0;
+  objects[1].visibility.state = Visibility::kOccluded;
+  objects[1].visibility.blocked_by = 7;  // something else: it waits
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
-  objects[1].blocked_by = 2;
+  objects[1].visibility.blocked_by = 2;
   const auto merges = mergeObjects(objects, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 2u);
@@ -46,7 +46,7 @@ TEST_F(Merging, OfTwoOfOneClassInOnePlaceTheOlderStays) {
   EXPECT_EQ(merges[0].absorbed, 5u);
   ASSERT_EQ(objects.size(), 1u);
   EXPECT_EQ(objects[0].id, 2u);
-  EXPECT_EQ(objects[0].hits, 8u);
+  EXPECT_EQ(objects[0].life.hits, 8u);
   EXPECT_NEAR(objects[0].best().x[0], 10.15, 0.01);
   EXPECT_GE(objects[0].existence, 0.9);
 }
@@ -94,11 +94,11 @@ TEST_F(Merging, OfBeliefsThatContradictEachOtherBothAreKept) {
   std::vector<Track> objects = {
       makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
       makeObject(2, "car", makeState(10, 0.1, 0.7, 0.5, 4, 1.8, 1.5), 0.1)};
-  objects[0].hits = 3, objects[1].hits = 9;
+  objects[0].life.hits = 3, objects[1].life.hits = 9;
   ASSERT_EQ(mergeObjects(objects, frame).size(), 1u);
   const Track& one = objects[0];
   EXPECT_EQ(one.id, 1u);
-  EXPECT_EQ(one.hits, 12u);
+  EXPECT_EQ(one.life.hits, 12u);
   ASSERT_EQ(one.hypotheses.size(), 2u);
   EXPECT_NEAR(one.best().x[kYaw], 0.5, 1e-12) << "that which was found more often";
   EXPECT_NEAR(one.best().weight, 0.75, 1e-9);
@@ -120,12 +120,12 @@ TEST_F(Merging, WhatWasHardlyFoundOfLateForgetsItsLooksThatDoNotFitTheOther) {
   const auto rememberedOf = [&](double support_of_first, double support_of_second) {
     Track a = makeObject(1, "car", was, 0.01);
     Track b = makeObject(2, "car", is, 0.01);
-    a.keyframes = Keyframes{scoreHypothesis(was), scoreHypothesis(was), scoreHypothesis(is)};
-    b.keyframes = Keyframes{scoreHypothesis(is), scoreHypothesis(is)};
-    a.recent_detection_share = support_of_first, b.recent_detection_share = support_of_second;
+    a.batch.keyframes = Keyframes{scoreHypothesis(was), scoreHypothesis(was), scoreHypothesis(is)};
+    b.batch.keyframes = Keyframes{scoreHypothesis(is), scoreHypothesis(is)};
+    a.history.recent_share = support_of_first, b.history.recent_share = support_of_second;
     mergeTwo(a, b, frame);
     EXPECT_EQ(a.hypotheses.size(), 2u) << "they contradict each other";
-    return a.keyframes.size();
+    return a.batch.keyframes.size();
   };
   EXPECT_EQ(rememberedOf(0.1, 0.9), 3u);
   EXPECT_EQ(rememberedOf(0.9, 0.9), 5u) << "both are found: later looks tell";
@@ -139,11 +139,11 @@ TEST_F(Merging, AGuessOfOneLookDoesNotOverruleWhatWasLookedAtForLong) {
   const auto merged = [&](std::uint32_t toy_hits, std::uint32_t car_hits) {
     std::vector<Track> objects = {makeObject(1, kOtherClass, toy, 1e-4),
                                   makeObject(2, "car", car, 0.01)};
-    objects[0].confirmed = objects[0].once_confirmed = true;
-    objects[0].hits = toy_hits, objects[1].hits = car_hits;
+    objects[0].life.confirmed = objects[0].life.once_confirmed = true;
+    objects[0].life.hits = toy_hits, objects[1].life.hits = car_hits;
     EXPECT_EQ(mergeObjects(objects, frame).size(), 1u);
     EXPECT_EQ(objects[0].id, 1u);
-    EXPECT_EQ(objects[0].hits, toy_hits + car_hits);
+    EXPECT_EQ(objects[0].life.hits, toy_hits + car_hits);
     return objects[0].best();
   };
   EXPECT_EQ(merged(345, 1).class_name, kOtherClass);
@@ -162,7 +162,7 @@ TEST_F(Merging, AChairUnderATableStaysTwoObjects) {
 TEST_F(Merging, HiddenObjectsWaitWithMerging) {
   std::vector<Track> objects = {makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01),
                                 makeObject(2, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.01)};
-  objects[1].visible_fraction = 0.0;
+  objects[1].visibility.fraction = 0.0;
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
 }
 

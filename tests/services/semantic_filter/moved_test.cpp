@@ -18,10 +18,10 @@ class Moved : public ::testing::Test, protected testing::UsualFrame {
     Track o;
     o.id = id;
     o.existence = {0.95, ExistenceEvidence::kPrior, at(last)};
-    o.confirmed = o.once_confirmed = true;
-    o.first_seen = at(first);
-    o.last_seen = o.as_of = at(last);
-    o.hits = 6;
+    o.life.confirmed = o.life.once_confirmed = true;
+    o.life.first_seen = at(first);
+    o.life.last_seen = o.as_of = at(last);
+    o.life.hits = 6;
     Hypothesis h;
     h.class_name = name;
     h.weight = 1.0;
@@ -33,14 +33,14 @@ class Moved : public ::testing::Test, protected testing::UsualFrame {
     for (int i = 0; i < 5; ++i) {
       Keyframe k;
       k.from = std::make_shared<const FrameView>(view, PoseError{}, at(last - 0.1 * i), nullptr);
-      o.keyframes.push_back(std::make_shared<const Keyframe>(k));
+      o.batch.keyframes.push_back(std::make_shared<const Keyframe>(k));
     }
     return o;
   }
   Track missing(ObjectId id, const std::string& name, const State& x, double last) {
     Track o = thing(id, name, x, 1.0, last);
     o.existence = {0.2, ExistenceEvidence::kPrior, at(last)};
-    o.confirmed = false;
+    o.life.confirmed = false;
     return o;
   }
 
@@ -58,9 +58,9 @@ TEST_F(Moved, AChairThatIsMissingAndOneThatIsNewBesideItAreOneThatWasMoved) {
   EXPECT_TRUE(merges[0].moved);
   ASSERT_EQ(objects.size(), 1u);
   EXPECT_EQ(objects[0].id, 3u);
-  EXPECT_EQ(objects[0].first_seen, at(1.0));
-  EXPECT_EQ(objects[0].hits, 12u);
-  EXPECT_TRUE(objects[0].confirmed);
+  EXPECT_EQ(objects[0].life.first_seen, at(1.0));
+  EXPECT_EQ(objects[0].life.hits, 12u);
+  EXPECT_TRUE(objects[0].life.confirmed);
   EXPECT_NEAR(objects[0].existence, 0.95, 1e-9);
   EXPECT_NEAR(objects[0].best().x[1], 1.4, 1e-9);
 }
@@ -126,8 +126,8 @@ class TookItsBox : public Moved {
                   thing(9, "car", makeState(20, 2, 0.75, 0, 4.2, 1.75, 1.5), 8.1, 8.6)};
     two.now.hypotheses[0].moving = true;
     two.now.hypotheses[0].x[kVelocity] = 4.0;
-    two.past.last_box = AssignedBox{at(8.0), {100, 100, 180, 160}};
-    two.now.first_box = AssignedBox{at(8.1), {104, 102, 182, 160}};
+    two.past.history.last_box = AssignedBox{at(8.0), {100, 100, 180, 160}};
+    two.now.history.first_box = AssignedBox{at(8.1), {104, 102, 182, 160}};
     return two;
   }
   std::vector<MergeRecord> reunited(const TakenOver& two) {
@@ -148,19 +148,19 @@ TEST_F(TookItsBox, WhatDrivesInTheBoxOfWhatIsMissingIsThatWhereverItWasBelievedT
 
 TEST_F(TookItsBox, AnotherBoxOrALaterOneOrOneOfTheSameImageIsAnotherThing) {
   TakenOver two = pair();
-  two.now.first_box->box = {150, 100, 230, 160};
+  two.now.history.first_box->box = {150, 100, 230, 160};
   EXPECT_TRUE(reunited(two).empty());
   two = pair();
-  two.now.first_box->time = at(8.9);
+  two.now.history.first_box->time = at(8.9);
   EXPECT_TRUE(reunited(two).empty());
   two = pair();
-  two.now.first_box->time = at(8.0);
+  two.now.history.first_box->time = at(8.0);
   EXPECT_TRUE(reunited(two).empty());
   two = pair();
   two.now.hypotheses[0].moving = false;
   EXPECT_TRUE(reunited(two).empty());
   two = pair();
-  two.past.last_box.reset();  // it came back from the map
+  two.past.history.last_box.reset();  // it came back from the map
   EXPECT_TRUE(reunited(two).empty());
 }
 
@@ -169,7 +169,7 @@ TEST_F(TookItsBox, OfWhatWasGivenUpAsWell) {
   std::vector<Track> recently_deleted;
   keepDeleted(recently_deleted, {two.past}, at(8.1), parameters.tracks);
   objects = {two.now};
-  objects[0].visible_fraction = 1.0;
+  objects[0].visibility.fraction = 1.0;
   const auto merges = reidentifyDeleted(objects, recently_deleted, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_TRUE(merges[0].moved);
@@ -191,7 +191,7 @@ class FoundAgain : public Moved {
   }
   std::vector<MergeRecord> after(std::vector<Track> past, const Track& newcomer) {
     objects = {newcomer};
-    objects[0].visible_fraction = 1.0;
+    objects[0].visibility.fraction = 1.0;
     return reidentifyDeleted(objects, past, frame);
   }
   std::vector<Track> objects;
@@ -206,10 +206,10 @@ TEST_F(FoundAgain, InItsPlaceWhatWasGivenUpGoesOn) {
   EXPECT_TRUE(merges[0].returned);
   ASSERT_EQ(objects.size(), 1u);
   EXPECT_EQ(objects[0].id, 3u);
-  EXPECT_EQ(objects[0].first_seen, at(1.0));
-  EXPECT_EQ(objects[0].last_seen, at(12.0));
-  EXPECT_EQ(objects[0].hits, 12u);
-  EXPECT_EQ(objects[0].visible_fraction, 1.0);
+  EXPECT_EQ(objects[0].life.first_seen, at(1.0));
+  EXPECT_EQ(objects[0].life.last_seen, at(12.0));
+  EXPECT_EQ(objects[0].life.hits, 12u);
+  EXPECT_EQ(objects[0].visibility.fraction, 1.0);
   EXPECT_GE(objects[0].existence, 0.95);
   EXPECT_NEAR(objects[0].best().x[0], 5.025, 0.01) << "what was known of it counts";
 }
@@ -217,12 +217,12 @@ TEST_F(FoundAgain, InItsPlaceWhatWasGivenUpGoesOn) {
 TEST_F(FoundAgain, WhatIsSurelyThereIsEnoughThoughItsPlaceIsNotYetAClaim) {
   Track newcomer = thing(9, "chair", here, 11.0, 12.0);
   newcomer.existence = {0.97, ExistenceEvidence::kPrior, at(12.0)};
-  newcomer.confirmed = false;  // or else it is something larger, further off
+  newcomer.life.confirmed = false;  // or else it is something larger, further off
   newcomer.hypotheses.push_back(
       thing(9, "dining table", makeState(12, 0, 0, 0, 2, 2, 2), 11.0, 12.0).best());
   newcomer.hypotheses[0].weight = 0.7, newcomer.hypotheses[1].weight = 0.3;
   EXPECT_EQ(after(recently_deleted("chair", here), newcomer).size(), 1u);
-  newcomer.hits = 1;
+  newcomer.life.hits = 1;
   EXPECT_TRUE(after(recently_deleted("chair", here), newcomer).empty());
 }
 
@@ -236,7 +236,7 @@ TEST_F(FoundAgain, NothingElseIsTakenForIt) {
 
 TEST_F(FoundAgain, WhatWasNeverClaimedOrIsLongGoneIsForgotten) {
   Track guess = missing(3, "chair", here, 8.0);
-  guess.once_confirmed = false;
+  guess.life.once_confirmed = false;
   Track driver = missing(4, "car", here, 8.0);
   driver.hypotheses[0].moving = true;
   std::vector<Track> list;

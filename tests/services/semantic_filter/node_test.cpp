@@ -193,7 +193,7 @@ std::vector<ObjectId> missForAWhile(Harness& h) {
   drive(h, 0, 20);
   std::vector<ObjectId> ids;
   for (const Track& o : h.node.belief().tracks) {
-    if (o.confirmed) ids.push_back(o.id);
+    if (o.life.confirmed) ids.push_back(o.id);
   }
   RigidTransform away = driveTo(20, 0.4);
   away.q = away.q * Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
@@ -262,7 +262,7 @@ TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
     EXPECT_EQ(h.node.belief().tracks[j].id, before.tracks[j].id);
   }
   const auto confirmed = std::count_if(before.tracks.begin(), before.tracks.end(),
-                                       [](const Track& o) { return o.confirmed; });
+                                       [](const Track& o) { return o.life.confirmed; });
   EXPECT_GE(confirmed, 2);
   EXPECT_EQ(reappeared(), confirmed);
 }
@@ -276,7 +276,7 @@ Recalled restored(const std::vector<TrueObject>& things, const std::vector<doubl
   recalled.next_id = 10;
   for (std::size_t i = 0; i < things.size(); ++i) {
     Track object = testing::makeObject(i + 1, things[i].class_name, things[i].x, variances[i]);
-    object.confirmed = true;
+    object.life.confirmed = true;
     recalled.objects.push_back(toBelief(object, 0.7));
   }
   return recalled;
@@ -305,7 +305,7 @@ TEST(Node, ABoxThatAHiddenThingExplainsFarBetterThanItsBlockerShowsItAndBearsNot
   }
   h.node.flush();
   ASSERT_EQ(h.node.belief().tracks.size(), 2u);
-  EXPECT_GE(h.node.belief().tracks[0].hits, 12u);
+  EXPECT_GE(h.node.belief().tracks[0].life.hits, 12u);
 }
 
 TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt) {
@@ -333,12 +333,12 @@ TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt)
   const auto& objects = h.node.belief().tracks;
   ASSERT_FALSE(objects.empty());
   ASSERT_EQ(objects[0].id, 1u);
-  EXPECT_EQ(objects[0].hits, 4u);
+  EXPECT_EQ(objects[0].life.hits, 4u);
   EXPECT_EQ(objects[0].existence, before);
   for (const Track& o : objects) {
     if (o.id == 1) continue;
     EXPECT_EQ(o.id, 2u);
-    EXPECT_EQ(o.hits, 4u);
+    EXPECT_EQ(o.life.hits, 4u);
     EXPECT_LT(o.existence, 0.8);
   }
 }

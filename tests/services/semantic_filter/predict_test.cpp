@@ -32,7 +32,7 @@ Track biasedCar(const ViewWalk& walk) {
   Track object;
   object.existence = {0.9, ExistenceEvidence::kPrior, object.as_of};
   object.hypotheses = {h};
-  object.predicted_from = walk.T_WC;
+  object.views.predicted_from = walk.T_WC;
   return object;
 }
 
@@ -96,15 +96,15 @@ TEST(Predict, LooksOfAnEarlierVisitVouchThatNothingHidesWhatIsBackInThePicture) 
     Track object = biasedCar(walk);
     Keyframe seen;
     seen.from = std::make_shared<const FrameView>(view, PoseError{}, fromNanoseconds(1), nullptr);
-    object.keyframes.assign(3, std::make_shared<const Keyframe>(seen));
+    object.batch.keyframes.assign(3, std::make_shared<const Keyframe>(seen));
     object.as_of = fromNanoseconds(2);
-    object.out_of_view_frames.count = 20;  // frames in which it was out of the picture
-    object.predicted_from.reset();
+    object.unused.out_of_view.count = 20;  // frames in which it was out of the picture
+    object.views.predicted_from.reset();
     ViewWalk now = walk;
     now.T_WC = seen.from->T_WC;
     now.T_WC.p += now.T_WC.R() * Eigen::Vector3d(metres_aside, 0, 0);
     predict(object, object.as_of + std::chrono::seconds(5), PoseError{}, MotionParameters{}, now);
-    return object.unmapped_occluder;
+    return object.detectability.unmapped_occluder;
   };
   EXPECT_LT(screenedAt(0.0), 1e-6);
   EXPECT_LT(screenedAt(0.5), 0.01);
@@ -119,18 +119,18 @@ TEST(Predict, HowOftenItIsFoundFromElsewhereIsNotKnown) {
   walk.screen = {0.15, 0.3, 1e9};
   for (const double now : {0.0, 0.7}) {
     Track object = biasedCar(walk);
-    object.unmapped_occluder = 0.1;
-    object.hard_to_detect = now;
-    object.predicted_from = walk.T_WC;
+    object.detectability.unmapped_occluder = 0.1;
+    object.detectability.hard_to_detect = now;
+    object.views.predicted_from = walk.T_WC;
     ViewWalk moved = walk;
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
-    EXPECT_NEAR(object.hard_to_detect, now, 1e-12);
+    EXPECT_NEAR(object.detectability.hard_to_detect, now, 1e-12);
     moved.T_WC.p += moved.T_WC.R() * Eigen::Vector3d(40.0, 0, 0);
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
-    EXPECT_NEAR(object.hard_to_detect, 0.05, 0.02);
+    EXPECT_NEAR(object.detectability.hard_to_detect, 0.05, 0.02);
     object.hypotheses[0].moving = true;
     predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
-    EXPECT_EQ(object.hard_to_detect, 0.0) << "what drives and is not found is lost";
+    EXPECT_EQ(object.detectability.hard_to_detect, 0.0) << "what drives and is not found is lost";
   }
 }
 

@@ -65,7 +65,7 @@ TEST_F(Primed, EvidenceOfNoughtIsAPlainMiss) {
 
 TEST_F(Primed, FollowsTheLikelihoodOfTheMissAndTheAnswerTogether) {
   Track o = object(0.9);
-  o.existence_when_detected = 0.99;
+  o.history.existence_when_detected = 0.99;
   TrackVisibility visibility;
   visibility.fraction = 1.0;
   const double D = scoreTrack(o, visibility, {}, frame).hypotheses[0].detection_probability;
@@ -76,7 +76,7 @@ TEST_F(Primed, FollowsTheLikelihoodOfTheMissAndTheAnswerTogether) {
 
 TEST_F(Primed, AGhostDiesSoonerThanOfItsMissesAlone) {
   Track plain = object(0.95), asked = object(0.95);
-  plain.unmapped_occluder = asked.unmapped_occluder = 0.2;
+  plain.detectability.unmapped_occluder = asked.detectability.unmapped_occluder = 0.2;
   for (int i = 0; i < 4; ++i) {
     lookWithoutBox(plain, {});
     lookWithoutBox(asked, -0.3);
@@ -89,7 +89,7 @@ TEST_F(Primed, NeverRaisesExistenceOverWhatTheLastHitLeft) {
   for (int i = 0; i < 30; ++i) lookWithoutBox(o, 5.0);
   EXPECT_NEAR(o.existence, 0.7, 1e-9) << "it was never seen by itself";
   o = object(0.7);
-  o.existence_when_detected = 0.8;
+  o.history.existence_when_detected = 0.8;
   for (int i = 0; i < 30; ++i) lookWithoutBox(o, 5.0);
   EXPECT_LE(o.existence, 0.8 + 1e-9);
   EXPECT_GT(o.existence, 0.7) << "it gives back what misses took";
@@ -97,19 +97,19 @@ TEST_F(Primed, NeverRaisesExistenceOverWhatTheLastHitLeft) {
 
 TEST_F(Primed, IsNoHitConfirmsNothingAndMovesNothing) {
   Track o = object(0.94);
-  o.existence_when_detected = 0.98;
+  o.history.existence_when_detected = 0.98;
   const Hypothesis before = o.best();
   std::vector<Track> all;
   for (int i = 0; i < 20; ++i) lookWithoutBox(o, 5.0);
   EXPECT_GT(o.existence, parameters.tracks.confirm);
-  EXPECT_EQ(o.hits, 0U);
-  EXPECT_EQ(o.visible_misses, 20U);
+  EXPECT_EQ(o.life.hits, 0U);
+  EXPECT_EQ(o.life.visible_misses, 20U);
   EXPECT_TRUE(o.best().x == before.x);
   EXPECT_TRUE(o.best().P == before.P);
   all.push_back(o);
   confirmAndDelete(all, frame);
   ASSERT_EQ(all.size(), 1U);
-  EXPECT_FALSE(all[0].confirmed);
+  EXPECT_FALSE(all[0].life.confirmed);
 }
 
 TEST_F(Primed, WhatIsExpectedIsFitToBeSentWhereverTheThingIs) {

@@ -73,7 +73,7 @@ struct Watch : Harness {
   std::map<ObjectId, double> confirmed() const {
     std::map<ObjectId, double> all;
     for (const Track& o : node.belief().tracks) {
-      if (o.confirmed) all[o.id] = o.existence;
+      if (o.life.confirmed) all[o.id] = o.existence;
     }
     return all;
   }

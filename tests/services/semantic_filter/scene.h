@@ -93,9 +93,9 @@ inline Track makeObject(ObjectId id, const std::string& name, const State& x, do
   Track o;
   o.id = id;
   o.existence = {0.9, ExistenceEvidence::kPrior, o.as_of};
-  o.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));
-  o.hits = 4;
-  o.visible_fraction = 1.0;
+  o.life.first_seen = fromNanoseconds(static_cast<std::int64_t>(id));
+  o.life.hits = 4;
+  o.visibility.fraction = 1.0;
   Hypothesis h;
   h.class_name = name;
   h.weight = 1.0;

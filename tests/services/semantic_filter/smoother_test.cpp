@@ -263,8 +263,8 @@ Track turnedBy(double angle, const Passing& scene) {
   h.x[kYaw] = wrapAngle(h.x[kYaw] + angle);
   Track object;
   object.hypotheses = {h};
-  object.keyframes = scene.keyframes();
-  object.keyframes_seen = static_cast<std::uint32_t>(object.keyframes.size());
+  object.batch.keyframes = scene.keyframes();
+  object.batch.seen = static_cast<std::uint32_t>(object.batch.keyframes.size());
   return object;
 }
 
@@ -278,7 +278,7 @@ TEST(Smooth, SeeksTheYawThatTheFilterGaveUp) {
     const double error = std::remainder(object.best().x[kYaw] - scene.truth()[kYaw], M_PI);
     found += std::abs(error) < 0.2 ? 1 : 0;
     // It is not sought again before as many looks have come.
-    EXPECT_EQ(object.mode_search_due, 2 * scene.keyframes().size());
+    EXPECT_EQ(object.batch.mode_search_due, 2 * scene.keyframes().size());
   }
   EXPECT_GE(found, 17) << "of " << kRuns;
 }
@@ -312,7 +312,7 @@ TEST(Smooth, WhatStandsBelowTheGroundMayMoveInstead) {
 std::string classAfterAll(const Passing& scene, const std::string& lookalike_class) {
   Track object = turnedBy(0.0, scene);
   object.hypotheses.front().class_name = kOtherClass;
-  object.lookalike_class = lookalike_class;
+  object.lookalike.class_name = lookalike_class;
   refit(object, scene.frame());
   return object.best().class_name;
 }
@@ -449,17 +449,17 @@ TEST(Keyframes, NewViewsAreRememberedAndTheMostAlikeForgotten) {
   h.x = scene.truth();
   object.hypotheses = {h};
   for (const auto& k : scene.keyframes()) addKeyframe(object, *k, scales, parameters);
-  ASSERT_EQ(object.keyframes.size(), 6U);
+  ASSERT_EQ(object.batch.keyframes.size(), 6U);
   EXPECT_FALSE(addKeyframe(object, *scene.keyframes().back(), scales, parameters));
   EXPECT_TRUE(
-      std::is_sorted(object.keyframes.begin(), object.keyframes.end(),
+      std::is_sorted(object.batch.keyframes.begin(), object.batch.keyframes.end(),
                      [](const auto& a, const auto& b) { return a->from->time < b->from->time; }));
   // They span the whole drive, not its end.
-  EXPECT_LT(toSeconds(object.keyframes.front()->from->time), 1.5);
+  EXPECT_LT(toSeconds(object.batch.keyframes.front()->from->time), 1.5);
   Track other = object;
-  other.keyframes = {scene.keyframes()[1], scene.keyframes()[2]};
-  mergeKeyframes(object, other, scales, parameters);
-  EXPECT_LE(object.keyframes.size(), 6U);
+  other.batch.keyframes = {scene.keyframes()[1], scene.keyframes()[2]};
+  mergeBatches(object, other, scales, parameters);
+  EXPECT_LE(object.batch.keyframes.size(), 6U);
 }
 
 }  // namespace

@@ -90,15 +90,15 @@ TEST_F(Tending, WhatLostItsShapeBeginsAgainFromItsOwnBoxAsWhatItWas) {
   const auto e = *makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box, {});
 
   Track o = makeObject(7, "car", makeState(7.0, 1.5, 0.9, 0.6, 2.1, 0.87, 0.75), 0.001);
-  o.once_confirmed = true;
-  o.hits = 40;
+  o.life.once_confirmed = true;
+  o.life.hits = 40;
   const double existence = o.existence;
   const auto pmf = classShares(o);
   reduceMixture(o, priors, parameters);
   ASSERT_TRUE(o.hypotheses.empty());
   ASSERT_TRUE(reinitialise(o, pmf, e, std::nullopt, frame));
   EXPECT_EQ(o.id, 7u);
-  EXPECT_EQ(o.hits, 40u);
+  EXPECT_EQ(o.life.hits, 40u);
   EXPECT_EQ(o.existence, existence);
   EXPECT_NEAR(classProbability(o, "car"), 1.0, 1e-12);
   EXPECT_LT((o.best().x - truth).head<3>().norm(), 2.0);
@@ -119,8 +119,8 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
   x.segment<3>(kSize) << size[0] - 3.5 * sigma[0], size.tail<2>();
   Track car = makeObject(3, "car", x, 0.05);
   car.existence = {0.99, ExistenceEvidence::kPrior, car.as_of};
-  car.hits = 30;
-  car.first_seen = car.last_seen = car.as_of = testing::stampOf(0).time;
+  car.life.hits = 30;
+  car.life.first_seen = car.life.last_seen = car.as_of = testing::stampOf(0).time;
   State shown = x;  // what passes before it hides an end of it, and is on no map
   shown[kSize] -= 0.3;
   const auto s = projectCuboid(shown, frame.view)->sides;
@@ -130,7 +130,7 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
 
   const auto after = [&](bool claimed) {
     Belief belief{{car}, {}};
-    belief.tracks[0].confirmed = belief.tracks[0].once_confirmed = claimed;
+    belief.tracks[0].life.confirmed = belief.tracks[0].life.once_confirmed = claimed;
     FrameInput input;
     input.stamp = testing::stampOf(1);
     input.view = frame.view;
@@ -150,8 +150,8 @@ TEST_F(Tending, WhatIsClaimedAtRestIsNotBentOutOfShapeByOneBox) {
   ASSERT_EQ(o.id, 3u);
   EXPECT_LT((o.best().x - x).head<3>().norm(), 1e-3);
   EXPECT_LT(o.existence, 0.99);
-  EXPECT_EQ(o.hits, 30u);
-  EXPECT_EQ(o.visible_misses, 1u);
+  EXPECT_EQ(o.life.hits, 30u);
+  EXPECT_EQ(o.life.visible_misses, 1u);
 }
 
 TEST_F(Tending, WhatMayBeAtTwoPlacesIsNotClaimedAtEither) {
@@ -165,7 +165,7 @@ TEST_F(Tending, WhatMayBeAtTwoPlacesIsNotClaimedAtEither) {
     o.hypotheses[1].weight = weight;
     std::vector<Track> objects{o};
     confirmAndDelete(objects, frame);
-    return objects.at(0).confirmed;
+    return objects.at(0).life.confirmed;
   };
   EXPECT_TRUE(claimed(0.5, 0.4));
   EXPECT_FALSE(claimed(15.0, 0.4));
@@ -175,7 +175,7 @@ TEST_F(Tending, WhatMayBeAtTwoPlacesIsNotClaimedAtEither) {
 TEST_F(Tending, WhatWasFoundOnAnotherVisitIsSurerThanWhatWasSeenOnce) {
   Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
   EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain);
-  o.detected_on_revisit = true;
+  o.life.detected_on_revisit = true;
   EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain_again);
   EXPECT_GT(parameters.tracks.certain_again, parameters.tracks.certain);
 }
@@ -198,11 +198,11 @@ TEST_F(Tending, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
 TEST_F(Tending, WhatWasSeenOnceAndIsOutOfSightIsForgottenAndWhatWasConfirmedIsKept) {
   const auto hiddenFor = [&](double seconds, std::uint32_t hits, bool confirmed) {
     Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
-    o.hits = hits;
-    o.confirmed = o.once_confirmed = confirmed;
-    o.visible_fraction = 0.0;
-    o.occluded_frames.count = 5;
-    o.occluded_frames.last = o.last_seen + Duration(static_cast<std::int64_t>(1e9 * seconds));
+    o.life.hits = hits;
+    o.life.confirmed = o.life.once_confirmed = confirmed;
+    o.visibility.fraction = 0.0;
+    o.unused.occluded.count = 5;
+    o.unused.occluded.last = o.life.last_seen + Duration(static_cast<std::int64_t>(1e9 * seconds));
     std::vector<Track> objects{o};
     confirmAndDelete(objects, frame);
     return objects.size();

@@ -67,8 +67,8 @@ bool sameBits(const Track& a, const Track& b) {
   if (a.hypotheses.size() != b.hypotheses.size()) return false;
   const double r_a = a.existence, r_b = b.existence;
   if (std::memcmp(&r_a, &r_b, sizeof(double)) != 0) return false;
-  if (std::memcmp(&a.unmapped_occluder, &b.unmapped_occluder, sizeof(double)) != 0) return false;
-  if (std::memcmp(&a.hard_to_detect, &b.hard_to_detect, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.detectability.unmapped_occluder, &b.detectability.unmapped_occluder, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.detectability.hard_to_detect, &b.detectability.hard_to_detect, sizeof(double)) != 0) return false;
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
     if (std::memcmp(&x.weight, &y.weight, sizeof(double)) != 0) return false;
@@ -130,20 +130,20 @@ TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
 
 TEST_F(Update, MissesFromOnePlaceSayAtMostThatItIsScreened) {
   object.existence = {0.99, ExistenceEvidence::kPrior, object.as_of};
-  object.unmapped_occluder = 0.25;
+  object.detectability.unmapped_occluder = 0.25;
   for (int k = 0; k < 100; ++k)
     update(object, scoreHypothesis({}, 1.0), Eigen::VectorXd(0), {}, frame);
-  EXPECT_GT(object.unmapped_occluder, 0.99);
+  EXPECT_GT(object.detectability.unmapped_occluder, 0.99);
   const double odds = object.existence / (1.0 - object.existence);
   EXPECT_NEAR(odds, 0.25 * 99.0,
               0.3);  // all that is left is what was unmapped_occluder to begin with
 }
 
 TEST_F(Update, ASightOfItSaysThatItIsNotScreened) {
-  object.unmapped_occluder = 0.25;
+  object.detectability.unmapped_occluder = 0.25;
   const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
   update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
-  EXPECT_LT(object.unmapped_occluder, 0.01);
+  EXPECT_LT(object.detectability.unmapped_occluder, 0.01);
 }
 
 /// Found in one look of five: by the tenth look that is known.
@@ -151,7 +151,7 @@ TEST_F(Update, WhatIsSeldomFoundFromHereIsElusiveAndStaysBelieved) {
   const std::vector<BoxDetection> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
   parameters.visibility.hard_detection_share = 0.3;
   Track plain = object, asked = object;
-  asked.hard_to_detect = 0.1;
+  asked.detectability.hard_to_detect = 0.1;
   asked.existence = plain.existence = {0.99, ExistenceEvidence::kPrior, object.as_of};
   double least = 1.0, least_plain = 1.0;
   for (int i = 0; i < 60; ++i) {
@@ -167,7 +167,7 @@ TEST_F(Update, WhatIsSeldomFoundFromHereIsElusiveAndStaysBelieved) {
     least = std::min<double>(least, asked.existence);
     least_plain = std::min<double>(least_plain, plain.existence);
   }
-  EXPECT_GT(asked.hard_to_detect, 0.9);
+  EXPECT_GT(asked.detectability.hard_to_detect, 0.9);
   EXPECT_GT(least, 0.5);
   EXPECT_LT(least_plain, 0.2);
 }
@@ -207,15 +207,15 @@ TEST_F(Update, ALookWeighsHowOftenItIsFoundFromHere) {
   parameters.visibility.hard_detection_share = 0.3;
   object.hypotheses.resize(1);
   object.hypotheses[0].weight = 1.0;
-  object.unmapped_occluder = 0.2;
-  object.hard_to_detect = 0.1;
+  object.detectability.unmapped_occluder = 0.2;
+  object.detectability.hard_to_detect = 0.1;
   const TrackScore l = scoreHypothesis({}, 1.0);
   const double P_D = l.hypotheses[0].detection_probability / (0.7 + 0.3 * 0.1);
   const double A = 0.2 + 0.1 * (1.0 - 0.3 * P_D) + 0.7 * (1.0 - P_D);
   EXPECT_NEAR(l.hypotheses[0].no_box, A, 1e-12);
   update(object, l, Eigen::VectorXd(0), {}, frame);
-  EXPECT_NEAR(object.unmapped_occluder, 0.2 / A, 1e-12);
-  EXPECT_NEAR(object.hard_to_detect, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
+  EXPECT_NEAR(object.detectability.unmapped_occluder, 0.2 / A, 1e-12);
+  EXPECT_NEAR(object.detectability.hard_to_detect, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
 }
 
 /// One look in five does not show it, from a place where the camera stands.
@@ -224,13 +224,13 @@ TEST_F(Update, ALookWhoseBoxIsRefusedIsAMiss) {
   const TrackScore seen = scoreHypothesis(boxes, 0.9);
   Track hit = object, miss = object;
   update(hit, seen, Eigen::VectorXd::Ones(1), boxes, frame);
-  ASSERT_EQ(hit.hits, object.hits + 1);
+  ASSERT_EQ(hit.life.hits, object.life.hits + 1);
   update(miss, scoreHypothesis({}, 0.9), Eigen::VectorXd(), {}, frame);
   const Track refused = updateAsMissed(object, seen, frame);
   EXPECT_EQ(refused.existence, miss.existence);
   EXPECT_LT(refused.existence, object.existence);
-  EXPECT_EQ(refused.hits, object.hits);
-  EXPECT_EQ(refused.visible_misses, object.visible_misses + 1);
+  EXPECT_EQ(refused.life.hits, object.life.hits);
+  EXPECT_EQ(refused.life.visible_misses, object.life.visible_misses + 1);
   EXPECT_EQ(refused.best().x, object.best().x);
   EXPECT_EQ(refused.best().P, object.best().P);
 }
@@ -251,10 +251,10 @@ TEST_F(Update, WhatIsNoLongerFoundFromWhereItWasFoundIsMissingAtOnce) {
     update(object, scoreHypothesis(box, 1.0), Eigen::VectorXd::Ones(1), box, frame);
   }
   ASSERT_GT(object.existence, 0.9);
-  object.unmapped_occluder = 0.0;  // nothing can be in the way
+  object.detectability.unmapped_occluder = 0.0;  // nothing can be in the way
   for (int i = 0; i < 4; ++i) {
     update(object, scoreHypothesis(nothing, 1.0), Eigen::VectorXd::Ones(0), nothing, frame);
-    object.unmapped_occluder = 0.0;
+    object.detectability.unmapped_occluder = 0.0;
   }
   EXPECT_LT(object.existence, 0.2);
 }
@@ -266,7 +266,7 @@ TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
   object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
   object.hypotheses[0].weight = object.hypotheses[1].weight = 0.35;
   const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
-  object.observed_from = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
+  object.views.observed_from = {frame.view.T_WC(), 50.0};  // this look is worth next to nothing
   const TrackScore l = scoreHypothesis(boxes, 1.0);
   double A[3];
   for (int i = 0; i < 3; ++i) {

@@ -36,7 +36,7 @@ class BoxExplanations {
     if (!score) return std::nullopt;
     const Track& track = belief_.tracks[j];
     return score->log_density - logClutterOf(box, *score, input_.view, clutter_) +
-           logRatio(box, input_.model, track.best().class_name, track.lookalike_nats);
+           logRatio(box, input_.model, track.best().class_name, track.lookalike.nats);
   }
 
  private:

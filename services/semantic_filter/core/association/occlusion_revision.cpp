@@ -43,8 +43,8 @@ void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
       visibilities[j].hidden_sides = {};
       visibilities[j].fraction = parameters.visibility.minimum;
       visibilities[j].state = Visibility::kPartial;
-      belief.tracks[j].visibility = Visibility::kPartial;
-      belief.tracks[j].visible_fraction = visibilities[j].fraction;
+      belief.tracks[j].visibility.state = Visibility::kPartial;
+      belief.tracks[j].visibility.fraction = visibilities[j].fraction;
     }
   }
 }

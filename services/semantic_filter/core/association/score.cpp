@@ -36,13 +36,13 @@ HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track
   HypothesisScore h;
   h.box = projectObserved(hypothesis.x, from, frame.styleOf(hypothesis.class_name),
                           hypothesis.heading());
-  h.correlated_observations = correlatedObservations(hypothesis.x.head<3>(), track.observed_from,
-                                                     frame.view, frame.parameters->tempering);
+  h.correlated_observations = correlatedObservations(
+      hypothesis.x.head<3>(), track.views.observed_from, frame.view, frame.parameters->tempering);
   if (!h.box) return h;
   h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
   const double size =
       std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
-  const double v = visibility.fraction * (1.0 - track.unmapped_occluder);
+  const double v = visibility.fraction * (1.0 - track.detectability.unmapped_occluder);
   h.expected = visibility.fraction *
                detectableShare(track, frame.parameters->visibility.hard_detection_share) *
                detectionProbabilityOf(hypothesis, track, size, frame);
@@ -123,7 +123,7 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
     HypothesisScore& h = result.hypotheses[i];
     h.matches.assign(result.boxes.size(), {});
     if (h.box)
-      scoreBoxes(h, track.hypotheses[i].class_name, track.lookalike_nats, result, boxes, frame);
+      scoreBoxes(h, track.hypotheses[i].class_name, track.lookalike.nats, result, boxes, frame);
   }
   return result;
 }

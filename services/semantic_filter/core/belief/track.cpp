@@ -1,9 +1,36 @@
 #include "services/semantic_filter/core/belief/track.h"
 
+#include <algorithm>
+
 namespace perdure::semantic_filter {
 
+void Lifecycle::merge(const Lifecycle& other) {
+  detected_on_revisit = detected_on_revisit || other.detected_on_revisit;
+  hits += other.hits;
+  confirmed = confirmed || other.confirmed;
+  once_confirmed = once_confirmed || other.once_confirmed;
+  last_seen = std::max(last_seen, other.last_seen);
+}
+
+void DetectionHistory::merge(const DetectionHistory& other) {
+  const auto &first = other.first_box, &last = other.last_box;
+  if (first && (!first_box || first->time < first_box->time)) first_box = first;
+  if (last && (!last_box || last->time > last_box->time)) last_box = last;
+  recent_share = std::max(recent_share, other.recent_share);
+  visible |= other.visible;
+  detected |= other.detected;
+}
+
+void Viewpoints::merge(const Viewpoints& other) {
+  detected_from.observations =
+      std::max(detected_from.observations, other.detected_from.observations);
+  observed_from.observations += other.observed_from.observations;
+}
+
+void BatchState::restart() { *this = {}; }
+
 double existenceCeiling(const Track& track, const TrackParameters& parameters) {
-  return track.detected_on_revisit ? parameters.certain_again : parameters.certain;
+  return track.life.detected_on_revisit ? parameters.certain_again : parameters.certain;
 }
 
 }  // namespace perdure::semantic_filter

@@ -1,9 +1,11 @@
-// The belief about one track as a plain value: existence × PMF × bank of Gaussians (eq. 9).
-// Beyond the paper, the bank is a mixture over (class, static or moving, yaw or scale mode): the
-// PMF over classes and the probability of moving are sums of the weights of its hypotheses.
+// A track: what is believed of one object, as a plain value (eq. 9: existence x PMF x a bank of
+// Gaussians). Beyond the paper the bank is a mixture over (class, static or moving, mode): the PMF
+// and the probability of moving are sums of the weights of its hypotheses.
+// Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <set>
@@ -21,90 +23,137 @@
 
 namespace perdure::semantic_filter {
 
-/// From where the track was last looked at, for the correlation of looks (DESIGN 5, item 7).
-struct Viewpoint {
-  RigidTransform T_WC;
-  double observations = 0.0;  ///< number of looks that share this view, discounted
+/// Out of the image for longer than this: what comes next is another visit.
+inline constexpr double kAnotherVisit_s = 1.0;
+
+/// What the rest of the system was told of the track, and since when.
+struct Lifecycle {
+  bool confirmed = false;
+  bool once_confirmed = false;  ///< it was confirmed at some time, so that the map knows it
+  bool recalled = false;        ///< it came back from the map and was not detected since
+  bool detected_on_revisit = false;
+  TimePoint first_seen, last_seen;
+  TimePoint visit_began;  ///< when it last came back into the image
+  std::uint32_t hits = 0, visible_misses = 0;
+
+  /// `other` is the same object.
+  void merge(const Lifecycle& other);
 };
 
-/// A box that was surely the track's, pixels.
+/// A box that was assigned to the track, pixels.
 struct AssignedBox {
   TimePoint time;
   Box box;
 };
 
-/// Out of the picture, not behind something, for so long: what comes next is another visit.
-inline constexpr double kAnotherVisit_s = 1.0;
-
-/// Of the last 64 frames that heard detections, a bit each: whether the track was in visibility,
-/// and whether it was found. Bits of one belief are of the same frames.
+/// How the detector did at this track.
 struct DetectionHistory {
+  /// One bit for each of the last 64 frames with detections: the track was visible, was detected.
+  /// The bits of all tracks of one belief are of the same frames.
   std::uint64_t visible = 0, detected = 0;
+  double recent_share = 1.0;             ///< share of the latest observations that were detections
+  double existence_when_detected = 0.0;  ///< existence after the latest detection
+  double running_nis = 1.0;              ///< normalised innovation of its boxes, per dimension
+  std::optional<AssignedBox> first_box, last_box;  ///< none of a track that came back
 
   void add(bool is_visible, bool is_detected) {
     visible = visible << 1 | (is_visible ? 1U : 0U);
     detected = detected << 1 | (is_detected ? 1U : 0U);
   }
+  void merge(const DetectionHistory& other);
 };
 
+/// The camera pose of an observation, and how many observations share its errors.
+struct Viewpoint {
+  RigidTransform T_WC;
+  double observations = 0.0;  ///< discounted by the change of view
+};
+
+struct Viewpoints {
+  Viewpoint detected_from;                       ///< of the latest detection
+  Viewpoint observed_from;                       ///< of the latest observation
+  std::optional<RigidTransform> predicted_from;  ///< T_WC that b and Detectability refer to
+
+  void merge(const Viewpoints& other);
+};
+
+/// What makes P_D of this track differ from that of its class.
+struct Detectability {
+  double unmapped_occluder = 0.0;  ///< probability that something not on the map hides the object
+  double hard_to_detect = 0.0;  ///< that nothing does, and the network seldom detects it from here
+  DetectionRate rate;           ///< how often earlier visits detected it, by view
+};
+
+/// A thing of no known class that the network takes for one.
+struct Lookalike {
+  double nats = 0.0;       ///< evidence for "it looks like a known class", if it is of none
+  std::string class_name;  ///< the class that the network last saw in it; empty: none
+};
+
+/// One observation that is kept for the batch; smoothing knows what it holds.
 struct Keyframe;
+
+/// State of the batch estimate (smoothing).
+struct BatchState {
+  SharedVector<std::shared_ptr<const Keyframe>> keyframes;  ///< in order of time
+  /// False for a track that came back: what it knew before is in its state alone, and a batch of
+  /// later keyframes would lose it.
+  bool complete = true;
+  std::uint32_t fresh = 0;            ///< keyframes since the latest fit
+  std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
+  std::uint32_t mode_search_due = 0;  ///< modes are searched when `seen` reaches it
+  std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
+
+  /// Forgets all: the state begins anew.
+  void restart();
+};
+
+/// As the latest frame saw it.
+struct PublishedVisibility {
+  Visibility state = Visibility::kVisible;
+  double fraction = 1.0;
+  ObjectId blocked_by = 0;
+};
+
+/// What the cross-covariances of the hypotheses refer to.
+struct PoseReference {
+  Matrix6d product = Matrix6d::Identity();  ///< PoseError::product at as_of
+  TimePoint drift_measured_at;              ///< when it last measured the map-relative drift
+};
+
+/// Frames that said nothing since the track was last predicted. They change no published value.
+struct UnusedFrames {
+  LedgerEntry occluded, out_of_view;
+
+  std::uint64_t count() const { return occluded.count + out_of_view.count; }
+};
 
 struct Track {
   ObjectId id = 0;
   Existence existence;
+  /// Log-odds of "it is a real object" above those of "it is still there"
+  /// (tools/docs/maths/class_and_existence_update.md).
+  double existence_lead = 0.0;
   SharedVector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
-  bool confirmed = false;
-  bool once_confirmed = false;  ///< it was; hence the map knows it
-  TimePoint first_seen, last_seen, as_of;
-  Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product that C refers to
-  TimePoint visit_began;                         ///< when it last came back into the picture
-  TimePoint drift_measured_at;                   ///< when it last told of the pose's error
-  bool detected_on_revisit = false;              ///< detected on another visit than the first
-  std::uint32_t hits = 0, visible_misses = 0;
-  double running_nis = 1.0;  ///< per degree of freedom, of the boxes it claimed
-  std::optional<AssignedBox> first_box, last_box;  ///< none of one that came back
-  Viewpoint detected_from;                         ///< of the last look that showed it
-  Viewpoint observed_from;                         ///< of the last look, whatever it showed
-  /// Log-odds by which "it is a real thing" is above "it is there still"
-  /// (core/updateClassAndExistence.cpp).
-  double real_over_present = 0.0;
-  double lookalike_nats =
-      0.0;  ///< nats for "looks like a known class", if it is of none (logRatio)
-  std::string lookalike_class;  ///< the class that the network last saw in it; "" where none
-  double unmapped_occluder =
-      0.0;  ///< probability that something not on the map hides it, if it exists
-  double hard_to_detect = 0.0;  ///< that nothing does, and the network seldom finds it from here
-  std::optional<RigidTransform> predicted_from;  ///< T_WC that those and b refer to
-  DetectionRate detection_rate;
-  DetectionHistory history;
-  double recent_detection_share = 1.0;   ///< share of late visible looks that showed it
-  double existence_when_detected = 0.0;  ///< existence after the last look that showed it
-  Visibility visibility = Visibility::kVisible;
-  double visible_fraction = 1.0;
-  ObjectId blocked_by = 0;
-  bool recalled = false;
-  /// KeyframeBatch that are remembered, in order of time.
-  SharedVector<std::shared_ptr<const Keyframe>> keyframes;
-  /// False for one that came back (restart, recall): what it knew before is in its state alone, and
-  /// an estimate from the looks since then would lose it.
-  bool keyframes_complete = true;
-  std::uint32_t new_keyframes = 0;    ///< that came since the state was last map_fit
-  std::uint32_t keyframes_seen = 0;   ///< since there were enough to smooth
-  std::uint32_t mode_search_due = 0;  ///< so many, other modes are sought
-  std::uint32_t refit_patience = 1;   ///< grows while smoothing finds little to mend
-  /// Classes that the models which saw it could name; none of one that came back.
+  TimePoint as_of;                      ///< time of the state
+  ClassAccount classes;                 ///< the reasons of the hypotheses' weights
+  /// Classes that the models which saw it could name; none of a track that came back.
   std::shared_ptr<const std::set<std::string>> classes_considered;
-  ClassAccount
-      classes;  ///< why the hypotheses updateClassAndExistence what they updateClassAndExistence
-  std::vector<ClassNumber> context;  ///< nats, laid over what is published (core/context.h)
-  /// KeyframeBatch that were not used since the track was last brought up to date: nothing of what
-  /// is published changes while it is hidden, its ledger neither.
-  LedgerEntry occluded_frames, out_of_view_frames;
+  std::vector<ClassNumber> context;  ///< nats, added to what is published (tracks/context.h)
+  Lookalike lookalike;
+  Lifecycle life;
+  DetectionHistory history;
+  Viewpoints views;
+  Detectability detectability;
+  BatchState batch;
+  PublishedVisibility visibility;
+  PoseReference pose;
+  UnusedFrames unused;
 
   const Hypothesis& best() const { return hypotheses.front(); }
 };
 
-/// The most that is believed of its existence.
+/// Existence is never believed above it, so that misses still count.
 double existenceCeiling(const Track& track, const TrackParameters& parameters);
 
 }  // namespace perdure::semantic_filter

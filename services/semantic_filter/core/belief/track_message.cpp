@@ -71,7 +71,7 @@ ObjectBelief toBelief(const Track& track, double min_speed) {
   ObjectBelief belief;
   belief.id = track.id;
   belief.existence = track.existence;
-  belief.confirmed = track.confirmed;
+  belief.confirmed = track.life.confirmed;
   std::vector<const std::string*> names;
   names.reserve(track.hypotheses.size());
   for (const auto& h : track.hypotheses) {
@@ -84,17 +84,17 @@ ObjectBelief toBelief(const Track& track, double min_speed) {
   if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
     std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
   }
-  belief.visibility = track.visibility;
-  belief.visible_fraction = track.visible_fraction;
-  belief.blocked_by = track.blocked_by;
-  belief.first_seen = track.first_seen;
-  belief.last_seen = track.last_seen;
+  belief.visibility = track.visibility.state;
+  belief.visible_fraction = track.visibility.fraction;
+  belief.blocked_by = track.visibility.blocked_by;
+  belief.first_seen = track.life.first_seen;
+  belief.last_seen = track.life.last_seen;
   belief.as_of = track.as_of;
-  belief.hits = track.hits;
-  belief.visible_misses = track.visible_misses;
+  belief.hits = track.life.hits;
+  belief.visible_misses = track.life.visible_misses;
   belief.moving = movingProbability(track, min_speed);
   if (track.best().moving) belief.velocity = track.best().x.tail<3>();
-  belief.recalled = track.recalled;
+  belief.recalled = track.life.recalled;
   belief.why = {track.existence.published(), track.classes.published(), track.classes.ousted()};
   return belief;
 }
@@ -104,8 +104,8 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
   track.id = belief.id;
   track.existence = {belief.existence, belief.why.existence, back, belief.as_of};
   track.classes = {belief.why.classes, belief.why.ousted};
-  track.confirmed = belief.confirmed;
-  track.once_confirmed = belief.confirmed || back == ExistenceEvidence::kRecall;
+  track.life.confirmed = belief.confirmed;
+  track.life.once_confirmed = belief.confirmed || back == ExistenceEvidence::kRecall;
   for (const auto& c : belief.classes) {
     Hypothesis h;
     h.class_name = c.name;
@@ -121,17 +121,17 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
     }
     track.hypotheses.push_back(h);
   }
-  track.first_seen = belief.first_seen;
-  track.last_seen = belief.last_seen;
+  track.life.first_seen = belief.first_seen;
+  track.life.last_seen = belief.last_seen;
   track.as_of = belief.as_of;
-  track.pose_product = pose_product;
-  track.hits = belief.hits;
-  track.visible_misses = belief.visible_misses;
-  track.visibility = belief.visibility;
-  track.visible_fraction = belief.visible_fraction;
-  track.blocked_by = belief.blocked_by;
-  track.recalled = true;
-  track.keyframes_complete = false;
+  track.pose.product = pose_product;
+  track.life.hits = belief.hits;
+  track.life.visible_misses = belief.visible_misses;
+  track.visibility.state = belief.visibility;
+  track.visibility.fraction = belief.visible_fraction;
+  track.visibility.blocked_by = belief.blocked_by;
+  track.life.recalled = true;
+  track.batch.complete = false;
   normalise(track, ClassEvidence::kRestore);
   return track;
 }

@@ -12,6 +12,10 @@ constexpr double kNever = 1e9;  // a change of view that never counts
 
 Projector FrameContext::projector() const { return frame_view ? frame_view->projector : view; }
 
+ViewScales biasScales(const BoxParameters& box) {
+  return {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
+}
+
 ViewScales detectabilityScales(const VisibilityParameters& visibility) {
   return {visibility.detectability_angle, visibility.detectability_log_distance, kNever};
 }
@@ -25,7 +29,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   const BoxNoise noise =
       frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{};
   walk.lasting = lastingError(box, noise) * std::sqrt(frame.noise_scale.lasting());
-  walk.bias = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
+  walk.bias = biasScales(box);
   walk.unmapped_occluder = visibility.unmapped_occluder;
   walk.hard_to_detect = visibility.hard_to_detect;
   walk.screen = detectabilityScales(visibility);

@@ -121,6 +121,8 @@ struct ViewWalk {
   ViewScales screen{1, 1, 1};
 };
 
+/// Changes of view after which the detector bias has fallen to 1/e.
+ViewScales biasScales(const BoxParameters& box);
 /// Changes of view after which what hides a thing, or makes the network miss it, is another.
 ViewScales detectabilityScales(const VisibilityParameters& visibility);
 /// What changes at an track with the view of this frame.

@@ -15,7 +15,7 @@ constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 /// It is on the map, or will be with the next commit. One whose place beside the body is no longer
 /// known is no claim now, and yet what the map has of it is worth keeping.
 bool onTheMap(const Track& track) {
-  return track.confirmed || (track.once_confirmed && track.existence >= 0.5);
+  return track.life.confirmed || (track.life.once_confirmed && track.existence >= 0.5);
 }
 
 bool mayMove(const Track& track, double min_speed) {
@@ -31,7 +31,8 @@ double extentOf(const Track& track) {
 
 bool Archive::farAndUnseen(const Track& track, const Eigen::Vector3d& p_WB, TimePoint now,
                            TimePoint oldest) const {
-  if (track.last_seen >= oldest || toSeconds(now - track.last_seen) < parameters_.after_s) {
+  if (track.life.last_seen >= oldest ||
+      toSeconds(now - track.life.last_seen) < parameters_.after_s) {
     return false;
   }
   const State x = stateAt(track.best(), toSeconds(now - track.as_of));
@@ -100,7 +101,7 @@ bool Archive::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) con
 }
 
 void Archive::rememberReference(const Track& track, const std::optional<RigidTransform>& T_MW) {
-  references_[track.as_of] = {track.pose_product, T_MW};
+  references_[track.as_of] = {track.pose.product, T_MW};
   if (references_.size() > kMostReferences) references_.erase(references_.begin());
 }
 

@@ -106,7 +106,7 @@ std::optional<PoseCorrection> DriftEstimator::correct(const RigidTransform& T_MB
 }
 
 void applyCorrection(Track& track, const PoseCorrection& correction, const PoseError& pose_error) {
-  const auto transition = transitionBetween(track.pose_product, pose_error.product);
+  const auto transition = transitionBetween(track.pose.product, pose_error.product);
   if (!transition) return;
   for (Hypothesis& h : track.hypotheses) {
     const CrossPose C = h.C * transition->transpose();

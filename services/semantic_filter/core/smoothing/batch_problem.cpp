@@ -107,7 +107,7 @@ BatchProblem::BatchProblem(const KeyframeBatch& batch, bool moving, const std::s
   if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
   size_information_ = inverseSymmetric(prior_.log_size_covariance);
   const auto& box = frame.parameters->box;
-  scales_ = {box.bias_angle, box.bias_log_distance, box.bias_image_angle};
+  scales_ = biasScales(box);
   heading_ = headingOf(logHeading(start));
   if (!moving) return;
   const double s2 = std::max(prior_.speed_sigma * prior_.speed_sigma, 0.01);

@@ -64,9 +64,9 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
     return changeBetween(keyframeAspectOf(place, *other), now, scales) < parameters.new_view;
   };
   // The late ones first: they are the most correlation.
-  const Keyframes& known = track.keyframes.read();
+  const Keyframes& known = track.batch.keyframes.read();
   if (std::any_of(known.rbegin(), known.rend(), same)) return false;
-  Keyframes& all = track.keyframes.write();
+  Keyframes& all = track.batch.keyframes.write();
   all.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
   thin(place, all, scales, static_cast<std::size_t>(parameters.keyframes));
   return true;
@@ -88,13 +88,15 @@ bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters
   return score && score->nis < kContradicted;
 }
 
-void mergeKeyframes(Track& a, const Track& b, const ViewScales& scales,
-                    const SmoothingParameters& parameters) {
-  Keyframes& all = a.keyframes.write();
-  all.insert(all.end(), b.keyframes.begin(), b.keyframes.end());
+void mergeBatches(Track& a, const Track& b, const ViewScales& scales,
+                  const SmoothingParameters& parameters) {
+  a.batch.complete = a.batch.complete && b.batch.complete;
+  Keyframes& all = a.batch.keyframes.write();
+  all.insert(all.end(), b.batch.keyframes.begin(), b.batch.keyframes.end());
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& x, const auto& y) { return x->from->time < y->from->time; });
-  thin(a.best().x.head<3>(), all, scales, static_cast<std::size_t>(parameters.keyframes));
+  thin(a.best().x.head<3>(), all, scales,
+       static_cast<std::size_t>(parameters.keyframes));
 }
 
 }  // namespace perdure::semantic_filter

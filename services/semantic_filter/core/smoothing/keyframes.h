@@ -22,8 +22,8 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
 /// Whether the keyframe may have been at `h`.
 bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters);
 
-/// What two tracks that are one addKeyframe, in order of time.
-void mergeKeyframes(Track& a, const Track& b, const ViewScales& scales,
-                    const SmoothingParameters& parameters);
+/// Takes b's keyframes into a's batch: both are of one object.
+void mergeBatches(Track& a, const Track& b, const ViewScales& scales,
+                  const SmoothingParameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -148,11 +148,11 @@ std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const Keyfr
 void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameContext& frame) {
   constexpr double kLeastOdds = -6.0, kSurest = 15.0;  // nats
   const Hypothesis other = track.best();
-  if (other.class_name != kOtherClass || other.moving || track.lookalike_class.empty()) return;
-  if (classProbability(track, track.lookalike_class) > 0.0) return;
+  if (other.class_name != kOtherClass || other.moving || track.lookalike.class_name.empty()) return;
+  if (classProbability(track, track.lookalike.class_name) > 0.0) return;
   const Parameters& p = *frame.parameters;
-  const ClassPrior& prior = frame.priors->of(track.lookalike_class);
-  if (prior.name != track.lookalike_class) return;
+  const ClassPrior& prior = frame.priors->of(track.lookalike.class_name);
+  if (prior.name != track.lookalike.class_name) return;
   const auto as_other = fit(other, batch, frame);
   if (!as_other) return;
   const Hypothesis& whole = as_other->hypothesis();
@@ -160,7 +160,7 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
   const double place = std::sqrt(whole.P.topLeftCorner<3, 3>().trace());
   if (place > p.tracks.scale_resolved * distance) return;
   Hypothesis start = other;
-  start.class_name = track.lookalike_class;
+  start.class_name = track.lookalike.class_name;
   start.x.segment<3>(kSize) = prior.log_size;
   std::vector<Hypothesis> starts = otherStarts(start, prior);
   starts.push_back(start);

@@ -28,11 +28,11 @@ struct Verdicts {
 void dropContradicted(Track& track, const Verdicts& verdicts, std::size_t least) {
   if (verdicts.fits == 0) return;
   std::vector<std::shared_ptr<const Keyframe>> kept;
-  const auto& all = track.keyframes.read();
+  const auto& all = track.batch.keyframes.read();
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) kept.push_back(all[i]);
   }
-  if (kept.size() >= least) track.keyframes = std::move(kept);
+  if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
 /// What the best fit of a thing of the class at rest leaves over.
@@ -69,7 +69,7 @@ std::optional<ResidualRatios> refitClass(Track& track, const std::string& name,
   if (!driving) return over;
   if (!at_rest) {
     const Hypothesis& mover = driving->map_fit.hypothesis();
-    auto map_fit = fit(atRest(mover, track.keyframes.read()), batch, frame);
+    auto map_fit = fit(atRest(mover, track.batch.keyframes.read()), batch, frame);
     if (!map_fit) return over;
     Hypothesis h = map_fit->hypothesis();
     h.weight = 1e-3 * mover.weight;
@@ -85,9 +85,9 @@ bool informsNoiseScale(const Track& track, const FrameContext& frame) {
   const Hypothesis& best = track.best();
   return !best.moving && best.class_name != kOtherClass && track.existence > kSure &&
          movingProbability(track, frame.parameters->motion.min_speed) < 1.0 - kSure &&
-         std::all_of(track.keyframes.begin(), track.keyframes.end(), [&](const auto& k) {
-           return k->from->noise_scale.model == frame.noise_scale.model;
-         });
+         std::all_of(
+             track.batch.keyframes.begin(), track.batch.keyframes.end(),
+             [&](const auto& k) { return k->from->noise_scale.model == frame.noise_scale.model; });
 }
 
 }  // namespace
@@ -95,33 +95,32 @@ bool informsNoiseScale(const Track& track, const FrameContext& frame) {
 bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bool, 4>& hidden,
                       const FrameContext& frame) {
   const auto& p = *frame.parameters;
-  if (p.smoothing.keyframes == 0 || !frame.frame_view || !track.keyframes_complete) return false;
-  const ViewScales scales{p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle};
+  if (p.smoothing.keyframes == 0 || !frame.frame_view || !track.batch.complete) return false;
   Keyframe keyframe{frame.frame_view, box.z, hidden, box.azimuth, box.azimuth_sigma};
-  if (!addKeyframe(track, std::move(keyframe), scales, p.smoothing)) return false;
-  if (track.keyframes.size() < static_cast<std::size_t>(p.smoothing.least)) return false;
-  ++track.new_keyframes;
-  ++track.keyframes_seen;
+  if (!addKeyframe(track, std::move(keyframe), biasScales(p.box), p.smoothing)) return false;
+  if (track.batch.keyframes.size() < static_cast<std::size_t>(p.smoothing.least)) return false;
+  ++track.batch.fresh;
+  ++track.batch.seen;
   return refitNeed(track, p.smoothing.fresh) >= 1.0;
 }
 
 double refitNeed(const Track& track, double fresh) {
-  return track.new_keyframes /
-         (fresh * static_cast<double>(track.keyframes.size()) * track.refit_patience);
+  return track.batch.fresh /
+         (fresh * static_cast<double>(track.batch.keyframes.size()) * track.batch.patience);
 }
 
 std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smoothing.patience);
   constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
   const auto& p = *frame.parameters;
-  const double fresh = track.new_keyframes / static_cast<double>(track.keyframes.size());
-  track.new_keyframes = 0;
+  const double fresh = track.batch.fresh / static_cast<double>(track.batch.keyframes.size());
+  track.batch.fresh = 0;
   const Hypothesis before = track.best();
-  const KeyframeBatch batch(track.keyframes.read(), frame.pose_error);
+  const KeyframeBatch batch(track.batch.keyframes.read(), frame.pose_error);
   std::set<std::string> names;
   for (const auto& h : track.hypotheses.read()) names.insert(h.class_name);
-  const bool search = track.keyframes_seen >= track.mode_search_due;
-  if (search) track.mode_search_due = 2 * track.keyframes_seen;
+  const bool search = track.batch.seen >= track.batch.mode_search_due;
+  if (search) track.batch.mode_search_due = 2 * track.batch.seen;
   Verdicts verdicts;
   std::map<std::string, ResidualRatios> over;
   for (const auto& name : names) {
@@ -135,7 +134,7 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   const bool same =
       before.class_name == track.best().class_name && before.moving == track.best().moving;
   const bool settled = same && distance2(before, track.best()) < kLittle;
-  track.refit_patience = settled ? std::min(2 * track.refit_patience, most_patience) : 1;
+  track.batch.patience = settled ? std::min(2 * track.batch.patience, most_patience) : 1;
   const auto told = over.find(track.best().class_name);
   if (told == over.end() || !informsNoiseScale(track, frame)) return std::nullopt;
   ResidualRatios result = told->second;
@@ -151,7 +150,7 @@ void refitNeediest(std::vector<Track*>& tracks, Belief& belief, const FrameConte
   const auto most = static_cast<std::size_t>(frame.parameters->smoothing.per_frame);
   if (tracks.size() > most) tracks.resize(most);
   for (Track* track : tracks) {
-    const double share = track->new_keyframes / static_cast<double>(track->keyframes.size());
+    const double share = track->batch.fresh / static_cast<double>(track->batch.keyframes.size());
     if (const auto over = refit(*track, frame)) {
       belief.learned.sides.learn(frame.noise_scale.model, over->sides);
       belief.learned.azimuths.learn(frame.noise_scale.model, over->azimuths);

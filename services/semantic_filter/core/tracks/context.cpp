@@ -94,7 +94,7 @@ void contextualise(std::vector<Track>& tracks, const ContextMatrix& matrix) {
   if (matrix.empty()) return;
   const auto all = neighboursOf(tracks);
   for (Track& o : tracks) {
-    if (o.visible_fraction <= 0.0 || o.best().moving) continue;
+    if (o.visibility.fraction <= 0.0 || o.best().moving) continue;
     auto fresh = contextFrom(o, all, matrix);
     if (differs(fresh, o.context)) o.context = std::move(fresh);
   }

@@ -203,7 +203,8 @@ bool leavesView(BoxExplanations& expected, const Belief& belief,
                 const std::vector<TrackVisibility>& visibilities, const BoxDetection& box) {
   if (box.z.count() == 4) return false;  // what leaves is cut by the border
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
-    if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].confirmed) continue;
+    if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].life.confirmed)
+      continue;
     if (expected.matches(j, visibilities[j].hidden_sides, box)) return true;
   }
   return false;
@@ -237,15 +238,15 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   }
   addOther(track, other * std::exp(detection.log_ratio_other), detection, *ray, range, frame);
   if (track.hypotheses.empty()) return std::nullopt;
-  track.first_seen = track.last_seen = track.as_of = now;
-  track.pose_product = frame.pose_error.product;
-  track.first_box = track.last_box = AssignedBox{now, detection.z.box()};
-  track.hits = 1;
+  track.life.first_seen = track.life.last_seen = track.as_of = now;
+  track.pose.product = frame.pose_error.product;
+  track.history.first_box = track.history.last_box = AssignedBox{now, detection.z.box()};
+  track.life.hits = 1;
   track.classes_considered = frame.model->names;
   bookInitiation(track, kept, detection, frame);
-  track.lookalike_nats = detection.log_ratio_best;
-  track.detected_from = track.observed_from = {frame.view.T_WC(), 1.0};
-  track.predicted_from = frame.view.T_WC();
+  track.lookalike.nats = detection.log_ratio_best;
+  track.views.detected_from = track.views.observed_from = {frame.view.T_WC(), 1.0};
+  track.views.predicted_from = frame.view.T_WC();
   return track;
 }
 

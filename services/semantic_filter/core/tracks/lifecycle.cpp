@@ -16,38 +16,39 @@ namespace {
 /// Detected a few times and then no more, where nothing can be asked of it: what nobody was told
 /// of, and what is mostly not there, is not kept for it to come back.
 bool forgettable(const Track& o, const TrackParameters& parameters) {
-  if (o.once_confirmed || o.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
+  if (o.life.once_confirmed || o.life.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;
-  const TimePoint last = std::max(o.occluded_frames.last, o.out_of_view_frames.last);
-  const bool unasked = o.occluded_frames.count + o.out_of_view_frames.count > 0;
-  return unasked && toSeconds(last - o.last_seen) > parameters.tentative_s;
+  const TimePoint last = std::max(o.unused.occluded.last, o.unused.out_of_view.last);
+  const bool unasked = o.unused.occluded.count + o.unused.out_of_view.count > 0;
+  return unasked && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
 }
 
 }  // namespace
 
 bool established(const Track& track, const FrameContext& frame) {
   const TrackParameters& tend = frame.parameters->tracks;
-  return track.existence >= tend.confirm && track.hits >= tend.confirm_hits &&
+  return track.existence >= tend.confirm && track.life.hits >= tend.confirm_hits &&
          placeSigma(track.best(), frame.pose_error.covariance) < tend.confirm_sigma_m;
 }
 
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame) {
   const TrackParameters& parameters = frame.parameters->tracks;
   for (auto& o : tracks) {
-    if (o.visible_fraction <= 0.0) continue;
+    if (o.visibility.fraction <= 0.0) continue;
     const double sigma = placeSigma(o, frame.pose_error.covariance);
     if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) {
-      o.confirmed = false;
+      o.life.confirmed = false;
       continue;
     }
     if (established(o, frame) && sigma < parameters.confirm_sigma_m) {
-      o.confirmed = o.once_confirmed = true;
+      o.life.confirmed = o.life.once_confirmed = true;
     }
   }
   std::vector<Track> deleted;
   std::erase_if(tracks, [&](Track& o) {
     if (forgettable(o, parameters)) return true;
-    if (o.existence >= (o.hits > 1 ? parameters.gone : parameters.gone_tentative)) return false;
+    if (o.existence >= (o.life.hits > 1 ? parameters.gone : parameters.gone_tentative))
+      return false;
     deleted.push_back(std::move(o));
     return true;
   });

@@ -31,7 +31,7 @@ void multiplyPmf(Track& a, const Track& b) {
 /// was looked at for long.
 bool knownAsWell(const Track& guess, const Track& thing) {
   constexpr std::uint32_t kFewer = 4;  // looks
-  return guess.once_confirmed || kFewer * guess.hits >= thing.hits;
+  return guess.life.once_confirmed || kFewer * guess.life.hits >= thing.life.hits;
 }
 
 /// They contradict each other: their mean would be wrong with more existenceCeiling than either,
@@ -49,7 +49,8 @@ bool contradict(const Hypothesis& a, const Hypothesis& b) {
 
 /// As many as both have, weighed by how often each was found: later looks will tell.
 void keepBoth(Track& a, const Track& b) {
-  const double share = static_cast<double>(b.hits) / std::max(1.0, double(a.hits) + double(b.hits));
+  const double share =
+      static_cast<double>(b.life.hits) / std::max(1.0, double(a.life.hits) + double(b.life.hits));
   for (auto& h : a.hypotheses) h.weight *= 1.0 - share;
   for (Hypothesis h : b.hypotheses) {
     h.weight *= share;
@@ -62,10 +63,10 @@ void keepBoth(Track& a, const Track& b) {
 /// do not fit the other.
 void forgetLooksAtOthers(Track& a, Track& b, const BoxParameters& parameters) {
   constexpr double kHardlyFound = 0.2;
-  Track& lost = a.recent_detection_share < b.recent_detection_share ? a : b;
-  const Hypothesis& found = (a.recent_detection_share < b.recent_detection_share ? b : a).best();
-  if (lost.recent_detection_share >= kHardlyFound) return;
-  std::erase_if(lost.keyframes.write(),
+  Track& lost = a.history.recent_share < b.history.recent_share ? a : b;
+  const Hypothesis& found = (a.history.recent_share < b.history.recent_share ? b : a).best();
+  if (lost.history.recent_share >= kHardlyFound) return;
+  std::erase_if(lost.batch.keyframes.write(),
                 [&](const auto& k) { return !explains(found, *k, parameters); });
 }
 
@@ -87,29 +88,15 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
     a.hypotheses.front().weight = weight;
     multiplyPmf(a, b);
   }
-  a.detected_on_revisit = a.detected_on_revisit || b.detected_on_revisit;
+  a.life.merge(b.life);
   a.existence.become(std::min(1.0 - (1.0 - a.existence) * (1.0 - b.existence),
                               existenceCeiling(a, frame.parameters->tracks)),
                      ExistenceEvidence::kMerge, a.as_of);
-  a.hits += b.hits;
-  a.confirmed = a.confirmed || b.confirmed;
-  a.once_confirmed = a.once_confirmed || b.once_confirmed;
-  a.last_seen = std::max(a.last_seen, b.last_seen);
-  if (b.first_box && (!a.first_box || b.first_box->time < a.first_box->time)) {
-    a.first_box = b.first_box;
-  }
-  if (b.last_box && (!a.last_box || b.last_box->time > a.last_box->time)) a.last_box = b.last_box;
-  a.detected_from.observations =
-      std::max(a.detected_from.observations, b.detected_from.observations);
-  a.observed_from.observations += b.observed_from.observations;
-  a.recent_detection_share = std::max(a.recent_detection_share, b.recent_detection_share);
-  a.detection_rate.join(b.detection_rate, detectabilityScales(frame.parameters->visibility));
-  a.history.visible |= b.history.visible;
-  a.history.detected |= b.history.detected;
-  a.keyframes_complete = a.keyframes_complete && b.keyframes_complete;
-  const auto& box = frame.parameters->box;
-  mergeKeyframes(a, b, {box.bias_angle, box.bias_log_distance, box.bias_image_angle},
-                 frame.parameters->smoothing);
+  a.history.merge(b.history);
+  a.views.merge(b.views);
+  a.detectability.rate.join(b.detectability.rate,
+                            detectabilityScales(frame.parameters->visibility));
+  mergeBatches(a, b, biasScales(frame.parameters->box), frame.parameters->smoothing);
 }
 
 /// Two things that the image shows side by side are two, however near their estimated depths are.
@@ -121,28 +108,30 @@ bool sameInImage(const State& a, const State& b, const Projector& from) {
 }
 
 bool bothSeen(const Track& a, const Track& b) {
-  return a.visible_fraction > 0.0 && b.visible_fraction > 0.0;
+  return a.visibility.fraction > 0.0 && b.visibility.fraction > 0.0;
 }
 
 /// Whether b is hidden by a, which is seen: two solid things cannot share their space, so that a
 /// copy behind its original is no thing of its own.
 bool hides(const Track& a, const Track& b) {
-  return a.visible_fraction > 0.0 && b.visibility == Visibility::kOccluded && b.blocked_by == a.id;
+  return a.visibility.fraction > 0.0 && b.visibility.state == Visibility::kOccluded &&
+         b.visibility.blocked_by == a.id;
 }
 
 /// A hidden one waits at the time when it was last seen; what is merged is of one time.
 void bringUpToDate(Track& a, Track& b, const FrameContext& frame) {
   const TimePoint now = std::max(a.as_of, b.as_of);
   for (Track* o : {&a, &b}) {
-    if (o->visible_fraction > 0.0) continue;
+    if (o->visibility.fraction > 0.0) continue;
     predict(*o, now, frame.pose_error, frame.parameters->motion, viewWalkOf(frame));
   }
 }
 
 /// Whose id survives: that which was claimed, whatever guesses at it are older.
 bool older(const Track& a, const Track& b) {
-  if (a.once_confirmed != b.once_confirmed) return a.once_confirmed;
-  return a.first_seen < b.first_seen || (a.first_seen == b.first_seen && a.id < b.id);
+  if (a.life.once_confirmed != b.life.once_confirmed) return a.life.once_confirmed;
+  return a.life.first_seen < b.life.first_seen ||
+         (a.life.first_seen == b.life.first_seen && a.id < b.id);
 }
 
 struct Shared {
@@ -183,7 +172,7 @@ bool foundTogether(const Track& a, const Track& b) {
 bool takeTurns(const Track& a, const Track& b) {
   constexpr int kTurns = 4;
   const DetectionHistory &of_a = a.history, &of_b = b.history;
-  if (foundTogether(a, b) || a.hits < 2 || b.hits < 2) return false;
+  if (foundTogether(a, b) || a.life.hits < 2 || b.life.hits < 2) return false;
   return std::popcount((of_a.detected ^ of_b.detected) & of_a.visible & of_b.visible) >= kTurns;
 }
 
@@ -213,7 +202,7 @@ struct Ball {
 Ball ballOf(const Track& track) {
   const State& x = track.best().x;
   return {x.head<3>(), 0.5 * x.segment<3>(kSize).array().exp().matrix().norm(),
-          track.visible_fraction > 0.0};
+          track.visibility.fraction > 0.0};
 }
 
 bool touch(const Ball& a, const Ball& b) {

@@ -61,7 +61,7 @@ void mergeNearHypotheses(Track& track, double threshold) {
 
 /// Without parallax nobody can tell a toy from a car: until the distance is known, "other" stays.
 bool scaleIsOpen(const Track& track, const TrackParameters& tend) {
-  const double distance = (track.best().x.head<3>() - track.detected_from.T_WC.p).norm();
+  const double distance = (track.best().x.head<3>() - track.views.detected_from.T_WC.p).norm();
   const double variance = track.best().P.topLeftCorner<3, 3>().trace();
   return std::sqrt(variance) > tend.scale_resolved * distance;
 }
@@ -83,7 +83,7 @@ void pruneMisshapen(Track& track, const ClassPriors& priors, double size_gate) {
 void pruneLightHypotheses(Track& track, const TrackParameters& tend) {
   const std::string best_class = track.best().class_name;
   const bool dominant =
-      track.hits >= 3 && classProbability(track, best_class) > tend.class_dominates;
+      track.life.hits >= 3 && classProbability(track, best_class) > tend.class_dominates;
   const bool open = scaleIsOpen(track, tend);
   std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
     if (open && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
@@ -92,9 +92,9 @@ void pruneLightHypotheses(Track& track, const TrackParameters& tend) {
 }
 
 void addMovingTwin(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
-  if (track.running_nis < motion.start_nis || hasMoving(track)) return;
+  if (track.history.running_nis < motion.start_nis || hasMoving(track)) return;
   const ClassPrior& prior = priors.of(track.best().class_name);
-  if (prior.moving <= 0.0 || track.hits < 3) return;
+  if (prior.moving <= 0.0 || track.life.hits < 3) return;
   Hypothesis twin = asMoving(track.best());
   twin.weight *= motion.start_probability;
   twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
@@ -102,7 +102,7 @@ void addMovingTwin(Track& track, const ClassPriors& priors, const MotionParamete
   Hypothesis wide = track.best();
   wide.ground_contact = {};
   wide.weight *= motion.start_probability * motion.misplaced_odds;
-  const Eigen::Vector3d ray = wide.x.head<3>() - track.detected_from.T_WC.p;
+  const Eigen::Vector3d ray = wide.x.head<3>() - track.views.detected_from.T_WC.p;
   const double relative = motion.misplaced_sigma;
   Eigen::Matrix<double, kStateDim, 1> g = Eigen::Matrix<double, kStateDim, 1>::Zero();
   g.head<3>() = ray;
@@ -110,7 +110,7 @@ void addMovingTwin(Track& track, const ClassPriors& priors, const MotionParamete
   wide.P += relative * relative * g * g.transpose();
   track.hypotheses.push_back(wide);
   track.hypotheses.push_back(twin);
-  track.running_nis = 1.0;
+  track.history.running_nis = 1.0;
 }
 
 }  // namespace

@@ -18,12 +18,12 @@ constexpr double kCarried_m = 2.5;  // by which things are carried without leavi
 constexpr int kLeastKeyframes = 3;  // at the empty place
 constexpr double kTooFar = std::numeric_limits<double>::infinity();
 
-bool isMissing(const Track& o) { return o.once_confirmed && o.existence < kMissing; }
+bool isMissing(const Track& o) { return o.life.once_confirmed && o.existence < kMissing; }
 
 /// Whether most keyframes that showed the one had the other's place in the picture, and nothing was
 /// there: what is new only because nobody looked there before has not moved.
 bool wasLookedAt(const Eigen::Vector3d& place, const Track& missing) {
-  const auto& keyframes = missing.keyframes;
+  const auto& keyframes = missing.batch.keyframes;
   const auto count = std::count_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
     const CameraModel& camera = k->from->camera;
     const auto pixel = camera.project(k->from->T_WC.inverse() * place);
@@ -33,19 +33,20 @@ bool wasLookedAt(const Eigen::Vector3d& place, const Track& missing) {
 }
 
 bool isThere(const Track& o, const FrameContext& frame) {
-  return o.confirmed || established(o, frame);
+  return o.life.confirmed || established(o, frame);
 }
 
 /// The one was seen in a box, and from then on the other in almost the same: they are one thing,
 /// though it was not believed to be where it was, or, bent to what no car is, not what it was.
 bool takesOver(const Track& found, const Track& missing) {
   constexpr double kAtOnce_s = 0.5, kAlike = 0.5;
-  if (!found.best().moving || !found.first_box || !missing.last_box) return false;
+  if (!found.best().moving || !found.history.first_box || !missing.history.last_box) return false;
   const std::string& was = missing.best().class_name;
   if (was != found.best().class_name && was != kOtherClass) return false;
-  const double since = toSeconds(found.first_box->time - missing.last_box->time);
+  const double since = toSeconds(found.history.first_box->time - missing.history.last_box->time);
   return since > 0.0 && since <= kAtOnce_s &&
-         intersectionOverUnion(found.first_box->box, missing.last_box->box) > kAlike;
+         intersectionOverUnion(found.history.first_box->box, missing.history.last_box->box) >
+             kAlike;
 }
 
 /// Metres between where the one stood and where the other must have been then; infinite where they
@@ -55,12 +56,12 @@ double apart(const Track& missing, const Track& found, const FrameContext& frame
   if (!isThere(found, frame) || h.class_name == kOtherClass) return kTooFar;
   if (takesOver(found, missing)) return 0.0;
   if (h.class_name != missing.best().class_name) return kTooFar;
-  const double since = toSeconds(found.first_seen - missing.last_seen);
+  const double since = toSeconds(found.life.first_seen - missing.life.last_seen);
   if (since < -kOverlap_s) return kTooFar;
   const bool carried =
       frame.priors->of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
   if (h.moving ? since > kDriven_s : !carried) return kTooFar;
-  const double ago = toSeconds(found.as_of - missing.last_seen);
+  const double ago = toSeconds(found.as_of - missing.life.last_seen);
   if (h.moving && ago > kTraced_s) return kTooFar;
   const State then = stateAt(h, -ago);
   const double metres = (then - missing.best().x).head<3>().norm();
@@ -85,26 +86,24 @@ std::size_t nearest(const std::vector<Track>& tracks, std::size_t of, bool among
 /// What is known of the thing is what the newcomer shows.
 void takeOverIdentity(Track& past, Track&& now) {
   now.id = past.id;
-  now.first_seen = past.first_seen;
-  now.first_box = past.first_box;
-  now.hits += past.hits;
-  now.visible_misses += past.visible_misses;
-  now.once_confirmed = true;
+  now.life.first_seen = past.life.first_seen;
+  now.history.first_box = past.history.first_box;
+  now.life.hits += past.life.hits;
+  now.life.visible_misses += past.life.visible_misses;
+  now.life.once_confirmed = true;
   past = std::move(now);
 }
 
 /// What was known of it stays; how it is seen now is what the newcomer shows.
 void resumeTrack(Track& past, Track& now, const FrameContext& frame) {
   mergeTwo(past, now, frame);
-  past.real_over_present = now.real_over_present;
-  past.detected_from = now.detected_from;
-  past.observed_from = now.observed_from;
-  past.unmapped_occluder = now.unmapped_occluder;
-  past.hard_to_detect = now.hard_to_detect;
-  past.existence_when_detected = now.existence_when_detected;
+  past.existence_lead = now.existence_lead;
+  past.views.detected_from = now.views.detected_from;
+  past.views.observed_from = now.views.observed_from;
+  past.detectability.unmapped_occluder = now.detectability.unmapped_occluder;
+  past.detectability.hard_to_detect = now.detectability.hard_to_detect;
+  past.history.existence_when_detected = now.history.existence_when_detected;
   past.visibility = now.visibility;
-  past.visible_fraction = now.visible_fraction;
-  past.blocked_by = now.blocked_by;
 }
 
 }  // namespace
@@ -129,8 +128,8 @@ void keepDeleted(std::vector<Track>& gone, std::vector<Track> deleted, TimePoint
                 [&](const Track& o) { return toSeconds(now - o.as_of) > parameters.return_s; });
   for (Track& o : deleted) {
     const Hypothesis& best = o.best();
-    if (!o.once_confirmed || best.moving || best.class_name == kOtherClass) continue;
-    o.visible_fraction = 0.0;
+    if (!o.life.once_confirmed || best.moving || best.class_name == kOtherClass) continue;
+    o.visibility.fraction = 0.0;
     gone.push_back(std::move(o));
   }
 }
@@ -140,13 +139,13 @@ std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks, std::vect
   std::vector<MergeRecord> merges;
   for (Track& o : tracks) {
     if (gone.empty()) break;
-    if (!isThere(o, frame) || o.visible_fraction <= 0.0) continue;
+    if (!isThere(o, frame) || o.visibility.fraction <= 0.0) continue;
     const bool drives = o.best().moving;
     std::size_t found = gone.size();
     double most = frame.parameters->tracks.merge_overlap;
     for (std::size_t i = 0; i < gone.size(); ++i) {
       const Track& past = gone[i];
-      if (o.first_seen <= past.last_seen) continue;
+      if (o.life.first_seen <= past.life.last_seen) continue;
       const bool lookalike_nats = past.best().class_name == o.best().class_name;
       const double shared = drives           ? (takesOver(o, past) ? 1.0 : 0.0)
                             : lookalike_nats ? overlap(past.best().x, o.best().x, frame.view.up_W)

@@ -30,11 +30,8 @@ bool reinitialise(Track& track, const std::vector<ClassNumber>& pmf, const BoxDe
   } else {
     track.hypotheses = std::move(initiated->hypotheses);
   }
-  track.keyframes.clear();
-  track.keyframes_complete = true;
-  track.new_keyframes = track.keyframes_seen = track.mode_search_due = 0;
-  track.refit_patience = 1;
-  track.running_nis = 1.0;
+  track.batch.restart();
+  track.history.running_nis = 1.0;
   normalise(track, ClassEvidence::kGeometry);
   return true;
 }

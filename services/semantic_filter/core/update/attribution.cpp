@@ -29,8 +29,8 @@ double temperedLog(const Track& track, const std::vector<ClassNumber>& pmf,
 double excusedByScreen(const Track& track, const std::vector<ClassNumber>& pmf,
                        const std::vector<Shares>& shares, double exponent) {
   constexpr double kLeast = 1e-6;
-  const double open = 1.0 - track.unmapped_occluder;
-  if (track.unmapped_occluder <= 0.0 || open < kLeast) return 0.0;
+  const double open = 1.0 - track.detectability.unmapped_occluder;
+  if (track.detectability.unmapped_occluder <= 0.0 || open < kLeast) return 0.0;
   std::vector<double> A, unscreened;
   A.reserve(shares.size());
   unscreened.reserve(shares.size());
@@ -51,7 +51,7 @@ double saidByNetwork(const Track& track, const std::vector<Shares>& shares,
   std::vector<double> unsaid;  // 1 / g_k, of each box
   unsaid.reserve(looked_at.size());
   for (const std::size_t z : looked_at) {
-    unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name, track.lookalike_nats)));
+    unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name, track.lookalike.nats)));
   }
   double with = 0.0, without = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {

@@ -77,10 +77,10 @@ double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
   const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
   const double most = logOdds(certain), now = logOdds(std::min<double>(track.existence, certain));
   const double real =
-      std::min(now + std::max(track.real_over_present, 0.0) + std::log(mean_A.tempered), most);
+      std::min(now + std::max(track.existence_lead, 0.0) + std::log(mean_A.tempered), most);
   const double still =
-      std::min(now - std::min(track.real_over_present, 0.0) + std::log(mean_A.full), most);
-  track.real_over_present = real - still;
+      std::min(now - std::min(track.existence_lead, 0.0) + std::log(mean_A.full), most);
+  track.existence_lead = real - still;
   return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 

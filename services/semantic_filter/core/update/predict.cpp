@@ -78,34 +78,34 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   const double dt = toSeconds(now - track.as_of);
   // Where the transition is lost nothing is left of C.
   const Matrix6d transition =
-      transitionBetween(track.pose_product, pose_error.product).value_or(Matrix6d::Zero());
+      transitionBetween(track.pose.product, pose_error.product).value_or(Matrix6d::Zero());
   std::optional<Matrix6d> L_pose = pose_error.covariance;
   if (!choleskyInPlace(*L_pose)) L_pose.reset();
   for (auto& h : track.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
-    predictBias(h, track.predicted_from, walk);
+    predictBias(h, track.views.predicted_from, walk);
     h.C = timesTransposed(h.C, transition);
     keepConsistent(h, pose_error.covariance, L_pose);
   }
-  const bool unseen = track.last_seen < track.as_of ||
-                      track.occluded_frames.count + track.out_of_view_frames.count > 0;
+  const bool unseen = track.life.last_seen < track.as_of ||
+                      track.unused.occluded.count + track.unused.out_of_view.count > 0;
   if (unseen && dt > 0.0) decayUnseenMoving(track, dt, parameters.mover_survival_s);
   dropLostHypotheses(track, now, parameters.lost_sigma_m);
   if (dt > 0.0) {
     track.existence.become(track.existence * std::exp(-dt / parameters.survival_s),
                            ExistenceEvidence::kTime, now);
   }
-  if (dt > kAnotherVisit_s && track.out_of_view_frames.count > 0 &&
-      track.occluded_frames.count == 0) {
-    track.visit_began = now;
-    track.detection_rate.beginVisit(walk.screen);
+  if (dt > kAnotherVisit_s && track.unused.out_of_view.count > 0 &&
+      track.unused.occluded.count == 0) {
+    track.life.visit_began = now;
+    track.detectability.rate.beginVisit(walk.screen);
   }
-  track.existence.note(ExistenceEvidence::kHidden, std::exchange(track.occluded_frames, {}));
-  track.existence.note(ExistenceEvidence::kAway, std::exchange(track.out_of_view_frames, {}));
+  track.existence.note(ExistenceEvidence::kHidden, std::exchange(track.unused.occluded, {}));
+  track.existence.note(ExistenceEvidence::kAway, std::exchange(track.unused.out_of_view, {}));
   track.as_of = now;
   predictDetectability(track, walk);
-  track.predicted_from = walk.T_WC;
-  track.pose_product = pose_error.product;
+  track.views.predicted_from = walk.T_WC;
+  track.pose.product = pose_error.product;
 }
 
 }  // namespace perdure::semantic_filter

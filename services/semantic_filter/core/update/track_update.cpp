@@ -83,38 +83,39 @@ std::optional<std::size_t> assignedBox(const Track& track, const std::vector<Sha
 void count(Track& track, double detected, const std::vector<Shares>& shares,
            const TrackScore& score) {
   const double visible = std::min(1.0, score.visibility.fraction);
-  track.recent_detection_share += 0.25 * visible * (detected - track.recent_detection_share);
+  track.history.recent_share += 0.25 * visible * (detected - track.history.recent_share);
   if (detected < 0.5) {
-    ++track.visible_misses;
+    ++track.life.visible_misses;
     return;
   }
-  ++track.hits;
+  ++track.life.hits;
   const bool from_map =
-      track.recalled && toSeconds(track.as_of - track.last_seen) > kAnotherVisit_s;
-  track.detected_on_revisit =
-      track.detected_on_revisit || from_map || track.visit_began > track.first_seen;
-  track.recalled = false;
-  track.last_seen = track.as_of;
+      track.life.recalled && toSeconds(track.as_of - track.life.last_seen) > kAnotherVisit_s;
+  track.life.detected_on_revisit =
+      track.life.detected_on_revisit || from_map || track.life.visit_began > track.life.first_seen;
+  track.life.recalled = false;
+  track.life.last_seen = track.as_of;
   const auto& box = shares.front().box;
   const auto z = std::max_element(box.begin(), box.end()) - box.begin();
   if (!box.empty() && box[z] > 0.5) {
-    track.running_nis = 0.85 * track.running_nis +
-                        0.15 * score.hypotheses.front().matches[static_cast<std::size_t>(z)].nis;
+    track.history.running_nis =
+        0.85 * track.history.running_nis +
+        0.15 * score.hypotheses.front().matches[static_cast<std::size_t>(z)].nis;
   }
 }
 
 void countFound(Track& track, const TrackScore& score, bool found, const FrameContext& frame) {
   const ViewRay from = viewRayOf(track.best().x.head<3>(), frame.view.T_WC());
-  track.detection_rate.add(from, score.hypotheses.front().expected, found,
-                           detectabilityScales(frame.parameters->visibility));
+  track.detectability.rate.add(from, score.hypotheses.front().expected, found,
+                               detectabilityScales(frame.parameters->visibility));
 }
 
 /// By how much the noise of a score counts more because the last score had almost the same: that of
 /// a stationary process of first order, whose correlation fades with the view.
 double repetition(const Track& track, const FrameContext& frame) {
-  if (track.detected_from.observations <= 0.0) return 1.0;
+  if (track.views.detected_from.observations <= 0.0) return 1.0;
   const double scale = frame.parameters->box.noise_view;
-  const double change = viewChange(track.best().x.head<3>(), track.detected_from.T_WC,
+  const double change = viewChange(track.best().x.head<3>(), track.views.detected_from.T_WC,
                                    frame.view.T_WC(), {scale, scale, 0.5 * scale});
   const double correlation = std::exp(-change);
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
@@ -161,23 +162,24 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   double next = updateClassAndExistence(track, shares, tempering.exponent, detected >= 0.5,
                                         *frame.parameters);
   if (detected >= 0.5) {
-    track.existence_when_detected = next;
+    track.history.existence_when_detected = next;
   } else if (score.top_down) {
-    next = std::min(next, std::max(r, track.existence_when_detected));
+    next = std::min(next, std::max(r, track.history.existence_when_detected));
   }
   bookExistence(track, next, reasons);
   if (!score.top_down && !track.best().moving) countFound(track, score, detected >= 0.5, frame);
   updateAzimuths(track, shares, tempering.exponent, score.boxes, boxes, frame);
   if (assigned) {
     const BoxDetection& box = boxes[score.boxes[*assigned]];
-    track.last_box = AssignedBox{track.as_of, box.z.box()};
-    track.lookalike_nats += tempering.exponent * box.log_ratio_best;
-    track.lookalike_class = classSeenIn(box, *frame.model);
+    track.history.last_box = AssignedBox{track.as_of, box.z.box()};
+    track.lookalike.nats += tempering.exponent * box.log_ratio_best;
+    track.lookalike.class_name = classSeenIn(box, *frame.model);
   }
-  if (detected >= 0.5) track.detected_from = {frame.view.T_WC(), 1.0 + tempering.observations};
+  if (detected >= 0.5)
+    track.views.detected_from = {frame.view.T_WC(), 1.0 + tempering.observations};
   if (detected >= 0.5 || !score.top_down) {  // to be asked again is no score of its assigned
-    track.observed_from = {frame.view.T_WC(),
-                           tempering.observations + std::min(1.0, score.visibility.fraction)};
+    track.views.observed_from = {frame.view.T_WC(),
+                                 tempering.observations + std::min(1.0, score.visibility.fraction)};
   }
   if (sound(track)) bookClasses(track, reasons);
   return assigned ? std::optional(score.boxes[*assigned]) : std::nullopt;

@@ -15,8 +15,8 @@ namespace {
 double unmappedOccluderFromHere(const Track& track, const Eigen::Vector3d& place,
                                 const ViewWalk& walk) {
   double unmapped_occluder = walk.unmapped_occluder;
-  for (const auto& k : track.keyframes.read()) {
-    if (k->from->time >= track.visit_began) break;  // they are in order of time
+  for (const auto& k : track.batch.keyframes.read()) {
+    if (k->from->time >= track.life.visit_began) break;  // they are in order of time
     unmapped_occluder *= 1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.screen));
   }
   return unmapped_occluder;
@@ -25,7 +25,8 @@ double unmappedOccluderFromHere(const Track& track, const Eigen::Vector3d& place
 }  // namespace
 
 double detectableShare(const Track& track, double hard_detection_share) {
-  return 1.0 - track.unmapped_occluder - (1.0 - hard_detection_share) * track.hard_to_detect;
+  return 1.0 - track.detectability.unmapped_occluder -
+         (1.0 - hard_detection_share) * track.detectability.hard_to_detect;
 }
 
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {
@@ -46,7 +47,7 @@ double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, 
                                   [](const auto& h) { return h.class_name != kOtherClass; });
   if (named == track.hypotheses.end()) return own;
   const double lookalike_nats =
-      lookalikeProbability(frame.parameters->clutter.other_lookalike, track.lookalike_nats);
+      lookalikeProbability(frame.parameters->clutter.other_lookalike, track.lookalike.nats);
   const ClassPrior& like = frame.priors->of(named->class_name);
   return (1.0 - lookalike_nats) * own + lookalike_nats * detectionProbability(like, size_px, frame);
 }
@@ -54,27 +55,29 @@ double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, 
 /// How often the track is found from here, beside P_D.
 double detectionRateFactor(const Track& track, const FrameContext& frame) {
   if (track.best().moving) return 1.0;
-  return track.detection_rate.factor(viewRayOf(track.best().x.head<3>(), frame.view.T_WC()),
-                                     frame.parameters->tempering.found_prior,
-                                     detectabilityScales(frame.parameters->visibility));
+  return track.detectability.rate.factor(viewRayOf(track.best().x.head<3>(), frame.view.T_WC()),
+                                         frame.parameters->tempering.found_prior,
+                                         detectabilityScales(frame.parameters->visibility));
 }
 
 /// What may hide it from elsewhere is not known until it is seen from there.
 void predictDetectability(Track& track, const ViewWalk& walk) {
   const Eigen::Vector3d place = track.best().x.head<3>();
   const double keep =
-      track.predicted_from
-          ? std::exp(-viewChange(place, *track.predicted_from, walk.T_WC, walk.screen))
+      track.views.predicted_from
+          ? std::exp(-viewChange(place, *track.views.predicted_from, walk.T_WC, walk.screen))
           : 0.0;
   const double here = unmappedOccluderFromHere(track, place, walk);
-  track.unmapped_occluder = here + keep * (track.unmapped_occluder - here);
+  track.detectability.unmapped_occluder =
+      here + keep * (track.detectability.unmapped_occluder - here);
   // What drives and is not found is lost rather than seldom found: it would take the boxes of what
   // stands where it was lost.
-  track.hard_to_detect =
+  track.detectability.hard_to_detect =
       track.best().moving
           ? 0.0
-          : walk.hard_to_detect + keep * (track.hard_to_detect - walk.hard_to_detect);
-  track.hard_to_detect = std::min(track.hard_to_detect, 1.0 - track.unmapped_occluder);
+          : walk.hard_to_detect + keep * (track.detectability.hard_to_detect - walk.hard_to_detect);
+  track.detectability.hard_to_detect =
+      std::min(track.detectability.hard_to_detect, 1.0 - track.detectability.unmapped_occluder);
 }
 
 /// A frame that does not show the track says that it is unmapped_occluder, too, or hard_to_detect.
@@ -83,9 +86,12 @@ void predictDetectability(Track& track, const ViewWalk& walk) {
 void updateDetectability(Track& track, double mean_A, double hard_detection_share) {
   const double open = detectableShare(track, hard_detection_share);
   const double found = open > 0.0 ? hard_detection_share / open : 0.0;
-  const double hard_to_detect = track.hard_to_detect * std::max(1.0 + found * (mean_A - 1.0), 0.0);
-  track.unmapped_occluder = std::min(1.0, track.unmapped_occluder / mean_A);
-  track.hard_to_detect = std::min(1.0 - track.unmapped_occluder, hard_to_detect / mean_A);
+  const double hard_to_detect =
+      track.detectability.hard_to_detect * std::max(1.0 + found * (mean_A - 1.0), 0.0);
+  track.detectability.unmapped_occluder =
+      std::min(1.0, track.detectability.unmapped_occluder / mean_A);
+  track.detectability.hard_to_detect =
+      std::min(1.0 - track.detectability.unmapped_occluder, hard_to_detect / mean_A);
 }
 
 }  // namespace perdure::semantic_filter

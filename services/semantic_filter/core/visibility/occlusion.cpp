@@ -247,7 +247,7 @@ Outline outlineOf(const Track& track, const State& x, const Projector& from, con
   const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
   Outline o;
   o.id = track.id;
-  o.solidity = track.existence * track.recent_detection_share;
+  o.solidity = track.existence * track.history.recent_share;
   o.distance_m = ray.norm();
   const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
   o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));

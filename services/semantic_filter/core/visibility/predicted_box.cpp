@@ -20,7 +20,7 @@ std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now
                                        const std::optional<ComingFrame>& coming) {
   const Hypothesis& best = track.best();
   const double probability =
-      track.existence * classProbability(track, best.class_name) * track.visible_fraction;
+      track.existence * classProbability(track, best.class_name) * track.visibility.fraction;
   if (probability < kPredictionFloor) return std::nullopt;
   const double since = toSeconds(now.stamp.time - track.as_of);
   const BoxStyle& style = now.model.styles->of(best.class_name);

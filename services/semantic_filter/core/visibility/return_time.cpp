@@ -48,12 +48,12 @@ std::vector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& 
   const Eigen::Vector3d ray = hidden.best().x.head<3>() - eye;
   std::vector<std::pair<double, Standing>> near;
   for (const Track& o : tracks) {
-    if (o.id == hidden.id || o.existence * o.recent_detection_share < parameters.solid) continue;
+    if (o.id == hidden.id || o.existence * o.history.recent_share < parameters.solid) continue;
     const State x = stateAt(o.best(), toSeconds(now.stamp.time - o.as_of));
     const Eigen::Vector3d other = x.head<3>() - eye;
     if (other.norm() > ray.norm()) continue;
     const double apart = std::atan2(ray.cross(other).norm(), ray.dot(other));
-    near.push_back({o.id == hidden.blocked_by ? 0.0 : apart, {&o, x, &shapeOf(o, now)}});
+    near.push_back({o.id == hidden.visibility.blocked_by ? 0.0 : apart, {&o, x, &shapeOf(o, now)}});
   }
   const std::size_t kept = std::min(near.size(), kMostBlockers);
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(kept), near.end(),
