@@ -1,4 +1,4 @@
-// What can be set of the semantic filter.
+// The configuration of the semantic filter.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@
 namespace perdure::semantic_filter {
 
 struct HistoryConfig {
-  std::int64_t frames = 32;         ///< how far back a late detection is still applied
-  bool wait_for_detections = true;  ///< a frame is published with its detections, or at the next
+  std::int64_t frames = 32;  ///< number of past frames to which a late detection is still applied
+  bool wait_for_detections = true;  ///< publish a frame with its detections, or at the next frame
 };
 
 struct RestoreConfig {
-  double timeout_s = 5.0;  ///< for the map store's answer at the start
+  double timeout_s = 5.0;  ///< s; wait for the map store's answer at the start
 };
 
 struct Config {

@@ -15,7 +15,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kFarthest = 100.0;  // metres
+constexpr double kFarthest = 100.0;  // m
 constexpr double kMostNats = 20.0;
 constexpr double kSymmetry = 1e-6;
 

@@ -1,4 +1,5 @@
-// The file of what stands near what: written by `perdure map learn-context`, read by the filter.
+// The context file, which says how often classes stand near each other: written by `perdure map
+// learn-context`, read by the filter. Derivation: tools/docs/maths/new_classes_and_context.md.
 #pragma once
 
 #include <string>
@@ -7,11 +8,12 @@
 
 namespace perdure::semantic_filter {
 
-/// Throws StartupError: kUnavailable where the file cannot be read, kConfiguration with all that is
-/// wrong in it as file:line:col.
+/// Throws StartupError: kUnavailable if the file cannot be read, kConfiguration with all its errors
+/// as file:line:col.
 ContextMatrix loadContext(const std::string& path);
 ContextMatrix parseContext(const std::string& yaml, const std::string& file);
-/// What parseContext reads, with three decimals. `note` is a comment for its first line.
+/// Formats a matrix as parseContext reads it, with three decimals. `note`: comment in the first
+/// line.
 std::string formatContext(const ContextMatrix& matrix, const std::string& note);
 
 }  // namespace perdure::semantic_filter

@@ -6,8 +6,8 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kResolved = 0.9;      // of a class
-constexpr double kMissingBelow = 0.5;  // existence of a confirmed object
+constexpr double kResolved = 0.9;      // probability of a class
+constexpr double kMissingBelow = 0.5;  // existence of an object that was confirmed
 
 bool isHidden(Visibility v) { return v != Visibility::kVisible && v != Visibility::kPartial; }
 
@@ -22,7 +22,7 @@ Event make(const Event& blank, EventKind kind, const ObjectBelief& object, doubl
 
 }  // namespace
 
-/// What was said of it before it went is not said again.
+/// Events from before the object left are not repeated.
 EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
   Known known;
   known.confirmed = known.ever_confirmed = o.confirmed;
@@ -97,7 +97,7 @@ std::vector<Event> EventTracker::update(const Objects& objects,
       e.kind = EventKind::kMoved;
       e.other_id = 0;
       events.push_back(e);
-      known_[m.survivor].moving = true;  // it is not said again of one that drives
+      known_[m.survivor].moving = true;  // a moving object gives no second event
     }
     if (m.returned) {
       e.kind = EventKind::kReappeared;

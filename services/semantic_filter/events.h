@@ -1,4 +1,4 @@
-// Events are differences between what was published for one frame and for the next.
+// Makes events from the differences between two published frames.
 #pragma once
 
 #include <map>
@@ -14,18 +14,19 @@ namespace perdure::semantic_filter {
 
 class EventTracker {
  public:
-  /// Events since the last call, in order of object id. `merges` happened since then.
+  /// Returns the events since the last call, ordered by object id. `merges`: those since then.
   std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
-  /// An object came back with this id, and how; the next update says so.
+  /// An object was recalled with this id. The next update makes its event. `how`: detail of the
+  /// event.
   void recalled(ObjectId id, bool restored, std::string how = "");
-  /// Objects that wait on the map from now on; the next update says so.
+  /// An object is archived from now on. The next update makes its event.
   void archived(ObjectId id) { archived_.insert(id); }
   void clear();
 
  private:
   struct Known {
     bool confirmed = false, resolved = false, missing = false, moving = false;
-    bool hidden = false;  ///< and not detected since
+    bool hidden = false;  ///< not visible, and not detected since
     std::uint32_t hits = 0;
     bool static_once = false, ever_confirmed = false;
     std::string class_name;

@@ -10,9 +10,9 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kPause_s = 0.5, kStep_m = 1.0;  // between two looks
+constexpr double kPause_s = 0.5, kStep_m = 1.0;  // between two searches
 constexpr std::size_t kMostKept = 256;
-constexpr std::size_t kLastSeen = 16;  // things that say where the map lies about here
+constexpr std::size_t kLastSeen = 16;  // objects that refine the alignment near the body
 
 bool stands(const ObjectBelief& belief) { return belief.confirmed && belief.moving < 0.5; }
 

@@ -1,6 +1,6 @@
-// The map of a frame of reference that ended: what was in the working set then waits here until it
-// is known where it lies in the new one (core/map_alignment); what else the map store has of it is
-// asked for as the body comes near.
+// The map of a frame of reference that has ended. Its working set waits here until map alignment
+// finds where it lies in the new frame. After that, the map store is asked for the rest as the body
+// comes near. Derivation: tools/docs/maths/map_alignment.md.
 #pragma once
 
 #include <map>
@@ -18,27 +18,27 @@ class FormerMap {
   explicit FormerMap(const Parameters& parameters)
       : parameters_(parameters), questions_(parameters.memory, parameters.motion.min_speed) {}
 
-  /// What was known when `world` ended. Of two that were not found again the one with more things
-  /// is kept.
+  /// Keeps the objects known when `world` ended. If an earlier map still waits, the one with more
+  /// objects is kept.
   void keep(const WorldId& world, const std::vector<ObjectBelief>& objects);
-  /// The frame of reference that is looked for, or was found.
+  /// The frame of reference that is sought, or was found.
   const std::optional<WorldId>& world() const { return world_; }
   bool waits() const { return lookout_.has_value(); }
   bool found() const { return alignment_.has_value(); }
-  /// For people; empty where nothing is looked for.
+  /// A sentence for users; empty if no map is sought.
   std::string note() const;
 
-  /// KeyframeBatch for it where that is due. The alignment when it was found just now.
+  /// Searches for the map if a search is due. Returns the alignment if it was found just now.
   const FrameAlignment* look(const std::vector<Track>& objects, const Eigen::Vector3d& p_WB,
                              TimePoint now);
-  /// What waited, in W.
+  /// Returns the waiting objects, transformed into W.
   std::vector<ObjectBelief> takeKept();
-  /// What of it was seen again says better where it lies about here.
+  /// Refines the alignment near the body with objects of the map that were detected again.
   void refine(const std::vector<Track>& objects);
-  /// A belief of that map, in W.
+  /// Transforms a belief of that map into W.
   ObjectBelief laid(const ObjectBelief& belief);
 
-  /// What to ask the map store for, in its own frame.
+  /// Returns the question for the map store that is due, in the frame of that map.
   std::optional<Archive::Question> ask(const Eigen::Vector3d& p_WB, TimePoint now);
   bool answered(std::uint64_t request, TimePoint kept, bool truncated) {
     return questions_.answered(request, kept, truncated);
@@ -52,7 +52,8 @@ class FormerMap {
   std::vector<ObjectBelief> kept_;
   std::optional<MapAlignment> lookout_;
   std::optional<FrameAlignment> alignment_;
-  std::map<ObjectId, std::pair<PlacedThing, std::uint32_t>> laid_;  ///< in M, and its hits then
+  /// objects in M, with their hits then
+  std::map<ObjectId, std::pair<PlacedThing, std::uint32_t>> laid_;
   std::optional<Eigen::Vector3d> looked_from_;
   TimePoint looked_at_;
   std::size_t looked_with_ = 0;

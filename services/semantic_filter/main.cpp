@@ -1,4 +1,4 @@
-// perdure-semantic-filter: the belief about objects, on the bus.
+// perdure-semantic-filter: publishes the belief about objects on the bus.
 #include <chrono>
 #include <deque>
 #include <functional>
@@ -16,8 +16,8 @@ namespace {
 using namespace perdure;
 namespace topics = bus::topics;
 
-/// Holds messages back, in order, until the working set of an earlier run has been asked for: what
-/// was initiated before would get ids that were given out already.
+/// Holds messages back, in order, until the map store has been asked for the working set of an
+/// earlier run. Otherwise new tracks would get ids that are already in use.
 class Gate {
  public:
   void pass(std::function<void()> message) {
@@ -70,7 +70,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   Gate gate;
   ReasonCounts lost;
   bus::Gaps odometry_gaps;
-  bus::Once odometry_once;  // repeated detections are the node's to count
+  bus::Once odometry_once;  // the node counts repeated detections
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&]() -> const ReasonCounts& { return lost; });
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });

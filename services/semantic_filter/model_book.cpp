@@ -6,9 +6,10 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kMaxModels = 64;
-constexpr std::size_t kMaxNamed = 8;  // classes in a sentence
+constexpr std::size_t kMaxNamed = 8;  // classes named in a sentence
 
-/// "; new classes: a, b and 3 more" for what `model` has beyond `other`.
+/// Text for the classes that `model` has and `other` lacks, such as "; new classes: a, b and 3
+/// more".
 std::string beyond(const Model& model, const Model& other, const std::string& title) {
   std::string text;
   std::size_t n = 0;
@@ -31,7 +32,7 @@ Result<void> ModelBook::add(const ModelInfo& info) {
   }
   order_.push_back(info.hash);
   if (order_.size() <= kMaxModels) return {};
-  if (order_.front() == used_) {  // the one in use stays
+  if (order_.front() == used_) {  // keep the model in use
     order_.pop_front();
     order_.push_back(used_);
   }

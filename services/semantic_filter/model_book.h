@@ -1,4 +1,5 @@
-// The models whose detections may come, and the one in use: what changes when inference is swapped.
+// The models whose detections may arrive and the one in use; it says what changes when inference is
+// swapped.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +18,14 @@ class ModelBook {
  public:
   explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
 
-  /// Reason: "model_contradicts_its_hash": what was said first of a hash stands.
+  /// Reason of failure: "model_contradicts_its_hash". The first information for a hash stays valid.
   Result<void> add(const ModelInfo& info);
-  /// nullptr where no model of this hash was told, or too many since then.
+  /// Returns nullptr if no model of this hash was added, or if too many were added since.
   const Model* find(std::uint64_t hash) const;
-  /// Detections of this (known) model are used in a frame of this time. Where the frame is newer
-  /// than all before and their model was another one: a sentence on what changes.
+  /// Detections of this (known) model are used in a frame at `time`. If the frame is the newest and
+  /// the model has changed, returns a sentence that says what changes.
   std::optional<std::string> use(std::uint64_t hash, TimePoint time);
-  /// The one of the newest frame; 0 before there is one.
+  /// Returns the hash of the model of the newest frame; 0 before the first.
   std::uint64_t used() const { return used_; }
 
  private:
@@ -34,7 +35,7 @@ class ModelBook {
   };
   ClassPriors priors_;
   std::map<std::uint64_t, Entry> entries_;
-  std::deque<std::uint64_t> order_;  ///< of arrival
+  std::deque<std::uint64_t> order_;  ///< in order of arrival
   std::uint64_t used_ = 0;
   TimePoint used_at_;
 };

@@ -1,4 +1,4 @@
-// `object_state` from `objects`: which keyed states to write and which to dispose of.
+// Derives `object_state` from `objects`: the keyed states to write and to dispose of.
 #pragma once
 
 #include <map>
@@ -11,8 +11,9 @@ namespace perdure::semantic_filter {
 class ObjectStates {
  public:
   struct Changes {
-    std::vector<ObjectState> written;  ///< new ones, those a frame updated, changed visibility
-    std::vector<ObjectState> gone;     ///< only their key means anything
+    /// new, updated by a frame, or of changed visibility or confirmation
+    std::vector<ObjectState> written;
+    std::vector<ObjectState> gone;  ///< only their key is valid
   };
   Changes update(const Objects& objects);
 

@@ -1,4 +1,4 @@
-// Reads config/class_priors.yaml, and the priors of a configuration.
+// Reads config/class_priors.yaml, and all priors that a configuration names.
 #pragma once
 
 #include <map>
@@ -10,14 +10,13 @@
 
 namespace perdure::semantic_filter {
 
-/// The files that the configuration names: class priors, and context where there is one. Throws
-/// StartupError as the two do.
+/// Loads the files that the configuration names: class priors, and context if there is one. Throws
+/// StartupError as the two readers do.
 ClassPriors loadPriors(const Config& config);
-/// Throws StartupError: kUnavailable where the file cannot be read, kConfiguration with all that is
-/// wrong in it as file:line:col.
+/// Throws StartupError: kUnavailable if the file cannot be read, kConfiguration with all its errors
+/// as file:line:col.
 ClassPriors loadClassPriors(const std::string& path);
-/// By class: points that span what its things fill of their cuboids, in halves of the cuboid's
-/// sides.
+/// Returns, for each class, the points that span its shape, in halves of the cuboid's sides.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors);
 ClassPriors parseClassPriors(const std::string& yaml, const std::string& file);
 

@@ -1,6 +1,6 @@
-// Detections of a newcomer among inference processes that are kept back: where it sees nothing of
-// what is known to be in visibility, either it is blind or the things are gone, and the process
-// that it follows will soon say which (services/inference/README.md, roll-backs).
+// Detections of a new inference process that are held back. If it misses everything that should be
+// visible, either it does not work or the objects are gone. The process that it replaces will soon
+// decide (services/inference/README.md, roll-backs).
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ namespace perdure::semantic_filter {
 
 class Probation {
  public:
-  /// Frames that are kept back at most; the old process judges after fewer, and a step can be
-  /// repeated for more (history.frames).
+  /// At most so many frames are held back. The old process decides within fewer, and the history
+  /// can repeat more (history.frames).
   static constexpr std::size_t kLongest = 24;
 
   void begin(InstanceId newcomer) { newcomer_ = newcomer; }
@@ -31,7 +31,8 @@ class Probation {
   std::vector<Detections> kept_;
 };
 
-/// One of them at least is likely to be seen, and no detection lies at any of the likely ones.
+/// Whether at least one object is likely to be detected and no detection lies at any of the likely
+/// ones.
 bool missesAll(const std::vector<Prediction>& expected, const Detections& detections);
 
 }  // namespace perdure::semantic_filter

@@ -1,5 +1,6 @@
-// Says when what is hidden should be seen again: when it is hidden, and anew where that has changed
-// or half of the time until then has passed, so that what is said gets better as it comes near.
+// Publishes the reappearance times of occluded objects: at the beginning of an occlusion, and again
+// when the time has changed or half of it has passed. So the prediction gets better as it comes
+// near. Derivation: tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <deque>
@@ -14,7 +15,8 @@ namespace perdure::semantic_filter {
 
 class ReappearanceMonitor {
  public:
-  /// Events of kind kPredictedReturn, for one published frame; `blank` has stamp and writer.
+  /// Returns events of kind kPredictedReturn for one published frame. `blank`: has the stamp and
+  /// the writer.
   std::vector<Event> update(const std::vector<Track>& objects, const FrameInput& now,
                             const std::optional<ComingFrame>& coming, const Parameters& parameters,
                             const Event& blank);
@@ -30,10 +32,10 @@ class ReappearanceMonitor {
   double speedWalk() const;
 
   struct Waiting {
-    std::uint32_t hits = 0;             ///< when it was hidden
-    TimePoint asked_again;              ///< not before
-    std::optional<TimePoint> expected;  ///< as said last
-    double then_s = 0.0;                ///< how far off it was
+    std::uint32_t hits = 0;             ///< when it was occluded
+    TimePoint asked_again;              ///< not computed again before
+    std::optional<TimePoint> expected;  ///< as last published
+    double then_s = 0.0;                ///< remaining time as last published, s
   };
 
   bool waits(const Track& object, const Parameters& parameters) const;

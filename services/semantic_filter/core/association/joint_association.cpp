@@ -12,11 +12,11 @@ namespace {
 constexpr int kMaxIterations = 200;
 constexpr double kTolerance = 1e-9;
 
-/// Track j may have made box z.
+/// Track j and a box z that it may have made.
 struct Pair {
   Eigen::Index j, z;
   double psi, eta;
-  double mu = 0.0;  ///< what track j offers box z: psi / (1 + sum over its other boxes)
+  double mu = 0.0;  ///< message from track j to box z: psi / (1 + sum over its other boxes)
 };
 
 std::vector<Pair> pairsOf(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) {

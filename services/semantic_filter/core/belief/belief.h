@@ -1,4 +1,5 @@
-// All that the filter believes, as one plain value.
+// Everything that the filter believes, as one plain value: all tracks and what was learned.
+// Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <vector>
@@ -9,19 +10,18 @@
 
 namespace perdure::semantic_filter {
 
-/// What is true of the networks and of the streets, whatever the world: it outlives a world.
+/// What was learned about networks and streets. It survives a change of the world.
 struct Learned {
-  NoiseScales sides{4000.0};    ///< of boxes
-  NoiseScales azimuths{200.0};  ///< each of another thing
+  NoiseScales sides{4000.0};    ///< scales of the variances of box sides
+  NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths
   GroundRoughness roughness_scale = {};
 };
 
 struct Belief {
-  std::vector<Track> tracks;  ///< in order of id
-  std::vector<Track>
-      recently_deleted;  ///< given up lately, for when they are found again (core/moved.h)
+  std::vector<Track> tracks;            ///< ordered by id
+  std::vector<Track> recently_deleted;  ///< kept for re-identification (core/tracks/reidentify.h)
   Learned learned = {};
-  BodyPath path = {};  ///< of the body
+  BodyPath path = {};  ///< recent positions of the body
 };
 
 }  // namespace perdure::semantic_filter

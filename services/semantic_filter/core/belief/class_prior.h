@@ -1,5 +1,6 @@
-// What is known of a class before any image: size, how well it is detected, whether it moves.
-// The paper's class-dependent shape prior (section "Filter Organization").
+// What is known of a class before any image: size, frequency, detection probability and motion. It
+// implements the paper's class-dependent shape prior (section "Filter Organization"). Derivation:
+// tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,23 +17,25 @@ struct ClassPrior {
   Eigen::Vector3d log_size = Eigen::Vector3d::Zero();  ///< mean of log(l, w, h), log metres
   Eigen::Matrix3d log_size_covariance = Eigen::Matrix3d::Identity();
   double frequency = 1.0;              ///< relative to other classes, > 0
-  double detection_probability = 0.8;  ///< of a fully visible, large instance; (0, 1)
-  double moving = 0.0;                 ///< prior probability that an instance moves, [0, 1)
-  double speed_sigma = 0.0;            ///< of moving ones, along their length, m/s
-  double stands = 0.0;          ///< probability that an instance stands on the ground, [0, 1)
-  bool has_yaw = true;          ///< false: too round for its yaw to show in a box
-  double azimuth_sigma = 0.35;  ///< radians, at least, until azimuths have shown less
-  Shape shape = cuboidShape();  ///< what its things fill of their cuboids
+  double detection_probability = 0.8;  ///< of a fully visible, large object; (0, 1)
+  double moving = 0.0;       ///< prior probability that an object of the class moves, [0, 1)
+  double speed_sigma = 0.0;  ///< of moving objects, along their length, m/s
+  double stands = 0.0;       ///< probability that an object stands on the ground, [0, 1)
+  bool has_yaw = true;       ///< false: the object is so round that a box does not show its yaw
+  /// rad; least deviation of an azimuth until a smaller one is learned
+  double azimuth_sigma = 0.35;
+  Shape shape = cuboidShape();  ///< what the object fills of its cuboid
 };
 
-/// How often things of two classes stand near each other, learned from maps (core/context.h).
+/// How often objects of two classes stand near each other. It is learned from maps
+/// (core/tracks/context.h). Derivation: tools/docs/maths/new_classes_and_context.md.
 struct ContextMatrix {
-  double radius_m = 0.0;             ///< what is further away is not near
+  double radius_m = 0.0;             ///< objects further apart are not near
   std::vector<std::string> classes;  ///< empty: no context
-  Eigen::MatrixXd log_ratio;         ///< log P(a near b) / (P(a) P(b)); symmetric, as `classes`
+  Eigen::MatrixXd log_ratio;  ///< log P(a near b) / (P(a) P(b)); symmetric; rows as `classes`
 
   bool empty() const { return classes.empty(); }
-  /// 0 for classes that it does not name.
+  /// Returns 0 for a class that the matrix does not name.
   double of(const std::string& a, const std::string& b) const {
     const auto i = std::find(classes.begin(), classes.end(), a) - classes.begin();
     const auto j = std::find(classes.begin(), classes.end(), b) - classes.begin();
@@ -40,14 +43,14 @@ struct ContextMatrix {
   }
 };
 
-/// Priors by name, with a documented fallback for names that are not listed.
+/// Priors by class name, with a fallback for names that are not listed.
 struct ClassPriors {
   std::vector<ClassPrior> classes;
   ClassPrior fallback;  ///< broad; its name is empty
-  ClassPrior other;     ///< of a thing of no known class; its name is kOtherClass
+  ClassPrior other;     ///< of an object of no known class; its name is kOtherClass
   ContextMatrix context;
 
-  /// The fallback, whose name is empty, where there is none of that name.
+  /// Returns the fallback where no class has this name.
   const ClassPrior& of(const std::string& name) const {
     for (const auto& c : classes) {
       if (c.name == name) return c;

@@ -6,7 +6,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kSameView = 0.5;  // change of view below which looks are counted together
+constexpr double kSameView = 0.5;  // view change below which observations share one count
 
 template <class Count>
 double change(const Count& a, const Count& b, const ViewScales& scales) {
@@ -25,7 +25,7 @@ void DetectionRate::addTo(Counts& counts, const Count& count, const ViewScales& 
     same->found += count.found;
     return;
   }
-  if (counts.size() == kMostViews) counts.erase(counts.begin());  // the oldest
+  if (counts.size() == kMostViews) counts.erase(counts.begin());  // remove the oldest
   counts.push_back(count);
 }
 

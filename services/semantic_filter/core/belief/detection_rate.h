@@ -1,5 +1,6 @@
-// How often the network found an track, by where it was looked at from. P_D is of the class; its
-// instances differ, and what a network misses from one side today it missed from there yesterday.
+// How often earlier visits detected a track, by viewpoint: the view-dependent detection
+// probability. P_D belongs to the class, but its objects differ: what a network misses from one
+// side, it usually misses from there again. Derivation: tools/docs/maths/detectability.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,22 +11,24 @@
 
 namespace perdure::semantic_filter {
 
-/// Copied with every belief that is kept for late detections: what earlier visits counted is
-/// shared.
+/// Every belief that is kept for late detections holds a copy. The copies share the counts of
+/// earlier visits.
 class DetectionRate {
  public:
-  static constexpr std::size_t kMostViews = 96;  ///< of one visit, and of those before it
+  /// at most, of one visit and of all earlier visits
+  static constexpr std::size_t kMostViews = 96;
 
-  /// A look that P_D and visibility expect to show the track with probability `expected`.
+  /// Adds an observation in which P_D and visibility expect a detection with probability
+  /// `expected`.
   void add(const ViewRay& from, double expected, bool found, const ViewScales& scales);
-  /// The track comes back into the picture: what was counted until then speaks for this visit.
-  /// Within one visit misses in a row do not excuse each other: the thing may have gone.
+  /// Begins a visit: the counts so far apply from now on. Within one visit, misses do not excuse
+  /// each other, because the object may have gone.
   void beginVisit(const ViewScales& scales);
-  /// By how much P_D is to be multiplied from there: the mean of a beta prior that is worth `prior`
-  /// looks, after what earlier visits found from about there; 1 where there were none. Where the
-  /// track is in the image does not count.
+  /// Returns the factor on P_D at this viewpoint: the mean of a beta prior of `prior` observations,
+  /// updated by what earlier visits found from similar viewpoints. It is 1 without earlier visits.
+  /// The place in the image does not count.
   double factor(const ViewRay& from, double prior, const ViewScales& scales) const;
-  /// Takes in the looks at what turned out to be the same track.
+  /// Adds the counts of a track that proved to be the same object.
   void join(const DetectionRate& other, const ViewScales& scales);
   std::size_t views() const { return (before_ ? before_->size() : 0) + now_.size(); }
 

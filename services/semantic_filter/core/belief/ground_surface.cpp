@@ -11,10 +11,11 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kNearest = 12, kLeast = 3;
-constexpr double kLevelSigma = 10.0;   // m, of the ground beside the mean of those that tell
+// m, of the ground beside the mean of the contributing heights
+constexpr double kLevelSigma = 10.0;
 constexpr double kOutlier = 12.0;      // squared deviations from what the others say
-constexpr double kBounce = 0.03;       // m, of the body beside its height, as it goes
-constexpr double kSurelyStands = 0.9;  // of a class whose things may tell
+constexpr double kBounce = 0.03;       // m, variation of the body's height as it moves
+constexpr double kSurelyStands = 0.9;  // of a class whose objects contribute
 
 }  // namespace
 
@@ -128,7 +129,7 @@ std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
     if (!S.positive()) return std::nullopt;
     const Eigen::MatrixXd J = S.solve(Eigen::MatrixXd::Identity(n, n));
     const Eigen::VectorXd weighed = J * z;
-    // Each thing beside what the others say of it.
+    // The difference of each object from what the others say.
     Eigen::Index worst = 0;
     double most_off = 0.0;
     for (Eigen::Index i = m; i < n; ++i) {

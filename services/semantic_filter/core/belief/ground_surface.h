@@ -1,12 +1,14 @@
-// How high the ground is, by what stands on it: things placed by parallax tell where their
-// undersides are, and what else stands near by stands about as high. A thing far ahead, of which
-// size alone says how far it is, so stands where the street is; one that seems to stand below it is
-// nearer, or moves. What carries the body stands on it, too: where the body's height above it is
-// known, the way that it came tells of it from the first frame on.
+// Height of the ground, from the objects that stand on it and from the path of the body: a Gaussian
+// process. Derivation: tools/docs/maths/ground_contact.md.
 //
-// The ground is a level plane of unknown height with a slope N(0, ground.slope²) and Brownian
-// unevenness, ground.roughness² a metre; nothing is known of it where nothing stands. Heights are
-// along the view's up, in the frame of reference of the beliefs.
+// Objects that parallax has placed show where their undersides are; what stands near them stands
+// about as high. So a far object whose distance only its size shows stands where the street is. An
+// object that seems to stand below the street is nearer, or moves. If the height of the body above
+// the ground is known, its path shows the ground from the first frame on.
+//
+// Model: a level plane of unknown height, with slope N(0, ground.slope²) and Brownian unevenness of
+// variance ground.roughness² per metre. Where nothing stands, nothing is known. Heights are along
+// the view's up direction, in the frame of the beliefs.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,17 +24,17 @@ namespace perdure::semantic_filter {
 
 struct GroundHeight {
   double mean = 0.0, variance = 0.0;  ///< m, m²
-  double uneven = 0.0;                ///< the part of the variance that slope and roughness make
+  double uneven = 0.0;                ///< the part of the variance that slope and roughness cause
 };
 
-/// How uneven the ground is beside what ground.slope and ground.roughness assume of it, as those
-/// that stand on it say. Part of the belief.
+/// How uneven the ground is relative to ground.slope and ground.roughness. It is learned from the
+/// objects that stand on the ground and is part of the belief.
 class GroundRoughness {
  public:
-  /// Of the variances, true by assumed. `assumed`: things that updateClassAndExistence as much as
-  /// the assumption.
+  /// Returns true over assumed variance. The assumption weighs as much as `assumed` objects.
   double ratio(double assumed) const;
-  /// A thing stands by `above` (m) higher than the others say. `share`: of its looks that are new.
+  /// Learns from an object that stands `above` (m) higher than the others say. `share`: the share
+  /// of its keyframes that are new.
   void learn(double above, const GroundHeight& others, double own_variance, double ratio,
              double share);
 
@@ -40,7 +42,7 @@ class GroundRoughness {
   double squares_ = 0.0, things_ = 0.0;
 };
 
-/// Where the body went lately, by places that are some metres apart. Part of the belief.
+/// Recent positions of the body, a few metres apart. Part of the belief.
 class BodyPath {
  public:
   static constexpr std::size_t kPlaces = 6;
@@ -51,37 +53,38 @@ class BodyPath {
   const Eigen::Vector3d* end() const { return places_.end(); }
 
  private:
-  InplaceVector<Eigen::Vector3d, kPlaces> places_;  ///< the newest last
+  InplaceVector<Eigen::Vector3d, kPlaces> places_;  ///< the newest is last
 };
 
 class GroundSurface {
  public:
-  /// Of all that stands surely, was seen from several sides and is of a class that does; and, where
-  /// its height above the ground is known, of where the body went.
+  /// Uses the tracks that surely stand, that parallax has placed, and whose class stands on the
+  /// ground. It also uses the path, if the height of the body is known.
   GroundSurface(const std::vector<Track>& tracks, const BodyPath& path,
                 const GroundRoughness& roughness_scale, const Eigen::Vector3d& up_W,
                 const ClassPriors& priors, const GroundParameters& parameters);
 
-  /// What the track's ground_contact says of how even it is.
+  /// Lets `roughness_scale` learn from the ground contact of the track.
   void tell(GroundRoughness& roughness_scale, const Track& track, double share) const;
-  /// Below `place`, without what `except` itself says; nothing where fewer than three tell and the
-  /// body's height is not known.
+  /// Returns the height of the ground below `place`, without the contribution of track `except`.
+  /// Returns nothing if fewer than three objects contribute and the height of the body is not
+  /// known.
   std::optional<GroundHeight> below(const Eigen::Vector3d& place, ObjectId except) const;
 
  private:
   struct Stand {
-    ObjectId id;            ///< 0: the body's
-    Eigen::Vector2d place;  ///< horizontal
+    ObjectId id;            ///< 0: the body
+    Eigen::Vector2d place;  ///< horizontal, m
     double height, variance;
   };
 
   struct Near {
-    double apart;  ///< m²
+    double apart;  ///< squared distance, m²
     const Stand* stand;
   };
 
-  /// Those of `stands` within reach of a place, but for `except`; the nearest first, `most` of
-  /// them.
+  /// Returns the `most` nearest of `stands` within reach of a place, nearest first, without
+  /// `except`.
   std::vector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
                            ObjectId except, std::size_t most) const;
   Eigen::Vector2d horizontal(const Eigen::Vector3d& p) const { return axes_ * p; }
@@ -90,10 +93,11 @@ class GroundSurface {
   double ratio_;
   Eigen::Matrix<double, 2, 3> axes_;
   Eigen::Vector3d up_;
-  std::vector<Stand> stands_, path_;  ///< those on the path have the body's height in common
+  /// points of the path have the error of the body's height in common
+  std::vector<Stand> stands_, path_;
 };
 
-/// Height of the underside of a cuboid, m.
+/// Returns the height of the underside of a cuboid, m.
 double underside(const State& x, const Eigen::Vector3d& up);
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,4 @@
-// Which ids are given to new tracks.
+// Gives ids to new tracks.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +9,14 @@
 
 namespace perdure::semantic_filter {
 
-/// Gives ids to initiateTracks. The same box of the same frame always gets the same id, so that
-/// stepping again after a late detection does not rename tracks, and no id is ever used twice.
+/// The same box of the same frame always gets the same id. So a step that is repeated after a late
+/// detection does not rename tracks, and no id is used twice.
 class IdBook {
  public:
   ObjectId idFor(std::uint64_t frame_sequence, std::size_t box);
   ObjectId next() const { return next_; }
   void atLeast(ObjectId next) { next_ = std::max(next_, next); }
-  /// Forgets frames before this one; they cannot be stepped again.
+  /// Forgets the frames before this one. They cannot be stepped again.
   void forgetBefore(std::uint64_t frame_sequence);
 
  private:

@@ -9,16 +9,16 @@ namespace {
 
 double sumOf(const auto& nats) { return std::accumulate(nats.begin(), nats.end(), 0.0); }
 
-/// What is hardly possible stays a number.
+/// Stays finite for probability 0.
 double logOf(double probability) { return std::log(std::max(probability, 1e-300)); }
 
-/// Kinds that this program does not know are left out: they are not explained by the others.
+/// Entries of kinds that this program does not know are left out.
 template <std::size_t N>
 void copyKnown(const std::vector<double>& from, std::array<double, N>& to) {
   std::copy_n(from.begin(), std::min(from.size(), N), to.begin());
 }
 
-/// What came back from elsewhere may have later times: the last never lies before the first.
+/// A ledger from elsewhere may have later times. The last time never lies before the first.
 void count(LedgerEntry& entry, const LedgerEntry& more) {
   if (entry.count == 0) entry.first = entry.last = more.first;
   entry.count += more.count;

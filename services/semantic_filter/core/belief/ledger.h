@@ -1,9 +1,10 @@
-// The ledger of an track: each change of its existence and of its PMF is booked under what caused
-// it, in nats. The entries of existence sum to log r / (1 - r), those of a class to log π.
+// The ledger of a track: every change of existence and PMF is booked under its cause, in nats. The
+// entries of existence sum to log r / (1 - r), those of a class to log π. Derivation:
+// tools/docs/maths/ledger.md.
 //
-// Existence changes by become() alone, and weights end in normalise() (track.h), which books: both
-// ask for the reason, so that nothing can change without one. Each booking is the difference
-// between what is believed now and the sum so far, so that rounding does not add up.
+// Only become() changes existence, and every change of weights ends in normalise() (mixture_ops.h).
+// Both ask for the cause, so nothing changes without one. Each booking is the new belief minus the
+// sum so far. So rounding does not add up.
 #pragma once
 
 #include <array>
@@ -15,19 +16,19 @@
 
 namespace perdure::semantic_filter {
 
-/// Probability that the track exists, with its reasons. A fresh one knows nothing: 1/2.
+/// Probability that the object exists, with its reasons. A new one is 1/2.
 class Existence {
  public:
   Existence() = default;
   Existence(double r, ExistenceEvidence why, TimePoint at) { become(r, why, at); }
-  /// As a ledger has it; what the ledger does not explain is booked under `why`.
+  /// Takes the entries of a known ledger. What they do not explain is booked under `why`.
   Existence(double r, const std::vector<LedgerEntry>& known, ExistenceEvidence why, TimePoint at);
 
   operator double() const { return r_; }
   void become(double r, ExistenceEvidence why, TimePoint at);
-  /// Books a part of `from` under `to` instead; counts it once there where it is not zero.
+  /// Moves `nats` from entry `from` to entry `to`, and counts it once there if it is not zero.
   void shift(ExistenceEvidence from, ExistenceEvidence to, double nats, TimePoint at);
-  /// KeyframeBatch that changed nothing.
+  /// Counts observations that changed nothing.
   void note(ExistenceEvidence why, const LedgerEntry& observations);
 
   const LedgerEntry& of(ExistenceEvidence why) const {
@@ -40,22 +41,22 @@ class Existence {
   std::array<LedgerEntry, kExistenceEvidences> entries_{};
 };
 
-/// A number for each of an track's classes.
+/// A number for one class of a track.
 struct ClassNumber {
   std::string name;
   double value = 0.0;
 };
 
-/// log π of each class with its reasons.
+/// log π of each class, with its reasons.
 class ClassAccount {
  public:
   ClassAccount() = default;
   ClassAccount(const std::vector<ClassLedger>& known, const std::vector<OustedClass>& ousted);
 
-  /// `pmf` sums to 1. Classes that are no longer in it leave the account; the one that came closest
-  /// to the best is kept as ousted.
+  /// `pmf` sums to 1. Classes that it no longer has leave the account. The one of them that came
+  /// closest to the best class is kept as ousted.
   void book(const std::vector<ClassNumber>& pmf, ClassEvidence why, TimePoint at);
-  /// Books a part of `from` under `to` instead, for each class.
+  /// Moves a part of entry `from` to entry `to`, for each class.
   void shift(ClassEvidence from, ClassEvidence to, const std::vector<ClassNumber>& nats);
 
   std::vector<ClassLedger> published() const;
@@ -79,7 +80,7 @@ class ClassAccount {
   std::optional<Ousted> ousted_;
 };
 
-/// Adds what each class gains by Bayes' rule: log_likelihood - log Σ π exp(log_likelihood).
+/// Returns what each class gains by Bayes' rule: log_likelihood - log Σ π exp(log_likelihood).
 std::vector<ClassNumber> gains(const std::vector<ClassNumber>& pmf,
                                const std::vector<ClassNumber>& log_likelihood);
 

@@ -1,4 +1,5 @@
-// How a hypothesis moves: at rest with a random walk, or at constant velocity.
+// How a hypothesis moves: a random walk at rest, or constant velocity with white acceleration
+// (Bar-Shalom, Li 2001, ch. 6). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <optional>
@@ -8,26 +9,29 @@
 
 namespace perdure::semantic_filter {
 
-/// Probability that a moving hypothesis is faster than `speed`, m/s.
+/// Returns the probability that a moving hypothesis is faster than `speed`, m/s.
 double fasterThan(const Hypothesis& h, double speed);
-/// Probability that the track moves faster than `min_speed`, given that it exists.
+/// Returns the probability that the track moves faster than `min_speed` (m/s), given that it
+/// exists.
 double movingProbability(const Track& track, double min_speed);
 
-/// Process noise and motion over `dt` seconds.
+/// Applies motion and process noise of `dt` seconds.
 void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m);
 
-/// The hypothesis given that v = 0: what it took for motion was the error of its place.
+/// Conditions the hypothesis on v = 0. This also corrects the error of position that looked like
+/// motion.
 void stop(Hypothesis& h);
-/// When the track gets out of visibility: what is more likely slower than `min_speed` may as well
-/// stand, and then it stays where it was. Divides such hypotheses by their speed.
+/// Is called when the track leaves the view. Splits each moving hypothesis that is probably slower
+/// than `min_speed` (m/s) by its speed: the slow share stops and stays where it was, the fast share
+/// moves on.
 void stopSlowHypotheses(Track& track, double min_speed);
-/// x at a later time: static ones stay, moving ones go on at constant velocity.
+/// Returns x after `dt` seconds: static hypotheses stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
-/// Where its motion alone will have brought it by `time`, as_of left as it was: for what is said of
-/// it between two looks. Not kept, so that the belief itself depends on its looks only.
+/// Returns the track as its motion alone predicts it for `time`; as_of stays. It is for publishing
+/// between two observations and is not stored, so that the belief depends on observations only.
 Track extrapolated(Track track, TimePoint time, const MotionParameters& parameters);
 
-/// One at rest as it may just be driving off.
+/// Returns a moving copy of a hypothesis at rest, for an object that may just be starting to move.
 Hypothesis asMoving(Hypothesis at_rest);
 
 }  // namespace perdure::semantic_filter

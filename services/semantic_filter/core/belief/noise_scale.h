@@ -1,7 +1,9 @@
-// How large the errors of a network's boxes and azimuths are beside what is assumed of them (box.*
-// of parameters.h and the classes' priors, or what the network says itself): learned from what the
-// fits of all looks at things that stand leave over, for each network of its own. Part of the
-// belief: a late frame finds it as it was.
+// Noise scale: squared ratio of true to assumed errors of boxes and azimuths, learned for each
+// network. Derivation: tools/docs/maths/noise_scale.md.
+//
+// The assumption is box.* of parameters.h with the class priors, or what the network says itself.
+// The scale is learned from the residuals of MAP fits of objects at rest. It is part of the belief,
+// so that a late frame finds it as it was.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +12,22 @@
 
 namespace perdure::semantic_filter {
 
-/// What a fit leaves over of what was measured.
+/// The residuals of one fit.
 struct ResidualRatio {
-  double ratio = 1.0;  ///< squared residuals by their variance, per degree of freedom
-  double count = 0.0;  ///< of new ones that it is of; what comes again tells nothing new
+  double ratio = 1.0;  ///< squared residuals over their variance, per degree of freedom
+  double count = 0.0;  ///< number of new residuals; keyframes of an earlier fit do not count again
 };
 
-/// Of the sides of boxes, or of azimuths.
+/// The noise scale of box sides, or of azimuths, for each network.
 class NoiseScales {
  public:
-  /// Of as many as are `remembered`: a network on another road has other errors.
+  /// Remembers at most `remembered` residuals, because a network has other errors on another road.
   explicit NoiseScales(double remembered) : remembered_(remembered) {}
 
-  /// Of the variances, true by assumed. `assumed`: as many as updateClassAndExistence as much as
-  /// the assumption; 0: it is believed for good.
+  /// Returns true over assumed variance. The assumption weighs as much as `assumed` residuals; with
+  /// 0 it is never changed.
   double ratio(std::uint64_t model, double assumed) const;
-  /// `over` is beside what was assumed at first, not beside the ratio so far.
+  /// `over` is relative to the first assumption, not to the present ratio.
   void learn(std::uint64_t model, const ResidualRatio& over);
 
  private:
@@ -33,7 +35,7 @@ class NoiseScales {
     double squares = 0.0, count = 0.0;
   };
   double remembered_;
-  std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< few networks
+  std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< a list, because networks are few
 };
 
 }  // namespace perdure::semantic_filter

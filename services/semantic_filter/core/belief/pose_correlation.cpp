@@ -10,8 +10,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite: the usual case, and cheap to see. L_pose
-/// is P_pose's Cholesky factor.
+/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite. This is the usual case and cheap to
+/// test. L_pose: Cholesky factor of P_pose.
 bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   CrossPose B = h.C;
   whitenRows(L_pose, B);
@@ -21,7 +21,7 @@ bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   return choleskyInPlace(still);
 }
 
-/// Of the pose's covariance; nothing where that is not positive definite.
+/// Cholesky factor of the pose's covariance; nothing if it is not positive definite.
 std::optional<Matrix6d> factorOf(const Matrix6d& P_pose) {
   std::optional<Matrix6d> L = P_pose;
   if (!choleskyInPlace(*L)) L.reset();
@@ -42,7 +42,7 @@ double sigmaGivenPose(const Hypothesis& h, const std::optional<Matrix6d>& L_pose
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later) {
   constexpr double kLargest = 10.0;
   if (earlier == later) return Matrix6d::Identity();
-  // Most tracks of a frame were brought up to date at the same frame before.
+  // Most tracks of a frame were last updated at the same frame.
   thread_local Matrix6d product = Matrix6d::Identity(), inverted = Matrix6d::Identity();
   if (earlier != product) {
     product = earlier;
@@ -59,9 +59,9 @@ bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose) {
   return choleskyInPlace(L) && isExplained(h, L, 1.0);
 }
 
-/// [P C; Cᵀ P_pose] must stay a covariance. Transitions are approximate, and vio's own updates
-/// shrink P_pose: C is scaled down where the pose would explain more of P than there is. (Much of
-/// P may well be the pose: a limit of .9 here costs half of the recall on KITTI.)
+/// Transitions are approximate, and the updates of vio shrink P_pose. So the pose may explain more
+/// of P than there is. Much of P may truly be the pose: a limit of 0.9 here costs half of the
+/// recall on KITTI.
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose) {
   constexpr double kExplained = 0.9999;
   if (h.C.isZero(0.0) || (L_pose && isExplained(h, *L_pose, kExplained))) return;

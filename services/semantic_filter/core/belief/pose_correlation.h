@@ -1,4 +1,5 @@
-// What a hypothesis has in common with the error of the pose that it is seen from.
+// Correlation of a hypothesis with the pose error, which is a consider state (Schmidt 1966).
+// Derivation: tools/docs/maths/pose_error.md.
 #pragma once
 
 #include <optional>
@@ -7,21 +8,20 @@
 
 namespace perdure::semantic_filter {
 
-/// The transition of the pose error between two products of transitions. vio's updates make the
-/// products small, so that the inverse may lose its sense: then nothing.
+/// Returns the transition of the pose error between two products of transitions. The updates of vio
+/// make the products small. Where the inverse is then not usable, it returns nothing.
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
 /// Whether [P C; Cᵀ P_pose] is a covariance.
 bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose);
 
-/// [P C; Cᵀ P_pose] must stay a covariance: C is scaled down where the pose would explain more of P
-/// than there is. `L_pose`: Cholesky factor of P_pose, where it has one.
+/// Scales C down where the pose would explain more of P than there is, so that [P C; Cᵀ P_pose]
+/// stays a covariance. `L_pose`: Cholesky factor of P_pose, if it has one.
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose);
 
-/// Standard deviation of the place relative to the body, metres: what the pose error does not
-/// share.
+/// Returns the standard deviation of the position given the pose error, m.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
-/// The same of an track: of its hypotheses, and by how far they are from each other.
+/// The same for a track: it includes the distances between its hypotheses.
 double placeSigma(const Track& track, const Matrix6d& P_pose);
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,5 @@
-// What a thing fills of its cuboid: a car stands on wheels, and its corners and its roof are round.
+// What an object fills of its cuboid: level outlines with cut corners. A car stands on wheels, and
+// its corners and its roof are round. Derivation: tools/docs/maths/cuboid_projection.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,37 +8,38 @@
 
 namespace perdure::semantic_filter {
 
-/// A level outline of the thing: a rectangle whose corners are cut.
+/// A level outline of the object: a rectangle with cut corners.
 struct ShapeLevel {
-  double height = 0.0;               ///< -1 (the ground) … 1 (the top)
-  double along = 1.0, across = 1.0;  ///< of half the length and half the width, (0, 1]
-  double corner = 1.0;               ///< where the cut begins, of each side's half; 1: a rectangle
-  double forward = 0.0;  ///< of half the length: its middle is so far before the cuboid's
+  double height = 0.0;               ///< -1 (the ground) to 1 (the top)
+  double along = 1.0, across = 1.0;  ///< in halves of length and width, (0, 1]
+  double corner = 1.0;               ///< where the cut begins, in halves of each side; 1: no cut
+  /// offset of its middle before the cuboid's middle, in halves of the length
+  double forward = 0.0;
 };
 
-/// The corners of a convex solid; the image of its hull is the thing's.
+/// The corners of a convex solid. The image of the object is the hull of their images.
 struct Shape {
   static constexpr int kMostLevels = 3, kMostCorners = 8 * kMostLevels;
-  /// A number for each corner.
+  /// One number for each corner.
   using PerCorner = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostCorners, 1>;
 
-  PerCorner along, across, up;  ///< in halves of length, width and height from the middle, -1 … 1
-  PerCorner forward;  ///< what is added to `along` of a thing that surely faces where its yaw says
+  PerCorner along, across, up;  ///< from the middle, in halves of length, width and height, -1 to 1
+  PerCorner forward;            ///< is added to `along` if the object surely faces along its yaw
   bool is_cuboid = false;
 
   int corners() const { return static_cast<int>(along.size()); }
-  /// `heading`: 1, where its yaw says; -1, the other way; 0, either.
+  /// `heading`: 1 if it faces along its yaw, -1 if it faces the other way, 0 if unknown.
   Eigen::Vector3d corner(int i, double heading) const {
     return {along[i] + heading * forward[i], across[i], up[i]};
   }
 };
 
-/// What is expected where it faces as its yaw says by these log-odds.
+/// Returns the expected heading, -1 to 1, from the log-odds that the yaw is not turned by 180°.
 inline double headingOf(double log_odds) { return std::tanh(0.5 * log_odds); }
 
-/// Bit i of a corner's number is set on the far side of axis i.
+/// Bit i of a corner's number is set on the positive side of axis i.
 const Shape& cuboidShape();
-/// At most Shape::kMostLevels of them.
+/// Takes at most Shape::kMostLevels levels.
 Shape shapeOf(const std::vector<ShapeLevel>& levels);
 
 }  // namespace perdure::semantic_filter

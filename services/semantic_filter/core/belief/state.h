@@ -1,4 +1,6 @@
-// One Gaussian of the mixture: state, covariance, and covariance with the pose error.
+// One hypothesis of the mixture: a Gaussian state with its covariance, and its cross-covariance
+// with the pose error (one EKF of the paper's eq. 9). Derivation:
+// tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,37 +11,37 @@
 
 namespace perdure::semantic_filter {
 
-/// x = [p_WO, yaw about gravity, log l, log w, log h, b, v_W]. b is the detector's own error at
-/// this track: how far it puts each side of the box (x1, y1, x2, y2) from the cuboid's image, in
-/// widths and heights of the box; it stays while the view stays (DESIGN 5, item 7). v and its
-/// covariance are zero while the hypothesis is a static one.
+/// x = [p_WO (m), yaw about gravity (rad), log l, log w, log h (log m), b, v_W (m/s)]. The detector
+/// bias b says how far the detector places each side (x1, y1, x2, y2) from the image of the cuboid,
+/// in widths and heights of the box. It stays while the view stays. v and its covariance are zero
+/// in a static hypothesis.
 inline constexpr int kStateDim = 14;
 using State = Eigen::Matrix<double, kStateDim, 1>;
 using StateCovariance = Eigen::Matrix<double, kStateDim, kStateDim>;
-using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< P_xg with the pose error [θ, p]
+using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< with the pose error [θ, p]
 inline constexpr int kYaw = 3, kSize = 4, kBias = 7, kVelocity = 11;
-inline constexpr int kGeometry = kBias;  ///< dimensions of the cuboid alone
+inline constexpr int kGeometry = kBias;  ///< dimensions of the cuboid without b and v
 
-/// What the looks at a thing alone say of the ground that it stands on (core/ground.h).
+/// What the boxes of an object alone say of the ground below it (core/update/ground_contact.h).
 struct GroundContact {
-  double above = 0.0;     ///< m, beside the underside of the hypothesis
+  double above = 0.0;     ///< m; height of the ground beside the underside of the hypothesis
   double variance = 0.0;  ///< m², given the pose; 0: they say nothing
 };
 
 struct Hypothesis {
   std::string class_name;
   bool moving = false;
-  double weight = 0.0;  ///< of this hypothesis given that the track exists; they sum to 1
+  double weight = 0.0;  ///< of the hypothesis given that the object exists; all sum to 1
   State x = State::Zero();
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();
   double heading_log_odds = 0.0;  ///< log-odds that the yaw is not turned by 180°
   double speed_prior_ratio =
-      1.0;  ///< of a moving one: its speed's prior against the Gaussian it began with
-  bool modes_searched = false;  ///< of yaw, and weighed by all looks that are remembered
+      1.0;  ///< moving: prior of its speed against the Gaussian that it began with
+  bool modes_searched = false;  ///< a mode search of yaw has weighed it by all keyframes
   GroundContact ground_contact = {};
 
-  /// Shape::corner's, in expectation.
+  /// Returns the expected heading, as Shape::corner takes it.
   double heading() const { return headingOf(heading_log_odds); }
 };
 

@@ -13,13 +13,14 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Rounding may leave a covariance whose parts differ by many orders with a pivot just below zero.
-/// No reader takes such a message: its correlations get the least eigenvalues that are definite.
+/// Makes P positive definite. Rounding may leave a pivot just below zero if its parts differ by
+/// many orders of magnitude, and readers refuse such a message. The eigenvalues of its correlations
+/// get the least value that is definite.
 Matrix7d definite(const Matrix7d& P) {
-  constexpr double kLeastEigenvalue = 1e-9;  // of correlations; and m², rad² for a variance
+  constexpr double kLeastEigenvalue = 1e-9;  // of the correlations; also m² or rad², of a variance
   constexpr double kRounding = 1e-12;
   Matrix7d L = P;
-  // A pivot's share of its variance is that of the correlations, which is what a reader looks at.
+  // A reader checks the correlations: their pivots are the pivots of P over its variances.
   if (choleskyInPlace(L) &&
       (L.diagonal().array().square() > kRounding * P.diagonal().array()).all()) {
     return P;
@@ -36,8 +37,8 @@ Matrix7d definite(const Matrix7d& P) {
   return result;
 }
 
-/// The Gaussian of the heaviest hypothesis, its covariance widened to what the others of the class
-/// say: second moments about its mean.
+/// The Gaussian of the heaviest hypothesis of a class. Its covariance holds the second moments of
+/// the others of the class about its mean.
 ClassBelief classBelief(const Track& track, const std::string& name) {
   ClassBelief belief;
   belief.name = name;
@@ -58,7 +59,8 @@ ClassBelief classBelief(const Track& track, const std::string& name) {
   belief.mean = heaviest->x.head<7>();
   belief.covariance = definite(moments / weight);
   if (name == kOtherClass && !heaviest->modes_searched) {
-    constexpr double kAnyYaw = M_PI * M_PI / 12.0;  // modulo 180 degrees
+    // variance of a yaw that may be any, modulo 180°
+    constexpr double kAnyYaw = M_PI * M_PI / 12.0;
     belief.covariance(kYaw, kYaw) = std::max(belief.covariance(kYaw, kYaw), kAnyYaw);
   }
   belief.cross_pose = cross / weight;
@@ -117,7 +119,7 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
     h.moving = belief.moving > 0.5;
     if (h.moving) {
       h.x.tail<3>() = belief.velocity;
-      h.P.diagonal().tail<3>().setConstant(1.0);  // the message does not carry it: (1 m/s)²
+      h.P.diagonal().tail<3>().setConstant(1.0);  // (1 m/s)²; the message does not carry it
     }
     track.hypotheses.push_back(h);
   }

@@ -1,14 +1,16 @@
-// The published belief of an track, and back.
+// Conversion between a track and its published belief. Derivation:
+// tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {
 
-/// The published belief: per class its hypotheses as one Gaussian around the heaviest one.
+/// Publishes one Gaussian for each class: the mean of its heaviest hypothesis, and the second
+/// moments of the others about it. `min_speed`: m/s, above which a track counts as moving.
 ObjectBelief toBelief(const Track& track, double min_speed);
 
-/// A belief that came back as an track with one hypothesis for each class. `back` is kRestore or
+/// Makes a track from a published belief, with one hypothesis for each class. `back`: kRestore or
 /// kRecall.
 Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
 

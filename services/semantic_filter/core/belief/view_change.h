@@ -1,4 +1,5 @@
-// From where a point is looked at, and how much that changes.
+// View change: how much the viewpoint of a point has changed, in correlation lengths. Derivation:
+// tools/docs/maths/class_and_existence_update.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,14 +8,14 @@
 
 namespace perdure::semantic_filter {
 
-/// How much the view of a point changed from camera pose a to b, in lengths after which what two
-/// looks have in common has fallen to 1/e.
+/// Correlation lengths: after such a change, the correlation of two observations has fallen to 1/e.
+/// Radians of direction, log distance, radians in the image.
 struct ViewScales {
   double angle, log_distance, image_angle;
 };
-/// Of a point from one camera pose.
+/// A point as one camera pose sees it.
 struct ViewRay {
-  Eigen::Vector3d ray_W, ray_C;  ///< unit, from the camera to it
+  Eigen::Vector3d ray_W, ray_C;  ///< unit vectors from the camera to the point
   double log_distance;
 };
 ViewRay viewRayOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);

@@ -8,7 +8,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-constexpr double kOutlier = 0.2;  // share of azimuths that say nothing
+constexpr double kOutlier = 0.2;  // share of azimuths that carry no information
 constexpr double kFlip = 0.1;     // share of azimuths that are turned by 180°
 
 }  // namespace

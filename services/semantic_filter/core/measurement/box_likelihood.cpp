@@ -15,11 +15,11 @@ double logBelowZero(double mean, double variance) {
   return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
 }
 
-/// log of the multivariate t density in n dimensions, by the squared Mahalanobis distance and the
-/// log-determinant of its scale matrix.
+/// log of the multivariate t density in n dimensions, from the squared Mahalanobis distance and the
+/// log-determinant of the scale matrix.
 double logStudent(double nis, double log_det, int n, double tail) {
   thread_local double cached_tail = -1.0;
-  thread_local std::array<double, 5> constant{};  // of 1..4 degrees of freedom
+  thread_local std::array<double, 5> constant{};  // for 1 to 4 dimensions
   if (cached_tail != tail) {
     for (int i = 1; i <= 4; ++i) {
       constant[i] =
@@ -30,7 +30,7 @@ double logStudent(double nis, double log_det, int n, double tail) {
   return constant[n] - 0.5 * log_det - 0.5 * (tail + n) * std::log1p(nis / tail);
 }
 
-/// χ² quantiles of one gate for 1..4 degrees of freedom, computed once per gate value.
+/// χ² quantile of the gate for 1 to 4 degrees of freedom, computed once for each gate value.
 double gateThreshold(double gate, int dof) {
   thread_local double cached_gate = -1.0;
   thread_local std::array<double, 5> quantile{};
@@ -131,8 +131,8 @@ std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox&
 
 namespace {
 
-/// How far the predicted side lies within the observed one: the true one, where that is cut, lies
-/// at or beyond it, left and top to smaller coordinates.
+/// How far the predicted side lies inside the observed one, px. The true side lies at or beyond a
+/// censored side: left and top at smaller coordinates, right and bottom at larger ones.
 double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
   const double d = predicted.sides[side] - z.sides[side];
   return side < 2 ? d : -d;
@@ -140,14 +140,15 @@ double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) 
 
 using Sides = std::array<bool, 4>;
 
-/// One side alone.
+/// Whether one side alone is outside the gate.
 bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predicted,
                const Eigen::Matrix4d& covariance, int side) {
   const double nu = z.sides[side] - predicted.sides[side];
   return nu * nu > gate * (covariance(side, side) + z.variance[side]);
 }
 
-/// Of the sides in use; those that are not used have the probability that they lie beyond.
+/// Scores the sides in use. Each other side counts with the probability that the true side lies
+/// beyond it.
 std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                    const Eigen::Matrix4d& covariance, const Sides& use,
                                    const BoxParameters& parameters) {
@@ -184,13 +185,14 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
   return score;
 }
 
-/// A side that is hidden lies anywhere within the thing.
+/// Log density of a hidden side: it ends anywhere within the object.
 double logAnywhere(const ProjectedBox& predicted, int side) {
   const int axis = side % 2;
   return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
 }
 
-/// Of the sides in use, those without which the others may fit: none of them is outside alone.
+/// Returns the sides in use that may be hidden: without such a side, no other side is outside the
+/// gate alone.
 Sides mayBeHidden(const BoxMeasurement& z, const ProjectedBox& predicted,
                   const Eigen::Matrix4d& covariance, const Sides& use,
                   const BoxParameters& parameters) {
@@ -221,7 +223,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
                                  const Eigen::Matrix4d& covariance,
                                  const std::array<bool, 4>& hidden,
                                  const BoxParameters& parameters) {
-  constexpr double kFits = 9.0;  // squared deviations up to which no part is asked for
+  constexpr double kFits = 9.0;  // squared deviations up to which no partial view is tried
   Sides use = comparableSides(z, predicted, hidden), whole = use, ignored{};
   double log_shown = 0.0;
   for (int i = 0; i < 4; ++i) {
@@ -231,7 +233,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
       log_shown += logAnywhere(predicted, i);
       continue;
     }
-    // What passes behind the camera reaches at least as far as it is predicted to.
+    // An object that passes behind the camera reaches at least as far as predicted.
     use[i] = whole[i] = !hidden[i] && within(z, predicted, i) < 0.0;
     ignored[i] = !use[i];
   }
@@ -256,7 +258,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     if (!parts[i]) continue;
     Sides others = use;
     others[i] = false;
-    // The four sides are as likely to be hidden by what is not on the map.
+    // Something unmapped hides each of the four sides with the same probability.
     consider(others, log_shown + std::log(0.25 * parameters.part) + logAnywhere(predicted, i), i);
   }
   if (best) best->ignored = ignored;

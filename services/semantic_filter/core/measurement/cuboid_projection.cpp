@@ -13,22 +13,22 @@ namespace {
 
 constexpr double kNear = 0.2;  // metres
 
-/// A number for each corner.
+/// One number for each corner.
 using PerCorner = std::array<double, Shape::kMostCorners>;
 
-/// From the camera to the middle of a cuboid, and from there along half of each of its axes, in C.
+/// In C: from the camera to the middle of a cuboid, and from there along half of each axis.
 struct Frame {
   Eigen::Vector3d centre, along, across, up;
   double heading;
 };
 
-/// Of N coordinates.
+/// Range of N coordinates.
 template <int N>
 struct Range {
   std::array<double, N> least, most;
 };
 
-/// Where a shape's corners are in C, and the range of their depths.
+/// Computes the corners of a shape in C, and the range of their depths.
 PERDURE_ALSO_AVX2 void placeCorners(const Frame& frame, const Shape& shape, PerCorner& x,
                                     PerCorner& y, PerCorner& z, Range<1>& depths) {
   simd::Four least, most;
@@ -51,7 +51,7 @@ PERDURE_ALSO_AVX2 void placeCorners(const Frame& frame, const Shape& shape, PerC
   depths = {{simd::leastOf(least)}, {simd::mostOf(most)}};
 }
 
-/// Their pixels by a camera without distortion, and the box about these.
+/// Computes their pixels for a camera without distortion, and the box around them.
 PERDURE_ALSO_AVX2 void projectCorners(const CameraModel& camera, const PerCorner& x,
                                       const PerCorner& y, const PerCorner& z, int corners,
                                       double* u, double* v, Range<2>& box) {
@@ -76,16 +76,16 @@ PERDURE_ALSO_AVX2 void projectCorners(const CameraModel& camera, const PerCorner
   }
 }
 
-/// The corners of a shape before the camera.
+/// The corners of a shape, relative to the camera.
 struct Corners {
   Eigen::Matrix3d R_WO;
   Eigen::Vector3d half;  ///< of length, width, height
   const Shape* shape = nullptr;
   double heading = 0.0;
   PerCorner x, y, z;       ///< in C
-  bool all_before = true;  ///< the near plane
+  bool all_before = true;  ///< all corners are before the near plane
 
-  /// From the centre, along the cuboid's axes.
+  /// Returns corner i from the centre, along the axes of the cuboid.
   Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, heading)); }
   Eigen::Vector3d p_C(int i) const {
     const auto k = static_cast<std::size_t>(i);
@@ -95,16 +95,17 @@ struct Corners {
 
 constexpr int kCut = -1;
 
-/// Pixels of corners, and of cuts by the near plane.
+/// Pixels of corners, and of cuts of edges by the near plane.
 struct ImagePoints {
   using Coordinates = std::array<double, kMostOutline>;
   Coordinates u, v;
-  std::array<int, kMostOutline> corner;  ///< or kCut; not set where all are corners, in order
+  /// corner index or kCut; not set if all points are corners in order
+  std::array<int, kMostOutline> corner;
   bool in_order = false;
   std::size_t size = 0;
   Eigen::Vector4d sides;
 
-  /// The corner whose u or v is this; a number that is none has no corner.
+  /// Returns the corner whose u or v has this value, or kCut.
   int at(const Coordinates& values, double value) const {
     for (std::size_t i = 0; i < size; ++i) {
       if (values[i] == value) return in_order ? static_cast<int>(i) : corner[i];
@@ -124,8 +125,8 @@ struct ImagePoints {
   }
 };
 
-/// False where all of it lies behind the near plane. What reaches it is the cuboid, whose edges
-/// are cut there.
+/// Returns false if the whole object is behind the near plane. An object that reaches the near
+/// plane is treated as its cuboid, whose edges are cut there.
 bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double heading,
                          Corners& c) {
   Frame frame;
@@ -146,7 +147,8 @@ bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& sha
   return depths.most[0] >= kNear;
 }
 
-/// Pixel of a point in front; far outside the image where the distortion is not defined.
+/// Pixel of a point in front of the camera. Where the distortion is not defined, it lies far
+/// outside the image.
 Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C) {
   if (const auto pixel = camera.project(p_C)) return *pixel;
   const Eigen::Vector2d direction = p_C.head<2>() / p_C.z();
@@ -154,7 +156,7 @@ Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C) {
           camera.cy() + camera.fy() * direction.y() * 4.0};
 }
 
-/// Of the cuboid's edges.
+/// Adds the cuts of the cuboid's edges at corner i by the near plane.
 void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
   const Eigen::Vector3d a = corners.p_C(i);
   for (int axis = 1; axis < 8; axis <<= 1) {
@@ -186,7 +188,8 @@ void project(const Corners& corners, const CameraModel& camera, ImagePoints& poi
   points.bound();
 }
 
-/// Derivatives of one coordinate of the image of a point in front. False where it has none.
+/// Derivative of one image coordinate of a point in front of the camera. Returns false where there
+/// is none.
 bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, int axis,
                        Eigen::RowVector3d& by_C) {
   if (camera.calibration().distortion == DistortionModel::kNone) {
@@ -202,7 +205,7 @@ bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, in
   return true;
 }
 
-/// Derivatives of a side, which is the image of a corner.
+/// Sets the derivatives of a side, which is the image of a corner.
 void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
              const Corners& corners) {
   const Eigen::Vector3d p_C = corner == kCut ? Eigen::Vector3d::Zero() : corners.p_C(corner);

@@ -1,6 +1,6 @@
-// The image of a thing in its cuboid: the box around its corners, with Jacobians (b = π(g s) of
-// eq. 7). The cuboid stands upright: its z axis is against gravity; yaw 0 has its length along x of
-// W.
+// Predicted box of an object in its cuboid: the box around the images of its corners, with
+// Jacobians (b = π(g s) of the paper's eq. 7). Derivation: tools/docs/maths/cuboid_projection.md.
+// The cuboid is upright: its z axis is against gravity. At yaw 0 its length is along x of W.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,39 +15,43 @@
 namespace perdure::semantic_filter {
 
 struct ProjectedBox {
-  Eigen::Vector4d sides = Eigen::Vector4d::Zero();  ///< x1, y1, x2, y2; may lie outside the image
+  /// x1, y1, x2, y2, px; may lie outside the image
+  Eigen::Vector4d sides = Eigen::Vector4d::Zero();
   Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
-  Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();  ///< by [θ, p] of T_WB
-  std::array<bool, 4> exact{true, true, true, true};  ///< false: set by the near plane's cut
+  /// by the pose error [θ, p] of T_WB
+  Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();
+  /// false: the side is a cut by the near plane
+  std::array<bool, 4> exact{true, true, true, true};
 };
 
-/// The same without derivatives.
+/// The same without derivatives, with the points of the outline.
 struct ProjectedOutline {
-  Eigen::Vector4d sides;  ///< x1, y1, x2, y2; may lie outside the image
-  Polygon points;         ///< images of corners and cuts by the near plane, in no order
+  Eigen::Vector4d sides;  ///< x1, y1, x2, y2, px; may lie outside the image
+  Polygon points;         ///< px; corners and cuts by the near plane, in no order
 };
 
-/// Nothing where no part of the cuboid is in front of the near plane (0.2 m).
-/// The box is of `shape` within the cuboid, or of all of it where that reaches the near plane.
-/// `heading` as in Shape::corner.
+/// Projects `shape` within the cuboid, or the whole cuboid if it reaches the near plane (0.2 m).
+/// Returns nothing if no part is before the near plane. `heading`: as in Shape::corner.
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
                                           const Shape& shape = cuboidShape(), double heading = 0.0);
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
                                                const Shape& shape = cuboidShape());
 
-/// How a detector draws its boxes about things of a class.
+/// How a network draws its boxes around objects of a class.
 struct BoxStyle {
-  Eigen::Vector4d offset = Eigen::Vector4d::Zero();  ///< mean, in widths and heights, like b
-  Shape shape = cuboidShape();                       ///< what they enclose of the cuboid
+  /// mean offset of the sides, in widths and heights, like b
+  Eigen::Vector4d offset = Eigen::Vector4d::Zero();
+  Shape shape = cuboidShape();  ///< the part of the cuboid that the box encloses
 };
 
-/// What a detector reports of it: the shape's box with the hypothesis's b and the style's offset
-/// added to its sides.
+/// Returns the box that the network should report: the box of the shape, with b of the hypothesis
+/// and the offset of the style added to its sides.
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
                                             const BoxStyle& style, double heading = 0.0);
 
-/// Yaw in W from KITTI's alpha seen at `centre_W`: alpha = rotation_y - atan2(x, z) of the centre,
-/// in the gravity-levelled camera frame (DESIGN 5, item 8).
+/// Returns the yaw in W (rad) from KITTI's alpha of an object at `centre_W`. alpha = rotation_y -
+/// atan2(x, z) of the centre, in the gravity-levelled camera frame. Derivation:
+/// tools/docs/maths/azimuth_and_heading.md.
 double yawFromAzimuth(double azimuth, const Eigen::Vector3d& centre_W, const View& view);
 
 }  // namespace perdure::semantic_filter

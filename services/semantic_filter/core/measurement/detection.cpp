@@ -64,7 +64,7 @@ const char* flawOf(const Detection& detection, const Model& model) {
 
 namespace {
 
-/// A thing of no known class looks to the network like clutter, or like one of its classes.
+/// To the network, an object of no known class resembles clutter or one of its classes.
 double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
   const double share = lookalikeProbability(e.lookalike, lookalike_nats);
   return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
@@ -120,7 +120,7 @@ std::string classSeenIn(const BoxDetection& detection, const Model& model) {
 }
 
 double lookalikeProbability(double prior, double lookalike_nats) {
-  constexpr double kMost = 0.5;  // from another side it may look like nothing
+  constexpr double kMost = 0.5;  // from another side it may resemble nothing
   const double looks_alike = prior * std::exp(std::min(lookalike_nats, 100.0));
   return std::min(looks_alike / (1.0 - prior + looks_alike), std::max(kMost, prior));
 }

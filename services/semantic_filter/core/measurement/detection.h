@@ -1,6 +1,7 @@
-// One box of the network as the filter reads it: geometry and log-likelihood ratios by class.
-// Eq. 6: activations before the soft-max are marginal likelihoods; only differences to the clutter
-// activation matter, so that any constant added to all of them changes nothing.
+// One box of the network as the filter uses it: box, and log-likelihood ratios by class (paper, eq.
+// 6). Activations before the soft-max are marginal likelihoods. Only differences to the clutter
+// activation matter, so a constant added to all of them changes nothing. Derivation:
+// tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <map>
@@ -19,7 +20,7 @@ namespace perdure::semantic_filter {
 /// How a model draws its boxes, by class.
 struct BoxStyles {
   std::map<std::string, BoxStyle> by_class;
-  BoxStyle rest;  ///< of a class that neither it nor the priors name: the mean of its offsets
+  BoxStyle rest;  ///< of a class that neither model nor priors name: mean of the offsets
 
   const BoxStyle& of(const std::string& class_name) const {
     const auto it = by_class.find(class_name);
@@ -33,56 +34,60 @@ using ClassNames = std::set<std::string>;
 struct Model {
   std::uint64_t hash = 0;
   std::vector<std::string> classes;
-  std::shared_ptr<const ClassNames> names = std::make_shared<const ClassNames>();  ///< the same
-  std::map<std::string, std::size_t> index;  ///< name to position in `classes`
-  double input_width = 0.0;                  ///< of the network, 0 = unknown
+  /// the same as `classes`
+  std::shared_ptr<const ClassNames> names = std::make_shared<const ClassNames>();
+  std::map<std::string, std::size_t> index;  ///< class name to position in `classes`
+  double input_width = 0.0;                  ///< of the network's input, px; 0: unknown
   double box_sigma = 0.0;
   std::shared_ptr<const BoxStyles> styles = std::make_shared<const BoxStyles>();
 };
-/// Shapes are the priors', where the model says that its boxes enclose what is seen of a thing.
+/// Shapes come from the priors if the model says that its boxes enclose outlines.
 Model makeModel(const ModelInfo& info, const ClassPriors& priors = {});
-/// What the model says of all its boxes, in images of this width in pixels.
+/// Returns what the model says about all its boxes, in images `image_width` pixels wide.
 BoxNoise boxNoise(const Model& model, double image_width);
 
 struct BoxDetection {
   BoxMeasurement z;
   double log_clutter = 0.0;
-  /// Nats by which things that show less than visibility.minimum make such a box commoner.
+  /// Nats by which partial views of objects below visibility.minimum make such a box more frequent.
   double log_partial_views = 0.0;
-  std::vector<double> log_ratio;  ///< by the model's class, clamped
-  double log_ratio_best = 0.0;    ///< the most of them
-  double log_ratio_other = 0.0;   ///< of a real thing of no known class, at first visibility
-  double lookalike = 0.0;         ///< share of such things that look like one of a known class
+  std::vector<double> log_ratio;  ///< by class of the model, clamped
+  double log_ratio_best = 0.0;    ///< the largest of them
+  double log_ratio_other = 0.0;   ///< of *other*, at its first observation
+  double lookalike = 0.0;         ///< share of *other* objects that resemble a known class
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
 };
 
-/// What no network can mean, as Health counts it: "detections_not_finite",
-/// "detections_box_inside_out", "detections_classes_mismatch", "detections_azimuth_without_sigma".
-/// A message that holds one such detection is no detection: what is missing in it would be a miss.
+/// Returns what is wrong with a detection, or nullptr. The names are those that Health counts:
+/// "detections_not_finite", "detections_box_inside_out", "detections_classes_mismatch",
+/// "detections_azimuth_without_sigma". A message with one such detection is refused as a whole,
+/// because what is missing in it would count as a miss.
 const char* flawOf(const Detection& detection, const Model& model);
 
-/// Nothing for a flawed detection, or one that leaves no pixel in the image.
+/// Returns nothing for a flawed detection, or for one that leaves no pixel in the image. `width`,
+/// `height`: of the image, px.
 std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
                                              double width, double height, const BoxParameters& box,
                                              const ClutterParameters& clutter);
 
-/// What primed answers say: log-likelihood ratios by the model's class, by the track asked for.
+/// Top-down answers of the network: log-likelihood ratios by class of the model, for each track
+/// that was asked for.
 using TopDownAnswers = std::map<ObjectId, std::vector<double>>;
-/// Of one answer, clamped; nothing where it is not usable.
+/// Returns the ratios of one answer, clamped; nothing if it is not usable.
 std::optional<std::vector<double>> topDownRatios(const Detection& detection, const Model& model,
                                                  const ClutterParameters& clutter);
 
-/// The class that the network sees in it; "" where it is more like clutter than like any.
+/// Returns the class that the network prefers; "" if clutter is more likely than every class.
 std::string classSeenIn(const BoxDetection& detection, const Model& model);
 
-/// That a thing of no known class looks like one of a known class: `prior` is the share of such
-/// things, `lookalike_nats` the nats by which its looks resembled one.
+/// Returns the probability that an *other* object resembles a known class. `prior`: the share of
+/// such objects. `lookalike_nats`: the nats by which its observations resembled a known class.
 double lookalikeProbability(double prior, double lookalike_nats);
 
-/// log g_k; classes that the model does not know are seen as "other". `lookalike_nats`: nats by
-/// which its earlier looks resembled a known class, if it is of none (a toy looks like a car
-/// whenever it is looked at).
+/// Returns log g_k. A class that the model does not know is scored as *other*. `lookalike_nats`:
+/// the nats by which earlier observations of an *other* object resembled a known class. (A toy car
+/// resembles a car in every observation.)
 double logRatio(const BoxDetection& detection, const Model& model, const std::string& class_name,
                 double lookalike_nats = 0.0);
 

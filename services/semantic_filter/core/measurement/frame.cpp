@@ -6,7 +6,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-constexpr double kNever = 1e9;  // a change of view that never counts
+constexpr double kNever = 1e9;  // a scale that makes a view change count nothing
 
 }  // namespace
 

@@ -1,4 +1,5 @@
-// Everything about one image that the filter needs: input, view, pose error, learned errors.
+// Everything that the filter needs about one image: input, view, pose error, learned noise scales,
+// and the keyframes taken from it. Derivation: tools/docs/maths/pose_error.md.
 #pragma once
 
 #include <map>
@@ -15,43 +16,44 @@
 
 namespace perdure::semantic_filter {
 
-/// The error of the body's pose at one frame, [θ, p].
+/// Error of the body's pose at one frame, [θ, p] (rad, m).
 struct PoseError {
   Matrix6d covariance = Matrix6d::Zero();
-  /// Product of the transitions of all frames so far: an track that was brought up to date at
-  /// product A has at product B the cross-covariance C (B A⁻¹)ᵀ.
+  /// Product of the transitions of all frames so far. A track updated at product A has the
+  /// cross-covariance C (B A⁻¹)ᵀ at product B.
   Matrix6d product = Matrix6d::Identity();
 };
 
-/// A landmark in the image: what stands between the camera and an track, or behind it.
+/// A landmark in the image. It lies before or behind an object.
 struct LandmarkDepth {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double distance_m = 0.0;
   double sigma_m = 0.0;
 };
 
-/// One image's worth of input. Without `boxes` it is no evidence; with an empty list it is.
+/// The input of one frame. Without `boxes` it carries no information; an empty list is a miss of
+/// every visible track.
 struct FrameInput {
   FrameStamp stamp;
   View view;
   PoseError pose_error;
-  std::vector<LandmarkDepth> points;  ///< landmarks seen in this image
+  std::vector<LandmarkDepth> points;  ///< landmarks in this image
   std::optional<std::vector<BoxDetection>> boxes;
-  TopDownAnswers top_down = {};  ///< where predictions were asked for and no box met them
-  Model model;                   ///< that the boxes' classes refer to
+  TopDownAnswers top_down = {};  ///< for predictions that no box met
+  Model model;                   ///< the classes of the boxes refer to it
 };
 
-/// Of the boxes of one network and their azimuths, beside what is assumed of them.
+/// Noise scales of the boxes and azimuths of one network.
 struct NoiseScale {
   std::uint64_t model = 0;
-  double noise = 1.0;    ///< of the sides' variances: NoiseScales::ratio
-  double azimuth = 1.0;  ///< of the azimuths'; heard by fits of many looks alone
-  /// The same of b. What the looks at one thing have in common passes for its place and size: what
-  /// is left over of fits tells of b by half only, as networks go.
+  double noise = 1.0;    ///< of the variances of the sides: NoiseScales::ratio
+  double azimuth = 1.0;  ///< of the variances of the azimuths; only batch estimates use it
+  /// The same for b. An error that all boxes of an object share looks like an error of its place
+  /// and size. So residuals show the scale of b by its square root only.
   double lasting() const { return std::sqrt(noise); }
 };
 
-/// From where a frame's looks were taken; shared by all of them, and owner of its camera.
+/// The viewpoint of a frame. All keyframes of the frame share it. It owns its camera.
 struct FrameView {
   FrameView(const View& of, const PoseError& pose_error, TimePoint at,
             std::shared_ptr<const BoxStyles> of_model, NoiseScale scale = {})
@@ -76,56 +78,55 @@ struct FrameView {
   TimePoint time;
   RigidTransform T_WC;
   Projector projector;
-  std::shared_ptr<const BoxStyles> styles;  ///< of the network that looked
-  NoiseScale noise_scale;                   ///< of its boxes, as they were thought to be
+  std::shared_ptr<const BoxStyles> styles;  ///< of the network that made the boxes
+  NoiseScale noise_scale;                   ///< of its boxes, as estimated then
 };
 
-/// One box that was surely the track's.
+/// An observation with an assigned box that is kept for the batch estimate.
 struct Keyframe {
   std::shared_ptr<const FrameView> from;
   BoxMeasurement z;
-  std::array<bool, 4> hidden{};  ///< sides that something nearer hides
+  std::array<bool, 4> hidden{};  ///< sides that a nearer object hides
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
 };
 
-/// Everything about one frame that scoring, updating and birth need.
+/// Everything about one frame that scoring, updating and initiation need.
 struct FrameContext {
   View view;
   PoseError pose_error;
   const Model* model = nullptr;
   const ClassPriors* priors = nullptr;
   const Parameters* parameters = nullptr;
-  std::shared_ptr<const FrameView> frame_view = {};  ///< of this frame, for what is remembered
+  std::shared_ptr<const FrameView> frame_view = {};  ///< of this frame, for its keyframes
   NoiseScale noise_scale = {};
-  std::shared_ptr<const GroundSurface> ground =
-      {};  ///< before this frame; none: nothing is known of it
+  std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
 
-  /// Of `view`.
+  /// Returns the projector that belongs to `view`.
   Projector projector() const;
-  /// How the network draws its boxes about things of a class, as projectObserved takes it.
+  /// Returns how the network draws boxes around objects of a class, for projectObserved.
   const BoxStyle& styleOf(const std::string& class_name) const {
     static const BoxStyle plain;
     return model ? model->styles->of(class_name) : plain;
   }
 };
 
-/// What changes at an track as the view of it changes, and goes back to where it began.
+/// What a view change alters at a track: b and detectability return to their stationary values.
 struct ViewWalk {
   RigidTransform T_WC;  ///< the new view
-  double focal = 1.0;   ///< pixels
-  SideError lasting;    ///< of b, stationary
+  double focal = 1.0;   ///< px
+  SideError lasting;    ///< stationary deviation of b
   ViewScales bias{1, 1, 1};
-  double unmapped_occluder = 0.0;  ///< Track::unmapped_occluder, stationary
-  double hard_to_detect = 0.0;     ///< Track::hard_to_detect, stationary
+  double unmapped_occluder = 0.0;  ///< stationary value of Track::unmapped_occluder
+  double hard_to_detect = 0.0;     ///< stationary value of Track::hard_to_detect
   ViewScales screen{1, 1, 1};
 };
 
-/// Changes of view after which the detector bias has fallen to 1/e.
+/// Returns the view changes after which the detector bias has fallen to 1/e.
 ViewScales biasScales(const BoxParameters& box);
-/// Changes of view after which what hides a thing, or makes the network miss it, is another.
+/// Returns the view changes after which detectability no longer correlates.
 ViewScales detectabilityScales(const VisibilityParameters& visibility);
-/// What changes at an track with the view of this frame.
+/// Returns what the view of this frame alters at a track.
 ViewWalk viewWalkOf(const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

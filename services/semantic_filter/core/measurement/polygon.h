@@ -1,4 +1,5 @@
-// Convex polygons in a plane: hull, area and cutting, for outlines in the image and footprints.
+// Convex polygons in a plane: hull, area and clipping, for outlines in the image and for footprints
+// (Andrew's monotone chain; Sutherland and Hodgman's clipping).
 #pragma once
 
 #include <Eigen/Core>
@@ -7,19 +8,18 @@
 
 namespace perdure::semantic_filter {
 
-/// Of points: the images of a shape's corners, or of a cuboid's and of its edges' cuts by the near
-/// plane.
+/// Most points of an outline: corners of a shape, or corners of a cuboid and cuts of its edges by
+/// the near plane.
 inline constexpr std::size_t kMostOutline = 24;
-/// With room for the points that cutting at the four borders of an image adds.
+/// Has room for the points that clipping at the four image borders adds.
 using Polygon = InplaceVector<Eigen::Vector2d, kMostOutline + 8>;
 
-/// Twice the signed area of the triangle o, a, b.
+/// Returns twice the signed area of the triangle o, a, b.
 double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Vector2d& b);
-/// Convex hull by Andrew's monotone chain, counter-clockwise where y points up. Empty where a point
-/// is not finite.
+/// Returns the convex hull, counter-clockwise if y points up. It is empty if a point is not finite.
 Polygon convexHull(Polygon points);
 double polygonArea(const Polygon& polygon);
-/// The part of a convex polygon with coordinate `axis` >= at (or <= at), by Sutherland-Hodgman.
+/// Returns the part of a convex polygon with coordinate `axis` >= at (or <= at).
 Polygon clip(const Polygon& polygon, int axis, double at, bool keep_greater);
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,4 @@
-// From where a scene is seen.
+// The camera, pose and gravity of one view. Derivation: tools/docs/maths/cuboid_projection.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +7,7 @@
 
 namespace perdure::semantic_filter {
 
-/// From where the scene is seen: everything that a projection needs.
+/// Everything that a projection needs.
 struct View {
   const CameraModel* camera = nullptr;
   RigidTransform T_WB;
@@ -16,17 +16,18 @@ struct View {
   RigidTransform T_WC() const { return T_WB * camera->T_BC(); }
 };
 
-/// A view with what all projections from it share; a View where there is but one.
+/// A view with the matrices that all projections from it share. It converts from a View, for a
+/// single projection.
 struct Projector {
   Projector(const View& view);  // NOLINT(google-explicit-constructor)
 
   const CameraModel* camera;
   RigidTransform T_WC;
   Eigen::Matrix3d R_CW, R_BC;
-  Eigen::Matrix3d R_WL;  ///< from W turned so that z is against gravity
+  Eigen::Matrix3d R_WL;  ///< R_WL: L is W turned so that its z axis is against gravity
 };
 
-/// R_WO of an upright cuboid.
+/// Returns R_WO of an upright cuboid.
 Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
 
 }  // namespace perdure::semantic_filter

@@ -7,13 +7,13 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kPatience_s = 1.0;       // for an answer
-constexpr double kAgain_s = 0.5;          // between questions whether what waits is on the disk
-constexpr double kStepShare = 1.0 / 3.0;  // of the margin: way between questions
+constexpr double kPatience_s = 1.0;  // wait for an answer
+constexpr double kAgain_s = 0.5;     // between two questions whether waiting tracks are on disk
+constexpr double kStepShare = 1.0 / 3.0;        // of the margin: distance between two questions
 constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
-/// It is on the map, or will be with the next commit. One whose place beside the body is no longer
-/// known is no claim now, and yet what the map has of it is worth keeping.
+/// The map has it, or will have it with the next commit. A track that is not confirmed now because
+/// its place relative to the body is too uncertain is still worth keeping as the map has it.
 bool onTheMap(const Track& track) {
   return track.life.confirmed || (track.life.once_confirmed && track.existence >= 0.5);
 }
@@ -22,7 +22,7 @@ bool mayMove(const Track& track, double min_speed) {
   return movingProbability(track, min_speed) > 0.5;
 }
 
-/// Half of what it extends: an track is near when any of it is.
+/// Half of the largest side: a track is near when any part of it is near.
 double extentOf(const Track& track) {
   return 0.5 * track.best().x.segment<3>(kSize).array().exp().maxCoeff();
 }
@@ -79,7 +79,7 @@ std::optional<Archive::Question> Archive::ask(const Eigen::Vector3d& p_WB, TimeP
     ++unanswered_;
     return open_;
   }
-  // What comes near before the next question is answered is asked for as well.
+  // Also asks for what comes near before the next question is answered.
   open_ = {++requests_, p_WB, parameters_.recall_m + kStepShare * parameters_.margin_m};
   return open_;
 }

@@ -11,7 +11,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kOutlier = 25.0;      // squared deviations of a box
-constexpr double kSignificant = 12.0;  // squared deviations of four numbers: 1 in 58
+constexpr double kSignificant = 12.0;  // squared deviations of four numbers: 1 in 58 by chance
 
 /// d[θ, p] by d[yaw, p].
 Eigen::Matrix<double, 6, 4> level(const RigidTransform& T_MB) {
@@ -91,7 +91,7 @@ std::optional<PoseCorrection> DriftEstimator::correct(const RigidTransform& T_MB
     return std::nullopt;
   }
   const Eigen::Matrix<double, 6, 4> G = level(T_MB);
-  Matrix6d tilt = Matrix6d::Identity();  // what is no yaw stays as it is
+  Matrix6d tilt = Matrix6d::Identity();  // keeps the part that is not yaw
   tilt.topLeftCorner<3, 3>() -= G.topLeftCorner<3, 1>() * G.topLeftCorner<3, 1>().transpose();
   tilt.bottomRightCorner<3, 3>().setZero();
   PoseCorrection correction;

@@ -1,7 +1,9 @@
-// How far odometry has wandered since the map was made: things that come back into the picture from
-// an earlier visit stand where they stood, and what their boxes are off by together is the pose's
-// error (DESIGN 5, item 13: T_MW within one epoch). The filter itself only considers that error
-// (item 2); where it is significant it is taken out at once, in yaw and position.
+// Map-relative drift T_MW: the error of odometry that returning objects show (ours; the consider
+// filter is Schmidt 1966). Derivation: tools/docs/maths/map_relative_drift.md.
+//
+// An object that returns from an earlier visit stands where it stood. What the boxes of such
+// objects are off by together is the pose error. The filter only considers that error; here it is
+// estimated in yaw and position. It is removed at once where it is significant.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,48 +18,48 @@ namespace perdure::semantic_filter {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// Of the pose's error g = [θ, p], true against said: log-likelihood pullᵀ g - ½ gᵀ information g.
+/// Log-likelihood of the pose error g = [θ, p], true minus assumed: pullᵀ g - ½ gᵀ information g.
 struct DriftMeasurement {
   Matrix6d information = Matrix6d::Zero();
   Vector6d pull = Vector6d::Zero();
 };
 
-/// What the box of a known thing says of the pose it is seen from, given what the thing's place has
-/// in common with that pose's error. `h` and `predicted` are of before the measurement. Nothing
-/// where no side can be compared, or the box is an outlier.
+/// Returns what the box of a known object says of the pose error, given what the object's place
+/// shares with that error. `h` and `predicted` are from before the update. Returns nothing if no
+/// side can be compared, or if the box is an outlier.
 std::optional<DriftMeasurement> driftMeasurement(const Hypothesis& h, const ProjectedBox& predicted,
                                                  const BoxMeasurement& z,
                                                  const std::array<bool, 4>& hidden,
                                                  const Matrix6d& P_pose);
 
-/// The pose is better known from one frame on.
+/// A correction of the pose from one frame on.
 struct PoseCorrection {
-  RigidTransform step;                ///< T_M'M: poses in M, times this from the left
-  Vector6d error = Vector6d::Zero();  ///< the estimate of g that is taken out
-  Matrix6d before, after;             ///< covariance of the pose's error
+  RigidTransform step;                ///< T_M'M: multiplies poses in M from the left
+  Vector6d error = Vector6d::Zero();  ///< the estimate of g that is removed
+  Matrix6d before, after;             ///< covariances of the pose error
 };
 
 class DriftEstimator {
  public:
   explicit DriftEstimator(const DriftParameters& parameters) : parameters_(parameters) {}
 
-  /// The body went on; its pose's error walks by so much for each metre, rad/√m and m/√m.
+  /// The body moved; the pose error walks by rad/√m and m/√m.
   void predict(const RigidTransform& from, const RigidTransform& to, double rotation_walk,
                double position_walk);
-  /// KeyframeBatch at things of earlier visits, from T_MB.
+  /// Adds measurements of returning objects, made from T_MB.
   void add(const std::vector<DriftMeasurement>& measurements, const RigidTransform& T_MB);
-  /// Where the error is significant and worth it: it is taken out, and no longer in here.
+  /// Removes the error and returns it, if it is significant and large enough.
   std::optional<PoseCorrection> correct(const RigidTransform& T_MB, const PoseError& pose_error);
 
  private:
   DriftParameters parameters_;
   Eigen::Vector4d g_ = Eigen::Vector4d::Zero();  ///< [yaw about gravity, p]
   Eigen::Matrix4d P_ = Eigen::Matrix4d::Zero();
-  std::size_t things_ = 0;  ///< heard since the last correction
+  std::size_t things_ = 0;  ///< number of measurements since the last correction
 };
 
-/// Its place as the corrected pose has it, as far as it hangs together with that pose's error.
-/// `pose_error` is of before the correction.
+/// Moves the track to its place under the corrected pose, as far as it is correlated with the pose
+/// error. `pose_error` is from before the correction.
 void applyCorrection(Track& track, const PoseCorrection& correction, const PoseError& pose_error);
 
 }  // namespace perdure::semantic_filter

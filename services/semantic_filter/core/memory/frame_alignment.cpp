@@ -14,7 +14,7 @@ Eigen::Matrix4d rotated(const Eigen::Matrix4d& covariance, const Eigen::Matrix3d
   return G * covariance * G.transpose();
 }
 
-/// d[p_W, yaw_W] of a thing at `arm` (W, from the middle) by d[middle, yaw].
+/// d[p_W, yaw_W] of an object at `arm` (in W, from the middle) by d[middle, yaw].
 Eigen::Matrix4d jacobianAt(const Eigen::Vector3d& arm) {
   Eigen::Matrix4d J = Eigen::Matrix4d::Identity();
   J(0, 3) = -arm.y();

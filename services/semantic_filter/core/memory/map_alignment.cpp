@@ -14,16 +14,19 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kNearest_m = 4.0, kFarthest_m = 60.0;  // of a pair that proposes
-constexpr double kGate = 3.0;                           // deviations
-constexpr double kStreet_m = 6.0;  // within which things of a street stand by chance
+// m, between the objects of a proposing pair
+constexpr double kNearest_m = 4.0, kFarthest_m = 60.0;
+constexpr double kGate = 3.0;  // deviations
+// deviation of the chance density of objects around those of the map
+constexpr double kStreet_m = 6.0;
 constexpr std::size_t kMostSeen = 32;
 constexpr std::size_t kMostVotes = 50'000;
 constexpr std::size_t kCandidates = 48;
 constexpr double kCell_m = 3.0, kCell_rad = 5.0 * kPi / 180.0;
-constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;  // what is another way
+// beyond this, an alignment is another one
+constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
-constexpr double kDefaultShare = 1e-3;  // of a class that one of two PMFs does not name
+constexpr double kDefaultShare = 1e-3;  // of a class that one of the two PMFs does not name
 
 double shareOf(const std::vector<ClassNumber>& pmf, const std::string& name) {
   for (const auto& c : pmf)
@@ -37,7 +40,7 @@ const std::string& mostProbable(const PlacedThing& thing) {
       ->name;
 }
 
-/// log of p(one thing has both PMFs) against p(two things have them).
+/// log of p(one object has both PMFs) against p(two objects have them).
 double logSameClass(const PlacedThing& a, const PlacedThing& b,
                     const std::vector<ClassNumber>& common) {
   double ratio = kDefaultShare;
@@ -47,7 +50,7 @@ double logSameClass(const PlacedThing& a, const PlacedThing& b,
   return std::log(ratio);
 }
 
-/// Of a yaw that is known modulo 180°, against any.
+/// log-likelihood ratio of a yaw known modulo 180°, against any yaw.
 double logSameYaw(double difference, double variance) {
   const double d = wrapHalfTurn(difference);
   double density = 0.0;
@@ -131,7 +134,7 @@ class MapAlignment::Search {
   using PairRange = std::pair<std::vector<Pair>::const_iterator, std::vector<Pair>::const_iterator>;
   struct SeenPair {
     std::size_t a, b;
-    PairRange range;  ///< of the map's that may be it
+    PairRange range;  ///< pairs of the map that may be the same
   };
   struct Cell {
     double votes = 0.0;
@@ -143,7 +146,7 @@ class MapAlignment::Search {
     return 0.5 * thing.covariance.topLeftCorner<2, 2>().trace();
   }
 
-  /// Pairs of seen things, those that few of the map's are like first.
+  /// Pairs of seen objects; those that resemble fewest pairs of the map come first.
   std::vector<SeenPair> seenPairs() const {
     std::vector<SeenPair> all;
     for (std::size_t a = 0; a < seen_.size(); ++a) {
@@ -168,7 +171,7 @@ class MapAlignment::Search {
     return all;
   }
 
-  /// Whether the yaws of a seen thing and of one on the map allow that turn.
+  /// Whether the yaws of a seen object and of one on the map allow this turn.
   bool yawsAgree(const PlacedThing& seen, const PlacedThing& thing, double turn) const {
     const double deviation = std::sqrt(seen.covariance(3, 3) + thing.covariance(3, 3));
     return std::abs(wrapHalfTurn(seen.yaw - thing.yaw - turn)) < kGate * deviation + 0.05;
@@ -223,7 +226,7 @@ class MapAlignment::Search {
            bits((turn + kPi) / kCell_rad) << 40;
   }
 
-  /// Of the map's middle, where things stand as high as those of their class on the map.
+  /// Height of the map's middle at which objects stand as high as those of their class on the map.
   double height(const LevelPose& x) const {
     std::vector<double> heights;
     for (const PlacedThing& seen : seen_) {
@@ -242,13 +245,13 @@ class MapAlignment::Search {
   }
 
   struct Likelihood {
-    double of_map = 0.0;     ///< that it is a thing of the map, by which
-    double by_chance = 0.0;  ///< that a thing stands there as things do on that map
+    double of_map = 0.0;     ///< density if it is an object of the map
+    double by_chance = 0.0;  ///< density of an object there by chance
     std::size_t thing = 0;
     double of_thing = 0.0;
   };
 
-  /// Densities on the ground, of where the thing is seen, times their number. `blur`: m.
+  /// Densities of the object's place on the ground, m⁻². `blur`: m.
   Likelihood likelihoodOf(std::size_t i, const LevelPose& x, double blur) const {
     const PlacedThing& seen = seen_[i];
     const Eigen::Matrix3d R = rotationAboutZ(x[3]);
@@ -284,7 +287,7 @@ class MapAlignment::Search {
     return l;
   }
 
-  /// Thing of the map that the seen one most likely is, and with what probability.
+  /// The most probable map object of a seen one, and its probability.
   std::pair<std::size_t, double> matchOf(std::size_t i, const LevelPose& x, double blur) const {
     const Likelihood l = likelihoodOf(i, x, blur);
     const double w = map_.parameters_.known_share;
@@ -292,8 +295,8 @@ class MapAlignment::Search {
     return {l.thing, w * l.of_thing / all};
   }
 
-  /// Things of the map by the seen one that each surely is. Of two that would be one neither is:
-  /// they may as well be neighbours.
+  /// Map objects, each with the seen object that it surely is. If two seen objects match one map
+  /// object, neither makes a pair: they may be neighbours.
   std::map<std::size_t, std::size_t> surePairs(const LevelPose& x) const {
     std::map<std::size_t, std::size_t> pairs;
     std::set<std::size_t> twice;
@@ -318,7 +321,8 @@ class MapAlignment::Search {
   LevelPose settled(LevelPose x) const {
     for (const double blur : {2.0, 1.0, 0.5, 0.2, 0.0, 0.0}) {
       AlignmentEquations equations;
-      equations.information.diagonal() << 1e-2, 1e-2, 1e-2, 1e-1;  // it stays about where it is
+      // a weak prior at the present estimate
+      equations.information.diagonal() << 1e-2, 1e-2, 1e-2, 1e-1;
       for (std::size_t i = 0; i < seen_.size(); ++i) {
         const auto [thing, share] = matchOf(i, x, blur);
         if (share < 0.1) continue;
@@ -331,12 +335,12 @@ class MapAlignment::Search {
     return x;
   }
 
-  /// Things for each square metre where the map has none: as one in a disc of 100 m.
+  /// m⁻²; density where the map has no objects: one in a disc of 100 m radius.
   static constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 
   const MapAlignment& map_;
   std::vector<PlacedThing> seen_;
-  std::vector<double> same_class_;  ///< log, by seen and remembered
+  std::vector<double> same_class_;  ///< log ratios, by seen and map object
 };
 
 std::optional<FrameAlignment> MapAlignment::best(const std::vector<PlacedThing>& seen) const {

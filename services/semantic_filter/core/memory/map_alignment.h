@@ -1,7 +1,9 @@
-// Where a map lies in another frame of reference: what is seen now, laid over what is remembered
-// (DESIGN 5, item 13: T_MW). Both frames are level, so that yaw and position are sought. Pairs of
-// things propose, the likelihood of all that is seen decides, and only what stands out from every
-// other way to lay the one over the other is believed.
+// Map alignment: where a stored map lies in another frame of reference (ours). Derivation:
+// tools/docs/maths/map_alignment.md.
+//
+// Both frames are level, so yaw and position are sought. Pairs of objects propose alignments, and
+// the likelihood of all that is seen decides. An alignment is accepted only if it is clearly better
+// than every other one.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,16 +18,16 @@
 
 namespace perdure::semantic_filter {
 
-/// Remembered things, laid out to be compared with many views.
+/// The objects of a map, prepared for comparison with many views.
 class MapAlignment {
  public:
   MapAlignment(std::vector<PlacedThing> remembered, const AlignmentParameters& parameters);
 
-  /// Nothing where too little is seen, it fits nowhere, or in more than one way.
+  /// Returns nothing if too little is seen, or if it fits nowhere or in more than one way.
   std::optional<FrameAlignment> align(const std::vector<PlacedThing>& seen) const;
 
-  /// The best way to lay `seen` over the map and the best other one, whether they are believed or
-  /// not; for tests and figures.
+  /// Returns the best alignment, whether accepted or not, with the score of the best other one. For
+  /// tests and figures.
   std::optional<FrameAlignment> best(const std::vector<PlacedThing>& seen) const;
 
   std::size_t size() const { return things_.size(); }
@@ -39,8 +41,8 @@ class MapAlignment {
   std::vector<PlacedThing> things_;
   AlignmentParameters parameters_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
-  std::vector<ClassNumber> common_;                                         ///< mean PMF
-  std::map<std::pair<std::string, std::string>, std::vector<Pair>> pairs_;  ///< by distance
+  std::vector<ClassNumber> common_;                                         ///< mean PMF of the map
+  std::map<std::pair<std::string, std::string>, std::vector<Pair>> pairs_;  ///< sorted by distance
 };
 
 }  // namespace perdure::semantic_filter

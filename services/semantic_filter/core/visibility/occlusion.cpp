@@ -12,21 +12,22 @@ namespace perdure::semantic_filter {
 namespace {
 
 struct Cell {
-  double transmittance = 1.0;              ///< probability that nothing nearer stands here
-  double distance_m = 0.0, sigma_m = 0.0;  ///< of the blocker that hides most
+  double transmittance = 1.0;              ///< probability that nothing nearer is here
+  double distance_m = 0.0, sigma_m = 0.0;  ///< of the most solid occluder
   double strongest = 0.0;
   ObjectId blocker = 0;
 };
 
-/// Cells side by side in a row; x and y of the centre of the first one.
+/// Adjacent cells of a row; x and y (px) are the centre of the first one.
 struct Span {
   std::size_t first;
   int cells;
   double x, y;
 };
 
-/// Its cells are kept from one painting to the next, of other grids too: to clear them all, or to
-/// make them anew, costs more than to use some. Most are blank, and are told by their stamps alone.
+/// A grid of cells that is reused for every painting, also of other grids: to clear or to allocate
+/// all cells costs more than to use a few. A stamp for each cell tells whether it belongs to the
+/// present painting. Most cells stay blank.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {
@@ -41,7 +42,7 @@ class DepthBuffer {
     }
   }
 
-  /// Nothing where nothing was painted.
+  /// Returns nullptr if nothing was painted in the cell.
   const Cell* find(std::size_t i) const { return painted_[i] == painting_ ? &cells_[i] : nullptr; }
   Cell& at(std::size_t i) {
     if (std::exchange(painted_[i], painting_) != painting_) cells_[i] = {};
@@ -49,8 +50,8 @@ class DepthBuffer {
   }
   double cell() const { return cell_; }
 
-  /// Cells side by side whose centres lie in the polygon, row by row; at least one cell of a
-  /// polygon that is smaller than the grid. Until this is asked again.
+  /// Returns the cells whose centres lie in the polygon, row by row. A polygon smaller than a cell
+  /// gets at least one. The result is valid until the next call.
   const std::vector<Span>& spansOf(const Polygon& hull) {
     spans_.clear();
     if (hull.empty()) return spans_;
@@ -90,7 +91,7 @@ class DepthBuffer {
   std::size_t indexOf(int row, int column) const {
     return static_cast<std::size_t>(row) * columns_ + column;
   }
-  /// Puts the line from a to b into the edges of the rows whose centres it crosses.
+  /// Enters the line from a to b into the edges of the rows whose centres it crosses.
   void cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, int top) {
     const double low = std::min(a.y(), b.y()), high = std::max(a.y(), b.y());
     if (!(low < high)) return;
@@ -109,22 +110,22 @@ class DepthBuffer {
   double cell_ = 1.0;
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
-  std::vector<std::uint32_t> painted_;  ///< which painting each cell is of
+  std::vector<std::uint32_t> painted_;  ///< the painting that each cell belongs to
   std::uint32_t painting_ = 0;
   std::vector<Span> spans_;
-  std::vector<Edges> edges_;  ///< of a polygon, by row
+  std::vector<Edges> edges_;  ///< of a polygon, for each row
 };
 
-/// P(the blocker in the cell stands nearer than the track).
+/// Returns the probability that the occluder in the cell is nearer than the object.
 double nearer(const Cell& cell, const Outline& o) {
   const double sigma = std::hypot(cell.sigma_m, o.depth_sigma_m) + 1e-3;
   return 0.5 * std::erfc((cell.distance_m - o.distance_m) / (std::sqrt(2.0) * sigma));
 }
 
-/// What an track's cells hold of one that may hide it.
+/// How much one occluder hides in the cells of an object.
 struct Blocked {
   ObjectId by;
-  double nearer;  ///< probability that this stands nearer than the track
+  double nearer;  ///< probability that the occluder is nearer than the object
   double hidden = 0.0;
 };
 
@@ -132,7 +133,8 @@ class Blockers {
  public:
   explicit Blockers(const Outline& outline) : o_(outline) {}
 
-  /// Few hide one thing, and cells side by side mostly show the same.
+  /// Searches from the newest: few occluders hide one object, and adjacent cells usually have the
+  /// same.
   Blocked& of(const Cell& cell) {
     for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
       if (b->by == cell.blocker) return *b;
@@ -154,10 +156,10 @@ struct Tally {
     inner = {s[0] + band_x, s[1] + band_y, s[2] - band_x, s[3] - band_y};
   }
 
-  /// A row of cells that nothing hides as yet.
+  /// Adds a row of cells as if nothing hid them.
   void add(const Span& span, double cell_px) {
     const double cells = span.cells;
-    const auto upTo = [&](double limit) {  // cells with a centre below it
+    const auto upTo = [&](double limit) {  // number of cells whose centre is below it
       return std::clamp(std::ceil((limit - span.x) / cell_px), 0.0, cells);
     };
     total += cells;
@@ -166,7 +168,7 @@ struct Tally {
     if (span.y < inner[1]) side_total[1] += cells;
     if (span.y > inner[3]) side_total[3] += cells;
   }
-  /// One of them, which something was painted in.
+  /// Adds the hidden share of a painted cell of such a row.
   void hide(const Cell& cell, double x, double y) {
     Blocked& blocked = blockers.of(cell);
     const double share = (1.0 - cell.transmittance) * blocked.nearer;
@@ -195,8 +197,8 @@ void paint(Cell& cell, const Outline& o) {
   cell.transmittance *= 1.0 - o.solidity;
 }
 
-/// Share of the outline's landmarks that stand in front of the track (nearer than its surface);
-/// those seen through it speak against (paper, line 190: the co-visibility cue).
+/// Returns the share of the outline's landmarks that lie before the surface of the object.
+/// Landmarks seen at or through it count against (paper, line 190: the co-visibility cue).
 double hiddenByPoints(const Outline& o, const Polygon& hull,
                       const std::vector<LandmarkDepth>& points) {
   double before = 0.0, through = 0.0;
@@ -210,7 +212,8 @@ double hiddenByPoints(const Outline& o, const Polygon& hull,
     const double margin = 2.0 * std::hypot(p.sigma_m, o.depth_sigma_m) + 0.1 * surface;
     (p.distance_m < surface - margin ? before : through) += 1.0;
   }
-  return before / (before + through + 3.0);  // three pseudo-points of "free" keep a few from ruling
+  // three free pseudo-landmarks, so that a few cannot decide
+  return before / (before + through + 3.0);
 }
 
 TrackVisibility classify(const Tally& tally, double in_image, double by_points,
@@ -258,7 +261,7 @@ Outline outlineOf(const Track& track, const State& x, const Projector& from, con
 
 namespace {
 
-/// What the image shows of an outline, and its share of the whole.
+/// The part of an outline that lies in the image, and its share of the whole.
 struct InImage {
   Polygon inside;
   double share;

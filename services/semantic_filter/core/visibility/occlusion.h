@@ -1,5 +1,6 @@
-// See: which tracks the camera can see now, by a coarse depth buffer of cuboids painted nearest
-// first (DESIGN 5, item 3; the paper's π that must take occlusions into account, line 182).
+// Visible fraction of each track, from a coarse depth buffer of outlines, nearest first (the
+// paper's π that must take occlusions into account, line 182). Derivation:
+// tools/docs/maths/visibility.md.
 #pragma once
 
 #include <array>
@@ -11,10 +12,10 @@
 
 namespace perdure::semantic_filter {
 
-/// One track as the depth buffer wants it.
+/// One track, as the depth buffer takes it.
 struct Outline {
   ObjectId id = 0;
-  double solidity = 0.0;       ///< probability that it is there and hides what is behind it
+  double solidity = 0.0;       ///< probability that the object is there and hides what is behind it
   double distance_m = 0.0;     ///< from the camera to the centre
   double depth_sigma_m = 0.0;  ///< standard deviation of that distance
   double extent_m = 0.0;       ///< half of the cuboid's largest side
@@ -23,24 +24,22 @@ struct Outline {
 
 struct TrackVisibility {
   Visibility state = Visibility::kBehind;
-  double fraction = 0.0;  ///< v; exactly 0 where a frame says nothing about the track
+  double fraction = 0.0;  ///< v; exactly 0 where a frame changes nothing about the track
   double residual_fraction =
-      0.0;  ///< what is to be seen of one whose v is 0, less than visibility.minimum
+      0.0;  ///< visible fraction of a track whose v is 0; below visibility.minimum
   ObjectId blocked_by = 0;
-  std::array<bool, 4> hidden_sides{};  ///< sides (x1, y1, x2, y2) that lie behind a nearer track
+  std::array<bool, 4> hidden_sides{};  ///< sides (x1, y1, x2, y2) that a nearer object hides
 };
 
-/// Of the track in its cuboid `x`, as it is seen `from` there.
+/// Returns the outline of the track's cuboid `x` in the view `from`.
 Outline outlineOf(const Track& track, const State& x, const Projector& from,
                   const Shape& shape = cuboidShape());
 
-/// TrackVisibility::fraction of the first outline as `see` gives it, without landmarks and for any
-/// minimum: what nothing nearer hides of it.
+/// Returns the visible fraction of the first outline, without landmarks and without a minimum.
 double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
                     const VisibilityParameters& parameters);
 
-/// One TrackVisibility for each outline, in the same order; `width`, `height` of the image in
-/// pixels.
+/// Returns the visibility of each outline, in the same order. `width`, `height`: of the image, px.
 std::vector<TrackVisibility> computeVisibility(const std::vector<Outline>& outlines,
                                                const std::vector<LandmarkDepth>& points,
                                                double width, double height,

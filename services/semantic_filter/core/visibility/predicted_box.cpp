@@ -9,10 +9,10 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not primed
-constexpr double kFastest = 1e5;           // pixels a second; what is faster passes the lens
-constexpr double kLeastSigma = 1;          // pixels
-constexpr double kFarthest = 1e5;          // pixels; a side beyond is of a thing beside the camera
+constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not asked
+constexpr double kFastest = 1e5;           // px/s; a faster side passes close to the lens
+constexpr double kLeastSigma = 1;          // px
+constexpr double kFarthest = 1e5;  // px; a side further away is of an object beside the camera
 
 }  // namespace
 

@@ -1,5 +1,6 @@
-// Where tracks should be seen: what primes inference (eq. 7: b = π(g s), a Gaussian in the four
-// sides of the box).
+// Predicted measurement that inference is asked about: a Gaussian in the four sides of the box
+// (paper, eq. 7: b = π(g s)). Derivation: tools/docs/maths/joint_association.md, "Top-down
+// likelihood".
 #pragma once
 
 #include <optional>
@@ -15,8 +16,9 @@ struct ComingFrame {
   double seconds = 0.0;  ///< after the present one
 };
 
-/// The box that the network should report of the track in this frame, with how its sides move
-/// towards `coming`; nothing where r·π·v is under 0.05, or nothing of it lies before the camera.
+/// Returns the box that the network should report of the track in this frame, with the velocity of
+/// its sides (px/s) towards `coming`. Returns nothing if r·π·v is below 0.05, or if nothing of the
+/// object is before the camera.
 std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming);
 

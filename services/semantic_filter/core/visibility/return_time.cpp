@@ -10,16 +10,17 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kHorizon_s = 10.0;
-constexpr double kStride_s = 0.25;        // what is in visibility for less may be passed over
-constexpr std::size_t kMostBlockers = 6;  // those next to it in the image
-constexpr double kCellsAcross = 16.0;     // of a depth buffer's cells, across a thing
-constexpr double kMayBeFound = 0.5;       // of the share below which a miss says nothing
-constexpr double kSliver = 0.01;          // share in visibility that nothing is found by
-constexpr double kNineInTen = 1.645;      // deviations of a Gaussian
+constexpr double kStride_s = 0.25;        // the object may be missed if it is visible for less
+constexpr std::size_t kMostBlockers = 6;  // those nearest to it in the image
+constexpr double kCellsAcross = 16.0;     // cells of the depth buffer across the object
+// share of the visible fraction below which a miss means nothing
+constexpr double kMayBeFound = 0.5;
+constexpr double kSliver = 0.01;      // visible fraction that is never detected
+constexpr double kNineInTen = 1.645;  // deviations of a Gaussian, for an interval of nine in ten
 
-using Walk = std::vector<View>;  // one a frame, the present one first
+using Walk = std::vector<View>;  // one view for each frame, the present one first
 
-/// `pace`: of the translation, relative.
+/// `pace`: factor on the translation.
 Walk walkOn(const View& now, const Way& way, double pace) {
   Walk walk{now};
   const RigidTransform step(way.step.q, pace * way.step.p);
@@ -41,7 +42,7 @@ const Shape& shapeOf(const Track& track, const FrameInput& now) {
   return now.model.styles->of(track.best().class_name).shape;
 }
 
-/// What may hide it on the way: solid, nearer, and next to it in the image.
+/// Returns the tracks that may hide it along the path: solid, nearer, and next to it in the image.
 std::vector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& hidden,
                                  const FrameInput& now, const VisibilityParameters& parameters) {
   const Eigen::Vector3d eye = now.view.T_WC().p;
@@ -67,14 +68,14 @@ bool apart(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
   return a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
 }
 
-/// What lies within `sides` of a convex hull's points.
+/// Returns the part of the convex hull of `points` that lies within `sides`.
 Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
   Polygon part = clip(clip(convexHull(points), 0, sides[0], true), 0, sides[2], false);
   return clip(clip(part, 1, sides[1], true), 1, sides[3], false);
 }
 
-/// Of the first of `things`, as the others leave it. Finer than a frame's own depth buffer: which
-/// frame it is hangs on a tenth of a small thing.
+/// Returns the visible fraction of the first of `things`; the others hide it. The depth buffer is
+/// finer than that of a frame, because a tenth of a small object decides which frame it is.
 double shareInSight(const std::vector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
@@ -98,15 +99,16 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
   return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
 }
 
-/// Of the first of `things`, from which on it may be found. What shows as much already and was not
-/// found is found when a miss would say that it is gone.
+/// Returns the visible fraction from which the first of `things` may be detected. If so much is
+/// visible already and it was not detected, the fraction is required at which a miss counts.
 double shareToBeFound(const std::vector<Standing>& things, const View& now,
                       const VisibilityParameters& parameters) {
   const double sure = std::max(parameters.minimum, kSliver), least = kMayBeFound * sure;
   return shareInSight(things, now, parameters) < least ? least : sure;
 }
 
-/// The first frame after the present one from which `share` of the first of `things` is seen.
+/// Returns the first frame after the present one in which the first of `things` has the visible
+/// fraction `share`.
 std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, const Walk& walk,
                                         double share, double frame_s,
                                         const VisibilityParameters& parameters) {
@@ -123,7 +125,8 @@ std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, con
   return std::nullopt;
 }
 
-/// Frames after `first` in which it is all but surely found; what shows little is found late.
+/// Returns the frames after `first` until it is almost surely detected. An object of which little
+/// is visible is detected late.
 std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, std::size_t first,
                          const VisibilityParameters& parameters) {
   constexpr double kMissed = 0.05;
@@ -135,7 +138,8 @@ std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, 
   return n - first;
 }
 
-/// By one deviation each: what moves the edges that hide it.
+/// Returns deviations of state, one standard deviation each, that move the edges which hide the
+/// object.
 std::vector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
   const StateCovariance& P = thing.track->best().P;
   const Eigen::Vector3d ray = (thing.x.head<3>() - eye).normalized();
@@ -153,8 +157,8 @@ std::vector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& ey
   return deviations;
 }
 
-/// How far the ends of the interval are from what is expected, squared. A body that slows down may
-/// not come round at all: the two ends are not alike.
+/// Squared distances of the two ends of the interval from the expected time. The ends differ: a
+/// body that slows down may not come round at all.
 struct Spread {
   Spread(double expected_s, double frame_s)
       : expected(expected_s), early(frame_s * frame_s), late(early) {}

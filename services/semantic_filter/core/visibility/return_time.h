@@ -1,5 +1,6 @@
-// When a hidden thing will be seen again, if the body goes on as it does: the other half of "knows
-// that it is hidden" (paper, line 182).
+// Reappearance time: when an occluded object is expected to be visible again if the body goes on as
+// it does (paper, line 182 and "Occlusion and Memory"; the method is ours). Derivation:
+// tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <optional>
@@ -10,27 +11,27 @@
 
 namespace perdure::semantic_filter {
 
-/// How the body goes on.
+/// How the body moves on.
 struct Way {
-  RigidTransform step;      ///< T_BB' from one frame to the next
-  double seconds = 0.0;     ///< of a step, > 0
-  double speed_walk = 0.0;  ///< m/s/√s, by which its velocity wanders
+  RigidTransform step;      ///< T_BB': motion from one frame to the next
+  double seconds = 0.0;     ///< duration of a step, > 0
+  double speed_walk = 0.0;  ///< m/s per √s, how much the velocity wanders
 };
 
 /// Seconds after the frame.
 struct ReappearanceInterval {
   double expected = 0.0;
-  double earliest = 0.0, latest = 0.0;  ///< of nine in ten
+  double earliest = 0.0, latest = 0.0;  ///< interval of nine in ten
 };
 
-/// Seconds after the frame in which `hidden`, one of `tracks` at rest, comes out from behind what
-/// hides it; nothing where it does not within ten seconds.
+/// Returns the seconds after the frame until `hidden`, one of `tracks` at rest, comes out from
+/// behind its occluders. Returns nothing if it does not within ten seconds.
 std::optional<double> expectedReappearance(const std::vector<Track>& tracks, const Track& hidden,
                                            const FrameInput& now, const Way& way,
                                            const VisibilityParameters& parameters);
 
-/// The same with an interval, at fifteen times the cost: how well it and what hides it are placed,
-/// and how the body's velocity wanders.
+/// The same with an interval, at fifteen times the cost. The interval includes the errors of the
+/// object's place, of its main occluder, and of the body's velocity.
 std::optional<ReappearanceInterval> reappearanceInterval(const std::vector<Track>& tracks,
                                                          const Track& hidden, const FrameInput& now,
                                                          const Way& way,
