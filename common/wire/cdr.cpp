@@ -6,6 +6,8 @@
 #include <bit>
 #include <cstring>
 
+#include "common/wire/absent_structs.h"
+
 namespace perdure::wire {
 namespace {
 
@@ -51,6 +53,10 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
   if (payload.size() > UINT32_MAX / 2 ||
       !dds_stream_normalize_data(bytes, &offset, size, turned, version, type.m_ops)) {
     return fail("malformed_cdr", std::string("no ") + type.m_typename);
+  }
+  if (version == kVersion2 &&
+      !structsArePresent({reinterpret_cast<const std::uint8_t*>(bytes), size}, type.m_ops)) {
+    return fail("malformed_cdr", std::string(type.m_typename) + " that lacks a struct");
   }
   std::unique_ptr<void, Free> sample(dds_alloc(type.m_size), Free{&type});
   std::memset(sample.get(), 0, type.m_size);  // what is read in would be freed otherwise

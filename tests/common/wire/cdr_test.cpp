@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include "common/wire/json.h"
 #include "tests/common/wire/examples.h"
 
@@ -52,6 +54,38 @@ TYPED_TEST(Cdr, TakesAnyBytesAndGivesAValueOrAReason) {
     if (!decoded<TypeParam>(bytes)) ++refused;
   }
   EXPECT_GT(refused, 100);
+}
+
+/// What an older writer, or one that lies about the length of its message, would send: the first
+/// `size` bytes of a delimited struct.
+template <class T>
+std::vector<std::uint8_t> shortened(std::uint32_t size) {
+  T message;
+  Examples(1).fill(message);
+  auto bytes = *encodeCdr(message);
+  constexpr std::size_t kHeads = 8;  // encapsulation and length
+  std::memcpy(bytes.data() + 4, &size, sizeof(size));
+  bytes.resize(kHeads + size);
+  return bytes;
+}
+
+// Cyclone 0.10.2 aborts where such a struct is not there.
+TEST(CdrLengths, RefusesAMessageThatEndsBeforeAStructThatMayGrow) {
+  constexpr std::uint32_t kBeforeBelief = 8 + 32 + 8 + 12;
+  for (std::uint32_t size = 0; size <= kBeforeBelief; size += 4) {
+    const auto state = decoded<ObjectState>(shortened<ObjectState>(size));
+    ASSERT_FALSE(state) << size;
+    EXPECT_EQ(state.error().code, "malformed_cdr") << size;
+  }
+}
+
+TEST(CdrLengths, ReadsAMessageThatEndsBeforeMembersThatMayBeAbsent) {
+  const auto header = decoded<MapHeader>(shortened<MapHeader>(24));
+  ASSERT_TRUE(header) << header.error().detail;
+  EXPECT_EQ(header->tiles, 0U);
+  const auto calibration = decoded<Calibration>(shortened<Calibration>(8));
+  ASSERT_TRUE(calibration) << calibration.error().detail;
+  EXPECT_FALSE(calibration->imu);
 }
 
 TYPED_TEST(Cdr, RefusesAnEncodingThatItsTypeHasNot) {
