@@ -1,5 +1,7 @@
 #include "tools/bus_tools/common.h"
 
+#include <CLI/CLI.hpp>
+
 #include "common/base/errors.h"
 #include "common/service/signals.h"
 #include "tools/bus_tools/command.h"

@@ -1,11 +1,14 @@
 // What the subcommands share: the bus's options, and waiting with an end by time or by signal.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
 
 #include "common/bus/wait_loop.h"
+
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

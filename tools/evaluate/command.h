@@ -1,7 +1,9 @@
 // `perdure evaluate {objects,trajectory,consistency}`: the metrics of the design, section 7.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

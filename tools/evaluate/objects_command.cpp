@@ -1,5 +1,6 @@
 // `perdure evaluate objects`: the nine cells and the identities, as text or JSON, against a
 // simulated folder or KITTI tracking.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
