@@ -12,6 +12,10 @@ class App;
 
 namespace perdure::tools {
 
+/// The services' configuration files: of the installation (/etc/perdure) or of config/ here.
+/// Empty where there is none.
+std::string configurationFolder();
+
 /// --interface, --domain, --vehicle, --security, --identity; what they do not say is said by
 /// bus.yaml, where the services' configuration is.
 void addBusOptions(CLI::App& command, bus::Options& options);

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "tools/evaluate/command.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/simulated_truth.h"

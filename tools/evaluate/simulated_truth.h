@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/camera/camera_model.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "common/sim/truth.h"
 #include "tools/evaluate/object_rows.h"
 #include "tools/evaluate/object_score.h"

@@ -10,8 +10,8 @@
 
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
-#include "common/replay/recorded_messages.h"
-#include "common/replay/recording_writer.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_writer.h"
 #include "common/wire/plain_twin.h"
 
 namespace perdure::tools {

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "common/base/errors.h"
-#include "common/bus/identity.h"
+#include "common/bus/security/identity.h"
 #include "tools/security/authority.h"
 
 namespace perdure::tools {

@@ -1,6 +1,6 @@
 #include "services/capture/live/live.h"
 
-#include "common/replay/rig_file.h"
+#include "common/replay/files/rig_file.h"
 
 namespace perdure::capture {
 namespace {
