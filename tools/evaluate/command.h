@@ -1,4 +1,5 @@
-// `perdure evaluate {objects,trajectory,consistency}`: the metrics of the design, section 7.
+// `perdure evaluate {objects,trajectory,consistency}`: objects and trajectory against the truth,
+// and whether their covariances are as large as their errors.
 #pragma once
 
 namespace CLI {

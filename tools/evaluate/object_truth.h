@@ -1,4 +1,4 @@
-// Which true objects count in a frame, and which are ignored (design, section 7).
+// Which true objects count in a frame, and which are ignored.
 #pragma once
 
 #include <map>

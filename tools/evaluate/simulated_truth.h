@@ -1,5 +1,5 @@
 // A simulated folder as truth for objects: the exact states of body and objects, and how much of
-// each is seen in each frame (design, section 7, with the folder's files in place of labels).
+// each is seen in each frame (the folder's files in place of labels).
 #pragma once
 
 #include <filesystem>

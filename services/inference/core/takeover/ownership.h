@@ -1,5 +1,6 @@
 // Which strength a result may be written with: a process that was taken for dead, or that comes
-// late, must not take the topic back with old results (DESIGN: Liveliness).
+// late, must not take the topic back with old results: it writes with the strength of a standby
+// first.
 #pragma once
 
 #include <chrono>
