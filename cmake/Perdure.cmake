@@ -45,6 +45,17 @@ function(perdure_program name)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 endfunction()
 
+# What every test reads first, compiled once; and the tests' own files are optimised less: what they
+# test is in libraries.
+if(PERDURE_BUILD_TESTS)
+  file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/test_headers.cpp CONTENT "")
+  add_library(perdure_test_headers STATIC ${PROJECT_BINARY_DIR}/test_headers.cpp)
+  target_link_libraries(perdure_test_headers PRIVATE perdure_options GTest::gmock Eigen3::Eigen)
+  target_compile_options(perdure_test_headers PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_precompile_headers(perdure_test_headers PRIVATE
+    <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry>)
+endif()
+
 # perdure_test(NAME SOURCES … DEPENDS … [TOGETHER] [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest
 # program, one ctest entry. Labels: unit (default), process, scenario, golden, data, long.
 function(perdure_test name)
@@ -54,6 +65,8 @@ function(perdure_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_precompile_headers(${name} REUSE_FROM perdure_test_headers)
   if(ARG_TOGETHER)
     perdure_together(${name})
   endif()

@@ -9,7 +9,7 @@
 
 #include "common/base/errors.h"
 #include "common/bus/dds.h"
-#include "common/bus/roles.h"
+#include "common/bus/security/roles.h"
 #include "common/bus/security_log.h"
 #include "common/bus/shared_memory.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/identity.h"
+#include "common/bus/security/identity.h"
 #include "common/config/fields.h"
 
 namespace perdure::bus {

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "common/bus/roles.h"
-#include "common/wire/types.h"
+#include "common/bus/security/roles.h"
+#include "common/wire/description/types.h"
 
 namespace perdure::bus {
 

@@ -3,9 +3,10 @@
 #include <algorithm>
 
 #include "common/base/errors.h"
-#include "common/replay/recorded_messages.h"
+#include "common/replay/files/rig_file.h"
+#include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
-#include "common/replay/rig_file.h"
+#include "common/replay/recordings/recorded_messages.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
 #include "common/vision/jpeg.h"

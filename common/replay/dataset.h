@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "common/types/sensors.h"
 
 namespace perdure::replay {

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "common/base/errors.h"
+#include "common/replay/files/sensor_file.h"
+#include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
-#include "common/replay/sensor_file.h"
-#include "common/replay/text_file.h"
 
 namespace perdure::replay {
 namespace {

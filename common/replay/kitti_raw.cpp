@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "common/base/errors.h"
-#include "common/replay/kitti_calibration.h"
+#include "common/replay/files/kitti_calibration.h"
+#include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
-#include "common/replay/text_file.h"
 
 namespace perdure::replay {
 namespace {

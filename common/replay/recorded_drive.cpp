@@ -6,8 +6,9 @@
 #include <utility>
 
 #include "common/base/errors.h"
-#include "common/replay/recorded_messages.h"
+#include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
+#include "common/replay/recordings/recorded_messages.h"
 
 namespace perdure::replay {
 namespace {

@@ -3,15 +3,9 @@
 #include <algorithm>
 #include <tuple>
 
-#include "common/base/errors.h"
 #include "common/vision/decode.h"
 
 namespace perdure::replay {
-
-void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view mend) {
-  throw StartupError(ExitCode::kUnavailable, std::string(what) + " is missing: " + path.string() +
-                                                 "; " + std::string(mend));
-}
 
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name) {
   for (const char* extension : {".png", ".jpg", ".jpeg"}) {

@@ -22,9 +22,6 @@ Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
 
-/// Throws StartupError(kUnavailable): "`what` is missing: `path`; `mend`".
-[[noreturn]] void throwMissing(const std::filesystem::path& path, std::string_view what,
-                               std::string_view mend);
 /// FOLDER/NAME.png, .jpg or .jpeg, the one that exists; else FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);
 /// Width and height of the first image that decodes; nothing where there is none.

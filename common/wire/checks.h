@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "common/types/sensors.h"
-#include "common/wire/bounds.h"
+#include "common/wire/description/bounds.h"
 
 namespace perdure::wire {
 

@@ -9,7 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/wire/arena.h"
-#include "common/wire/types.h"
+#include "common/wire/description/types.h"
 
 namespace perdure::wire {
 

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "common/wire/checked.h"
-#include "common/wire/describe.h"
+#include "common/wire/description/describe.h"
 
 namespace perdure::wire {
 

@@ -5,7 +5,7 @@
 
 #include "common/wire/arena.h"
 #include "common/wire/checked.h"
-#include "common/wire/describe.h"
+#include "common/wire/description/describe.h"
 
 namespace perdure::wire {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/wire/types.h"
+#include "common/wire/description/types.h"
 
 namespace perdure::wire {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "common/wire/describe.h"
+#include "common/wire/description/describe.h"
 
 namespace perdure::wire {
 namespace {

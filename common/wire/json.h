@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/wire/types.h"
+#include "common/wire/description/types.h"
 
 namespace perdure::wire {
 

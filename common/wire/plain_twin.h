@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "common/wire/types.h"
+#include "common/wire/description/types.h"
 
 namespace perdure::wire {
 

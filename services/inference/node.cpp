@@ -6,8 +6,8 @@
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
-#include "services/inference/core/image_fit.h"
-#include "services/inference/core/suppress.h"
+#include "services/inference/core/decode/suppress.h"
+#include "services/inference/core/network/image_fit.h"
 
 namespace perdure::inference {
 namespace {

@@ -11,8 +11,8 @@
 #include "common/types/detections.h"
 #include "common/types/sensors.h"
 #include "services/inference/config.h"
-#include "services/inference/core/network.h"
-#include "services/inference/core/prime.h"
+#include "services/inference/core/decode/prime.h"
+#include "services/inference/core/network/network.h"
 #include "services/inference/model_file.h"
 
 namespace perdure::inference {

@@ -12,8 +12,8 @@
 #include "common/bus/endpoint.h"
 #include "common/service/health.h"
 #include "services/inference/core/budget.h"
-#include "services/inference/core/ownership.h"
-#include "services/inference/core/swap.h"
+#include "services/inference/core/takeover/ownership.h"
+#include "services/inference/core/takeover/swap.h"
 #include "services/inference/node.h"
 
 namespace perdure::inference {

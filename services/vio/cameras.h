@@ -7,7 +7,7 @@
 #include "common/types/sensors.h"
 #include "services/vio/config.h"
 #include "services/vio/core/estimator.h"
-#include "services/vio/core/tracker.h"
+#include "services/vio/core/tracks/tracker.h"
 
 namespace perdure::vio {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "common/config/fields.h"
-#include "services/vio/core/options.h"
-#include "services/vio/core/tracker.h"
+#include "services/vio/core/state/options.h"
+#include "services/vio/core/tracks/tracker.h"
 #include "services/vio/moving_mask.h"
 
 namespace perdure::vio {

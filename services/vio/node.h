@@ -15,10 +15,10 @@
 #include "common/types/sensors.h"
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
-#include "services/vio/core/descriptor.h"
-#include "services/vio/core/initialiser.h"
-#include "services/vio/core/motion_initialiser.h"
-#include "services/vio/core/speed_history.h"
+#include "services/vio/core/start/initialiser.h"
+#include "services/vio/core/start/motion_initialiser.h"
+#include "services/vio/core/start/speed_history.h"
+#include "services/vio/core/tracks/descriptor.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {

@@ -12,6 +12,23 @@ namespace {
 constexpr std::array kCommon{"base",   "math", "types", "camera", "sim",    "config",
                              "vision", "wire", "bus",   "replay", "service"};
 
+/// Folders with layers of their own: their sub-folders from bottom to top; "" is the folder itself.
+struct Layers {
+  std::string_view folder;
+  std::vector<std::string_view> bottom_to_top;
+};
+const std::vector<Layers> kLayers{
+    {"common/wire/", {"description", ""}},
+    {"common/bus/", {"security", ""}},
+    {"common/replay/", {"files", "recordings", ""}},
+    {"common/sim/scenes/", {"parts", ""}},
+    {"services/vio/core/", {"state", "propagation", "tracks", "update", "", "start"}},
+    {"services/inference/core/", {"", "network", "decode", "takeover"}},
+    {"tools/bus_tools/", {"", "status", "doctor"}},
+    {"tools/calibrate/", {"estimate", ""}},
+    {"tools/outputs/", {"pictures", ""}},
+    {"tools/simulate/", {"shapes", "render", ""}}};
+
 std::string part(const std::string& path, std::size_t index) {
   std::istringstream stream(path);
   std::string word;
@@ -23,6 +40,22 @@ std::string part(const std::string& path, std::size_t index) {
 
 std::ptrdiff_t heightOf(const std::string& folder) {
   return std::find(kCommon.begin(), kCommon.end(), folder) - kCommon.begin();
+}
+
+/// The height of a file among its folder's layers; above all where its sub-folder is not listed.
+std::ptrdiff_t layerOf(const std::string& file, const Layers& layers) {
+  const std::string rest = file.substr(layers.folder.size());
+  const std::size_t slash = rest.find('/');
+  const std::string sub = slash == std::string::npos ? "" : rest.substr(0, slash);
+  const auto& order = layers.bottom_to_top;
+  return std::find(order.begin(), order.end(), sub) - order.begin();
+}
+
+bool pointsUp(const std::string& path, const std::string& include) {
+  return std::any_of(kLayers.begin(), kLayers.end(), [&](const Layers& layers) {
+    return path.starts_with(layers.folder) && include.starts_with(layers.folder) &&
+           layerOf(include, layers) > layerOf(path, layers);
+  });
 }
 
 bool startsWith(const std::string& text, std::initializer_list<std::string_view> prefixes) {
@@ -54,6 +87,7 @@ std::string whyNotIncluded(const std::string& path, const std::string& include) 
       heightOf(part(include, 1)) > heightOf(part(path, 1))) {
     return "a folder of common uses only those below it";
   }
+  if (pointsUp(path, include)) return "a layer of a folder uses only those below it";
   if ((used == "idl" || used == "final") &&
       !startsWith(path, {"common/wire/", "tools/examples/", "tests/"})) {
     return "only common/wire knows the generated types";

@@ -9,7 +9,7 @@
 #include <cstdio>
 
 #include "common/math/so3.h"
-#include "tools/calibrate/camera_imu.h"
+#include "tools/calibrate/estimate/camera_imu.h"
 #include "tools/calibrate/simulated.h"
 
 namespace perdure::calibrate {

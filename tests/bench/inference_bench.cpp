@@ -6,10 +6,10 @@
 #include <random>
 
 #include "common/wire/codec.h"
-#include "services/inference/core/decode.h"
-#include "services/inference/core/image_fit.h"
-#include "services/inference/core/prime.h"
-#include "services/inference/core/suppress.h"
+#include "services/inference/core/decode/decode.h"
+#include "services/inference/core/decode/prime.h"
+#include "services/inference/core/decode/suppress.h"
+#include "services/inference/core/network/image_fit.h"
 
 namespace {
 

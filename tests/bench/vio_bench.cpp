@@ -5,13 +5,13 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "services/vio/core/descriptor.h"
-#include "services/vio/core/imu_propagator.h"
-#include "services/vio/core/initialiser.h"
-#include "services/vio/core/motion_initialiser.h"
-#include "services/vio/core/tracker.h"
-#include "services/vio/core/updater_msckf.h"
-#include "services/vio/core/updater_slam.h"
+#include "services/vio/core/propagation/imu_propagator.h"
+#include "services/vio/core/start/initialiser.h"
+#include "services/vio/core/start/motion_initialiser.h"
+#include "services/vio/core/tracks/descriptor.h"
+#include "services/vio/core/tracks/tracker.h"
+#include "services/vio/core/update/updater_msckf.h"
+#include "services/vio/core/update/updater_slam.h"
 #include "tests/bench/allocations.h"
 #include "tests/bench/vio_stages.h"
 

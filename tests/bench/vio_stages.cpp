@@ -4,7 +4,7 @@
 #include <random>
 
 #include "common/base/check.h"
-#include "services/vio/core/imu_propagator.h"
+#include "services/vio/core/propagation/imu_propagator.h"
 
 namespace perdure::vio::bench {
 namespace {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "services/vio/core/estimator.h"
-#include "services/vio/core/imu_buffer.h"
-#include "services/vio/core/ransac.h"
-#include "services/vio/core/tracks.h"
+#include "services/vio/core/propagation/imu_buffer.h"
+#include "services/vio/core/tracks/ransac.h"
+#include "services/vio/core/tracks/tracks.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio::bench {

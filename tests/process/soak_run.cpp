@@ -15,7 +15,7 @@
 #include "common/math/so3.h"
 #include "tools/demo/embedded_drive.h"
 #include "tools/demo/reporter.h"
-#include "tools/outputs/chart.h"
+#include "tools/outputs/pictures/chart.h"
 #include "tools/simulate/simulate.h"
 
 namespace perdure::test {

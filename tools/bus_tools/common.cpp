@@ -1,11 +1,21 @@
 #include "tools/bus_tools/common.h"
 
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
 #include "common/base/errors.h"
 #include "common/service/signals.h"
-#include "tools/bus_tools/command.h"
-#include "tools/bus_tools/doctor.h"
 
 namespace perdure::tools {
+
+std::string configurationFolder() {
+  for (const char* folder : {"/etc/perdure", "config"}) {
+    std::error_code ignored;
+    if (std::filesystem::exists(std::filesystem::path(folder) / "capture.yaml", ignored))
+      return folder;
+  }
+  return {};
+}
 
 void addBusOptions(CLI::App& command, bus::Options& options) {
   // Before the command line: options of it go before the file.
@@ -54,15 +64,6 @@ std::string knownTopics() {
 void refuseTopic(const std::string& topic) {
   throw StartupError(ExitCode::kUsage,
                      "there is no topic " + topic + "; the topics are " + knownTopics());
-}
-
-void addBusCommands(CLI::App& app) {
-  addTopicsCommand(app);
-  addHzCommand(app);
-  addEchoCommand(app);
-  addEnvCommand(app);
-  addDoctorCommand(app);
-  addStatusCommand(app);
 }
 
 }  // namespace perdure::tools

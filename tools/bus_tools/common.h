@@ -1,13 +1,20 @@
 // What the subcommands share: the bus's options, and waiting with an end by time or by signal.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
 
 #include "common/bus/wait_loop.h"
 
+namespace CLI {
+class App;
+}
+
 namespace perdure::tools {
+
+/// The services' configuration files: of the installation (/etc/perdure) or of config/ here.
+/// Empty where there is none.
+std::string configurationFolder();
 
 /// --interface, --domain, --vehicle, --security, --identity; what they do not say is said by
 /// bus.yaml, where the services' configuration is.

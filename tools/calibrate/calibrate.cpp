@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/base/errors.h"
-#include "common/replay/rig_file.h"
+#include "common/replay/files/rig_file.h"
 #include "tools/simulate/writer.h"
 
 namespace perdure::calibrate {

@@ -1,7 +1,9 @@
 // `perdure calibrate`: the rig of a camera and an IMU from a recording of a board.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

@@ -9,7 +9,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
-#include "common/replay/text_file.h"
+#include "common/replay/files/text_file.h"
 #include "common/vision/image.h"
 
 namespace perdure::calibrate {

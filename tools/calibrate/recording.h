@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/calibrate/views.h"
+#include "tools/calibrate/estimate/views.h"
 
 namespace perdure::calibrate {
 

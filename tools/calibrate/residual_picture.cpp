@@ -8,7 +8,7 @@
 
 #include "common/base/errors.h"
 #include "tools/calibrate/calibrate.h"
-#include "tools/outputs/chart.h"
+#include "tools/outputs/pictures/chart.h"
 
 namespace perdure::calibrate {
 namespace {

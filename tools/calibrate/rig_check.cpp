@@ -9,7 +9,7 @@
 #include "common/math/chi2.h"
 #include "common/math/so3.h"
 #include "common/replay/dataset.h"
-#include "services/vio/core/saved_state.h"
+#include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
 
 namespace perdure::calibrate {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "services/vio/config.h"
-#include "services/vio/core/updater_slam.h"
+#include "services/vio/core/update/updater_slam.h"
 #include "tools/calibrate/verdict.h"
 
 namespace perdure::calibrate {

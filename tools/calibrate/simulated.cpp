@@ -6,7 +6,7 @@
 #include "common/math/so3.h"
 #include "common/sim/dice.h"
 #include "common/sim/imu.h"
-#include "common/sim/scenes/rigs.h"
+#include "common/sim/scenes/parts/rigs.h"
 #include "tools/simulate/writer.h"
 
 namespace perdure::calibrate {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/sim/scene.h"
-#include "tools/calibrate/views.h"
-#include "tools/simulate/lens.h"
-#include "tools/simulate/renderer.h"
+#include "tools/calibrate/estimate/views.h"
+#include "tools/simulate/render/lens.h"
+#include "tools/simulate/render/renderer.h"
 
 namespace perdure::calibrate {
 

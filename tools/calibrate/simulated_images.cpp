@@ -4,10 +4,10 @@
 #include <opencv2/core/mat.hpp>
 
 #include "common/base/errors.h"
-#include "common/replay/rig_file.h"
+#include "common/replay/files/rig_file.h"
 #include "common/sim/dice.h"
 #include "tools/calibrate/simulated.h"
-#include "tools/simulate/sensor.h"
+#include "tools/simulate/render/sensor.h"
 #include "tools/simulate/writer.h"
 
 namespace perdure::calibrate {

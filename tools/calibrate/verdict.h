@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/calibrate/camera_imu.h"
+#include "tools/calibrate/estimate/camera_imu.h"
 #include "tools/calibrate/recording.h"
 
 namespace perdure::calibrate {

@@ -2,7 +2,9 @@
 // deploy/demo installs and builds, then calls it.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

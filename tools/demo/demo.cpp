@@ -18,8 +18,8 @@
 #include "common/base/ids.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
-#include "tools/outputs/overlay_video.h"
-#include "tools/outputs/truth_sources.h"
+#include "tools/outputs/pictures/overlay_video.h"
+#include "tools/outputs/pictures/truth_sources.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,4 +1,4 @@
-// Listens to a running system and writes down what came out: DESIGN section 3's files.
+// Listens to a running system and writes down what came out: the files of `perdure pipeline`.
 #pragma once
 
 #include <cstdint>

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "common/base/errors.h"
-#include "common/replay/kitti_calibration.h"
-#include "common/replay/kitti_labels.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/kitti_calibration.h"
+#include "common/replay/files/kitti_labels.h"
+#include "common/replay/files/pose_file.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
 

@@ -1,7 +1,9 @@
 // `perdure detect`: a network's detections of a dataset as a CSV that `--detections FILE` reads.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

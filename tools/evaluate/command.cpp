@@ -1,5 +1,7 @@
 #include "tools/evaluate/command.h"
 
+#include <CLI/CLI.hpp>
+
 namespace perdure::tools {
 
 void addEvaluateCommand(CLI::App& app) {

@@ -1,7 +1,10 @@
-// `perdure evaluate {objects,trajectory,consistency}`: the metrics of the design, section 7.
+// `perdure evaluate {objects,trajectory,consistency}`: objects and trajectory against the truth,
+// and whether their covariances are as large as their errors.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

@@ -1,6 +1,7 @@
 // `perdure evaluate consistency`: ANEES of the map's objects and of odometry against truth.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>

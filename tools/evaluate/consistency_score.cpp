@@ -15,7 +15,7 @@
 #include "common/math/chi2.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "common/replay/text_file.h"
+#include "common/replay/files/text_file.h"
 
 namespace perdure::tools {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/math/rigid_transform.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 #include "tools/evaluate/simulated_truth.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/base/errors.h"
-#include "common/replay/text_file.h"
+#include "common/replay/files/text_file.h"
 
 namespace perdure::tools {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 
 namespace perdure::tools {
 

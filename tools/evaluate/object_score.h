@@ -1,5 +1,5 @@
 // Precision and recall of objects against counted truth, and what goes wrong with identities
-// (design, section 7; the paper's Table 1).
+// (the paper's Table 1).
 #pragma once
 
 #include <array>

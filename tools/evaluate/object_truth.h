@@ -1,4 +1,4 @@
-// Which true objects count in a frame, and which are ignored (design, section 7).
+// Which true objects count in a frame, and which are ignored.
 #pragma once
 
 #include <map>
@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "common/math/rigid_transform.h"
-#include "common/replay/kitti_calibration.h"
-#include "common/replay/kitti_labels.h"
+#include "common/replay/files/kitti_calibration.h"
+#include "common/replay/files/kitti_labels.h"
 
 namespace perdure::tools {
 

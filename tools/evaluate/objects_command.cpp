@@ -1,12 +1,13 @@
 // `perdure evaluate objects`: the nine cells and the identities, as text or JSON, against a
 // simulated folder or KITTI tracking.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "tools/evaluate/command.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/simulated_truth.h"

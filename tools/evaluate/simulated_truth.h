@@ -1,5 +1,5 @@
 // A simulated folder as truth for objects: the exact states of body and objects, and how much of
-// each is seen in each frame (design, section 7, with the folder's files in place of labels).
+// each is seen in each frame (the folder's files in place of labels).
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/camera/camera_model.h"
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "common/sim/truth.h"
 #include "tools/evaluate/object_rows.h"
 #include "tools/evaluate/object_score.h"

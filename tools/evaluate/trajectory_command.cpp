@@ -1,4 +1,5 @@
 // `perdure evaluate trajectory`: a TUM file against a pose file or a dataset folder's own truth.
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <iostream>

@@ -1,7 +1,9 @@
 // `perdure inference swap`: another network takes over while frames go on.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

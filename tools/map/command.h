@@ -1,7 +1,9 @@
 // `perdure map`: what the map store holds, asked over DDS or read from its file.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

@@ -5,10 +5,10 @@
 #include <random>
 
 #include "common/base/errors.h"
-#include "services/inference/core/evidence.h"
-#include "services/inference/core/image_fit.h"
-#include "services/inference/core/prime.h"
-#include "services/inference/core/suppress.h"
+#include "services/inference/core/decode/evidence.h"
+#include "services/inference/core/decode/prime.h"
+#include "services/inference/core/decode/suppress.h"
+#include "services/inference/core/network/image_fit.h"
 #include "services/inference/node.h"
 #include "tools/pipeline/settings.h"
 

@@ -5,7 +5,7 @@
 
 #include "common/base/errors.h"
 #include "tools/model/calibrate.h"
-#include "tools/outputs/chart.h"
+#include "tools/outputs/pictures/chart.h"
 
 namespace perdure::tools {
 namespace {

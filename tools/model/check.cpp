@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/base/errors.h"
-#include "services/inference/core/network.h"
+#include "services/inference/core/network/network.h"
 #include "services/inference/model_file.h"
 
 namespace perdure::tools {

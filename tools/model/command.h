@@ -1,7 +1,9 @@
 // `perdure model`: bring a network of one's own, and see what it sees.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

@@ -6,7 +6,7 @@
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
-#include "common/replay/kitti_labels.h"
+#include "common/replay/files/kitti_labels.h"
 #include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {

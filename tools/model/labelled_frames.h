@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "common/replay/class_aliases.h"
 #include "common/replay/dataset.h"
+#include "common/replay/files/class_aliases.h"
 #include "common/types/detections.h"
 
 namespace perdure::tools {

@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/base/errors.h"
-#include "services/inference/core/evidence.h"
+#include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
-#include "tools/outputs/drawing.h"
+#include "tools/outputs/pictures/drawing.h"
 
 namespace perdure::tools {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
-#include "tools/outputs/evolution_picture.h"
 #include "tools/outputs/geodesy.h"
 #include "tools/outputs/ledger_json.h"
-#include "tools/outputs/map_picture.h"
+#include "tools/outputs/pictures/evolution_picture.h"
+#include "tools/outputs/pictures/map_picture.h"
 
 namespace perdure::tools {
 namespace {

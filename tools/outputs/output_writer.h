@@ -1,4 +1,4 @@
-// The files that `perdure pipeline` and the demo leave behind (DESIGN section 3), from the streams
+// The files that `perdure pipeline` and the demo leave behind, from the streams
 // odometry, objects and events. Two runs over the same messages give the same bytes.
 #pragma once
 
@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
-#include "tools/outputs/drive_log.h"
 #include "tools/outputs/object_history.h"
-#include "tools/outputs/picture_truth.h"
+#include "tools/outputs/pictures/drive_log.h"
+#include "tools/outputs/pictures/picture_truth.h"
 
 namespace perdure::tools {
 

@@ -1,7 +1,9 @@
 // `perdure pipeline`: the services' nodes in one process, over a dataset folder.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

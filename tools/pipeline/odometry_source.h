@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "common/replay/pose_file.h"
+#include "common/replay/files/pose_file.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
 

@@ -5,11 +5,11 @@
 #include <opencv2/core/utility.hpp>
 
 #include "common/base/errors.h"
-#include "common/replay/class_aliases.h"
+#include "common/replay/files/class_aliases.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/evaluate/simulated_truth.h"
-#include "tools/outputs/overlay_video.h"
-#include "tools/outputs/truth_sources.h"
+#include "tools/outputs/pictures/overlay_video.h"
+#include "tools/outputs/pictures/truth_sources.h"
 
 namespace perdure::tools {
 namespace {

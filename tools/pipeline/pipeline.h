@@ -11,9 +11,9 @@
 
 #include "common/bus/once.h"
 #include "common/replay/dataset.h"
-#include "common/replay/detection_file.h"
-#include "common/replay/recorded_messages.h"
-#include "common/replay/recording_writer.h"
+#include "common/replay/files/detection_file.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_writer.h"
 #include "services/inference/node.h"
 #include "services/semantic_filter/node.h"
 #include "services/vio/node.h"

@@ -1,7 +1,7 @@
 #include "tools/pipeline/simulated_source.h"
 
 #include "common/base/errors.h"
-#include "common/replay/text_file.h"
+#include "common/replay/files/text_file.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,7 +1,9 @@
 // `perdure record` (with info, repair, export) and `perdure play`.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

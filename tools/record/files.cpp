@@ -3,14 +3,15 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 #include <regex>
 
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
-#include "common/replay/recorded_messages.h"
-#include "common/replay/recording_writer.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_writer.h"
 #include "common/wire/plain_twin.h"
 
 namespace perdure::tools {

@@ -1,10 +1,13 @@
 // What can be done with recordings that lie there: `perdure record info`, `repair`, `export`.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 
 #include "common/base/result.h"
+
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

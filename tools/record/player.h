@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/bus/wait_loop.h"
-#include "common/replay/recorded_messages.h"
+#include "common/replay/recordings/recorded_messages.h"
 
 namespace perdure::tools {
 

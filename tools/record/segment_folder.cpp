@@ -10,7 +10,7 @@
 #include <charconv>
 
 #include "common/base/errors.h"
-#include "common/replay/mcap_reader.h"
+#include "common/replay/recordings/mcap_reader.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,6 +1,6 @@
 #include "tools/record/segment_writer.h"
 
-#include "common/replay/mcap_reader.h"
+#include "common/replay/recordings/mcap_reader.h"
 
 namespace perdure::tools {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/replay/mcap_writer.h"
+#include "common/replay/recordings/mcap_writer.h"
 #include "tools/record/segment_folder.h"
 
 namespace perdure::tools {

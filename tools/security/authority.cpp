@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "common/bus/identity.h"
+#include "common/bus/security/identity.h"
 #include "tools/security/private_file.h"
 
 namespace perdure::tools {

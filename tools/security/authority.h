@@ -12,7 +12,7 @@
 namespace perdure::tools {
 
 /// FOLDER/authority: the authority's key, which no vehicle needs, and what it has issued.
-/// FOLDER/NAME: an identity, all that its host needs (common/bus/identity.h).
+/// FOLDER/NAME: an identity, all that its host needs (common/bus/security/identity.h).
 class Authority {
  public:
   /// A new one. Throws StartupError where the folder has one, or cannot be written.

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/openssl.h"
+#include "common/bus/security/openssl.h"
 
 namespace perdure::tools {
 

@@ -4,10 +4,11 @@
 #include <pwd.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "common/base/errors.h"
-#include "common/bus/identity.h"
+#include "common/bus/security/identity.h"
 #include "tools/security/authority.h"
 
 namespace perdure::tools {

@@ -1,7 +1,9 @@
 // `perdure security`: identities for a bus that is closed to strangers.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

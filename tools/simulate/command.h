@@ -1,7 +1,9 @@
 // `perdure simulate`: a rendered camera and IMU sequence with exact truth.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace perdure::tools {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/sim/truth.h"
-#include "tools/simulate/sensor.h"
+#include "tools/simulate/render/sensor.h"
 
 namespace perdure::tools {
 

@@ -4,7 +4,7 @@
 #include <bit>
 #include <string>
 
-#include "tools/simulate/counter_noise.h"
+#include "tools/simulate/render/counter_noise.h"
 
 namespace perdure::tools {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "common/sim/imu.h"
 #include "common/sim/speed.h"
-#include "tools/simulate/counter_noise.h"
+#include "tools/simulate/render/counter_noise.h"
 #include "tools/simulate/writer.h"
 
 namespace perdure::tools {

@@ -11,12 +11,12 @@
 
 #include "common/base/errors.h"
 #include "common/sim/truth_files.h"
-#include "tools/simulate/counter_noise.h"
 #include "tools/simulate/journal.h"
-#include "tools/simulate/outline.h"
-#include "tools/simulate/renderer.h"
+#include "tools/simulate/render/counter_noise.h"
+#include "tools/simulate/render/outline.h"
+#include "tools/simulate/render/renderer.h"
+#include "tools/simulate/render/sensor.h"
 #include "tools/simulate/scene_digest.h"
-#include "tools/simulate/sensor.h"
 
 namespace perdure::tools {
 namespace {

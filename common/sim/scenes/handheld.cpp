@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "common/math/so3.h"
-#include "common/sim/scenes/rooms.h"
+#include "common/sim/scenes/parts/rooms.h"
 
 namespace perdure::sim {
 namespace {

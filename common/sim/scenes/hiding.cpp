@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "common/math/so3.h"
-#include "common/sim/scenes/rigs.h"
-#include "common/sim/scenes/rooms.h"
+#include "common/sim/scenes/parts/rigs.h"
+#include "common/sim/scenes/parts/rooms.h"
 #include "common/sim/scenes/scenes.h"
 
 namespace perdure::sim {

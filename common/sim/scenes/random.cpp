@@ -1,11 +1,11 @@
 // Streets or rooms with things anywhere, and a camera that is somewhere else every second.
 #include <cmath>
 
-#include "common/sim/scenes/rigs.h"
-#include "common/sim/scenes/rooms.h"
+#include "common/sim/scenes/parts/rigs.h"
+#include "common/sim/scenes/parts/rooms.h"
+#include "common/sim/scenes/parts/streets.h"
+#include "common/sim/scenes/parts/views.h"
 #include "common/sim/scenes/scenes.h"
-#include "common/sim/scenes/streets.h"
-#include "common/sim/scenes/views.h"
 
 namespace perdure::sim {
 namespace {

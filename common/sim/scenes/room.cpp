@@ -1,8 +1,8 @@
 // A walk around a table in a furnished room.
 #include <limits>
 
-#include "common/sim/scenes/rigs.h"
-#include "common/sim/scenes/rooms.h"
+#include "common/sim/scenes/parts/rigs.h"
+#include "common/sim/scenes/parts/rooms.h"
 #include "common/sim/scenes/scenes.h"
 
 namespace perdure::sim {

@@ -3,9 +3,9 @@
 #include <limits>
 
 #include "common/sim/path.h"
-#include "common/sim/scenes/rigs.h"
+#include "common/sim/scenes/parts/rigs.h"
+#include "common/sim/scenes/parts/streets.h"
 #include "common/sim/scenes/scenes.h"
-#include "common/sim/scenes/streets.h"
 
 namespace perdure::sim {
 namespace {

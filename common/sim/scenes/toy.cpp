@@ -2,10 +2,10 @@
 // from another side.
 #include <cmath>
 
-#include "common/sim/scenes/rigs.h"
-#include "common/sim/scenes/rooms.h"
+#include "common/sim/scenes/parts/rigs.h"
+#include "common/sim/scenes/parts/rooms.h"
+#include "common/sim/scenes/parts/streets.h"
 #include "common/sim/scenes/scenes.h"
-#include "common/sim/scenes/streets.h"
 
 namespace perdure::sim {
 namespace {

@@ -11,7 +11,7 @@
 
 namespace perdure::inference {
 
-/// How the network's heads are laid out; one decode rule each (core/decode.cpp).
+/// How the network's heads are laid out; one decode rule each (core/decode/decode.cpp).
 enum class Family {
   kYolox,
   kYoloFastest,

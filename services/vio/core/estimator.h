@@ -9,12 +9,12 @@
 
 #include "common/base/result.h"
 #include "common/types/odometry.h"
-#include "services/vio/core/imu_buffer.h"
-#include "services/vio/core/options.h"
-#include "services/vio/core/saved_state.h"
-#include "services/vio/core/state.h"
-#include "services/vio/core/tracks.h"
-#include "services/vio/core/updater_slam.h"
+#include "services/vio/core/propagation/imu_buffer.h"
+#include "services/vio/core/state/options.h"
+#include "services/vio/core/state/saved_state.h"
+#include "services/vio/core/state/state.h"
+#include "services/vio/core/tracks/tracks.h"
+#include "services/vio/core/update/updater_slam.h"
 
 namespace perdure::vio {
 

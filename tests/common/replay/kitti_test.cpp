@@ -6,8 +6,8 @@
 
 #include "common/camera/camera_model.h"
 #include "common/replay/dataset.h"
-#include "common/replay/kitti_calibration.h"
-#include "common/replay/kitti_labels.h"
+#include "common/replay/files/kitti_calibration.h"
+#include "common/replay/files/kitti_labels.h"
 #include "tests/common/replay/tiny_datasets.h"
 
 namespace perdure::replay {

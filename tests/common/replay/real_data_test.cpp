@@ -5,8 +5,8 @@
 
 #include "common/camera/camera_model.h"
 #include "common/replay/dataset.h"
-#include "common/replay/kitti_calibration.h"
-#include "common/replay/kitti_labels.h"
+#include "common/replay/files/kitti_calibration.h"
+#include "common/replay/files/kitti_labels.h"
 
 namespace perdure::replay {
 namespace {

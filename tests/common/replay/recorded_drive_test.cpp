@@ -5,8 +5,8 @@
 #include <random>
 
 #include "common/replay/dataset.h"
-#include "common/replay/recorded_messages.h"
-#include "common/replay/recording_writer.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_writer.h"
 #include "tests/common/replay/tiny_datasets.h"
 
 namespace perdure::replay {

@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 #include <random>
 
-#include "common/wire/types.h"
+#include "common/wire/description/types.h"
 
 namespace perdure::wire {
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "common/wire/bounds.h"
 #include "common/wire/codec.h"
+#include "common/wire/description/bounds.h"
 #include "tests/common/wire/examples.h"
 
 namespace perdure::wire {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "common/wire/codec.h"
-#include "common/wire/describe.h"
+#include "common/wire/description/describe.h"
 #include "tests/common/wire/examples.h"
 
 namespace perdure::wire {

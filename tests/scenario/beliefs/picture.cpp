@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "common/math/chi2.h"
-#include "tools/outputs/chart.h"
+#include "tools/outputs/pictures/chart.h"
 
 namespace perdure::test {
 namespace {

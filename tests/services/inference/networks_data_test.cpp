@@ -12,8 +12,8 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "services/inference/core/evidence.h"
-#include "services/inference/core/image_fit.h"
+#include "services/inference/core/decode/evidence.h"
+#include "services/inference/core/network/image_fit.h"
 #include "services/inference/node.h"
 
 namespace perdure::inference {

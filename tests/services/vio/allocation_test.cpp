@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/vio/core/estimator.h"
-#include "services/vio/core/imu_propagator.h"
+#include "services/vio/core/propagation/imu_propagator.h"
 #include "tests/bench/allocations.h"
 #include "tests/services/vio/simulated_drive.h"
 

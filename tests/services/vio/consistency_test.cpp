@@ -11,7 +11,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/vio/core/estimator.h"
-#include "services/vio/core/initialiser.h"
+#include "services/vio/core/start/initialiser.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {

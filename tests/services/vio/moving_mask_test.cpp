@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "services/vio/core/tracker.h"
+#include "services/vio/core/tracks/tracker.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {

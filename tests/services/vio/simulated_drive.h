@@ -9,7 +9,7 @@
 
 #include "common/camera/camera_model.h"
 #include "services/vio/core/estimator.h"
-#include "services/vio/core/imu_buffer.h"
+#include "services/vio/core/propagation/imu_buffer.h"
 
 namespace perdure::vio::test {
 

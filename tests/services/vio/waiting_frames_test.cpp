@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "services/vio/core/speed_history.h"
+#include "services/vio/core/start/speed_history.h"
 
 namespace perdure::vio {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "common/bus/wait_loop.h"
 #include "tests/common/bus/isolation.h"
-#include "tools/bus_tools/doctor.h"
+#include "tools/bus_tools/doctor/doctor.h"
 
 namespace perdure::tools {
 namespace {

@@ -8,7 +8,7 @@
 #include "common/base/errors.h"
 #include "common/math/so3.h"
 #include "common/replay/dataset.h"
-#include "common/replay/rig_file.h"
+#include "common/replay/files/rig_file.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/calibrate/simulated.h"
 #include "tools/simulate/writer.h"

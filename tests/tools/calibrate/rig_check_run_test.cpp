@@ -6,7 +6,7 @@
 
 #include "common/math/so3.h"
 #include "common/replay/dataset.h"
-#include "common/replay/rig_file.h"
+#include "common/replay/files/rig_file.h"
 #include "tools/calibrate/rig_check.h"
 #include "tools/simulate/simulate.h"
 

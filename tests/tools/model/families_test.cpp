@@ -7,9 +7,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/inference/core/decode.h"
-#include "services/inference/core/image_fit.h"
-#include "services/inference/core/network.h"
+#include "services/inference/core/decode/decode.h"
+#include "services/inference/core/network/image_fit.h"
+#include "services/inference/core/network/network.h"
 #include "services/inference/model_file.h"
 #include "tests/tools/model/python.h"
 #include "tools/model/check.h"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "services/inference/core/network.h"
+#include "services/inference/core/network/network.h"
 #include "tests/tools/model/python.h"
 
 namespace perdure::tools {

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "services/inference/core/evidence.h"
+#include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
 #include "tests/tools/model/python.h"
 #include "tools/model/check.h"

@@ -3,7 +3,7 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "tools/outputs/drawing.h"
+#include "tools/outputs/pictures/drawing.h"
 
 namespace perdure::tools {
 

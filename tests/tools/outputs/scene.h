@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/types/sensors.h"
-#include "tools/outputs/drive_log.h"
+#include "tools/outputs/pictures/drive_log.h"
 
 namespace perdure::tools {
 

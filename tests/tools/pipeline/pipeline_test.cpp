@@ -9,8 +9,8 @@
 
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
-#include "common/replay/kitti_calibration.h"
-#include "common/replay/text_file.h"
+#include "common/replay/files/kitti_calibration.h"
+#include "common/replay/files/text_file.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tools/evaluate/object_rows.h"
 #include "tools/pipeline/report.h"

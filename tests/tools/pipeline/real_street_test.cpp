@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "common/replay/text_file.h"
+#include "common/replay/files/text_file.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/pipeline/pipeline.h"

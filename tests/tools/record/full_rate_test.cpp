@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "common/bus/wait_loop.h"
-#include "common/replay/recorded_messages.h"
+#include "common/replay/recordings/recorded_messages.h"
 #include "tests/process/support.h"
 
 namespace perdure::tools {

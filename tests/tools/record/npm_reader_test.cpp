@@ -5,8 +5,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "common/replay/mcap_reader.h"
-#include "common/replay/recording_writer.h"
+#include "common/replay/recordings/mcap_reader.h"
+#include "common/replay/recordings/recording_writer.h"
 #include "tests/common/wire/examples.h"
 #include "tests/process/support.h"
 #include "tools/record/files.h"

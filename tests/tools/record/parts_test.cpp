@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "common/base/errors.h"
-#include "common/replay/mcap_reader.h"
+#include "common/replay/recordings/mcap_reader.h"
 #include "tests/process/support.h"
 #include "tests/tools/record/chunks.h"
 #include "tools/record/black_box.h"

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "common/bus/wait_loop.h"
-#include "common/replay/recorded_messages.h"
-#include "common/replay/recording_writer.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_writer.h"
 #include "tests/process/support.h"
 #include "tests/services/semantic_filter/scene.h"
 #include "tools/pipeline/pipeline.h"

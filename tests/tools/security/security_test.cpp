@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "common/bus/identity.h"
+#include "common/bus/security/identity.h"
 #include "common/bus/security_log.h"
 #include "tests/process/support.h"
 #include "tools/security/authority.h"

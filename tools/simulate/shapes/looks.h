@@ -1,8 +1,8 @@
 // Materials that the generators share, with colours drawn from palettes of the real thing.
 #pragma once
 
-#include "tools/simulate/mesh.h"
 #include "tools/simulate/shapes/dice.h"
+#include "tools/simulate/shapes/mesh.h"
 
 namespace perdure::tools::shapes {
 

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "tools/simulate/mesh.h"
+#include "tools/simulate/shapes/mesh.h"
 
 namespace perdure::tools::shapes {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/simulate/mesh.h"
+#include "tools/simulate/shapes/mesh.h"
 
 namespace perdure::tools::shapes {
 

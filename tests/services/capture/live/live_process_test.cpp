@@ -6,7 +6,7 @@
 #include <fstream>
 #include <memory>
 
-#include "common/replay/rig_file.h"
+#include "common/replay/files/rig_file.h"
 #include "tests/process/support.h"
 #include "tests/services/capture/live/fake_iiod.h"
 #include "tests/services/run_until.h"

@@ -1,0 +1,243 @@
+#include "common/replay/files/detection_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/base/errors.h"
+#include "common/base/result.h"
+#include "common/replay/files/text_file.h"
+
+namespace perdure::replay {
+namespace {
+
+/// Where each field stands in a row.
+struct Columns {
+  std::size_t frame = 0, x1 = 0, y1 = 0, x2 = 0, y2 = 0, score = 0, count = 0;
+  std::optional<std::size_t> class_name, azimuth;
+  std::optional<std::size_t> sigma_azimuth;
+  std::optional<std::array<std::size_t, 4>> sigmas;
+  std::vector<std::pair<std::size_t, std::string>> logits;
+};
+
+Columns readHeader(const std::filesystem::path& file, const TextLine& line,
+                   const ClassAliases& aliases) {
+  Columns columns;
+  Complaints wrong(file);
+  std::map<std::string, std::size_t> at;
+  const auto names = split(line.text, ',');
+  columns.count = names.size();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string name = toLower(names[i]);
+    if (!at.emplace(name, i).second) wrong.add(line.number, "column " + name + " is there twice");
+    if (name.starts_with("alpha") || name.starts_with("azimuth")) columns.azimuth = i;
+    if (name.starts_with("logit:"))
+      columns.logits.emplace_back(i, aliases.canonical(name.substr(6)));
+  }
+  const auto need = [&](const std::string& name) -> std::size_t {
+    const auto found = at.find(name);
+    if (found != at.end()) return found->second;
+    wrong.add(line.number, "column " + name + " is missing; the header is " +
+                               "frame,class,x1,y1,x2,y2,score[,azimuth][,logit:<class>]");
+    return 0;
+  };
+  columns.frame = need("frame");
+  columns.x1 = need("x1"), columns.y1 = need("y1");
+  columns.x2 = need("x2"), columns.y2 = need("y2");
+  columns.score = need("score");
+  columns.class_name = need("class");
+  if (at.contains("sigma_azimuth")) columns.sigma_azimuth = at["sigma_azimuth"];
+  if (at.contains("sigma_x1")) {
+    columns.sigmas = {need("sigma_x1"), need("sigma_y1"), need("sigma_x2"), need("sigma_y2")};
+  }
+  wrong.throwIfAny();
+  return columns;
+}
+
+Columns headerlessColumns() {
+  Columns columns;
+  columns.frame = 0, columns.x1 = 1, columns.y1 = 2, columns.x2 = 3, columns.y2 = 4;
+  columns.score = 5, columns.count = 6;
+  return columns;
+}
+
+/// An empty answer, or what is wrong with the numbers of the row.
+std::string fillBox(const std::vector<std::string_view>& fields, const Columns& columns,
+                    const DetectionFileOptions& options, DetectionFile::Row& row) {
+  const auto x1 = parseNumber(fields[columns.x1]), y1 = parseNumber(fields[columns.y1]);
+  const auto x2 = parseNumber(fields[columns.x2]), y2 = parseNumber(fields[columns.y2]);
+  const auto score = parseNumber(fields[columns.score]);
+  if (!x1 || !y1 || !x2 || !y2) return "x1, y1, x2 and y2 are finite numbers, in pixels";
+  if (*x2 <= *x1 || *y2 <= *y1) return "x1 < x2 and y1 < y2: corners, not a corner and a size";
+  if (!score || *score < 0 || *score > 1) return "score is a number from 0 to 1";
+  const double o = options.box_origin;
+  row.detection.box = Box{*x1 - o, *y1 - o, *x2 - o, *y2 - o};
+  const double clipped = std::clamp(*score, options.score_floor, 1.0 - options.score_floor);
+  row.logit = std::log(clipped / (1.0 - clipped));
+  return {};
+}
+
+std::string fillEvidence(const std::vector<std::string_view>& fields, const Columns& columns,
+                         const DetectionFileOptions& options, DetectionFile::Row& row) {
+  if (columns.azimuth && !fields[*columns.azimuth].empty()) {
+    const auto azimuth = parseNumber(fields[*columns.azimuth]);
+    if (!azimuth || std::abs(*azimuth) > 7.0) return "azimuth is in radians, or empty";
+    row.detection.azimuth = *azimuth;
+    row.detection.azimuth_sigma = options.azimuth_sigma;
+    if (columns.sigma_azimuth && !fields[*columns.sigma_azimuth].empty()) {
+      const auto sigma = parseNumber(fields[*columns.sigma_azimuth]);
+      if (!sigma || *sigma <= 0.0) return "sigma_azimuth is above 0, in radians, or empty";
+      row.detection.azimuth_sigma = *sigma;
+    }
+  }
+  for (std::size_t i = 0; columns.sigmas && i < 4; ++i) {
+    const auto field = fields[(*columns.sigmas)[i]];
+    if (field.empty()) continue;
+    const auto sigma = parseNumber(field);
+    if (!sigma || *sigma < 0.0) return "sigma_x1 to sigma_y2 are 0 or more pixels, or empty";
+    row.detection.side_sigma[i] = *sigma;
+  }
+  if (columns.logits.empty()) return {};
+  row.detection.activations = {0.0F};
+  for (const auto& [column, name] : columns.logits) {
+    const auto logit = parseNumber(fields[column]);
+    if (!logit) return "logit:" + name + " is a finite number";
+    row.detection.activations.push_back(static_cast<float>(*logit));
+  }
+  return {};
+}
+
+std::optional<std::set<std::uint64_t>> readFrameList(std::filesystem::path file) {
+  file.replace_extension(".frames");
+  if (!std::filesystem::exists(file)) return std::nullopt;
+  std::set<std::uint64_t> frames;
+  Complaints wrong(file);
+  for (const auto& line : readLines(file, "it lists the frames that have detections")) {
+    for (const auto field : split(line.text, ' ')) {
+      const auto frame = parseInteger(field);
+      if (!frame || *frame < 0) {
+        wrong.add(line.number, "write frame numbers from 0, separated by blanks or lines");
+      } else {
+        frames.insert(static_cast<std::uint64_t>(*frame));
+      }
+    }
+  }
+  wrong.throwIfAny();
+  return frames;
+}
+
+bool isHeaderless(const std::vector<TextLine>& lines, const DetectionFileOptions& options) {
+  if (lines.empty()) {
+    throw StartupError(
+        ExitCode::kUnavailable,
+        options.file.string() + " is empty; it begins with a header frame,class,x1,y1,x2,y2,score");
+  }
+  if (!parseNumber(split(lines[0].text, ',')[0])) return false;
+  if (options.class_name.empty()) {
+    throw StartupError(ExitCode::kUsage, options.file.string() +
+                                             " has no header: say the class of its boxes with "
+                                             "--class (for example --class Car)");
+  }
+  return true;
+}
+
+using NumberedRow = std::pair<std::uint64_t, DetectionFile::Row>;
+
+Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
+                            const DetectionFileOptions& options, const ClassAliases& aliases) {
+  const auto fields = split(text, ',');
+  if (fields.size() != columns.count) {
+    return fail("detection_malformed", std::to_string(fields.size()) + " fields; " +
+                                           std::to_string(columns.count) + " are expected");
+  }
+  const auto frame = parseInteger(fields[columns.frame]);
+  if (!frame || *frame < 0) return fail("detection_malformed", "frame is a whole number from 0");
+  DetectionFile::Row row;
+  row.class_name =
+      aliases.canonical(columns.class_name ? fields[*columns.class_name] : options.class_name);
+  if (row.class_name.empty()) return fail("detection_malformed", "class is empty");
+  std::string error = fillBox(fields, columns, options, row);
+  if (error.empty()) error = fillEvidence(fields, columns, options, row);
+  if (!error.empty()) return fail("detection_malformed", error);
+  return NumberedRow(static_cast<std::uint64_t>(*frame), std::move(row));
+}
+
+}  // namespace
+
+DetectionFile DetectionFile::read(const DetectionFileOptions& options,
+                                  const ClassAliases& aliases) {
+  const auto lines = readLines(options.file, "--detections takes `model`, `none` or a CSV");
+  DetectionFile result;
+  result.options_ = options;
+  result.listed_frames_ = readFrameList(options.file);
+  const bool headerless = isHeaderless(lines, options);
+  const Columns columns =
+      headerless ? headerlessColumns() : readHeader(options.file, lines[0], aliases);
+  for (const auto& [column, name] : columns.logits) result.logit_classes_.push_back(name);
+  Complaints wrong(options.file);
+  for (std::size_t i = headerless ? 0 : 1; i < lines.size(); ++i) {
+    const auto row = readRow(lines[i].text, columns, options, aliases);
+    if (row) {
+      result.rows_[row->first].push_back(row->second);
+    } else {
+      wrong.add(lines[i].number, row.error().detail);
+    }
+  }
+  wrong.throwIfAny();
+  if (headerless) result.first_seen_.emplace_back(0, aliases.canonical(options.class_name));
+  result.noteClasses();
+  return result;
+}
+
+void DetectionFile::noteClasses() {
+  for (const auto& [frame, rows] : rows_) {
+    for (const auto& row : rows) {
+      const bool known = std::any_of(first_seen_.begin(), first_seen_.end(),
+                                     [&](const auto& c) { return c.second == row.class_name; });
+      if (!known) first_seen_.emplace_back(frame, row.class_name);
+    }
+  }
+}
+
+std::vector<std::string> DetectionFile::classesAt(std::uint64_t frame) const {
+  if (!logit_classes_.empty()) return logit_classes_;
+  std::vector<std::string> classes;
+  for (const auto& [first, name] : first_seen_) {
+    if (first <= frame) classes.push_back(name);
+  }
+  return classes;
+}
+
+ModelInfo DetectionFile::modelAt(std::uint64_t frame) const {
+  ModelInfo model;
+  model.name = options_.file.filename().string();
+  model.classes = classesAt(frame);
+  std::string identity = "detections of a file";
+  for (const auto& name : model.classes) identity += '\n' + name;
+  model.boxes = options_.boxes;
+  model.hash = digest(identity);
+  return model;
+}
+
+std::optional<std::vector<Detection>> DetectionFile::at(std::uint64_t frame) const {
+  if (listed_frames_ && !listed_frames_->contains(frame)) return std::nullopt;
+  std::vector<Detection> detections;
+  const auto rows = rows_.find(frame);
+  if (rows == rows_.end()) return detections;
+  const auto classes = classesAt(frame);
+  const double floor = std::log(options_.score_floor / (1.0 - options_.score_floor));
+  for (const auto& row : rows->second) {
+    Detection detection = row.detection;
+    if (logit_classes_.empty()) {
+      detection.activations = {0.0F};
+      for (const auto& name : classes) {
+        detection.activations.push_back(
+            static_cast<float>(name == row.class_name ? row.logit : floor));
+      }
+    }
+    detections.push_back(std::move(detection));
+  }
+  return detections;
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,39 @@
+#include "common/replay/files/kitti_labels.h"
+
+#include "common/replay/files/text_file.h"
+
+namespace perdure::replay {
+
+std::vector<KittiLabel> readKittiLabels(const std::filesystem::path& file) {
+  constexpr std::size_t kFields = 17;
+  std::vector<KittiLabel> labels;
+  Complaints wrong(file);
+  for (const auto& line : readLines(file, "KITTI tracking keeps label_02/SEQUENCE.txt")) {
+    auto fields = split(line.text, ' ');
+    if (fields.size() != kFields) {
+      wrong.add(line.number, "17 fields are expected: frame id type truncated occluded …");
+      continue;
+    }
+    KittiLabel label;
+    label.type = std::string(fields[2]);
+    fields[2] = "0";
+    const auto v = parseNumbers(fields);
+    if (!v || (*v)[0] < 0) {
+      wrong.add(line.number, "a field is not a number");
+      continue;
+    }
+    label.frame = static_cast<std::uint64_t>((*v)[0]);
+    label.track = static_cast<std::int64_t>((*v)[1]);
+    label.truncated = static_cast<int>((*v)[3]);
+    label.occluded = static_cast<int>((*v)[4]);
+    label.box = Box{(*v)[6], (*v)[7], (*v)[8], (*v)[9]};
+    label.height = (*v)[10], label.width = (*v)[11], label.length = (*v)[12];
+    label.centre = Eigen::Vector3d((*v)[13], (*v)[14] - 0.5 * label.height, (*v)[15]);
+    label.rotation_y = (*v)[16];
+    labels.push_back(std::move(label));
+  }
+  wrong.throwIfAny();
+  return labels;
+}
+
+}  // namespace perdure::replay

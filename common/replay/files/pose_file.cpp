@@ -1,0 +1,124 @@
+#include "common/replay/files/pose_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
+
+namespace perdure::replay {
+namespace {
+
+constexpr double kUnitTolerance = 1e-2;
+
+/// Seconds as written, to the nanosecond: a double holds only 0.2 µs of a Unix time.
+std::optional<TimePoint> parseSeconds(std::string_view text) {
+  const auto dot = text.find('.');
+  const bool plain = text.find_first_of("eE") == text.npos;
+  const auto whole = parseInteger(text.substr(0, dot));
+  if (plain && whole && dot != text.npos) {
+    std::string digits(text.substr(dot + 1, 9));
+    digits.resize(9, '0');
+    const auto fraction = parseInteger(digits);
+    if (!fraction || *fraction < 0 || std::abs(*whole) > 9'000'000'000) return std::nullopt;
+    const std::int64_t sign = text.starts_with('-') ? -1 : 1;
+    return fromNanoseconds(*whole * 1'000'000'000 + sign * *fraction);
+  }
+  const auto seconds = parseNumber(text);
+  if (!seconds || std::abs(*seconds) > 9e9) return std::nullopt;
+  return TimePoint(durationFromSeconds(*seconds));
+}
+
+void addTum(const TextLine& line, const std::vector<std::string_view>& fields,
+            std::vector<StampedPose>& poses, Complaints& wrong) {
+  const auto time = parseSeconds(fields[0]);
+  const auto v = parseNumbers(fields);
+  if (!v || !time) return wrong.add(line.number, "write eight finite numbers, t x y z qx qy qz qw");
+  const Eigen::Quaterniond q((*v)[7], (*v)[4], (*v)[5], (*v)[6]);
+  if (std::abs(q.norm() - 1.0) > kUnitTolerance) {
+    return wrong.add(line.number, "the quaternion's norm is " + std::to_string(q.norm()) +
+                                      ", not 1; the order is qx qy qz qw");
+  }
+  if (!poses.empty() && *time <= poses.back().time) {
+    return wrong.add(line.number, "the time does not increase; sort the lines by time");
+  }
+  poses.push_back({*time, RigidTransform(q, {(*v)[1], (*v)[2], (*v)[3]})});
+}
+
+void addKitti(const TextLine& line, const std::vector<std::string_view>& fields,
+              std::vector<StampedPose>& poses, Complaints& wrong) {
+  const auto v = parseNumbers(fields);
+  if (!v) return wrong.add(line.number, "write 12 or 16 finite numbers, row by row");
+  Eigen::Matrix3d R;
+  Eigen::Vector3d p;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto i = static_cast<Eigen::Index>(row);
+    for (std::size_t col = 0; col < 3; ++col) {
+      R(i, static_cast<Eigen::Index>(col)) = (*v)[row * 4 + col];
+    }
+    p(i) = (*v)[row * 4 + 3];
+  }
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (error > kUnitTolerance || R.determinant() < 0) {
+    return wrong.add(line.number, "the rotation is not orthonormal and right-handed");
+  }
+  if (v->size() == 16 && ((*v)[12] != 0 || (*v)[13] != 0 || (*v)[14] != 0 || (*v)[15] != 1)) {
+    return wrong.add(line.number, "the last row of a 4x4 pose is 0 0 0 1");
+  }
+  poses.push_back({TimePoint{}, RigidTransform(R, p)});
+}
+
+}  // namespace
+
+PoseFile::PoseFile(PoseFormat format, std::vector<StampedPose> poses)
+    : format_(format), poses_(std::move(poses)) {}
+
+PoseFile PoseFile::read(const std::filesystem::path& file) {
+  const auto lines = readLines(file, "--odometry takes `vio`, `truth` or a file of poses");
+  Complaints wrong(file);
+  std::vector<StampedPose> poses;
+  std::size_t columns = 0;
+  for (const auto& line : lines) {
+    if (line.text.starts_with('#')) continue;
+    const auto fields = split(line.text, line.text.find(',') != std::string::npos ? ',' : ' ');
+    if (columns == 0) columns = fields.size();
+    const bool known = columns == 8 || columns == 12 || columns == 16;
+    if (!known || fields.size() != columns) {
+      wrong.add(line.number, std::to_string(fields.size()) +
+                                 " numbers; write 8 (TUM: t x y z qx qy qz qw) or 12 or 16 (KITTI: "
+                                 "a row-major pose) in every line");
+    } else if (columns == 8) {
+      addTum(line, fields, poses, wrong);
+    } else {
+      addKitti(line, fields, poses, wrong);
+    }
+  }
+  wrong.throwIfAny();
+  if (poses.empty()) {
+    throw StartupError(ExitCode::kUnavailable, file.string() + ": holds no poses");
+  }
+  return PoseFile(columns == 8 ? PoseFormat::kTum : PoseFormat::kKitti, std::move(poses));
+}
+
+std::optional<RigidTransform> PoseFile::at(std::uint64_t frame, TimePoint time,
+                                           Duration max_gap) const {
+  if (format_ == PoseFormat::kTum) return atTime(time, max_gap);
+  if (frame >= poses_.size()) return std::nullopt;
+  return poses_[frame].T_WB;
+}
+
+std::optional<RigidTransform> PoseFile::atTime(TimePoint time, Duration max_gap) const {
+  constexpr Duration kSame = std::chrono::milliseconds(1);
+  const auto after = std::lower_bound(poses_.begin(), poses_.end(), time,
+                                      [](const StampedPose& p, TimePoint t) { return p.time < t; });
+  if (after != poses_.end() && after->time - time <= kSame) return after->T_WB;
+  if (after == poses_.begin()) return std::nullopt;
+  const auto before = after - 1;
+  if (time - before->time <= kSame) return before->T_WB;
+  if (after == poses_.end() || after->time - before->time > max_gap) return std::nullopt;
+  const double s = toSeconds(time - before->time) / toSeconds(after->time - before->time);
+  return interpolate(before->T_WB, after->T_WB, s);
+}
+
+}  // namespace perdure::replay

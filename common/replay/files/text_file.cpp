@@ -1,0 +1,105 @@
+#include "common/replay/files/text_file.h"
+
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+
+#include "common/base/errors.h"
+
+namespace perdure::replay {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\n\f\v";
+constexpr std::size_t kShownComplaints = 10;
+
+template <class Number>
+std::optional<Number> parseWhole(std::string_view text) {
+  text = trim(text);
+  if (text.starts_with('+')) text.remove_prefix(1);
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend) {
+  std::ifstream file(path);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw StartupError(ExitCode::kUnavailable,
+                       path.string() + " cannot be read; " + std::string(mend));
+  }
+  std::vector<TextLine> lines;
+  std::string text;
+  for (std::size_t number = 1; std::getline(file, text); ++number) {
+    const auto trimmed = trim(text);
+    if (!trimmed.empty()) lines.push_back({number, std::string(trimmed)});
+  }
+  return lines;
+}
+
+void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view mend) {
+  throw StartupError(ExitCode::kUnavailable, std::string(what) + " is missing: " + path.string() +
+                                                 "; " + std::string(mend));
+}
+
+std::string_view trim(std::string_view text) {
+  const auto first = text.find_first_not_of(kBlanks);
+  if (first == text.npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+std::string toLower(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lower;
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> fields;
+  while (true) {
+    const auto end = separator == ' ' ? text.find_first_of(kBlanks) : text.find(separator);
+    const auto field = trim(text.substr(0, end));
+    if (separator != ' ' || !field.empty()) fields.push_back(field);
+    if (end == text.npos) return fields;
+    text.remove_prefix(end + 1);
+  }
+}
+
+std::optional<double> parseNumber(std::string_view text) {
+  const auto value = parseWhole<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+std::optional<std::int64_t> parseInteger(std::string_view text) {
+  return parseWhole<std::int64_t>(text);
+}
+
+std::optional<std::vector<double>> parseNumbers(const std::vector<std::string_view>& fields) {
+  std::vector<double> values;
+  for (const auto field : fields) {
+    const auto value = parseNumber(field);
+    if (!value) return std::nullopt;
+    values.push_back(*value);
+  }
+  return values;
+}
+
+void Complaints::add(std::size_t line, std::string_view what) {
+  if (++count_ > kShownComplaints) return;
+  if (!text_.empty()) text_ += '\n';
+  text_ += file_.string() + ":" + std::to_string(line) + ": " + std::string(what);
+}
+
+void Complaints::throwIfAny() const {
+  if (empty()) return;
+  std::string message = text_;
+  if (count_ > kShownComplaints) {
+    message += "\nand " + std::to_string(count_ - kShownComplaints) + " more";
+  }
+  throw StartupError(ExitCode::kUnavailable, message);
+}
+
+}  // namespace perdure::replay

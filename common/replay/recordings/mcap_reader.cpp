@@ -1,0 +1,353 @@
+#include "common/replay/recordings/mcap_reader.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <cerrno>
+
+namespace perdure::replay::mcap {
+namespace {
+
+constexpr char kBare[] = "bare";  ///< no chunk: one message's record in the file itself
+constexpr std::uint64_t kMostContent = 64u << 20;  ///< of a record other than a chunk
+
+/// What stands before a chunk's records.
+struct ChunkHead {
+  ChunkIndex place;
+  std::uint32_t crc = 0;
+  std::uint64_t records_at = 0;  ///< from the beginning of the content
+};
+
+std::optional<ChunkHead> chunkHeadFrom(Bytes content) {
+  Take take(content);
+  ChunkHead head;
+  ChunkIndex& place = head.place;
+  const bool whole = take.number(place.start_ns) && take.number(place.end_ns) &&
+                     take.number(place.unpacked) && take.number(head.crc) &&
+                     take.text(place.compression) && take.number(place.packed);
+  head.records_at = content.size() - take.rest().size();
+  return whole ? std::optional(head) : std::nullopt;
+}
+
+Result<std::vector<std::uint8_t>> unpacked(const ChunkHead& head, Bytes packed) {
+  const ChunkIndex& place = head.place;
+  if (place.unpacked > kMostRecords) {
+    return fail("chunk_too_large", "a chunk of " + std::to_string(place.unpacked) + " bytes");
+  }
+  std::vector<std::uint8_t> records;
+  if (place.compression.empty()) {
+    records.assign(packed.begin(), packed.end());
+  } else if (place.compression == "zstd") {
+    // What the frame says goes before memory is asked for by what the record says.
+    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != place.unpacked) {
+      return fail("chunk_damaged", "a chunk whose sizes differ");
+    }
+    records.resize(place.unpacked);
+    const std::size_t n =
+        ZSTD_decompress(records.data(), records.size(), packed.data(), packed.size());
+    if (ZSTD_isError(n) != 0) return fail("chunk_damaged", ZSTD_getErrorName(n));
+  } else {
+    return fail("chunk_" + place.compression,
+                "chunks packed by " + place.compression +
+                    " are not read; `mcap compress --compression zstd` packs them anew");
+  }
+  const bool right =
+      records.size() == place.unpacked && (head.crc == 0 || crc(records) == head.crc);
+  if (!right) return fail("chunk_damaged", "a chunk with a wrong checksum");
+  return records;
+}
+
+}  // namespace
+
+bool forEachMessage(Bytes records, const std::function<void(const Message&, std::uint64_t)>& visit,
+                    Catalogue& other) {
+  const std::size_t size = records.size();
+  while (!records.empty()) {
+    const std::uint64_t offset = size - records.size();
+    const auto record = takeRecord(records);
+    if (!record) return false;
+    if (record->op == Op::kMessage) {
+      const auto message = messageFrom(record->content);
+      if (!message) return false;
+      visit(*message, offset);
+    } else if (record->op == Op::kSchema) {
+      if (auto schema = schemaFrom(record->content)) other.schemas.emplace(schema->id, *schema);
+    } else if (record->op == Op::kChannel) {
+      if (auto channel = channelFrom(record->content))
+        other.channels.emplace(channel->id, *channel);
+    }
+  }
+  return true;
+}
+
+Result<Reader> Reader::open(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat status {};
+  if (file < 0 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
+    const std::string why = file < 0 ? std::strerror(errno) : "not a file";
+    if (file >= 0) close(file);
+    return fail("file", path.string() + ": " + why);
+  }
+  Reader reader(path, file, static_cast<std::uint64_t>(status.st_size));
+  const auto magic = reader.read(0, kMagic.size());
+  const bool begun = std::equal(magic.begin(), magic.end(), kMagic.begin());
+  if (!begun || (magic.size() < kMagic.size() && reader.size_ > 0)) {
+    return fail("not_mcap",
+                path.string() + " is no MCAP file; recordings come from perdure record");
+  }
+  reader.finished_ = reader.readSummary();
+  if (!reader.finished_) reader.scan();
+  return reader;
+}
+
+Reader::Reader(Reader&& other) noexcept
+    : path_(std::move(other.path_)),
+      file_(std::exchange(other.file_, -1)),
+      size_(other.size_),
+      whole_(other.whole_),
+      damaged_(other.damaged_),
+      finished_(other.finished_),
+      catalogue_(std::move(other.catalogue_)),
+      chunks_(std::move(other.chunks_)),
+      statistics_(std::move(other.statistics_)),
+      last_index_(std::move(other.last_index_)) {}
+
+Reader::~Reader() { letGo(); }
+
+void Reader::letGo() {
+  if (file_ >= 0) close(file_);
+  file_ = -1;
+}
+
+/// Fewer bytes where the file ends before, or cannot be read.
+std::vector<std::uint8_t> Reader::read(std::uint64_t at, std::uint64_t length) const {
+  const int file = file_ >= 0 ? file_ : ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
+  std::vector<std::uint8_t> bytes(at < size_ ? std::min(length, size_ - at) : 0);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t n =
+        pread(file, bytes.data() + done, bytes.size() - done, static_cast<off_t>(at + done));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  bytes.resize(done);
+  if (file_ < 0 && file >= 0) close(file);
+  return bytes;
+}
+
+bool Reader::readSummary() {
+  constexpr std::uint64_t kEnd = kRecordHead + kFooterContent + kMagic.size();
+  if (size_ < kMagic.size() + kEnd) return false;
+  const std::uint64_t footer_at = size_ - kEnd;
+  const auto end = read(footer_at, kEnd);
+  Bytes rest(end);
+  const auto footer = takeRecord(rest);
+  if (!footer || footer->op != Op::kFooter || !std::equal(rest.begin(), rest.end(), kMagic.begin()))
+    return false;
+  Take take(footer->content);
+  std::uint64_t summary_at = 0, offsets_at = 0;
+  std::uint32_t checksum = 0;
+  if (!take.number(summary_at) || !take.number(offsets_at) || !take.number(checksum)) return false;
+  if (summary_at < kMagic.size() || summary_at > footer_at) return false;
+  if (footer_at - summary_at > kMostContent) return false;
+  const std::uint64_t covered = size_ - summary_at - kMagic.size() - sizeof checksum;
+  const auto summary = read(summary_at, covered);
+  if (summary.size() != covered || (checksum != 0 && crc(summary) != checksum)) return false;
+  whole_ = size_;
+  return takeSummary(Bytes(summary).first(footer_at - summary_at)) && plausible();
+}
+
+bool Reader::takeSummary(Bytes records) {
+  bool counted = false;
+  while (!records.empty()) {
+    const auto record = takeRecord(records);
+    if (!record) return false;
+    if (record->op == Op::kSchema) {
+      const auto schema = schemaFrom(record->content);
+      if (!schema) return false;
+      catalogue_.schemas.emplace(schema->id, *schema);
+    } else if (record->op == Op::kChannel) {
+      const auto channel = channelFrom(record->content);
+      if (!channel) return false;
+      catalogue_.channels.emplace(channel->id, *channel);
+    } else if (record->op == Op::kChunkIndex) {
+      const auto chunk = chunkIndexFrom(record->content);
+      if (!chunk) return false;
+      chunks_.push_back(*chunk);
+    } else if (record->op == Op::kStatistics) {
+      const auto statistics = statisticsFrom(record->content);
+      if (!statistics) return false;
+      statistics_ = *statistics;
+      counted = true;
+    }
+  }
+  return counted;
+}
+
+/// Whether chunks lie in the file, and all messages in chunks.
+bool Reader::plausible() const {
+  for (const ChunkIndex& chunk : chunks_) {
+    if (chunk.offset < kMagic.size() || chunk.offset > size_ || chunk.length < kRecordHead ||
+        chunk.length > size_ - chunk.offset) {
+      return false;
+    }
+  }
+  return !chunks_.empty() || statistics_.messages == 0;
+}
+
+void Reader::scan() {
+  catalogue_ = {};
+  chunks_.clear();
+  statistics_ = {};
+  std::uint64_t at = whole_ = std::min<std::uint64_t>(size_, kMagic.size());
+  while (at + kRecordHead <= size_) {
+    const auto head = read(at, kRecordHead);
+    Take take(head);
+    std::uint8_t op = 0;
+    std::uint64_t length = 0;
+    if (!take.number(op) || !take.number(length) || op == 0) return;
+    if (length > size_ - at - kRecordHead) return;  // cut off
+    if (!scanRecord(static_cast<Op>(op), at, length)) return;
+    at += kRecordHead + length;
+  }
+}
+
+/// False at the end of the data, and where nothing behind can be believed.
+bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
+  if (op == Op::kDataEnd || op == Op::kFooter) return false;
+  if (op == Op::kChunk) return scanChunk(at, length);
+  if (op == Op::kHeader && chunks_.empty()) whole_ = at + kRecordHead + length;
+  if (op != Op::kSchema && op != Op::kChannel && op != Op::kMessage && op != Op::kMessageIndex) {
+    return true;
+  }
+  if (length > kMostContent) return false;
+  const auto content = read(at + kRecordHead, length);
+  if (content.size() != length) return false;
+  if (op == Op::kSchema) {
+    const auto schema = schemaFrom(content);
+    if (schema) catalogue_.schemas.emplace(schema->id, *schema);
+    return schema.has_value();
+  }
+  if (op == Op::kChannel) {
+    const auto channel = channelFrom(content);
+    if (channel) catalogue_.channels.emplace(channel->id, *channel);
+    return channel.has_value();
+  }
+  if (op == Op::kMessage) {
+    addBare(at, length);
+  } else {
+    scanMessageIndex(at, length, content);
+  }
+  return true;
+}
+
+bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
+  ChunkIndex place;
+  place.offset = at;
+  place.length = kRecordHead + length;
+  const auto records = unpack(place);
+  if (!records) {
+    ++damaged_;
+    return true;
+  }
+  constexpr std::uint64_t kHead = 256;
+  const auto content = read(at + kRecordHead, std::min(length, kHead));
+  const auto head = chunkHeadFrom(content);
+  if (!head) return false;
+  place = head->place;
+  place.offset = at;
+  place.length = kRecordHead + length;
+  last_index_.clear();
+  const bool whole = forEachMessage(
+      **records,
+      [&](const Message& message, std::uint64_t offset) {
+        last_index_[message.channel].emplace_back(message.log_ns, offset);
+        ++statistics_.by_channel[message.channel];
+      },
+      catalogue_);
+  if (!whole) ++damaged_;
+  for (const auto& [channel, entries] : last_index_) statistics_.messages += entries.size();
+  statistics_.start_ns =
+      chunks_.empty() ? place.start_ns : std::min(statistics_.start_ns, place.start_ns);
+  statistics_.end_ns = std::max(statistics_.end_ns, place.end_ns);
+  chunks_.push_back(place);
+  whole_ = at + place.length;
+  return true;
+}
+
+void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content) {
+  Take take(content);
+  std::uint16_t channel = 0;
+  if (chunks_.empty() || !take.number(channel) || !last_index_.contains(channel)) return;
+  ChunkIndex& chunk = chunks_.back();
+  chunk.index_offsets[channel] = at;
+  chunk.index_length += kRecordHead + length;
+  if (chunk.index_offsets.size() == last_index_.size()) whole_ = at + kRecordHead + length;
+}
+
+/// A message outside of chunks, as small writers leave them.
+void Reader::addBare(std::uint64_t at, std::uint64_t length) {
+  const auto message = messageFrom(read(at + kRecordHead, length));
+  if (!message) return;
+  ChunkIndex place{message->log_ns, message->log_ns, at, kRecordHead + length, {}, 0, kBare};
+  chunks_.push_back(place);
+  last_index_.clear();
+  ++statistics_.messages;
+  ++statistics_.by_channel[message->channel];
+  whole_ = at + place.length;
+}
+
+Result<Records> Reader::unpack(const ChunkIndex& chunk) const {
+  if (chunk.length > kMostRecords + kMostContent) {
+    return fail("chunk_too_large", "a chunk of " + std::to_string(chunk.length) + " bytes");
+  }
+  auto bytes = read(chunk.offset, chunk.length);
+  if (chunk.compression == kBare) {
+    return std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes));
+  }
+  Bytes rest(bytes);
+  const auto record = takeRecord(rest);
+  const auto head =
+      record && record->op == Op::kChunk ? chunkHeadFrom(record->content) : std::nullopt;
+  if (!head || head->place.packed != record->content.size() - head->records_at) {
+    return fail("chunk_damaged", path_.string() + ": no chunk at " + std::to_string(chunk.offset));
+  }
+  auto records = unpacked(*head, record->content.subspan(head->records_at));
+  if (!records) return fail(records.error().code, path_.string() + ": " + records.error().detail);
+  return std::make_shared<const std::vector<std::uint8_t>>(*std::move(records));
+}
+
+Result<void> Reader::finish() {
+  if (finished_) return {};
+  std::vector<ChunkIndex> chunks = chunks_;
+  for (const ChunkIndex& chunk : chunks) {
+    if (chunk.compression == kBare) {
+      return fail("not_chunked", path_.string() +
+                                     " holds messages outside of chunks; it reads as "
+                                     "it is");
+    }
+  }
+  const bool lacks_index =
+      !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
+  std::optional<ChunkIndex> last;
+  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: begun anew, with its header
+  if (lacks_index) {
+    last = chunks.back();
+    last->index_length = 0;
+    chunks.pop_back();
+  }
+  auto writer = Writer::resume(path_, end, catalogue_, std::move(chunks), statistics_);
+  if (!writer) return tl::unexpected(writer.error());
+  if (last) {
+    if (auto written = writer->appendIndex(*last, last_index_); !written) return written;
+  }
+  if (auto written = writer->finish(); !written) return written;
+  writer->sync();
+  return {};
+}
+
+}  // namespace perdure::replay::mcap

@@ -1,0 +1,76 @@
+// A recording's file as it is read: by its summary, or, where that is missing or wrong (a recorder
+// that was killed), by going through it chunk by chunk. Any bytes are taken; nothing is believed
+// that was not checked.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/replay/recordings/mcap_writer.h"
+
+namespace perdure::replay::mcap {
+
+using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
+
+class Reader {
+ public:
+  /// Reasons: "file", "not_mcap"; the detail says the mend.
+  static Result<Reader> open(const std::filesystem::path& path);
+  Reader(Reader&& other) noexcept;
+  Reader& operator=(Reader&&) = delete;
+  ~Reader();
+
+  const std::filesystem::path& path() const { return path_; }
+  /// Whether it has a summary that holds. Otherwise all that is whole was found by looking.
+  bool finished() const { return finished_; }
+  const Catalogue& catalogue() const { return catalogue_; }
+  const std::vector<ChunkIndex>& chunks() const { return chunks_; }
+  const Statistics& statistics() const { return statistics_; }
+  std::uint64_t size() const { return size_; }
+  /// Of an unfinished file: bytes behind the last whole chunk, and chunks that are damaged.
+  std::uint64_t cutBytes() const { return size_ - whole_; }
+  std::uint64_t damagedChunks() const { return damaged_; }
+
+  /// The chunk's records. Reasons: "chunk_damaged", "chunk_lz4", "chunk_too_large", "file".
+  Result<Records> unpack(const ChunkIndex& chunk) const;
+
+  /// Keeps no file open from now on; unpack() opens it each time.
+  void letGo();
+
+  /// Makes an unfinished file a finished one: cuts what is not whole, writes the summary.
+  Result<void> finish();
+
+ private:
+  Reader(std::filesystem::path path, int file, std::uint64_t size)
+      : path_(std::move(path)), file_(file), size_(size) {}
+  bool readSummary();
+  bool takeSummary(Bytes records);
+  bool plausible() const;
+  void scan();
+  bool scanRecord(Op op, std::uint64_t at, std::uint64_t length);
+  bool scanChunk(std::uint64_t at, std::uint64_t length);
+  void scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content);
+  void addBare(std::uint64_t at, std::uint64_t length);
+  std::vector<std::uint8_t> read(std::uint64_t at, std::uint64_t length) const;
+
+  std::filesystem::path path_;
+  int file_ = -1;
+  std::uint64_t size_ = 0, whole_ = 0, damaged_ = 0;
+  bool finished_ = false;
+  Catalogue catalogue_;
+  std::vector<ChunkIndex> chunks_;
+  Statistics statistics_;
+  Draft::Index last_index_;  ///< of the last chunk that the scan found
+};
+
+/// Goes through a chunk's records; false where they are damaged (what came before was given).
+/// `other` gets schemas and channels.
+bool forEachMessage(Bytes records,
+                    const std::function<void(const Message&, std::uint64_t offset)>& visit,
+                    Catalogue& other);
+
+}  // namespace perdure::replay::mcap

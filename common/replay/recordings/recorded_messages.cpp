@@ -1,0 +1,166 @@
+#include "common/replay/recordings/recorded_messages.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "common/base/errors.h"
+#include "common/base/ids.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kExtension[] = ".mcap";
+
+std::vector<fs::path> filesIn(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return {path};
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(path, ignored)) {
+    if (entry.path().extension() == kExtension) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// What a recorder writes again at the beginning of each segment.
+bool isLatchedAlone(const std::string& topic) { return topic == "calibration" || topic == "model"; }
+
+}  // namespace
+
+std::string topicOf(const std::string& channel) {
+  constexpr std::string_view kPrefix = "perdure/";
+  if (!channel.starts_with(kPrefix)) return channel;
+  const auto slash = channel.find('/', kPrefix.size());
+  return slash == std::string::npos ? channel : channel.substr(slash + 1);
+}
+
+bool RecordedMessages::looksLikeOne(const fs::path& path) {
+  std::error_code ignored;
+  if (path.extension() == kExtension) return true;
+  return fs::is_directory(path, ignored) && !filesIn(path).empty();
+}
+
+RecordedMessages::RecordedMessages(const fs::path& path) {
+  const auto files = filesIn(path);
+  for (const fs::path& file : files) openFile(file);
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    for (const auto& chunk : files_[i].chunks()) chunks_.push_back({i, &chunk});
+  }
+  if (chunks_.empty()) {
+    throw StartupError(ExitCode::kUnavailable,
+                       path.string() + " holds no messages" +
+                           (last_problem_.empty() ? "" : " (" + last_problem_ + ")") +
+                           "; perdure record makes recordings");
+  }
+  std::stable_sort(chunks_.begin(), chunks_.end(), [](const auto& a, const auto& b) {
+    return a.index->start_ns < b.index->start_ns;
+  });
+  rewind();
+}
+
+void RecordedMessages::openFile(const fs::path& path) {
+  auto reader = mcap::Reader::open(path);
+  if (!reader) {
+    if (reader.error().code == "file") {
+      throw StartupError(ExitCode::kUnavailable, reader.error().detail);
+    }
+    return count(reader.error());
+  }
+  if (!reader->finished()) {
+    count({"unfinished", path.string() +
+                             " was not finished: " + std::to_string(reader->cutBytes()) +
+                             " bytes at its end are lost; `perdure record repair` makes it whole"});
+  }
+  const auto& catalogue = reader->catalogue();
+  for (const auto& [id, n] : reader->statistics().by_channel) {
+    const auto channel = catalogue.channels.find(id);
+    if (channel == catalogue.channels.end() || n == 0) continue;
+    TopicCount& topic = topics_[topicOf(channel->second.topic)];
+    const auto schema = catalogue.schemas.find(channel->second.schema);
+    if (schema != catalogue.schemas.end()) topic.type = schema->second.name;
+    topic.messages += n;
+  }
+  for (const auto& chunk : reader->chunks()) {
+    start_ns_ = std::min(start_ns_, chunk.start_ns);
+    end_ns_ = std::max(end_ns_, chunk.end_ns);
+  }
+  reader->letGo();  // a folder may hold more segments than a process may open
+  files_.push_back(*std::move(reader));
+}
+
+void RecordedMessages::count(const Reason& reason) {
+  reasons_.add(reason);
+  last_problem_ = reason.detail;
+}
+
+void RecordedMessages::rewind(std::function<bool(const std::string&)> wanted,
+                              std::uint64_t from_ns) {
+  wanted_ = std::move(wanted);
+  from_ns_ = from_ns;
+  next_chunk_ = 0;
+  order_ = 0;
+  pending_ = {};
+  repeatable_.clear();
+}
+
+bool RecordedMessages::holdsWanted(const ChunkPlace& place) const {
+  if (place.index->end_ns < from_ns_) return false;
+  if (!wanted_ || place.index->index_offsets.empty()) return true;
+  const auto& channels = files_[place.file].catalogue().channels;
+  for (const auto& [id, offset] : place.index->index_offsets) {
+    const auto channel = channels.find(id);
+    if (channel == channels.end() || wanted_(topicOf(channel->second.topic))) return true;
+  }
+  return false;
+}
+
+void RecordedMessages::load(const ChunkPlace& place) {
+  if (!holdsWanted(place)) return;
+  const mcap::Reader& file = files_[place.file];
+  const auto records = file.unpack(*place.index);
+  if (!records) return count(records.error());
+  mcap::Catalogue catalogue = file.catalogue();
+  const auto visit = [&](const mcap::Message& message, std::uint64_t) {
+    const auto channel = catalogue.channels.find(message.channel);
+    if (channel == catalogue.channels.end()) {
+      return count({"channel_unknown", file.path().string() + " has a message of no channel"});
+    }
+    RecordedMessage recorded;
+    recorded.topic = topicOf(channel->second.topic);
+    if (wanted_ && !wanted_(recorded.topic)) return;
+    const auto schema = catalogue.schemas.find(channel->second.schema);
+    if (schema != catalogue.schemas.end()) recorded.type = schema->second.name;
+    recorded.log_ns = message.log_ns;
+    recorded.data = message.data;
+    recorded.keeper = *records;
+    pending_.push({std::move(recorded), order_++});
+  };
+  if (!mcap::forEachMessage(**records, visit, catalogue)) {
+    count({"chunk_damaged", file.path().string() + ": a chunk ends within a record"});
+  }
+}
+
+bool RecordedMessages::isRepeated(const RecordedMessage& message) {
+  if (!isLatchedAlone(message.topic)) return false;
+  const std::string_view bytes(reinterpret_cast<const char*>(message.data.data()),
+                               message.data.size());
+  return !repeatable_.emplace(message.topic, digest(bytes)).second;
+}
+
+std::optional<RecordedMessage> RecordedMessages::next() {
+  while (true) {
+    while (next_chunk_ < chunks_.size() &&
+           (pending_.empty() ||
+            chunks_[next_chunk_].index->start_ns <= pending_.top().message.log_ns)) {
+      load(chunks_[next_chunk_++]);
+    }
+    if (pending_.empty()) return std::nullopt;
+    RecordedMessage message = pending_.top().message;
+    pending_.pop();
+    if (!isRepeated(message)) return message;
+  }
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,196 @@
+#include "common/sim/scenes/parts/streets.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/so3.h"
+#include "common/sim/scenes/parts/rigs.h"
+
+namespace perdure::sim {
+namespace {
+
+constexpr double kCrossingClearance = 3.5;  ///< nobody parks nearer to a crossing road's edge
+
+Solid areaOf(const Road& road) {
+  const Eigen::Vector2d way = road.to - road.from;
+  return {0.5 * (road.from + road.to), std::atan2(way.y(), way.x()),
+          Eigen::Vector2d(0.5 * way.norm(), 0.5 * road.width_m), 0.0, 1e3};
+}
+
+Solid solidAt(const Place& place, const Eigen::Vector3d& size) {
+  return {place.point, place.yaw, 0.5 * size.head<2>(), place.low, place.low + size.z()};
+}
+
+double lengthOf(const Road& road) { return (road.to - road.from).norm(); }
+
+}  // namespace
+
+Streets::Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishing& furnishing)
+    : builder_(builder), roads_(std::move(roads)), furnishing_(furnishing) {
+  builder_.scene().ground = GroundKind::kStreet;
+  builder_.scene().roads = roads_;
+}
+
+/// `across` is the distance from the road's middle line to that side; `yaw` is relative to the way
+/// that traffic takes on that side (people drive on the right).
+Place Streets::placeAt(const Road& road, int side, double along, double across, double yaw) const {
+  const Eigen::Vector2d way = (road.to - road.from).normalized(), left(-way.y(), way.x());
+  const double heading = std::atan2(way.y(), way.x()) + (side > 0 ? M_PI : 0.0);
+  return {road.from + along * way + side * across * left, wrapAngle(heading + yaw), 0.0};
+}
+
+bool Streets::onAnotherRoad(const Road& road, const Solid& solid, double margin) const {
+  return std::any_of(roads_.begin(), roads_.end(), [&](const Road& other) {
+    const bool same = other.from == road.from && other.to == road.to;
+    return !same && meet(areaOf(other), solid, margin);
+  });
+}
+
+bool Streets::nearACrossing(const Road& road, const Solid& solid) const {
+  return onAnotherRoad(road, solid, kCrossingClearance);
+}
+
+void Streets::furnish() {
+  // Houses first: they are the largest and everything else finds room before them.
+  for (const Road& road : roads_) {
+    for (const int side : {-1, 1}) build(road, side);
+    if (furnishing_.ends) closeEnds(road);
+  }
+  for (const Road& road : roads_) {
+    for (const int side : {-1, 1}) {
+      park(road, side);
+      plant(road, side);
+      people(road, side);
+    }
+  }
+}
+
+void Streets::build(const Road& road, int side) {
+  Dice& dice = builder_.dice();
+  for (double along = 0.0; along < lengthOf(road) - 3.0;) {
+    const double set_back =
+        furnishing_.pavement + (dice.chance(0.25) ? dice.uniform(0.5, 2.5) : 0.05);
+    const Eigen::Vector3d size(dice.uniform(8.0, 17.0), 7.0, dice.uniform(5.5, 13.0));
+    bool built = false;
+    for (double length = size.x(); length >= 4.0 && !built; length *= 0.6) {
+      const Eigen::Vector3d shorter(length, size.y(), size.z());
+      // The front looks at the road: −y of the house, on the side away from the traffic's yaw.
+      const Place place = placeAt(road, side, along + 0.5 * length,
+                                  0.5 * road.width_m + set_back + 0.5 * size.y(), M_PI);
+      const Solid solid = solidAt(place, shorter);
+      built = !onAnotherRoad(road, solid, furnishing_.pavement) &&
+              builder_.put(PropKind::kFacade, shorter, place);
+      if (built) along += length + (dice.chance(0.2) ? dice.uniform(1.5, 5.0) : 0.1);
+    }
+    if (!built) along += 2.0;
+  }
+}
+
+void Streets::closeEnds(const Road& road) {
+  const Eigen::Vector2d way = (road.to - road.from).normalized();
+  const double heading = std::atan2(way.y(), way.x());
+  for (const bool at_end : {false, true}) {
+    const Eigen::Vector3d size(road.width_m + 2.0 * furnishing_.pavement + 3.0, 7.0,
+                               builder_.dice().uniform(6.0, 12.0));
+    const Eigen::Vector2d end = at_end ? road.to : road.from;
+    const Eigen::Vector2d point = end + (at_end ? 7.0 : -7.0) * way;
+    const Place place{point, wrapAngle(heading + (at_end ? -M_PI_2 : M_PI_2)), 0.0};
+    if (!onAnotherRoad(road, solidAt(place, size), 0.5)) {
+      builder_.put(PropKind::kFacade, size, place);
+    }
+  }
+}
+
+void Streets::park(const Road& road, int side) {
+  Dice& dice = builder_.dice();
+  for (double along = dice.uniform(0.5, 4.0); along < lengthOf(road) - 3.0;) {
+    if (dice.chance(furnishing_.free_share)) {
+      along += dice.uniform(5.0, 11.0);
+      continue;
+    }
+    SceneObject vehicle = builder_.draw(dice.chance(furnishing_.van_share) ? "van" : "car");
+    const double across =
+        0.5 * road.width_m - 0.18 - 0.5 * vehicle.size.y() + dice.uniform(-0.1, 0.1);
+    const double turned = dice.chance(furnishing_.reversed_share) ? M_PI : 0.0;
+    const double length = vehicle.size.x();
+    const Place place =
+        placeAt(road, side, along + 0.5 * length, across, turned + dice.uniform(-0.03, 0.03));
+    const bool stands = !nearACrossing(road, solidAt(place, vehicle.size)) &&
+                        builder_.put(std::move(vehicle), place, 0.25);
+    // Gaps are many small ones and few large ones.
+    const double gap = 0.6 - (furnishing_.mean_gap - 0.6) * std::log(1.0 - dice.unit());
+    along += stands ? length + std::min(gap, 6.0) : 1.0;
+  }
+}
+
+void Streets::plant(const Road& road, int side) {
+  Dice& dice = builder_.dice();
+  const double kerb = 0.5 * road.width_m;
+  for (double along = 2.0; along < lengthOf(road);
+       along += dice.uniform(0.7, 1.3) * furnishing_.tree_every) {
+    const double crown = dice.uniform(2.2, 3.2);
+    const Place place = placeAt(road, side, along, kerb + 0.9, dice.uniform(-M_PI, M_PI));
+    const Eigen::Vector3d size(crown, crown, dice.uniform(6.5, 8.5));
+    if (!onAnotherRoad(road, solidAt(place, size), 0.5)) builder_.put(PropKind::kTree, size, place);
+  }
+  for (double along = 6.0; along < lengthOf(road);
+       along += dice.uniform(0.8, 1.2) * furnishing_.pole_every) {
+    const Place place = placeAt(road, side, along, kerb + 0.45, 0.0);
+    const Eigen::Vector3d size(0.16, 0.16, dice.uniform(4.5, 7.0));
+    if (!onAnotherRoad(road, solidAt(place, size), 0.5)) builder_.put(PropKind::kPole, size, place);
+  }
+  for (double along = 3.0; along < lengthOf(road) - 6.0; along += 9.0) {
+    if (!dice.chance(furnishing_.hedge_share)) continue;
+    // Between the cars and the pavement, or before the houses.
+    const bool at_kerb = dice.chance(0.4);
+    const Eigen::Vector3d size(dice.uniform(2.5, 6.0), dice.uniform(0.5, 0.7),
+                               dice.uniform(0.7, 1.5));
+    const double across = at_kerb ? kerb + 0.55 : kerb + furnishing_.pavement - 0.4;
+    const Place place = placeAt(road, side, along + 0.5 * size.x(), across, M_PI);
+    if (!onAnotherRoad(road, solidAt(place, size), 0.5))
+      builder_.put(PropKind::kHedge, size, place);
+  }
+}
+
+void Streets::people(const Road& road, int side) {
+  Dice& dice = builder_.dice();
+  const double kerb = 0.5 * road.width_m;
+  const auto along_the_pavement = [&](const std::string& class_name, double every) {
+    for (double along = dice.uniform(0.0, every); along < lengthOf(road);
+         along += dice.uniform(0.4, 1.6) * every) {
+      const bool person = class_name == "person";
+      const double across =
+          kerb + (person ? dice.uniform(0.6, furnishing_.pavement - 0.6) : dice.uniform(0.55, 0.9));
+      const double yaw = person ? dice.uniform(-M_PI, M_PI)
+                                : (dice.chance(0.5) ? M_PI : 0.0) + dice.uniform(-0.2, 0.2);
+      SceneObject thing = builder_.draw(class_name);
+      const Place place = placeAt(road, side, along, across, yaw);
+      if (!onAnotherRoad(road, solidAt(place, thing.size), 0.3))
+        builder_.put(std::move(thing), place);
+    }
+  };
+  along_the_pavement("person", furnishing_.person_every);
+  along_the_pavement("bicycle", furnishing_.bicycle_every);
+}
+
+void drawDaylight(SceneBuilder& builder) {
+  Dice& dice = builder.dice();
+  const double azimuth = dice.uniform(-M_PI, M_PI), height = dice.uniform(0.5, 1.15);
+  builder.scene().sun_W = {std::cos(height) * std::cos(azimuth),
+                           std::cos(height) * std::sin(azimuth), std::sin(height)};
+  builder.scene().sun_strength = dice.uniform(0.7, 1.1);
+  builder.scene().sky_strength = dice.uniform(0.4, 0.6);
+}
+
+void putOnWheels(SceneBuilder& builder, const GroundPath& way, const Drive& driven, double seconds,
+                 const SceneOptions& options) {
+  constexpr double kHeightOfCamera = 1.6;
+  Suspension suspension;
+  suspension.height = kHeightOfCamera - kCameraAboveBody;
+  suspension.seed = builder.dice().seed();
+  builder.setBody(vehicleMotion(way, driven, suspension), seconds, 1.15, 2.2);
+  builder.scene().rig = makeRig(Carrier::kVehicle, options, builder.dice(), 0.02);
+  drawDaylight(builder);
+}
+
+}  // namespace perdure::sim

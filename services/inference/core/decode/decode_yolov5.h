@@ -1,0 +1,16 @@
+// Raw heads of YOLOv5 and YOLOv7: anchors, every value through a sigmoid.
+#pragma once
+
+#include <vector>
+
+#include "services/inference/core/decode/decode.h"
+
+namespace perdure::inference {
+
+/// `tensor`: (1,A·(5+K),H,W) or (1,A,H,W,5+K) of one level; its shape is checked. Of each anchor
+/// x, y, w, h, objectness, K classes:
+///   centre (g − ½ + 2σ(t))·s, size anchor·(2σ(t))²
+void decodeYolov5(const ModelDescription& model, const DecodeOptions& options, const Level& level,
+                  const Tensor& tensor, std::vector<Candidate>& out);
+
+}  // namespace perdure::inference

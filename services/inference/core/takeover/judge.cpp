@@ -1,0 +1,102 @@
+#include "services/inference/core/takeover/judge.h"
+
+#include <algorithm>
+
+namespace perdure::inference {
+namespace {
+
+constexpr std::size_t kMaxModels = 256;
+constexpr float kSure = 2.0F;       // nats for a class against clutter
+constexpr double kSameThing = 0.3;  // intersection over union
+constexpr std::size_t kFlood = 10;
+
+/// Position of the likeliest class, where the box is sure to be one.
+std::optional<std::size_t> sureClass(const Detection& d) {
+  if (d.activations.size() < 2) return std::nullopt;
+  const auto best = std::max_element(d.activations.begin() + 1, d.activations.end());
+  if (*best - d.activations[0] < kSure) return std::nullopt;
+  return static_cast<std::size_t>(best - d.activations.begin()) - 1;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool hasBoxAt(const Detections& list, const Box& box) {
+  return std::any_of(list.detections.begin(), list.detections.end(), [&](const Detection& d) {
+    return !d.primed && intersectionOverUnion(d.box, box) >= kSameThing;
+  });
+}
+
+/// Boxes that it found by itself: an answer to a prediction shows little of how it sees.
+std::size_t boxesOf(const Detections& list) {
+  return static_cast<std::size_t>(std::count_if(list.detections.begin(), list.detections.end(),
+                                                [](const Detection& d) { return !d.primed; }));
+}
+
+}  // namespace
+
+void Judge::learn(const ModelInfo& model) {
+  if (classes_.size() < kMaxModels) classes_.try_emplace(model.hash, model.classes);
+}
+
+void Judge::reset() {
+  rows_.clear();
+  frames_ = sure_ = found_ = 0;
+}
+
+void Judge::compare(const Detections& elder, const Detections& newcomer) {
+  Row row{boxesOf(elder), boxesOf(newcomer)};
+  const auto its = classes_.find(newcomer.model_hash), ours = classes_.find(elder.model_hash);
+  row.told = its != classes_.end();
+  for (const Detection& d : elder.detections) {
+    if (!row.told || ours == classes_.end()) break;
+    const auto k = sureClass(d);
+    if (d.primed || !k || *k >= ours->second.size() || !contains(its->second, ours->second[*k]))
+      continue;
+    ++row.sure;
+    row.found += hasBoxAt(newcomer, d.box);
+  }
+  ++frames_, sure_ += row.sure, found_ += row.found;
+  rows_.push_back(row);
+  if (rows_.size() > kWindow) rows_.pop_front();
+}
+
+std::optional<Reason> Judge::complaint() const {
+  Row sum;
+  std::size_t untold = 0, with_sure = 0, with_any = 0, empty = 0;
+  for (const Row& row : rows_) {
+    untold += !row.told;
+    if (row.elder > 0) ++with_any, sum.elder += row.elder, sum.newcomer += row.newcomer;
+    if (row.sure == 0) continue;
+    ++with_sure, sum.sure += row.sure, sum.found += row.found;
+    empty += row.newcomer == 0;
+  }
+  const auto text = [](std::size_t n) { return std::to_string(n); };
+  if (untold >= kEnough) {
+    return Reason{"unknown_model", "its detections are of a model that it never published"};
+  }
+  if (with_sure >= kEnough && 10 * empty >= 9 * with_sure) {
+    return Reason{"empty", text(empty) + " of " + text(with_sure) +
+                               " frames are empty in which the other is sure of " + text(sum.sure) +
+                               " things"};
+  }
+  if (with_sure >= kEnough && 10 * sum.found < sum.sure) {
+    return Reason{"elsewhere", "of " + text(sum.sure) +
+                                   " things that the other is sure of it has " + text(sum.found)};
+  }
+  if (with_any >= kEnough && sum.newcomer >= kFlood * sum.elder) {
+    return Reason{"flood", text(sum.newcomer) + " boxes in " + text(with_any) +
+                               " frames where the other has " + text(sum.elder)};
+  }
+  return std::nullopt;
+}
+
+std::string Judge::summary() const {
+  std::string text = std::to_string(frames_) + " frames";
+  if (sure_ == 0) return text + "; nothing in them to compare by";
+  return text + "; " + std::to_string(100 * found_ / sure_) + " % of " + std::to_string(sure_) +
+         " sure things found";
+}
+
+}  // namespace perdure::inference

@@ -1,0 +1,188 @@
+#include "services/vio/core/propagation/imu_propagator.h"
+
+#include <algorithm>
+
+#include "common/base/check.h"
+#include "common/math/so3.h"
+
+namespace perdure::vio {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Rotation over `dt` with the rate going linearly from w0 to w1 (second-order Magnus), and its
+/// derivative by a bias that both rates contain.
+struct Turn {
+  Matrix3d R, J_bias;  ///< J_bias: right tangent of R by the bias
+};
+
+Turn turn(const Vector3d& w0, const Vector3d& w1, double dt) {
+  const Vector3d theta = 0.5 * (w0 + w1) * dt + w0.cross(w1) * (dt * dt / 12.0);
+  const Matrix3d d_theta = -dt * Matrix3d::Identity() + (dt * dt / 12.0) * skew(w1 - w0);
+  return {expSo3(theta), rightJacobianSo3(theta) * d_theta};
+}
+
+/// Time in which the velocity of linearisation follows the estimated one, s.
+constexpr double kFollow = 1.0;
+
+struct Densities {
+  double gyro2, accel2;
+};
+
+/// Added to a square density where values are interpolated over `span`, and they differ by
+/// `change` over `dt` of it.
+double interpolationDensity(double span, double dt, double change2, double floor, double gap,
+                            const ImuNoise& noise) {
+  if (span <= noise.interpolation_from_s) return 0.0;
+  const double whole = span / dt;  // the change over all of the span
+  double variance = floor * floor + whole * whole * change2 / 12.0;
+  if (span > noise.gap_from_s) variance += gap * gap;
+  return span * variance;
+}
+
+/// Square noise densities of one step, with the error of interpolation where samples are sparse.
+Densities densities(const ImuReading& a, const ImuReading& b, double dt, const ImuNoise& noise) {
+  const auto added = [&](double span, const Vector3d& change, double floor, double gap) {
+    return interpolationDensity(std::max(span, dt), dt, change.squaredNorm(), floor, gap, noise);
+  };
+  return {noise.gyro * noise.gyro +
+              added(b.gyro_span_s, b.gyro - a.gyro, noise.interpolation_gyro, noise.gap_gyro),
+          noise.accel * noise.accel +
+              added(b.accel_span_s, b.accel - a.accel, noise.interpolation_accel, noise.gap_accel)};
+}
+
+void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vector3d& bg,
+          const Vector3d& ba, const ImuNoise& noise) {
+  const double dt = toSeconds(b.time - a.time);
+  const Vector3d w0 = a.gyro - bg, w1 = b.gyro - bg, wm = 0.5 * (w0 + w1);
+  const Vector3d f0 = a.accel - ba, f1 = b.accel - ba, fm = 0.5 * (f0 + f1);
+  const Turn half = turn(w0, wm, 0.5 * dt), whole = turn(w0, w1, dt);
+  const Matrix3d R0 = x.dq.toRotationMatrix(), Rm = R0 * half.R, R1 = R0 * whole.R;
+
+  // d (R f) by the rotation error at the start and by the gyro bias, at start, middle and end.
+  const Matrix3d A0 = -R0 * skew(f0), Am = -Rm * skew(fm), A1 = -R1 * skew(f1);
+  const Matrix3d Am_t = Am * half.R.transpose(), A1_t = A1 * whole.R.transpose();
+  const Matrix3d Am_b = Am * half.J_bias, A1_b = A1 * whole.J_bias;
+  const double v6 = dt / 6.0, p6 = dt * dt / 6.0;
+
+  Matrix15d F = Matrix15d::Identity();
+  F.block<3, 3>(kTheta, kTheta) = whole.R.transpose();
+  F.block<3, 3>(kTheta, kGyroBias) = whole.J_bias;
+  F.block<3, 3>(kPosition, kTheta) = p6 * (A0 + 2.0 * Am_t);
+  F.block<3, 3>(kPosition, kVelocity) = dt * Matrix3d::Identity();
+  F.block<3, 3>(kPosition, kGyroBias) = p6 * 2.0 * Am_b;
+  F.block<3, 3>(kPosition, kAccelBias) = -p6 * (R0 + 2.0 * Rm);
+  F.block<3, 3>(kVelocity, kTheta) = v6 * (A0 + 4.0 * Am_t + A1_t);
+  F.block<3, 3>(kVelocity, kGyroBias) = v6 * (4.0 * Am_b + A1_b);
+  F.block<3, 3>(kVelocity, kAccelBias) = -v6 * (R0 + 4.0 * Rm + R1);
+
+  const Densities d = densities(a, b, dt, noise);
+  const Matrix3d I = Matrix3d::Identity();
+  Matrix15d Q = Matrix15d::Zero();
+  Q.block<3, 3>(kTheta, kTheta) = d.gyro2 * dt * I;
+  Q.block<3, 3>(kPosition, kPosition) = d.accel2 * dt * dt * dt / 3.0 * I;
+  Q.block<3, 3>(kPosition, kVelocity) = d.accel2 * dt * dt / 2.0 * I;
+  Q.block<3, 3>(kVelocity, kPosition) = d.accel2 * dt * dt / 2.0 * I;
+  Q.block<3, 3>(kVelocity, kVelocity) = d.accel2 * dt * I;
+  Q.block<3, 3>(kGyroBias, kGyroBias) = noise.gyro_walk * noise.gyro_walk * dt * I;
+  Q.block<3, 3>(kAccelBias, kAccelBias) = noise.accel_walk * noise.accel_walk * dt * I;
+
+  x.F = (F * x.F).eval();
+  x.Q = (F * x.Q * F.transpose() + Q).eval();
+  x.dp += x.dv * dt + p6 * (R0 * f0 + 2.0 * (Rm * fm));
+  x.dv += v6 * (R0 * f0 + 4.0 * (Rm * fm) + R1 * f1);
+  x.dq = Eigen::Quaterniond(R1).normalized();
+  x.dt += dt;
+  x.end_rate = w1;
+  x.mean_rate += dt * wm;
+  x.mean_force += dt * fm;
+}
+
+}  // namespace
+
+ImuIncrement integrate(const std::vector<ImuReading>& readings, const Vector3d& gyro_bias,
+                       const Vector3d& accel_bias, const ImuNoise& noise) {
+  check(readings.size() >= 2, "an interval has two ends");
+  ImuIncrement x;
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    step(x, readings[i - 1], readings[i], gyro_bias, accel_bias, noise);
+  }
+  x.mean_rate /= x.dt;
+  x.mean_force /= x.dt;
+  return x;
+}
+
+Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
+                                     const Vector3d& gyro_bias) {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    const ImuReading &a = readings[i - 1], &b = readings[i];
+    const Matrix3d R = turn(a.gyro - gyro_bias, b.gyro - gyro_bias, toSeconds(b.time - a.time)).R;
+    q = Eigen::Quaterniond(Matrix3d(q.toRotationMatrix() * R)).normalized();
+  }
+  return q;
+}
+
+Nav predict(const Nav& nav, const ImuIncrement& x, double gravity) {
+  const Vector3d g(0, 0, -gravity);
+  Nav to = nav;
+  to.q_WB = (nav.q_WB * x.dq).normalized();
+  to.p_WB = nav.p_WB + nav.v_WB * x.dt + 0.5 * x.dt * x.dt * g + nav.q_WB * x.dp;
+  to.v_WB = nav.v_WB + x.dt * g + nav.q_WB * x.dv;
+  return to;
+}
+
+Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& x, const Matrix3d& R_W_B0,
+                     double gravity) {
+  const Vector3d g(0, 0, -gravity);
+  const Matrix3d R0 = from.q_WB.toRotationMatrix();
+  Matrix15d Phi = x.F;
+  Phi.block<3, 3>(kTheta, kTheta) = to.q_WB.toRotationMatrix().transpose() * R0;
+  Phi.block<3, 3>(kPosition, kTheta) =
+      -skew(to.p_WB - from.p_WB - from.v_WB * x.dt - 0.5 * x.dt * x.dt * g) * R0;
+  Phi.block<3, 3>(kVelocity, kTheta) = -skew(to.v_WB - from.v_WB - x.dt * g) * R0;
+  Phi.block<6, 6>(kPosition, kGyroBias) << R_W_B0 * x.F.block<3, 3>(kPosition, kGyroBias),
+      R_W_B0 * x.F.block<3, 3>(kPosition, kAccelBias),
+      R_W_B0 * x.F.block<3, 3>(kVelocity, kGyroBias),
+      R_W_B0 * x.F.block<3, 3>(kVelocity, kAccelBias);
+  return Phi;
+}
+
+void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity,
+               bool first_estimates) {
+  const Matrix3d R0 = state.nav.q_WB.toRotationMatrix();
+  const Nav predicted = predict(state.nav, x, gravity);
+  Nav from = state.nav, to_linear = predicted;
+  if (first_estimates) {
+    from = state.nav_linear;
+    from.v_WB += std::min(1.0, x.dt / kFollow) * (state.nav.v_WB - from.v_WB);
+    Nav turned = from;
+    turned.q_WB = state.nav.q_WB;
+    to_linear = predict(turned, x, gravity);
+  }
+  const Matrix15d Phi = transition(from, to_linear, x, R0, gravity);
+  Matrix15d G = Matrix15d::Identity();
+  G.block<3, 3>(kPosition, kPosition) = R0;
+  G.block<3, 3>(kVelocity, kVelocity) = R0;
+
+  auto P = state.P();
+  const Eigen::Index rest = state.size() - kNavSize;
+  Matrix15d P_nav =
+      Phi * P.topLeftCorner<kNavSize, kNavSize>() * Phi.transpose() + G * x.Q * G.transpose();
+  P.topLeftCorner<kNavSize, kNavSize>() = 0.5 * (P_nav + P_nav.transpose());
+  // In pieces that fit on the stack.
+  constexpr int kPiece = 32;
+  for (Eigen::Index at = 0; at < rest; at += kPiece) {
+    auto cross = P.block(0, kNavSize + at, kNavSize, std::min<Eigen::Index>(kPiece, rest - at));
+    const Eigen::Matrix<double, kNavSize, Eigen::Dynamic, Eigen::ColMajor, kNavSize, kPiece> moved =
+        Phi * cross;
+    cross = moved;
+  }
+  P.bottomLeftCorner(rest, kNavSize) = P.topRightCorner(kNavSize, rest).transpose();
+  state.nav = predicted;
+  state.nav_linear = to_linear;
+  state.time = to;
+}
+
+}  // namespace perdure::vio

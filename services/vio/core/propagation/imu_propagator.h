@@ -1,0 +1,50 @@
+// Inertial propagation of the state between two images. The increment over the interval is
+// integrated by Runge-Kutta 4 in the body frame at its start, with the exact derivative of each
+// step (Forster et al., TRO 2017, with linearly interpolated samples); the transition is then
+// evaluated at first estimates (Li & Mourikis, IJRR 2013; Huang et al., IJRR 2010).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "services/vio/core/propagation/imu_buffer.h"
+#include "services/vio/core/state/options.h"
+#include "services/vio/core/state/state.h"
+
+namespace perdure::vio {
+
+using Matrix15d = Eigen::Matrix<double, 15, 15>;
+
+/// Increment from body frame B0 to B1; gravity and the initial velocity are not in it.
+struct ImuIncrement {
+  double dt = 0.0;                                                             ///< s
+  Eigen::Quaterniond dq = Eigen::Quaterniond::Identity();                      ///< R_B0_B1
+  Eigen::Vector3d dv = Eigen::Vector3d::Zero(), dp = Eigen::Vector3d::Zero();  ///< in B0
+  Matrix15d F = Matrix15d::Identity();  ///< d [θ, dp, dv, bg, ba] at the end / at the start
+  Matrix15d Q = Matrix15d::Zero();      ///< noise of the same
+  Eigen::Vector3d end_rate = Eigen::Vector3d::Zero();    ///< w_WB_B at the end, bias removed
+  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();   ///< bias removed
+  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();  ///< bias removed, in B
+};
+
+/// readings: at least two, in time order, as ImuBuffer::between gives them.
+ImuIncrement integrate(const std::vector<ImuReading>& readings, const Eigen::Vector3d& gyro_bias,
+                       const Eigen::Vector3d& accel_bias, const ImuNoise& noise);
+
+/// integrate()'s dq alone: R_B0_B1.
+Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
+                                     const Eigen::Vector3d& gyro_bias);
+
+/// The navigation state after the increment; gravity in m/s², along −z of W.
+Nav predict(const Nav& nav, const ImuIncrement& increment, double gravity);
+
+/// Transition of the navigation error [θ, p, v, b_g, b_a] from `from` to `to` in W; rotation,
+/// position and velocity of `from` are those of linearisation.
+Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& increment,
+                     const Eigen::Matrix3d& R_W_B0, double gravity);
+
+/// Moves state and covariance over the increment, to `to` on the IMU clock.
+void propagate(State& state, const ImuIncrement& increment, TimePoint to, double gravity,
+               bool first_estimates);
+
+}  // namespace perdure::vio

@@ -1,0 +1,31 @@
+// The part of the filter that outlives its process, as text: navigation, calibration, covariance.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/result.h"
+#include "services/vio/core/state/state.h"
+
+namespace perdure::vio {
+
+struct SavedState {
+  WorldId world;
+  TimePoint time;  ///< IMU clock
+  Nav nav;
+  std::vector<RigidTransform> T_BC;
+  double time_offset_s = 0.0;
+  Eigen::MatrixXd covariance;  ///< of [nav, extrinsics, time offset]
+  std::uint64_t next_track = 1;
+};
+
+std::string toText(const SavedState& saved);
+/// Fails with "state_malformed": cut off, altered, of another version, or not finite.
+Result<SavedState> fromText(const std::string& text);
+
+/// Moves a saved state on by `gap` at constant velocity, and widens it for what may have happened.
+void coast(SavedState& saved, double gap_s);
+
+}  // namespace perdure::vio

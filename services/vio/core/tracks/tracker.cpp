@@ -1,0 +1,292 @@
+#include "services/vio/core/tracks/tracker.h"
+
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <tuple>
+
+#include "common/base/check.h"
+
+namespace perdure::vio {
+namespace {
+
+constexpr double kBorder = 4.0;
+
+Eigen::Vector2d toEigen(const cv::Point2f& p) { return {p.x, p.y}; }
+cv::Point2f toCv(const Eigen::Vector2d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y())};
+}
+
+cv::TermCriteria criteria(std::int64_t iterations) {
+  return {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, static_cast<int>(iterations), 0.01};
+}
+
+/// By response; of equal ones the later in reading order is the worse.
+bool worse(const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  return std::tuple(-a.response, a.pt.y, a.pt.x) > std::tuple(-b.response, b.pt.y, b.pt.x);
+}
+
+}  // namespace
+
+Tracker::Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras)
+    : options_(options), cameras_(cameras) {
+  check(!cameras.empty() && cameras.size() <= kMaxCameras, "one or two cameras");
+}
+
+void Tracker::reset() {
+  points_.clear();
+  previous_.clear();
+  history_.clear();
+}
+
+std::vector<cv::Mat> Tracker::pyramid(const cv::Mat& image, std::int64_t levels) const {
+  std::vector<cv::Mat> result;
+  const int w = static_cast<int>(options_.window_px);
+  cv::buildOpticalFlowPyramid(image, result, {w, w}, static_cast<int>(levels));
+  return result;
+}
+
+std::vector<cv::Point2f> Tracker::seeds(const std::optional<Eigen::Matrix3d>& R) const {
+  std::vector<cv::Point2f> result;
+  result.reserve(points_.size());
+  const Eigen::Matrix3d R_BC = cameras_[0].T_BC().R();
+  const Eigen::Matrix3d R_C =
+      R ? Eigen::Matrix3d(R_BC.transpose() * *R * R_BC) : Eigen::Matrix3d::Identity();
+  for (const Point& p : points_) {
+    std::optional<Eigen::Vector2d> pixel;
+    if (R) pixel = cameras_[0].project(R_C * p.normalised.homogeneous());
+    result.push_back(pixel && cameras_[0].inImage(*pixel) ? toCv(*pixel) : p.pixel);
+  }
+  return result;
+}
+
+std::vector<bool> Tracker::inliers(const std::vector<Match>& matches,
+                                   const std::optional<Eigen::Matrix3d>& R) {
+  std::vector<bool> two_point;
+  if (R) {
+    const Eigen::Matrix3d R_BC = cameras_[0].T_BC().R();
+    two_point = twoPointRansac(matches, R_BC.transpose() * *R * R_BC, options_.ransac_px);
+    const auto agreeing = std::count(two_point.begin(), two_point.end(), true);
+    if (2 * agreeing > static_cast<long>(matches.size())) return two_point;
+    reasons_.add("tracker_rotation_disagrees");
+  }
+  if (matches.size() < 12) return R ? two_point : std::vector<bool>(matches.size(), true);
+  std::vector<cv::Point2f> before, now;
+  const double f = cameras_[0].fx();
+  for (const Match& m : matches) {
+    before.push_back(toCv(f * m.before));
+    now.push_back(toCv(f * m.now));
+  }
+  cv::Mat mask;
+  cv::findFundamentalMat(before, now, cv::FM_RANSAC, options_.ransac_px, 0.99, mask);
+  std::vector<bool> result(matches.size(), true);
+  if (static_cast<std::size_t>(mask.total()) != matches.size()) return result;
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    result[i] = mask.at<std::uint8_t>(static_cast<int>(i)) != 0;
+  }
+  return result;
+}
+
+void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R) {
+  if (points_.empty() || previous_.empty()) return;
+  std::vector<cv::Point2f> from, to = seeds(R);
+  for (const Point& p : points_) from.push_back(p.pixel);
+  std::vector<std::uint8_t> status;
+  const int w = static_cast<int>(options_.window_px);
+  for (auto* points : {&from, &to}) {
+    for (cv::Point2f& p : *points) p *= 0.5F;
+  }
+  cv::calcOpticalFlowPyrLK(previous_, now.half, from, to, status, cv::noArray(), {w, w},
+                           static_cast<int>(options_.pyramid_levels) - 1,
+                           criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  for (cv::Point2f& p : to) p *= 2.0F;
+  std::vector<Point> kept;
+  std::vector<Match> matches;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!status[i]) continue;
+    Point& p = points_[i];
+    const auto found = p.patch->find(now.levels, to[i]);
+    if (!found || !(found->similarity >= options_.similarity)) continue;
+    const auto seen = imagePoint(cameras_[0], toEigen(found->pixel));
+    if (!seen) continue;
+    matches.push_back({p.normalised, seen->normalised, seen->scale});
+    p.second += found->pixel - p.pixel;  // the second camera's seed moves along
+    p.pixel = found->pixel;
+    p.normalised = seen->normalised;
+    kept.push_back(std::move(p));
+  }
+  const std::vector<bool> good = inliers(matches, R);
+  points_.clear();
+  std::vector<Point> renewed;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (!good[i]) continue;
+    const bool grown = kept[i].patch->growth() > options_.growth;
+    (grown ? renewed : points_).push_back(std::move(kept[i]));
+  }
+  // Behind the others: points are in order of their ids.
+  for (Point& p : renewed) {
+    const auto patch = Patch::cut(now.levels.front(), p.pixel);
+    if (!patch) continue;
+    *p.patch = *patch;
+    p.id = next_id_++;
+    points_.push_back(std::move(p));
+  }
+}
+
+void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked) {
+  const auto missing = options_.max_points - static_cast<std::int64_t>(points_.size());
+  if (missing <= 0) return;
+  const int columns = static_cast<int>(options_.grid_columns);
+  const int rows = static_cast<int>(options_.grid_rows);
+  const auto per_cell =
+      std::max<std::int64_t>(1, (options_.max_points + columns * rows - 1) / (columns * rows));
+  std::vector<std::int64_t> filled(static_cast<std::size_t>(columns * rows), 0);
+  const double cell_w = image.cols / static_cast<double>(columns);
+  const double cell_h = image.rows / static_cast<double>(rows);
+  cv::Mat taken = cv::Mat::zeros(image.size(), CV_8UC1);
+  const int radius = static_cast<int>(options_.min_distance_px);
+  for (const cv::Rect2f& box : masked) cv::rectangle(taken, cv::Rect(box), 255, cv::FILLED);
+  for (const Point& p : points_) {
+    cv::circle(taken, cv::Point(p.pixel), radius, 255, cv::FILLED);
+    const int cell = std::min(static_cast<int>(p.pixel.y / cell_h), rows - 1) * columns +
+                     std::min(static_cast<int>(p.pixel.x / cell_w), columns - 1);
+    ++filled[static_cast<std::size_t>(cell)];
+  }
+  std::vector<cv::Point2f> fresh;
+  std::vector<cv::KeyPoint> corners;
+  for (int cell = 0; cell < columns * rows; ++cell) {
+    const std::int64_t wanted = per_cell - filled[static_cast<std::size_t>(cell)];
+    if (2 * wanted <= per_cell) continue;  // half full: seeking costs more than it brings
+    // Three pixels more on each side: FAST's circle.
+    const cv::Rect inner(static_cast<int>(cell % columns * cell_w),
+                         static_cast<int>(cell / columns * cell_h), static_cast<int>(cell_w),
+                         static_cast<int>(cell_h));
+    const cv::Rect roi =
+        (inner + cv::Size(6, 6) - cv::Point(3, 3)) & cv::Rect(0, 0, image.cols, image.rows);
+    cv::FAST(image(roi), corners, static_cast<int>(options_.fast_threshold), true);
+    if (corners.empty()) cv::FAST(image(roi), corners, 7, true);
+    // The best first; only a few are asked for.
+    std::make_heap(corners.begin(), corners.end(), worse);
+    std::int64_t added = 0;
+    for (auto end = corners.end(); end != corners.begin(); --end) {
+      if (added >= wanted || static_cast<std::int64_t>(fresh.size()) >= missing) break;
+      std::pop_heap(corners.begin(), end, worse);
+      const cv::KeyPoint& corner = *(end - 1);
+      const cv::Point2f p = corner.pt + cv::Point2f(roi.tl());
+      if (!cameras_[0].inImage(toEigen(p), 8.0) || taken.at<std::uint8_t>(cv::Point(p))) continue;
+      cv::circle(taken, cv::Point(p), radius, 255, cv::FILLED);
+      fresh.push_back(p);
+      ++added;
+    }
+  }
+  if (fresh.empty()) return;
+  for (const cv::Point2f& p : fresh) {
+    const auto seen = imagePoint(cameras_[0], toEigen(p));
+    auto patch = Patch::cut(image, p);
+    if (seen && patch) {
+      points_.push_back(
+          {next_id_++, p, p, false, seen->normalised, std::make_unique<Patch>(*patch)});
+    }
+  }
+}
+
+void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
+                               const std::vector<cv::Mat>& second) {
+  if (points_.empty()) return;
+  std::vector<cv::Point2f> from, to, back;
+  for (const Point& p : points_) {
+    from.push_back(p.pixel);
+    to.push_back(p.has_second ? p.second : p.pixel);
+  }
+  back = from;
+  std::vector<std::uint8_t> status, status_back;
+  const int w = static_cast<int>(options_.window_px);
+  const auto levels = static_cast<int>(options_.stereo_levels);
+  cv::calcOpticalFlowPyrLK(first, second, from, to, status, cv::noArray(), {w, w}, levels,
+                           criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  cv::calcOpticalFlowPyrLK(second, first, to, back, status_back, cv::noArray(), {w, w}, 1,
+                           criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
+  const RigidTransform T_10 = cameras_[1].T_BC().inverse() * cameras_[0].T_BC();
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    Point& p = points_[i];
+    p.has_second = false;
+    if (!status[i] || !status_back[i] || cv::norm(back[i] - from[i]) > 1.0) continue;
+    if (!cameras_[1].inImage(toEigen(to[i]), kBorder)) continue;
+    const auto seen = imagePoint(cameras_[1], toEigen(to[i]));
+    if (!seen) continue;
+    const Match match{p.normalised, seen->normalised, seen->scale};
+    if (epipolarDistance(match, T_10.R(), T_10.p) > options_.stereo_px) continue;
+    // In front of both: the disparity points along the baseline.
+    const Eigen::Vector3d turned = T_10.R() * p.normalised.homogeneous();
+    const Eigen::Vector3d d = seen->normalised.homogeneous() - turned / turned.z();
+    const Eigen::Vector3d along(T_10.p.x() - turned.x() / turned.z() * T_10.p.z(),
+                                T_10.p.y() - turned.y() / turned.z() * T_10.p.z(), 0);
+    if (d.dot(along) < 0.0 && d.norm() * seen->scale > 1.0) continue;
+    p.has_second = true;
+    p.second = to[i];
+  }
+}
+
+TrackedFrame Tracker::result() const {
+  TrackedFrame frame;
+  for (const Point& p : points_) {
+    TrackedPoint tracked{p.id, {}};
+    tracked.seen[0] = imagePoint(cameras_[0], toEigen(p.pixel));
+    if (p.has_second) tracked.seen[1] = imagePoint(cameras_[1], toEigen(p.second));
+    if (tracked.seen[0]) frame.points.push_back(tracked);
+  }
+  std::sort(frame.points.begin(), frame.points.end(),
+            [](const TrackedPoint& a, const TrackedPoint& b) { return a.id < b.id; });
+  return frame;
+}
+
+TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
+                            const std::optional<Eigen::Matrix3d>& R_now_before,
+                            const std::vector<cv::Rect2f>& masked) {
+  const bool stereo = cameras_.size() == 2 && !second.empty();
+  Images now;
+  cv::Mat half;
+  cv::pyrDown(first, half);
+  now.half = pyramid(half, options_.pyramid_levels - 1);
+  now.levels.push_back(first);
+  for (std::size_t i = 0; i < now.half.size(); i += 2) now.levels.push_back(now.half[i]);
+  follow(now, R_now_before);
+  std::erase_if(points_, [&](const Point& p) {
+    return std::any_of(masked.begin(), masked.end(),
+                       [&](const cv::Rect2f& box) { return box.contains(p.pixel); });
+  });
+  detect(first, masked);
+  if (stereo) {
+    followIntoSecond(pyramid(first, options_.stereo_levels),
+                     pyramid(second, options_.stereo_levels));
+  } else {
+    for (Point& p : points_) p.has_second = false;
+  }
+  previous_ = std::move(now.half);
+  std::vector<std::pair<std::uint64_t, cv::Point2f>> seen;
+  for (const Point& p : points_) seen.emplace_back(p.id, p.pixel);
+  history_.push_back(std::move(seen));
+  while (static_cast<std::int64_t>(history_.size()) > options_.memory + 1) history_.pop_front();
+  return result();
+}
+
+std::optional<double> Tracker::motionSince(std::size_t frames) const {
+  constexpr std::size_t kFewest = 10;
+  if (frames == 0 || history_.size() <= frames) return std::nullopt;
+  const auto& before = history_[history_.size() - 1 - frames];
+  std::vector<float> motion;
+  auto it = before.begin();
+  for (const auto& [id, pixel] : history_.back()) {  // both by rising id
+    while (it != before.end() && it->first < id) ++it;
+    if (it == before.end()) break;
+    if (it->first == id) motion.push_back(static_cast<float>(cv::norm(pixel - it->second)));
+  }
+  if (motion.size() < kFewest) return std::nullopt;
+  std::nth_element(motion.begin(), motion.begin() + static_cast<long>(motion.size() / 2),
+                   motion.end());
+  return motion[motion.size() / 2];
+}
+
+}  // namespace perdure::vio

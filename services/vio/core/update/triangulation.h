@@ -1,0 +1,35 @@
+// A point from its rays: linear least squares of the distances to the rays, then Gauss-Newton on
+// the reprojection error in the inverse-depth coordinates of the newest view.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/math/rigid_transform.h"
+#include "services/vio/core/state/options.h"
+#include "services/vio/core/state/state.h"
+#include "services/vio/core/tracks/tracks.h"
+
+namespace perdure::vio {
+
+struct Ray {
+  RigidTransform T_WC;
+  Eigen::Vector2d normalised;
+  double weight = 1.0;  ///< 1 / σ in the normalised image
+};
+
+struct Triangulated {
+  Eigen::Vector3d p_W;
+  Eigen::Matrix3d covariance;  ///< in W, of the pixel noise alone
+  double relative_sigma;       ///< of the depth from the newest view, σ / depth
+  double rms;                  ///< of the weighted residuals
+};
+
+/// Needs two rays. Fails with "triangulation_…": views, parallel, depth, condition.
+Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options);
+
+/// The rays of a track from the clones that saw it.
+std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);
+
+}  // namespace perdure::vio

@@ -1,0 +1,142 @@
+#include "services/vio/core/update/updater_slam.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+
+#include "common/base/check.h"
+#include "services/vio/core/update/triangulation.h"
+#include "services/vio/core/update/visual.h"
+
+namespace perdure::vio {
+namespace {
+
+constexpr int kFailuresToLeave = 3;
+
+/// The newest clone's views of one point: rows × [extrinsics, clone, point].
+struct PointRows {
+  static constexpr int kRows = 2 * kMaxCameras, kColumns = 6 * kMaxCameras + 9;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
+  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kRows, 1> r;
+  std::array<Block, kMaxCameras + 2> block;
+  std::size_t blocks = 0;
+
+  Measurement measurement() const { return {H, std::span(block.data(), blocks), r}; }
+};
+
+Result<PointRows> rowsOf(const State& state, const PointState& point, const Observation& seen,
+                         double sigma_px) {
+  const Clone& clone = state.clones.back();
+  const auto cameras = static_cast<Eigen::Index>(state.T_BC.size());
+  const auto views = std::count_if(seen.seen.begin(), seen.seen.begin() + cameras,
+                                   [](const auto& s) { return s.has_value(); });
+  PointRows rows;
+  rows.H.setZero(2 * views, 6 * cameras + 9);
+  rows.r.resize(2 * views);
+  for (int c = 0; c < static_cast<int>(cameras); ++c) {
+    rows.block[rows.blocks++] = {state.extrinsicsAt(c), 6};
+  }
+  rows.block[rows.blocks++] = {clone.at, 6};
+  rows.block[rows.blocks++] = {point.at, 3};
+  Eigen::Index row = 0;
+  for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
+    if (!seen.seen[c]) continue;
+    Eigen::Vector2d now, there;
+    ProjectionJacobians J;
+    if (!projectPoint(clone.T_WB, state.T_BC[c], point.p_W, now) ||
+        !projectPoint(clone.linear, state.T_BC[c], point.linear, there, &J)) {
+      return fail("slam_behind_camera");
+    }
+    const Eigen::Matrix2d weight = seen.seen[c]->to_pixels / sigma_px;
+    rows.H.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = weight * J.extrinsic;
+    rows.H.block<2, 6>(row, 6 * cameras) = weight * J.pose;
+    rows.H.block<2, 3>(row, 6 * cameras + 6) = weight * J.point;
+    rows.r.segment<2>(row) = weight * (seen.seen[c]->normalised - now);
+    row += 2;
+  }
+  return rows;
+}
+
+/// The first two rows are the first camera's: it always sees.
+Innovation innovationOf(const State& state, const PointRows& rows, const ImagePoint& seen,
+                        double sigma_px, bool used) {
+  const Measurement m = rows.measurement();
+  Eigen::MatrixXd S = state.project(m.H, m.blocks);
+  S.diagonal().array() += 1.0;
+  const Eigen::VectorXd r = m.r;
+  return {seen.pixel, sigma_px * r.head<2>(), r.dot(S.llt().solve(r)), static_cast<int>(r.size()),
+          used};
+}
+
+}  // namespace
+
+Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
+                                const VisionOptions& options, ReasonCounts& reasons,
+                                std::vector<Innovation>* innovations) {
+  check(!state.clones.empty(), "the newest pose is cloned");
+  UpdateCounts counts;
+  std::vector<PointRows> used;
+  used.reserve(state.points.size());
+  std::vector<std::uint64_t> leaving;
+  for (PointState& point : state.points) {
+    const Track* track = database.find(point.id);
+    if (!track || !track->seenAt(state.clones.back().frame)) continue;
+    const auto rows = rowsOf(state, point, track->observations.back(), options.sigma_px);
+    const auto of_views = [&] { return state.project(rows->H, rows->measurement().blocks); };
+    const bool passes = rows && passesGateWith(rows->r, of_views, options.gate_probability);
+    if (rows && innovations) {
+      innovations->push_back(innovationOf(state, *rows, *track->observations.back().seen[0],
+                                          options.sigma_px, passes));
+    }
+    if (passes) {
+      point.failed_gates = 0;
+      used.push_back(*rows);
+      ++counts.used;
+      continue;
+    }
+    ++counts.gated;
+    reasons.add(rows ? "slam_gated" : rows.error().code);
+    if (!rows || ++point.failed_gates >= kFailuresToLeave) leaving.push_back(point.id);
+  }
+  if (!used.empty()) {
+    std::vector<Measurement> measurements;
+    measurements.reserve(used.size());
+    for (const PointRows& rows : used) measurements.push_back(rows.measurement());
+    if (const auto done = state.update(measurements); !done) return tl::unexpected(done.error());
+  }
+  for (const std::uint64_t id : leaving) state.removePoint(id);
+  return counts;
+}
+
+Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options) {
+  const auto point = triangulate(raysOf(track, state, options.sigma_px), options);
+  if (!point) return tl::unexpected(point.error());
+  PointSystem s = stackViews(track, state, point->p_W, options.sigma_px);
+  if (s.r.size() < 4) return fail("slam_few_views");
+  const std::vector<Block> blocks = calibrationAndClones(state);
+  separatePoint(s);
+  const Eigen::Matrix3d R_f = s.H_f.topRows<3>();
+  if (!(R_f.diagonal().cwiseAbs().minCoeff() > 1e-9)) return fail("slam_unobserved");
+  const Eigen::MatrixXd H_1 = s.H_x.topRows<3>();
+  const Eigen::Vector3d r_1 = s.r.head<3>();
+  dropPoint(s);
+  const auto of_views = [&] { return state.project(s.H_x, blocks); };
+  if (!passesGateWith(s.r, of_views, options.gate_probability)) return fail("slam_gated");
+
+  // δf = R_f⁻¹ (r₁ − H₁ δx − n₁): mean, covariance and cross-covariance of the new point.
+  const Eigen::Matrix3d R_inverse = R_f.inverse();
+  const Eigen::MatrixXd J = -R_inverse * H_1;
+  Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(3, state.size());
+  Eigen::Index column = 0;
+  for (const Block& b : blocks) {
+    cross.noalias() += J.middleCols(column, b.size) * state.P().middleRows(b.at, b.size);
+    column += b.size;
+  }
+  const Eigen::Matrix3d covariance = state.project(J, blocks) + R_inverse * R_inverse.transpose();
+  state.addPoint(track.id, point->p_W + R_inverse * r_1, covariance, cross);
+  state.points.back().linear = linearisationPoint(state, track, point->p_W);
+  compress(s.H_x, s.r);
+  return state.update(s.H_x, blocks, s.r);
+}
+
+}  // namespace perdure::vio

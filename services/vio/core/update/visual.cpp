@@ -1,0 +1,140 @@
+#include "services/vio/core/update/visual.h"
+
+#include <Eigen/QR>
+#include <array>
+
+#include "common/base/check.h"
+#include "common/math/chi2.h"
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+
+namespace perdure::vio {
+namespace {
+
+/// Quantiles are looked up: they are asked for hundreds of times a frame.
+double gate(int dof, double probability) {
+  constexpr int kTable = 128;
+  thread_local std::array<double, kTable> table{};
+  thread_local double table_probability = -1.0;
+  if (table_probability != probability) {
+    table.fill(0.0);
+    table_probability = probability;
+  }
+  if (dof >= kTable) return chi2Quantile(probability, dof);
+  double& entry = table[static_cast<std::size_t>(dof)];
+  if (entry == 0.0) entry = chi2Quantile(probability, dof);
+  return entry;
+}
+
+}  // namespace
+
+bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
+                  const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised, ProjectionJacobians* J) {
+  const Eigen::Matrix3d R_BW = T_WB.R().transpose(), R_CB = T_BC.R().transpose();
+  const Eigen::Vector3d p_B = R_BW * (p_W - T_WB.p), p_C = R_CB * (p_B - T_BC.p);
+  if (!(p_C.z() > 1e-3)) return false;
+  normalised = p_C.hnormalized();
+  if (!J) return true;
+  Eigen::Matrix<double, 2, 3> J_C;
+  J_C << 1, 0, -normalised.x(), 0, 1, -normalised.y();
+  J_C /= p_C.z();
+  const Eigen::Matrix<double, 2, 3> J_B = J_C * R_CB;
+  J->point = J_B * R_BW;
+  J->pose << J_B * skew(p_B), -J->point;
+  J->extrinsic << J_C * skew(p_C), -J_B;
+  return true;
+}
+
+std::vector<Block> calibrationAndClones(const State& state) {
+  std::vector<Block> blocks;
+  blocks.reserve(state.T_BC.size() + state.clones.size());
+  for (int c = 0; c < static_cast<int>(state.T_BC.size()); ++c) {
+    blocks.push_back({state.extrinsicsAt(c), 6});
+  }
+  for (const Clone& clone : state.clones) blocks.push_back({clone.at, 6});
+  return blocks;
+}
+
+Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
+                                   const Eigen::Vector3d& p_W) {
+  const Clone* clone = state.clone(track.observations.back().frame);
+  if (!clone) clone = &state.clones.back();
+  return clone->linear * (clone->T_WB.inverse() * p_W);
+}
+
+PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
+                       double sigma_px) {
+  const Eigen::Index cameras = static_cast<Eigen::Index>(state.T_BC.size());
+  const Eigen::Index columns = 6 * (cameras + static_cast<Eigen::Index>(state.clones.size()));
+  const Eigen::Index capacity = 2 * static_cast<Eigen::Index>(track.views());
+  PointSystem s{Eigen::MatrixXd::Zero(capacity, columns), Eigen::MatrixXd(capacity, 3),
+                Eigen::VectorXd(capacity)};
+  Eigen::Index row = 0, k = 0;
+  std::size_t o = 0;
+  const Eigen::Vector3d p_linear = linearisationPoint(state, track, p_W);
+  for (const Clone& clone : state.clones) {
+    const Eigen::Index column = 6 * (cameras + k++);
+    while (o < track.observations.size() && track.observations[o].frame < clone.frame) ++o;
+    if (o == track.observations.size()) break;
+    if (track.observations[o].frame != clone.frame) continue;
+    for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
+      const auto& seen = track.observations[o].seen[c];
+      if (!seen) continue;
+      Eigen::Vector2d now, there;
+      ProjectionJacobians J;
+      if (!projectPoint(clone.T_WB, state.T_BC[c], p_W, now) ||
+          !projectPoint(clone.linear, state.T_BC[c], p_linear, there, &J)) {
+        return {};
+      }
+      const Eigen::Matrix2d weight = seen->to_pixels / sigma_px;
+      s.r.segment<2>(row) = weight * (seen->normalised - now);
+      s.H_x.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = weight * J.extrinsic;
+      s.H_x.block<2, 6>(row, column) = weight * J.pose;
+      s.H_f.middleRows<2>(row) = weight * J.point;
+      row += 2;
+    }
+  }
+  s.r.conservativeResize(row);
+  s.H_x.conservativeResize(row, Eigen::NoChange);
+  s.H_f.conservativeResize(row, Eigen::NoChange);
+  return s;
+}
+
+void separatePoint(PointSystem& s) {
+  check(s.r.size() >= 3, "a point has at least three rows");
+  Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(s.H_f);
+  s.H_x.applyOnTheLeft(qr.householderQ().adjoint());
+  s.r.applyOnTheLeft(qr.householderQ().adjoint());
+  s.H_f.triangularView<Eigen::StrictlyLower>().setZero();
+}
+
+void dropPoint(PointSystem& s) {
+  const Eigen::Index rows = s.r.size() - 3;
+  s.H_x = s.H_x.bottomRows(rows).eval();
+  s.r = s.r.tail(rows).eval();
+}
+
+bool passesGate(const VectorView& r, const MatrixView& S, double probability) {
+  const Cholesky chol(S);
+  return chol.positive() &&
+         chol.whiten(r).squaredNorm() < gate(static_cast<int>(r.size()), probability);
+}
+
+bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
+                    double probability) {
+  if (r.squaredNorm() < gate(static_cast<int>(r.size()), probability)) return true;
+  Eigen::MatrixXd S = P();
+  S.diagonal().array() += 1.0;
+  return passesGate(r, S, probability);
+}
+
+void compress(Eigen::MatrixXd& H, Eigen::VectorXd& r) {
+  const Eigen::Index n = H.cols();
+  if (H.rows() <= n) return;
+  Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(H);
+  r.applyOnTheLeft(qr.householderQ().adjoint());
+  r.conservativeResize(n);
+  H = Eigen::MatrixXd(H.topRows(n).triangularView<Eigen::Upper>());
+}
+
+}  // namespace perdure::vio

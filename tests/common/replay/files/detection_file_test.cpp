@@ -1,0 +1,132 @@
+#include "common/replay/files/detection_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/common/replay/tiny_datasets.h"
+
+namespace perdure::replay {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+DetectionFile readCsv(const std::string& text, DetectionFileOptions options = {}) {
+  options.file = freshFolder("detections") / "d.csv";
+  writeText(options.file, text);
+  return DetectionFile::read(options, ClassAliases());
+}
+std::string errorOfCsv(const std::string& text) {
+  return startupErrorOf([&] { readCsv(text); });
+}
+constexpr char kHeader[] = "frame,class,x1,y1,x2,y2,score,alpha_semisynthetic\n";
+
+TEST(DetectionFile, AScoreBecomesTheLogitOfItsClassAgainstClutter) {
+  const auto file = readCsv(std::string(kHeader) + "2,Car,10,20,30,50,0.8,-1.5\n");
+  const auto detections = file.at(2);
+  ASSERT_TRUE(detections && detections->size() == 1);
+  const Detection& d = detections->front();
+  EXPECT_DOUBLE_EQ(d.box.x2, 30);
+  ASSERT_EQ(d.activations.size(), 2U);
+  EXPECT_EQ(d.activations[0], 0.0F);
+  EXPECT_NEAR(d.activations[1], std::log(4.0), 1e-6);
+  EXPECT_EQ(d.azimuth, -1.5);
+  EXPECT_THAT(file.modelAt(2).classes, ElementsAre("car"));
+}
+
+TEST(DetectionFile, AScoreOfOneIsClippedBecauseItIsNotCertainty) {
+  const auto file = readCsv("frame,class,x1,y1,x2,y2,score\n0,car,1,2,3,4,1.0\n");
+  EXPECT_NEAR(file.at(0)->front().activations[1], std::log(99.0), 1e-5);
+}
+
+TEST(DetectionFile, AFrameWithoutRowsHasAnEmptyList) {
+  const auto file = readCsv(std::string(kHeader) + "2,Car,10,20,30,50,0.8,\n");
+  ASSERT_TRUE(file.at(1));
+  EXPECT_THAT(*file.at(1), IsEmpty());
+  EXPECT_EQ(file.at(2)->front().azimuth, std::nullopt);
+}
+
+TEST(DetectionFile, AListOfFramesSaysWhichFramesHaveAMessageAtAll) {
+  DetectionFileOptions options;
+  options.file = freshFolder("frames") / "d.csv";
+  writeText(options.file, std::string(kHeader) + "2,Car,10,20,30,50,0.8,0\n");
+  writeText(options.file.parent_path() / "d.frames", "1 2\n5\n");
+  const auto file = DetectionFile::read(options, ClassAliases());
+  EXPECT_FALSE(file.at(0));
+  EXPECT_THAT(*file.at(1), IsEmpty());
+  EXPECT_EQ(file.at(2)->size(), 1U);
+  EXPECT_THAT(*file.at(5), IsEmpty());
+  writeText(options.file.parent_path() / "d.frames", "1\nx\n");
+  EXPECT_THAT(startupErrorOf([&] { DetectionFile::read(options, ClassAliases()); }),
+              HasSubstr("d.frames:2"));
+}
+
+TEST(DetectionFile, LogitColumnsAreTakenAsTheyAre) {
+  const auto file =
+      readCsv("frame,class,x1,y1,x2,y2,score,logit:Car,logit:Van\n0,car,1,2,3,4,0.5,1.25,-2\n");
+  EXPECT_THAT(file.modelAt(0).classes, ElementsAre("car", "van"));
+  EXPECT_THAT(file.at(0)->front().activations, ElementsAre(0.0F, 1.25F, -2.0F));
+}
+
+TEST(DetectionFile, DeviationsOfSidesAndAzimuthAreRead) {
+  const auto file = readCsv(
+      "frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,sigma_x1,sigma_y1,sigma_x2,sigma_y2\n"
+      "0,car,1,2,3,4,0.5,1.0,0.1,1,2,3,4\n0,car,5,2,7,4,0.5,1.0,,,,,\n");
+  ASSERT_EQ(file.at(0)->size(), 2U);
+  EXPECT_THAT(file.at(0)->front().side_sigma, ElementsAre(1.0, 2.0, 3.0, 4.0));
+  EXPECT_EQ(file.at(0)->front().azimuth_sigma, 0.1);
+  EXPECT_THAT(file.at(0)->back().side_sigma, ElementsAre(0.0, 0.0, 0.0, 0.0));
+  EXPECT_EQ(file.at(0)->back().azimuth_sigma, DetectionFileOptions{}.azimuth_sigma);
+}
+
+TEST(DetectionFile, ClassesAreKnownFromTheFrameInWhichTheyFirstAppear) {
+  const std::string first = "0,car,1,2,3,4,0.5,\n", second = "7,van,1,2,3,4,0.5,\n";
+  const auto whole = readCsv(kHeader + first + second);
+  const auto prefix = readCsv(kHeader + first);
+  EXPECT_THAT(whole.modelAt(6).classes, ElementsAre("car"));
+  EXPECT_THAT(whole.modelAt(7).classes, ElementsAre("car", "van"));
+  EXPECT_EQ(whole.modelAt(6).hash, prefix.modelAt(6).hash);
+  EXPECT_NE(whole.modelAt(7).hash, whole.modelAt(6).hash);
+  EXPECT_NEAR(whole.at(7)->front().activations[1], -std::log(99.0), 1e-5) << "it is no car";
+}
+
+TEST(DetectionFile, RrcWithoutHeaderNeedsAClassAndIsShiftedOnlyWhenAsked) {
+  const std::string rrc = "0,296.021000,160.173000,452.297000,288.372000,0.529230\n";
+  EXPECT_THAT(errorOfCsv(rrc), HasSubstr("--class"));
+  DetectionFileOptions options;
+  options.class_name = "Car";
+  const auto as_is = readCsv(rrc, options);
+  EXPECT_DOUBLE_EQ(as_is.at(0)->front().box.x1, 296.021);
+  EXPECT_THAT(as_is.modelAt(0).classes, ElementsAre("car"));
+  options.box_origin = 1.0;
+  EXPECT_DOUBLE_EQ(readCsv(rrc, options).at(0)->front().box.x1, 295.021);
+}
+
+TEST(DetectionFile, EveryWrongLineIsLocated) {
+  const std::string h = kHeader;
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,0.5,\n0,car,9,2,3,4,0.5,\n"),
+              HasSubstr("d.csv:3: x1 < x2"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,1.5,\n"), HasSubstr(":2: score"));
+  EXPECT_THAT(errorOfCsv(h + "-1,car,1,2,3,4,0.5,\n"), HasSubstr(":2: frame"));
+  EXPECT_THAT(errorOfCsv(h + "0,,1,2,3,4,0.5,\n"), HasSubstr(":2: class is empty"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,nan,4,0.5,\n"), HasSubstr(":2: x1, y1"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,0.5,90\n"), HasSubstr(":2: azimuth is in radians"));
+  EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3\n"), HasSubstr(":2: 5 fields; 8 are expected"));
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,score\n"), HasSubstr(":1: column y2 is missing"));
+  EXPECT_THAT(errorOfCsv("frame,frame,class,x1,y1,x2,y2,score\n"),
+              HasSubstr("frame is there twice"));
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,y2,score,logit:car\n0,car,1,2,3,4,.5,?\n"),
+              HasSubstr(":2: logit:car"));
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,y2,score,sigma_x1\n"),
+              HasSubstr("sigma_y1 is missing"));
+  EXPECT_THAT(errorOfCsv("frame,class,x1,y1,x2,y2,score,sigma_x1,sigma_y1,sigma_x2,sigma_y2\n"
+                         "0,car,1,2,3,4,.5,1,1,-1,1\n"),
+              HasSubstr("sigma_x1 to sigma_y2 are 0 or more"));
+  EXPECT_THAT(errorOfCsv(""), HasSubstr("is empty"));
+}
+
+}  // namespace
+}  // namespace perdure::replay

@@ -1,0 +1,78 @@
+#include "common/replay/files/pose_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "common/math/so3.h"
+#include "tests/common/replay/tiny_datasets.h"
+
+namespace perdure::replay {
+namespace {
+
+using ::testing::HasSubstr;
+
+PoseFile readPoses(const std::string& text) {
+  const auto file = freshFolder("poses") / "poses.txt";
+  writeText(file, text);
+  return PoseFile::read(file);
+}
+std::string errorOfPoses(const std::string& text) {
+  return startupErrorOf([&] { readPoses(text); });
+}
+TimePoint at(double seconds) { return TimePoint(durationFromSeconds(seconds)); }
+
+TEST(PoseFile, TumTimesAreExactToTheNanosecond) {
+  const auto poses = readPoses("# t x y z q\n1403715273.262142976 1 2 3 0 0 0 1\n");
+  EXPECT_EQ(poses.format(), PoseFormat::kTum);
+  EXPECT_EQ(toNanoseconds(poses.poses()[0].time), 1403715273262142976);
+  EXPECT_TRUE(poses.poses()[0].T_WB.p.isApprox(Eigen::Vector3d(1, 2, 3)));
+}
+
+TEST(PoseFile, TumPosesAreInterpolatedBetweenCloseNeighboursOnly) {
+  const auto poses = readPoses(
+      "0 0 0 0 0 0 0 1\n"
+      "0.4 4 0 0 0 0 0.70710678 0.70710678\n"
+      "9 9 0 0 0 0 0 1\n");
+  const auto half = poses.at(0, at(0.2));
+  ASSERT_TRUE(half);
+  EXPECT_NEAR(half->p.x(), 2.0, 1e-12);
+  EXPECT_NEAR(yawOf(half->R()), std::numbers::pi / 4, 1e-6);
+  EXPECT_FALSE(poses.at(0, at(5.0))) << "the neighbours are 8.6 s apart";
+  EXPECT_FALSE(poses.at(0, at(-0.1)));
+  EXPECT_FALSE(poses.at(0, at(9.1)));
+  EXPECT_TRUE(poses.at(0, at(9.0005))) << "within a millisecond it is the same time";
+}
+
+TEST(PoseFile, KittiLinesOfTwelveAndSixteenNumbersAreByFrame) {
+  for (const char* last_row : {"", " 0 0 0 1"}) {
+    const std::string rows = std::string("1 0 0 0 0 1 0 0 0 0 1 0") + last_row +
+                             "\n0 -1 0 5 1 0 0 6 0 0 1 7" + last_row + "\n";
+    const auto poses = readPoses(rows);
+    EXPECT_EQ(poses.format(), PoseFormat::kKitti);
+    const auto second = poses.at(1, at(77));
+    ASSERT_TRUE(second);
+    EXPECT_TRUE(second->p.isApprox(Eigen::Vector3d(5, 6, 7)));
+    EXPECT_NEAR(yawOf(second->R()), std::numbers::pi / 2, 1e-12);
+    EXPECT_FALSE(poses.at(2, at(0)));
+  }
+}
+
+TEST(PoseFile, EveryWrongLineIsLocated) {
+  EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 0.5\n"),
+              HasSubstr("poses.txt:2: the quat"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"),
+              HasSubstr(":2: the time does not"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 2 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 -1 0\n"), HasSubstr("right-handed"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\n"), HasSubstr("0 0 0 1"));
+  EXPECT_THAT(errorOfPoses("0 0 0 nan 0 0 0 1\n"), HasSubstr(":1: write eight finite numbers"));
+  EXPECT_THAT(errorOfPoses("1 2 3\n"), HasSubstr(":1: 3 numbers; write 8"));
+  EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0\n"), HasSubstr(":2: 4 numbers"));
+  EXPECT_THAT(errorOfPoses("# nothing\n"), HasSubstr("holds no poses"));
+  EXPECT_THAT(startupErrorOf([] { PoseFile::read("/nowhere.txt"); }), HasSubstr("--odometry"));
+}
+
+}  // namespace
+}  // namespace perdure::replay

@@ -1,0 +1,105 @@
+#include "common/replay/files/rig_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/base/errors.h"
+#include "common/math/so3.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+Calibration someRig() {
+  Calibration rig;
+  CameraCalibration camera;
+  camera.name = "cam0";
+  camera.width = 640, camera.height = 480;
+  camera.fx = 381.25, camera.fy = 380.5, camera.cx = 320.1, camera.cy = 239.9;
+  camera.distortion = DistortionModel::kEquidistant;
+  camera.distortion_coefficients = {-0.01, 1.0 / 3.0, 1e-7, -2e-4};
+  camera.T_BC = RigidTransform(expQuaternion({0.3, -1.1, 0.7}), {0.01, -0.2, 1.0 / 7.0});
+  camera.time_offset_s = -0.00812345678912;
+  camera.readout_s = 0.0175;
+  camera.rate_hz = 20.0;
+  rig.cameras = {camera, camera};
+  rig.cameras[1].name = "cam1";
+  rig.cameras[1].distortion = DistortionModel::kNone;
+  rig.cameras[1].distortion_coefficients.clear();
+  rig.imu = ImuCalibration{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
+  return rig;
+}
+
+class RigFile : public testing::Test {
+ protected:
+  fs::path write(const std::string& text) const {
+    const fs::path file = fs::path(testing::TempDir()) /
+                          (std::string("perdure_rig_") +
+                           testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml");
+    std::ofstream(file) << text;
+    return file;
+  }
+};
+
+TEST_F(RigFile, IsReadAsItWasWrittenToTheLastDigit) {
+  const Calibration rig = someRig();
+  const Calibration again = readRig(write(rigText(rig, "two\nlines")));
+  ASSERT_EQ(again.cameras.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const CameraCalibration &a = rig.cameras[i], &b = again.cameras[i];
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.fx, b.fx);
+    EXPECT_EQ(a.cy, b.cy);
+    EXPECT_EQ(a.distortion, b.distortion);
+    EXPECT_EQ(a.distortion_coefficients, b.distortion_coefficients);
+    EXPECT_LT(boxMinus(a.T_BC, b.T_BC).norm(), 1e-14);
+    EXPECT_EQ(a.time_offset_s, b.time_offset_s);
+    EXPECT_EQ(a.readout_s, b.readout_s);
+  }
+  EXPECT_EQ(again.imu->accel_bias_walk, rig.imu->accel_bias_walk);
+}
+
+TEST_F(RigFile, SaysWhatIsWrongAndWhere) {
+  const auto complaint = [&](const std::string& text) -> std::string {
+    try {
+      readRig(write(text));
+    } catch (const StartupError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(complaint("imu0:\n  rate_hz: 200\n"), testing::HasSubstr("cam0 is missing"));
+  std::string text = rigText(someRig(), "");
+  text.replace(text.find("381.25"), 6, "-1");
+  EXPECT_THAT(complaint(text), testing::HasSubstr("cam0: intrinsics"));
+  EXPECT_THAT(complaint("cam0: 3\n"), testing::HasSubstr("cam0"));
+  EXPECT_THAT(complaint("cam0: [\n"), testing::HasSubstr(".yaml"));
+  EXPECT_THROW(readRig("/nowhere/rig.yaml"), StartupError);
+}
+
+TEST_F(RigFile, TakesThePlaceOfADrivesCalibration) {
+  Calibration drive = someRig();
+  drive.cameras.pop_back();
+  drive.cameras[0].fx = 300.0;
+  applyRig(someRig(), "rig.yaml", drive);
+  ASSERT_EQ(drive.cameras.size(), 1u);
+  EXPECT_EQ(drive.cameras[0].fx, 381.25);
+  EXPECT_EQ(drive.cameras[0].time_offset_s, someRig().cameras[0].time_offset_s);
+}
+
+TEST_F(RigFile, OfAnotherSizeOrWithoutACameraIsRefused) {
+  Calibration drive = someRig();
+  drive.cameras[0].width = 752;
+  EXPECT_THROW(applyRig(someRig(), "rig.yaml", drive), StartupError);
+  Calibration mono = someRig();
+  mono.cameras.pop_back();
+  Calibration stereo = someRig();
+  EXPECT_THROW(applyRig(mono, "rig.yaml", stereo), StartupError);
+}
+
+}  // namespace
+}  // namespace perdure::replay

@@ -1,0 +1,56 @@
+#include "common/replay/files/text_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/common/replay/tiny_datasets.h"
+
+namespace perdure::replay {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+TEST(TextFile, LinesAreTrimmedNumberedAndNeverEmpty) {
+  const auto file = freshFolder("text") / "a.txt";
+  writeText(file, "one\r\n\n  two  \nthree");
+  const auto lines = readLines(file, "");
+  ASSERT_EQ(lines.size(), 3U);
+  EXPECT_EQ(lines[1].text, "two");
+  EXPECT_EQ(lines[1].number, 3U);
+  EXPECT_EQ(lines[2].text, "three");
+}
+
+TEST(TextFile, AMissingFileIsNamedWithTheMend) {
+  const auto error = startupErrorOf([] { readLines("/nowhere/x.csv", "make it"); });
+  EXPECT_THAT(error, HasSubstr("/nowhere/x.csv"));
+  EXPECT_THAT(error, HasSubstr("make it"));
+}
+
+TEST(TextFile, SplitsAtCommasKeepingEmptyFieldsAndAtRunsOfBlanks) {
+  EXPECT_THAT(split("a, b,,c", ','), ElementsAre("a", "b", "", "c"));
+  EXPECT_THAT(split("  a \t b  ", ' '), ElementsAre("a", "b"));
+}
+
+TEST(TextFile, OnlyWholeFiniteNumbersAreNumbers) {
+  EXPECT_EQ(parseNumber(" 1e-3 "), 1e-3);
+  EXPECT_EQ(parseNumber("+2.5"), 2.5);
+  for (const char* text : {"", "x", "1x", "nan", "inf", "1e999", "1,2"}) {
+    EXPECT_EQ(parseNumber(text), std::nullopt) << text;
+  }
+  EXPECT_EQ(parseInteger("-7"), -7);
+  EXPECT_EQ(parseInteger("7.0"), std::nullopt);
+}
+
+TEST(TextFile, ComplaintsNameFileAndLineAndCountTheRest) {
+  Complaints complaints("file.csv");
+  EXPECT_NO_THROW(complaints.throwIfAny());
+  for (std::size_t line = 1; line <= 12; ++line) complaints.add(line, "is wrong");
+  const auto error = startupErrorOf([&] { complaints.throwIfAny(); });
+  EXPECT_THAT(error, HasSubstr("file.csv:1: is wrong"));
+  EXPECT_THAT(error, HasSubstr("file.csv:10: is wrong"));
+  EXPECT_THAT(error, HasSubstr("and 2 more"));
+}
+
+}  // namespace
+}  // namespace perdure::replay

@@ -1,0 +1,93 @@
+#include "services/inference/core/network/image_fit.h"
+
+#include <gtest/gtest.h>
+
+namespace perdure::inference {
+namespace {
+
+Input input(Fit fit) {
+  Input i;
+  i.width = 416;
+  i.height = 416;
+  i.fit = fit;
+  return i;
+}
+
+Frame frame(std::uint32_t width, std::uint32_t height, ImageEncoding encoding,
+            std::vector<std::uint8_t> pixel) {
+  Frame f;
+  f.width = width;
+  f.height = height;
+  f.encoding = encoding;
+  std::vector<std::uint8_t> data;
+  for (std::uint32_t i = 0; i < width * height; ++i) {
+    data.insert(data.end(), pixel.begin(), pixel.end());
+  }
+  f.data = std::make_shared<const std::vector<std::uint8_t>>(std::move(data));
+  return f;
+}
+
+TEST(ImageFit, LetterboxUsesOneScaleAndResizeTwo) {
+  const ImageFit letterbox = fitOf(input(Fit::kLetterboxTopLeft), 1242, 375);
+  EXPECT_EQ(letterbox.width, 416);
+  EXPECT_EQ(letterbox.height, 125);
+  EXPECT_EQ(letterbox.offset_y, 0);
+  const ImageFit centre = fitOf(input(Fit::kLetterboxCentre), 1242, 375);
+  EXPECT_EQ(centre.offset_y, (416 - 125) / 2);
+  const ImageFit resize = fitOf(input(Fit::kResize), 1242, 375);
+  EXPECT_EQ(resize.height, 416);
+  EXPECT_NE(resize.scale_x, resize.scale_y);
+}
+
+TEST(ImageFit, BoxesComeBackToWhereTheyWere) {
+  for (const Fit fit : {Fit::kLetterboxTopLeft, Fit::kLetterboxCentre, Fit::kResize}) {
+    const ImageFit f = fitOf(input(fit), 1242, 375);
+    const Box image{100, 50, 300, 200};
+    const Box there{image.x1 * f.scale_x + f.offset_x, image.y1 * f.scale_y + f.offset_y,
+                    image.x2 * f.scale_x + f.offset_x, image.y2 * f.scale_y + f.offset_y};
+    const Box back = f.toImage(there);
+    EXPECT_NEAR(back.x1, image.x1, 1e-9);
+    EXPECT_NEAR(back.y1, image.y1, 1e-9);
+    EXPECT_NEAR(back.x2, image.x2, 1e-9);
+    EXPECT_NEAR(back.y2, image.y2, 1e-9);
+  }
+}
+
+TEST(ImageFit, BlobHasTheNetworksColourOrderScaleMeanAndPadding) {
+  Input in = input(Fit::kLetterboxTopLeft);
+  in.width = 8;
+  in.height = 8;
+  in.rgb = true;
+  in.scale = {0.5, 0.25, 2};
+  in.mean = {1, 2, 3};
+  in.pad = 114;
+  const auto blob = makeBlob(in, frame(8, 4, ImageEncoding::kBgr8, {10, 20, 30}));
+  ASSERT_TRUE(blob);
+  const float* r = blob->ptr<float>();
+  EXPECT_FLOAT_EQ(r[0], (30 - 1) * 0.5F);
+  EXPECT_FLOAT_EQ(r[64], (20 - 2) * 0.25F);
+  EXPECT_FLOAT_EQ(r[128], (10 - 3) * 2.0F);
+  EXPECT_FLOAT_EQ(r[63], (114 - 1) * 0.5F) << "the last row is padding";
+}
+
+TEST(ImageFit, MonoImagesFillAllChannels) {
+  const auto blob = makeBlob(input(Fit::kResize), frame(32, 16, ImageEncoding::kMono8, {77}));
+  ASSERT_TRUE(blob);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(blob->ptr<float>()[c * 416 * 416 + 5], 77.0F);
+}
+
+TEST(ImageFit, RefusesAFrameWhoseSizeAndDataDisagree) {
+  Frame short_data = frame(32, 16, ImageEncoding::kMono8, {77});
+  short_data.encoding = ImageEncoding::kBgr8;
+  Frame none = frame(32, 16, ImageEncoding::kMono8, {77});
+  none.data = nullptr;
+  Frame empty;
+  for (const Frame& f : {short_data, none, empty}) {
+    const auto blob = makeBlob(input(Fit::kResize), f);
+    ASSERT_FALSE(blob);
+    EXPECT_EQ(blob.error().code, "frame_malformed");
+  }
+}
+
+}  // namespace
+}  // namespace perdure::inference

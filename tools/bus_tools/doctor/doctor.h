@@ -1,0 +1,51 @@
+// The checks of `perdure doctor`: each is a line with its verdict and, where it fails, the mend.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/bus/domain.h"
+
+namespace perdure::tools {
+
+enum class Verdict { kOk, kWarn, kFail };
+
+struct Finding {
+  Verdict verdict = Verdict::kOk;
+  std::string text;  ///< what was found; the mend where it is not well
+};
+using Findings = std::vector<Finding>;
+
+/// "OK   vio is on the bus", a line each.
+std::string toText(const Findings& findings);
+
+/// Of the host: receive buffers, the interface, large datagrams over loopback, the clock.
+Findings checkHost(const bus::Options& options);
+/// Of RouDi, where images are to go through shared memory: it answers, and its largest chunk
+/// (`roudi_toml`, where it can be read) holds an image of bus.shared_memory_mb. Else nothing.
+Findings checkSharedMemory(const bus::Options& options, const std::string& roudi_toml);
+/// Of the identities in bus.security that this user can read, and of an authority beside them.
+Findings checkSecurity(const bus::Options& options);
+/// Of a folder that a service must write to.
+Finding checkWritable(const std::string& folder);
+/// Of the bus: who is there, what each says of itself, what does not fit together.
+Findings checkBus(const bus::Options& options, double seconds);
+
+/// Of a rig file (empty: the recording's own) by the innovations of vio over a recording.
+Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds);
+
+/// The largest bus.shared_memory_mb in the folder's files; 0 where none is set.
+std::int64_t configuredSharedMemory(const std::string& folder);
+
+struct ReportOptions {
+  bus::Options bus;
+  double seconds = 5.0;  ///< how long Health is written down
+  std::string file;      ///< NAME.tar.gz
+  std::string configuration;
+  bool images = false;  ///< one of each camera
+};
+/// Packs what a maintainer asks for: versions, host, configuration, status, Health, journal.
+/// Throws StartupError where the file cannot be written.
+void writeReport(const ReportOptions& options, const Findings& findings);
+
+}  // namespace perdure::tools

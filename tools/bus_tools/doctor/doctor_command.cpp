@@ -1,0 +1,122 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <memory>
+
+#include "common/base/errors.h"
+#include "tools/bus_tools/command.h"
+#include "tools/bus_tools/common.h"
+#include "tools/bus_tools/doctor/doctor.h"
+
+namespace perdure::tools {
+namespace {
+
+struct DoctorOptions {
+  bus::Options bus;
+  double seconds = 2.5;
+  std::vector<std::string> folders;
+  std::string configuration = configurationFolder();
+  std::string report;
+  bool images = false;
+  std::string recording, rig;
+  double rig_seconds = 60.0;
+};
+
+const char* wordOf(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kOk:
+      return "OK  ";
+    case Verdict::kWarn:
+      return "WARN";
+    case Verdict::kFail:
+      return "FAIL";
+  }
+  return "FAIL";
+}
+
+void stopIfFailed(const Findings& findings) {
+  const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.verdict == Verdict::kFail;
+  });
+  if (failed) throw CLI::RuntimeError(1);
+}
+
+void runDoctor(const DoctorOptions& given) {
+  if (!given.rig.empty() && given.recording.empty()) {
+    throw StartupError(ExitCode::kUsage,
+                       "--rig is judged by a recording; give --data DRIVE (with images) as well");
+  }
+  if (!given.recording.empty()) {
+    const Findings findings = checkRigBy(given.recording, given.rig, given.rig_seconds);
+    std::cout << toText(findings);
+    return stopIfFailed(findings);
+  }
+  DoctorOptions options = given;
+  options.bus.shared_memory_mb =
+      std::max(options.bus.shared_memory_mb, configuredSharedMemory(options.configuration));
+  Findings findings = checkHost(options.bus);
+  const std::string roudi = options.configuration + "/roudi.toml";
+  const Findings shared = checkSharedMemory(options.bus, roudi);
+  findings.insert(findings.end(), shared.begin(), shared.end());
+  options.bus.shared_memory_mb = 0;  // what listens here needs none
+  const Findings security = checkSecurity(options.bus);
+  findings.insert(findings.end(), security.begin(), security.end());
+  for (const std::string& folder : options.folders) findings.push_back(checkWritable(folder));
+  const Findings bus = checkBus(options.bus, options.seconds);
+  findings.insert(findings.end(), bus.begin(), bus.end());
+  std::cout << toText(findings);
+  if (!options.report.empty()) {
+    writeReport({.bus = options.bus,
+                 .file = options.report,
+                 .configuration = options.configuration,
+                 .images = options.images},
+                findings);
+    std::cout << "report: " << options.report << '\n';
+  }
+  stopIfFailed(findings);
+}
+
+}  // namespace
+
+std::string toText(const Findings& findings) {
+  std::string text;
+  for (const Finding& finding : findings) {
+    text += std::string(wordOf(finding.verdict)) + " " + finding.text + "\n";
+  }
+  return text;
+}
+
+void addDoctorCommand(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the mend");
+  auto options = std::make_shared<DoctorOptions>();
+  command->add_option("--seconds", options->seconds, "how long to listen to the bus")
+      ->capture_default_str();
+  command->add_option("--data-dir", options->folders, "a folder that the services write to");
+  command
+      ->add_option("--config-dir", options->configuration,
+                   "folder of the services' configuration: /etc/perdure, else config")
+      ->capture_default_str();
+  command->add_option("--shared-memory-mb", options->bus.shared_memory_mb,
+                      "check RouDi as if bus.shared_memory_mb were this");
+  command
+      ->add_option("--report", options->report,
+                   "pack what a maintainer asks for: versions, host, configuration, status, "
+                   "five seconds of Health, journal")
+      ->type_name("FILE.tar.gz");
+  command
+      ->add_option("--data", options->recording,
+                   "judge a rig by this recording instead (dataset folder or .mcap with images): "
+                   "vio runs over it, and its innovations tell")
+      ->type_name("DRIVE");
+  command->add_option("--rig", options->rig,
+                      "the rig file to judge; the recording's own calibration where not given");
+  command->add_option("--rig-seconds", options->rig_seconds, "of the recording, at most")
+      ->check(CLI::Range(5.0, 3600.0))
+      ->capture_default_str();
+  command->add_flag("--images", options->images, "with an image of each camera in the report");
+  addBusOptions(*command, options->bus);
+  command->callback([options] { runDoctor(*options); });
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,161 @@
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "common/base/errors.h"
+#include "common/vision/jpeg.h"
+#include "common/wire/json.h"
+#include "tools/bus_tools/common.h"
+#include "tools/bus_tools/doctor/doctor.h"
+#include "tools/bus_tools/status/status_watch.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder that goes away with its owner.
+class Workshop {
+ public:
+  Workshop() {
+    std::string name = (fs::temp_directory_path() / "perdure-report-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw StartupError(ExitCode::kUnavailable, "no folder can be made in " +
+                                                     fs::temp_directory_path().string() +
+                                                     "; set TMPDIR to one that can be written");
+    }
+    path_ = name;
+  }
+  ~Workshop() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  Workshop(const Workshop&) = delete;
+  Workshop& operator=(const Workshop&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::string quotedWord(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+bool runs(const std::string& command) {
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+/// What the commands say, each under its own heading; those that are not here say so themselves.
+void writeAnswers(const fs::path& file, std::initializer_list<const char*> commands) {
+  for (const char* command : commands) {
+    std::ofstream(file, std::ios::app) << "\n$ " << command << '\n';
+    (void)runs(fmt::format("({}) >> {} 2>&1", command, quotedWord(file.string())));
+  }
+}
+
+void writeHost(const fs::path& folder) {
+  writeAnswers(folder / "versions.txt",
+               {"cat /etc/os-release", "uname -a",
+                "dpkg-query -W 'perdure*' 'cyclonedds*' 'libddsc*' 'iceoryx*' 'libopencv-dnn*' "
+                "'libceres*' 'libcamera*' 'libiio*'"});
+  writeAnswers(folder / "host.txt",
+               {"uptime", "nproc", "free -m", "df -h", "ip -brief address", "ip -s link",
+                "sysctl net.core.rmem_max net.core.rmem_default", "cat /proc/net/snmp",
+                "ls /dev/video* /dev/media* /dev/iio* /tmp/roudi /dev/shm",
+                "ps -eo pid,cls,rtprio,psr,pcpu,rss,etime,args --sort=-pcpu | head -n 40"});
+  writeAnswers(folder / "journal.txt",
+               {"systemctl status --no-pager 'perdure*' iox-roudi",
+                "journalctl --no-pager -o short-precise -n 5000 -u 'perdure-*' -u iox-roudi"});
+}
+
+/// Settings only: the keys of bus.security may be in the same folder.
+void copyConfiguration(const std::string& from, const fs::path& to) {
+  std::error_code ignored;
+  if (from.empty()) return;
+  for (const auto& entry : fs::recursive_directory_iterator(
+           from, fs::directory_options::skip_permission_denied, ignored)) {
+    const auto kind = entry.path().extension();
+    if (kind != ".yaml" && kind != ".toml") continue;
+    const fs::path copy = to / fs::relative(entry.path(), from, ignored);
+    fs::create_directories(copy.parent_path(), ignored);
+    fs::copy_file(entry.path(), copy, ignored);
+  }
+}
+
+const char* const kPnmKind[] = {"P5", "P6"};
+
+/// Grey as PGM, colour as PPM.
+void writePnm(const Frame& frame, const fs::path& file) {
+  const bool grey = frame.encoding == ImageEncoding::kMono8;
+  std::ofstream out(file, std::ios::binary);
+  out << kPnmKind[grey ? 0 : 1] << '\n' << frame.width << ' ' << frame.height << "\n255\n";
+  std::string pixels(reinterpret_cast<const char*>(frame.data->data()), frame.data->size());
+  for (std::size_t i = 0; !grey && i + 2 < pixels.size(); i += 3)
+    std::swap(pixels[i], pixels[i + 2]);
+  out << pixels;
+}
+
+/// One image of each camera that the calibration names, within two seconds.
+void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::path& folder) {
+  if (!seen.calibration) return;
+  for (const CameraCalibration& camera : seen.calibration->cameras) {
+    const bus::Domain domain(options);
+    const bus::Participant participant(domain, "perdure doctor");
+    bus::WaitLoop loop(participant);
+    bus::Reader<Frame> reader(participant, bus::topics::frame(camera.name));
+    loop.on(reader, [&](const Frame& compressed) {
+      const auto pixels = vision::decompressed(compressed);
+      if (!pixels) return;
+      const Frame& frame = *pixels;
+      writePnm(frame, folder / (camera.name +
+                                (frame.encoding == ImageEncoding::kMono8 ? ".pgm" : ".ppm")));
+      loop.stop();
+    });
+    runLoop(loop, 2.0);
+  }
+}
+
+/// Health as it comes, a line each, and the status at the end.
+StatusSeen writeBus(const ReportOptions& options, const fs::path& folder) {
+  std::ofstream health(folder / "health.jsonl");
+  StatusWatch watch(options.bus);
+  watch.onHealth([&](const Health& h) { health << dumped(wire::toJson(h)) << '\n'; });
+  runLoop(watch.loop(), options.seconds);
+  StatusSeen seen = watch.seen();
+  seen.host = lookAtHost({"/"}, options.bus);
+  const StatusNode status = judge(seen);
+  std::ofstream(folder / "status.txt") << toText(status, false);
+  std::ofstream(folder / "status.json") << dumped(toJson(status), 2) << '\n';
+  return seen;
+}
+
+}  // namespace
+
+void writeReport(const ReportOptions& options, const Findings& findings) {
+  const Workshop workshop;
+  const fs::path folder = workshop.path() / "perdure-report";
+  fs::create_directories(folder);
+  std::ofstream(folder / "doctor.txt") << toText(findings);
+  writeHost(folder);
+  copyConfiguration(options.configuration, folder / "configuration");
+  const StatusSeen seen = writeBus(options, folder);
+  if (options.images) writeImages(options.bus, seen, folder);
+  const fs::path file = fs::absolute(options.file);
+  if (!runs(fmt::format("tar -C {} -czf {} perdure-report", quotedWord(workshop.path().string()),
+                        quotedWord(file.string())))) {
+    throw StartupError(ExitCode::kUnavailable, file.string() +
+                                                   " cannot be written; give --report a file in a "
+                                                   "folder that can be");
+  }
+}
+
+}  // namespace perdure::tools

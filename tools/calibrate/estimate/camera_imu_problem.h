@@ -1,0 +1,81 @@
+// The least-squares problem of camera_imu.h: its unknowns, how they are tied to the samples, and
+// what a solution says.
+#pragma once
+
+#include <ceres/problem.h>
+
+#include <vector>
+
+#include "tools/calibrate/estimate/camera_imu.h"
+
+namespace perdure::calibrate {
+
+/// A view and which of its corners are believed; time by the images' clock, since the first view.
+struct Sighting {
+  View view;
+  double time_s = 0.0;
+  std::vector<bool> good;
+};
+
+struct Unknowns {
+  Spline spline;
+  Eigen::Quaterniond q_BC = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p_BC = Eigen::Vector3d::Zero();
+  double time_offset_s = 0.0;
+  Vector8d lens = Vector8d::Zero();
+  std::vector<Eigen::Vector3d> gyro_bias, accel_bias;  ///< one each kBiasInterval
+  Eigen::Vector3d down_T = Eigen::Vector3d::UnitY();   ///< unit, along gravity
+};
+
+/// Deviations of one sample.
+struct Deviations {
+  double px = 0.1, gyro = 1e-3, accel = 1e-2, gyro_walk = 1e-5, accel_walk = 1e-3;
+};
+
+class CameraImuProblem {
+ public:
+  CameraImuProblem(const Board& board, DistortionModel model, double readout_s, double height,
+                   const CameraImuOptions& options);
+
+  std::vector<Sighting> sightings;
+  std::vector<ImuReading> readings;  ///< within the spline
+  Unknowns x;
+  Deviations sigma;
+
+  /// Makes room for biases over the spline.
+  void setBiases(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel);
+  /// False where Ceres finds no solution.
+  bool solve(int iterations);
+  std::vector<CornerResidual> cornerResiduals() const;
+  std::vector<ImuResidual> imuResiduals() const;
+  /// Distrusts corners further than `limit_px` from where they should be, and trusts the others.
+  void gateCorners(double limit_px);
+  Eigen::Vector3d biasMean(const std::vector<Eigen::Vector3d>& bias) const;
+
+  struct Certainty {
+    Matrix15d calibration = Matrix15d::Zero();
+    double widened = 1.0;                   ///< see CameraImu::widened
+    Eigen::Vector3d gyro_bias, accel_bias;  ///< deviations in the middle of the time
+  };
+  /// Fails with calibrate_not_observable.
+  Result<Certainty> certainty();
+
+ private:
+  void build(ceres::Problem& problem);
+  void addFrames(ceres::Problem& problem);
+  void addSamples(ceres::Problem& problem);
+  void addBiases(ceres::Problem& problem);
+  std::size_t biasAt(double t, double& share) const;
+  bool hasDistortion() const { return model_ != DistortionModel::kNone; }
+  double delayOf(const Corner& corner) const;
+  std::vector<int> clusterOfRows() const;
+  std::vector<double*> calibrationBlocks();  ///< in the order of the covariance
+  Eigen::Vector2d residualOf(const Sighting& sighting, std::size_t i) const;
+
+  const Board& board_;
+  DistortionModel model_;
+  double readout_s_, height_;
+  CameraImuOptions options_;
+};
+
+}  // namespace perdure::calibrate

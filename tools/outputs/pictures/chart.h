@@ -1,0 +1,38 @@
+// A plain line chart in a part of a picture: axes with ticks and numbers, curves, shaded spans.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "tools/outputs/pictures/drawing.h"
+
+namespace perdure::tools {
+
+/// Round numbers, at most `most` of them, that cover [low, high].
+std::vector<double> ticksOf(double low, double high, int most);
+/// 1, 2 or 5 times a power of ten: the largest that is not above `value` > 0.
+double roundBelow(double value);
+/// In as few digits as are needed; never "-0".
+std::string numberText(double value);
+
+class Chart {
+ public:
+  struct Range {
+    double low = 0.0, high = 1.0;
+  };
+  /// `area` is that of the curves; numbers stand to the left of it and below it.
+  Chart(cv::Mat& picture, const cv::Rect& area, const Range& x, const Range& y);
+
+  void shade(double from, double to, const Colour& colour, double opacity);
+  void drawGrid(bool with_x_numbers);
+  /// Points (x, y); what is above or below the range is drawn at its edge.
+  void drawCurve(const std::vector<cv::Point2d>& points, Stroke stroke);
+  cv::Point2d at(double x, double y) const;
+
+ private:
+  cv::Mat& picture_;
+  cv::Rect area_;
+  Range x_, y_;
+};
+
+}  // namespace perdure::tools

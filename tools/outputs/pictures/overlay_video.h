@@ -1,0 +1,49 @@
+// overlay.mp4: the frames of the first camera with what was known at each of them.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/replay/dataset.h"
+#include "common/types/sensors.h"
+#include "tools/outputs/pictures/overlay_picture.h"
+#include "tools/outputs/pictures/video_file.h"
+
+namespace perdure::tools {
+
+class OverlayWriter {
+ public:
+  OverlayWriter(std::filesystem::path file, const CameraCalibration& camera, double rate_hz,
+                const OverlaySettings& settings);
+
+  /// Frames by time. Opens the file at the first. Reasons: image_missing, image_malformed (viewOf),
+  /// image_size (not that of the calibration), those of VideoFile (nothing is written then).
+  Result<void> add(const Frame& frame, const FrameGlance& glance);
+  std::size_t frames() const { return video_ ? video_->frames() : 0; }
+  /// "H.264", "MPEG-4"; empty before the first frame.
+  std::string codec() const { return video_ ? video_->codec() : ""; }
+
+ private:
+  std::filesystem::path file_;
+  OverlayPicture picture_;
+  double rate_hz_;
+  cv::Size image_size_;
+  std::optional<VideoFile> video_;
+  std::optional<Reason> refused_;
+  std::vector<Eigen::Vector3d> path_;
+  TimePoint start_;
+};
+
+/// Draws each frame of the log whose image the folder still has. Returns what was written as a
+/// sentence, or why nothing was: it never throws for want of images or of a codec. `progress` is
+/// called with frames done and frames in all.
+std::string writeOverlay(const DriveLog& log, const replay::DatasetOptions& data,
+                         const std::filesystem::path& file,
+                         const std::function<void(std::size_t, std::size_t)>& progress);
+
+}  // namespace perdure::tools

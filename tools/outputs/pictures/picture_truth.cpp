@@ -1,0 +1,35 @@
+#include "tools/outputs/pictures/picture_truth.h"
+
+#include <algorithm>
+
+#include "common/math/so3.h"
+
+namespace perdure::tools {
+
+std::optional<TruthTrack::Key> TruthTrack::at(TimePoint time) const {
+  if (time < present_from || time >= present_until) return std::nullopt;
+  const auto after =
+      std::find_if(keys.begin(), keys.end(), [time](const Key& key) { return key.time > time; });
+  if (!moves) return after == keys.begin() ? keys.front() : *(after - 1);
+  if (after == keys.begin()) return std::nullopt;
+  const Key& before = *(after - 1);
+  if (before.time == time) return before;
+  if (after == keys.end()) return std::nullopt;
+  const double s = toSeconds(time - before.time) / toSeconds(after->time - before.time);
+  return Key{time, before.centre_W + s * (after->centre_W - before.centre_W),
+             wrapAngle(before.yaw + s * wrapAngle(after->yaw - before.yaw))};
+}
+
+const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,
+                               TimePoint time, double within) {
+  const TruthTrack* nearest = nullptr;
+  for (const TruthTrack& track : truth.objects) {
+    const auto key = track.at(time);
+    if (!key || (key->centre_W - p_W).norm() >= within) continue;
+    within = (key->centre_W - p_W).norm();
+    nearest = &track;
+  }
+  return nearest;
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,56 @@
+// Light on surfaces: sun (with a shadow ray by the caller), the sky's hemisphere, light thrown back
+// by the ground, a dark rim where objects touch what they stand on, gloss and haze. Lambert's law.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "tools/simulate/render/sky.h"
+#include "tools/simulate/render/world.h"
+
+namespace perdure::tools {
+
+/// What a ray met.
+struct Hit {
+  std::uint32_t instance = kNothing;  ///< kNothing: the sky
+  std::uint32_t material = 0;
+  float distance = 0.0F;
+  Eigen::Vector3f position, normal;  ///< W, the normal of unit length and towards the eye
+  Eigen::Vector2f uv;
+  float repeats_per_metre = 0.0F;
+  const Material* surface = nullptr;
+};
+
+class Lighting {
+ public:
+  explicit Lighting(const sim::Scene& scene);
+  /// Learns where objects stand now.
+  void setTime(const World& world);
+
+  const Eigen::Vector3f& sun() const { return sun_W_; }
+  /// Linear RGB radiance towards the eye; `ray` is the unit direction from it, `pixel_angle` the
+  /// angle that a pixel covers.
+  Eigen::Vector3f shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& ray, const Hit& hit,
+                        bool in_sun, float pixel_angle) const;
+  const Sky& sky() const { return sky_; }
+
+ private:
+  struct Footprint {
+    std::uint32_t instance = 0;
+    Eigen::Vector2f centre, along;  ///< along: unit x axis of the object
+    Eigen::Vector2f half;           ///< half length, half width
+    float bottom = 0.0F, height = 0.0F;
+  };
+  float contact(const Hit& hit) const;
+  Eigen::Vector3f ambient(const Hit& hit) const;
+  Eigen::Vector3f gloss(const Eigen::Vector3f& ray, const Hit& hit, bool in_sun) const;
+  std::size_t cellOf(float x, float y) const;
+
+  Sky sky_;
+  Eigen::Vector3f sun_W_, sun_colour_, sky_colour_, bounce_colour_;
+  std::vector<Footprint> footprints_;
+  std::vector<std::vector<std::uint32_t>> cells_;  ///< footprints near a cell, hashed
+};
+
+}  // namespace perdure::tools

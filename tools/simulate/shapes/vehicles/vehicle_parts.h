@@ -1,0 +1,18 @@
+// What every road vehicle has beside its body: wheels, mirrors, handles, and the materials of all.
+#pragma once
+
+#include "tools/simulate/shapes/dice.h"
+#include "tools/simulate/shapes/mesh_builder.h"
+#include "tools/simulate/shapes/shapes.h"
+#include "tools/simulate/shapes/vehicles/vehicle_body.h"
+
+namespace perdure::tools::shapes {
+
+BodyMaterials vehicleMaterials(MeshBuilder& builder, const Order& order, const Vec3& paint,
+                               Dice& dice);
+/// Body, wheels, mirrors, handles, roof rails where wished.
+void addVehicle(MeshBuilder& builder, const BodyProfile& profile, const Order& order, Dice& dice,
+                bool roof_rails);
+void addWheels(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size, Dice& dice);
+
+}  // namespace perdure::tools::shapes
