@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <sstream>
 
 #include "services/capture/live/clocks.h"
+#include "services/capture/live/iio_text.h"
 
 namespace perdure::capture {
 namespace {
@@ -33,19 +33,31 @@ std::optional<double> readNumber(const iio_channel* channel, const char* attribu
 
 std::string readText(const iio_device* device, const char* attribute) {
   char text[256] = {};
-  return iio_device_attr_read(device, attribute, text, sizeof text) > 0 ? text : "";
+  return iio_device_attr_read(device, attribute, text, sizeof text) > 0 ? trimmed(text) : "";
 }
 
-/// "1, 0, 0; 0, 1, 0; 0, 0, 1"
-std::optional<Eigen::Matrix3d> parseMount(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
-  std::istringstream in(text);
-  Eigen::Matrix3d R;
-  for (int i = 0; i < 9; ++i) {
-    if (!(in >> R(i / 3, i % 3))) return std::nullopt;
-  }
-  return R;
+std::string readText(const iio_channel* channel, const char* attribute) {
+  char text[256] = {};
+  if (!channel || iio_channel_attr_read(channel, attribute, text, sizeof text) <= 0) return "";
+  return trimmed(text);
+}
+
+/// Asks for a rate; what was made of it: many know a few only. Nothing where there is none to set.
+std::optional<double> askRate(const iio_device* device, double wanted) {
+  constexpr const char* kRate = "sampling_frequency";
+  if (!iio_device_find_attr(device, kRate)) return std::nullopt;
+  (void)!iio_device_attr_write_double(device, kRate, wanted);
+  double is = 0.0;
+  if (iio_device_attr_read_double(device, kRate, &is) < 0 || is <= 0.0) return std::nullopt;
+  return is;
+}
+
+std::optional<double> askRate(const iio_channel* channel, double wanted) {
+  constexpr const char* kRate = "sampling_frequency";
+  if (!iio_channel_find_attr(channel, kRate)) return std::nullopt;
+  (void)!iio_channel_attr_write_double(channel, kRate, wanted);
+  const auto is = readNumber(channel, kRate);
+  return is && *is > 0.0 ? is : std::nullopt;
 }
 
 /// One axis as its integers are to be read.
@@ -80,15 +92,11 @@ std::optional<Axes> axesOf(const iio_device* device, const std::string& kind) {
   return axes;
 }
 
-enum class Clock { kBoot, kMonotonic, kRealtime, kElsewhere };
-
 /// Of a local device the clock can be chosen; one in the network has a clock of its own.
-Clock clockOf(const iio_context* context, const iio_device* device) {
-  if (std::strcmp(iio_context_get_name(context), "local") != 0) return Clock::kElsewhere;
+StampClock clockOf(const iio_context* context, const iio_device* device) {
+  if (std::strcmp(iio_context_get_name(context), "local") != 0) return StampClock::kElsewhere;
   (void)!iio_device_attr_write(device, "current_timestamp_clock", "boottime");
-  const std::string clock = readText(device, "current_timestamp_clock");
-  if (clock == "boottime") return Clock::kBoot;
-  return clock.starts_with("monotonic") ? Clock::kMonotonic : Clock::kRealtime;
+  return stampClockNamed(readText(device, "current_timestamp_clock"));
 }
 
 struct ContextDeleter {
@@ -177,14 +185,7 @@ class IioStream::Device {
   }
 
   Result<void> setUp(const IioSettings& settings) {
-    if (!settings.trigger.empty()) {
-      const iio_device* trigger = iio_context_find_device(context_.get(), settings.trigger.c_str());
-      const int code = trigger ? iio_device_set_trigger(device_, trigger) : -ENODEV;
-      if (code < 0) {
-        return fail("imu_absent", fmt::format("the trigger {} cannot be set: {}; see imu.trigger.",
-                                              settings.trigger, sayError(code)));
-      }
-    }
+    if (const auto set = setTrigger(settings.trigger); !set) return set;
     mount_.setIdentity();
     if (settings.mount.size() == 9) {
       mount_ =
@@ -197,30 +198,33 @@ class IioStream::Device {
     return {};
   }
 
-  std::string mountText() const {
-    for (const char* name : {"mount_matrix", "in_mount_matrix"}) {
-      if (const std::string text = readText(device_, name); !text.empty()) return text;
+  Result<void> setTrigger(const std::string& named) {
+    if (named.empty()) {
+      (void)!iio_device_get_trigger(device_, &trigger_);
+      return {};
     }
-    char text[256] = {};
-    const iio_channel* channel = (gyro_ ? *gyro_ : *accel_)[0].channel;
-    return iio_channel_attr_read(channel, "mount_matrix", text, sizeof text) > 0 ? text : "";
+    trigger_ = iio_context_find_device(context_.get(), named.c_str());
+    const int code = trigger_ ? iio_device_set_trigger(device_, trigger_) : -ENODEV;
+    if (code >= 0) return {};
+    return fail("imu_absent", fmt::format("the trigger {} cannot be set: {}; see imu.trigger.",
+                                          named, sayError(code)));
   }
 
-  /// What the device makes of it is read back: many know a few rates only.
+  /// libiio takes a matrix that is one for all channels, "in_mount_matrix", for a channel "mount".
+  std::string mountText() const {
+    if (const auto text = readText(device_, "mount_matrix"); !text.empty()) return text;
+    const iio_channel* shared = iio_device_find_channel(device_, "mount", false);
+    if (const auto text = readText(shared, "matrix"); !text.empty()) return text;
+    return readText((gyro_ ? *gyro_ : *accel_)[0].channel, "mount_matrix");
+  }
+
+  /// The device's own, and that of the trigger, which is what scans come at.
   void setRate(double wanted) {
-    rate_hz_ = wanted;
-    constexpr const char* kRate = "sampling_frequency";
-    if (iio_device_find_attr(device_, kRate)) {
-      (void)!iio_device_attr_write_double(device_, kRate, wanted);
-      double is = 0.0;
-      if (iio_device_attr_read_double(device_, kRate, &is) >= 0 && is > 0) rate_hz_ = is;
-    }
+    rate_hz_ = askRate(device_, wanted).value_or(wanted);
     for (const auto& axes : {gyro_, accel_}) {
-      if (!axes || !iio_channel_find_attr((*axes)[0].channel, kRate)) continue;
-      (void)!iio_channel_attr_write_double((*axes)[0].channel, kRate, wanted);
-      const auto is = readNumber((*axes)[0].channel, kRate);
-      if (is && *is > 0) rate_hz_ = *is;
+      if (axes) rate_hz_ = askRate((*axes)[0].channel, wanted).value_or(rate_hz_);
     }
+    if (trigger_) rate_hz_ = askRate(trigger_, wanted).value_or(rate_hz_);
   }
 
   Result<void> start(const IioSettings&) {
@@ -250,12 +254,12 @@ class IioStream::Device {
     } else {  // by counting, at the rate that the device says it has
       stamp = std::llround(1e9 * static_cast<double>(counted_ + i) / rate_hz_);
     }
-    if (!stamp_ || clock_ == Clock::kElsewhere) {
+    if (!stamp_ || clock_ == StampClock::kElsewhere) {
       if (i == 0) observe(scans, now_ns);
       return map_.toOurs(stamp);
     }
-    if (clock_ == Clock::kMonotonic) return stamp + HostClock::monotonicToBootNs();
-    if (clock_ == Clock::kRealtime) return stamp + HostClock::realtimeToBootNs();
+    if (clock_ == StampClock::kMonotonic) return stamp + HostClock::monotonicToBootNs();
+    if (clock_ == StampClock::kRealtime) return stamp + HostClock::realtimeToBootNs();
     return stamp;
   }
 
@@ -293,11 +297,12 @@ class IioStream::Device {
 
   std::unique_ptr<iio_context, ContextDeleter> context_;
   iio_device* device_ = nullptr;
+  const iio_device* trigger_ = nullptr;
   std::optional<Axes> gyro_, accel_;
   iio_channel* stamp_ = nullptr;
   Eigen::Matrix3d mount_;
   double rate_hz_ = 0.0;
-  Clock clock_ = Clock::kElsewhere;
+  StampClock clock_ = StampClock::kElsewhere;
   ClockMap map_;
   std::int64_t counted_ = 0;
   std::unique_ptr<iio_buffer, BufferDeleter> buffer_;

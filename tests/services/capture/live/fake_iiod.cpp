@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -18,6 +19,8 @@ namespace perdure::capture::testing {
 namespace {
 
 constexpr std::uint16_t kPort = 30431;
+constexpr const char *kTrigger = "trigger0", *kRate = "sampling_frequency";
+constexpr double kMostTriggers_hz = 500.0;
 
 bool sendAll(int socket, const std::string& bytes) {
   for (std::size_t sent = 0; sent < bytes.size();) {
@@ -149,15 +152,17 @@ bool FakeIiod::answer(int socket, const std::string& line, std::vector<std::int6
   }
   if (verb == "TIMEOUT" || verb == "SET" || verb == "CLOSE") return sendNumber(socket, 0);
   if (verb == "EXIT") return false;
+  std::string rest;
+  std::getline(words >> std::ws, rest);
+  if (verb == "READ") return answerRead(socket, id, rest);
+  if (verb == "WRITE") return answerWrite(socket, id, rest);
   const FakeImu* device = find(id);
   if (!device) return sendNumber(socket, verb == "ZPRINT" ? -EINVAL : -ENODEV);
   auto& at = next[static_cast<std::size_t>(device - devices_.data())];
-  std::string rest;
-  std::getline(words >> std::ws, rest);
   if (verb == "OPEN") {
     if (device->needs_trigger && triggerSet().empty()) return sendNumber(socket, -EINVAL);
     const double since_s = 1e-9 * static_cast<double>(HostClock::nowNs() - start_ns_);
-    at = static_cast<std::int64_t>(since_s * device->rate_hz);
+    at = static_cast<std::int64_t>(since_s * rateOf(*device));
     return sendNumber(socket, 0);
   }
   if (verb == "READBUF") return sendScans(socket, *device, std::stoul(rest), at);
@@ -166,24 +171,41 @@ bool FakeIiod::answer(int socket, const std::string& line, std::vector<std::int6
     trigger_ = rest;
     return sendNumber(socket, 0);
   }
-  if (verb == "READ") {
-    if (rest.ends_with("accel_x scale")) return sendText(socket, "0.01");
-    if (rest.find("accel_") != std::string::npos && rest.ends_with("scale")) {
-      return sendText(socket, "0.01");
-    }
-    if (rest.ends_with("scale")) return sendText(socket, "0.001");
-    if (rest == "sampling_frequency") return sendText(socket, fmt::format("{}", device->rate_hz));
-    if (rest == "mount_matrix") return sendText(socket, device->mount);
-    return sendNumber(socket, -ENOENT);
-  }
-  if (verb == "WRITE") {
-    const auto length = std::stoul(rest.substr(rest.rfind(' ') + 1));
-    std::string value;
-    for (char c = 0; value.size() < length && readByte(socket, c);) value += c;
-    if (rest.starts_with("sampling_frequency")) rate_asked_ = std::strtod(value.c_str(), nullptr);
-    return sendNumber(socket, static_cast<long>(length));
-  }
   return sendNumber(socket, -EINVAL);
+}
+
+bool FakeIiod::answerRead(int socket, const std::string& id, const std::string& what) {
+  if (id == kTrigger && what == kRate) return sendText(socket, fmt::format("{}\n", triggerRate()));
+  const FakeImu* device = find(id);
+  if (!device) return sendNumber(socket, -ENODEV);
+  if (what.find("accel_") != std::string::npos && what.ends_with("scale")) {
+    return sendText(socket, "0.01\n");
+  }
+  if (what.ends_with("scale")) return sendText(socket, "0.001\n");
+  if (what == kRate) return sendText(socket, fmt::format("{}\n", device->rate_hz));
+  if (what == (device->shared_mount ? "INPUT mount matrix" : "mount_matrix")) {
+    return sendText(socket, device->mount + "\n");
+  }
+  return sendNumber(socket, -ENOENT);
+}
+
+bool FakeIiod::answerWrite(int socket, const std::string& id, const std::string& what) {
+  const auto length = std::stoul(what.substr(what.rfind(' ') + 1));
+  std::string value;
+  for (char c = 0; value.size() < length && readByte(socket, c);) value += c;
+  if (what.starts_with(kRate)) {
+    const double rate_hz = std::strtod(value.c_str(), nullptr);
+    if (id == kTrigger) {
+      trigger_rate_ = std::min(rate_hz, kMostTriggers_hz);
+    } else {
+      rate_asked_ = rate_hz;
+    }
+  }
+  return sendNumber(socket, static_cast<long>(length));
+}
+
+double FakeIiod::rateOf(const FakeImu& device) const {
+  return device.needs_trigger ? triggerRate() : device.rate_hz;
 }
 
 /// A block is sent when its last scan has been made.
@@ -193,8 +215,9 @@ bool FakeIiod::sendScans(int socket, const FakeImu& device, std::size_t bytes, s
   std::int64_t made_ns = 0;
   for (std::size_t i = 0; i < scans; ++i, ++next) {
     made_ns =
-        start_ns_ + static_cast<std::int64_t>(1e9 * static_cast<double>(next) / device.rate_hz);
-    data += scan(device, next, made_ns + device.clock_ns + step_ns_);
+        start_ns_ + static_cast<std::int64_t>(1e9 * static_cast<double>(next) / rateOf(device));
+    const std::int64_t read_ns = device.frozen_clock ? start_ns_ : made_ns;
+    data += scan(device, next, read_ns + device.clock_ns + step_ns_);
   }
   while (HostClock::nowNs() < made_ns && !stopping_) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -236,10 +259,16 @@ std::string FakeIiod::xml() const {
                           index);
     }
     text += R"(<attribute name="sampling_frequency" />)";
-    if (!d.mount.empty()) text += R"(<attribute name="mount_matrix" />)";
+    if (d.shared_mount) {
+      text += R"(<channel id="mount" type="input"><attribute name="matrix" )"
+              R"(filename="in_mount_matrix" /></channel>)";
+    } else if (!d.mount.empty()) {
+      text += R"(<attribute name="mount_matrix" />)";
+    }
     text += "</device>";
   }
-  text += R"(<device id="trigger0" name="hrtimer"></device></context>)";
+  text += R"(<device id="trigger0" name="hrtimer"><attribute name="sampling_frequency" />)"
+          "</device></context>";
   return text;
 }
 

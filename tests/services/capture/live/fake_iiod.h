@@ -16,9 +16,11 @@ struct FakeImu {
   std::string id = "iio:device0", name = "imu";
   bool gyro = true, accel = true, stamps = true;
   double rate_hz = 200.0;
-  std::int64_t clock_ns = 0;  ///< its clock less CLOCK_BOOTTIME
-  std::string mount = {};     ///< matrix, in IIO's text; empty: it has none
-  bool needs_trigger = false;
+  std::int64_t clock_ns = 0;   ///< its clock less CLOCK_BOOTTIME
+  std::string mount = {};      ///< matrix, in IIO's text; empty: it has none
+  bool shared_mount = false;   ///< as in_mount_matrix, which libiio shows as a channel "mount"
+  bool needs_trigger = false;  ///< and scans come at its rate
+  bool frozen_clock = false;   ///< every scan has the stamp of the first one
 };
 
 /// Raw values of scan i: gyro x, y, z = i % 1000, −7, 3 (scale .001), accel 5, −6, 981 (scale .01).
@@ -36,11 +38,16 @@ class FakeIiod {
   void stepClock(std::int64_t ns) { step_ns_ += ns; }
   double rateAskedFor() const { return rate_asked_; }
   std::string triggerSet() const;
+  /// Of "trigger0", the hrtimer; it takes no more than 500 Hz.
+  double triggerRate() const { return trigger_rate_; }
 
  private:
   void serve();
   void talk(int socket);
   bool answer(int socket, const std::string& line, std::vector<std::int64_t>& next);
+  bool answerRead(int socket, const std::string& id, const std::string& what);
+  bool answerWrite(int socket, const std::string& id, const std::string& what);
+  double rateOf(const FakeImu& device) const;
   bool sendScans(int socket, const FakeImu& device, std::size_t bytes, std::int64_t& next);
   const FakeImu* find(const std::string& id) const;
   std::string xml() const;
@@ -51,7 +58,7 @@ class FakeIiod {
   int listener_ = -1;
   std::atomic<bool> stopping_{false}, silent_{false};
   std::atomic<std::int64_t> step_ns_{0};
-  std::atomic<double> rate_asked_{0.0};
+  std::atomic<double> rate_asked_{0.0}, trigger_rate_{100.0};
   mutable std::mutex mutex_;
   std::string trigger_;
   std::list<int> sockets_;

@@ -102,6 +102,28 @@ TEST_F(Stream, TurnsTheAxesAsMounted) {
       << "the configuration's goes before the device's";
 }
 
+TEST_F(Stream, TurnsTheAxesByAMatrixThatIsOneForAllChannels) {
+  const FakeIiod iiod(address_, {{.mount = "0, -1, 0; 1, 0, 0; 0, 0, 1", .shared_mount = true}});
+  open();
+  ASSERT_TRUE(flows(1)) << stream_->state().problem();
+  stream_.reset();
+  EXPECT_TRUE(scans_[0].accel->isApprox(Eigen::Vector3d(0.06, 0.05, 9.81), 1e-9));
+  EXPECT_TRUE(scans_[0].gyro->isApprox(Eigen::Vector3d(0.007, scans_[0].gyro->y(), 0.003), 1e-9));
+}
+
+TEST_F(Stream, SetsTheRateOfTheTriggerAndSaysWhatThatMadeOfIt) {
+  const FakeIiod iiod(address_, {{.needs_trigger = true}});
+  open({.rate_hz = 250.0, .trigger = "hrtimer"});
+  ASSERT_TRUE(flows(100)) << stream_->state().problem();
+  EXPECT_THAT(stream_->state().name(), HasSubstr("imu at 250 Hz"));
+  stream_.reset();
+  EXPECT_EQ(iiod.triggerRate(), 250.0);
+  EXPECT_NEAR(static_cast<double>(scans_[80].time_ns - scans_[79].time_ns), 4e6, 5e5);
+  open({.rate_hz = 1000.0, .trigger = "hrtimer"});
+  ASSERT_TRUE(waitFor([&] { return stream_->state().name() == "imu at 500 Hz"; }))
+      << stream_->state().name();
+}
+
 TEST_F(Stream, TakesTheDeviceAndTheTriggerThatAreNamed) {
   const FakeIiod iiod(
       address_, {{.id = "iio:device0", .name = "pressure", .gyro = false, .accel = false},
