@@ -81,6 +81,7 @@ void Live::scanned(const IioScan& scan) {
     for (const auto& pair : pairing_.accel({scan.time_ns, *scan.accel})) offer(pair);
   }
   if (scan.gyro) {
+    ++readings_;
     for (const auto& pair : pairing_.gyro({scan.time_ns, *scan.gyro})) offer(pair);
   }
 }
@@ -120,12 +121,18 @@ void Live::publish(const InertialPair& sample) {
   imu_(out);
 }
 
+std::string Live::imuYield() {
+  const std::lock_guard lock(pairing_mutex_);
+  return yield_.look(readings_, samples_);
+}
+
 void Live::updateHealth() {
   std::string problem = camera_->state().problem(), names = camera_->state().name();
   for (const auto& imu : imus_) {
     join(problem, imu->state().problem(), " ");
     join(names, imu->state().name(), "; ");
   }
+  join(problem, imuYield(), " ");
   if (names != said_ && !names.empty()) context_.log().info("gives {}", names);
   said_ = names;
   context_.health().state(problem.empty() ? HealthState::kOk : HealthState::kDegraded, problem);

@@ -13,6 +13,7 @@
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/iio_stream.h"
 #include "services/capture/live/imu_pairing.h"
+#include "services/capture/live/imu_yield.h"
 #include "services/capture/live/live_camera.h"
 
 namespace perdure::capture {
@@ -33,6 +34,7 @@ class Live {
   void publish(CameraImage image);
   void publish(const InertialPair& sample);
   void updateHealth();
+  std::string imuYield();
   void report(ReasonCounts& counts) const;
 
   service::Context& context_;
@@ -44,8 +46,10 @@ class Live {
   std::int64_t last_ns_ = 0;  ///< of the last inertial sample
   ReasonCounts reasons_;
   std::string said_;  ///< names of the sensors, as logged last
+  ImuYield yield_;
   mutable std::mutex pairing_mutex_;
   ImuPairing pairing_;
+  std::uint64_t readings_ = 0;  ///< of the gyroscope
   // The threads of these use all of the above: they go first.
   std::vector<std::unique_ptr<IioStream>> imus_;
   std::unique_ptr<LiveCamera> camera_;

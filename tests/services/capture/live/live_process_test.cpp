@@ -108,6 +108,17 @@ TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
   })) << last_health_.message;
 }
 
+TEST_F(LiveProcess, SaysThatAnImuWithAFrozenClockGivesNoSamples) {
+  const FakeIiod iiod(address_, {{.rate_hz = 400.0, .frozen_clock = true}});
+  const Child capture(command({"imu.uri=ip:" + address_, "imu.rate_hz=400"}), folder_.file("log"));
+  ASSERT_TRUE(runUntil(loop_, [&] {
+    return last_health_.message.find("became samples") != std::string::npos;
+  })) << last_health_.message;
+  EXPECT_EQ(last_health_.state, HealthState::kDegraded);
+  EXPECT_THAT(last_health_.message, HasSubstr("current_timestamp_clock"));
+  EXPECT_GT(last_health_.reasons["imu_out_of_order"], 0U);
+}
+
 TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
   const auto messageOf = [&](const std::vector<std::string>& words, int status) {
     Child capture(words, folder_.file("log"));
