@@ -36,6 +36,18 @@ std::int64_t HostClock::monotonicToBootNs() { return difference(CLOCK_MONOTONIC,
 
 std::int64_t HostClock::realtimeToBootNs() { return difference(CLOCK_REALTIME, CLOCK_BOOTTIME); }
 
+std::int64_t HostClock::monotonicNs() { return read(CLOCK_MONOTONIC); }
+
+std::int64_t middleOfExposure(std::int64_t start_ns, std::int64_t exposure_us, double readout_s) {
+  return start_ns + 500 * exposure_us + static_cast<std::int64_t>(0.5e9 * readout_s);
+}
+
+std::int64_t cameraStampToBoot(std::int64_t stamp_ns, std::int64_t monotonic_ns,
+                               std::int64_t boot_ns) {
+  const bool monotonic = std::abs(monotonic_ns - stamp_ns) <= std::abs(boot_ns - stamp_ns);
+  return monotonic ? stamp_ns + (boot_ns - monotonic_ns) : stamp_ns;
+}
+
 void ClockMap::begin(std::int64_t ours_ns) {
   buckets_.clear();
   first_ns_ = ours_ns;

@@ -20,10 +20,20 @@ class HostClock {
   /// From these to CLOCK_BOOTTIME, as they stand now.
   static std::int64_t monotonicToBootNs();
   static std::int64_t realtimeToBootNs();
+  static std::int64_t monotonicNs();
 
  private:
   std::int64_t to_wall_ns_;
 };
+
+/// Middle of the middle row's exposure. `start_ns`: when that of the first row began.
+std::int64_t middleOfExposure(std::int64_t start_ns, std::int64_t exposure_us, double readout_s);
+
+/// A camera's stamp as CLOCK_BOOTTIME. V4L2 stamps by CLOCK_MONOTONIC, where libcamera promises
+/// CLOCK_BOOTTIME; they differ by the time that the machine was suspended. It is of the one that it
+/// is nearer to, as both stand now.
+std::int64_t cameraStampToBoot(std::int64_t stamp_ns, std::int64_t monotonic_ns,
+                               std::int64_t boot_ns);
 
 /// A clock elsewhere, of which only messages with its stamps are seen: they come late by a varying
 /// time, and the least of the last seconds stands for none. What is left is that least delay, a

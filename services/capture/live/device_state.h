@@ -12,6 +12,11 @@
 
 namespace perdure::capture {
 
+/// Both, with what is between them where both are.
+inline std::string joined(const std::string& a, const std::string& b, const char* between = " ") {
+  return a + (a.empty() || b.empty() ? "" : between) + b;
+}
+
 /// Safe from any thread.
 class DeviceState {
  public:
@@ -21,18 +26,22 @@ class DeviceState {
   std::string problem() const { return locked(problem_); }
   /// What it is, for people; empty while there is none.
   std::string name() const { return locked(name_); }
+  /// What it does not do as asked while it flows; empty where it does.
+  std::string note() const { return locked(note_); }
   ReasonCounts reasons() const { return locked(reasons_); }
 
-  void flows(const std::string& name, const std::string& problem = {}) {
+  void flows(const std::string& name, const std::string& note = {}) {
     const std::lock_guard lock(mutex_);
     name_ = name;
-    problem_ = problem;
+    note_ = note;
+    problem_.clear();
   }
   void fails(const Reason& reason) {
     const std::lock_guard lock(mutex_);
     reasons_.add(reason);
     problem_ = reason.detail;
     name_.clear();
+    note_.clear();
   }
   void count(const std::string& reason, std::uint64_t n = 1) {
     const std::lock_guard lock(mutex_);
@@ -47,7 +56,7 @@ class DeviceState {
   }
 
   mutable std::mutex mutex_;
-  std::string problem_, name_;
+  std::string problem_, name_, note_;
   ReasonCounts reasons_;
 };
 

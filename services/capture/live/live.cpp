@@ -1,6 +1,7 @@
 #include "services/capture/live/live.h"
 
 #include "common/replay/rig_file.h"
+#include "services/capture/live/libcamera_session.h"
 
 namespace perdure::capture {
 namespace {
@@ -32,10 +33,6 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
   return settings;
 }
 
-void join(std::string& text, const std::string& more, const char* between) {
-  if (!more.empty()) text += (text.empty() ? "" : between) + more;
-}
-
 }  // namespace
 
 Live::Live(service::Context& context, const Config& config)
@@ -48,9 +45,11 @@ Live::Live(service::Context& context, const Config& config)
   context_.onHealth([this] { updateHealth(); });
   context_.loop().onWake([this] { pump(); });
   if (rig.imu) openImu(config.imu);
-  camera_ =
-      std::make_unique<LiveCamera>(cameraSettings(config, rig.cameras.front()),
-                                   [this](CameraImage image) { offer(Message(std::move(image))); });
+  camera_ = std::make_unique<LiveCamera>(
+      libcameraOpener(
+          cameraSettings(config, rig.cameras.front()),
+          [this](const std::string& line) { context_.log().warn("libcamera: {}", line); }),
+      config.camera.rate_hz, [this](CameraImage image) { offer(Message(std::move(image))); });
 }
 
 void Live::openImu(const ImuConfig& config) {
@@ -127,15 +126,19 @@ std::string Live::imuYield() {
 }
 
 void Live::updateHealth() {
+  const std::string note = camera_->state().note();
   std::string problem = camera_->state().problem(), names = camera_->state().name();
   for (const auto& imu : imus_) {
-    join(problem, imu->state().problem(), " ");
-    join(names, imu->state().name(), "; ");
+    problem = joined(problem, imu->state().problem());
+    names = joined(names, imu->state().name(), "; ");
   }
-  join(problem, imuYield(), " ");
+  problem = joined(problem, imuYield());
   if (names != said_ && !names.empty()) context_.log().info("gives {}", names);
   said_ = names;
-  context_.health().state(problem.empty() ? HealthState::kOk : HealthState::kDegraded, problem);
+  if (note != noted_ && !note.empty()) context_.log().warn("{}", note);
+  if (!names.empty()) noted_ = note;
+  context_.health().state(problem.empty() ? HealthState::kOk : HealthState::kDegraded,
+                          joined(problem, note));
 }
 
 void Live::report(ReasonCounts& counts) const {

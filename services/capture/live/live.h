@@ -45,7 +45,8 @@ class Live {
   std::uint64_t samples_ = 0;
   std::int64_t last_ns_ = 0;  ///< of the last inertial sample
   ReasonCounts reasons_;
-  std::string said_;  ///< names of the sensors, as logged last
+  std::string said_;   ///< names of the sensors, as logged last
+  std::string noted_;  ///< what the camera does not do as asked, as logged last
   ImuYield yield_;
   mutable std::mutex pairing_mutex_;
   ImuPairing pairing_;

@@ -1,42 +1,27 @@
-// A camera through libcamera: set up, read on a thread of its own, and opened again when it was
-// gone.
+// A camera that is read on a thread of its own, and opened again when it was gone.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <string>
 #include <thread>
 
-#include "common/types/sensors.h"
+#include "services/capture/live/camera_session.h"
 #include "services/capture/live/device_state.h"
+#include "services/capture/live/frame_count.h"
 
 namespace perdure::capture {
 
-struct CameraSettings {
-  std::string id;                       ///< of libcamera, or a part of it; empty: the first one
-  std::uint32_t width = 0, height = 0;  ///< pixels, as the rig was calibrated for
-  std::string format = "auto";          ///< libcamera's name, as "YUYV"; auto: the best it has
-  double rate_hz = 20.0;
-  double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
-  double readout_s = 0.0;                ///< first to last row
-  int jpeg_quality = 0;                  ///< 1 … 100: images travel as JPEG; 0: raw
-  std::string encoding = "as_is";        ///< as_is, mono8, bgr8
-};
-
 struct CameraImage {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  std::uint64_t number = 0;  ///< frames that were lost on the way leave a gap
+  std::uint64_t number = 0;  ///< goes on over openings; frames that were lost leave a gap
   Frame frame;               ///< pixels alone
 };
 
-/// Middle of the middle row's exposure. `start_ns`: when that of the first row began.
-std::int64_t middleOfExposure(std::int64_t start_ns, std::int64_t exposure_us, double readout_s);
-
 class LiveCamera {
  public:
-  /// `give` is called on the camera's thread.
-  LiveCamera(CameraSettings settings, std::function<void(CameraImage)> give);
+  /// Both are called on the camera's thread. `rate_hz`: what is asked for.
+  LiveCamera(OpenCamera open, double rate_hz, std::function<void(CameraImage)> give);
   ~LiveCamera();
   LiveCamera(const LiveCamera&) = delete;
   LiveCamera& operator=(const LiveCamera&) = delete;
@@ -46,12 +31,14 @@ class LiveCamera {
   const DeviceState& state() const { return state_; }
 
  private:
-  class Session;
   void run();
-  void flow(Session& session);
+  void flow(CameraSession& session);
+  void take(CameraShot shot);
 
-  const CameraSettings settings_;
+  const OpenCamera open_;
   const std::function<void(CameraImage)> give_;
+  FrameNumbers numbers_;
+  RateWatch rate_;
   std::atomic<bool> stopping_{false};
   DeviceState state_{"the camera has not been opened yet"};
   std::thread thread_;

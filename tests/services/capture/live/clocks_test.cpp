@@ -21,6 +21,20 @@ TEST(HostClock, GoesAsTheSystemsClocksDo) {
   EXPECT_GE(HostClock::monotonicToBootNs(), -kMs);
 }
 
+TEST(CameraStamp, IsOnBootTimeWhicheverOfTheClocksTheDriverStampsBy) {
+  const std::int64_t monotonic = 5000 * kSecond, boot = monotonic + 1000 * kSecond;
+  EXPECT_EQ(cameraStampToBoot(monotonic - 40 * kMs, monotonic, boot), boot - 40 * kMs);
+  EXPECT_EQ(cameraStampToBoot(boot - 40 * kMs, monotonic, boot), boot - 40 * kMs);
+  EXPECT_EQ(cameraStampToBoot(monotonic + kMs, monotonic, boot), boot + kMs)
+      << "a driver that predicts";
+  EXPECT_EQ(cameraStampToBoot(monotonic - kMs, monotonic, monotonic), monotonic - kMs)
+      << "never suspended";
+}
+
+TEST(CameraStamp, IsTheMiddleOfTheMiddleRowsExposure) {
+  EXPECT_EQ(middleOfExposure(kSecond, 10'000, 0.02), kSecond + 5 * kMs + 10 * kMs);
+}
+
 /// A clock that is an hour ahead and 100 ppm fast, seen through messages that come 2 ms late and
 /// more.
 struct Elsewhere {

@@ -1,0 +1,42 @@
+#include "services/capture/live/frame_count.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+namespace perdure::capture {
+
+std::uint64_t FrameNumbers::of(std::uint32_t sequence) {
+  const std::uint32_t gap = last_ ? sequence - *last_ - 1 : 0;
+  const bool back = gap > std::numeric_limits<std::uint32_t>::max() / 2;
+  lost_ = back ? 0 : gap;
+  last_ = sequence;
+  next_ += lost_;
+  return next_++;
+}
+
+void RateWatch::reopened() {
+  since_ns_.reset();
+  note_.clear();
+}
+
+void RateWatch::frame(std::uint64_t number, std::int64_t time_ns) {
+  constexpr double kWindow_s = 2.0, kOff = 0.1;
+  const double seconds = since_ns_ ? 1e-9 * static_cast<double>(time_ns - *since_ns_) : 0.0;
+  if (since_ns_ && seconds < kWindow_s) return;
+  if (since_ns_) {
+    const double hz = static_cast<double>(number - since_number_) / seconds;
+    note_ =
+        std::abs(hz / asked_hz_ - 1.0) <= kOff
+            ? ""
+            : fmt::format(
+                  "The camera gives {:.0f} images a second where {:g} are asked for, and all of "
+                  "them are given on; set camera.rate_hz to a rate that it has.",
+                  hz, asked_hz_);
+  }
+  since_ns_ = time_ns;
+  since_number_ = number;
+}
+
+}  // namespace perdure::capture

@@ -1,0 +1,340 @@
+#include "services/capture/live/libcamera_session.h"
+
+#include <fmt/format.h>
+#include <libcamera/libcamera.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include "common/base/bounded_queue.h"
+#include "common/vision/jpeg.h"
+#include "services/capture/live/camera_memory.h"
+#include "services/capture/live/clocks.h"
+#include "services/capture/live/libcamera_controls.h"
+#include "services/capture/live/libcamera_log.h"
+#include "services/capture/live/pixels.h"
+
+namespace perdure::capture {
+namespace {
+
+using libcamera::CameraManager;
+using libcamera::FrameBuffer;
+using libcamera::PixelFormat;
+using libcamera::Request;
+namespace formats = libcamera::formats;
+namespace controls = libcamera::controls;
+
+constexpr std::size_t kBuffers = 4;
+
+/// The best first: the least to convert, and all the colour there is. libcamera names the bytes of
+/// a pixel from the last one in memory on.
+const std::array<std::pair<PixelFormat, PixelLayout>, 11> kFormats = {{
+    {formats::RGB888, PixelLayout::kBgr},
+    {formats::BGR888, PixelLayout::kRgb},
+    {formats::XRGB8888, PixelLayout::kBgrx},
+    {formats::XBGR8888, PixelLayout::kRgbx},
+    {formats::NV12, PixelLayout::kNv12},
+    {formats::NV21, PixelLayout::kNv21},
+    {formats::YUV420, PixelLayout::kYuv420},
+    {formats::YUYV, PixelLayout::kYuyv},
+    {formats::UYVY, PixelLayout::kUyvy},
+    {formats::MJPEG, PixelLayout::kJpeg},
+    {formats::R8, PixelLayout::kGrey},
+}};
+
+/// libcamera's manager: one at a time in a process. Used by one thread.
+class Cameras {
+ public:
+  explicit Cameras(std::function<void(const std::string&)> log) : log_(std::move(log)) {}
+
+  Result<CameraManager*> manager();
+  /// A camera was unplugged: the next manager is another one. libcamera 0.0.3 looks for cameras
+  /// twice as often at each device that is plugged in, 2^n times at the nth.
+  void renew() { stale_ = true; }
+
+ private:
+  const LibcameraLog log_;  // goes after the manager, whose thread writes to it
+  std::unique_ptr<CameraManager> manager_;
+  bool stale_ = false;
+};
+
+Result<CameraManager*> Cameras::manager() {
+  if (stale_) manager_.reset();
+  stale_ = false;
+  if (manager_) return manager_.get();
+  auto manager = std::make_unique<CameraManager>();
+  if (const int code = manager->start(); code < 0) {
+    return fail("camera_absent",
+                fmt::format("libcamera does not start: {}.", std::strerror(-code)));
+  }
+  manager_ = std::move(manager);
+  return manager_.get();
+}
+
+/// libcamera's thread calls slots and looks at requests by bare pointers, and a call of
+/// queueRequest() only reaches it some time later. So all that touches requests and signals is done
+/// on that thread: nothing can be unplugged in between, and after end() it knows of none of them.
+class Session final : public CameraSession, public libcamera::Object {
+ public:
+  static Result<std::unique_ptr<CameraSession>> open(std::shared_ptr<Cameras> cameras,
+                                                     const CameraSettings& settings);
+  ~Session() override;
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  std::string name() const override {
+    return fmt::format("{}, {}x{} {}", camera_->id(), stream().size.width, stream().size.height,
+                       stream().pixelFormat.toString());
+  }
+  std::string note() const override {
+    return refused_ ? "The camera refuses what camera.exposure_ms and camera.gain ask for; are "
+                      "they in its range?"
+                    : asked_.missing;
+  }
+  bool gone() const override { return gone_; }
+  std::optional<CameraShot> next(std::chrono::milliseconds longest) override;
+
+ private:
+  Session(std::shared_ptr<Cameras> cameras, const CameraSettings& settings)
+      : cameras_(std::move(cameras)), settings_(settings) {}
+
+  const libcamera::StreamConfiguration& stream() const { return configuration_->at(0); }
+
+  Result<void> choose();
+  Result<void> configure();
+  void chooseFormat(libcamera::StreamConfiguration& wanted) const;
+  Result<void> allocate();
+  Result<void> start();
+  CameraShot shotOf(Request& request);
+  Result<Frame> frameOf(const FrameBuffer& buffer);
+  std::int64_t timeOf(Request& request, const libcamera::FrameMetadata& metadata) const;
+
+  // On libcamera's thread:
+  bool begin();
+  void queue(Request* request);
+  void completed(Request* request);
+  void disconnected();
+  void end(bool vanished);
+
+  const std::shared_ptr<Cameras> cameras_;
+  const CameraSettings settings_;
+  std::shared_ptr<libcamera::Camera> camera_;
+  std::unique_ptr<libcamera::CameraConfiguration> configuration_;
+  std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
+  PixelLayout layout_ = PixelLayout::kGrey;
+  AskedControls asked_;
+  std::vector<std::unique_ptr<Request>> requests_;
+  std::map<const FrameBuffer*, MappedBuffer> memory_;
+  BoundedQueue<Request*> done_{2 * kBuffers, Overflow::kDropOldest};  // never full: kBuffers exist
+  std::atomic<bool> gone_{false}, refused_{false};
+  bool acquired_ = false, ending_ = false;
+  libcamera::Thread* home_ = nullptr;
+  const Request* asking_ = nullptr;  ///< the one that carries the controls, until it is back
+};
+
+Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<Cameras> cameras,
+                                                     const CameraSettings& settings) {
+  auto session = std::unique_ptr<Session>(new Session(std::move(cameras), settings));
+  for (const auto& step :
+       {&Session::choose, &Session::configure, &Session::allocate, &Session::start}) {
+    if (const auto done = (session.get()->*step)(); !done) return tl::unexpected(done.error());
+  }
+  return session;
+}
+
+Session::~Session() {
+  if (!camera_) return;
+  const bool vanished = openVideoNodeVanished();
+  if (gone_ || vanished) cameras_->renew();
+  invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking, vanished);
+}
+
+/// A camera whose node is gone is not stopped: libcamera, which is told of that later, would end
+/// the process over requests that the kernel does not give back.
+void Session::end(bool vanished) {
+  ending_ = true;
+  if (!vanished) camera_->stop();
+  camera_->requestCompleted.disconnect(this);
+  camera_->disconnected.disconnect(this);
+  requests_.clear();
+  allocator_.reset();
+  if (acquired_) camera_->release();
+  moveToThread(home_);
+}
+
+Result<void> Session::choose() {
+  const auto manager = cameras_->manager();
+  if (!manager) return tl::unexpected(manager.error());
+  std::string there;
+  for (const auto& camera : (*manager)->cameras()) {
+    there += (there.empty() ? "" : ", ") + camera->id();
+    if (!camera_ && camera->id().find(settings_.id) != std::string::npos) camera_ = camera;
+  }
+  if (!camera_) {
+    return fail("camera_absent",
+                fmt::format("libcamera sees no camera{} (there are: {}); is it plugged in, and may "
+                            "this user read /dev/video* and /dev/media*?",
+                            settings_.id.empty() ? "" : " with " + settings_.id + " in its id",
+                            there.empty() ? "none" : there));
+  }
+  home_ = thread();
+  moveToThread(camera_->thread());
+  acquired_ = camera_->acquire() == 0;
+  if (acquired_) return {};
+  return fail("camera_absent",
+              fmt::format("the camera {} is in use by another program.", camera_->id()));
+}
+
+void Session::chooseFormat(libcamera::StreamConfiguration& wanted) const {
+  const auto offered = wanted.formats().pixelformats();
+  for (const auto& [format, layout] : kFormats) {
+    const bool named = settings_.format == "auto" || settings_.format == format.toString();
+    if (!named || std::find(offered.begin(), offered.end(), format) == offered.end()) continue;
+    wanted.pixelFormat = format;
+    return;
+  }
+}
+
+Result<void> Session::configure() {
+  configuration_ = camera_->generateConfiguration({libcamera::StreamRole::Viewfinder});
+  if (!configuration_ || configuration_->empty()) {
+    return fail("camera_absent", fmt::format("the camera {} has no stream.", camera_->id()));
+  }
+  auto& wanted = configuration_->at(0);
+  chooseFormat(wanted);
+  wanted.size = {settings_.width, settings_.height};
+  wanted.bufferCount = kBuffers;
+  const bool valid = configuration_->validate() != libcamera::CameraConfiguration::Invalid;
+  const auto known = std::find_if(kFormats.begin(), kFormats.end(), [&](const auto& entry) {
+    return entry.first == wanted.pixelFormat;
+  });
+  const bool sized = wanted.size.width == settings_.width && wanted.size.height == settings_.height;
+  if (!valid || known == kFormats.end() || !sized || camera_->configure(configuration_.get()) < 0) {
+    return fail(
+        "camera_absent",
+        fmt::format("the camera {} gives {} of {}x{} where {} of {}x{} is wanted; set "
+                    "camera.format, or calibrate it at a size that it has.",
+                    camera_->id(), wanted.pixelFormat.toString(), wanted.size.width,
+                    wanted.size.height, settings_.format, settings_.width, settings_.height));
+  }
+  layout_ = known->second;
+  return {};
+}
+
+Result<void> Session::allocate() {
+  libcamera::Stream* stream = configuration_->at(0).stream();
+  allocator_ = std::make_unique<libcamera::FrameBufferAllocator>(camera_);
+  if (allocator_->allocate(stream) < 0) {
+    return fail("camera_absent", fmt::format("no memory for images of {}.", camera_->id()));
+  }
+  for (const auto& buffer : allocator_->buffers(stream)) {
+    auto request = camera_->createRequest();
+    if (!request || request->addBuffer(stream, buffer.get()) < 0) {
+      return fail("camera_absent", fmt::format("{} takes no requests.", camera_->id()));
+    }
+    memory_.try_emplace(buffer.get(), *buffer);
+    requests_.push_back(std::move(request));
+  }
+  return {};
+}
+
+Result<void> Session::start() {
+  asked_ = controlsFor(settings_, camera_->controls());
+  if (invokeMethod(&Session::begin, libcamera::ConnectionTypeBlocking)) return {};
+  return fail("camera_absent", fmt::format("the camera {} does not start.", camera_->id()));
+}
+
+/// Some pipelines take controls as they start, that of UVC takes them from requests alone.
+bool Session::begin() {
+  camera_->requestCompleted.connect(this, &Session::completed);
+  camera_->disconnected.connect(this, &Session::disconnected);
+  if (requests_.empty() || camera_->start(&asked_.list) != 0) return false;
+  asking_ = requests_.front().get();
+  requests_.front()->controls().merge(asked_.list);
+  return std::all_of(requests_.begin(), requests_.end(), [&](const auto& request) {
+    return camera_->queueRequest(request.get()) == 0;
+  });
+}
+
+void Session::queue(Request* request) {
+  request->reuse(Request::ReuseBuffers);
+  if (!gone_) camera_->queueRequest(request);
+}
+
+/// No work here. A request that is cancelled before the end found the camera gone, or controls that
+/// it refuses.
+void Session::completed(Request* request) {
+  const bool asked = std::exchange(asking_, request == asking_ ? nullptr : asking_) == request;
+  if (request->status() != Request::RequestCancelled) {
+    done_.push(request);
+  } else if (asked && !ending_) {
+    refused_ = true;
+    queue(request);
+  }
+}
+
+void Session::disconnected() {
+  gone_ = true;
+  done_.close();
+}
+
+std::optional<CameraShot> Session::next(std::chrono::milliseconds longest) {
+  const auto request = done_.popWithin(longest);
+  if (!request) return std::nullopt;
+  CameraShot shot = shotOf(**request);
+  invokeMethod(&Session::queue, libcamera::ConnectionTypeQueued, *request);
+  return shot;
+}
+
+CameraShot Session::shotOf(Request& request) {
+  const FrameBuffer& buffer = *request.buffers().begin()->second;
+  const auto& metadata = buffer.metadata();
+  return {metadata.sequence, timeOf(request, metadata), frameOf(buffer)};
+}
+
+Result<Frame> Session::frameOf(const FrameBuffer& buffer) {
+  const auto& metadata = buffer.metadata();
+  if (metadata.status != libcamera::FrameMetadata::FrameSuccess) return fail("camera_frame_error");
+  const MappedBuffer& memory = memory_.at(&buffer);
+  memory.sync(true);
+  auto frame = packed(layout_, stream().size.width, stream().size.height,
+                      imagePlanes(stream(), layout_, memory, metadata), settings_.encoding);
+  memory.sync(false);
+  if (!frame || settings_.jpeg_quality == 0) return frame;
+  return vision::compressed(*frame, settings_.jpeg_quality);
+}
+
+/// Without the sensor's own time: when the driver had the image, which was exposed before that.
+std::int64_t Session::timeOf(Request& request, const libcamera::FrameMetadata& metadata) const {
+  const auto exposure_us = request.metadata().get(controls::ExposureTime).value_or(0);
+  const auto start = request.metadata().get(controls::SensorTimestamp);
+  const std::int64_t begun = start ? *start
+                                   : static_cast<std::int64_t>(metadata.timestamp) -
+                                         1000 * std::int64_t{exposure_us} -
+                                         static_cast<std::int64_t>(1e9 * settings_.readout_s);
+  const std::int64_t boot = cameraStampToBoot(begun, HostClock::monotonicNs(), HostClock::nowNs());
+  return middleOfExposure(boot, exposure_us, settings_.readout_s);
+}
+
+}  // namespace
+
+OpenCamera libcameraOpener(CameraSettings settings, std::function<void(const std::string&)> log) {
+  return [settings = std::move(settings), cameras = std::make_shared<Cameras>(std::move(log))] {
+    return Session::open(cameras, settings);
+  };
+}
+
+bool openVideoNodeVanished(const std::filesystem::path& descriptors) {
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(descriptors, none)) {
+    const std::string target = std::filesystem::read_symlink(entry.path(), none).string();
+    if (target.starts_with("/dev/video") && target.ends_with(" (deleted)")) return true;
+  }
+  return false;
+}
+
+}  // namespace perdure::capture

@@ -1,0 +1,76 @@
+#include "services/capture/live/frame_count.h"
+
+#include <gmock/gmock.h>
+
+namespace perdure::capture {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+TEST(FrameNumbers, GoOnWhenTheCameraIsOpenedAgain) {
+  FrameNumbers numbers;
+  for (std::uint32_t i = 0; i < 5; ++i) EXPECT_EQ(numbers.of(i), i);
+  numbers.reopened();
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(numbers.of(i), 5 + i);
+    EXPECT_EQ(numbers.lost(), 0U);
+  }
+}
+
+TEST(FrameNumbers, LeaveAGapForWhatTheDriverLost) {
+  FrameNumbers numbers;
+  (void)numbers.of(0);
+  EXPECT_EQ(numbers.of(3), 3U);
+  EXPECT_EQ(numbers.lost(), 2U);
+  EXPECT_EQ(numbers.of(4), 4U);
+  EXPECT_EQ(numbers.lost(), 0U);
+}
+
+TEST(FrameNumbers, GoOnWhereTheDriversNumberWrapsOrGoesBack) {
+  FrameNumbers numbers;
+  (void)numbers.of(0xfffffffe);
+  EXPECT_EQ(numbers.of(1), 3U);
+  EXPECT_EQ(numbers.lost(), 2U);
+  EXPECT_EQ(numbers.of(1), 4U);
+  EXPECT_EQ(numbers.lost(), 0U);
+  EXPECT_EQ(numbers.of(0), 5U);
+  EXPECT_EQ(numbers.lost(), 0U);
+}
+
+/// Frames of so many seconds, at this rate.
+void run(RateWatch& watch, double hz, double seconds) {
+  for (int i = 0; i <= static_cast<int>(seconds * hz); ++i) {
+    watch.frame(static_cast<std::uint64_t>(i), static_cast<std::int64_t>(kSecond / hz * i));
+  }
+}
+
+TEST(RateWatch, SaysWhatTheCameraGivesWhereThatIsNotWhatIsAsked) {
+  RateWatch watch(20.0);
+  run(watch, 30.0, 1.0);
+  EXPECT_EQ(watch.note(), "") << "it has seen too little";
+  watch.reopened();
+  run(watch, 30.0, 3.0);
+  EXPECT_THAT(watch.note(), HasSubstr("30 images a second where 20 are asked for"));
+  EXPECT_THAT(watch.note(), HasSubstr("camera.rate_hz"));
+  watch.reopened();
+  EXPECT_EQ(watch.note(), "");
+}
+
+TEST(RateWatch, TakesARateThatIsNearlyAskedForAsThat) {
+  RateWatch watch(20.0);
+  run(watch, 21.0, 5.0);
+  EXPECT_EQ(watch.note(), "");
+}
+
+TEST(RateWatch, CountsFramesThatWereLostOnTheWayAsGiven) {
+  RateWatch watch(20.0);
+  for (int i = 0; i <= 100; i += 2) {
+    watch.frame(static_cast<std::uint64_t>(i), kSecond / 20 * i);
+  }
+  EXPECT_EQ(watch.note(), "");
+}
+
+}  // namespace
+}  // namespace perdure::capture

@@ -1,0 +1,126 @@
+// What of libcamera can be asked without a camera.
+#include <gmock/gmock.h>
+#include <libcamera/libcamera.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "services/capture/live/libcamera_controls.h"
+#include "services/capture/live/libcamera_log.h"
+#include "services/capture/live/libcamera_session.h"
+
+namespace perdure::capture {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+namespace controls = libcamera::controls;
+
+/// As those of a UVC camera: no rate.
+libcamera::ControlInfoMap webcam(bool with_gain = true) {
+  libcamera::ControlInfoMap::Map map = {
+      {&controls::AeEnable, libcamera::ControlInfo(false, true, true)},
+      {&controls::ExposureTime, libcamera::ControlInfo(100, 500'000, 15'600)}};
+  if (with_gain) map.emplace(&controls::AnalogueGain, libcamera::ControlInfo(0.5F, 4.0F, 1.0F));
+  return {std::move(map), controls::controls};
+}
+
+CameraSettings manual() {
+  CameraSettings settings;
+  settings.exposure_ms = 10.0;
+  settings.gain = 2.0;
+  return settings;
+}
+
+TEST(LibcameraControls, AskForTheExposureAndTheGainThatAreConfigured) {
+  const auto offered = webcam();
+  const AskedControls asked = controlsFor(manual(), offered);
+  EXPECT_EQ(asked.list.get(controls::AeEnable), false);
+  EXPECT_EQ(asked.list.get(controls::ExposureTime), 10'000);
+  EXPECT_EQ(asked.list.get(controls::AnalogueGain), 2.0F);
+  EXPECT_EQ(asked.missing, "");
+  EXPECT_TRUE(controlsFor({}, offered).list.empty()) << "automatic";
+}
+
+TEST(LibcameraControls, SayWhichOfThemTheCameraDoesNotOffer) {
+  const auto offered = webcam(false);
+  const AskedControls asked = controlsFor(manual(), offered);
+  EXPECT_EQ(asked.missing, "The camera offers no AnalogueGain (camera.gain), and keeps its own.");
+  EXPECT_EQ(asked.list.get(controls::ExposureTime), 10'000);
+  const libcamera::ControlInfoMap none({}, controls::controls);
+  EXPECT_THAT(controlsFor(manual(), none).missing, HasSubstr("ExposureTime (camera.exposure_ms)"));
+  EXPECT_EQ(controlsFor({}, none).missing, "");
+}
+
+TEST(LibcameraControls, AskForTheRateWhereThereIsAControlOfIt) {
+  const libcamera::ControlInfoMap offered(
+      {{&controls::FrameDurationLimits,
+        libcamera::ControlInfo(std::int64_t{10'000}, std::int64_t{1'000'000})}},
+      controls::controls);
+  CameraSettings settings;
+  settings.rate_hz = 25.0;
+  const auto asked = controlsFor(settings, offered);
+  const auto limits = asked.list.get(controls::FrameDurationLimits);
+  ASSERT_TRUE(limits);
+  EXPECT_THAT(std::vector<std::int64_t>(limits->begin(), limits->end()),
+              ElementsAre(40'000, 40'000));
+}
+
+TEST(LibcameraLog, KeepsTheWordsOfWarningsAndWhatIsWorse) {
+  EXPECT_EQ(worthLogging("[0:01:02.34] [77] ERROR V4L2 v4l2_videodevice.cpp:1697 /dev/video0: "
+                         "Failed to queue buffer 0\n"),
+            "ERROR V4L2 v4l2_videodevice.cpp:1697 /dev/video0: Failed to queue buffer 0");
+  EXPECT_EQ(worthLogging("[0:01:02.34] [77]  WARN UVC uvc.cpp:1 dim\n"), "WARN UVC uvc.cpp:1 dim");
+  EXPECT_EQ(worthLogging("[0:01:02.34] [77]  INFO Camera camera.cpp:1026 configuring\n"),
+            std::nullopt);
+  EXPECT_EQ(worthLogging("[0:01:02.34] [77] DEBUG Camera camera.cpp:1 stop\n"), std::nullopt);
+  EXPECT_EQ(worthLogging("Backtrace:\n"), "Backtrace:");
+  EXPECT_EQ(worthLogging("  \n"), std::nullopt);
+}
+
+TEST(LibcameraLog, GetsLibcamerasLinesWithoutColours) {
+  std::vector<std::string> lines;
+  ::testing::internal::CaptureStderr();
+  {
+    const LibcameraLog log([&](const std::string& line) { lines.push_back(line); });
+    const libcamera::ControlList empty(controls::controls);
+    (void)empty.get(controls::AeEnable.id());  // it complains of what is not in a list
+  }
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(lines.empty());
+  EXPECT_THAT(lines.front(), HasSubstr("ERROR Controls"));
+  EXPECT_THAT(lines.front(), Not(HasSubstr("\033")));
+}
+
+TEST(LibcameraSession, SaysThatThereIsNoCameraEachTimeItIsAsked) {
+  CameraSettings settings;
+  settings.id = "that nobody has";
+  const OpenCamera open = libcameraOpener(settings, [](const std::string&) {});
+  for (int i = 0; i < 3; ++i) {
+    const auto session = open();
+    ASSERT_FALSE(session);
+    EXPECT_EQ(session.error().code, "camera_absent");
+    EXPECT_THAT(session.error().detail, HasSubstr("that nobody has in its id"));
+  }
+}
+
+TEST(LibcameraSession, SeesThatAVideoNodeThatIsOpenIsThereNoMore) {
+  const std::filesystem::path folder =
+      ::testing::TempDir() + "/perdure_descriptors_" + std::to_string(getpid());
+  std::filesystem::create_directories(folder);
+  const auto link = [&](const char* name, const char* to) {
+    std::filesystem::create_symlink(to, folder / name);
+  };
+  link("0", "/dev/null");
+  link("1", "/dev/video0");
+  link("2", "/tmp/video (deleted)");
+  EXPECT_FALSE(openVideoNodeVanished(folder));
+  link("3", "/dev/video1 (deleted)");
+  EXPECT_TRUE(openVideoNodeVanished(folder));
+  EXPECT_FALSE(openVideoNodeVanished(folder / "none"));
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace perdure::capture
