@@ -31,8 +31,11 @@ void describeLive(Config& c, config::Fields& fields) {
   fields.text(
       "camera.format", c.camera.format,
       {"live: libcamera's name of a pixel format, as YUYV or MJPEG; auto: the best it has"});
-  fields.number("camera.rate_hz", c.camera.rate_hz, config::between(1, 240),
-                {"live: images a second, by limits of the frame's duration", "Hz"});
+  fields.number(
+      "camera.rate_hz", c.camera.rate_hz, config::between(1, 240),
+      {"live: images a second that are asked for; a camera without a control of it keeps its "
+       "own",
+       "Hz"});
   fields.number("camera.exposure_ms", c.camera.exposure_ms, config::between(0, 1000),
                 {"live: of an image; 0: automatic", "ms"});
   fields.number("camera.gain", c.camera.gain, config::between(0, 100),
@@ -42,10 +45,13 @@ void describeLive(Config& c, config::Fields& fields) {
   fields.text("imu.gyro", c.imu.gyro,
               {"live: name or id of the gyroscope's device; empty: the first there is"});
   fields.text("imu.accel", c.imu.accel, {"live: of the accelerometer's; empty: the same device"});
-  fields.number("imu.rate_hz", c.imu.rate_hz, config::between(10, 8000),
-                {"live: samples a second that are asked for; the device says what it gives", "Hz"});
+  fields.number(
+      "imu.rate_hz", c.imu.rate_hz, config::between(10, 8000),
+      {"live: samples a second, asked of the device and of the trigger; they say what they "
+       "give",
+       "Hz"});
   fields.text("imu.trigger", c.imu.trigger,
-              {"live: name or id of the trigger of its buffer; empty: as it is set"});
+              {"live: name or id of the trigger of its buffer; empty: the one that is set"});
   fields.numbers("imu.mount", c.imu.mount, config::between(-1, 1),
                  {"live: rows of the rotation from the device's axes to the body's; empty: the "
                   "device's own mount matrix"});

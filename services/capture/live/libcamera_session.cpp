@@ -104,6 +104,7 @@ class Session final : public CameraSession, public libcamera::Object {
 
   const libcamera::StreamConfiguration& stream() const { return configuration_->at(0); }
 
+  void waitToBeTold();
   Result<void> choose();
   Result<void> configure();
   void chooseFormat(libcamera::StreamConfiguration& wanted) const;
@@ -118,7 +119,7 @@ class Session final : public CameraSession, public libcamera::Object {
   void queue(Request* request);
   void completed(Request* request);
   void disconnected();
-  void end(bool vanished);
+  void end();
 
   const std::shared_ptr<Cameras> cameras_;
   const CameraSettings settings_;
@@ -148,16 +149,21 @@ Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<Cameras> ca
 
 Session::~Session() {
   if (!camera_) return;
-  const bool vanished = openVideoNodeVanished();
-  if (gone_ || vanished) cameras_->renew();
-  invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking, vanished);
+  waitToBeTold();
+  if (gone_) cameras_->renew();
+  invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking);
 }
 
-/// A camera whose node is gone is not stopped: libcamera, which is told of that later, would end
-/// the process over requests that the kernel does not give back.
-void Session::end(bool vanished) {
+/// Where the kernel has removed the camera and libcamera does not know that yet, stopping it ends
+/// the process: over requests that the kernel does not give back. udev tells it within a second.
+void Session::waitToBeTold() {
+  constexpr std::chrono::milliseconds kStep{50};
+  for (int i = 0; i < 20 && !gone_ && openVideoNodeVanished(); ++i) (void)done_.popWithin(kStep);
+}
+
+void Session::end() {
   ending_ = true;
-  if (!vanished) camera_->stop();
+  camera_->stop();
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
   requests_.clear();
