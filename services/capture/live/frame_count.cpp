@@ -18,25 +18,26 @@ std::uint64_t FrameNumbers::of(std::uint32_t sequence) {
 
 void RateWatch::reopened() {
   since_ns_.reset();
+  known_ = false;
   note_.clear();
 }
 
 void RateWatch::frame(std::uint64_t number, std::int64_t time_ns) {
-  constexpr double kWindow_s = 2.0, kOff = 0.1;
-  const double seconds = since_ns_ ? 1e-9 * static_cast<double>(time_ns - *since_ns_) : 0.0;
-  if (since_ns_ && seconds < kWindow_s) return;
-  if (since_ns_) {
-    const double hz = static_cast<double>(number - since_number_) / seconds;
-    note_ =
-        std::abs(hz / asked_hz_ - 1.0) <= kOff
-            ? ""
-            : fmt::format(
-                  "The camera gives {:.0f} images a second where {:g} are asked for, and all of "
-                  "them are given on; set camera.rate_hz to a rate that it has.",
-                  hz, asked_hz_);
+  constexpr double kWindow_s = 5.0, kOff = 0.1;
+  if (known_) return;
+  if (!since_ns_) {
+    since_ns_ = time_ns;
+    since_number_ = number;
   }
-  since_ns_ = time_ns;
-  since_number_ = number;
+  const double seconds = 1e-9 * static_cast<double>(time_ns - *since_ns_);
+  if (seconds < kWindow_s) return;
+  known_ = true;
+  const double hz = static_cast<double>(number - since_number_) / seconds;
+  if (std::abs(hz / asked_hz_ - 1.0) <= kOff) return;
+  note_ = fmt::format(
+      "The camera gives {:.0f} images a second where {:g} are asked for, and all of them are given "
+      "on; set camera.rate_hz to a rate that it has.",
+      hz, asked_hz_);
 }
 
 }  // namespace perdure::capture

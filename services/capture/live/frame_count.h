@@ -22,7 +22,8 @@ class FrameNumbers {
   std::uint64_t next_ = 0, lost_ = 0;
 };
 
-/// Whether a camera gives the rate that it is asked for, looked at over two seconds each.
+/// Whether a camera gives the rate that it is asked for: over five seconds, once after each
+/// opening.
 class RateWatch {
  public:
   explicit RateWatch(double asked_hz) : asked_hz_(asked_hz) {}
@@ -35,6 +36,7 @@ class RateWatch {
   const double asked_hz_;
   std::optional<std::int64_t> since_ns_;
   std::uint64_t since_number_ = 0;
+  bool known_ = false;
   std::string note_;
 };
 

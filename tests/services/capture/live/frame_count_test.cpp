@@ -48,10 +48,10 @@ void run(RateWatch& watch, double hz, double seconds) {
 
 TEST(RateWatch, SaysWhatTheCameraGivesWhereThatIsNotWhatIsAsked) {
   RateWatch watch(20.0);
-  run(watch, 30.0, 1.0);
+  run(watch, 30.0, 4.0);
   EXPECT_EQ(watch.note(), "") << "it has seen too little";
   watch.reopened();
-  run(watch, 30.0, 3.0);
+  run(watch, 30.0, 6.0);
   EXPECT_THAT(watch.note(), HasSubstr("30 images a second where 20 are asked for"));
   EXPECT_THAT(watch.note(), HasSubstr("camera.rate_hz"));
   watch.reopened();
@@ -60,13 +60,23 @@ TEST(RateWatch, SaysWhatTheCameraGivesWhereThatIsNotWhatIsAsked) {
 
 TEST(RateWatch, TakesARateThatIsNearlyAskedForAsThat) {
   RateWatch watch(20.0);
-  run(watch, 21.0, 5.0);
+  run(watch, 21.0, 6.0);
   EXPECT_EQ(watch.note(), "");
+}
+
+TEST(RateWatch, SaysItOnceAndNotAnewWithEachChange) {
+  RateWatch watch(20.0);
+  run(watch, 30.0, 6.0);
+  const std::string said = watch.note();
+  for (int i = 0; i < 100; ++i) {
+    watch.frame(static_cast<std::uint64_t>(200 + i), 10 * kSecond + i * kSecond / 7);
+  }
+  EXPECT_EQ(watch.note(), said);
 }
 
 TEST(RateWatch, CountsFramesThatWereLostOnTheWayAsGiven) {
   RateWatch watch(20.0);
-  for (int i = 0; i <= 100; i += 2) {
+  for (int i = 0; i <= 120; i += 2) {
     watch.frame(static_cast<std::uint64_t>(i), kSecond / 20 * i);
   }
   EXPECT_EQ(watch.note(), "");
