@@ -274,12 +274,8 @@ void Session::queue(Request* request) {
 /// No work here. A request that is cancelled before the end found the camera gone, or controls that
 /// it refuses.
 void Session::completed(Request* request) {
-<<<<<<< HEAD
-  const bool asked = std::exchange(asking_, request == asking_ ? nullptr : asking_) == request;
-=======
   const bool asked = request == asking_;
   if (asked) asking_ = nullptr;
->>>>>>> capture-live
   if (request->status() != Request::RequestCancelled) {
     done_.push(request);
   } else if (asked && !ending_) {

@@ -1,10 +1,6 @@
 #include "services/capture/live/live.h"
 
-<<<<<<< HEAD
 #include "common/replay/files/rig_file.h"
-=======
-#include "common/replay/rig_file.h"
->>>>>>> capture-live
 #include "services/capture/live/libcamera_session.h"
 
 namespace perdure::capture {
