@@ -15,9 +15,8 @@
 #include "common/base/sink.h"
 #include "common/types/map.h"
 #include "services/semantic_filter/config.h"
-#include "services/semantic_filter/core/filter.h"
+#include "services/semantic_filter/core/history.h"
 #include "services/semantic_filter/core/memory/archive.h"
-#include "services/semantic_filter/core/visibility/predicted_box.h"
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/former_map.h"
 #include "services/semantic_filter/model_book.h"
@@ -50,88 +49,57 @@ class Node {
 
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
-  const Belief& belief() const { return belief_; }
+  const Belief& belief() const { return history_.belief(); }
   /// For people: what the node is still at beside its frames, and what it makes of the network's
   /// boxes.
   std::string note() const;
 
  private:
-  struct Entry {
-    FrameInput input;
-    WorldId world;
-    std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
-    Belief before;
-    bool stepped = false, drift_measured = false;
-    std::vector<MergeRecord> merges = {};
-  };
+  using Frame = HistoryFrame;
 
-  FrameInput makeInput(const Odometry& odometry);
-  void advancePoseError(const Odometry& odometry);
   void beginWorld(const WorldId& world);
   const char* refusalOf(const Detections& detections) const;
-  bool attach(Entry& entry, const Detections& detections);
-  bool use(Entry& entry, const Detections& detections);
+  bool attach(Frame& frame, const Detections& detections);
+  bool use(Frame& frame, const Detections& detections);
   void keepEarly(const Detections& detections);
   void forgetEarlyBefore(TimePoint time);
-  void stepEntry(Entry& entry);
-  bool isLevel(const Entry& entry);
-  void correctDrift();
-  /// From W, the odometry's own, into M and back.
-  RigidTransform inM(const RigidTransform& T_WB) const { return T_MW_ ? *T_MW_ * T_WB : T_WB; }
-  ObjectBelief inM(ObjectBelief belief) const;
-  RigidTransform inW(const RigidTransform& T_MB) const;
-  ObjectBelief inW(ObjectBelief belief) const;
-  void stepAgainFrom(std::size_t index);
-  void publish(const Entry& entry);
-  std::optional<ComingFrame> comingFrame(const Entry& entry) const;
-  void publishPredictions(const Entry& entry, const std::optional<ComingFrame>& coming);
+  void publish(const Frame& frame);
+  void publishPredictions(const Frame& frame, const std::optional<ComingFrame>& coming);
   // In node_swap.cpp.
   void tellModelChange(const FrameStamp& stamp, const std::string& detail);
-  bool inflations(const Entry& entry, const Detections& detections);
+  bool isInDoubt(const Frame& frame, const Detections& detections);
   void settleDoubts(bool believed);
   // In node_memory.cpp.
   std::vector<ObjectBelief> soundOf(std::vector<ObjectBelief> beliefs);
   void insertRecalled(const Recalled& recalled);
-  void insert(const Track& object);
   void restore(const ObjectBelief& belief);
   void recall(const ObjectBelief& belief);
   bool isNear(const ObjectBelief& belief) const;
   void recallLaid(const ObjectBelief& belief);
   void onRecalledOfFormer(const Recalled& recalled);
-  void letGo(const Entry& entry);
-  void askTheMap(const Entry& entry);
+  void letGo(const Frame& frame);
+  void askTheMap(const Frame& frame);
   /// `centre` is the question's, in that frame of reference.
   void ask(const Archive::Question& question, const Eigen::Vector3d& centre, const WorldId& world);
   void keepFormer();
-  void rejoin(const Entry& entry);
+  void rejoin(const Frame& frame);
 
   Config config_;
   InstanceId instance_;
   Outputs outputs_;
-  SemanticFilter filter_;
+  ReasonCounts reasons_;
+  History history_;
   std::shared_ptr<const CameraModel> camera_;  // shared with the entries that were made with it
   std::string camera_name_;
   ModelBook models_;
   Probation probation_;
   std::optional<WorldId> world_;
-  PoseError pose_error_;
-  std::optional<RigidTransform> last_T_WB_;
-  /// Beliefs and views are in M: W less the drift that the map has shown. None: no such drift.
-  std::optional<RigidTransform> T_MW_;
-  DriftEstimator drift_;
-  bool told_not_level_ = false;
-  Belief belief_;
-  Belief spare_;  ///< an old one, whose memory the next copy takes
-  IdBook ids_;
-  std::deque<Entry> history_;
   std::deque<Detections> early_;
-  std::vector<MergeRecord> late_merges_;
   std::optional<Recalled> waiting_recalled_;
   EventTracker events_;
   ReappearanceMonitor returns_;
   Archive archive_;
   FormerMap former_;
-  ReasonCounts reasons_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -13,36 +13,35 @@ namespace {
 
 constexpr std::uint32_t kMostRecalled = 1000;  // by one answer
 
-void eraseFrom(std::vector<Track>& objects, const std::set<ObjectId>& ids) {
-  std::erase_if(objects, [&](const Track& o) { return ids.contains(o.id); });
-}
-
 }  // namespace
 
 /// What leaves was seen in no frame that may be stepped again, and leaves those too: a late
 /// detection does not bring it back.
-void Node::letGo(const Entry& entry) {
-  const TimePoint now = entry.input.stamp.time, oldest = history_.front().input.stamp.time;
-  const auto leaving = archive_.leaving(belief_.tracks, entry.input.view.T_WB.p, now, oldest);
+void Node::letGo(const Frame& frame) {
+  const TimePoint now = frame.input.stamp.time, oldest = history_.oldestTime();
+  const auto leaving =
+      archive_.leaving(history_.belief().tracks, frame.input.view.T_WB.p, now, oldest);
   if (leaving.archived.empty() && leaving.forgotten.empty()) return;
   std::set<ObjectId> ids(leaving.archived.begin(), leaving.archived.end());
-  for (const Track& o : belief_.tracks) {
+  for (const Track& o : history_.belief().tracks) {
     if (!ids.contains(o.id)) continue;
-    archive_.rememberReference(o, T_MW_);
+    archive_.rememberReference(o, history_.mapFrame().T_MW());
     events_.archived(o.id);
   }
   ids.insert(leaving.forgotten.begin(), leaving.forgotten.end());
-  eraseFrom(belief_.tracks, ids);
-  for (Entry& e : history_) eraseFrom(e.before.tracks, ids);
+  history_.erase(ids);
 }
 
-void Node::askTheMap(const Entry& entry) {
+void Node::askTheMap(const Frame& frame) {
   if (!outputs_.queries) return;
-  const Eigen::Vector3d& p_WB = entry.input.view.T_WB.p;
-  const TimePoint now = entry.input.stamp.time;
+  const Eigen::Vector3d& p_WB = frame.input.view.T_WB.p;
+  const TimePoint now = frame.input.stamp.time;
   if (const auto question = archive_.ask(p_WB, now)) {
-    ask(*question, inW(RigidTransform(Eigen::Quaterniond::Identity(), question->centre_W)).p,
-        entry.world);
+    ask(*question,
+        history_.mapFrame()
+            .inW(RigidTransform(Eigen::Quaterniond::Identity(), question->centre_W))
+            .p,
+        frame.world);
   }
   if (const auto question = former_.ask(p_WB, now)) {
     ask(*question, question->centre_W, *former_.world());
@@ -67,63 +66,37 @@ void Node::ask(const Archive::Question& question, const Eigen::Vector3d& centre,
 /// What was known when the frame of reference ended.
 void Node::keepFormer() {
   std::vector<ObjectBelief> objects;
-  for (const Track& o : belief_.tracks) {
-    objects.push_back(inW(toBelief(o, config_.filter.motion.min_speed)));
+  for (const Track& o : history_.belief().tracks) {
+    objects.push_back(history_.mapFrame().inW(toBelief(o, config_.filter.motion.min_speed)));
   }
   former_.keep(*world_, objects);
 }
 
 /// Where the map of before is found again, what it holds comes back, and what was taken for new
 /// meanwhile goes on under the old id.
-void Node::rejoin(const Entry& entry) {
-  if (!former_.waits() || !isLevel(entry)) return;
-  const FrameInput& input = entry.input;
-  const FrameAlignment* found = former_.look(belief_.tracks, input.view.T_WB.p, input.stamp.time);
+void Node::rejoin(const Frame& frame) {
+  if (!former_.waits() || !history_.isLevel(frame)) return;
+  const FrameInput& input = frame.input;
+  const FrameAlignment* found =
+      former_.look(history_.belief().tracks, input.view.T_WB.p, input.stamp.time);
   if (!found) return;
   for (const ObjectBelief& belief : former_.takeKept()) recallLaid(belief);
-  for (const auto& [remembered, seen] : found->pairs) {
-    if (const auto merge = filter_.join(belief_, remembered, seen, input)) {
-      late_merges_.push_back(*merge);
-    }
-    for (Entry& e : history_) (void)filter_.join(e.before, remembered, seen, e.input);
-  }
+  for (const auto& [remembered, seen] : found->pairs) history_.join(remembered, seen, input);
 }
 
 void Node::recallLaid(const ObjectBelief& belief) {
   const auto same = [&](const Track& o) { return o.id == belief.id; };
-  if (std::any_of(belief_.tracks.begin(), belief_.tracks.end(), same)) return;
+  if (std::any_of(history_.belief().tracks.begin(), history_.belief().tracks.end(), same)) return;
   if (!isNear(belief)) return;
-  insert(fromBelief(belief, pose_error_.product, ExistenceEvidence::kRecall));
+  history_.insert(fromBelief(belief, history_.poseError().product, ExistenceEvidence::kRecall));
   events_.recalled(belief.id, false,
                    fmt::format("of frame of reference {:x}/{}, found again", former_.world()->world,
                                former_.world()->epoch));
 }
 
-/// Into the newest belief and those that late detections may go back to, in order of id.
-void Node::insert(const Track& object) {
-  const auto into = [&](Belief& b) {
-    const auto at = std::find_if(b.tracks.begin(), b.tracks.end(),
-                                 [&](const Track& o) { return o.id > object.id; });
-    b.tracks.insert(at, object);
-  };
-  into(belief_);
-  for (auto& entry : history_) into(entry.before);
-}
-
-RigidTransform Node::inW(const RigidTransform& T_MB) const {
-  return T_MW_ ? T_MW_->inverse() * T_MB : T_MB;
-}
-
-ObjectBelief Node::inW(ObjectBelief belief) const {
-  return T_MW_ ? turned(T_MW_->inverse(), std::move(belief)) : belief;
-}
-
-ObjectBelief Node::inM(ObjectBelief belief) const {
-  return T_MW_ ? turned(*T_MW_, std::move(belief)) : belief;
-}
-
 void Node::restore(const ObjectBelief& belief) {
-  insert(fromBelief(inM(belief), pose_error_.product, ExistenceEvidence::kRestore));
+  history_.insert(fromBelief(history_.mapFrame().inM(belief), history_.poseError().product,
+                             ExistenceEvidence::kRestore));
   events_.recalled(belief.id, true);
 }
 
@@ -132,23 +105,24 @@ void Node::recall(const ObjectBelief& belief) {
   const auto reference = archive_.referenceAt(belief.as_of);
   ObjectBelief there = belief;
   if (!reference) {
-    there = inM(std::move(there));
+    there = history_.mapFrame().inM(std::move(there));
   } else if (reference->T_MW) {  // W has drifted since then, M has not
     there = turned(*reference->T_MW, std::move(there));
   }
   if (!isNear(there)) return;
-  Track object = fromBelief(there, reference ? reference->product : pose_error_.product,
+  Track object = fromBelief(there, reference ? reference->product : history_.poseError().product,
                             ExistenceEvidence::kRecall);
   if (!reference) {  // of another run: how its error hangs together with this one's is not known
     for (auto& h : object.hypotheses) h.C.setZero();
   }
-  insert(object);
+  history_.insert(object);
   events_.recalled(belief.id, false);
 }
 
 /// `belief` is in M.
 bool Node::isNear(const ObjectBelief& belief) const {
-  return !last_T_WB_ || archive_.near(belief.best().mean.head<3>(), inM(*last_T_WB_).p);
+  return !history_.lastPose() || archive_.near(belief.best().mean.head<3>(),
+                                               history_.mapFrame().inM(*history_.lastPose()).p);
 }
 
 /// What can be used of it, without its context; no id of it is given out again.
@@ -157,7 +131,7 @@ std::vector<ObjectBelief> Node::soundOf(std::vector<ObjectBelief> beliefs) {
       std::erase_if(beliefs, [](const ObjectBelief& b) { return b.classes.empty() || b.id == 0; });
   if (malformed > 0) reasons_.add("recalled_malformed", malformed);
   for (ObjectBelief& belief : beliefs) {
-    ids_.atLeast(belief.id + 1);
+    history_.ids().atLeast(belief.id + 1);
     removeContext(belief);
   }
   return beliefs;
@@ -166,7 +140,8 @@ std::vector<ObjectBelief> Node::soundOf(std::vector<ObjectBelief> beliefs) {
 void Node::insertRecalled(const Recalled& recalled) {
   for (const ObjectBelief& belief : soundOf(recalled.objects)) {
     const auto same = [&](const Track& o) { return o.id == belief.id; };
-    if (std::any_of(belief_.tracks.begin(), belief_.tracks.end(), same)) continue;
+    if (std::any_of(history_.belief().tracks.begin(), history_.belief().tracks.end(), same))
+      continue;
     recalled.restore ? restore(belief) : recall(belief);
   }
 }
@@ -174,7 +149,7 @@ void Node::insertRecalled(const Recalled& recalled) {
 void Node::onRecalled(const Recalled& recalled) {
   const bool for_all = recalled.client == 0 && !recalled.restore;
   if (recalled.client != instance_ && !for_all) return;
-  ids_.atLeast(recalled.next_id);
+  history_.ids().atLeast(recalled.next_id);
   if (!world_) {
     waiting_recalled_ = recalled;
     return;
@@ -195,7 +170,7 @@ void Node::onRecalledOfFormer(const Recalled& recalled) {
   if (!former_.answered(recalled.request, recalled.kept, recalled.truncated)) {
     return reasons_.add("recalled_unasked");
   }
-  former_.refine(belief_.tracks);
+  former_.refine(history_.belief().tracks);
   for (const ObjectBelief& belief : soundOf(recalled.objects)) {
     if (belief.moving > 0.5) {
       reasons_.add("recalled_moving");

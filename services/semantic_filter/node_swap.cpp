@@ -20,7 +20,7 @@ void Node::onSwap(const SwapNotice& notice) {
     settleDoubts(false);
   }
   if (history_.empty()) return;
-  tellModelChange(history_.back().input.stamp,
+  tellModelChange(history_.newest().input.stamp,
                   notice.model + " was rolled back, " + notice.reason + ": " + notice.detail);
 }
 
@@ -37,13 +37,13 @@ void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
 /// Whether these detections of a newcomer are kept back. What was kept before is used as soon as it
 /// sees one of the things again, or has been in inflation for so long that the old one would have
 /// said.
-bool Node::inflations(const Entry& entry, const Detections& detections) {
+bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const Model* model = models_.find(detections.model_hash);
   std::vector<Prediction> expected;
-  for (const Track& object : (entry.stepped ? entry.before : belief_).tracks) {
+  for (const Track& object : (frame.stepped ? frame.before : history_.belief()).tracks) {
     if (!object.life.confirmed || !model->names->contains(object.best().class_name)) continue;
-    if (auto prediction = predictionOf(object, entry.input, {})) expected.push_back(*prediction);
+    if (auto prediction = predictionOf(object, frame.input, {})) expected.push_back(*prediction);
   }
   const bool blind = missesAll(expected, detections);
   if (blind && !probation_.full()) {
@@ -61,15 +61,16 @@ void Node::settleDoubts(bool believed) {
   const auto kept = probation_.take();
   if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());
   if (!believed) return;
-  std::size_t first = history_.size();
+  auto& frames = history_.frames();
+  std::size_t first = frames.size();
   for (const Detections& detections : kept) {
     if (refusalOf(detections) != nullptr) continue;  // its model was forgotten meanwhile
-    for (std::size_t i = 0; i < history_.size(); ++i) {
-      if (!history_[i].input.stamp.sameFrame(detections.stamp)) continue;
-      if (use(history_[i], detections) && history_[i].stepped) first = std::min(first, i);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (!frames[i].input.stamp.sameFrame(detections.stamp)) continue;
+      if (use(frames[i], detections) && frames[i].stepped) first = std::min(first, i);
     }
   }
-  if (first < history_.size()) stepAgainFrom(first);
+  if (first < frames.size()) history_.stepAgainFrom(first);
 }
 
 }  // namespace perdure::semantic_filter

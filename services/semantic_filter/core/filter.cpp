@@ -107,7 +107,8 @@ std::vector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
 }
 
 bool SemanticFilter::measuresDrift(const Track& track, const FrameContext& frame) const {
-  if (track.life.visit_began <= std::max(track.pose.drift_measured_at, track.life.first_seen)) return false;
+  if (track.life.visit_began <= std::max(track.pose.drift_measured_at, track.life.first_seen))
+    return false;
   const Hypothesis& best = track.best();
   return track.life.confirmed && !best.moving && best.weight > 0.5 &&
          (best.x.head<3>() - frame.view.T_WB.p).norm() < parameters_.drift.within_m;

@@ -1,0 +1,33 @@
+#include "services/semantic_filter/core/measurement/pose_error.h"
+
+namespace perdure::semantic_filter {
+
+std::optional<PoseWalk> poseWalkOf(const Odometry& odometry, const PoseParameters& pose) {
+  if (!odometry.has_increment) return PoseWalk{pose.walk_rotation, pose.walk_position};
+  if (pose.drift_position <= 0.0 || odometry.increment_covariance.isZero(0.0)) return std::nullopt;
+  return PoseWalk{pose.drift_rotation, pose.drift_position};
+}
+
+void advancePoseError(PoseError& error, const Odometry& odometry,
+                      const std::optional<RigidTransform>& last_T_WB,
+                      const PoseParameters& parameters) {
+  const auto walk = poseWalkOf(odometry, parameters);
+  if (!walk) {
+    error.covariance = odometry.covariance.topLeftCorner<6, 6>();
+    error.product = (odometry.transition * error.product).eval();
+    return;
+  }
+  if (!last_T_WB) return;
+  // The error of rotation is expressed in the body, which turns against W.
+  Matrix6d A = Matrix6d::Identity();
+  A.topLeftCorner<3, 3>() = odometry.T_WB.R().transpose() * last_T_WB->R();
+  Eigen::Matrix<double, 6, 1> q;
+  q << Eigen::Vector3d::Constant(walk->rotation * walk->rotation),
+      Eigen::Vector3d::Constant(walk->position * walk->position);
+  const double metres = (odometry.T_WB.p - last_T_WB->p).norm();
+  error.covariance = (A * error.covariance * A.transpose()).eval();
+  error.covariance.diagonal() += metres * q;
+  error.product = (A * error.product).eval();
+}
+
+}  // namespace perdure::semantic_filter
