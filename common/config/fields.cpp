@@ -10,6 +10,7 @@ Field& Fields::add(std::string key, Doc doc) {
   Field& field = fields_.emplace_back();
   field.key = std::move(key);
   field.doc = std::move(doc);
+  field.expert = expert_;
   return field;
 }
 
@@ -50,6 +51,21 @@ void Fields::numbers(std::string key, std::vector<double>& target, Range range, 
 
 void Fields::texts(std::string key, std::vector<std::string>& target, Doc doc) {
   add(std::move(key), std::move(doc)).target = &target;
+}
+
+void Fields::formerly(std::string key, std::string sentence) {
+  formerly_.emplace(std::move(key), std::move(sentence));
+}
+
+std::string Fields::formerlyOf(const std::string& key) const {
+  const auto it = formerly_.find(key);
+  return it == formerly_.end() ? "" : it->second;
+}
+
+bool Fields::wasGroup(const std::string& name) const {
+  const std::string prefix = name + ".";
+  const auto it = formerly_.lower_bound(prefix);
+  return it != formerly_.end() && it->first.starts_with(prefix);
 }
 
 void Fields::require() {

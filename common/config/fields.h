@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -36,6 +37,7 @@ struct Field {
   std::vector<std::string> choices;  ///< strings: allowed values; empty = any
   std::size_t length = 0;            ///< lists: required length; 0 = any
   bool required = false;             ///< must be given in the file or by --set
+  bool expert = false;               ///< for those who have read what it does
   Doc doc;
   bool given = false;  ///< set by readYaml and assign, also where the value was refused
 };
@@ -52,6 +54,16 @@ class Fields {
   void texts(std::string key, std::vector<std::string>& target, Doc doc);
   /// The field described last must be given.
   void require();
+  /// Whether fields that are described from here on are marked expert.
+  void expert(bool on) { expert_ = on; }
+  /// A key of earlier versions is refused by this sentence: "is now tracks.confirm", "is fixed at
+  /// 0.05".
+  void formerly(std::string key, std::string sentence);
+
+  /// The sentence about a key of earlier versions; empty for others.
+  std::string formerlyOf(const std::string& key) const;
+  /// Whether earlier versions had keys in this group.
+  bool wasGroup(const std::string& name) const;
 
   const std::vector<Field>& all() const { return fields_; }
   std::vector<Field>& all() { return fields_; }
@@ -59,6 +71,8 @@ class Fields {
  private:
   Field& add(std::string key, Doc doc);
   std::vector<Field> fields_;
+  std::map<std::string, std::string> formerly_;
+  bool expert_ = false;
 };
 
 /// One thing wrong. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; mend".

@@ -52,6 +52,7 @@ std::string commentOf(const Field& field) {
   if (!field.doc.unit.empty()) text += " [" + field.doc.unit + "]";
   if (const std::string limits = limitsText(field); !limits.empty()) text += " (" + limits + ")";
   if (field.required) text += " (required)";
+  if (field.expert) text += " (expert)";
   return text;
 }
 
@@ -147,7 +148,8 @@ std::string toMarkdown(const Fields& fields) {
   for (const Field& field : fields.all()) {
     out +=
         "| `" + field.key + "` | " + (field.required ? "required" : "`" + valueText(field) + "`");
-    out += " | " + field.doc.unit + " | " + limitsText(field) + " | " + field.doc.text + " |\n";
+    out += " | " + field.doc.unit + " | " + limitsText(field) + " | " + field.doc.text +
+           (field.expert ? " (expert)" : "") + " |\n";
   }
   return out;
 }

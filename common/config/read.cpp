@@ -101,14 +101,16 @@ class Reader {
     } else if (Field* field = find(name)) {
       field->given = true;
       readField(*field, value);
-    } else if (!isGroup(name)) {
+    } else if (const std::string former = fields_.formerlyOf(name); !former.empty()) {
+      problem(key, name + ": " + former);
+    } else if (!isGroup(name) && !fields_.wasGroup(name)) {
       problem(key, name + ": is not a known key" + suggestion(name));
     } else if (value.IsMap()) {
       seen_.erase(name);  // a group may go on under a second heading; its keys may not
       readGroup(value, name + ".");
     } else if (!value.IsNull()) {
       problem(value, name + ": is a group of keys, not a value; its first key is " +
-                         firstKeyOf(name + "."));
+                         (isGroup(name) ? firstKeyOf(name + ".") : "gone with its group"));
     }
   }
 

@@ -40,7 +40,7 @@ enum class ClassEvidence : std::uint8_t {
   kPruning,     ///< explanations that were given up; the others share what they had
   kMerge,       ///< what another object knew that turned out to be the same
   kRestore,     ///< what was believed before this ledger
-  kContext,     ///< what stands near it; laid over what is published, never kept
+  kContext,     ///< of earlier versions: what stood near it
 };
 inline constexpr std::size_t kClassEvidences = 9;
 

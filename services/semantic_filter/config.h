@@ -20,7 +20,6 @@ struct RestoreConfig {
 
 struct Config {
   std::string class_priors = "config/class_priors.yaml";
-  std::string context;  ///< file of `perdure map learn-context`; empty: no context
   HistoryConfig history;
   RestoreConfig restore;
   Parameters filter;

@@ -10,7 +10,6 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/track_message.h"
-#include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
@@ -217,7 +216,6 @@ void Node::publish(const Frame& frame) {
       const Track now = extrapolated(object, frame.input.stamp.time, motion);
       belief.classes = toBelief(now, motion.min_speed).classes;
     }
-    addContext(belief, object);
     if (history_.mapFrame().T_MW()) belief = history_.mapFrame().inW(std::move(belief));
   }
   auto merges = history_.takeLateMerges();
@@ -246,9 +244,8 @@ std::string Node::note() const {
     if (!note.empty()) note += "; ";
     note += fmt::format("{} err {:.2f} times as far as was assumed", what, times);
   };
-  say("boxes", history_.belief().learned.sides.ratio(models_.used(), assumed.assumed_sides));
-  say("azimuths",
-      history_.belief().learned.azimuths.ratio(models_.used(), assumed.assumed_azimuths));
+  say("boxes", history_.belief().learned.sides.ratio(models_.used(), assumed.prior_sides));
+  say("azimuths", history_.belief().learned.azimuths.ratio(models_.used(), assumed.prior_azimuths));
   return note;
 }
 

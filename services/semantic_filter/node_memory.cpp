@@ -5,7 +5,6 @@
 #include <set>
 
 #include "services/semantic_filter/core/belief/track_message.h"
-#include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/node.h"
 
 namespace perdure::semantic_filter {
@@ -132,7 +131,6 @@ std::vector<ObjectBelief> Node::soundOf(std::vector<ObjectBelief> beliefs) {
   if (malformed > 0) reasons_.add("recalled_malformed", malformed);
   for (ObjectBelief& belief : beliefs) {
     history_.ids().atLeast(belief.id + 1);
-    removeContext(belief);
   }
   return beliefs;
 }

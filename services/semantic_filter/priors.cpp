@@ -11,7 +11,6 @@
 
 #include "common/base/errors.h"
 #include "common/types/objects.h"
-#include "services/semantic_filter/context_file.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -173,11 +172,7 @@ ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
   return priors;
 }
 
-ClassPriors loadPriors(const Config& config) {
-  ClassPriors priors = loadClassPriors(config.class_priors);
-  if (!config.context.empty()) priors.context = loadContext(config.context);
-  return priors;
-}
+ClassPriors loadPriors(const Config& config) { return loadClassPriors(config.class_priors); }
 
 std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors) {
   std::map<std::string, std::vector<Eigen::Vector3d>> result;

@@ -38,6 +38,12 @@ TEST(IncludeRules, ForbidWhatCrossesLayers) {
               ElementsAre(HasSubstr("a layer of a folder")));
   EXPECT_THAT(including("services/vio/core/estimator.h", "services/vio/core/start/a.h"),
               ElementsAre(HasSubstr("a layer of a folder")));
+  EXPECT_THAT(including("services/semantic_filter/core/belief/track.h",
+                        "services/semantic_filter/core/measurement/frame.h"),
+              ElementsAre(HasSubstr("a layer of a folder")));
+  EXPECT_THAT(including("services/semantic_filter/core/belief/parameters.h",
+                        "services/semantic_filter/core/belief/track.h"),
+              ElementsAre(HasSubstr("plain numbers")));
   EXPECT_THAT(including("services/vio/main.cpp", "dds/dds.h"),
               ElementsAre(HasSubstr("only common/bus speaks DDS")));
   EXPECT_THAT(including("common/wire/cdr.cpp", "dds/dds.h"),
@@ -56,6 +62,9 @@ TEST(IncludeRules, AllowWhatStaysInsideThem) {
   EXPECT_THAT(including("services/vio/core/a.h", "common/camera/camera_model.h"), IsEmpty());
   EXPECT_THAT(including("services/vio/main.cpp", "common/service/service.h"), IsEmpty());
   EXPECT_THAT(including("services/vio/main.cpp", "services/vio/node.h"), IsEmpty());
+  EXPECT_THAT(including("services/semantic_filter/core/belief/track.h",
+                        "services/semantic_filter/core/tracks/parameters.h"),
+              IsEmpty());
   EXPECT_THAT(including("services/vio/core/start/a.h", "services/vio/core/estimator.h"), IsEmpty());
   EXPECT_THAT(including("common/bus/dds.h", "dds/dds.h"), IsEmpty());
   EXPECT_THAT(including("common/wire/cdr.cpp", "dds/ddsi/ddsi_cdrstream.h"), IsEmpty());

@@ -22,6 +22,9 @@ const std::vector<Layers> kLayers{
     {"common/bus/", {"security", ""}},
     {"common/replay/", {"files", "recordings", ""}},
     {"common/sim/scenes/", {"parts", ""}},
+    {"services/semantic_filter/core/",
+     {"belief", "measurement", "visibility", "association", "update", "smoothing", "tracks",
+      "memory", ""}},
     {"services/vio/core/", {"state", "propagation", "tracks", "update", "", "start"}},
     {"services/inference/core/", {"", "network", "decode", "takeover"}},
     {"tools/bus_tools/", {"", "status", "doctor"}},
@@ -51,7 +54,11 @@ std::ptrdiff_t layerOf(const std::string& file, const Layers& layers) {
   return std::find(order.begin(), order.end(), sub) - order.begin();
 }
 
+/// The plain numbers of a room: they include nothing but each other, and everybody may read them.
+bool isParameters(const std::string& path) { return path.ends_with("/parameters.h"); }
+
 bool pointsUp(const std::string& path, const std::string& include) {
+  if (isParameters(include)) return false;
   return std::any_of(kLayers.begin(), kLayers.end(), [&](const Layers& layers) {
     return path.starts_with(layers.folder) && include.starts_with(layers.folder) &&
            layerOf(include, layers) > layerOf(path, layers);
@@ -72,7 +79,8 @@ bool isPure(const std::string& path) {
 std::string whyNotIncluded(const std::string& path, const std::string& include) {
   const std::string room = part(path, 0), used = part(include, 0);
   // How Cyclone encodes a message is a matter of the wire.
-  const bool encodes = path.starts_with("common/wire/") && include.starts_with("dds/ddsi/");
+  const bool encodes = path.starts_with("common/wire/") &&
+                       startsWith(include, {"dds/ddsi/", "dds/ddsc/dds_opcodes.h"});
   if (include.starts_with("dds/") && !encodes &&
       !startsWith(path, {"common/bus/", "tools/examples/", "tests/"})) {
     return "only common/bus speaks DDS";
@@ -86,6 +94,9 @@ std::string whyNotIncluded(const std::string& path, const std::string& include) 
   if (room == "common" && used == "common" &&
       heightOf(part(include, 1)) > heightOf(part(path, 1))) {
     return "a folder of common uses only those below it";
+  }
+  if (isParameters(path) && include.find('/') != std::string::npos && !isParameters(include)) {
+    return "parameters are plain numbers";
   }
   if (pointsUp(path, include)) return "a layer of a folder uses only those below it";
   if ((used == "idl" || used == "final") &&

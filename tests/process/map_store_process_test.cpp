@@ -134,32 +134,6 @@ TEST_F(MapStoreProcess, SaysWhyOverDdsAndFromItsFileAlike) {
   EXPECT_THAT(unknown.second, HasSubstr("no object 17"));
 }
 
-TEST_F(MapStoreProcess, LeavesAFileThatTeachesContext) {
-  const auto child = start();
-  ASSERT_TRUE(objects_.write(frame(1, 4)).has_value());
-  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 4; }));
-  const auto learn = [&](const char* radius) {
-    Child command(
-        {(programs() / "perdure").string(), "map", "learn-context", folder_.file("map.sqlite"),
-         "--radius", radius, "--out", folder_.file("context.yaml")},
-        folder_.file("learn"));
-    const int code = command.wait(10s);
-    return std::make_pair(code, command.log());
-  };
-  const auto nothing = learn("0.5");
-  EXPECT_NE(nothing.first, 0);
-  EXPECT_THAT(nothing.second, HasSubstr("larger --radius"));
-  const auto learnt = learn("2.5");
-  EXPECT_EQ(learnt.first, 0) << learnt.second;
-  EXPECT_THAT(learnt.second, HasSubstr("1 classes from 4 things, 5 pairs"));
-  Child checking(
-      {(programs() / "perdure-semantic-filter").string(), "--set",
-       "context=" + folder_.file("context.yaml"), "--set",
-       "class_priors=" + (sources() / "config/class_priors.yaml").string(), "--check-config"},
-      folder_.file("check"));
-  EXPECT_EQ(checking.wait(10s), 0) << checking.log();
-}
-
 TEST_F(MapStoreProcess, ShowsItsTilesToALateJoiner) {
   const auto child = start();
   ASSERT_TRUE(objects_.write(frame(1, 40)).has_value());

@@ -10,9 +10,7 @@
 #include <vector>
 
 #include "common/base/errors.h"
-#include "services/semantic_filter/context_file.h"
 #include "tools/bus_tools/common.h"
-#include "tools/map/learn_context.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -29,7 +27,6 @@ struct Request {
   std::string out;
   std::vector<double> radius, box, anchor;
   std::vector<std::string> maps;
-  LearnOptions learn;
   MapQuery query;
 };
 
@@ -132,26 +129,6 @@ void write(const std::string& path, const std::string& text) {
   }
 }
 
-void learnContextOf(const Request& request) {
-  std::vector<map_store::PlacedBelief> beliefs;
-  for (const std::string& map : request.maps) {
-    auto more = beliefsOfMapFile(map);
-    std::move(more.begin(), more.end(), std::back_inserter(beliefs));
-  }
-  const LearntContext learnt = learnContext(std::move(beliefs), request.learn);
-  if (learnt.matrix.empty()) {
-    throw StartupError(ExitCode::kFailure,
-                       fmt::format("no two things of known class stand within {} m of each other "
-                                   "in these maps; give maps with more, or a larger --radius",
-                                   request.learn.radius_m));
-  }
-  const std::string note = fmt::format(
-      "Learned by `perdure map learn-context`: {} things, {} pairs.", learnt.objects, learnt.pairs);
-  write(request.out, semantic_filter::formatContext(learnt.matrix, note));
-  std::cout << fmt::format("{}: {} classes from {} things, {} pairs of which are near\n",
-                           request.out, learnt.matrix.classes.size(), learnt.objects, learnt.pairs);
-}
-
 void exportMap(const Request& request) {
   const MapReply reply = ask(request);
   const auto json =
@@ -221,20 +198,6 @@ void addMapCommand(CLI::App& app) {
       ->expected(4);
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
-
-  CLI::App* learning = map->add_subcommand(
-      "learn-context", "What stands near what in maps, for the filter's context");
-  learning->add_option("MAP", request->maps, "files of map_store")->required()->type_name("FILE");
-  learning->add_option("--out", request->out, "the filter's key context names this file")
-      ->required()
-      ->type_name("FILE");
-  learning
-      ->add_option("--radius", request->learn.radius_m, "what is further apart is not near, metres")
-      ->check(CLI::Range(0.1, 100.0));
-  learning
-      ->add_option("--smoothing", request->learn.smoothing, "pairs by chance, added to each count")
-      ->check(CLI::PositiveNumber);
-  learning->callback([request] { learnContextOf(*request); });
 
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);

@@ -10,7 +10,6 @@
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/refit.h"
-#include "services/semantic_filter/core/tracks/context.h"
 #include "services/semantic_filter/core/tracks/initiation.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
@@ -39,8 +38,8 @@ void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_spee
 NoiseScale SemanticFilter::noiseScaleOf(const Belief& belief, const FrameInput& input) const {
   const std::uint64_t model = input.model.hash;
   const BoxParameters& assumed = parameters_.box;
-  return {model, belief.learned.sides.ratio(model, assumed.assumed_sides),
-          belief.learned.azimuths.ratio(model, assumed.assumed_azimuths)};
+  return {model, belief.learned.sides.ratio(model, assumed.prior_sides),
+          belief.learned.azimuths.ratio(model, assumed.prior_azimuths)};
 }
 
 FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& input) const {
@@ -247,7 +246,6 @@ StepReport SemanticFilter::step(const Belief& before, Belief& belief, const Fram
               parameters_.tracks);
   const auto found = reidentifyDeleted(belief.tracks, belief.recently_deleted, frame);
   report.merges.insert(report.merges.end(), found.begin(), found.end());
-  contextualise(belief.tracks, priors_.context);
   return report;
 }
 

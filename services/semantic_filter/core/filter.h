@@ -10,7 +10,6 @@
 
 #include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/belief/belief.h"
-#include "services/semantic_filter/core/belief/id_book.h"
 #include "services/semantic_filter/core/measurement/frame.h"
 #include "services/semantic_filter/core/memory/drift.h"
 #include "services/semantic_filter/core/tracks/merge.h"

@@ -13,6 +13,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 
 struct Example {
@@ -136,6 +137,26 @@ TEST(Fields, AnUnknownKeyFarFromAllKnownOnesPointsToThePrintedConfiguration) {
               ElementsAre("a.yaml:1:1: zzzzzzzz: is not a known key; --print-config lists the "
                           "known ones"));
   EXPECT_THAT(reading("trackr: {max_points: 3}"), ElementsAre(HasSubstr("did you mean tracker?")));
+}
+
+TEST(Fields, AKeyOfEarlierVersionsIsRefusedWithWhatItBecame) {
+  double noise = 1.0, gate = 2.0;
+  Fields fields;
+  fields.number("tracks.noise", noise, positive(), {"noise"});
+  fields.expert(true);
+  fields.number("tracks.gate", gate, positive(), {"gate"});
+  fields.expert(false);
+  fields.formerly("tend.noise", "is now tracks.noise");
+  fields.formerly("tend.floor", "is fixed at 3; leave it out");
+  EXPECT_THAT(lines(readYaml(fields, "tend:\n  noise: 4\n  floor: 2\n  other: 1\n", "a.yaml")),
+              ElementsAre("a.yaml:2:3: tend.noise: is now tracks.noise",
+                          "a.yaml:3:3: tend.floor: is fixed at 3; leave it out",
+                          HasSubstr("a.yaml:4:3: tend.other: is not a known key")));
+  EXPECT_THAT(lines(assign(fields, "tend.noise=4")), ElementsAre(HasSubstr("is now tracks.noise")));
+  EXPECT_THAT(lines(assign(fields, "tend=4")), ElementsAre(HasSubstr("tend: is a group")));
+  EXPECT_EQ(noise, 1.0);
+  EXPECT_THAT(toYaml(fields), HasSubstr("# gate (> 0) (expert)"));
+  EXPECT_THAT(toYaml(fields), Not(HasSubstr("# noise (> 0) (expert)")));
 }
 
 TEST(Fields, ASelfReferringAliasEnds) {

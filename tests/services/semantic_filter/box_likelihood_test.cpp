@@ -14,7 +14,7 @@ BoxParameters gatedAt(double gate, double tail = 5.0) {
   BoxParameters parameters;
   parameters.gate = gate;
   parameters.tail = tail;
-  parameters.part = 0.0;
+  parameters.partial_view = 0.0;
   return parameters;
 }
 
@@ -85,7 +85,7 @@ TEST(BoxLikelihood, NoiseAndWhatStaysAreTheWholeError) {
 
 TEST(BoxLikelihood, WhatTheNetworkDoubtsItPlacesWorse) {
   BoxParameters parameters;
-  parameters.sigma_doubt = 0.2;
+  parameters.sigma_weak = 0.2;
   const auto at = [&](double inflation) {
     return measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {.inflation = inflation})
         .variance[0];
@@ -162,7 +162,7 @@ TEST(BoxLikelihood, ABoxMayEndWhereSomethingThatIsNotOnTheMapHidesTheRest) {
   const auto z = measure({250, 100, 330, 180}, kWidth, kHeight, {});
   const auto p = predictedBox(250, 100, 400, 180);
   EXPECT_FALSE(scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, parameters));
-  parameters.part = 0.1;
+  parameters.partial_view = 0.1;
   const auto part = scoreBox(z, p, Eigen::Matrix4d::Zero(), {}, parameters);
   ASSERT_TRUE(part);
   EXPECT_EQ(part->part, 2) << "the right side";
@@ -223,7 +223,7 @@ double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
     if (box.x1 < 10 || box.y1 < 10 || box.x2 > kWidth - 10 || box.y2 > kHeight - 10) continue;
     const auto z = measure(box, kWidth, kHeight, {});
     auto parameters = gatedAt(0.9999);
-    parameters.part = 0.1;
+    parameters.partial_view = 0.1;
     const auto score = scoreBox(z, predicted, covariance, hidden, parameters);
     if (!score) continue;
     sum += std::exp(score->log_density - logClutter(z, kWidth, kHeight, clutter, score->ignored));

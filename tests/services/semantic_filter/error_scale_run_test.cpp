@@ -59,7 +59,7 @@ void drive(Harness& h, double noise, double azimuth_sigma = 0.0) {
 
 double learned(const Harness& h) {
   return h.node.belief().learned.sides.ratio(testing::makeModelInfo().hash,
-                                             Parameters{}.box.assumed_sides);
+                                             Parameters{}.box.prior_sides);
 }
 
 double learnedFrom(double noise) {
@@ -79,13 +79,13 @@ TEST(ErrorScaleRun, LearnsHowFarBoxesErr) {
   EXPECT_LT(twice, 4.5);
 }
 
-double azimuthsLearned(const Harness& h, double assumed = Parameters{}.box.assumed_azimuths) {
+double azimuthsLearned(const Harness& h, double assumed = Parameters{}.box.prior_azimuths) {
   return h.node.belief().learned.azimuths.ratio(testing::makeModelInfo().hash, assumed);
 }
 
-double azimuthsLearnedFrom(double sigma, double assumed = Parameters{}.box.assumed_azimuths) {
+double azimuthsLearnedFrom(double sigma, double assumed = Parameters{}.box.prior_azimuths) {
   Config config;
-  config.filter.box.assumed_azimuths = assumed;
+  config.filter.box.prior_azimuths = assumed;
   Harness h(config);
   drive(h, 0.35, sigma);
   return azimuthsLearned(h, assumed);

@@ -176,7 +176,7 @@ TEST(GroundSurface, LearnsHowEvenItIs) {
       now.uneven *= ratio, now.variance = others.variance - others.uneven + now.uneven;
       const double sigma = std::sqrt(times * others.uneven + others.variance - others.uneven + own);
       roughness_scale.learn(sigma * normal(random), now, own, ratio, 1.0);
-      ratio = roughness_scale.ratio(GroundParameters{}.assumed);
+      ratio = roughness_scale.ratio(GroundParameters{}.prior_objects);
     }
     return ratio;
   };

@@ -162,7 +162,7 @@ TEST_F(Booking, AHitDividesIntoWhatTheNetworkSaidAndWhatTheGeometryDid) {
 
 TEST_F(Booking, WhatTheNetworkSaidIsWhatWouldBeMissingHadItSaidNothing) {
   // The box is shared with another object, so that the look is not surely a hit.
-  parameters.box.sigma_doubt = 0.0;  // or the activations change the box's noise, too
+  parameters.box.sigma_weak = 0.0;  // or the activations change the box's noise, too
   Track silent = object;
   const double before = std::log(0.7 / 0.3), eta = 2e-6;
   computeVisibility(boxOfTheCar(), eta);

@@ -227,7 +227,8 @@ TEST_F(FoundAgain, WhatIsSurelyThereIsEnoughThoughItsPlaceIsNotYetAClaim) {
 }
 
 TEST_F(FoundAgain, NothingElseIsTakenForIt) {
-  EXPECT_TRUE(after(recently_deleted("chair", here), thing(9, "chair", beside, 11.0, 12.0)).empty());
+  EXPECT_TRUE(
+      after(recently_deleted("chair", here), thing(9, "chair", beside, 11.0, 12.0)).empty());
   EXPECT_TRUE(after(recently_deleted("car", here), thing(9, "chair", here, 11.0, 12.0)).empty());
   EXPECT_TRUE(after(recently_deleted("chair", here), thing(9, "chair", here, 7.0, 12.0)).empty())
       << "both were seen";
@@ -244,9 +245,9 @@ TEST_F(FoundAgain, WhatWasNeverClaimedOrIsLongGoneIsForgotten) {
   EXPECT_TRUE(list.empty());
   list = recently_deleted("chair", here);
   ASSERT_EQ(list.size(), 1u);
-  keepDeleted(list, {}, at(9.9 + parameters.tracks.return_s), parameters.tracks);
+  keepDeleted(list, {}, at(9.9 + parameters.tracks.reidentify_s), parameters.tracks);
   EXPECT_EQ(list.size(), 1u);
-  keepDeleted(list, {}, at(10.1 + parameters.tracks.return_s), parameters.tracks);
+  keepDeleted(list, {}, at(10.1 + parameters.tracks.reidentify_s), parameters.tracks);
   EXPECT_TRUE(list.empty());
 }
 

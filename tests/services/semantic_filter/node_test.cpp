@@ -226,7 +226,7 @@ TEST(Node, WhatWasGivenUpAndIsFoundInItsPlaceIsTheSameThing) {
   }
 
   Config forgets;
-  forgets.filter.tracks.return_s = 0.5;
+  forgets.filter.tracks.reidentify_s = 0.5;
   Harness short_memory(forgets);
   for (const ObjectId id : missForAWhile(short_memory)) {
     EXPECT_EQ(count(short_memory, EventKind::kReappeared, id), 0);

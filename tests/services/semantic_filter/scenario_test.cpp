@@ -77,7 +77,7 @@ TEST(Scenario, PositionsAreAsUncertainAsTheirCovarianceSays) {
   Config config;
   config.filter.tempering.correlation = 0.0;
   config.filter.box.bias_share = 0.0;
-  config.filter.box.part = 0.0;
+  config.filter.box.partial_view = 0.0;
   std::mt19937 random(21);
   std::normal_distribution<double> normal;
   constexpr int kRuns = 600;

@@ -67,8 +67,12 @@ bool sameBits(const Track& a, const Track& b) {
   if (a.hypotheses.size() != b.hypotheses.size()) return false;
   const double r_a = a.existence, r_b = b.existence;
   if (std::memcmp(&r_a, &r_b, sizeof(double)) != 0) return false;
-  if (std::memcmp(&a.detectability.unmapped_occluder, &b.detectability.unmapped_occluder, sizeof(double)) != 0) return false;
-  if (std::memcmp(&a.detectability.hard_to_detect, &b.detectability.hard_to_detect, sizeof(double)) != 0) return false;
+  if (std::memcmp(&a.detectability.unmapped_occluder, &b.detectability.unmapped_occluder,
+                  sizeof(double)) != 0)
+    return false;
+  if (std::memcmp(&a.detectability.hard_to_detect, &b.detectability.hard_to_detect,
+                  sizeof(double)) != 0)
+    return false;
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     const Hypothesis &x = a.hypotheses[i], &y = b.hypotheses[i];
     if (std::memcmp(&x.weight, &y.weight, sizeof(double)) != 0) return false;
@@ -120,7 +124,8 @@ TEST_F(Update, TwoClassesFollowEquationFourByHand) {
 
 TEST_F(Update, AMissLowersExistenceByItsOddsAlone) {
   const TrackScore l = scoreHypothesis({}, 1.0);
-  const double P_D[2] = {l.hypotheses[0].detection_probability, l.hypotheses[1].detection_probability};
+  const double P_D[2] = {l.hypotheses[0].detection_probability,
+                         l.hypotheses[1].detection_probability};
   const double mean = 0.7 * (1 - P_D[0]) + 0.3 * (1 - P_D[1]);
   const State before = object.best().x;
   update(object, l, Eigen::VectorXd(0), {}, frame);
@@ -270,7 +275,8 @@ TEST_F(Update, OneLookTellsMotionsApartInFullAndClassesByItsWorth) {
   const TrackScore l = scoreHypothesis(boxes, 1.0);
   double A[3];
   for (int i = 0; i < 3; ++i) {
-    A[i] = 1.0 - l.hypotheses[i].detection_probability * (1.0 - l.hypotheses[i].matches[0].likelihood);
+    A[i] =
+        1.0 - l.hypotheses[i].detection_probability * (1.0 - l.hypotheses[i].matches[0].likelihood);
   }
   update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
   double still = 0.0, moving = 0.0;

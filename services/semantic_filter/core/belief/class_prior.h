@@ -27,28 +27,11 @@ struct ClassPrior {
   Shape shape = cuboidShape();  ///< what the object fills of its cuboid
 };
 
-/// How often objects of two classes stand near each other. It is learned from maps
-/// (core/tracks/context.h). Derivation: tools/docs/maths/new_classes_and_context.md.
-struct ContextMatrix {
-  double radius_m = 0.0;             ///< objects further apart are not near
-  std::vector<std::string> classes;  ///< empty: no context
-  Eigen::MatrixXd log_ratio;  ///< log P(a near b) / (P(a) P(b)); symmetric; rows as `classes`
-
-  bool empty() const { return classes.empty(); }
-  /// Returns 0 for a class that the matrix does not name.
-  double of(const std::string& a, const std::string& b) const {
-    const auto i = std::find(classes.begin(), classes.end(), a) - classes.begin();
-    const auto j = std::find(classes.begin(), classes.end(), b) - classes.begin();
-    return i < log_ratio.rows() && j < log_ratio.cols() ? log_ratio(i, j) : 0.0;
-  }
-};
-
 /// Priors by class name, with a fallback for names that are not listed.
 struct ClassPriors {
   std::vector<ClassPrior> classes;
   ClassPrior fallback;  ///< broad; its name is empty
   ClassPrior other;     ///< of an object of no known class; its name is kOtherClass
-  ContextMatrix context;
 
   /// Returns the fallback where no class has this name.
   const ClassPrior& of(const std::string& name) const {

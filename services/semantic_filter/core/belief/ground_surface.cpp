@@ -50,7 +50,7 @@ GroundSurface::GroundSurface(const std::vector<Track>& tracks, const BodyPath& p
                              const GroundRoughness& roughness_scale, const Eigen::Vector3d& up_W,
                              const ClassPriors& priors, const GroundParameters& parameters)
     : parameters_(parameters),
-      ratio_(roughness_scale.ratio(parameters.assumed)),
+      ratio_(roughness_scale.ratio(parameters.prior_objects)),
       axes_(levelling(up_W).toRotationMatrix().topRows<2>()),
       up_(up_W.normalized()) {
   constexpr double kSure = 0.8, kHalf = 0.5;

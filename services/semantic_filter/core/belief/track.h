@@ -139,7 +139,6 @@ struct Track {
   ClassAccount classes;                 ///< the reasons of the hypotheses' weights
   /// Classes that the models which saw it could name; none of a track that came back.
   std::shared_ptr<const std::set<std::string>> classes_considered;
-  std::vector<ClassNumber> context;  ///< nats, added to what is published (tracks/context.h)
   Lookalike lookalike;
   Lifecycle life;
   DetectionHistory history;

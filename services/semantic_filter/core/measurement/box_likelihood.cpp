@@ -63,7 +63,7 @@ BoxMeasurement measure(const Box& box, double width, double height, const BoxPar
       std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
   const SideError lasting = lastingError(parameters, noise);
   SideError error = sideError(parameters, noise);
-  error.relative += parameters.sigma_doubt * noise.inflation;
+  error.relative += parameters.sigma_weak * noise.inflation;
   const double sx = error.at(z.width()), sy = error.at(z.height());
   for (int i = 0; i < 4; ++i) {
     const bool is_x = i % 2 == 0;
@@ -251,7 +251,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     log_shown += std::log(1.0 - parameters.amodal);
   }
   consider(use, log_shown, -1);
-  const Sides parts = fits || parameters.part <= 0.0
+  const Sides parts = fits || parameters.partial_view <= 0.0
                           ? Sides{}
                           : mayBeHidden(z, predicted, covariance, use, parameters);
   for (int i = 0; i < 4 && !fits; ++i) {
@@ -259,7 +259,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     Sides others = use;
     others[i] = false;
     // Something unmapped hides each of the four sides with the same probability.
-    consider(others, log_shown + std::log(0.25 * parameters.part) + logAnywhere(predicted, i), i);
+    consider(others, log_shown + std::log(0.25 * parameters.partial_view) + logAnywhere(predicted, i), i);
   }
   if (best) best->ignored = ignored;
   return best;

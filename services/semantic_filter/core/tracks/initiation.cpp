@@ -108,7 +108,7 @@ void addClass(Track& track, const ClassPrior& prior, double ratio, const BoxDete
     const auto fit = fitCuboid(detection, prior, start.yaw, start.sigma, range, frame);
     if (!fit) continue;
     fits.push_back(fit->hypothesis);
-    const double part = frame.parameters->box.part;
+    const double part = frame.parameters->box.partial_view;
     const double shape = std::exp(logShapeRatio(*fit, prior, start.sigma, detection, frame));
     const double ground = groundRatio(fits.back(), frame);
     fits.back().weight = ratio * start.weight * (part + (1.0 - part) * shape) * ground;

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "services/semantic_filter/core/belief/belief.h"
-#include "services/semantic_filter/core/belief/id_book.h"
 #include "services/semantic_filter/core/tracks/cuboid_fit.h"
 #include "services/semantic_filter/core/visibility/occlusion.h"
 

@@ -47,7 +47,7 @@ std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameConte
   std::vector<Track> deleted;
   std::erase_if(tracks, [&](Track& o) {
     if (forgettable(o, parameters)) return true;
-    if (o.existence >= (o.life.hits > 1 ? parameters.gone : parameters.gone_tentative))
+    if (o.existence >= (o.life.hits > 1 ? parameters.delete_below : parameters.delete_tentative_below))
       return false;
     deleted.push_back(std::move(o));
     return true;

@@ -125,7 +125,7 @@ std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const Frame
 void keepDeleted(std::vector<Track>& gone, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters) {
   std::erase_if(gone,
-                [&](const Track& o) { return toSeconds(now - o.as_of) > parameters.return_s; });
+                [&](const Track& o) { return toSeconds(now - o.as_of) > parameters.reidentify_s; });
   for (Track& o : deleted) {
     const Hypothesis& best = o.best();
     if (!o.life.once_confirmed || best.moving || best.class_name == kOtherClass) continue;

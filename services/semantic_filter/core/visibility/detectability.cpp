@@ -56,7 +56,7 @@ double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, 
 double detectionRateFactor(const Track& track, const FrameContext& frame) {
   if (track.best().moving) return 1.0;
   return track.detectability.rate.factor(viewRayOf(track.best().x.head<3>(), frame.view.T_WC()),
-                                         frame.parameters->tempering.found_prior,
+                                         frame.parameters->tempering.detection_rate_prior,
                                          detectabilityScales(frame.parameters->visibility));
 }
 

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/belief/id_book.h"
+#include "services/semantic_filter/core/belief/belief.h"
 
 namespace perdure::semantic_filter {
 
