@@ -1,4 +1,4 @@
-// A filter and a map store behind it, as the bus would connect them, on a drive along a street.
+// A filter with a map store, connected as by the bus, on a drive along a street.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ inline Config configWith(const MemoryParameters& memory) {
   return config;
 }
 
-/// The body always looks along x, with the weave that gives parallax.
+/// The body always looks along x. It weaves, which gives parallax.
 inline RigidTransform bodyAt(double x) {
   return RigidTransform(
       Eigen::Quaterniond(Eigen::AngleAxisd(0.05 * std::sin(0.1 * x), Eigen::Vector3d::UnitZ())),
@@ -48,7 +48,7 @@ inline std::vector<Detection> boxesFrom(const RigidTransform& T_WB, std::uint64_
   return list;
 }
 
-/// A filter and a map store, connected as the bus would; who is `deaf` gets and gives nothing.
+/// A filter and a map store, connected as by the bus. One that is `deaf` gets and sends nothing.
 struct Pair {
   TemporaryFolder folder;
   std::vector<Objects> objects;
@@ -60,7 +60,7 @@ struct Pair {
   double x = 0.0;
   std::vector<TrueObject> things;
   WorldId world{5, 0};
-  RigidTransform T_W;    ///< the frame of reference of the things, in that of odometry
+  RigidTransform T_W;    ///< the frame of the objects, in that of the odometry
   RigidTransform drift;  ///< of T_W, with each frame, about the body
   Node filter;
 
@@ -98,7 +98,7 @@ struct Pair {
     for (const auto& message : std::exchange(to_map, {})) message();
     if (!deaf) map->tick(stampOf(frame).time.time_since_epoch());
   }
-  /// To `until`, so many metres a frame; what the camera sees is detected.
+  /// Drives to `until`, so many metres per frame. What the camera views is detected.
   void driveTo(double until, double step = 0.4) {
     const double way = until > x ? step : -step;
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {

@@ -101,7 +101,7 @@ TEST(Node, MapsAStreetOfParkedCars) {
   EXPECT_EQ(confirmed, 3);
 }
 
-TEST(Node, PrimedAnswersAloneBeginNoObject) {
+TEST(Node, TopDownAnswersAloneInitiateNoTrack) {
   Harness h;
   for (std::uint64_t k = 0; k < 20; ++k) {
     auto boxes = boxesAt(kStreet, k, 0.4);
@@ -135,7 +135,7 @@ TEST(Node, LateAndDisorderedDetectionsGiveThePosteriorOfThoseOnTime) {
   EXPECT_GE(on_time.node.belief().tracks.size(), 3u);
 }
 
-TEST(Node, IdsOfObjectsSurviveARollback) {
+TEST(Node, IdsSurviveARollBack) {
   Harness h;
   drive(h, 0, 10);
   h.node.onOdometry(odometryAt(10, driveTo(10, 0.4)));
@@ -150,7 +150,7 @@ TEST(Node, IdsOfObjectsSurviveARollback) {
   }
 }
 
-TEST(Node, AFrameWithoutDetectionsIsNoEvidenceAndAnEmptyListIs) {
+TEST(Node, AFrameWithoutDetectionsSaysNothingAndAnEmptyListIsAMiss) {
   Harness silent, empty;
   drive(silent, 0, 20);
   drive(empty, 0, 20);
@@ -166,7 +166,7 @@ TEST(Node, AFrameWithoutDetectionsIsNoEvidenceAndAnEmptyListIs) {
   EXPECT_LT(existence(empty), existence(silent));
 }
 
-TEST(Node, WhatIsFoundAgainAfterTheCameraLookedAwayIsBelievedMore) {
+TEST(Node, DetectionOnAnotherVisitRaisesExistence) {
   const auto surest = [](const Harness& h) {
     double most = 0.0;
     for (const auto& o : h.objects.back().objects) most = std::max(most, o.existence);
@@ -188,7 +188,7 @@ TEST(Node, WhatIsFoundAgainAfterTheCameraLookedAwayIsBelievedMore) {
   EXPECT_LE(surest(h), parameters.certain_again);
 }
 
-/// Sees the street, looks away, sees nothing of it for three seconds, and then all of it again.
+/// The camera views the street, turns away for three seconds, and then views all of it again.
 std::vector<ObjectId> missForAWhile(Harness& h) {
   drive(h, 0, 20);
   std::vector<ObjectId> ids;
@@ -205,7 +205,7 @@ std::vector<ObjectId> missForAWhile(Harness& h) {
   return ids;
 }
 
-TEST(Node, WhatWasGivenUpAndIsFoundInItsPlaceIsTheSameThing) {
+TEST(Node, ADeletedTrackDetectedInItsPlaceIsReidentified) {
   const auto count = [](const Harness& h, EventKind kind, ObjectId id) {
     return std::count_if(h.events.begin(), h.events.end(),
                          [&](const Event& e) { return e.kind == kind && e.object_id == id; });
@@ -233,7 +233,7 @@ TEST(Node, WhatWasGivenUpAndIsFoundInItsPlaceIsTheSameThing) {
   }
 }
 
-TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
+TEST(Node, AnOutOfViewTrackKeepsEveryBitAndItsId) {
   Harness h;
   drive(h, 0, 20);
   const Belief before = h.node.belief();
@@ -252,7 +252,7 @@ TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
   h.node.onOdometry(odometryAt(80, driveTo(20, 0.4)));
   h.node.onDetections(detectionsAt(80, {}));
   EXPECT_EQ(h.objects.back().objects.front().visibility, Visibility::kVisible);
-  EXPECT_EQ(reappeared(), 0) << "it should be in sight, and was not found yet";
+  EXPECT_EQ(reappeared(), 0) << "it should be visible, and was not detected yet";
   for (std::uint64_t k = 81; k < 85; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(20, 0.4)));
     h.node.onDetections(detectionsAt(k, boxesAt(kStreet, 20, 0.4)));
@@ -267,7 +267,7 @@ TEST(Node, WhatIsOutOfViewKeepsEveryBitAndComesBackAsTheSame) {
   EXPECT_EQ(reappeared(), confirmed);
 }
 
-/// Things of which the map knows, each certain to some variance, in the place of a first frame.
+/// Map objects with the given variance, in place of a first frame.
 Recalled restored(const std::vector<TrueObject>& things, const std::vector<double>& variances) {
   Recalled recalled;
   recalled.world = {5, 0};
@@ -282,9 +282,9 @@ Recalled restored(const std::vector<TrueObject>& things, const std::vector<doubl
   return recalled;
 }
 
-TEST(Node, ABoxThatAHiddenThingExplainsFarBetterThanItsBlockerShowsItAndBearsNothing) {
-  // A table that the image's border cuts and a chair before it hides but for a rest, which the
-  // detector finds. The chair's box has the same upper and lower side.
+TEST(Node, ABoxThatOnlyAnOccludedTrackExplainsRevisesTheOcclusionAndInitiatesNothing) {
+  // A table that the image border cuts and a chair that hides it except for a part, which the
+  // network detects. The box of the chair has the same upper and lower side.
   const State table = makeState(8.3, -6.6, 0.37, 0, 0.8, 1.5, 0.74);
   const State chair = makeState(6.9, -4.9, 0.59, 0, 0.5, 0.75, 0.64);
   Harness h;
@@ -308,8 +308,8 @@ TEST(Node, ABoxThatAHiddenThingExplainsFarBetterThanItsBlockerShowsItAndBearsNot
   EXPECT_GE(h.node.belief().tracks[0].life.hits, 12u);
 }
 
-TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt) {
-  // Two chairs at the left border: of one a strip is in the image, the nearer one is gone.
+TEST(Node, ABoxOfAPartialViewIsNotThatOfARemovedObjectBesideIt) {
+  // Two chairs at the left border: a strip of one is in the image, and the nearer one was removed.
   const TrueObject at_border{makeState(6.3, 5.38, 0.45, 0, 0.5, 0.5, 0.9), "chair"};
   const TrueObject taken{makeState(5.6, 4.35, 0.45, 0, 0.5, 0.5, 0.9), "chair"};
   Harness h;
@@ -343,7 +343,7 @@ TEST(Node, ABoxOfWhatIsAllButOutOfThePictureIsNotThatOfWhatWasTakenAwayBesideIt)
   }
 }
 
-TEST(Node, ARestartedNodeGoesOnWithTheSameIds) {
+TEST(Node, ARestartedNodeContinuesWithTheSameIds) {
   Harness first;
   drive(first, 0, 20);
   Recalled recalled;

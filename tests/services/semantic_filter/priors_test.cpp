@@ -37,7 +37,7 @@ TEST(ClassPriors, AClassThatIsNotListedIsTheFallback) {
   EXPECT_EQ(p.log_size, priors.fallback.log_size);
 }
 
-TEST(ClassPriors, EveryMistakeIsNamedWithItsPlace) {
+TEST(ClassPriors, NamesEveryMistakeWithItsPlace) {
   const std::string yaml =
       "fallback: {size: [1, 1, 1], spread: [0.3, 0.3, 0.3]}\n"
       "other: {}\n"
@@ -73,7 +73,7 @@ TEST(ClassPriors, ShapesLieWithinTheCuboidAndFillItsLengthAndWidth) {
   }
 }
 
-TEST(ClassPriors, AShapeThatIsNoneIsNamedWithItsPlace) {
+TEST(ClassPriors, NamesAnInvalidShapeWithItsPlace) {
   for (const char* wrong :
        {"7", "[]", "[[0, 1, 1]]", "[[0, 1, 1, 2]]", "[[-2, 1, 1, 1]]", "[[0, 0.8, 1, 1, 0.3]]",
         "[[0, 1, 1, 1, 0, 0]]", "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]"}) {
@@ -89,7 +89,7 @@ TEST(ClassPriors, AShapeThatIsNoneIsNamedWithItsPlace) {
   }
 }
 
-TEST(ClassPriors, AMissingFileIsNamed) {
+TEST(ClassPriors, NamesAMissingFile) {
   try {
     loadClassPriors("/nowhere/priors.yaml");
     FAIL() << "accepted";

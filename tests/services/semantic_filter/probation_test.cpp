@@ -1,5 +1,5 @@
-// A swap of inference on the way: a newcomer that goes blind on probation makes
-// nothing doubtful, and one that rightly sees nothing is believed in the end.
+// A swap of inference: a new process that detects nothing makes no track doubtful, and one that
+// rightly detects nothing is trusted in the end.
 #include <gtest/gtest.h>
 
 #include "tests/services/semantic_filter/scene.h"
@@ -23,7 +23,7 @@ const std::vector<TrueObject> kStreet = {{makeState(14, 3.5, 0.75, 0.1, 4.3, 1.7
                                          {makeState(16, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
                                          {makeState(24, 5.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
 
-/// Slower from the swap on, so that everything stays in view.
+/// Slower after the swap, so that everything stays in view.
 RigidTransform bodyAt(std::uint64_t k) {
   const auto fast = static_cast<double>(std::min(k, kSwapAt));
   return driveTo(1, 0.3 * fast + 0.1 * (static_cast<double>(k) - fast));
@@ -64,12 +64,12 @@ struct Watch : Harness {
       node.onDetections(look(next, seen, who));
     }
   }
-  /// Twenty frames by the old one, and the newcomer takes over.
+  /// Twenty frames by the old process, then the new one takes over.
   explicit Watch(bool told = true) {
     frames(kSwapAt, kStreet, kOld);
     if (told) node.onSwap(notice(SwapStep::kTookOver, kNew, kOld));
   }
-  /// Existence of what is confirmed, by id.
+  /// Existence of confirmed tracks, by id.
   std::map<ObjectId, double> confirmed() const {
     std::map<ObjectId, double> all;
     for (const Track& o : node.belief().tracks) {
@@ -79,7 +79,7 @@ struct Watch : Harness {
   }
 };
 
-TEST(Probation, ABlindNewcomerThatIsRolledBackCostsNothing) {
+TEST(Probation, ABlindNewProcessThatIsRolledBackCostsNothing) {
   Watch w;
   const auto before = w.confirmed();
   ASSERT_EQ(before.size(), 3U);
@@ -95,28 +95,28 @@ TEST(Probation, ABlindNewcomerThatIsRolledBackCostsNothing) {
   EXPECT_EQ(w.node.reasons().of("detections_rolled_back"), 12U);
   w.frames(3, kStreet, kOld);
   for (const auto& [id, existence] : before) EXPECT_TRUE(w.confirmed().contains(id));
-  EXPECT_EQ(w.confirmed().size(), before.size()) << "nothing was born a second time";
+  EXPECT_EQ(w.confirmed().size(), before.size()) << "nothing was initiated a second time";
 }
 
-/// What the others of these tests would see if nothing were kept back.
-TEST(Probation, WithoutASwapAsManyEmptyFramesMakeWhatIsInSightDoubtful) {
+/// What the other tests would find if nothing were held back.
+TEST(Probation, WithoutASwapAsManyEmptyFramesLowerExistence) {
   Watch w(false);
   ASSERT_EQ(w.confirmed().size(), 3U);
   w.frames(12, {}, kNew);
   for (const auto& [id, existence] : w.confirmed()) EXPECT_LT(existence, kDoubtful);
 }
 
-TEST(Probation, BoxesElsewhereAreKeptBackAndNothingIsBornOfThem) {
+TEST(Probation, BoxesElsewhereAreHeldBackAndInitiateNothing) {
   Watch w;
   const std::vector<TrueObject> elsewhere = {
       {makeState(12, 0.2, 0.75, 0.1, 4.3, 1.75, 1.5), "car"}};
   w.frames(12, elsewhere, kNew);
-  w.node.onSwap(notice(SwapStep::kRolledBack, kNew, 0));  // it gave up by itself
+  w.node.onSwap(notice(SwapStep::kRolledBack, kNew, 0));  // it stopped by itself
   EXPECT_EQ(w.confirmed().size(), 3U);
   EXPECT_EQ(w.node.belief().tracks.size(), 3U);
 }
 
-TEST(Probation, WhatIsGoneIsBelievedGoneWhenTheNewcomerHasPassed) {
+TEST(Probation, RemovedObjectsAreDeletedWhenTheNewProcessHasPassed) {
   Watch w, plain(false);
   w.frames(12, {}, kNew), plain.frames(12, {}, kNew);
   w.node.onSwap(notice(SwapStep::kPassed, kNew, kOld));
@@ -127,17 +127,18 @@ TEST(Probation, WhatIsGoneIsBelievedGoneWhenTheNewcomerHasPassed) {
   EXPECT_EQ(w.node.reasons().of("detections_rolled_back"), 0U);
 }
 
-TEST(Probation, WhatIsGoneIsBelievedGoneWhenTheOldOneHasHadItsTimeToObject) {
+TEST(Probation, RemovedObjectsAreDeletedWhenTheOldProcessHasNotObjectedInTime) {
   Watch w;
   w.frames(Probation::kLongest, {}, kNew);
   EXPECT_EQ(w.confirmed().size(), 3U);
   w.frames(1, {}, kNew);
   for (const auto& [id, existence] : w.confirmed()) EXPECT_LT(existence, kDoubtful);
   w.frames(5, {}, kNew);
-  EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), Probation::kLongest) << "no second doubt";
+  EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), Probation::kLongest)
+      << "nothing is held back a second time";
 }
 
-TEST(Probation, WhoSeesTheOthersIsBelievedAboutTheOneThatIsMissing) {
+TEST(Probation, AProcessThatDetectsTheOthersIsTrustedAboutTheMissingOne) {
   Watch w, plain(false);
   const std::vector<TrueObject> rest(kStreet.begin() + 1, kStreet.end());
   w.frames(10, rest, kNew), plain.frames(10, rest, kNew);
@@ -146,7 +147,7 @@ TEST(Probation, WhoSeesTheOthersIsBelievedAboutTheOneThatIsMissing) {
   EXPECT_LT(w.confirmed().begin()->second, kDoubtful);
 }
 
-TEST(Probation, BlindFramesBetweenOthersAreUsedWhenItSeesAgain) {
+TEST(Probation, BlindFramesBetweenOthersAreUsedWhenDetectionsResume) {
   Watch w, plain(false);
   w.frames(4, {}, kNew), plain.frames(4, {}, kNew);
   w.frames(1, kStreet, kNew), plain.frames(1, kStreet, kNew);

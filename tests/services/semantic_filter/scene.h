@@ -1,4 +1,5 @@
-// A street of true cuboids, a camera that drives through it, and boxes that a network would report.
+// A street of true cuboids, a camera that drives through it, and the boxes that a network would
+// report.
 #pragma once
 
 #include <random>
@@ -63,7 +64,8 @@ struct TrueObject {
   std::string class_name;
 };
 
-/// The box of a true object with noise on its sides, cut at the image; nothing where out of view.
+/// The box of a true object, with noise on its sides and cut at the image border; nothing if out of
+/// view.
 template <class Random>
 std::optional<Detection> detect(const TrueObject& object, const View& view,
                                 const BoxParameters& box, double noise, double log_ratio,
@@ -88,7 +90,7 @@ std::optional<Detection> detect(const TrueObject& object, const View& view,
   return d;
 }
 
-/// Seen four times and certain in each of its seven numbers alike.
+/// Detected four times, with the same variance in each of its seven numbers.
 inline Track makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
   Track o;
   o.id = id;
@@ -106,8 +108,7 @@ inline Track makeObject(ObjectId id, const std::string& name, const State& x, do
   return o;
 }
 
-/// What the verbs are told of a frame, from the origin, with the usual camera, classes and
-/// parameters.
+/// A frame from the origin, with the usual camera, classes and parameters.
 struct UsualFrame {
   UsualFrame() {
     frame.view.camera = &camera;
@@ -141,7 +142,7 @@ inline Odometry odometryAt(std::uint64_t k, const RigidTransform& T_WB) {
   return o;
 }
 
-/// The body drives along x with a slight bend; `metres` a frame.
+/// The body drives along x with a slight bend, `metres` per frame.
 inline RigidTransform driveTo(std::uint64_t k, double metres) {
   const double s = static_cast<double>(k) * metres;
   return RigidTransform(Eigen::Quaterniond(Eigen::AngleAxisd(0.002 * s, Eigen::Vector3d::UnitZ())),
@@ -164,7 +165,7 @@ inline Calibration calibrationOf(const CameraCalibration& camera) {
   return c;
 }
 
-/// A node with what it published.
+/// A node, and what it published.
 struct Harness {
   std::vector<Objects> objects;
   std::vector<Event> events;

@@ -1,0 +1,48 @@
+#include "services/semantic_filter/core/measurement/detection.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeCamera;
+using testing::makeState;
+
+TEST(BoxStyles, MoveTheBoxByTheInsetsAndUseTheirMeanForOtherClasses) {
+  ModelInfo info = testing::makeModelInfo();
+  info.side_insets = {0.1, 0.0, 0.1, 0.2, 0, 0, 0, 0, 0, 0, 0, 0, 0.02, 0.04, 0.06, 0.08};
+  const Model model = makeModel(info);
+  const CameraModel camera{makeCamera()};
+  const View view{&camera, RigidTransform(), Eigen::Vector3d::UnitZ()};
+  const State x = makeState(20, 1, 0, 0.4, 4, 2, 1.5);
+  const auto whole = projectCuboid(x, view);
+  const auto car = projectObserved(x, view, model.styles->of("car"));
+  ASSERT_TRUE(whole && car);
+  const double w = whole->sides[2] - whole->sides[0], h = whole->sides[3] - whole->sides[1];
+  EXPECT_TRUE(car->sides.isApprox(whole->sides + Eigen::Vector4d(0.1 * w, 0, -0.1 * w, -0.2 * h)));
+  EXPECT_TRUE(
+      model.styles->of(kOtherClass).offset.isApprox(Eigen::Vector4d(0.03, 0.01, -0.04, -0.07)));
+  EXPECT_TRUE(makeModel(testing::makeModelInfo()).styles->of("car").offset.isZero());
+}
+
+TEST(BoxStyles, TakeTheShapesOfThePriorsIfTheBoxesEncloseOutlines) {
+  ClassPriors priors;
+  priors.classes = {ClassPrior{.name = "car"}, ClassPrior{.name = "unicorn"}};
+  priors.classes[0].shape = shapeOf({{-1, 0.5, 0.5, 1}, {1, 1, 1, 0.5}});
+  ModelInfo info = testing::makeModelInfo();
+  EXPECT_TRUE(makeModel(info, priors).styles->of("car").shape.is_cuboid);
+  info.boxes = BoxExtent::kOutline;
+  info.side_insets.assign(4 * info.classes.size(), 0.02);
+  const Model model = makeModel(info, priors);
+  EXPECT_EQ(model.styles->of("car").shape.corners(), 12);
+  EXPECT_DOUBLE_EQ(model.styles->of("car").offset[0], 0.02);
+  EXPECT_TRUE(model.styles->of("unicorn").shape.is_cuboid);
+  EXPECT_DOUBLE_EQ(model.styles->of("unicorn").offset[3], -0.02)
+      << "of a class that the network does not know: the mean";
+  EXPECT_TRUE(model.styles->of(kOtherClass).shape.is_cuboid);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

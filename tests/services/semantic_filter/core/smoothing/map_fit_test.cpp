@@ -1,0 +1,236 @@
+#include "services/semantic_filter/core/smoothing/map_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "tests/services/semantic_filter/core/smoothing/passing_car.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::Passing;
+
+/// The same keyframes with `factor` times the noise, taken when the noise scale of their network
+/// was `then`.
+Keyframes lookedAs(const Keyframes& looks, double factor, const NoiseScale& then) {
+  Keyframes result;
+  for (const auto& look : looks) {
+    Keyframe k = *look;
+    const FrameView& v = *look->from;
+    k.from = std::make_shared<const FrameView>(v.view, v.error, v.time, v.styles, then);
+    k.z.variance *= factor;
+    k.z.lasting *= std::sqrt(factor);
+    result.push_back(std::make_shared<const Keyframe>(k));
+  }
+  return result;
+}
+
+Eigen::Vector3d placeError(const MapFit& s, const Passing& scene) {
+  return (s.hypothesis().x - scene.truth()).head<3>();
+}
+
+TEST(MapFit, FindsThePlaceFromAStartMetresAway) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Passing scene(seed);
+    const FrameContext frame = scene.frame();
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(s) << seed;
+    EXPECT_LT(placeError(*s, scene).norm(), 0.7) << seed;
+    EXPECT_LT(s->contradicted(), 0.1) << seed;
+  }
+}
+
+TEST(MapFit, OldKeyframesUseThePresentNoiseScale) {
+  const Passing scene(3);
+  FrameContext frame = scene.frame();
+  frame.noise_scale = {17, 0.25};
+  const Keyframes early = lookedAs(scene.keyframes(), 1.0, {17, 1.0});
+  const Keyframes late = lookedAs(scene.keyframes(), 0.25, {17, 0.25});
+  const Keyframes other = lookedAs(scene.keyframes(), 1.0, {18, 1.0});
+  std::vector<Hypothesis> fits;
+  for (const Keyframes* looks : {&early, &late, &other}) {
+    const KeyframeBatch all(*looks, frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), all, frame);
+    ASSERT_TRUE(s);
+    fits.push_back(s->hypothesis());
+  }
+  EXPECT_LT((fits[0].x - fits[1].x).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((fits[0].P - fits[1].P).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_GT(fits[2].P(0, 0), 1.2 * fits[0].P(0, 0));  // no scale was learned for this network
+}
+
+TEST(MapFit, ResidualsGiveTheNoiseScale) {
+  double left = 0.0, sides = 0.0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const Passing scene(seed);
+    const FrameContext frame = scene.frame();
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(s) << seed;
+    left += s->residualRatio().count * s->residualRatio().ratio;
+    sides += s->residualRatio().count;
+  }
+  EXPECT_NEAR(left / sides, 1.0, 0.15);
+}
+
+TEST(MapFit, TheJointCovarianceWithThePoseStaysConsistent) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const Passing scene(seed, 0.0, 0.3);
+    const FrameContext frame = scene.frame();
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto mode = MapFit::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(mode) << seed;
+    EXPECT_TRUE(isJointCovariance(mode->hypothesis(), frame.pose_error.covariance)) << seed;
+    for (const double turn : {-0.8, 0.8, M_PI / 2}) {  // each starts from the first fit
+      Hypothesis start = mode->hypothesis();
+      start.x[kYaw] += turn;
+      const auto other = MapFit::make(start, looks, frame, &*mode);
+      if (!other) continue;
+      EXPECT_TRUE(isJointCovariance(other->hypothesis(), frame.pose_error.covariance)) << seed;
+    }
+  }
+}
+
+TEST(MapFit, TheCovarianceIsHonest) {
+  double nees = 0.0;
+  constexpr int kRuns = 60;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    const Passing scene(seed, 0.0, 0.3);
+    const FrameContext frame = scene.frame();
+    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const auto s = MapFit::make(scene.start(false), looks, frame);
+    ASSERT_TRUE(s) << seed;
+    const Eigen::Vector3d e = placeError(*s, scene);
+    nees += e.dot(s->hypothesis().P.topLeftCorner<3, 3>().ldlt().solve(e)) / kRuns;
+  }
+  // Three degrees of freedom. The band is wide, because the true size is not drawn from the prior
+  // and b not from its process.
+  EXPECT_GT(nees, 1.0);
+  EXPECT_LT(nees, 5.0);
+}
+
+TEST(MapFit, ThePlaceIsCorrelatedWithThePresentPoseError) {
+  const Passing scene(3, 0.0, 0.3);
+  const FrameContext frame = scene.frame();
+  const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+  const auto s = MapFit::make(scene.start(false), looks, frame);
+  ASSERT_TRUE(s);
+  // All poses share one error: the place is known far better relative to the body than in W.
+  EXPECT_LT(placeSigma(s->hypothesis(), frame.pose_error.covariance),
+            0.75 * std::sqrt(s->hypothesis().P.topLeftCorner<3, 3>().trace()));
+}
+
+TEST(MapFit, OneBoxOfAnotherObjectCountsLittle) {
+  Passing scene(5);
+  Keyframe wrong = *scene.keyframes()[9];
+  wrong.z.sides += Eigen::Vector4d(60, 5, 70, 8);
+  scene.keyframes()[9] = std::make_shared<const Keyframe>(wrong);
+  const FrameContext frame = scene.frame();
+  const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+  const auto s = MapFit::make(scene.start(false), looks, frame);
+  ASSERT_TRUE(s);
+  EXPECT_GT(s->inflations()[9], 5.0);
+  EXPECT_LT(placeError(*s, scene).norm(), 0.8);
+}
+
+TEST(MapFit, DistinguishesMotionFromRest) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    for (const double speed : {0.0, 5.0}) {
+      const Passing scene(seed, speed);
+      const FrameContext frame = scene.frame();
+      const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+      const auto still = MapFit::make(scene.start(false), looks, frame);
+      const auto moving = MapFit::make(scene.start(true), looks, frame);
+      ASSERT_TRUE(moving) << seed;
+      if (speed > 0.0) {
+        EXPECT_NEAR(moving->hypothesis().x[kVelocity], speed, 1.5) << seed;
+        if (!still) continue;  // no hypothesis at rest fits
+      }
+      ASSERT_TRUE(still) << seed;
+      const Eigen::VectorXd inflations = still->inflations().cwiseMin(moving->inflations());
+      const double odds = still->logEvidence(inflations) - moving->logEvidence(inflations);
+      if (speed > 0.0) {
+        EXPECT_LT(odds, -3.0) << seed;
+      } else {
+        EXPECT_GT(odds, 1.0) << seed;
+      }
+    }
+  }
+}
+
+TEST(MapFit, RefusesAPlaceThatTheKeyframesDoNotDetermine) {
+  Passing scene(2);
+  scene.parameters().smoothing.place = 1e-4;
+  const FrameContext frame = scene.frame();
+  const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+  EXPECT_FALSE(MapFit::make(scene.start(false), looks, frame));
+}
+
+/// The same keyframes with exact boxes of an object whose roof lies behind its middle, and azimuths
+/// if `with_azimuths`.
+Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimuths) {
+  auto styles = std::make_shared<BoxStyles>();
+  styles->rest.shape = shapeOf({{-1, 1, 1, 1}, {0, 1, 1, 1}, {1, 0.3, 0.7, 1, -0.5}});
+  Keyframes result;
+  for (const auto& look : looks) {
+    Keyframe k = *look;
+    const FrameView& v = *look->from;
+    k.from = std::make_shared<const FrameView>(v.view, v.error, v.time, styles, v.noise_scale);
+    k.z.sides = projectCuboid(truth, v.projector, styles->rest.shape, 1.0)->sides;
+    if (with_azimuths) {
+      k.azimuth = wrapAngle(yawFromAzimuth(0.0, truth.head<3>(), v.view) - truth[kYaw]);
+    }
+    result.push_back(std::make_shared<const Keyframe>(k));
+  }
+  return result;
+}
+
+TEST(MapFit, AzimuthsLetAnAsymmetricShapeExplainItsBoxes) {
+  Passing scene(6);
+  const auto left_over = [&](bool with_azimuths, double turned) {
+    const Keyframes keyframes = ofLeaning(scene.keyframes(), scene.truth(), with_azimuths);
+    FrameContext frame = scene.frame();
+    frame.frame_view = keyframes.back()->from;
+    const KeyframeBatch looks(keyframes, frame.pose_error);
+    Hypothesis start = scene.start(false);
+    start.x[kYaw] = wrapAngle(start.x[kYaw] + turned);
+    const auto fit = MapFit::make(start, looks, frame);
+    return fit ? fit->residualRatio().ratio : 1e9;
+  };
+  const double told = left_over(true, 0.0);
+  EXPECT_NEAR(left_over(true, M_PI), told, 1e-3 * told) << "it started turned by 180 degrees";
+  EXPECT_GT(left_over(false, 0.0), 1.5 * told);
+}
+
+TEST(BatchProblem, WhetherACensoredSideCountsDoesNotChangeTheVolume) {
+  Passing scene(6);
+  const FrameContext frame = scene.frame();
+  const auto volume = [&](double cut_at) {
+    Keyframe cut = *scene.keyframes()[9];
+    const auto box = projectCuboid(scene.truth(), cut.from->view);
+    cut.z.measured[2] = false;
+    cut.z.sides[2] = box->sides[2] + cut_at;
+    Keyframes keyframes = scene.keyframes();
+    keyframes[9] = std::make_shared<const Keyframe>(cut);
+    const KeyframeBatch looks(keyframes, frame.pose_error);
+    const BatchProblem model(looks, false, "car", scene.truth(), frame);
+    const auto stack = model.linearise(scene.truth());
+    const Eigen::VectorXd inflations =
+        Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
+    SideCovariance covariance;
+    model.covariance(scene.truth(), *stack, covariance);
+    const Cholesky R(covariance.with(inflations));
+    EXPECT_EQ(stack->counts[9][2], cut_at > 0.0);
+    return std::pair(R.logDeterminant(), model.logVolumeOfCuts(*stack, inflations));
+  };
+  const auto beyond = volume(-1.0), inside = volume(1.0);
+  EXPECT_GT(std::abs(beyond.first - inside.first), 10.0);
+  EXPECT_NEAR(beyond.first - beyond.second, inside.first - inside.second, 1.0);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter

@@ -1,0 +1,61 @@
+#include "services/semantic_filter/core/tracks/lifecycle.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::makeObject;
+using testing::makeState;
+
+class Lifecycle : public ::testing::Test, protected testing::UsualFrame {};
+
+TEST_F(Lifecycle, ATrackWithTwoPossiblePlacesIsNotConfirmed) {
+  // A large object far away or a small one near by; each is well placed.
+  const auto claimed = [&](double far_off, double weight) {
+    Track o = makeObject(1, "car", makeState(30, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    o.existence = {0.97, ExistenceEvidence::kPrior, o.as_of};
+    o.hypotheses.push_back(
+        makeObject(1, kOtherClass, makeState(30 - far_off, 0, 1.0, 0, 2, 0.9, 0.8), 0.04).best());
+    o.hypotheses[0].weight = 1.0 - weight;
+    o.hypotheses[1].weight = weight;
+    std::vector<Track> objects{o};
+    confirmAndDelete(objects, frame);
+    return objects.at(0).life.confirmed;
+  };
+  EXPECT_TRUE(claimed(0.5, 0.4));
+  EXPECT_FALSE(claimed(15.0, 0.4));
+  EXPECT_TRUE(claimed(15.0, 0.001)) << "that it is near is ruled out";
+}
+
+TEST_F(Lifecycle, DetectionOnAnotherVisitRaisesTheLimitOfExistence) {
+  Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
+  EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain);
+  o.life.detected_on_revisit = true;
+  EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain_again);
+  EXPECT_GT(parameters.tracks.certain_again, parameters.tracks.certain);
+}
+
+TEST_F(Lifecycle, AnInvisibleTrackOfOneHitIsDeletedAndAConfirmedOneIsKept) {
+  const auto hiddenFor = [&](double seconds, std::uint32_t hits, bool confirmed) {
+    Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    o.life.hits = hits;
+    o.life.confirmed = o.life.once_confirmed = confirmed;
+    o.visibility.fraction = 0.0;
+    o.unused.occluded.count = 5;
+    o.unused.occluded.last = o.life.last_seen + Duration(static_cast<std::int64_t>(1e9 * seconds));
+    std::vector<Track> objects{o};
+    confirmAndDelete(objects, frame);
+    return objects.size();
+  };
+  const double patience = parameters.tracks.tentative_s;
+  EXPECT_EQ(hiddenFor(patience + 1.0, 1, false), 0u);
+  EXPECT_EQ(hiddenFor(patience - 1.0, 1, false), 1u);
+  EXPECT_EQ(hiddenFor(patience + 1.0, 30, false), 1u) << "much is known of it";
+  EXPECT_EQ(hiddenFor(patience + 1.0, 3, true), 1u);
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
