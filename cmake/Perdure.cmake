@@ -38,7 +38,7 @@ function(perdure_program name)
 endfunction()
 
 # perdure_test(NAME SOURCES … DEPENDS … [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest program,
-# one ctest entry. Labels: unit (default), process, scenario, golden, data, long.
+# one ctest entry. Labels: unit (default), process, scenario, golden, fuzz, data, long.
 function(perdure_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
   if(NOT PERDURE_BUILD_TESTS)

@@ -39,7 +39,8 @@ bool isPure(const std::string& path) {
 std::string whyNotIncluded(const std::string& path, const std::string& include) {
   const std::string room = part(path, 0), used = part(include, 0);
   // How Cyclone encodes a message is a matter of the wire.
-  const bool encodes = path.starts_with("common/wire/") && include.starts_with("dds/ddsi/");
+  const bool encodes = path.starts_with("common/wire/") &&
+                       startsWith(include, {"dds/ddsi/", "dds/ddsc/dds_opcodes.h"});
   if (include.starts_with("dds/") && !encodes &&
       !startsWith(path, {"common/bus/", "tools/examples/", "tests/"})) {
     return "only common/bus speaks DDS";
