@@ -57,7 +57,7 @@ if(PERDURE_BUILD_TESTS)
 endif()
 
 # perdure_test(NAME SOURCES … DEPENDS … [TOGETHER] [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest
-# program, one ctest entry. Labels: unit (default), process, scenario, golden, data, long.
+# program, one ctest entry. Labels: unit (default), process, scenario, golden, fuzz, data, long.
 function(perdure_test name)
   cmake_parse_arguments(ARG "TOGETHER" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
   if(NOT PERDURE_BUILD_TESTS)

@@ -45,13 +45,15 @@ std::optional<TimePoint> parseStamp(const std::string& text) {
   const std::chrono::year_month_day date{std::chrono::year(year),
                                          std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
+  const auto below = [](int value, int most) { return value >= 0 && value < most; };
   if (!date.ok() || year < 1970 || year > 2200) return std::nullopt;
+  if (!below(hour, 24) || !below(minute, 60) || !below(second, 61)) return std::nullopt;
   std::string digits = "0";
   if (text[static_cast<std::size_t>(used)] == '.')
     digits = text.substr(static_cast<std::size_t>(used) + 1, 9);
   digits.resize(9, '0');
   const auto fraction = parseInteger(digits);
-  if (!fraction) return std::nullopt;
+  if (!fraction || *fraction < 0) return std::nullopt;
   const Duration since = std::chrono::sys_days(date).time_since_epoch() + std::chrono::hours(hour) +
                          std::chrono::minutes(minute) + std::chrono::seconds(second);
   return TimePoint(since + Duration(*fraction));

@@ -15,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Duration kInterval = std::chrono::milliseconds(100);
+constexpr std::int64_t kMostImages = 1'000'000;  // names have six digits
 
 std::string availableSequences(const fs::path& root) {
   std::vector<std::string> names;
@@ -47,7 +48,8 @@ std::size_t countImages(const fs::path& folder) {
   std::size_t count = 0;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const auto number = parseInteger(entry.path().stem().string());
-    if (number && *number >= 0) count = std::max(count, static_cast<std::size_t>(*number) + 1);
+    if (number && *number >= 0 && *number < kMostImages)
+      count = std::max(count, static_cast<std::size_t>(*number) + 1);
   }
   return count;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
@@ -46,7 +47,9 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
 
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) return fail("image_missing", path + " cannot be read");
+  if (!file || std::filesystem::is_directory(path)) {
+    return fail("image_missing", path + " cannot be read");
+  }
   const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   auto image = decodeImage(bytes, encoding);
   if (!image) return fail(image.error().code, path + ": " + image.error().detail);

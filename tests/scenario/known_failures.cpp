@@ -5,7 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "common/replay/text_file.h"
+#include "common/replay/files/text_file.h"
 
 namespace perdure::test {
 namespace {

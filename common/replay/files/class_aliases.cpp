@@ -34,13 +34,15 @@ ClassAliases ClassAliases::load(const std::filesystem::path& file) {
   const YAML::Node root = loadYaml(file);
   if (!root.IsMap()) complain(file, root.Mark(), "write `name: [alias, …]`, one line a class");
   for (const auto& entry : root) {
-    const auto name = toLower(entry.first.as<std::string>());
+    if (!entry.first.IsScalar())
+      complain(file, entry.first.Mark(), "the name of a class is a word");
+    const auto name = toLower(entry.first.Scalar());
     if (!entry.second.IsSequence()) {
       complain(file, entry.second.Mark(), name + ": write a list of aliases, [a, b]");
     }
     for (const auto& alias : entry.second) {
       if (!alias.IsScalar()) complain(file, alias.Mark(), name + ": an alias is a word");
-      const auto [at, is_new] = aliases.canonical_.emplace(toLower(alias.as<std::string>()), name);
+      const auto [at, is_new] = aliases.canonical_.emplace(toLower(alias.Scalar()), name);
       if (!is_new && at->second != name) {
         complain(file, alias.Mark(), at->first + ": is an alias of " + at->second + " already");
       }

@@ -1,5 +1,6 @@
 #include "common/replay/files/kitti_calibration.h"
 
+#include <Eigen/LU>
 #include <map>
 #include <vector>
 
@@ -39,21 +40,48 @@ class Entries {
                                                    " is missing; fetch KITTI's calibration again");
   }
 
-  ProjectionMatrix projection(const std::vector<std::string>& names) const {
-    return Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(get(names, 12).data());
+  /// Of a camera: K with focal lengths from 1 to 1e6 pixels, and [I | t] with t in metres.
+  ProjectionMatrix projection(const std::string& name) const {
+    const ProjectionMatrix P = matrix({name});
+    const bool focal = P(0, 0) >= 1.0 && P(1, 1) >= 1.0 && P.cwiseAbs().maxCoeff() <= 1e6;
+    if (!focal || P(1, 0) != 0.0 || !P.row(2).head<3>().isApprox(Eigen::RowVector3d(0, 0, 1))) {
+      wrong(name, "is no projection of a rectified camera");
+    }
+    return P;
   }
   Eigen::Matrix3d rotation(const std::vector<std::string>& names) const {
-    return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(get(names, 9).data());
+    return checked(names, Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+                              get(names, 9).data()));
   }
   RigidTransform transform(const std::vector<std::string>& names) const {
-    const ProjectionMatrix m = projection(names);
-    return RigidTransform(Eigen::Matrix3d(m.leftCols<3>()), Eigen::Vector3d(m.col(3)));
+    const ProjectionMatrix m = matrix(names);
+    return RigidTransform(checked(names, m.leftCols<3>()), Eigen::Vector3d(m.col(3)));
   }
   RigidTransform rotationAndTranslation() const {
     return RigidTransform(rotation({"R"}), Eigen::Vector3d(get({"T"}, 3).data()));
   }
+  /// Of an image in pixels.
+  std::uint32_t size(const std::string& name, std::size_t index) const {
+    const double pixels = get({name}, 2)[index];
+    if (!(pixels >= 1.0 && pixels <= 65535.0)) wrong(name, "is no size of an image");
+    return static_cast<std::uint32_t>(pixels);
+  }
 
  private:
+  ProjectionMatrix matrix(const std::vector<std::string>& names) const {
+    return Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(get(names, 12).data());
+  }
+  Eigen::Matrix3d checked(const std::vector<std::string>& names, const Eigen::Matrix3d& R) const {
+    constexpr double kTolerance = 1e-2;
+    const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    if (!(error <= kTolerance) || R.determinant() < 0.0) wrong(names.front(), "is no rotation");
+    return R;
+  }
+  [[noreturn]] void wrong(const std::string& name, const std::string& what) const {
+    throw StartupError(ExitCode::kUnavailable, file_.string() + ": " + name + " " + what +
+                                                   "; fetch KITTI's calibration file again");
+  }
+
   std::filesystem::path file_;
   std::map<std::string, std::vector<double>> entries_;
 };
@@ -77,8 +105,8 @@ CameraCalibration KittiCalibration::camera(const std::string& name) const {
 KittiCalibration readTrackingCalibration(const std::filesystem::path& file) {
   const Entries entries(file, "KITTI tracking keeps calib/SEQUENCE.txt in its root");
   KittiCalibration calibration;
-  calibration.P2 = entries.projection({"P2"});
-  calibration.P3 = entries.projection({"P3"});
+  calibration.P2 = entries.projection("P2");
+  calibration.P3 = entries.projection("P3");
   const RigidTransform rectify(entries.rotation({"R0_rect", "R_rect"}), Eigen::Vector3d::Zero());
   calibration.T_RI = rectify * entries.transform({"Tr_velo_to_cam", "Tr_velo_cam"}) *
                      entries.transform({"Tr_imu_to_velo", "Tr_imu_velo"});
@@ -91,13 +119,12 @@ KittiCalibration readRawCalibration(const std::filesystem::path& folder) {
   const Entries velo(folder / "calib_velo_to_cam.txt", mend);
   const Entries imu(folder / "calib_imu_to_velo.txt", mend);
   KittiCalibration calibration;
-  calibration.P2 = cameras.projection({"P_rect_02"});
-  calibration.P3 = cameras.projection({"P_rect_03"});
+  calibration.P2 = cameras.projection("P_rect_02");
+  calibration.P3 = cameras.projection("P_rect_03");
   const RigidTransform rectify(cameras.rotation({"R_rect_00"}), Eigen::Vector3d::Zero());
   calibration.T_RI = rectify * velo.rotationAndTranslation() * imu.rotationAndTranslation();
-  const auto& size = cameras.get({"S_rect_02"}, 2);
-  calibration.width = static_cast<std::uint32_t>(size[0]);
-  calibration.height = static_cast<std::uint32_t>(size[1]);
+  calibration.width = cameras.size("S_rect_02", 0);
+  calibration.height = cameras.size("S_rect_02", 1);
   return calibration;
 }
 

@@ -1,8 +1,22 @@
 #include "common/replay/files/kitti_labels.h"
 
+#include <cmath>
+
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
+namespace {
+
+constexpr double kLastFrame = 999999;  // KITTI's names of images have six digits
+constexpr double kMostCount = 1e6;
+
+/// Frame, track, truncated and occluded, which become integers.
+bool countsMakeSense(const std::vector<double>& v) {
+  const auto within = [](double x) { return std::abs(x) <= kMostCount; };
+  return v[0] >= 0 && v[0] <= kLastFrame && within(v[1]) && within(v[3]) && within(v[4]);
+}
+
+}  // namespace
 
 std::vector<KittiLabel> readKittiLabels(const std::filesystem::path& file) {
   constexpr std::size_t kFields = 17;
@@ -18,8 +32,8 @@ std::vector<KittiLabel> readKittiLabels(const std::filesystem::path& file) {
     label.type = std::string(fields[2]);
     fields[2] = "0";
     const auto v = parseNumbers(fields);
-    if (!v || (*v)[0] < 0) {
-      wrong.add(line.number, "a field is not a number");
+    if (!v || !countsMakeSense(*v)) {
+      wrong.add(line.number, "a field is not a number, or none that makes sense");
       continue;
     }
     label.frame = static_cast<std::uint64_t>((*v)[0]);

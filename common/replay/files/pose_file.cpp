@@ -21,7 +21,9 @@ std::optional<TimePoint> parseSeconds(std::string_view text) {
     std::string digits(text.substr(dot + 1, 9));
     digits.resize(9, '0');
     const auto fraction = parseInteger(digits);
-    if (!fraction || *fraction < 0 || std::abs(*whole) > 9'000'000'000) return std::nullopt;
+    constexpr std::int64_t kMost = 9'000'000'000;
+    const bool fits = *whole >= -kMost && *whole <= kMost;
+    if (!fraction || *fraction < 0 || !fits) return std::nullopt;
     const std::int64_t sign = text.starts_with('-') ? -1 : 1;
     return fromNanoseconds(*whole * 1'000'000'000 + sign * *fraction);
   }
@@ -60,7 +62,7 @@ void addKitti(const TextLine& line, const std::vector<std::string_view>& fields,
     p(i) = (*v)[row * 4 + 3];
   }
   const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (error > kUnitTolerance || R.determinant() < 0) {
+  if (!(error <= kUnitTolerance) || R.determinant() < 0) {
     return wrong.add(line.number, "the rotation is not orthonormal and right-handed");
   }
   if (v->size() == 16 && ((*v)[12] != 0 || (*v)[13] != 0 || (*v)[14] != 0 || (*v)[15] != 1)) {

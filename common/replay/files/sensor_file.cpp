@@ -1,5 +1,6 @@
 #include "common/replay/files/sensor_file.h"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <fstream>
 
@@ -52,11 +53,13 @@ std::string SensorFile::text(const char* key) const {
 
 RigidTransform SensorFile::T_BS() const {
   if (!has("T_BS")) return {};
+  if (!root_["T_BS"].IsMap()) wrong("T_BS", "holds no `data` of 16 numbers");
   using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
   const auto v = numbersOf(root_["T_BS"]["data"], "T_BS.data", 16);
   const Eigen::Matrix4d m = Eigen::Map<const RowMajor>(v.data());
   const Eigen::Matrix3d R = m.topLeftCorner<3, 3>();
-  if ((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-2) {
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(error <= 1e-2) || R.determinant() < 0.0) {
     wrong("T_BS", "is not a rotation and a translation");
   }
   return RigidTransform(R, Eigen::Vector3d(m.topRightCorner<3, 1>()));

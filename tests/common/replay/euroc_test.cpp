@@ -170,7 +170,19 @@ TEST(Euroc, CalibrationThatMakesNoSenseIsRefusedByKey) {
   EXPECT_THAT(errorWith("[32, 24]", "[32]"), HasSubstr("resolution is missing or has not 2"));
   EXPECT_THAT(errorWith("radial-tangential", "fov"), HasSubstr("distortion_model is `fov`"));
   EXPECT_THAT(errorWith("-1.0, 0.0, 0.0, 0.2", "-2.0, 0.0, 0.0, 0.2"), HasSubstr("T_BS is not"));
+  EXPECT_THAT(errorWith("-1.0, 0.0, 0.0, 0.2", "1.0, 0.0, 0.0, 0.2"), HasSubstr("T_BS is not"));
+  EXPECT_THAT(errorWith("T_BS:", "T_BS: 3\nother:"), HasSubstr("T_BS holds no `data`"));
   EXPECT_THAT(errorWith("rate_hz: 20", "rate_hz: x"), HasSubstr("rate_hz is missing or no number"));
+}
+
+TEST(Euroc, ALineThatNamesNoImageIsAMissingImage) {
+  const auto root = tinyEuroc("unnamed");
+  const auto frames = root / "mav0/cam0/data.csv";
+  writeText(frames, readText(frames) + "1250000000,\n");
+  const auto dataset = open(root);
+  while (dataset->next()) {
+  }
+  EXPECT_EQ(dataset->reasons().of("image_missing"), 1U);
 }
 
 TEST(Euroc, BrokenLinesAreCountedAndLeftOut) {

@@ -58,6 +58,37 @@ TEST(KittiCalibration, AMissingOrShortEntryIsNamed) {
               HasSubstr("Tr_imu_to_velo has 11"));
 }
 
+/// What the calibration says when one of its numbers is another.
+std::string complaintOf(const std::string& number, const std::string& other) {
+  const auto file = tinyKittiTracking("damaged") / "calib/0000.txt";
+  std::string text = readText(file);
+  text.replace(text.find(number), number.size(), other);
+  writeText(file, text);
+  return startupErrorOf([&] { readTrackingCalibration(file); });
+}
+
+TEST(KittiCalibration, WhatIsNoProjectionOrNoRotationIsNamed) {
+  EXPECT_THAT(complaintOf("P2: 700", "P2: 0"), HasSubstr("P2 is no projection"));
+  EXPECT_THAT(complaintOf("P2: 700", "P2: 1e300"), HasSubstr("P2 is no projection"));
+  EXPECT_THAT(complaintOf("8 0.7 0 0 1 0", "8 0.7 0 0 0 0"), HasSubstr("P2 is no projection"));
+  EXPECT_THAT(complaintOf("R0_rect: 1", "R0_rect: -1"), HasSubstr("R0_rect is no rotation"));
+  EXPECT_THAT(complaintOf("velo: 1 0", "velo: 1 0.1"), HasSubstr("Tr_imu_to_velo is no rotation"));
+}
+
+TEST(KittiCalibration, AnImageHasASize) {
+  const auto drive = tinyKittiRaw("sizes");
+  const auto file = drive.parent_path() / "calib_cam_to_cam.txt";
+  const std::string text = readText(file);
+  for (const std::string size : {"-48 16", "0 16", "48 1e10"}) {
+    std::string damaged = text;
+    damaged.replace(damaged.find("48 16"), 5, size);
+    writeText(file, damaged);
+    EXPECT_THAT(startupErrorOf([&] { readRawCalibration(drive.parent_path()); }),
+                HasSubstr("S_rect_02 is no size"))
+        << size;
+  }
+}
+
 TEST(KittiRaw, OxtsComesAsInertialSamplesAndSpeedOfTheBody) {
   const auto dataset = Dataset::open({.path = tinyKittiRaw("oxts")});
   EXPECT_EQ(dataset->kind(), DatasetKind::kKittiRaw);
@@ -73,6 +104,18 @@ TEST(KittiRaw, OxtsComesAsInertialSamplesAndSpeedOfTheBody) {
   EXPECT_TRUE(imu[0].gyro.isApprox(Eigen::Vector3d(0.01, 0.02, 0.03))) << "wx wy wz";
   EXPECT_EQ(speed[3].speed, 6.0);
   EXPECT_EQ(speed[3].time, imu[3].time);
+}
+
+TEST(KittiRaw, AStampOfNoTimeOfDayIsNone) {
+  for (const char* stamp :
+       {"24:04:32.1", "13:60:32.1", "13:04:61.1", "-1:04:32.1", "13:04:32.-1", "2147483647:0:0"}) {
+    const auto drive = tinyKittiRaw("no_time");
+    const auto file = drive / "image_02/timestamps.txt";
+    std::string text = readText(file);
+    text.replace(text.find("13:04:32.1"), 10, stamp);
+    writeText(file, text);
+    EXPECT_EQ(Dataset::open({.path = drive})->reasons().of("frame_malformed"), 2U) << stamp;
+  }
 }
 
 TEST(KittiRaw, StampsAreAsWrittenAndThePairSharesTheLeftOnes) {
@@ -211,6 +254,17 @@ TEST(KittiLabels, WrongLinesAreLocated) {
   const auto error = startupErrorOf([&] { readKittiLabels(file); });
   EXPECT_THAT(error, HasSubstr("0000.txt:2: 17 fields"));
   EXPECT_THAT(error, HasSubstr("0000.txt:3: a field is not a number"));
+}
+
+// As many frames as the last label says would be laid out.
+TEST(KittiLabels, AFrameOrACountThatMakesNoSenseIsRefused) {
+  const auto file = freshFolder("senseless_labels") / "0000.txt";
+  writeText(file,
+            "1000000 1 Car 0 0 0 1 2 3 4 1 1 1 0 0 5 0\n0 1e300 Car 0 0 0 1 2 3 4 1 1 1 0 0 5 0\n"
+            "0 1 Car 0 -1e10 0 1 2 3 4 1 1 1 0 0 5 0\n999999 1 Car 0 0 0 1 2 3 4 1 1 1 0 0 5 0\n");
+  const auto error = startupErrorOf([&] { readKittiLabels(file); });
+  for (const char* line : {":1:", ":2:", ":3:"}) EXPECT_THAT(error, HasSubstr(line));
+  EXPECT_THAT(error, testing::Not(HasSubstr(":4:")));
 }
 
 }  // namespace

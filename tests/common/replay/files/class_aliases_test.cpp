@@ -31,6 +31,7 @@ TEST(ClassAliases, WhatIsWrongIsLocated) {
   EXPECT_THAT(errorOfAliases("car: [a]\nvan: [A]\n"),
               HasSubstr("a.yaml:2:7: a: is an alias of car"));
   EXPECT_THAT(errorOfAliases("car: auto\n"), HasSubstr("a.yaml:1:6: car: write a list"));
+  EXPECT_THAT(errorOfAliases("? [car]\n: [a]\n"), HasSubstr("a.yaml:1:3: the name of a class"));
   EXPECT_THAT(errorOfAliases("- car\n"), HasSubstr("write `name: [alias, …]`"));
   EXPECT_THAT(errorOfAliases("car: [a\n"), HasSubstr("a.yaml:"));
   EXPECT_THAT(startupErrorOf([] { ClassAliases::load("/nowhere.yaml"); }),

@@ -1,0 +1,249 @@
+// Messages of the bus, recordings of them, compressed images and the map's blobs.
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "common/replay/dataset.h"
+#include "common/replay/recordings/mcap_reader.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_writer.h"
+#include "common/vision/decode.h"
+#include "common/vision/jpeg.h"
+#include "common/wire/cdr.h"
+#include "common/wire/json.h"
+#include "services/map_store/core/belief_codec.h"
+#include "tests/common/wire/examples.h"
+#include "tests/fuzz/scratch.h"
+#include "tests/fuzz/target.h"
+
+namespace perdure::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct WireType {
+  std::string name;
+  bool (*take)(View);
+  Bytes (*example)(unsigned seed);
+};
+
+/// What is taken is sound enough to be sent and shown.
+template <class T>
+bool takeMessage(View bytes) {
+  // Memory of its own, aligned as DDS gives it.
+  const auto keeper = std::make_shared<Bytes>(bytes.begin(), bytes.end());
+  const auto value = wire::decodeCdr<T>(*keeper, keeper);
+  if (!value) {
+    require(!value.error().code.empty(), "a refusal has a reason");
+    return false;
+  }
+  const auto again = wire::encodeCdr(*value);
+  require(again.has_value(), "what was taken can be sent");
+  const auto copy = std::make_shared<Bytes>(*again);
+  require(wire::decodeCdr<T>(*copy, copy).has_value(), "what was sent is taken");
+  require(!wire::toJson(*value).dump().empty(), "what was taken can be shown");
+  return true;
+}
+
+template <class T>
+Bytes exampleOf(unsigned seed) {
+  T message;
+  wire::Examples(seed).fill(message);
+  return wire::encodeCdr(message).value();
+}
+
+template <class... T>
+std::vector<WireType> wireTypes() {
+  return {{wire::Type<T>::descriptor().m_typename, takeMessage<T>, exampleOf<T>}...};
+}
+
+const std::vector<WireType>& allTypes() {
+  static const auto types =
+      wireTypes<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
+                ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions, MapTile,
+                MapHeader, MapQuery, MapReply, Health>();
+  return types;
+}
+
+/// The first byte says the type.
+bool takeWire(View bytes) {
+  if (bytes.empty()) return false;
+  return allTypes()[bytes[0] % allTypes().size()].take(bytes.subspan(1));
+}
+
+std::vector<Bytes> wireSeeds() {
+  std::vector<Bytes> seeds;
+  for (std::size_t i = 0; i < allTypes().size(); ++i) {
+    for (const unsigned seed : {1U, 2U, 3U}) {
+      Bytes bytes = allTypes()[i].example(seed);
+      bytes.insert(bytes.begin(), static_cast<std::uint8_t>(i));
+      seeds.push_back(std::move(bytes));
+    }
+  }
+  return seeds;
+}
+
+Bytes contentsOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Two of each sensor message, odometry and a calibration, in two chunks.
+Bytes recording(bool finished) {
+  const fs::path file = scratch() / "seed.mcap";
+  fs::remove(file);
+  replay::RecordingWriter writer(file);
+  wire::Examples examples(7);
+  Calibration calibration;
+  Frame frame;
+  Odometry odometry;
+  examples.fill(calibration), examples.fill(frame), examples.fill(odometry);
+  (void)writer.add("calibration", calibration, 1000);
+  for (std::uint64_t i = 1; i <= 4; ++i) {
+    ImuSample imu;
+    examples.fill(imu);
+    imu.time = fromNanoseconds(static_cast<std::int64_t>(5'000'000 * i));
+    (void)writer.add("imu", imu, 1000 + i);
+    (void)writer.add("frame/cam0", frame, 1000 + i);
+    (void)writer.add("odometry", odometry, 1000 + i);
+    if (i == 2) (void)writer.cut();
+  }
+  if (finished) (void)writer.finish();
+  if (!finished) (void)writer.cut();
+  return contentsOf(file);
+}
+
+/// Every chunk and message, and then a finished file of it.
+bool readContainer(const fs::path& file) {
+  auto reader = replay::mcap::Reader::open(file);
+  if (!reader) return false;
+  std::uint64_t messages = 0;
+  for (const auto& chunk : reader->chunks()) {
+    const auto records = reader->unpack(chunk);
+    if (!records) continue;
+    replay::mcap::Catalogue found;
+    replay::mcap::forEachMessage(
+        **records, [&](const auto& message, std::uint64_t) { messages += 1 + message.data.size(); },
+        found);
+  }
+  if (reader->finish()) require(replay::mcap::Reader::open(file).has_value(), "finished is read");
+  return messages > 0;
+}
+
+bool takeContainer(View bytes) { return readContainer(asFile("run.mcap", bytes)); }
+
+/// As a dataset, and message by message.
+bool takeRecording(View bytes) {
+  const fs::path file = asFile("drive.mcap", bytes);
+  const bool messages = unlessRefused([&] {
+    replay::RecordedMessages recorded(file);
+    recorded.rewind();
+    std::uint64_t last = 0;
+    while (const auto message = recorded.next()) {
+      require(message->log_ns >= last, "log times do not go back");
+      last = message->log_ns;
+      (void)replay::valueOf<Frame>(*message);
+      (void)replay::valueOf<Calibration>(*message);
+    }
+  });
+  const bool drive = unlessRefused([&] {
+    const auto dataset = replay::Dataset::open({.path = file});
+    while (dataset->next()) {
+    }
+  });
+  return messages && drive;
+}
+
+bool takeRecords(View bytes) {
+  replay::mcap::Catalogue found;
+  return replay::mcap::forEachMessage(
+      bytes, [](const auto&, std::uint64_t) {}, found);
+}
+
+std::vector<Bytes> recordSeeds() {
+  replay::mcap::Draft draft;
+  const Bytes data(40, 7);
+  draft.add({1, 1, 1000, 1007, data});
+  draft.add({2, 2, 1001, 1008, data});
+  Bytes records = draft.records();
+  const auto put = [&](replay::mcap::Op op, const Bytes& content) {
+    replay::mcap::Put(records).record(op, content);
+  };
+  Bytes schema, channel;
+  replay::mcap::putSchema(schema, {1, "perdure::msg::Imu", "omgidl", "struct Imu {};"});
+  replay::mcap::putChannel(channel, {1, 1, "perdure/ego/imu", "cdr", {{"key", "value"}}});
+  put(replay::mcap::Op::kSchema, schema);
+  put(replay::mcap::Op::kChannel, channel);
+  return {records};
+}
+
+Frame ramp() {
+  Frame frame;
+  frame.width = 24, frame.height = 16;
+  auto pixels = std::make_shared<Bytes>(std::size_t{24} * 16);
+  for (std::size_t i = 0; i < pixels->size(); ++i) (*pixels)[i] = static_cast<std::uint8_t>(3 * i);
+  frame.data = pixels;
+  return frame;
+}
+
+/// A frame of 24 by 16 pixels whose JPEG the bytes are.
+bool takeJpeg(View bytes) {
+  Frame frame = ramp();
+  frame.encoding = ImageEncoding::kJpegMono8;
+  frame.data = std::make_shared<Bytes>(bytes.begin(), bytes.end());
+  const auto grey = vision::decompressed(frame, ImageEncoding::kMono8);
+  const auto colour = vision::decompressed(frame, ImageEncoding::kBgr8);
+  require(!grey || grey->data->size() == 24 * 16, "a frame has its pixels");
+  require(!colour || colour->data->size() == 3 * 24 * 16, "a frame has its pixels");
+  return grey && colour;
+}
+
+std::vector<Bytes> jpegs() {
+  const auto packed = vision::compressed(ramp(), 80).value();
+  return {Bytes(packed.data->begin(), packed.data->end())};
+}
+
+bool takeBelief(View bytes) {
+  const auto belief = map_store::decodeBelief(bytes);
+  if (!belief) return false;
+  require(map_store::decodeBelief(map_store::encodeBelief(*belief)).has_value(),
+          "a belief reads back");
+  return true;
+}
+
+bool takeHeader(View bytes) {
+  const auto header = map_store::decodeHeader(bytes);
+  if (!header) return false;
+  require(map_store::decodeHeader(map_store::encodeHeader(*header)).has_value(),
+          "a header reads back");
+  return true;
+}
+
+std::vector<Bytes> beliefs() {
+  std::vector<Bytes> seeds;
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    seeds.push_back(map_store::encodeBelief(wire::Examples(seed).belief()));
+  }
+  return seeds;
+}
+
+std::vector<Bytes> headers() {
+  Objects objects;
+  wire::Examples(4).fill(objects);
+  return {map_store::encodeHeader(objects)};
+}
+
+}  // namespace
+
+std::vector<Target> binaryTargets() {
+  const auto recordings = [] { return std::vector<Bytes>{recording(true), recording(false)}; };
+  return {{"wire", 48000, wireSeeds, takeWire},
+          {"mcap", 9000, recordings, takeContainer},
+          {"recording", 4200, recordings, takeRecording},
+          {"mcap_records", 18000, recordSeeds, takeRecords},
+          {"jpeg", 9000, jpegs, takeJpeg},
+          {"map_belief", 18000, beliefs, takeBelief},
+          {"map_header", 9000, headers, takeHeader}};
+}
+
+}  // namespace perdure::fuzz
