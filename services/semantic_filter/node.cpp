@@ -130,7 +130,7 @@ bool Node::use(Frame& frame, const Detections& detections) {
   }
   frame.input.model = *models_.find(detections.model_hash);
   if (const auto change = models_.use(detections.model_hash, frame.input.stamp.time)) {
-    tellModelChange(frame.input.stamp, *change);
+    reportModelChange(frame.input.stamp, *change);
   }
   if (detections.input_scale > 0.0) frame.input.model.input_width *= detections.input_scale;
   frame.input.boxes.emplace();

@@ -1,9 +1,7 @@
 // The semantic filter as a node: odometry, landmarks, detections and recalled objects in; objects,
 // events and predictions out. Single-threaded; time enters by messages only.
 //
-// Frames are kept with the belief before them. Detections belong to a frame; those that come late
-// (or out of order) are applied at their own frame's pose by stepping again from there, which gives
-// the posterior that they would have given on time (DESIGN 5, item 14).
+// What is estimated is core/history's. The node checks messages, waits for detections, and publishes.
 #pragma once
 
 #include <deque>
@@ -21,7 +19,7 @@
 #include "services/semantic_filter/former_map.h"
 #include "services/semantic_filter/model_book.h"
 #include "services/semantic_filter/probation.h"
-#include "services/semantic_filter/returns.h"
+#include "services/semantic_filter/return_events.h"
 
 namespace perdure::semantic_filter {
 
@@ -50,8 +48,7 @@ class Node {
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return history_.belief(); }
-  /// For people: what the node is still at beside its frames, and what it makes of the network's
-  /// boxes.
+  /// For people: a search for an earlier map, and how far the network's boxes err.
   std::string note() const;
 
  private:
@@ -66,9 +63,9 @@ class Node {
   void publish(const Frame& frame);
   void publishPredictions(const Frame& frame, const std::optional<ComingFrame>& coming);
   // In node_swap.cpp.
-  void tellModelChange(const FrameStamp& stamp, const std::string& detail);
+  void reportModelChange(const FrameStamp& stamp, const std::string& detail);
   bool isInDoubt(const Frame& frame, const Detections& detections);
-  void settleDoubts(bool believed);
+  void settleProbation(bool believed);
   // In node_memory.cpp.
   std::vector<ObjectBelief> soundOf(std::vector<ObjectBelief> beliefs);
   void insertRecalled(const Recalled& recalled);

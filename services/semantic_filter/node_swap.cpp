@@ -7,24 +7,24 @@ namespace perdure::semantic_filter {
 /// passed, and that it failed is told as an event.
 void Node::onSwap(const SwapNotice& notice) {
   if (notice.step == SwapStep::kTookOver && notice.about != 0) {
-    settleDoubts(true);
+    settleProbation(true);
     probation_.begin(notice.instance);
   }
   if (notice.step == SwapStep::kPassed && probation_.isOf(notice.instance)) {
     probation_.end();
-    settleDoubts(true);
+    settleProbation(true);
   }
   if (notice.step != SwapStep::kRolledBack) return;
   if (probation_.isOf(notice.about != 0 ? notice.about : notice.instance)) {
     probation_.end();
-    settleDoubts(false);
+    settleProbation(false);
   }
   if (history_.empty()) return;
-  tellModelChange(history_.newest().input.stamp,
+  reportModelChange(history_.newest().input.stamp,
                   notice.model + " was rolled back, " + notice.reason + ": " + notice.detail);
 }
 
-void Node::tellModelChange(const FrameStamp& stamp, const std::string& detail) {
+void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail) {
   Event event;
   event.stamp = stamp;
   event.instance = instance_;
@@ -52,12 +52,12 @@ bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
     return true;
   }
   if (blind) probation_.end();
-  settleDoubts(true);
+  settleProbation(true);
   return false;
 }
 
 /// Late detections where they are believed; no evidence where not.
-void Node::settleDoubts(bool believed) {
+void Node::settleProbation(bool believed) {
   const auto kept = probation_.take();
   if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());
   if (!believed) return;

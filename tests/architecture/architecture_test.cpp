@@ -8,6 +8,7 @@
 
 #include "tests/architecture/folder_rules.h"
 #include "tests/architecture/include_rules.h"
+#include "tests/architecture/vocabulary_rules.h"
 
 namespace perdure::tests {
 namespace {
@@ -86,6 +87,13 @@ TEST(FolderRules, CountAUnitOnceAndNameTheFolderThatHoldsTooMany) {
               ElementsAre(HasSubstr("tools/a holds 16 units")));
 }
 
+TEST(VocabularyRules, FindFormerWordsInCodeAndComments) {
+  EXPECT_THAT(formerWords("a.h", "/// Birth of an object.\ndouble elusive = 0.0;\n"),
+              ElementsAre(HasSubstr("a.h:1: 'birth' is now initiation"),
+                          HasSubstr("a.h:2: 'elusive' is now detectability")));
+  EXPECT_THAT(formerWords("a.h", "double lookalike_nats;  // an outlook\n"), IsEmpty());
+}
+
 /// Every header and source file, relative to the project's root.
 std::vector<std::string> filesUnder(const std::filesystem::path& root,
                                     std::initializer_list<const char*> rooms) {
@@ -117,6 +125,14 @@ TEST_F(TheProject, KeepsItsLayers) {
     std::ifstream stream(root_ / path);
     const std::string content{std::istreambuf_iterator<char>(stream), {}};
     EXPECT_THAT(violations(path, content), IsEmpty());
+  }
+}
+
+TEST_F(TheProject, KeepsTheWordsOfItsGlossary) {
+  for (const std::string& path : filesUnder(root_, {"services/semantic_filter/core"})) {
+    std::ifstream stream(root_ / path);
+    const std::string content{std::istreambuf_iterator<char>(stream), {}};
+    EXPECT_THAT(formerWords(path, content), IsEmpty());
   }
 }
 

@@ -87,7 +87,7 @@ ObjectBelief ghost(ObjectId id, const std::string& name, const Eigen::Vector3d& 
 
 /// Whether the object is still believed in after the frame.
 bool believed(const LookedAt& look, ObjectId id) {
-  for (const ObjectBelief& belief : look.before.tracks) {
+  for (const ObjectBelief& belief : look.before.objects) {
     if (belief.id == id) return belief.existence > 0.5;
   }
   return false;

@@ -23,9 +23,9 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// A look that says nothing about the track, for its ledger.
+/// A frame in which the track is not visible, for its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
-  if (track.unused.occluded.count + track.unused.out_of_view.count == 0)
+  if (track.unused.count() == 0)
     stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
   LedgerEntry& entry = away ? track.unused.out_of_view : track.unused.occluded;
@@ -156,9 +156,7 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
 Track SemanticFilter::asScored(const Track& was, const Track& now, const ScoredTrack& scored,
                                const FrameInput& input, const FrameContext& frame) const {
   Track track = was;
-  track.visibility.state = now.visibility.state;
-  track.visibility.fraction = now.visibility.fraction;
-  track.visibility.blocked_by = now.visibility.blocked_by;
+  track.visibility = now.visibility;
   predict(track, input.stamp.time, input.pose_error, parameters_.motion, viewWalkOf(frame));
   const TrackScore first = scoreTrack(track, scored.score.visibility, *input.boxes, frame);
   admitNewClasses(track, first, *input.boxes, frame);
@@ -204,23 +202,18 @@ std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, Obj
   return MergeRecord{id, absorbed};
 }
 
-StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
-                                IdBook& ids) const {
-  belief.path.go(heard.view.T_WB.p);
-  auto visibilities = updateVisibility(belief, heard);
-  if (!heard.boxes) return {};
-  FrameInput input = heard;
-  const NoiseScale noise_scale = noiseScaleOf(belief, heard);
+FrameInput SemanticFilter::withLearnedNoise(const Belief& belief, FrameInput input) const {
+  const NoiseScale scale = noiseScaleOf(belief, input);
   for (BoxDetection& box : *input.boxes) {
-    box.z.variance *= noise_scale.noise;
-    box.z.lasting *= noise_scale.lasting();
+    box.z.variance *= scale.noise;
+    box.z.lasting *= scale.lasting();
   }
-  explainPartialViews(belief, visibilities, input, parameters_, priors_);
-  const FrameContext frame = contextOf(belief, input);
-  reviseOcclusion(belief, visibilities, input, parameters_);
-  auto scored = scoreAll(belief, visibilities, input, frame);
-  StepReport report;
-  const auto explained = associateAndUpdate(belief, scored, input, frame);
+  return input;
+}
+
+void SemanticFilter::manageAll(const Belief& before, Belief& belief,
+                               std::vector<ScoredTrack>& scored, const FrameInput& input,
+                               const FrameContext& frame, StepReport& report) const {
   std::vector<Track> lost;
   for (auto& s : scored) {
     Track& track = belief.tracks[s.track];
@@ -232,20 +225,55 @@ StepReport SemanticFilter::step(const Belief& before, Belief& belief, const Fram
     if (s.drift) report.drift.push_back(*s.drift);
   }
   keepDeleted(belief.recently_deleted, std::move(lost), input.stamp.time, parameters_.tracks);
-  initiateTracks(belief, visibilities, explained, input, frame, ids);
-  std::erase_if(belief.tracks, [](const Track& o) { return o.hypotheses.empty(); });
-  report.broken = std::erase_if(belief.tracks, [](const Track& o) { return !sound(o); });
-  for (Track& o : belief.tracks) {
-    const bool visible = o.visibility.fraction > 0.0;
-    o.history.add(visible, visible && o.life.last_seen == input.stamp.time);
+}
+
+void SemanticFilter::dropBroken(Belief& belief, StepReport& report) {
+  std::erase_if(belief.tracks, [](const Track& t) { return t.hypotheses.empty(); });
+  report.broken = std::erase_if(belief.tracks, [](const Track& t) { return !sound(t); });
+}
+
+void SemanticFilter::recordDetections(Belief& belief, TimePoint now) {
+  for (Track& t : belief.tracks) {
+    const bool visible = t.visibility.fraction > 0.0;
+    t.history.add(visible, visible && t.life.last_seen == now);
   }
-  report.merges = mergeObjects(belief.tracks, frame);
-  const auto moved = reidentifyMoved(belief.tracks, frame);
-  report.merges.insert(report.merges.end(), moved.begin(), moved.end());
-  keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), input.stamp.time,
+}
+
+void SemanticFilter::resolveIdentities(Belief& belief, const FrameContext& frame, TimePoint now,
+                                       StepReport& report) const {
+  const auto add = [&](const std::vector<MergeRecord>& merges) {
+    report.merges.insert(report.merges.end(), merges.begin(), merges.end());
+  };
+  add(mergeObjects(belief.tracks, frame));
+  add(reidentifyMoved(belief.tracks, frame));
+  keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), now,
               parameters_.tracks);
-  const auto found = reidentifyDeleted(belief.tracks, belief.recently_deleted, frame);
-  report.merges.insert(report.merges.end(), found.begin(), found.end());
+  add(reidentifyDeleted(belief.tracks, belief.recently_deleted, frame));
+}
+
+StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
+                                IdBook& ids) const {
+  StepReport report;
+  const TimePoint now = heard.stamp.time;
+  belief.path.go(heard.view.T_WB.p);
+  // Visibility is published with every frame, evidence or not.
+  auto visibilities = updateVisibility(belief, heard);
+  if (!heard.boxes) return report;
+  FrameInput input = withLearnedNoise(belief, heard);
+  // Both change what a box or a miss means, so that they come before any score.
+  explainPartialViews(belief, visibilities, input, parameters_, priors_);
+  const FrameContext frame = contextOf(belief, input);
+  reviseOcclusion(belief, visibilities, input, parameters_);
+  // Scores of all tracks come before the first update: association weighs them against each other.
+  auto scored = scoreAll(belief, visibilities, input, frame);
+  const auto explained = associateAndUpdate(belief, scored, input, frame);
+  // A track that lost its shape may take its box again before that box starts another track.
+  manageAll(before, belief, scored, input, frame, report);
+  initiateTracks(belief, visibilities, explained, input, frame, ids);
+  dropBroken(belief, report);
+  // Identity asks who was detected in this frame, and new tracks take part.
+  recordDetections(belief, now);
+  resolveIdentities(belief, frame, now, report);
   return report;
 }
 

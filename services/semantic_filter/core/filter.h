@@ -1,7 +1,6 @@
-// The semantic filter in six verbs: predict, see, associate, update, smooth, tend (eq. 4, 8, 9).
-//
-// The belief is a plain value and a step is a function of (belief, frame): a late frame is applied
-// by taking the belief before it and stepping again (DESIGN 5, item 14).
+// One step of the semantic filter: from the belief before a frame and the frame to the belief after
+// it (eq. 4, 8, 9). The belief is a plain value, so that a late frame is applied by taking the
+// belief before it and stepping again (core/history.h).
 #pragma once
 
 #include <map>
@@ -17,7 +16,7 @@
 namespace perdure::semantic_filter {
 
 struct StepReport {
-  std::vector<DriftMeasurement> drift;  ///< of things that came back from an earlier visit
+  std::vector<DriftMeasurement> drift;  ///< of objects that came back from an earlier visit
   std::vector<MergeRecord> merges;
   std::size_t broken = 0;  ///< tracks whose numbers went bad, and which were dropped
 };
@@ -39,32 +38,43 @@ class SemanticFilter {
 
  private:
   struct ScoredTrack {
-    std::size_t track;
+    std::size_t track;  ///< index in Belief::tracks
     TrackScore score;
-    std::optional<std::size_t> assigned = {};    ///< the box that is surely its own
-    bool near_box = false;                       ///< at rest, and a box lies near
-    std::optional<DriftMeasurement> drift = {};  ///< until the look is taken back
+    std::optional<std::size_t> assigned = {};    ///< box of the frame
+    bool near_box = false;                       ///< it was confirmed, is static, and a box is near
+    std::optional<DriftMeasurement> drift = {};  ///< none once its assignment was undone
   };
 
   NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input) const;
+  /// The input with boxes whose noise is as it was learned for their network.
+  FrameInput withLearnedNoise(const Belief& belief, FrameInput input) const;
   FrameContext contextOf(const Belief& belief, const FrameInput& input) const;
-  /// Visibility of all tracks, published with them; one TrackVisibility for each.
+  /// Sets the visibility of all tracks; returns it, one for each.
   std::vector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput& input) const;
+  /// Predicts and scores the visible tracks.
   std::vector<ScoredTrack> scoreAll(Belief& belief,
                                     const std::vector<TrackVisibility>& visibilities,
                                     const FrameInput& input, const FrameContext& frame) const;
-  /// Updates what is scored; returns for each box how much of it is explained.
+  /// Updates the scored tracks; returns Association::explained.
   Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<ScoredTrack>& scored,
                                      const FrameInput& input, const FrameContext& frame) const;
-  /// Whether a look at it will tell of the pose: once for each time that it comes back.
+  /// Whether the track measures the map-relative drift in this frame: once for each visit.
   bool measuresDrift(const Track& track, const FrameContext& frame) const;
-  /// One as it was scored, until its look was heard: from `was`, as it was before the frame, and
-  /// `now`, as it is.
+  /// The track as it was scored, before its update. `was`: before the frame; `now`: after the
+  /// update.
   Track asScored(const Track& was, const Track& now, const ScoredTrack& scored,
                  const FrameInput& input, const FrameContext& frame) const;
-  /// Of one track after its look; nothing may be left of it.
+  void manageAll(const Belief& before, Belief& belief, std::vector<ScoredTrack>& scored,
+                 const FrameInput& input, const FrameContext& frame, StepReport& report) const;
+  /// Reduces the mixture of one track after its update. Where nothing is left of it the assignment
+  /// is undone, or its state begins anew; otherwise its existence is 0.
   void manage(Track& track, const Track& was, ScoredTrack& scored, const FrameInput& input,
               const FrameContext& frame) const;
+  static void dropBroken(Belief& belief, StepReport& report);
+  static void recordDetections(Belief& belief, TimePoint now);
+  /// Merges, confirms, deletes and re-identifies tracks.
+  void resolveIdentities(Belief& belief, const FrameContext& frame, TimePoint now,
+                         StepReport& report) const;
 
   Parameters parameters_;
   ClassPriors priors_;

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "services/semantic_filter/returns.h"
+#include "services/semantic_filter/return_events.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

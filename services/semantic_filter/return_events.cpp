@@ -1,4 +1,4 @@
-#include "services/semantic_filter/returns.h"
+#include "services/semantic_filter/return_events.h"
 
 #include <algorithm>
 #include <cmath>
