@@ -10,7 +10,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-constexpr double kMisjudged = 3.0;  // nats, against that the blocker is not where it was thought
+// nats by which an occluded track must explain a box better than every visible one
+constexpr double kMisjudged = 3.0;
 
 }  // namespace
 
@@ -24,22 +25,22 @@ void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
   if (hidden.empty()) return;
   BoxExplanations expected(belief, input, parameters);
   for (const auto& e : *input.boxes) {
-    std::vector<std::size_t> may_be;
+    std::vector<std::size_t> candidates;
     double best_hidden = -std::numeric_limits<double>::infinity();
     for (const std::size_t j : hidden) {
       const auto fit = expected.fit(j, {}, e);
       if (!fit) continue;
-      may_be.push_back(j);
+      candidates.push_back(j);
       best_hidden = std::max(best_hidden, *fit);
     }
-    bool others = may_be.empty();
-    for (std::size_t j = 0; j < visibilities.size() && !others; ++j) {
+    bool explained_by_visible = candidates.empty();
+    for (std::size_t j = 0; j < visibilities.size() && !explained_by_visible; ++j) {
       if (visibilities[j].fraction <= 0.0) continue;
       const auto fit = expected.fit(j, visibilities[j].hidden_sides, e);
-      others = fit && *fit > best_hidden - kMisjudged;
+      explained_by_visible = fit && *fit > best_hidden - kMisjudged;
     }
-    if (others) continue;
-    for (const std::size_t j : may_be) {
+    if (explained_by_visible) continue;
+    for (const std::size_t j : candidates) {
       visibilities[j].hidden_sides = {};
       visibilities[j].fraction = parameters.visibility.minimum;
       visibilities[j].state = Visibility::kPartial;
@@ -52,22 +53,23 @@ void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
 void explainPartialViews(const Belief& belief, const std::vector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors) {
-  std::vector<std::pair<std::size_t, double>> remnants;  // and how surely each is found
+  std::vector<std::pair<std::size_t, double>> partial_views;  // and its expected number of boxes
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].residual_fraction <= 0.0) continue;
     const Track& o = belief.tracks[j];
-    const double found = priors.of(o.best().class_name).detection_probability;
-    remnants.emplace_back(j, o.existence * visibilities[j].residual_fraction * found);
+    const double detection_probability = priors.of(o.best().class_name).detection_probability;
+    partial_views.emplace_back(
+        j, o.existence * visibilities[j].residual_fraction * detection_probability);
   }
-  if (remnants.empty()) return;
+  if (partial_views.empty()) return;
   BoxExplanations expected(belief, input, parameters);
   for (BoxDetection& box : *input.boxes) {
-    double boxes = 0.0;
-    for (const auto& [j, found] : remnants) {
+    double ratio = 0.0;  // to clutter
+    for (const auto& [j, detections] : partial_views) {
       const auto fit = expected.fit(j, visibilities[j].hidden_sides, box);
-      if (fit) boxes += found * std::exp(*fit);
+      if (fit) ratio += detections * std::exp(*fit);
     }
-    box.log_partial_views = std::log1p(boxes);
+    box.log_partial_views = std::log1p(ratio);
   }
 }
 

@@ -1,4 +1,5 @@
-// Where a frame's boxes contradict what was thought to be hidden.
+// Occlusion revision: boxes that contradict the predicted occlusion, and boxes of partial views
+// (paper, line 182, has occlusion as yes or no). Derivation: tools/docs/maths/visibility.md.
 #pragma once
 
 #include <vector>
@@ -8,14 +9,15 @@
 
 namespace perdure::semantic_filter {
 
-/// Of an track with v = 0 there may be a rest to see, which may be detected: its box is less
-/// likely to be clutter, new, or of anything else. The track itself stays as it is.
+/// Adds the partial views of tracks with v = 0 to the clutter of each box
+/// (BoxDetection::log_partial_views). Such a box is less likely a new object or that of another
+/// track. The track with v = 0 does not change.
 void explainPartialViews(const Belief& belief, const std::vector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors);
 
-/// A box that a hidden track explains far better than any that is in visibility says that the
-/// blocker was misjudged: that track can be seen.
+/// A box that an occluded track explains far better than any visible one shows that the occluder
+/// was misjudged. The occluded track gets v = visibility.minimum in this frame.
 void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
                      const FrameInput& input, const Parameters& parameters);
 

@@ -11,7 +11,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
-constexpr double kMostFound = 0.98;
+constexpr double kMaxDetection = 0.98;      // of v without an unmapped occluder
 
 void scoreBoxes(HypothesisScore& h, const std::string& class_name, double lookalike_nats,
                 const TrackScore& score, const std::vector<BoxDetection>& boxes,
@@ -19,14 +19,14 @@ void scoreBoxes(HypothesisScore& h, const std::string& class_name, double lookal
   for (std::size_t i = 0; i < score.boxes.size(); ++i) {
     const BoxDetection& e = boxes[score.boxes[i]];
     if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
-    const auto found =
+    const auto box_score =
         scoreBox(e.z, *h.box, h.covariance, score.visibility.hidden_sides, frame.parameters->box);
-    if (!found) continue;
+    if (!box_score) continue;
     const double log_l = logRatio(e, *frame.model, class_name, lookalike_nats) +
-                         found->log_density -
-                         logClutterOf(e, *found, frame.view, frame.parameters->clutter);
-    h.matches[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), found->nis / found->dof,
-                    found->part};
+                         box_score->log_density -
+                         logClutterOf(e, *box_score, frame.view, frame.parameters->clutter);
+    h.matches[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), box_score->nis / box_score->dof,
+                    box_score->part};
   }
 }
 
@@ -46,18 +46,18 @@ HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track
   h.expected = visibility.fraction *
                detectableShare(track, frame.parameters->visibility.hard_detection_share) *
                detectionProbabilityOf(hypothesis, track, size, frame);
-  h.detection_probability = std::min(h.expected * rate, kMostFound * v);
+  h.detection_probability = std::min(h.expected * rate, kMaxDetection * v);
   h.undetected = v - h.detection_probability;
   h.no_box = 1.0 - h.detection_probability;
   return h;
 }
 
-/// Where boxes lie that mayOverlap may be true of, for one of the hypotheses: to see that a box
-/// lies elsewhere is most of the work.
+/// Bounds of the boxes that mayOverlap can accept for one of the hypotheses. To reject boxes that
+/// lie elsewhere is most of the work.
 struct Reach {
   double least[2], most[2];
 
-  /// True where in inflation.
+  /// False only if mayOverlap is surely false.
   bool touches(const BoxMeasurement& z) const {
     for (int axis = 0; axis < 2; ++axis) {
       if (z.sides[axis] > most[axis] || z.sides[axis + 2] < least[axis]) return false;
@@ -68,7 +68,7 @@ struct Reach {
 
 Reach reachOf(const std::vector<HypothesisScore>& hypotheses,
               const std::vector<BoxDetection>& boxes) {
-  constexpr double kFar = 1e30, kReach = 5.01;  // a little more than mayOverlap's deviations
+  constexpr double kFar = 1e30, kReach = 5.01;  // deviations, a little more than mayOverlap takes
   double noise[2] = {0.0, 0.0};
   for (const BoxDetection& e : boxes) {
     for (int axis = 0; axis < 2; ++axis) noise[axis] = std::max(noise[axis], e.z.variance[axis]);
@@ -143,14 +143,14 @@ std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box) {
 }
 
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box) {
-  double made = 0.0, silent = 0.0;
+  double reported = 0.0, unreported = 0.0;
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
     const HypothesisScore& h = score.hypotheses[i];
-    made += track.hypotheses[i].weight * h.detection_probability * h.matches[box].likelihood;
-    silent += track.hypotheses[i].weight * h.no_box;
+    reported += track.hypotheses[i].weight * h.detection_probability * h.matches[box].likelihood;
+    unreported += track.hypotheses[i].weight * h.no_box;
   }
   const double r = track.existence;
-  return r * made / std::max(1.0 - r + r * silent, 1e-12);
+  return r * reported / std::max(1.0 - r + r * unreported, 1e-12);
 }
 
 }  // namespace perdure::semantic_filter

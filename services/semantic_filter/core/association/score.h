@@ -1,5 +1,6 @@
-// Score: how each hypothesis of an track explains each box (eq. 7 at b = π(g s)), and how much a
-// score is worth beside earlier looks from the same place (DESIGN 5, items 5 and 7).
+// Score: likelihoods of all hypotheses of a track for all boxes (paper, eq. 7 at b = π(g s)), and
+// the correlation with earlier observations. Derivation:
+// tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <cmath>
@@ -16,41 +17,45 @@ namespace perdure::semantic_filter {
 /// How a hypothesis explains one box.
 struct BoxMatch {
   double likelihood = 0.0;  ///< L(z), 0 outside the gate
-  double nis = 0.0;         ///< per degree of freedom, where likelihood > 0
+  double nis = 0.0;         ///< normalised innovation per degree of freedom, if likelihood > 0
   int part = -1;            ///< BoxScore::part
 };
 
 /// One hypothesis in one frame.
 struct HypothesisScore {
   std::optional<ProjectedBox> box;
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the predicted sides, without R
-  double detection_probability = 0.0;  ///< v P_D: probability that the network reports it
-  double undetected = 0.0;             ///< v (1 - P_D): that it is in visibility and not reported
-  double no_box = 1.0;            ///< A without a box: 1 - v P_D, and what a primed answer says
-  std::vector<BoxMatch> matches;  ///< for each box of the score
-  double expected = 0.0;          ///< v P_D of its class, whatever is known of the track itself
-  double correlated_observations = 0.0;  ///< earlier looks that share this view, if it is true
+  /// of the predicted sides, without noise, px²
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
+  double undetected = 0.0;             ///< v (1 - P_D): probability of visible and not reported
+  double no_box = 1.0;  ///< A without a box: 1 - v P_D, with a top-down answer if there is one
+  std::vector<BoxMatch> matches;  ///< for each of TrackScore::boxes
+  double expected = 0.0;          ///< v P_D without the detection rate of earlier visits
+  /// number of earlier observations with correlated errors, given this hypothesis
+  double correlated_observations = 0.0;
 };
 
 struct TrackScore {
   TrackVisibility visibility;
-  bool top_down = false;           ///< the network was asked about it (core/primed.h)
-  std::vector<std::size_t> boxes;  ///< of the frame, those that lie near one of the hypotheses
+  bool top_down = false;           ///< a top-down answer is applied (association/top_down.h)
+  std::vector<std::size_t> boxes;  ///< indices of the frame's boxes that are near a hypothesis
   std::vector<HypothesisScore> hypotheses;
 };
 
-/// log of the density of clutter, of the sides that were compared: one of fewer is of other units.
+/// Returns the log clutter density of the sides that were compared. With fewer sides it has other
+/// units.
 double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters);
 
 TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
-/// The sides of one of the frame's boxes that something hides: by the hypothesis that explains it
-/// best.
+/// Returns the hidden sides of a box, given the hypothesis that explains it best. `box`: index
+/// among the boxes of the frame.
 std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box);
 
-/// "Object made this box of the look" against "object made none, or is not there".
+/// Returns ψ: "the track made this box" against "it made none, or does not exist". `box`: index
+/// into TrackScore::boxes.
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box);
 
 }  // namespace perdure::semantic_filter

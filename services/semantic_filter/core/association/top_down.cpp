@@ -11,8 +11,8 @@ void applyTopDown(TrackScore& score, const Track& track, const std::vector<doubl
                   const FrameContext& frame) {
   const auto k = frame.model->index.find(track.best().class_name);
   if (k == frame.model->index.end() || k->second >= log_ratio.size()) return;
-  // KeyframeBatch from one place share what the network mistakes: what speaks for the track counts
-  // by their worth. What speaks against it is held off by `unmapped_occluder`, as misses are.
+  // Observations from one viewpoint share the mistakes of the network, so an answer in favour of
+  // the track is tempered. An answer against it is limited by the unmapped occluder, as a miss is.
   double nats = log_ratio[k->second];
   if (nats > 0.0) {
     nats *= temperingExponent(score.hypotheses.front().correlated_observations,

@@ -1,14 +1,16 @@
-// What the network says of an track that it was asked about and that no box met (eq. 7: the
-// likelihood at the predicted projection; services/inference/README.md, "Top-down").
+// Top-down likelihood: what the network says at a predicted measurement where it reported no box
+// (paper, eq. 7: likelihood at the predicted projection; services/inference/README.md, "Top-down").
+// Derivation: tools/docs/maths/joint_association.md, "Top-down likelihood".
 //
-// Of an track that is in visibility and not reported the best activation at its place has another
-// distribution than at a place where nothing is; ρ is their ratio. Without a box
+// The best activation at a visible object that was not reported has another distribution than where
+// nothing is; ρ is the ratio of the two. Without a box
 //   A = (1 - v) + v (1 - P_D) ρ
-// in place of 1 - v P_D: where nothing is, log ρ is negative on average, so that a ghost dies
-// sooner than by its misses alone, whatever the selection of the best does. An answer is detection
-// of existence only: its box was chosen for being near the prediction and tells little of the
-// place; it begins no track, is no hit, and does not raise existence beyond what the last score
-// that showed the track left.
+// in place of 1 - v P_D. Where nothing is, log ρ is negative on average, although the best
+// activation is selected. So a false track is deleted sooner than by its misses alone.
+//
+// An answer is evidence of existence only. Its box was chosen near the prediction and says little
+// of the place. It initiates no track, is no hit, and does not raise existence above what the last
+// hit left.
 #pragma once
 
 #include <vector>
@@ -17,8 +19,8 @@
 
 namespace perdure::semantic_filter {
 
-/// `log_ratio` by the model's class; that of the track's best class counts. An answer of a class
-/// that the model does not know says nothing.
+/// `log_ratio`: by class of the model; that of the track's best class counts. If the model does not
+/// know that class, nothing changes.
 void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
                   const FrameContext& frame);
 

@@ -18,7 +18,8 @@ State difference(const State& a, const State& b) {
   return d;
 }
 
-/// A hypothesis turned by 180° describes the same cuboid: choose the turn that is nearer.
+/// Returns x, turned by 180° if its yaw is then nearer to that of `reference`. The cuboid is the
+/// same.
 State nearestTurn(const State& x, const State& reference) {
   State y = x;
   if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2)
@@ -27,7 +28,8 @@ State nearestTurn(const State& x, const State& reference) {
 }
 
 template <int N>
-double deviation2(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<double, N, N>& P) {
+double squaredDeviation(const Eigen::Matrix<double, N, 1>& d,
+                        const Eigen::Matrix<double, N, N>& P) {
   Eigen::Matrix<double, N, N> L = P;
   if (!choleskyInPlace(L)) return std::numeric_limits<double>::infinity();
   Eigen::Matrix<double, N, 1> whitened = d;
@@ -46,7 +48,7 @@ double classProbability(const Track& track, const std::string& class_name) {
 bool sound(const Track& track) {
   double sum = 0.0;
   for (const auto& h : track.hypotheses) {
-    // A sum is finite where all that it is of is.
+    // A sum is finite if all its terms are.
     if (!std::isfinite(h.x.sum() + h.P.sum() + h.C.sum())) return false;
     sum += h.weight;
   }
@@ -82,7 +84,7 @@ void normalise(Track& track, ClassEvidence why) {
   auto& hs = track.hypotheses.write();
   for (auto& h : hs) h.weight /= sum;
   const auto heavier = [](const auto& a, const auto& b) { return a.weight > b.weight; };
-  // Few, and nearly in order: std::stable_sort would ask for memory for as many again.
+  // The hypotheses are few and nearly in order; std::stable_sort would allocate a buffer.
   for (auto next = hs.begin(); next != hs.end(); ++next) {
     const auto at = std::upper_bound(hs.begin(), next, *next, heavier);
     if (at != next) std::rotate(at, next, next + 1);
@@ -112,17 +114,17 @@ Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b) {
 
 double distance2(const Hypothesis& a, const Hypothesis& b) {
   const Matrix7d P = a.P.topLeftCorner<kGeometry, kGeometry>();
-  double result = deviation2<kGeometry>(geometryDifference(a, b), P);
+  double result = squaredDeviation<kGeometry>(geometryDifference(a, b), P);
   if (a.moving) {
     const Eigen::Matrix3d P_v = a.P.bottomRightCorner<3, 3>();
-    result += deviation2<3>((a.x - b.x).tail<3>(), P_v);
+    result += squaredDeviation<3>((a.x - b.x).tail<3>(), P_v);
   }
   return result;
 }
 
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate) {
   const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
-  return !(deviation2<3>(d, prior.log_size_covariance) < size_gate * size_gate);
+  return !(squaredDeviation<3>(d, prior.log_size_covariance) < size_gate * size_gate);
 }
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,5 @@
-// Operations on the mixture of one track: weights, PMF, moment matching, distances.
+// Operations on the mixture of one track: weights, PMF, moment matching (Bar-Shalom, Li 2001, eq.
+// 1.4.16) and distances. Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <string>
@@ -9,26 +10,28 @@
 
 namespace perdure::semantic_filter {
 
-/// π of a class: the sum of its hypotheses' weights.
+/// Returns π of a class: the sum of the weights of its hypotheses.
 double classProbability(const Track& track, const std::string& class_name);
-/// All numbers are finite and some weight is left.
+/// Whether all numbers are finite and the sum of the weights is positive.
 bool sound(const Track& track);
-/// π of each class, in the order of its heaviest hypothesis.
+/// Returns π of each class, in the order of the first hypothesis of each. The sum is 1.
 std::vector<ClassNumber> classShares(const Track& track);
-/// Books the weights as they are now, whatever their sum.
+/// Enters the present PMF in the ledger, whatever the sum of the weights.
 void book(Track& track, ClassEvidence why);
-/// Divides the weights by their sum, puts the heaviest first (stable), and books them.
+/// Divides the weights by their sum, sorts them (heaviest first, stable), and enters the PMF in the
+/// ledger.
 void normalise(Track& track, ClassEvidence why);
-/// a - b of the cuboids, yaw modulo 180°: a cuboid is the same turned by that.
+/// Returns a - b of the cuboids. Yaw is taken modulo 180°, because a cuboid is the same when turned
+/// by 180°.
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b);
-/// x ⊕ of a moment-matched pair: b is merged into a, weights added; yaw differences are wrapped.
+/// Merges b into a: adds the weights and keeps two moments of the pair, yaw modulo 180°.
 void mergeInto(Hypothesis& a, const Hypothesis& b);
 
-/// Squared Mahalanobis distance of b from a by a's covariance: geometry, yaw modulo 180°, and the
-/// velocity where a moves.
+/// Returns the squared Mahalanobis distance of b from a, by the covariance of a: of the geometry
+/// (yaw modulo 180°), and of the velocity if a moves.
 double distance2(const Hypothesis& a, const Hypothesis& b);
 
-/// Whether its size is `size_gate` deviations of the class's from that of the class, or further.
+/// Whether its size differs from that of the class by `size_gate` deviations or more.
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate);
 
 }  // namespace perdure::semantic_filter

@@ -259,7 +259,8 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     Sides others = use;
     others[i] = false;
     // Something unmapped hides each of the four sides with the same probability.
-    consider(others, log_shown + std::log(0.25 * parameters.partial_view) + logAnywhere(predicted, i), i);
+    consider(others,
+             log_shown + std::log(0.25 * parameters.partial_view) + logAnywhere(predicted, i), i);
   }
   if (best) best->ignored = ignored;
   return best;

@@ -11,13 +11,13 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kNoInformation = 1e8;  // px², of a side that does not count
-constexpr double kYawSpread = 0.8;      // rad, around the start: which way a cuboid lies
+constexpr double kNoInformation = 1e8;  // px², variance of a side that does not count
+constexpr double kYawSpread = 0.8;      // rad, deviation of the yaw prior around the start
 constexpr double kAzimuthCorrelation = 0.5;
-constexpr double kOtherScale = 1.0;  // of the logarithm of all three dimensions
-constexpr double kAzimuthTail = 3.0;
-constexpr double kAcross = 0.2;   // share of a class's speed across its length
-constexpr double kUpwards = 0.2;  // m/s
+constexpr double kOtherScale = 1.0;   // deviation that all three log sizes of *other* share
+constexpr double kAzimuthTail = 3.0;  // degrees of freedom of the t distribution
+constexpr double kAcross = 0.2;  // deviation of the speed across the length, share of that along it
+constexpr double kUpwards = 0.2;  // m/s, deviation of the vertical speed
 
 Matrix6d transition(const PoseError& earlier, const PoseError& later) {
   return transitionBetween(earlier.product, later.product).value_or(Matrix6d::Identity());
@@ -103,7 +103,7 @@ BatchProblem::BatchProblem(const KeyframeBatch& batch, bool moving, const std::s
       class_name_(class_name),
       yaw_(start[kYaw]),
       dim_(moving ? kMostFree : kGeometry) {
-  // At birth "other" has three scales, which one Gaussian has to cover here.
+  // *Other* is initiated with three sizes; here one Gaussian has to cover them.
   if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
   size_information_ = inverseSymmetric(prior_.log_size_covariance);
   const auto& box = frame.parameters->box;
@@ -138,7 +138,7 @@ std::optional<Stack> BatchProblem::linearise(const State& x) const {
     const Keyframe& k = *batch_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    if (k.from->styles.get() != styles) {  // batch of one network are mostly side by side
+    if (k.from->styles.get() != styles) {  // adjacent keyframes mostly have the same network
       styles = k.from->styles.get();
       style = &styles->of(class_name_);
     }
@@ -166,14 +166,14 @@ void BatchProblem::covariance(const State& x, const Stack& s, SideCovariance& re
   result.pose.resize(0, 0);
   if (!batch_.exactPoses()) batch_.poseCovariance(s.J_pose, result.pose);
   std::vector<ViewRay> rays;
-  std::vector<Eigen::Vector4d> stays;  // deviations of b; 0 of a side that does not count
+  std::vector<Eigen::Vector4d> bias_sigma;  // deviations of b, px; 0 for a side that does not count
   rays.reserve(batch_.size());
-  stays.reserve(batch_.size());
+  bias_sigma.reserve(batch_.size());
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const Keyframe& k = *batch_.keyframes()[i];
     rays.push_back(viewRayOf(x.head<3>(), k.from->T_WC));
-    stays.push_back(lasting(k).cwiseSqrt());
-    for (int side = 0; side < 4; ++side) stays.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
+    bias_sigma.push_back(lasting(k).cwiseSqrt());
+    for (int side = 0; side < 4; ++side) bias_sigma.back()[side] *= s.counts[i][side] ? 1.0 : 0.0;
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
@@ -181,13 +181,13 @@ void BatchProblem::covariance(const State& x, const Stack& s, SideCovariance& re
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
       Eigen::Matrix4d own =
           moving() ? acceleration(s, i, j) : Eigen::Matrix4d(Eigen::Matrix4d::Zero());
-      own.diagonal() += correlation * stays[i].cwiseProduct(stays[j]);
+      own.diagonal() += correlation * bias_sigma[i].cwiseProduct(bias_sigma[j]);
       result.own.block<4, 4>(row, column) = own;
     }
-    const Eigen::Vector4d new_each_time = noise(*batch_.keyframes()[i]);
+    const Eigen::Vector4d noise_variance = noise(*batch_.keyframes()[i]);
     for (int side = 0; side < 4; ++side) {
       const auto row = static_cast<Eigen::Index>(4 * i) + side;
-      result.own(row, row) += s.counts[i][side] ? new_each_time[side] : kNoInformation;
+      result.own(row, row) += s.counts[i][side] ? noise_variance[side] : kNoInformation;
     }
   }
 }
@@ -271,13 +271,13 @@ double BatchProblem::logHeading(const State& x) const {
 }
 
 ResidualRatio BatchProblem::azimuthResidualRatio(const State& x, double yaw_variance) const {
-  const double weight_of_each = azimuthWeight();
+  const double azimuth_weight = azimuthWeight();
   double squares = 0.0, count = 0.0, information = 0.0;
   for (const auto& k : batch_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
     const double variance = azimuthVariance(*k);
     const auto match = matchAzimuth(*k->azimuth, x, k->from->view, variance + yaw_variance);
-    const double share = weight_of_each * match.inlier;
+    const double share = azimuth_weight * match.inlier;
     squares += share * std::pow(match.residual / azimuthSigma(k->azimuth_sigma, prior_), 2);
     count += share;
     information += share / variance;
@@ -343,15 +343,12 @@ Eigen::Vector4d BatchProblem::lasting(const Keyframe& k) const {
   return (then.model == now.model ? now.lasting() / then.lasting() : 1.0) * k.z.lasting;
 }
 
-/// Seconds from the look to the newest one, which the position is of.
 double BatchProblem::age(std::size_t i) const {
   return moving()
              ? toSeconds(batch_.keyframes().back()->from->time - batch_.keyframes()[i]->from->time)
              : 0.0;
 }
 
-/// Covariance of the sides of look i (the later one) and j of what moves, by white acceleration
-/// since then: the later look is the nearer to the newest one.
 Eigen::Matrix4d BatchProblem::acceleration(const Stack& s, std::size_t i, std::size_t j) const {
   const double near = age(i), far = age(j);
   const double q = std::pow(frame_.parameters->motion.acceleration, 2);
@@ -376,23 +373,22 @@ double BatchProblem::azimuthVariance(const Keyframe& k) const {
   return (then.model == now.model ? now : then).azimuth * assumed * assumed;
 }
 
-/// What each azimuth counts, since their errors are correlation.
 double BatchProblem::azimuthWeight() const {
-  const auto batch =
+  const auto count =
       static_cast<double>(std::count_if(batch_.keyframes().begin(), batch_.keyframes().end(),
                                         [](const auto& k) { return k->azimuth.has_value(); }));
-  return 1.0 / (1.0 + std::max(batch - 1.0, 0.0) * kAzimuthCorrelation);
+  return 1.0 / (1.0 + std::max(count - 1.0, 0.0) * kAzimuthCorrelation);
 }
 
 void BatchProblem::addAzimuths(const State& x, Quadratic& q) const {
-  const double weight_of_each = azimuthWeight();
+  const double azimuth_weight = azimuthWeight();
   for (const auto& k : batch_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
     const double variance = azimuthVariance(*k);
     const double residual = matchAzimuth(*k->azimuth, x, k->from->view, variance).residual;
     const double nis = residual * residual / variance;
     const double information =
-        weight_of_each * (kAzimuthTail + 1.0) / (kAzimuthTail + nis) / variance;
+        azimuth_weight * (kAzimuthTail + 1.0) / (kAzimuthTail + nis) / variance;
     q.G(kYaw, kYaw) += information;
     q.g[kYaw] += information * residual;
   }

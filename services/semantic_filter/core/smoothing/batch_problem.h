@@ -1,5 +1,6 @@
-// All remembered batch at an track as one measurement of a cuboid: its residuals, Jacobians and
-// full covariance, and the priors. What MapFit maximises; see smoother.h for the model.
+// Batch problem that a MAP fit solves: residuals, Jacobians and full covariance of all keyframes of
+// a track as one measurement of a cuboid, and the priors (Dellaert, Kaess 2017). map_fit.h
+// describes the model. Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include <optional>
@@ -18,43 +19,46 @@ using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
 using PoseJacobian = Eigen::Matrix<double, 4, 6>;
 
-/// The batch at one track, and the covariances between the pose errors of all pairs of them, and
-/// with the present one.
+/// The keyframes of one track, with the covariances of their pose errors: of all pairs, and with
+/// the present pose error.
 class KeyframeBatch {
  public:
-  /// `keyframes` are in order of time and outlive this.
+  /// `keyframes`: in order of time; they outlive this object.
   KeyframeBatch(const Keyframes& keyframes, const PoseError& now);
 
   const Keyframes& keyframes() const { return *keyframes_; }
   std::size_t size() const { return keyframes_->size(); }
   /// True where all poses are exact.
   bool exactPoses() const { return exact_; }
-  /// Of all sides, by their derivatives by the batch' poses; its lower triangle.
+  /// Computes the covariance that the pose errors cause in all sides, px²; only its lower triangle.
+  /// `J`: derivatives of the sides by the pose error, for each keyframe.
   void poseCovariance(const std::vector<PoseJacobian>& J, Eigen::MatrixXd& result) const;
-  /// Of the present pose with look i.
+  /// Returns the covariance of the present pose error with that of keyframe i.
   const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
 
  private:
   const Keyframes* keyframes_;
+  /// Fills onto_, from_ and now_. Returns false where a transition has no usable inverse.
   bool chain(const PoseError& now);
+  /// Fills pairs_ and now_ instead.
   void pairUp(const PoseError& now);
 
-  /// Φ_i (from the first look to look i) and Φ_i⁻¹ P_i: look i and an earlier j have the covariance
-  /// Φ_i (Φ_j⁻¹ P_j). Of no size where a Φ_i has no inverse weight_of_each the name.
+  /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i. Keyframe i and an earlier keyframe
+  /// j have the covariance Φ_i (Φ_j⁻¹ P_j). Empty where a Φ_i has no usable inverse.
   std::vector<Matrix6d> onto_, from_;
-  std::vector<Matrix6d> pairs_;  ///< then, of i and j <= i
-  std::vector<Matrix6d> now_;
+  std::vector<Matrix6d> pairs_;  ///< in that case: the covariances of i and j <= i
+  std::vector<Matrix6d> now_;    ///< of the present pose error with keyframe i
   bool exact_ = true;
 };
 
-/// Dimensions that a batch estimates: the cuboid, and the velocity of what moves.
+/// Most dimensions of an estimate: the cuboid, and the velocity of a moving hypothesis.
 inline constexpr int kMostFree = kGeometry + 3;
 using FreeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFree, 1>;
 using FreeMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree, kMostFree>;
 
-/// Linearised at one state: four rows for each look.
+/// The measurement, linearised at one state: four rows for each keyframe.
 struct Stack {
-  /// [J r]: derivatives by geometry (and velocity), and z - h(x), pixels; 0 where a side does not
+  /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for a side that does not
   /// count.
   Eigen::MatrixXd rows;
   std::vector<PoseJacobian> J_pose;
@@ -64,23 +68,25 @@ struct Stack {
   auto residual() const { return rows.col(rows.cols() - 1); }
 };
 
-/// Of the dimensions of a batch: [J r]ᵀ R⁻¹ [J r].
+/// [J r]ᵀ R⁻¹ [J r].
 using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree + 1, kMostFree + 1>;
+/// `whitened`: L⁻¹ [J r], where R = L Lᵀ.
 Gram gramOf(const Eigen::MatrixXd& whitened);
 
-/// Of the rows of a Stack given the cuboid, in two parts; of each the lower triangle alone.
+/// Covariance of the rows of a Stack, given the cuboid, in two parts, px². Only lower triangles.
 struct SideCovariance {
-  Eigen::MatrixXd own;   ///< by what the network and the thing itself do: noise, b, acceleration
-  Eigen::MatrixXd pose;  ///< by the pose errors; of no size where poses are exact
+  Eigen::MatrixXd own;   ///< of noise, b and acceleration
+  Eigen::MatrixXd pose;  ///< of the pose errors; empty where poses are exact
 
-  /// The whole, its own part widened by the batch' inflations. A doubtful box says nothing of the
-  /// pose: its inflation does not widen the error that all share.
+  /// Returns the sum R, with `own` widened by the inflations of the keyframes. `pose` is not
+  /// widened: a common pose error that every keyframe scales differently would seem observed.
+  /// `storage`: memory to use for R.
   Cholesky with(const Eigen::VectorXd& inflations, Eigen::MatrixXd storage = {}) const;
-  /// What is left of the residuals r when the pose errors have been estimated from them: a common
-  /// pose error is no contradiction. `explained` is R⁻¹ r, R the whole.
+  /// Returns the residuals r without the pose errors that are estimated from them. So a common pose
+  /// error contradicts nothing. `explained`: R⁻¹ r.
   Eigen::VectorXd withoutPose(const Eigen::VectorXd& residual,
                               const Eigen::VectorXd& explained) const;
-  /// Squared deviation of one look with these residuals.
+  /// Returns the squared Mahalanobis distance of the residuals of one keyframe, given `own`.
   double deviation(const Eigen::VectorXd& residual, Eigen::Index keyframe) const;
 };
 
@@ -89,55 +95,61 @@ struct Quadratic {
   FreeVector g;  ///< its gradient: the maximum is at x + G⁻¹ g
 };
 
-/// `inflations` (one for each look, >= 1) widen whole batch; x has b = 0.
+/// Every x has b = 0. `inflations`: one for each keyframe, >= 1; it widens all sides of the
+/// keyframe.
 class BatchProblem {
  public:
-  /// Of a class, at rest or moving. It faces as the azimuths say at the start, and its yaw is about
-  /// what it is there.
+  /// The problem of one class, at rest or moving. `start` is the mean of the yaw prior; the heading
+  /// is what the azimuths say at `start`.
   BatchProblem(const KeyframeBatch& batch, bool moving, const std::string& class_name,
                const State& start, const FrameContext& frame);
 
   int dim() const { return dim_; }
   bool moving() const { return dim_ == kMostFree; }
   State at(const State& x, const FreeVector& step) const;
-  /// Nothing where a look does not see the cuboid at all.
+  /// Returns nothing if the cuboid has no projection in one of the keyframes.
   std::optional<Stack> linearise(const State& x) const;
-  /// Into `result`, whose memory it takes.
+  /// Writes into `result` and uses its memory.
   void covariance(const State& x, const Stack& s, SideCovariance& result) const;
-  /// KeyframeBatch and priors at x.
+  /// Returns information and gradient of keyframes and priors at x.
   Quadratic quadratic(const State& x, const Gram& gram) const;
-  /// Twice the negative logarithm of the priors, but for a constant and the azimuths.
+  /// Returns -2 log of the priors, without a constant and without the azimuths.
   double priorCost(const State& x) const;
-  /// The part of it that holds yaw to where it started.
+  /// Returns the part of priorCost that holds the yaw to its start.
   double yawPriorCost(const State& x) const;
-  /// log p(azimuths | yaw modulo 180°), up to a constant.
+  /// Returns log p(azimuths | yaw modulo 180°), without a constant.
   double logAzimuths(const State& x) const;
-  /// Log-odds that the azimuths mean the yaw of x and not the one turned by 180°.
+  /// Returns the log-odds, by the azimuths, that the yaw of x is not turned by 180°.
   double logHeading(const State& x) const;
-  /// Of the azimuths that say something, beside what was assumed of their errors at first.
-  /// `yaw_variance`: of the fit that x is of.
+  /// Returns the residuals of the azimuths that carry information, relative to the first
+  /// assumption. `yaw_variance`: of the fit, rad².
   ResidualRatio azimuthResidualRatio(const State& x, double yaw_variance) const;
-  /// log |Λ / 2π| of the velocity's prior, which only what moves has.
+  /// Returns log |Λ / 2π| of the velocity prior; 0 at rest.
   double logSpeedPrior() const;
-  /// log |Λ| of the size's prior.
+  /// Returns log |Λ| of the size prior.
   double logSizePrior() const;
-  /// The part of log |R| that is of no density: a side that is cut has a probability (of lying
-  /// beyond the cut), and whether it counts depends on the state.
+  /// Returns the part of log |R| that belongs to no density: a cut side has a probability (that it
+  /// lies beyond the cut), and whether it counts depends on the state.
   double logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& inflations) const;
-  /// Covariance of the present b, in units of a box whose b has deviations `sigma`, with all rows.
+  /// Returns the covariance of the present b with all rows. `sigma`: present deviations of b, in
+  /// widths and heights.
   Eigen::MatrixXd biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
                           const Eigen::VectorXd& inflations) const;
-  /// Covariance of the present pose error with all rows.
+  /// Returns the covariance of the present pose error with all rows.
   Eigen::MatrixXd poseNow(const Stack& s) const;
 
  private:
+  /// Returns the seconds from a keyframe to the newest one, whose time the position has; 0 at rest.
   double age(std::size_t keyframe) const;
-  /// Of its box, as the network is known now.
+  /// Return the variances of the sides, px², with the present noise scale of the network.
   Eigen::Vector4d noise(const Keyframe& k) const;
   Eigen::Vector4d lasting(const Keyframe& k) const;
+  /// Returns the covariance of the sides of keyframe i and an earlier or equal j that white
+  /// acceleration causes between them and the newest keyframe, px².
   Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
   std::vector<AzimuthMatch> azimuths(const State& x) const;
-  double azimuthVariance(const Keyframe& k) const;  ///< as the network is known now
+  double azimuthVariance(const Keyframe& k) const;  ///< rad², with the present noise scale
+  /// Returns the weight of each azimuth, given that their errors are correlated.
   double azimuthWeight() const;
   void addAzimuths(const State& x, Quadratic& q) const;
 

@@ -9,48 +9,50 @@ namespace {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
-/// What one keyframe shows of a thing, as far as other batch may differ.
-struct KeyframeAspect {
-  ViewRay aspect;
+/// The view of an object in one keyframe, as far as keyframes can differ.
+struct KeyframeView {
+  ViewRay ray;
   Eigen::Vector2d centre;  ///< of the box, rad
   double log_height;
 };
 
-KeyframeAspect keyframeAspectOf(const Eigen::Vector3d& place, const Keyframe& k) {
+KeyframeView keyframeViewOf(const Eigen::Vector3d& place, const Keyframe& k) {
   const Eigen::Vector2d centre(k.z.sides[0] + k.z.sides[2], k.z.sides[1] + k.z.sides[3]);
   return {viewRayOf(place, k.from->T_WC), 0.5 * centre / k.from->camera.fx(),
           std::log(k.z.height())};
 }
 
-/// By the view from the two places, or by the boxes where the thing itself moves.
-double changeBetween(const KeyframeAspect& a, const KeyframeAspect& b, const ViewScales& scales) {
-  return std::max(viewChange(a.aspect, b.aspect, scales),
+/// Returns the larger of two changes, in correlation lengths: that of the view, and that of the
+/// box, which shows that the object itself moves.
+double changeBetween(const KeyframeView& a, const KeyframeView& b, const ViewScales& scales) {
+  return std::max(viewChange(a.ray, b.ray, scales),
                   (a.centre - b.centre).norm() / scales.image_angle +
                       std::abs(a.log_height - b.log_height) / scales.log_distance);
 }
 
-/// The keyframe that is least apart from the nearest other one. The newest stays: what moves is
-/// estimated at its time.
-std::size_t leastApart(const Eigen::Vector3d& place, const Keyframes& all,
-                       const ViewScales& scales) {
-  std::vector<KeyframeAspect> glimpses;
-  glimpses.reserve(all.size());
-  for (const auto& k : all) glimpses.push_back(keyframeAspectOf(place, *k));
-  std::vector<double> apart(all.size(), std::numeric_limits<double>::infinity());
+/// Returns the keyframe that is most similar to another. It is never the newest, because a moving
+/// object is estimated at the time of the newest.
+std::size_t mostSimilar(const Eigen::Vector3d& place, const Keyframes& all,
+                        const ViewScales& scales) {
+  std::vector<KeyframeView> views;
+  views.reserve(all.size());
+  for (const auto& k : all) views.push_back(keyframeViewOf(place, *k));
+  std::vector<double> least_change(all.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      const double change = changeBetween(glimpses[i], glimpses[j], scales);
-      apart[i] = std::min(apart[i], change);
-      apart[j] = std::min(apart[j], change);
+      const double change = changeBetween(views[i], views[j], scales);
+      least_change[i] = std::min(least_change[i], change);
+      least_change[j] = std::min(least_change[j], change);
     }
   }
-  return static_cast<std::size_t>(std::min_element(apart.begin(), apart.end() - 1) - apart.begin());
+  return static_cast<std::size_t>(std::min_element(least_change.begin(), least_change.end() - 1) -
+                                  least_change.begin());
 }
 
 void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales,
           std::size_t limit) {
   while (all.size() > limit) {
-    all.erase(all.begin() + static_cast<std::ptrdiff_t>(leastApart(place, all, scales)));
+    all.erase(all.begin() + static_cast<std::ptrdiff_t>(mostSimilar(place, all, scales)));
   }
 }
 
@@ -59,11 +61,11 @@ void thin(const Eigen::Vector3d& place, Keyframes& all, const ViewScales& scales
 bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters) {
   const Eigen::Vector3d place = track.best().x.head<3>();
-  const KeyframeAspect now = keyframeAspectOf(place, keyframe);
+  const KeyframeView now = keyframeViewOf(place, keyframe);
   const auto same = [&](const auto& other) {
-    return changeBetween(keyframeAspectOf(place, *other), now, scales) < parameters.new_view;
+    return changeBetween(keyframeViewOf(place, *other), now, scales) < parameters.new_view;
   };
-  // The late ones first: they are the most correlation.
+  // Begins with the newest: it is usually the most similar.
   const Keyframes& known = track.batch.keyframes.read();
   if (std::any_of(known.rbegin(), known.rend(), same)) return false;
   Keyframes& all = track.batch.keyframes.write();
@@ -73,7 +75,8 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
 }
 
 bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters) {
-  constexpr double kContradicted = 14.0;  // of four degrees of freedom, one in 140
+  // χ² with four degrees of freedom exceeds it once in 140 times.
+  constexpr double kContradicted = 14.0;
   const FrameView& from = *keyframe.from;
   State cuboid = h.x;
   cuboid.segment<4>(kBias).setZero();
@@ -95,8 +98,7 @@ void mergeBatches(Track& a, const Track& b, const ViewScales& scales,
   all.insert(all.end(), b.batch.keyframes.begin(), b.batch.keyframes.end());
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& x, const auto& y) { return x->from->time < y->from->time; });
-  thin(a.best().x.head<3>(), all, scales,
-       static_cast<std::size_t>(parameters.keyframes));
+  thin(a.best().x.head<3>(), all, scales, static_cast<std::size_t>(parameters.keyframes));
 }
 
 }  // namespace perdure::semantic_filter

@@ -1,6 +1,8 @@
-// The batch at an track that are remembered, so that a static thing can be estimated again from
-// all of them at once: a filter that linearised at a wrong first depth, or that took the visible
-// part of a thing for the whole, stays wrong; the batch does not.
+// Keyframes of a track: observations that are kept for the batch estimate (Dellaert, Kaess 2017).
+// Derivation: tools/docs/maths/map_fit.md.
+//
+// A filter that linearised at a wrong first depth, or that took the visible part of an object for
+// the whole, stays wrong. A fit to all keyframes does not.
 #pragma once
 
 #include <memory>
@@ -14,15 +16,16 @@
 
 namespace perdure::semantic_filter {
 
-/// Takes the keyframe in if it shows the track from where no remembered one does. Where there are
-/// `limit` already, the one that tells least beside its neighbours goes. Whether anything changed.
+/// Adds the keyframe if its view differs from those of all others. When there are more than
+/// `parameters.keyframes`, the one that is most similar to another goes, but never the newest.
+/// Returns whether the keyframe was added.
 bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters);
 
-/// Whether the keyframe may have been at `h`.
+/// Whether the box of the keyframe fits the hypothesis.
 bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters);
 
-/// Takes b's keyframes into a's batch: both are of one object.
+/// Adds the keyframes of b to those of a. Both tracks are one object.
 void mergeBatches(Track& a, const Track& b, const ViewScales& scales,
                   const SmoothingParameters& parameters);
 

@@ -13,20 +13,20 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr int kRounds = 12;
-constexpr double kContradicted = 25.0;  // of about four degrees of freedom
-constexpr double kEnough = 0.02;        // squared deviations that a further step is worth
+constexpr double kContradicted = 25.0;  // squared deviations of a keyframe, of about four sides
+constexpr double kEnough = 0.02;        // least gain of a further step, squared deviations
 
 }  // namespace
 
 struct MapFit::Fit {
   State x;
   Stack stack;
-  std::shared_ptr<const SideCovariance> covariance;  ///< shared by fits of the same batch
-  State covariance_at;                               ///< the x that it is of
+  std::shared_ptr<const SideCovariance> covariance;  ///< fits of the same batch share it
+  State covariance_at;                               ///< the x that it was computed at
   Eigen::VectorXd inflations;
   Eigen::ArrayXi contradicted;
   std::shared_ptr<const Cholesky> R;
-  Eigen::MatrixXd whitened;  ///< the rows of the stack by R
+  Eigen::MatrixXd whitened;  ///< L⁻¹ times the rows of the stack, R = L Lᵀ
 
   double squaredResidual() const { return whitened.rightCols<1>().squaredNorm(); }
 };
@@ -35,8 +35,8 @@ namespace {
 
 using Fit = MapFit::Fit;
 
-/// Weights of a t distribution for whole batch, and which of them contradict x. Whether the weights
-/// changed enough to matter.
+/// Sets the inflation of each keyframe (t distribution) and whether the keyframe contradicts x.
+/// Returns whether an inflation changed enough to matter.
 bool inflateKeyframes(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
   const Eigen::VectorXd residual = fit.covariance->withoutPose(
@@ -55,7 +55,8 @@ bool inflateKeyframes(Fit& fit, double tail) {
   return matters;
 }
 
-/// The covariance changes little with x: it is taken anew where the thing has moved in the view.
+/// Whether the object has moved so far that the covariance must be computed again. It changes
+/// little with x.
 bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
   constexpr double kLittle = 0.02;  // of the distance
   const double distance = (fit.x.head<3>() - from).norm();
@@ -75,24 +76,25 @@ bool factorise(const BatchProblem& model, Fit& fit, bool anew) {
   return true;
 }
 
-/// Damping of Levenberg and Marquardt's steps, less by what the last one gained of what it was to
-/// gain (Nielsen 1999). Where an extreme corner gives way to another the cost has a kink, at which
-/// a damping that falls after each success fails at every other step.
+/// Damping of Levenberg-Marquardt steps. It falls by the ratio of true to predicted gain (Nielsen
+/// 1999). Where the extreme corner changes, the cost has a kink; there a damping that falls after
+/// each success fails at every other step.
 class Damping {
  public:
   double value() const { return value_; }
-  void failed() { value_ = std::max(5.0 * value_, kFelt); }
+  void failed() { value_ = std::max(5.0 * value_, kEffective); }
   void succeeded(double share) {
     value_ = std::max(value_ * std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * share - 1.0, 3)), 1e-6);
   }
 
  private:
-  static constexpr double kFelt = 0.03;  // a lesser one hardly changes a step
+  static constexpr double kEffective = 0.03;  // a smaller damping hardly changes a step
   double value_ = 1e-4;
 };
 
-/// One step, and what it was to gain (squared deviations). False where none lowers the cost.
-bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& gained) {
+/// Takes one step and returns its predicted gain, squared deviations. Returns false if no damping
+/// gives a step that lowers the cost.
+bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& predicted_gain) {
   const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
   const double cost = fit.squaredResidual() + model.priorCost(fit.x);
   for (int attempt = 0; attempt < 6; ++attempt) {
@@ -105,11 +107,11 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& gain
       auto whitened = fit.R->whiten(stack->rows);
       const double then = whitened.rightCols<1>().squaredNorm() + model.priorCost(next);
       if (then <= cost * (1.0 + 1e-3) + 1e-6) {
-        gained = q.g.dot(step);
+        predicted_gain = q.g.dot(step);
         fit.x = next;
         fit.stack = std::move(*stack);
         fit.whitened = std::move(whitened);
-        damping.succeeded(gained > 1e-9 ? (cost - then) / gained : 1.0);
+        damping.succeeded(predicted_gain > 1e-9 ? (cost - then) / predicted_gain : 1.0);
         return true;
       }
     }
@@ -119,19 +121,19 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& gain
 }
 
 bool isOneOf(const std::vector<const Hypothesis*>& found, const State& x) {
-  constexpr double kSame = 0.25;  // squared deviations
+  constexpr double kSameMode = 0.25;  // squared deviations
   return std::any_of(found.begin(), found.end(), [&](const Hypothesis* mode) {
     Hypothesis h = *mode;
     h.x = x;
-    return distance2(*mode, h) < kSame;
+    return distance2(*mode, h) < kSameMode;
   });
 }
 
-/// `like` has the covariance and the inflations to begin with: those of another mode of the same
-/// batch.
-std::optional<Fit> fitLooks(const BatchProblem& model, const State& start,
-                            const KeyframeBatch& batch, double tail, const Fit* like,
-                            const std::vector<const Hypothesis*>& found) {
+/// `like`: fit of another mode of the same batch. This fit begins with its covariance and
+/// inflations.
+std::optional<Fit> fitKeyframes(const BatchProblem& model, const State& start,
+                                const KeyframeBatch& batch, double tail, const Fit* like,
+                                const std::vector<const Hypothesis*>& found) {
   Fit fit;
   fit.x = start;
   fit.inflations = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(batch.size()));
@@ -151,21 +153,21 @@ std::optional<Fit> fitLooks(const BatchProblem& model, const State& start,
   Damping damping;
   double before = 0.0;
   for (int round = 0; round < kRounds; ++round) {
-    double gained = 0.0;
-    const bool better = descend(model, fit, damping, gained);
+    double predicted_gain = 0.0;
+    const bool better = descend(model, fit, damping, predicted_gain);
     if (isOneOf(found, fit.x)) return std::nullopt;
     const bool inflated = inflateKeyframes(fit, tail);
     const bool elsewhere = movedInView(fit, from);
     if ((inflated || elsewhere) && !factorise(model, fit, elsewhere)) return std::nullopt;
-    if (round > 0 && (!better || gained < kEnough)) break;
-    const bool converges = !inflated && !elsewhere && gained < 0.5 * before;
-    if (round > 0 && converges && gained * gained < kEnough * before) break;
-    before = gained;
+    if (round > 0 && (!better || predicted_gain < kEnough)) break;
+    const bool converges = !inflated && !elsewhere && predicted_gain < 0.5 * before;
+    if (round > 0 && converges && predicted_gain * predicted_gain < kEnough * before) break;
+    before = predicted_gain;
   }
   return fit;
 }
 
-/// The filter's state, with b and C, from the fit.
+/// Returns the hypothesis of the fit, with b and C for the filter.
 std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
                                   const Hypothesis& start, const FrameContext& frame) {
   const auto Jw = fit.whitened.leftCols(model.dim());
@@ -184,7 +186,7 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
   const Eigen::MatrixXd Bw =
       fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.inflations).transpose());
   const Eigen::MatrixXd Ew = fit.R->whiten(model.poseNow(fit.stack).transpose());
-  // Tall and narrow: to pack them for Eigen's product costs more than the sums.
+  // The factors are tall and narrow: to pack them for Eigen's product costs more than the sums.
   const Eigen::MatrixXd BJ = Bw.transpose().lazyProduct(Jw);
   const Eigen::MatrixXd C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
 
@@ -230,12 +232,13 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
   const BatchProblem model(batch, start.moving, start.class_name, start.x, frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
-  auto fit = fitLooks(model, x, batch, frame.parameters->box.tail,
-                      like ? like->fit_.get() : nullptr, found);
+  auto fit = fitKeyframes(model, x, batch, frame.parameters->box.tail,
+                          like ? like->fit_.get() : nullptr, found);
   if (!fit) return std::nullopt;
   auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
-  // Of another view what moves the thing together with the pose batch like information.
+  // With the covariance of another state, a motion of object and pose together looks like
+  // information.
   if (fit->covariance_at != fit->x && !isJointCovariance(*h, frame.pose_error.covariance)) {
     h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;
     if (!h) return std::nullopt;
@@ -264,11 +267,12 @@ std::size_t MapFit::sides() const {
 }
 
 ResidualRatio MapFit::residualRatio() const {
-  // Of a Gaussian residual of four dimensions: a inflation is never less than one.
-  constexpr double kShareLeftByDoubts = 0.83;
+  // Robust weights leave this share of a squared Gaussian residual of four dimensions, because an
+  // inflation is never less than one.
+  constexpr double kShareAfterWeights = 0.83;
   const double free = static_cast<double>(sides()) - modelOf().dim();
   if (free <= 0.0) return {};
-  return {frame_->noise_scale.noise * fit_->squaredResidual() / (kShareLeftByDoubts * free), free};
+  return {frame_->noise_scale.noise * fit_->squaredResidual() / (kShareAfterWeights * free), free};
 }
 
 ResidualRatio MapFit::azimuthResidualRatio() const {
@@ -281,7 +285,7 @@ double MapFit::logEvidence(const Eigen::VectorXd& inflations, bool of_yaw) const
   constexpr double kImpossible = -1e6;
   const BatchProblem model = modelOf();
   const Stack& stack = fit_->stack;
-  // At this very state: a determinant of a hundred dimensions forgives no other.
+  // R is computed at exactly this state: its determinant of a hundred dimensions depends on it.
   thread_local SideCovariance covariance;
   thread_local Eigen::MatrixXd storage;
   model.covariance(fit_->x, stack, covariance);

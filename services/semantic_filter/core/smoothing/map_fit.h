@@ -1,11 +1,14 @@
-// Smooth: the state of a hypothesis from all remembered batch at once (the maximum of its
-// posterior, by Gauss-Newton), in place of what the filter made of them one after the other.
+// MAP fit: the state of a hypothesis that maximises the posterior given all keyframes at once, by
+// Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999). It replaces what the filter made of
+// them one after the other. Derivation: tools/docs/maths/map_fit.md.
 //
-// The model is the filter's own: sides with noise and with the track's b, an Ornstein-Uhlenbeck
-// process along the change of view; the pose error of each look, with its correlation between batch
-// and with the present one; t-distributed boxes; the class's prior of size; for what moves, its
-// speed's prior and white acceleration. b, the pose errors and the accelerations are marginal, so
-// that the covariance of the sides of all batch is one full matrix.
+// The model is that of the filter:
+// - sides with noise and with b, an Ornstein-Uhlenbeck process along the view change;
+// - a pose error for each keyframe, correlated between keyframes and with the present pose error;
+// - t-distributed boxes, and the size prior of the class;
+// - for a moving hypothesis, a speed prior and white acceleration.
+// b, pose errors and accelerations are marginalised. So the sides of all keyframes have one full
+// covariance matrix.
 #pragma once
 
 #include <memory>
@@ -17,38 +20,38 @@
 
 namespace perdure::semantic_filter {
 
-/// A hypothesis as the batch have it. The batch and the frame outlive it.
+/// One hypothesis, fitted to all keyframes. The batch and the frame outlive it.
 class MapFit {
  public:
   struct Fit;
 
-  /// Nothing where the batch do not see `start`, or do not fix its place. `like`: another mode of
-  /// the same batch, at rest or moving as `start`, to begin with what it found of the boxes'
-  /// errors. `found`: modes of the same batch, to which a further fit need not come: nothing where
-  /// it does.
+  /// Returns nothing if `start` has no projection in a keyframe, if the keyframes do not determine
+  /// the place, or if the fit comes to one of the modes `found` of the same batch. `like`: another
+  /// mode of the same batch with the same motion; the fit begins with its inflations and
+  /// covariance.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
                                     const std::vector<const Hypothesis*>& found = {});
 
   const Hypothesis& hypothesis() const { return hypothesis_; }
-  /// By how much each look's noise is widened (t distribution), >= 1.
+  /// Returns the inflation of each keyframe, d >= 1 (t distribution).
   const Eigen::VectorXd& inflations() const;
-  /// Share of the batch that contradict it.
+  /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// What it leaves over of the boxes, beside what was assumed of their errors at first; of as many
-  /// sides as it has degrees of freedom.
+  /// Returns the residuals of the sides, relative to the first assumption. Their count is the
+  /// degrees of freedom.
   ResidualRatio residualRatio() const;
-  /// The same of the azimuths.
+  /// Returns the same for the azimuths.
   ResidualRatio azimuthResidualRatio() const;
-  /// Sides that count as measured, of all batch.
+  /// Returns the number of sides that count, of all keyframes.
   std::size_t sides() const;
-  /// 1 for each look that does.
+  /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
   const Eigen::ArrayXi& contradictions() const;
-  /// log p(boxes | this class, and that it moves or not), by Laplace's method. To compare two, both
-  /// are asked with the same inflations. `of_yaw`: to compare modes of yaw, with what azimuths say
-  /// and without the prior around the start.
+  /// Returns the log marginal likelihood, log p(boxes | class, motion), by Laplace's method. Two
+  /// fits are compared with the same inflations. `of_yaw`: for modes of yaw; with the azimuths and
+  /// without the yaw prior around the start.
   double logEvidence(const Eigen::VectorXd& inflations, bool of_yaw = false) const;
-  /// Log-odds that the azimuths mean its yaw and not the one turned by 180°.
+  /// Returns the log-odds, by the azimuths, that its yaw is not turned by 180°.
   double logHeading() const;
 
  private:

@@ -12,12 +12,12 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-bool oneMode(const Hypothesis& a, const Hypothesis& b) {
-  constexpr double kTwins = 1.0;  // squared deviations
-  return std::min(distance2(a, b), distance2(b, a)) < kTwins;
+bool sameMode(const Hypothesis& a, const Hypothesis& b) {
+  constexpr double kSameMode = 1.0;  // squared deviations
+  return std::min(distance2(a, b), distance2(b, a)) < kSameMode;
 }
 
-/// A thing at rest as none of its hypotheses may have it: turned, and of usual size.
+/// Returns starts at rest that no hypothesis may have: yaw turned by 45°, 90° and 135°, usual size.
 std::vector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
   std::vector<Hypothesis> starts;
   if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
@@ -60,20 +60,20 @@ Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
 }
 
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
-                 const Fitted& driving, const FrameContext& frame) {
-  const MapFit &still = at_rest.map_fit, &moving = driving.map_fit;
-  constexpr double kSurest = 15.0;  // nats
+                 const Fitted& in_motion, const FrameContext& frame) {
+  const MapFit &static_fit = at_rest.map_fit, &moving_fit = in_motion.map_fit;
+  constexpr double kMaxLogOdds = 15.0;  // nats
   const ClassPrior& prior = frame.priors->of(name);
   const auto& motion = frame.parameters->motion;
-  const Eigen::VectorXd inflations = still.inflations().cwiseMin(moving.inflations());
+  const Eigen::VectorXd inflations = static_fit.inflations().cwiseMin(moving_fit.inflations());
   const double speed_prior_ratio =
-      motion.creeping + (1.0 - motion.creeping) *
-                            fasterThan(moving.hypothesis(), motion.slow_share * prior.speed_sigma);
+      motion.creeping + (1.0 - motion.creeping) * fasterThan(moving_fit.hypothesis(),
+                                                             motion.slow_share * prior.speed_sigma);
   const double log_odds = std::clamp(
-      still.logEvidence(inflations) - moving.logEvidence(inflations) + at_rest.ground -
-          driving.ground + std::log((1.0 - prior.moving) / prior.moving / speed_prior_ratio),
-      -kSurest, kSurest);
-  const double rests = 1.0 / (1.0 + std::exp(-log_odds));
+      static_fit.logEvidence(inflations) - moving_fit.logEvidence(inflations) + at_rest.ground -
+          in_motion.ground + std::log((1.0 - prior.moving) / prior.moving / speed_prior_ratio),
+      -kMaxLogOdds, kMaxLogOdds);
+  const double p_rest = 1.0 / (1.0 + std::exp(-log_odds));
   double weight[2] = {0.0, 0.0};
   for (const auto& h : hs) {
     if (h.class_name == name) weight[h.moving] += h.weight;
@@ -81,7 +81,7 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
   const double all = weight[0] + weight[1];
   for (auto& h : hs) {
     if (h.class_name != name || weight[h.moving] <= 0.0) continue;
-    h.weight *= all * (h.moving ? 1.0 - rests : rests) / weight[h.moving];
+    h.weight *= all * (h.moving ? 1.0 - p_rest : p_rest) / weight[h.moving];
     if (h.moving) h.speed_prior_ratio = speed_prior_ratio;
   }
 }
@@ -92,16 +92,17 @@ void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
   for (const auto& f : fits) inflations = inflations.cwiseMin(f.map_fit.inflations());
   constexpr double kNone = -1e9;
   std::vector<double> log_evidence;
-  double most = kNone, all = 0.0, sum = 0.0;
+  double largest = kNone, all = 0.0, sum = 0.0;
   for (auto f = fits.begin(); f != fits.end(); ++f) {
     all += hs[f->index].weight;
-    const bool twin = std::any_of(
-        fits.begin(), f, [&](const Fitted& g) { return oneMode(hs[g.index], hs[f->index]); });
-    log_evidence.push_back(twin ? kNone : f->map_fit.logEvidence(inflations, true) + f->ground);
-    most = std::max(most, log_evidence.back());
+    const bool duplicate = std::any_of(
+        fits.begin(), f, [&](const Fitted& g) { return sameMode(hs[g.index], hs[f->index]); });
+    log_evidence.push_back(duplicate ? kNone
+                                     : f->map_fit.logEvidence(inflations, true) + f->ground);
+    largest = std::max(largest, log_evidence.back());
   }
   for (auto& e : log_evidence) {
-    e = std::exp(e - most);
+    e = std::exp(e - largest);
     if (e < least) e = 0.0;
     sum += e;
   }
@@ -146,7 +147,7 @@ std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const Keyfr
 }
 
 void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameContext& frame) {
-  constexpr double kLeastOdds = -6.0, kSurest = 15.0;  // nats
+  constexpr double kLeastOdds = -6.0, kMaxLogOdds = 15.0;  // nats
   const Hypothesis other = track.best();
   if (other.class_name != kOtherClass || other.moving || track.lookalike.class_name.empty()) return;
   if (classProbability(track, track.lookalike.class_name) > 0.0) return;
@@ -155,9 +156,9 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
   if (prior.name != track.lookalike.class_name) return;
   const auto as_other = fit(other, batch, frame);
   if (!as_other) return;
-  const Hypothesis& whole = as_other->hypothesis();
-  const double distance = (whole.x.head<3>() - frame.view.T_WC().p).norm();
-  const double place = std::sqrt(whole.P.topLeftCorner<3, 3>().trace());
+  const Hypothesis& fitted_other = as_other->hypothesis();
+  const double distance = (fitted_other.x.head<3>() - frame.view.T_WC().p).norm();
+  const double place = std::sqrt(fitted_other.P.topLeftCorner<3, 3>().trace());
   if (place > p.tracks.scale_resolved * distance) return;
   Hypothesis start = other;
   start.class_name = track.lookalike.class_name;
@@ -169,7 +170,7 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
     std::vector<const Hypothesis*> found;
     for (const MapFit& f : fits) found.push_back(&f.hypothesis());
     auto map_fit = fit(one, batch, frame, fits.empty() ? nullptr : &fits.front(), found);
-    // What the image's border cuts on all sides fits any box.
+    // A fit with fewer compared sides is refused: one whose sides are all cut fits any box.
     if (map_fit && map_fit->sides() >= as_other->sides() &&
         !misshapen(map_fit->hypothesis(), prior, p.tracks.size_gate)) {
       fits.push_back(std::move(*map_fit));
@@ -178,16 +179,16 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
   if (fits.empty()) return;
   Eigen::VectorXd inflations = as_other->inflations();
   for (const MapFit& one : fits) inflations = inflations.cwiseMin(one.inflations());
-  const double most = as_other->logEvidence(inflations);
-  const double at_birth = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -
-                          std::log(std::max(p.clutter.other_lookalike, 1e-3));
+  const double other_evidence = as_other->logEvidence(inflations);
+  const double initial_log_odds = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -
+                                  std::log(std::max(p.clutter.other_lookalike, 1e-3));
   for (const MapFit& one : fits) {
     Hypothesis h = one.hypothesis();
     const double ground = updateWithGround(h, track.id, frame);
-    const double odds = one.logEvidence(inflations) - most + at_birth + ground;
+    const double odds = one.logEvidence(inflations) - other_evidence + initial_log_odds + ground;
     if (odds < kLeastOdds) continue;
     track.hypotheses.push_back(h);
-    track.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kSurest));
+    track.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kMaxLogOdds));
   }
   normalise(track, ClassEvidence::kGeometry);
 }

@@ -1,5 +1,6 @@
-// Which mode of yaw an track is in, and whether it moves: fits from several starts, weighed by the
-// log_evidence of all batch.
+// Mode search: MAP fits of a track from other starts of yaw and size, at rest and in motion,
+// weighed by their marginal likelihoods (Laplace's method; the paper has none). Derivation:
+// tools/docs/maths/mode_search.md.
 #pragma once
 
 #include <optional>
@@ -10,39 +11,39 @@
 
 namespace perdure::semantic_filter {
 
-/// A fit of one of an track's hypotheses, by its index.
+/// The fit of one hypothesis of a track.
 struct Fitted {
   std::size_t index;
   MapFit map_fit;
-  double ground;  ///< nats, of standing on it
+  double ground;  ///< log-likelihood ratio of its ground contact, nats
 };
 using Fits = std::vector<Fitted>;
 
-/// Nothing where too many batch contradict.
+/// As MapFit::make; also returns nothing if too many keyframes contradict the fit.
 std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
                           const FrameContext& frame, const MapFit* like = nullptr,
                           const std::vector<const Hypothesis*>& found = {});
-/// A fit that none of the track's hypotheses had, with its own `h`.
+/// Adds `h` with its ground contact to the track and returns it with its fit.
 Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame);
-/// The thing at rest where the batch say, when the filter has come to believe that it moves.
+/// Returns a start at rest for a moving hypothesis: its position at the middle keyframe.
 Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes);
-/// Of one class: whether it moves, by what all batch and the ground say.
+/// Divides the weight of one class between rest and motion, by all keyframes and the ground.
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
-                 const Fitted& driving, const FrameContext& frame);
-/// What all batch and the ground say of each mode. One that was reached twice counts once; those
-/// that say less than `least` of the best go.
+                 const Fitted& in_motion, const FrameContext& frame);
+/// Divides the weight of the fitted hypotheses among them, by all keyframes and the ground. A mode
+/// that was reached twice counts once. A mode below `least` of the best gets the weight 0.
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least);
-/// The fit whose hypothesis weighs most.
+/// Returns the fit whose hypothesis has the largest weight.
 std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits);
-/// Fits from other starts of yaw and size; those that are new are added.
+/// Fits from other starts of yaw and size, and adds the new modes to the track and to `fits`.
 void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits);
-/// What stands where the ground is not may go along it elsewhere: one that moves, which the filter
-/// has given up, is tried again.
+/// If the ground contradicts rest, fits a moving hypothesis, which the filter has given up: the
+/// object may move on the ground elsewhere. Returns nothing if there is no such fit.
 std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const KeyframeBatch& batch,
                                 const FrameContext& frame);
-/// A thing of no known class that the network takes for one: boxes that were of two things make the
-/// shape of none, and what is of no known class takes any. Whether all batch together are of the
-/// class after all. To look like one at all is paid for once, as at birth.
+/// Fits an *other* track as the class that it resembles, and adds what fits. Boxes of two objects
+/// make the shape of neither, and *other* fits any shape; all keyframes together may show the class
+/// after all. The odds of *other* against the class are those at initiation, counted once.
 void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

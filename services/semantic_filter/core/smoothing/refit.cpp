@@ -15,71 +15,73 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// What the fits that were taken say of each look.
-struct Verdicts {
+/// How many of the accepted fits contradict each keyframe.
+struct ContradictionCounts {
   int fits = 0;
-  Eigen::ArrayXi against;
+  Eigen::ArrayXi counts;
   void add(const Eigen::ArrayXi& contradictions) {
-    against = fits++ == 0 ? contradictions : Eigen::ArrayXi(against + contradictions);
+    counts = fits++ == 0 ? contradictions : Eigen::ArrayXi(counts + contradictions);
   }
 };
 
-/// A look that contradicts every fit showed something else.
-void dropContradicted(Track& track, const Verdicts& verdicts, std::size_t least) {
-  if (verdicts.fits == 0) return;
+/// Removes the keyframes that contradict every fit: they showed something else.
+void dropContradicted(Track& track, const ContradictionCounts& contradictions, std::size_t least) {
+  if (contradictions.fits == 0) return;
   std::vector<std::shared_ptr<const Keyframe>> kept;
   const auto& all = track.batch.keyframes.read();
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (verdicts.against[static_cast<Eigen::Index>(i)] < verdicts.fits) kept.push_back(all[i]);
+    if (contradictions.counts[static_cast<Eigen::Index>(i)] < contradictions.fits)
+      kept.push_back(all[i]);
   }
   if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
-/// What the best fit of a thing of the class at rest leaves over.
+/// Fits the hypotheses of one class. Returns the residuals of its best fit at rest.
 std::optional<ResidualRatios> refitClass(Track& track, const std::string& name,
                                          const KeyframeBatch& batch, const FrameContext& frame,
-                                         bool search, Verdicts& verdicts) {
+                                         bool search, ContradictionCounts& contradictions) {
   const auto& p = frame.parameters->smoothing;
-  Fits still, moving;
+  Fits static_fits, moving_fits;
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
     auto& h = track.hypotheses[i];
     if (h.class_name != name || h.weight < p.least_weight) continue;
-    Fits& others = h.moving ? moving : still;
-    auto map_fit = fit(h, batch, frame, others.empty() ? nullptr : &others.front().map_fit);
+    Fits& fits = h.moving ? moving_fits : static_fits;
+    auto map_fit = fit(h, batch, frame, fits.empty() ? nullptr : &fits.front().map_fit);
     if (!map_fit) continue;
     h = map_fit->hypothesis();
     const double ground = updateWithGround(h, track.id, frame);
-    verdicts.add(map_fit->contradictions());
-    others.push_back({i, std::move(*map_fit), ground});
+    contradictions.add(map_fit->contradictions());
+    fits.push_back({i, std::move(*map_fit), ground});
   }
-  if (search && !still.empty() && name == track.best().class_name) {
-    searchModes(track, batch, frame, still);
-    for (const Fitted& f : still) track.hypotheses[f.index].modes_searched = true;
+  if (search && !static_fits.empty() && name == track.best().class_name) {
+    searchModes(track, batch, frame, static_fits);
+    for (const Fitted& f : static_fits) track.hypotheses[f.index].modes_searched = true;
   }
-  weighModes(track.hypotheses.write(), still, p.least_weight);
-  weighModes(track.hypotheses.write(), moving, p.least_weight);
-  auto at_rest = heaviest(track.hypotheses.read(), std::move(still));
-  std::optional<ResidualRatios> over;
+  weighModes(track.hypotheses.write(), static_fits, p.least_weight);
+  weighModes(track.hypotheses.write(), moving_fits, p.least_weight);
+  auto at_rest = heaviest(track.hypotheses.read(), std::move(static_fits));
+  std::optional<ResidualRatios> residuals;
   if (at_rest) {
-    over =
+    residuals =
         ResidualRatios{at_rest->map_fit.residualRatio(), at_rest->map_fit.azimuthResidualRatio()};
   }
-  auto driving = heaviest(track.hypotheses.read(), std::move(moving));
-  if (!driving && at_rest) driving = tryMoving(track, *at_rest, batch, frame);
-  if (!driving) return over;
+  auto in_motion = heaviest(track.hypotheses.read(), std::move(moving_fits));
+  if (!in_motion && at_rest) in_motion = tryMoving(track, *at_rest, batch, frame);
+  if (!in_motion) return residuals;
   if (!at_rest) {
-    const Hypothesis& mover = driving->map_fit.hypothesis();
+    const Hypothesis& mover = in_motion->map_fit.hypothesis();
     auto map_fit = fit(atRest(mover, track.batch.keyframes.read()), batch, frame);
-    if (!map_fit) return over;
+    if (!map_fit) return residuals;
     Hypothesis h = map_fit->hypothesis();
     h.weight = 1e-3 * mover.weight;
     at_rest.emplace(adopt(track, std::move(h), std::move(*map_fit), frame));
   }
-  weighMotion(track.hypotheses.write(), name, *at_rest, *driving, frame);
-  return over;
+  weighMotion(track.hypotheses.write(), name, *at_rest, *in_motion, frame);
+  return residuals;
 }
 
-/// All of its batch are of the present network, and it is something that stands.
+/// Whether the residuals of the track may inform the noise scale: it surely exists and stands, its
+/// class is known, and all its keyframes are of the present network.
 bool informsNoiseScale(const Track& track, const FrameContext& frame) {
   constexpr double kSure = 0.9;
   const Hypothesis& best = track.best();
@@ -111,7 +113,7 @@ double refitNeed(const Track& track, double fresh) {
 
 std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smoothing.patience);
-  constexpr double kLittle = 1.0;  // squared deviations, of seven dimensions
+  constexpr double kLittle = 1.0;  // squared deviations of seven dimensions
   const auto& p = *frame.parameters;
   const double fresh = track.batch.fresh / static_cast<double>(track.batch.keyframes.size());
   track.batch.fresh = 0;
@@ -121,23 +123,23 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   for (const auto& h : track.hypotheses.read()) names.insert(h.class_name);
   const bool search = track.batch.seen >= track.batch.mode_search_due;
   if (search) track.batch.mode_search_due = 2 * track.batch.seen;
-  Verdicts verdicts;
-  std::map<std::string, ResidualRatios> over;
+  ContradictionCounts contradictions;
+  std::map<std::string, ResidualRatios> residuals;
   for (const auto& name : names) {
-    const auto left = refitClass(track, name, batch, frame, search, verdicts);
-    if (left) over[name] = *left;
+    const auto residual = refitClass(track, name, batch, frame, search, contradictions);
+    if (residual) residuals[name] = *residual;
   }
   std::erase_if(track.hypotheses.write(), [](const Hypothesis& h) { return h.weight <= 0.0; });
   normalise(track, ClassEvidence::kMotion);
   tryLookalikeClass(track, batch, frame);
-  dropContradicted(track, verdicts, static_cast<std::size_t>(p.smoothing.least));
+  dropContradicted(track, contradictions, static_cast<std::size_t>(p.smoothing.least));
   const bool same =
       before.class_name == track.best().class_name && before.moving == track.best().moving;
   const bool settled = same && distance2(before, track.best()) < kLittle;
   track.batch.patience = settled ? std::min(2 * track.batch.patience, most_patience) : 1;
-  const auto told = over.find(track.best().class_name);
-  if (told == over.end() || !informsNoiseScale(track, frame)) return std::nullopt;
-  ResidualRatios result = told->second;
+  const auto of_best = residuals.find(track.best().class_name);
+  if (of_best == residuals.end() || !informsNoiseScale(track, frame)) return std::nullopt;
+  ResidualRatios result = of_best->second;
   for (ResidualRatio* one : {&result.sides, &result.azimuths}) one->count *= std::min(fresh, 1.0);
   return result;
 }
@@ -151,9 +153,9 @@ void refitNeediest(std::vector<Track*>& tracks, Belief& belief, const FrameConte
   if (tracks.size() > most) tracks.resize(most);
   for (Track* track : tracks) {
     const double share = track->batch.fresh / static_cast<double>(track->batch.keyframes.size());
-    if (const auto over = refit(*track, frame)) {
-      belief.learned.sides.learn(frame.noise_scale.model, over->sides);
-      belief.learned.azimuths.learn(frame.noise_scale.model, over->azimuths);
+    if (const auto residuals = refit(*track, frame)) {
+      belief.learned.sides.learn(frame.noise_scale.model, residuals->sides);
+      belief.learned.azimuths.learn(frame.noise_scale.model, residuals->azimuths);
     }
     frame.ground->tell(belief.learned.roughness_scale, *track, share);
   }

@@ -1,5 +1,5 @@
-// The verb "smooth": an track's hypotheses again from all its remembered batch; which mode of yaw
-// it is, and whether it moves.
+// Refit: when a track is fitted to its keyframes, and the fits of all its hypotheses (Dellaert,
+// Kaess 2017). Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/belief.h"
@@ -7,22 +7,23 @@
 
 namespace perdure::semantic_filter {
 
-/// Remembers this box of the track's where it shows something new. Whether the track is then to
-/// be map_fit.
+/// Keeps this assigned box as a keyframe if its view is new. Returns whether the track should then
+/// be fitted.
 bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bool, 4>& hidden,
                       const FrameContext& frame);
-/// How much there is to gain, where `fresh` is the share of new batch that is waited for: 1 and
-/// more is worth it.
+/// Returns the number of new keyframes over the number that is awaited; from 1 on the track should
+/// be fitted. `fresh`: the share of new keyframes that is awaited.
 double refitNeed(const Track& track, double fresh);
-/// What the fit of a thing leaves over of its batch.
+/// The residuals of a fit.
 struct ResidualRatios {
   ResidualRatio sides, azimuths;
 };
-/// Smooths the track's hypotheses and weighs within each class whether it moves. Of a thing that
-/// surely stands, what is left over of the batch that are new.
+/// Fits the hypotheses of the track and weighs rest against motion in each class. Returns the
+/// residuals of the new keyframes, if the track may inform the noise scale.
 std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame);
 
-/// Smooths the tracks that need it most: as many as a frame has time for; the others wait.
+/// Fits the tracks with the largest refitNeed, at most SmoothingParameters::per_frame, and learns
+/// noise scales and ground from them. The others wait.
 void refitNeediest(std::vector<Track*>& tracks, Belief& belief, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -11,12 +11,12 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Residuals where nothing is before the camera: the solver reads them of a step whose cost cannot
-/// be told, and must not take it.
+/// Residuals of a state without a projection. The solver reads the residuals of a step even if its
+/// cost could not be computed, and must not take such a step.
 constexpr double kNoStep = 1e100;
 
-/// Residuals: four sides, three of position (weak), one of yaw, three of size, one of range,
-/// four of bias.
+/// Residuals, whitened: four of sides, three of position (weak), one of yaw, three of size, one of
+/// range, four of bias.
 class CuboidCost {
  public:
   using Scalar = double;
@@ -91,7 +91,8 @@ class CuboidCost {
   Eigen::Matrix3d size_whitening_;
 };
 
-/// Depth at which an track of the prior's size has the box's height, or else its width.
+/// Returns the depth, m, at which an object of the prior's size has the height of the box, or else
+/// its width.
 std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& prior,
                                     const CameraModel& camera) {
   if (z.measured[1] && z.measured[3]) return camera.fy() * std::exp(prior.log_size[2]) / z.height();
@@ -101,7 +102,7 @@ std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& p
   return std::nullopt;
 }
 
-/// The pose error enters what was seen from the body: δp = δp_B + R [·]x θ, δψ = up · R θ.
+/// Adds the pose error [θ, p] of the body: δp = p - R_WB [p_B]x θ, δψ = up · R_WB θ.
 void addPoseError(Hypothesis& h, const FrameContext& frame) {
   Eigen::Matrix<double, kStateDim, 6> A = Eigen::Matrix<double, kStateDim, 6>::Zero();
   const Eigen::Matrix3d R_WB = frame.view.T_WB.R();
@@ -116,13 +117,12 @@ void addPoseError(Hypothesis& h, const FrameContext& frame) {
 
 }  // namespace
 
-/// Unit ray in W through the box's centre.
 std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view) {
   const Eigen::Vector2d centre(0.5 * (z.sides[0] + z.sides[2]), 0.5 * (z.sides[1] + z.sides[3]));
   const auto normalised = view.camera->unproject(centre);
   if (!normalised) return std::nullopt;
   const Eigen::Vector3d ray(normalised->x(), normalised->y(), 1.0);
-  return Eigen::Vector3d(view.T_WC().R() * ray);  // its length is per metre of depth
+  return Eigen::Vector3d(view.T_WC().R() * ray);
 }
 
 std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
@@ -138,7 +138,7 @@ std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
     if (std::abs(u) > 1.0 || std::abs(v) > 1.0 || p.distance_m <= 0.0) continue;
     const double weight = std::exp(-std::hypot(u, v) / parameters.landmark_decay) /
                           (1.0 + p.sigma_m * p.sigma_m / (p.distance_m * p.distance_m));
-    const double inverse = 1.0 / p.distance_m;  // the mean of the inverse: far points pull less
+    const double inverse = 1.0 / p.distance_m;  // in its mean, far landmarks count less
     sum += weight, mean += weight * inverse, square += weight * inverse * inverse;
     ++n;
   }
@@ -163,7 +163,8 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
   x.head<7>() << start, yaw, prior.log_size;
   CuboidCost::Residuals r;
   CuboidCost::Jacobian J;
-  if (!cost(x.data(), r.data(), J.data())) return std::nullopt;  // the solver would not ask
+  // The solver does not check its start.
+  if (!cost(x.data(), r.data(), J.data())) return std::nullopt;
   ceres::TinySolver<CuboidCost> solver;
   solver.options.max_num_iterations = 15;
   solver.Solve(cost, &x);

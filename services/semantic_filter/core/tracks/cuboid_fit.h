@@ -1,4 +1,5 @@
-// The cuboid that one box, a class and a start of yaw make: the fit of initiation.
+// Fit of a cuboid to one box, for one class and one start of yaw (paper, "Initialization", line
+// 284). Derivation: tools/docs/maths/initiation.md.
 #pragma once
 
 #include <optional>
@@ -11,18 +12,18 @@ namespace perdure::semantic_filter {
 inline constexpr int kFree = kVelocity;  ///< dimensions of the fit: geometry and bias
 using VectorFit = Eigen::Matrix<double, kFree, 1>;
 
-/// Range (and its spread) of what is inside a box, from landmarks.
+/// Range of the object in a box, from landmarks, with its standard deviation.
 struct RangeHint {
   double distance_m = 0.0, sigma_m = 0.0;
 };
 
-/// Centroid along the ray of the landmarks inside the box; weights fall exponentially from its
-/// centre. Nothing with fewer than birth.min_landmarks.
+/// Returns the weighted centroid, along the ray, of the landmarks inside the box. Weights fall
+/// exponentially from its centre. Returns nothing with fewer than `parameters.min_landmarks`.
 std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
                                             const std::vector<LandmarkDepth>& points,
                                             const InitiationParameters& parameters);
 
-/// One hypothesis for a class and a yaw start. `cost` is half the squared whitened residual.
+/// The hypothesis of one class and one start of yaw. `cost`: half of the squared whitened residual.
 struct CuboidFit {
   Hypothesis hypothesis;
   double cost = 0.0;
@@ -32,7 +33,8 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
                                    const std::optional<RangeHint>& range,
                                    const FrameContext& frame);
 
-/// Unit ray in W through the box's centre.
+/// Returns the ray in W from the camera through the centre of the box. Its length is that of 1 m of
+/// depth.
 std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view);
 
 }  // namespace perdure::semantic_filter

@@ -22,7 +22,7 @@ struct YawStart {
   double yaw, sigma, weight;
 };
 
-/// Four starts that cover a half turn: the cuboid is the same when turned by 180°.
+/// Returns four starts that cover a half turn: a cuboid is the same when turned by 180°.
 std::vector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& frame,
                                 const Eigen::Vector3d& ray) {
   const Eigen::Vector3d level = levelling(frame.view.up_W) * ray;
@@ -33,22 +33,22 @@ std::vector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& fra
   return starts;
 }
 
-void addMovingTwin(Track& track, const Hypothesis& still, const ClassPrior& prior) {
+void addMovingCopy(Track& track, const Hypothesis& at_rest, const ClassPrior& prior) {
   if (prior.moving <= 0.0 || prior.speed_sigma <= 0.0) return;
-  Hypothesis twin = still;
+  Hypothesis copy = at_rest;
   track.hypotheses.back().weight *= 1.0 - prior.moving;
-  twin.weight *= prior.moving;
-  twin.moving = true;
-  const Eigen::Vector2d along(std::cos(twin.x[kYaw]), std::sin(twin.x[kYaw]));
+  copy.weight *= prior.moving;
+  copy.moving = true;
+  const Eigen::Vector2d along(std::cos(copy.x[kYaw]), std::sin(copy.x[kYaw]));
   const double s2 = prior.speed_sigma * prior.speed_sigma;
-  twin.P.block<2, 2>(kVelocity, kVelocity) =
+  copy.P.block<2, 2>(kVelocity, kVelocity) =
       s2 * along * along.transpose() + 0.04 * s2 * Eigen::Matrix2d::Identity();
-  twin.P(kVelocity + 2, kVelocity + 2) = 0.04;
-  track.hypotheses.push_back(twin);
+  copy.P(kVelocity + 2, kVelocity + 2) = 0.04;
+  track.hypotheses.push_back(copy);
 }
 
-/// One azimuth alone may be far off: it counts half. It weighs the yaw starts
-/// of a class among each other; the class's own weight does not change.
+/// Updates the yaw starts of one class by the azimuth and weighs them. The total weight of the
+/// class stays. The azimuth counts half, because a single one may be far off.
 void weighByAzimuth(std::vector<Hypothesis>& fits, const BoxDetection& detection,
                     const ClassPrior& prior, const FrameContext& frame) {
   if (!detection.azimuth || !prior.has_yaw) return;
@@ -62,8 +62,8 @@ void weighByAzimuth(std::vector<Hypothesis>& fits, const BoxDetection& detection
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
 }
 
-/// How much better the box's shape (its aspect) fits what was assumed than clutter, whose extents
-/// are log-uniform. Where sides are cut it has none.
+/// Returns the log ratio, to log-uniform clutter, of how well the ratio of width to height and the
+/// cost of the fit agree with what was assumed. If a side is cut, only the cost counts.
 double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_sigma,
                      const BoxDetection& detection, const FrameContext& frame) {
   const auto& z = detection.z;
@@ -89,8 +89,8 @@ double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_s
   return -fit.cost - 0.5 * std::log(2.0 * M_PI * variance) + std::log(range);
 }
 
-/// How much better the thing's underside fits the ground than that of clutter does, whose boxes are
-/// as likely anywhere in the image: 1 where nothing is known of the ground.
+/// Returns how much better the underside fits the ground than that of clutter, whose boxes are
+/// uniform in the image; 1 if nothing is known of the ground.
 double groundRatio(Hypothesis& h, const FrameContext& frame) {
   const double log_ratio = updateWithGround(h, 0, frame);
   if (log_ratio == 0.0) return 1.0;
@@ -117,11 +117,11 @@ void addClass(Track& track, const ClassPrior& prior, double ratio, const BoxDete
   for (const auto& h : fits) {
     if (h.weight < 1e-15) continue;
     track.hypotheses.push_back(h);
-    addMovingTwin(track, h, prior);
+    addMovingCopy(track, h, prior);
   }
 }
 
-/// "other" has three starts of size, so that each Gaussian is narrow enough to be linear in depth.
+/// *Other* has three starts of size, so that each Gaussian is narrow enough to be linear in depth.
 void addOther(Track& track, double ratio, const BoxDetection& detection, const Eigen::Vector3d& ray,
               const std::optional<RangeHint>& range, const FrameContext& frame) {
   constexpr double kScales[3] = {-1.2, 0.0, 1.2};
@@ -147,24 +147,25 @@ std::vector<Candidate> candidates(const BoxDetection& detection, const FrameCont
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& a, const auto& b) { return a.log_weight > b.log_weight; });
-  const auto& birth = frame.parameters->initiation;
-  const auto limit = static_cast<std::size_t>(birth.max_classes);
+  const auto& initiation = frame.parameters->initiation;
+  const auto limit = static_cast<std::size_t>(initiation.max_classes);
   if (all.size() > limit) all.resize(limit);
-  const double floor = all.empty() ? 0.0 : all.front().log_weight + std::log(birth.class_ratio);
+  const double floor =
+      all.empty() ? 0.0 : all.front().log_weight + std::log(initiation.class_ratio);
   std::erase_if(all, [&](const auto& c) { return c.log_weight < floor; });
   return all;
 }
 
-/// Sum of the classes' frequencies. A network with K classes spreads the prior over those that it
-/// reports at all: bounded below by one class's share in ten.
+/// Returns the sum of the frequencies of the network's classes, at most 10. So a class of
+/// frequency 1 has at least a tenth of the prior, however many classes the network has.
 double frequencies(const FrameContext& frame) {
   double sum = 0.0;
   for (const auto& name : frame.model->classes) sum += frame.priors->of(name).frequency;
   return std::max(std::min(sum, 10.0), 1e-9);
 }
 
-/// Sets existence by the weights, normalises them, and books both: what was expected before the
-/// box, what the network says, and for the classes what the fits make of that.
+/// Sets existence from the weights, normalises them, and enters the reasons of both in the ledger:
+/// the prior, the activations and, for the PMF, the geometry of the fits.
 void bookInitiation(Track& track, const std::vector<Candidate>& kept, const BoxDetection& detection,
                     const FrameContext& frame) {
   const double odds = frame.parameters->initiation.odds;
@@ -174,31 +175,31 @@ void bookInitiation(Track& track, const std::vector<Candidate>& kept, const BoxD
   track.existence = {odds / (1.0 + odds), ExistenceEvidence::kPrior, track.as_of};
   track.existence.become(ratio / (1.0 + ratio), ExistenceEvidence::kHit, track.as_of);
   const double other = frame.parameters->clutter.other_prior;
-  double frequency = 0.0, said_of_all = 0.0;
+  double frequency = 0.0, activation_of_all = 0.0;
   for (const auto& c : kept) frequency += c.prior.frequency;
   std::vector<ClassNumber> prior = {{kOtherClass, std::log(other)}};
-  std::vector<ClassNumber> said = {{kOtherClass, detection.log_ratio_other}};
+  std::vector<ClassNumber> activation = {{kOtherClass, detection.log_ratio_other}};
   for (const auto& c : kept) {
     prior.push_back({c.prior.name, std::log((1.0 - other) * c.prior.frequency / frequency)});
-    said.push_back({c.prior.name, c.log_weight - std::log(c.prior.frequency)});
+    activation.push_back({c.prior.name, c.log_weight - std::log(c.prior.frequency)});
   }
-  for (std::size_t i = 0; i < said.size(); ++i) {
-    said_of_all += std::exp(prior[i].value + said[i].value);
+  for (std::size_t i = 0; i < activation.size(); ++i) {
+    activation_of_all += std::exp(prior[i].value + activation[i].value);
   }
-  for (auto& s : said) s.value -= std::log(said_of_all);
+  for (auto& s : activation) s.value -= std::log(activation_of_all);
   normalise(track, ClassEvidence::kGeometry);
   track.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kPrior, prior);
-  track.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, said);
+  track.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, activation);
 }
 
-/// How much another look of the same detector at one track may overlap with its box.
-bool sameThing(const BoxMeasurement& a, const BoxMeasurement& b) {
+/// Whether two boxes of one frame overlap so much that the detector reported one object twice.
+bool sameObject(const BoxMeasurement& a, const BoxMeasurement& b) {
   const Box box_a{a.sides[0], a.sides[1], a.sides[2], a.sides[3]};
   const Box box_b{b.sides[0], b.sides[1], b.sides[2], b.sides[3]};
   return intersectionOverUnion(box_a, box_b) > 0.65;
 }
 
-/// The rest of an track that is almost out of the image is no new track.
+/// Whether the box is the rest of an object that is almost out of the image.
 bool leavesView(BoxExplanations& expected, const Belief& belief,
                 const std::vector<TrackVisibility>& visibilities, const BoxDetection& box) {
   if (box.z.count() == 4) return false;  // what leaves is cut by the border
@@ -268,10 +269,10 @@ void initiateTracks(Belief& belief, const std::vector<TrackVisibility>& visibili
         frame.parameters->initiation.min_log_ratio) {
       continue;
     }
-    const bool doubled = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
-      return sameThing(boxes[other].z, e.z);
+    const bool duplicate = std::any_of(accepted.begin(), accepted.end(), [&](std::size_t other) {
+      return sameObject(boxes[other].z, e.z);
     });
-    if (doubled || leavesView(expected, belief, visibilities, e)) continue;
+    if (duplicate || leavesView(expected, belief, visibilities, e)) continue;
     auto track = initiate(e, rangeFromLandmarks(e, input.points, frame.parameters->initiation),
                           input.stamp.time, frame);
     if (!track) continue;

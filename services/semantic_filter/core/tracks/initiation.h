@@ -1,10 +1,11 @@
-// Birth of an track from a box that nobody claims (paper, "Initialization"; DESIGN 5, item 10).
+// Initiation of a track from a box that no track explains (paper, "Initialization", line 284).
+// Derivation: tools/docs/maths/initiation.md.
 //
-// Position, yaw and size minimise the reprojection error of the box under the class's size prior
-// (Ceres' TinySolver); the covariance is the inverse of the Gauss-Newton Hessian there, so that a
-// depth that only the size prior knows has the uncertainty it deserves. Landmarks inside the box,
-// where there are enough, add their weighted centroid. The prior on size is used here and never
-// again. The pose error enters position and yaw once, with its cross-covariance.
+// Position, yaw and size minimise the reprojection error of the box under the size prior of the
+// class (Ceres' TinySolver). The covariance is the inverse of the Gauss-Newton Hessian. So a depth
+// that only the size prior determines has the variance it deserves. Enough landmarks inside the box
+// add their weighted centroid. Later updates do not apply the size prior again. The pose error
+// enters position and yaw once, with its cross-covariance.
 #pragma once
 
 #include <optional>
@@ -16,14 +17,15 @@
 
 namespace perdure::semantic_filter {
 
-/// Log of the ratio "new object" to clutter for this box, all classes together.
+/// Returns the log ratio of "new object" to clutter for this box, all classes together.
 double logInitiationRatio(const BoxDetection& detection, const FrameContext& frame);
 
-/// An track without id, or nothing where the box cannot fix one (too few sides measured).
+/// Returns a track without an id; nothing if the box does not determine one (too few measured
+/// sides).
 std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
                               TimePoint now, const FrameContext& frame);
 
-/// Objects from the boxes that nobody claims; `explained` is Association::explained.
+/// Adds tracks from the boxes that no track explains. `explained`: Association::explained.
 void initiateTracks(Belief& belief, const std::vector<TrackVisibility>& visibilities,
                     const Eigen::VectorXd& explained, const FrameInput& input,
                     const FrameContext& frame, IdBook& ids);

@@ -13,22 +13,22 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Detected a few times and then no more, where nothing can be asked of it: what nobody was told
-/// of, and what is mostly not there, is not kept for it to come back.
+/// Whether a track was detected only a few times, was never confirmed, and has been occluded or out
+/// of view for tentative_s. Most such tracks are false, so they are not kept.
 bool forgettable(const Track& o, const TrackParameters& parameters) {
   if (o.life.once_confirmed || o.life.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;
   const TimePoint last = std::max(o.unused.occluded.last, o.unused.out_of_view.last);
-  const bool unasked = o.unused.occluded.count + o.unused.out_of_view.count > 0;
-  return unasked && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
+  const bool invisible = o.unused.occluded.count + o.unused.out_of_view.count > 0;
+  return invisible && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
 }
 
 }  // namespace
 
 bool established(const Track& track, const FrameContext& frame) {
-  const TrackParameters& tend = frame.parameters->tracks;
-  return track.existence >= tend.confirm && track.life.hits >= tend.confirm_hits &&
-         placeSigma(track.best(), frame.pose_error.covariance) < tend.confirm_sigma_m;
+  const TrackParameters& parameters = frame.parameters->tracks;
+  return track.existence >= parameters.confirm && track.life.hits >= parameters.confirm_hits &&
+         placeSigma(track.best(), frame.pose_error.covariance) < parameters.confirm_sigma_m;
 }
 
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame) {
@@ -47,7 +47,8 @@ std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameConte
   std::vector<Track> deleted;
   std::erase_if(tracks, [&](Track& o) {
     if (forgettable(o, parameters)) return true;
-    if (o.existence >= (o.life.hits > 1 ? parameters.delete_below : parameters.delete_tentative_below))
+    if (o.existence >=
+        (o.life.hits > 1 ? parameters.delete_below : parameters.delete_tentative_below))
       return false;
     deleted.push_back(std::move(o));
     return true;

@@ -1,5 +1,5 @@
-// Tend: prune, confirm, die (paper, "Termination"; DESIGN 5, items 11 and 12). What two tracks
-// that are one become: merge.h.
+// Confirmation and deletion of tracks (paper, "Termination"; Bar-Shalom, Li 2001). Derivation of
+// the thresholds: tools/docs/maths/re_identification.md.
 #pragma once
 
 #include <vector>
@@ -9,11 +9,11 @@
 
 namespace perdure::semantic_filter {
 
-/// Whether it surely exists and its best hypothesis knows its place. A claim asks all of them for
-/// the place; to be a thing that was known before, its being there is enough.
+/// Whether the track surely exists and its best hypothesis is placed. Re-identification needs no
+/// more; confirmation also needs that all hypotheses agree on the place.
 bool established(const Track& track, const FrameContext& frame);
-/// Confirms what surely exists at a known place, takes that back where it is lost, and removes
-/// those whose existence has gone, which it returns.
+/// Confirms visible tracks that surely exist at a known place, and withdraws it where either is
+/// lost. Removes tracks, and returns those whose existence fell below the threshold.
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -14,12 +14,13 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kSurelyOne = 0.6;    // overlap that two boxes of one frame do not make two things
-constexpr double kSameInImage = 0.6;  // intersection over union of two images of one thing
+constexpr double kSurelyOne =
+    0.6;  // overlap above which two boxes of one frame may be of one object
+constexpr double kSameInImage = 0.6;  // intersection over union of two images of one object
 
 bool isOther(const Track& o) { return o.best().class_name == kOtherClass; }
 
-/// Weights of a's hypotheses once b's PMF is taken in as well.
+/// Multiplies the PMF of a by that of b.
 void multiplyPmf(Track& a, const Track& b) {
   for (auto& h : a.hypotheses) {
     h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
@@ -27,27 +28,27 @@ void multiplyPmf(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// A guess of a moment, as the border of the image makes them, says nothing against a thing that
-/// was looked at for long.
-bool knownAsWell(const Track& guess, const Track& thing) {
-  constexpr std::uint32_t kFewer = 4;  // looks
-  return guess.life.once_confirmed || kFewer * guess.life.hits >= thing.life.hits;
+/// Whether a track of a known class has enough hits to replace an *other* track. A track of a
+/// few boxes, as they occur at the border of the image, does not.
+bool hasEnoughHits(const Track& known, const Track& other) {
+  constexpr std::uint32_t kFewer = 4;  // times fewer hits
+  return known.life.once_confirmed || kFewer * known.life.hits >= other.life.hits;
 }
 
-/// They contradict each other: their mean would be wrong with more existenceCeiling than either,
-/// and of cuboids that are turned against each other it is of no thing's shape.
+/// Whether two beliefs contradict each other. Then their mean would be wrong and more certain than
+/// either. The mean of two cuboids that are turned against each other has the shape of neither.
 bool contradict(const Hypothesis& a, const Hypothesis& b) {
-  constexpr double kBeyond = 24.3;  // of a squared deviation in seven dimensions, one in a thousand
+  constexpr double kGate = 24.3;  // χ² with seven dimensions exceeds it once in a thousand times
   constexpr double kTurned = 0.35;  // rad
   if (a.moving) return false;
   const Vector7d d = geometryDifference(a, b);
   if (std::abs(d[kYaw]) > kTurned) return true;
   const Cholesky P(a.P.topLeftCorner<kGeometry, kGeometry>() +
                    b.P.topLeftCorner<kGeometry, kGeometry>());
-  return !P.positive() || P.whiten(d).squaredNorm() > kBeyond;
+  return !P.positive() || P.whiten(d).squaredNorm() > kGate;
 }
 
-/// As many as both have, weighed by how often each was found: later looks will tell.
+/// Keeps the hypotheses of both, weighted by their numbers of hits. Later observations decide.
 void keepBoth(Track& a, const Track& b) {
   const double share =
       static_cast<double>(b.life.hits) / std::max(1.0, double(a.life.hits) + double(b.life.hits));
@@ -59,30 +60,31 @@ void keepBoth(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// The one that was hardly found of late where it should be was something else, as far as its looks
-/// do not fit the other.
-void forgetLooksAtOthers(Track& a, Track& b, const BoxParameters& parameters) {
-  constexpr double kHardlyFound = 0.2;
-  Track& lost = a.history.recent_share < b.history.recent_share ? a : b;
-  const Hypothesis& found = (a.history.recent_share < b.history.recent_share ? b : a).best();
-  if (lost.history.recent_share >= kHardlyFound) return;
-  std::erase_if(lost.batch.keyframes.write(),
-                [&](const auto& k) { return !explains(found, *k, parameters); });
+/// If one track was seldom detected of late, removes those of its keyframes that the other does not
+/// explain: they showed something else.
+void forgetForeignKeyframes(Track& a, Track& b, const BoxParameters& parameters) {
+  constexpr double kSeldomDetected = 0.2;  // share of late observations
+  Track& seldom_detected = a.history.recent_share < b.history.recent_share ? a : b;
+  const Hypothesis& often_detected =
+      (a.history.recent_share < b.history.recent_share ? b : a).best();
+  if (seldom_detected.history.recent_share >= kSeldomDetected) return;
+  std::erase_if(seldom_detected.batch.keyframes.write(),
+                [&](const auto& k) { return !explains(often_detected, *k, parameters); });
 }
 
 void absorb(Track& a, Track& b, const FrameContext& frame) {
   if (isOther(a) != isOther(b)) {
-    if (isOther(a) && knownAsWell(b, a)) {
+    if (isOther(a) && hasEnoughHits(b, a)) {
       a.hypotheses = b.hypotheses;
       a.classes = b.classes;
     }
   } else if (contradict(a.best(), b.best())) {
-    forgetLooksAtOthers(a, b, frame.parameters->box);
+    forgetForeignKeyframes(a, b, frame.parameters->box);
     keepBoth(a, b);
   } else {
     const ClassPrior& prior = frame.priors->of(a.best().class_name);
     const double weight = a.best().weight;
-    if (!a.best().moving) {  // velocities are not fused: a moving one keeps its own state
+    if (!a.best().moving) {  // velocities are not fused: a moving track keeps its state
       a.hypotheses.front() = fuse(a.best(), b.best(), prior, frame.pose_error.covariance);
     }
     a.hypotheses.front().weight = weight;
@@ -99,7 +101,8 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
   mergeBatches(a, b, biasScales(frame.parameters->box), frame.parameters->smoothing);
 }
 
-/// Two things that the image shows side by side are two, however near their estimated depths are.
+/// Whether the images of two cuboids overlap as those of one object do. Objects side by side in the
+/// image are two, however close their estimated depths are.
 bool sameInImage(const State& a, const State& b, const Projector& from) {
   const auto box_a = projectCuboid(a, from), box_b = projectCuboid(b, from);
   if (!box_a || !box_b) return true;
@@ -107,19 +110,20 @@ bool sameInImage(const State& a, const State& b, const Projector& from) {
   return intersectionOverUnion(toBox(box_a->sides), toBox(box_b->sides)) > kSameInImage;
 }
 
-bool bothSeen(const Track& a, const Track& b) {
+bool bothVisible(const Track& a, const Track& b) {
   return a.visibility.fraction > 0.0 && b.visibility.fraction > 0.0;
 }
 
-/// Whether b is hidden by a, which is seen: two solid things cannot share their space, so that a
-/// copy behind its original is no thing of its own.
-bool hides(const Track& a, const Track& b) {
+/// Whether a is visible and occludes b. Two solid objects cannot share their space, so a copy
+/// behind its original is no object of its own.
+bool occludes(const Track& a, const Track& b) {
   return a.visibility.fraction > 0.0 && b.visibility.state == Visibility::kOccluded &&
          b.visibility.blocked_by == a.id;
 }
 
-/// A hidden one waits at the time when it was last seen; what is merged is of one time.
-void bringUpToDate(Track& a, Track& b, const FrameContext& frame) {
+/// Predicts invisible tracks to the time of the later one. A track that is not visible has the time
+/// of its last observation.
+void predictToSameTime(Track& a, Track& b, const FrameContext& frame) {
   const TimePoint now = std::max(a.as_of, b.as_of);
   for (Track* o : {&a, &b}) {
     if (o->visibility.fraction > 0.0) continue;
@@ -127,18 +131,18 @@ void bringUpToDate(Track& a, Track& b, const FrameContext& frame) {
   }
 }
 
-/// Whose id survives: that which was claimed, whatever guesses at it are older.
-bool older(const Track& a, const Track& b) {
+/// Whether the id of a survives that of b: the confirmed one, or else the older one.
+bool survives(const Track& a, const Track& b) {
   if (a.life.once_confirmed != b.life.once_confirmed) return a.life.once_confirmed;
   return a.life.first_seen < b.life.first_seen ||
          (a.life.first_seen == b.life.first_seen && a.id < b.id);
 }
 
-struct Shared {
-  double of_joint = 0.0, of_lesser = 0.0;  ///< volume in common over that of both, of the lesser
+struct SharedVolume {
+  double of_joint = 0.0, of_lesser = 0.0;  ///< shared volume over joint and over lesser volume
 };
 
-Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W) {
+SharedVolume sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W) {
   const Eigen::Vector3d size_a = a.segment<3>(kSize).array().exp();
   const Eigen::Vector3d size_b = b.segment<3>(kSize).array().exp();
   const Eigen::Vector3d offset =
@@ -162,41 +166,42 @@ Shared sharedVolume(const State& a, const State& b, const Eigen::Vector3d& up_W)
           shared / std::min(size_a.prod(), size_b.prod())};
 }
 
-/// Two boxes of one frame are of two things.
-bool foundTogether(const Track& a, const Track& b) {
+/// Whether one frame detected both: its two boxes are of two objects.
+bool detectedTogether(const Track& a, const Track& b) {
   return (a.history.detected & b.history.detected) != 0;
 }
 
-/// In visibility both, each frame's box went to the one or to the other: so do two beliefs share
-/// the boxes of one thing.
-bool takeTurns(const Track& a, const Track& b) {
-  constexpr int kTurns = 4;
+/// Whether, in frames with both visible, the box was assigned now to the one and now to the other.
+/// Two tracks share the boxes of one object in this way.
+bool alternate(const Track& a, const Track& b) {
+  constexpr int kTurns = 4;  // frames
   const DetectionHistory &of_a = a.history, &of_b = b.history;
-  if (foundTogether(a, b) || a.life.hits < 2 || b.life.hits < 2) return false;
+  if (detectedTogether(a, b) || a.life.hits < 2 || b.life.hits < 2) return false;
   return std::popcount((of_a.detected ^ of_b.detected) & of_a.visible & of_b.visible) >= kTurns;
 }
 
-/// Two beliefs about one thing: they overlap in space and in the image, or less and take turns; or
-/// one is of no known class and lies in the other, since two solid things cannot share their space.
+/// Whether two tracks are one object by their space: they overlap in space and in the image; or
+/// they overlap less and alternate; or one is *other* and lies inside the other, because two solid
+/// objects cannot share their space.
 bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
   const State &x = a.best().x, &y = b.best().x;
-  const TrackParameters& tend = frame.parameters->tracks;
-  const Shared shared = sharedVolume(x, y, frame.view.up_W);
+  const TrackParameters& parameters = frame.parameters->tracks;
+  const SharedVolume shared = sharedVolume(x, y, frame.view.up_W);
   if (isOther(a) != isOther(b)) {
-    if (shared.of_lesser > tend.merge_inside) return true;
+    if (shared.of_lesser > parameters.merge_inside) return true;
   } else {
-    if (shared.of_joint < kSurelyOne && foundTogether(a, b)) return false;
-    if (shared.of_joint >= tend.merge_turns && takeTurns(a, b)) return true;
+    if (shared.of_joint < kSurelyOne && detectedTogether(a, b)) return false;
+    if (shared.of_joint >= parameters.merge_turns && alternate(a, b)) return true;
   }
-  return shared.of_joint >= tend.merge_overlap && sameInImage(x, y, frame.projector());
+  return shared.of_joint >= parameters.merge_overlap && sameInImage(x, y, frame.projector());
 }
 
-/// Of an track's best hypothesis: where it stands, and half the diagonal of its cuboid. Of all
-/// pairs few touch, and to see that is most of the work: it is laid out apart from the beliefs.
+/// The sphere around the cuboid of a track's best hypothesis. Few of all pairs touch, and to test
+/// that is most of the work. So the spheres are stored apart from the beliefs.
 struct Ball {
   Eigen::Vector3d centre;
   double radius;
-  bool seen;
+  bool visible;
 };
 
 Ball ballOf(const Track& track) {
@@ -207,16 +212,16 @@ Ball ballOf(const Track& track) {
 
 bool touch(const Ball& a, const Ball& b) {
   const double reach = a.radius + b.radius;
-  return (a.seen || b.seen) && (a.centre - b.centre).squaredNorm() <= reach * reach;
+  return (a.visible || b.visible) && (a.centre - b.centre).squaredNorm() <= reach * reach;
 }
 
-bool oneHasBeenSeen(const Track& a, const Track& b) {
-  return bothSeen(a, b) || hides(a, b) || hides(b, a);
+bool bothVisibleOrOccluded(const Track& a, const Track& b) {
+  return bothVisible(a, b) || occludes(a, b) || occludes(b, a);
 }
 
 }  // namespace
 
-/// "other" is no class of its own: it may turn out to be the known thing in the same place.
+/// *Other* may prove to be the object of known class in the same place.
 bool sameKind(const Track& a, const Track& b) {
   if (a.best().moving != b.best().moving) return false;
   return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
@@ -238,9 +243,9 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   const Matrix7d J_b = inverseSymmetric(P_b);
   Matrix7d J_prior = Matrix7d::Zero();
   J_prior.block<3, 3>(kSize, kSize) = inverseSymmetric(prior.log_size_covariance);
-  Matrix7d J_new = J_b - J_prior;  // what b knows beyond the prior that a has used already
+  Matrix7d J_new = J_b - J_prior;  // information of b without the prior, which a contains already
   if (eigenvalues(J_new).minCoeff() < 0.0) {
-    J_new = 0.5 * J_b;  // its own information is not separable: count half of it
+    J_new = 0.5 * J_b;  // the prior cannot be separated: half of b counts
     J_prior = 0.5 * J_b;
   }
   const Matrix7d P = inverseSymmetric(J_a + J_new);
@@ -265,7 +270,7 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
 }
 
 void mergeTwo(Track& a, Track& b, const FrameContext& frame) {
-  bringUpToDate(a, b, frame);
+  predictToSameTime(a, b, frame);
   absorb(a, b, frame);
 }
 
@@ -276,12 +281,12 @@ std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameCon
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     for (std::size_t j = i + 1; j < tracks.size();) {
       Track &a = tracks[i], &b = tracks[j];
-      if (!touch(balls[i], balls[j]) || !oneHasBeenSeen(a, b) || !sameKind(a, b) ||
+      if (!touch(balls[i], balls[j]) || !bothVisibleOrOccluded(a, b) || !sameKind(a, b) ||
           !sameSpace(a, b, frame)) {
         ++j;
         continue;
       }
-      if (older(b, a)) std::swap(a, b);
+      if (survives(b, a)) std::swap(a, b);
       mergeTwo(a, b, frame);
       merges.push_back({a.id, b.id});
       tracks.erase(tracks.begin() + static_cast<std::ptrdiff_t>(j));

@@ -1,4 +1,5 @@
-// Two tracks that are one (paper, "Merge"; DESIGN 5, item 12): which are, and what is then known.
+// Merge: which two tracks are one object, and what is then believed (paper, "Merge", line 286).
+// Derivation: tools/docs/maths/merge_and_fusion.md.
 #pragma once
 
 #include <vector>
@@ -10,26 +11,26 @@ namespace perdure::semantic_filter {
 
 struct MergeRecord {
   ObjectId survivor = 0, absorbed = 0;
-  bool moved = false;     ///< the one was found again as the other, elsewhere (core/moved.h)
-  bool returned = false;  ///< the one was believed gone, and is found again as the other
+  bool moved = false;  ///< re-identified: the object was moved or drove off (tracks/reidentify.h)
+  bool returned = false;  ///< re-identified: the survivor had been deleted
 };
 
-/// Shared volume over joint volume of two upright cuboids.
+/// Returns the shared volume over the joint volume of two upright cuboids. `up_W`: against gravity.
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 
-/// Merges tracks of the same best class that occupy the same space; the older survives. Both are
-/// seen, or one hides the other; the rest waits: a frame that does not see them does not change
-/// them.
+/// Merges tracks of the same kind that occupy the same space. The confirmed one survives, or else
+/// the older one. Both must be visible, or one occludes the other. Otherwise they wait: a frame in
+/// which they are not visible does not change them.
 std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame);
 
-/// Neither class nor motion forbids that they are one.
+/// Whether class and motion allow that both are one object.
 bool sameKind(const Track& a, const Track& b);
 
-/// Takes b, which is the same track, into a.
+/// Merges b into a. Both are one object.
 void mergeTwo(Track& a, Track& b, const FrameContext& frame);
 
-/// The state of two beliefs about one track whose errors are independent but for the size prior
-/// and the pose error, both of which are counted once.
+/// Fuses two beliefs about one object. Their errors are independent, except for the size prior and
+/// the pose error; each of these counts once.
 Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
                 const Matrix6d& P_pose);
 

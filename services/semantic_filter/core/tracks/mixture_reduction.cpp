@@ -26,8 +26,8 @@ void settleSlowHypotheses(Track& track, double min_speed) {
   }
 }
 
-/// What moves seldom creeps: the Gaussian prior of a moving one's velocity has a hole around zero.
-/// Without it a parked car of unusual size is one of usual size that creeps.
+/// Objects that move seldom creep: the Gaussian prior of their velocity gets a hole around zero.
+/// Without it, a parked car of unusual size passes for a creeping car of usual size.
 void applySpeedPrior(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
   if (!hasMoving(track)) return;
   for (auto& h : track.hypotheses) {
@@ -40,8 +40,8 @@ void applySpeedPrior(Track& track, const ClassPriors& priors, const MotionParame
   }
 }
 
-/// Two beliefs about one place of very different existenceCeiling are two explanations.
-bool wider(const Hypothesis& a, const Hypothesis& b) {
+/// Two hypotheses at one place with very different certainty are two explanations.
+bool differInCertainty(const Hypothesis& a, const Hypothesis& b) {
   const double va = a.P.topLeftCorner<3, 3>().trace(), vb = b.P.topLeftCorner<3, 3>().trace();
   return std::max(va, vb) > 4.0 * std::min(va, vb);
 }
@@ -51,7 +51,7 @@ void mergeNearHypotheses(Track& track, double threshold) {
   for (std::size_t i = 0; i < hs.size(); ++i) {
     for (std::size_t j = hs.size() - 1; j > i; --j) {
       if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
-      if (wider(hs[i], hs[j])) continue;
+      if (differInCertainty(hs[i], hs[j])) continue;
       if (distance2(hs[i], hs[j]) > threshold) continue;
       mergeInto(hs[i], hs[j]);
       hs.erase(hs.begin() + static_cast<std::ptrdiff_t>(j));
@@ -59,15 +59,15 @@ void mergeNearHypotheses(Track& track, double threshold) {
   }
 }
 
-/// Without parallax nobody can tell a toy from a car: until the distance is known, "other" stays.
-bool scaleIsOpen(const Track& track, const TrackParameters& tend) {
+/// Without parallax a toy looks like a car: until the distance is known, *other* stays.
+bool scaleIsUnknown(const Track& track, const TrackParameters& parameters) {
   const double distance = (track.best().x.head<3>() - track.views.detected_from.T_WC.p).norm();
   const double variance = track.best().P.topLeftCorner<3, 3>().trace();
-  return std::sqrt(variance) > tend.scale_resolved * distance;
+  return std::sqrt(variance) > parameters.scale_resolved * distance;
 }
 
-/// A car half as high as cars are is none: what has drifted there has lost its way. Whatever is
-/// left of the track is as likely as it was.
+/// Removes hypotheses of implausible size: a car half as high as cars are is no car. Existence is
+/// multiplied by the share of the others, so that they are as likely as before.
 void pruneMisshapen(Track& track, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
   std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
@@ -80,36 +80,37 @@ void pruneMisshapen(Track& track, const ClassPriors& priors, double size_gate) {
                          ExistenceEvidence::kMisshapen, track.as_of);
 }
 
-void pruneLightHypotheses(Track& track, const TrackParameters& tend) {
+void pruneLightHypotheses(Track& track, const TrackParameters& parameters) {
   const std::string best_class = track.best().class_name;
   const bool dominant =
-      track.life.hits >= 3 && classProbability(track, best_class) > tend.class_dominates;
-  const bool open = scaleIsOpen(track, tend);
+      track.life.hits >= 3 && classProbability(track, best_class) > parameters.class_dominates;
+  const bool scale_unknown = scaleIsUnknown(track, parameters);
   std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
-    if (open && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
-    return h.weight < tend.hypothesis_floor || (dominant && h.class_name != best_class);
+    if (scale_unknown && h.class_name == kOtherClass && !h.moving) return h.weight < 1e-9;
+    return h.weight < parameters.hypothesis_floor || (dominant && h.class_name != best_class);
   });
 }
 
-void addMovingTwin(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
+void addMovingAndMisplaced(Track& track, const ClassPriors& priors,
+                           const MotionParameters& motion) {
   if (track.history.running_nis < motion.start_nis || hasMoving(track)) return;
   const ClassPrior& prior = priors.of(track.best().class_name);
   if (prior.moving <= 0.0 || track.life.hits < 3) return;
-  Hypothesis twin = asMoving(track.best());
-  twin.weight *= motion.start_probability;
-  twin.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
-  // Or it stands where we are wrong about it: the same thing along the ray, near and far.
-  Hypothesis wide = track.best();
-  wide.ground_contact = {};
-  wide.weight *= motion.start_probability * motion.misplaced_odds;
-  const Eigen::Vector3d ray = wide.x.head<3>() - track.views.detected_from.T_WC.p;
+  Hypothesis copy = asMoving(track.best());
+  copy.weight *= motion.start_probability;
+  copy.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
+  // The alternative to motion: the object stands, but nearer or farther along the ray.
+  Hypothesis misplaced = track.best();
+  misplaced.ground_contact = {};
+  misplaced.weight *= motion.start_probability * motion.misplaced_odds;
+  const Eigen::Vector3d ray = misplaced.x.head<3>() - track.views.detected_from.T_WC.p;
   const double relative = motion.misplaced_sigma;
   Eigen::Matrix<double, kStateDim, 1> g = Eigen::Matrix<double, kStateDim, 1>::Zero();
   g.head<3>() = ray;
   g.segment<3>(kSize).setOnes();
-  wide.P += relative * relative * g * g.transpose();
-  track.hypotheses.push_back(wide);
-  track.hypotheses.push_back(twin);
+  misplaced.P += relative * relative * g * g.transpose();
+  track.hypotheses.push_back(misplaced);
+  track.hypotheses.push_back(copy);
   track.history.running_nis = 1.0;
 }
 
@@ -125,7 +126,7 @@ void reduceMixture(Track& track, const ClassPriors& priors, const Parameters& pa
   normalise(track, ClassEvidence::kGeometry);
   pruneLightHypotheses(track, parameters.tracks);
   book(track, ClassEvidence::kPruning);
-  addMovingTwin(track, priors, parameters.motion);
+  addMovingAndMisplaced(track, priors, parameters.motion);
   normalise(track, ClassEvidence::kMotion);
 }
 

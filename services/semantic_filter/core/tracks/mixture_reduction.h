@@ -1,4 +1,5 @@
-// Mixture reduction: merges and prunes the hypotheses of one track.
+// Mixture reduction: merging and pruning of the hypotheses of one track (Bar-Shalom, Li 2001, eq.
+// 1.4.16). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/class_prior.h"
@@ -7,10 +8,11 @@
 
 namespace perdure::semantic_filter {
 
-/// Merges and prunes an track's hypotheses: near ones of the same class and motion become one,
-/// light ones go, so do those that no longer have the size of their class, a dominant class ends
-/// the others, a moving one that stands still is static, and a static track that its boxes
-/// contradict gets a moving twin and one that is misplaced along the ray. Nothing may be left.
+/// - Merges near hypotheses of the same class and motion.
+/// - Prunes light hypotheses, those of implausible size, and all others if one class dominates.
+/// - Stops moving hypotheses that are slow.
+/// - Gives a static track that its boxes contradict a moving copy, and one misplaced along the ray.
+/// Possibly no hypothesis is left.
 void reduceMixture(Track& track, const ClassPriors& priors, const Parameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -9,17 +9,17 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// The box inside the gate that fits the track's place best, whatever it is said to be.
+/// Returns the box inside the gate that fits the geometry of the track best, of whatever class.
 const BoxDetection* boxOf(const TrackScore& score, const std::vector<BoxDetection>& boxes) {
   const HypothesisScore& best = score.hypotheses.front();
-  const BoxDetection* found = nullptr;
+  const BoxDetection* nearest = nullptr;
   double least = 0.0;
   for (std::size_t i = 0; i < score.boxes.size(); ++i) {
-    if (best.matches[i].likelihood <= 0.0 || (found && best.matches[i].nis >= least)) continue;
-    found = &boxes[score.boxes[i]];
+    if (best.matches[i].likelihood <= 0.0 || (nearest && best.matches[i].nis >= least)) continue;
+    nearest = &boxes[score.boxes[i]];
     least = best.matches[i].nis;
   }
-  return found;
+  return nearest;
 }
 
 std::vector<std::string> missing(const ClassNames& known, const ClassNames& considered) {
@@ -29,7 +29,7 @@ std::vector<std::string> missing(const ClassNames& known, const ClassNames& cons
   return names;
 }
 
-/// Of the new ones those that a birth from this box would keep.
+/// Returns those of the new classes that an initiation from this box would keep.
 std::vector<ClassPrior> candidatesOf(const std::vector<std::string>& names, const BoxDetection& box,
                                      const FrameContext& frame) {
   const auto weight = [&](const std::string& name) {
@@ -37,14 +37,14 @@ std::vector<ClassPrior> candidatesOf(const std::vector<std::string>& names, cons
   };
   double best = -1e300;
   for (const auto& name : frame.model->classes) best = std::max(best, weight(name));
-  const auto& birth = frame.parameters->initiation;
+  const auto& initiation = frame.parameters->initiation;
   std::vector<std::pair<double, std::string>> kept;
   for (const auto& name : names) {
     const double w = weight(name);
-    if (w >= best + std::log(birth.class_ratio)) kept.emplace_back(-w, name);
+    if (w >= best + std::log(initiation.class_ratio)) kept.emplace_back(-w, name);
   }
   std::sort(kept.begin(), kept.end());
-  kept.resize(std::min(kept.size(), static_cast<std::size_t>(birth.max_classes)));
+  kept.resize(std::min(kept.size(), static_cast<std::size_t>(initiation.max_classes)));
   std::vector<ClassPrior> priors;
   for (const auto& [w, name] : kept) {
     priors.push_back(frame.priors->of(name));
@@ -59,7 +59,7 @@ double logSizeDensity(const Hypothesis& h, const ClassPrior& prior) {
   return -0.5 * (squaredMahalanobis(d, S) + std::log(S.determinant()));
 }
 
-/// The hypothesis as one of another class: its geometry, given that class's size prior.
+/// Returns the hypothesis as one of another class: its geometry, conditioned on the size prior.
 Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   h.class_name = prior.name;
   h.ground_contact = {};
@@ -72,7 +72,7 @@ Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   return h;
 }
 
-/// Frequencies of the classes that the track has.
+/// Returns the sum of the frequencies of the classes that the track has.
 double frequencyOf(const Track& track, const ClassPriors& priors) {
   double sum = 0.0;
   for (const auto& c : classShares(track)) {
@@ -81,24 +81,25 @@ double frequencyOf(const Track& track, const ClassPriors& priors) {
   return sum;
 }
 
-/// The class by the track's best one: each way of standing (mode, motion) that this one has.
+/// Returns the hypotheses of a class that enters: one for each mode and motion of the best class.
+/// Their weights sum to 1.
 std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
                                   const FrameContext& frame) {
   std::vector<Hypothesis> all;
   double weight = 0.0;
   for (const auto& h : track.hypotheses) {
     if (h.class_name != track.best().class_name || (h.moving && prior.moving <= 0.0)) continue;
-    Hypothesis twin = recast(h, prior);
-    if (misshapen(twin, prior, frame.parameters->tracks.size_gate) || !twin.x.allFinite()) continue;
-    weight += twin.weight;
-    all.push_back(twin);
+    Hypothesis copy = recast(h, prior);
+    if (misshapen(copy, prior, frame.parameters->tracks.size_gate) || !copy.x.allFinite()) continue;
+    weight += copy.weight;
+    all.push_back(copy);
   }
   for (auto& h : all) h.weight /= weight;
   return all;
 }
 
-/// What enters: hypotheses at the classes' prior shares, and how well the size fits each class
-/// against the best one's.
+/// The hypotheses that enter, at the prior shares of their classes, and how well the size fits each
+/// class relative to the best class (at most 1).
 struct Entrants {
   std::vector<Hypothesis> hypotheses;
   std::vector<ClassNumber> fits;
@@ -113,14 +114,14 @@ Entrants entrantsOf(const Track& track, const std::vector<ClassPrior>& entering,
   const double named = 1.0 - frame.parameters->clutter.other_prior;
   const double usual = logSizeDensity(track.best(), frame.priors->of(track.best().class_name));
   for (const auto& prior : entering) {
-    auto twins = recastAll(track, prior, frame);
-    if (twins.empty()) continue;
+    auto copies = recastAll(track, prior, frame);
+    if (copies.empty()) continue;
     const double share = named * prior.frequency / frequency;
     result.share += share;
-    for (auto& h : twins) h.weight *= share;
+    for (auto& h : copies) h.weight *= share;
     const double fit = logSizeDensity(track.best(), prior) - usual;
     result.fits.push_back({prior.name, std::exp(std::min(fit, 0.0))});
-    result.hypotheses.insert(result.hypotheses.end(), twins.begin(), twins.end());
+    result.hypotheses.insert(result.hypotheses.end(), copies.begin(), copies.end());
   }
   return result;
 }
@@ -143,7 +144,7 @@ bool admitNewClasses(Track& track, const TrackScore& score, const std::vector<Bo
   const auto& known = frame.model->names;
   if (track.classes_considered == known) return false;
   if (!track.classes_considered ||
-      *track.classes_considered == *known) {  // one that came back: nobody knows what by
+      *track.classes_considered == *known) {  // a recalled track is not asked again
     track.classes_considered = known;
     return false;
   }

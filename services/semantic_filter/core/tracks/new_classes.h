@@ -1,14 +1,15 @@
-// Classes that a new model brings enter the tracks that are there already (DESIGN 4, "Swapping
-// inference"): at their prior, with the geometry that the track has, when the track is next seen.
+// New classes: the classes of a new network enter the tracks that exist, at their prior and with
+// the geometry of the track, when the track is next detected. (The paper, line 279, has a fixed set
+// of classes.) Derivation: tools/docs/maths/new_classes_and_context.md.
 #pragma once
 
 #include "services/semantic_filter/core/association/score.h"
 
 namespace perdure::semantic_filter {
 
-/// Gives the track hypotheses of classes that this frame's model knows and that it was never
-/// considered about: of those as many, and by the same rule, as a birth from the box that shows it
-/// would consider. True where its hypotheses changed: then it must be looked at again.
+/// Adds hypotheses of classes that the model of this frame knows and that the track was never
+/// considered for. They are those that an initiation from the track's box would keep. Returns
+/// whether hypotheses changed; the track must then be scored again.
 bool admitNewClasses(Track& track, const TrackScore& score, const std::vector<BoxDetection>& boxes,
                      const FrameContext& frame);
 

@@ -10,19 +10,20 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kMissing = 0.5;    // existence of what was claimed
-constexpr double kOverlap_s = 0.5;  // both may have been seen for so long
-constexpr double kDriven_s = 2.0;   // and for so long nobody knows it
-constexpr double kTraced_s = 3.0;   // for which a speed tells where something came from
-constexpr double kCarried_m = 2.5;  // by which things are carried without leaving
-constexpr int kLeastKeyframes = 3;  // at the empty place
+constexpr double kMissing = 0.5;    // existence below which a once confirmed track is missing
+constexpr double kOverlap_s = 0.5;  // both may have been detected for so long
+constexpr double kDriven_s = 2.0;   // from the last detection of one to the first of the other
+constexpr double kTraced_s = 3.0;   // over which a velocity shows where an object came from
+constexpr double kCarried_m = 2.5;  // by which objects are carried
+constexpr int kLeastKeyframes = 3;  // that had the empty place in the image
 constexpr double kTooFar = std::numeric_limits<double>::infinity();
 
 bool isMissing(const Track& o) { return o.life.once_confirmed && o.existence < kMissing; }
 
-/// Whether most keyframes that showed the one had the other's place in the picture, and nothing was
-/// there: what is new only because nobody looked there before has not moved.
-bool wasLookedAt(const Eigen::Vector3d& place, const Track& missing) {
+/// Whether most keyframes of the missing track had the place of the new one in the image, when
+/// nothing was there. What is new only because the camera never saw its place was not carried
+/// there.
+bool wasInView(const Eigen::Vector3d& place, const Track& missing) {
   const auto& keyframes = missing.batch.keyframes;
   const auto count = std::count_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
     const CameraModel& camera = k->from->camera;
@@ -32,40 +33,43 @@ bool wasLookedAt(const Eigen::Vector3d& place, const Track& missing) {
   return count >= kLeastKeyframes && 2 * count >= static_cast<std::ptrdiff_t>(keyframes.size());
 }
 
-bool isThere(const Track& o, const FrameContext& frame) {
+bool confirmedOrEstablished(const Track& o, const FrameContext& frame) {
   return o.life.confirmed || established(o, frame);
 }
 
-/// The one was seen in a box, and from then on the other in almost the same: they are one thing,
-/// though it was not believed to be where it was, or, bent to what no car is, not what it was.
-bool takesOver(const Track& found, const Track& missing) {
-  constexpr double kAtOnce_s = 0.5, kAlike = 0.5;
-  if (!found.best().moving || !found.history.first_box || !missing.history.last_box) return false;
+/// Whether the first box of a moving track is almost the last box of the missing one, and follows
+/// it at once. Then both are one object, even if the missing one was misplaced, or deformed until
+/// it was of no known class.
+bool takesOver(const Track& new_track, const Track& missing) {
+  constexpr double kAtOnce_s = 0.5, kSameBox = 0.5;  // kSameBox: intersection over union
+  if (!new_track.best().moving || !new_track.history.first_box || !missing.history.last_box)
+    return false;
   const std::string& was = missing.best().class_name;
-  if (was != found.best().class_name && was != kOtherClass) return false;
-  const double since = toSeconds(found.history.first_box->time - missing.history.last_box->time);
+  if (was != new_track.best().class_name && was != kOtherClass) return false;
+  const double since =
+      toSeconds(new_track.history.first_box->time - missing.history.last_box->time);
   return since > 0.0 && since <= kAtOnce_s &&
-         intersectionOverUnion(found.history.first_box->box, missing.history.last_box->box) >
-             kAlike;
+         intersectionOverUnion(new_track.history.first_box->box, missing.history.last_box->box) >
+             kSameBox;
 }
 
-/// Metres between where the one stood and where the other must have been then; infinite where they
-/// cannot be one.
-double apart(const Track& missing, const Track& found, const FrameContext& frame) {
-  const Hypothesis& h = found.best();
-  if (!isThere(found, frame) || h.class_name == kOtherClass) return kTooFar;
-  if (takesOver(found, missing)) return 0.0;
+/// Returns the distance, m, between the place of the missing track and where the new one was then;
+/// infinite if they cannot be one object.
+double distanceBetween(const Track& missing, const Track& new_track, const FrameContext& frame) {
+  const Hypothesis& h = new_track.best();
+  if (!confirmedOrEstablished(new_track, frame) || h.class_name == kOtherClass) return kTooFar;
+  if (takesOver(new_track, missing)) return 0.0;
   if (h.class_name != missing.best().class_name) return kTooFar;
-  const double since = toSeconds(found.life.first_seen - missing.life.last_seen);
+  const double since = toSeconds(new_track.life.first_seen - missing.life.last_seen);
   if (since < -kOverlap_s) return kTooFar;
   const bool carried =
-      frame.priors->of(h.class_name).moving <= 0.0 && wasLookedAt(h.x.head<3>(), missing);
+      frame.priors->of(h.class_name).moving <= 0.0 && wasInView(h.x.head<3>(), missing);
   if (h.moving ? since > kDriven_s : !carried) return kTooFar;
-  const double ago = toSeconds(found.as_of - missing.life.last_seen);
+  const double ago = toSeconds(new_track.as_of - missing.life.last_seen);
   if (h.moving && ago > kTraced_s) return kTooFar;
   const State then = stateAt(h, -ago);
   const double metres = (then - missing.best().x).head<3>().norm();
-  // A belief at rest follows what drives off a little before it loses it.
+  // A belief at rest follows an object that drives off for a while.
   const double length = h.x.segment<3>(kSize).array().exp().maxCoeff();
   return metres < (h.moving ? 0.75 * length : kCarried_m) ? metres : kTooFar;
 }
@@ -76,14 +80,15 @@ std::size_t nearest(const std::vector<Track>& tracks, std::size_t of, bool among
   double least = kTooFar;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (i == of || isMissing(tracks[i]) != among_missing) continue;
-    const double d =
-        among_missing ? apart(tracks[i], tracks[of], frame) : apart(tracks[of], tracks[i], frame);
+    const double d = among_missing ? distanceBetween(tracks[i], tracks[of], frame)
+                                   : distanceBetween(tracks[of], tracks[i], frame);
     if (d < least) least = d, best = i;
   }
   return best;
 }
 
-/// What is known of the thing is what the newcomer shows.
+/// The new track keeps its belief and takes over the id, the first times and the counts of the old
+/// one.
 void takeOverIdentity(Track& past, Track&& now) {
   now.id = past.id;
   now.life.first_seen = past.life.first_seen;
@@ -94,7 +99,7 @@ void takeOverIdentity(Track& past, Track&& now) {
   past = std::move(now);
 }
 
-/// What was known of it stays; how it is seen now is what the newcomer shows.
+/// Merges the new track into the old one. Visibility and detectability are those of the new track.
 void resumeTrack(Track& past, Track& now, const FrameContext& frame) {
   mergeTwo(past, now, frame);
   past.existence_lead = now.existence_lead;
@@ -122,45 +127,46 @@ std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const Frame
   return merges;
 }
 
-void keepDeleted(std::vector<Track>& gone, std::vector<Track> deleted, TimePoint now,
+void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters) {
-  std::erase_if(gone,
+  std::erase_if(recently_deleted,
                 [&](const Track& o) { return toSeconds(now - o.as_of) > parameters.reidentify_s; });
   for (Track& o : deleted) {
     const Hypothesis& best = o.best();
     if (!o.life.once_confirmed || best.moving || best.class_name == kOtherClass) continue;
     o.visibility.fraction = 0.0;
-    gone.push_back(std::move(o));
+    recently_deleted.push_back(std::move(o));
   }
 }
 
-std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks, std::vector<Track>& gone,
+std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks,
+                                           std::vector<Track>& recently_deleted,
                                            const FrameContext& frame) {
   std::vector<MergeRecord> merges;
   for (Track& o : tracks) {
-    if (gone.empty()) break;
-    if (!isThere(o, frame) || o.visibility.fraction <= 0.0) continue;
-    const bool drives = o.best().moving;
-    std::size_t found = gone.size();
+    if (recently_deleted.empty()) break;
+    if (!confirmedOrEstablished(o, frame) || o.visibility.fraction <= 0.0) continue;
+    const bool moves = o.best().moving;
+    std::size_t match = recently_deleted.size();
     double most = frame.parameters->tracks.merge_overlap;
-    for (std::size_t i = 0; i < gone.size(); ++i) {
-      const Track& past = gone[i];
+    for (std::size_t i = 0; i < recently_deleted.size(); ++i) {
+      const Track& past = recently_deleted[i];
       if (o.life.first_seen <= past.life.last_seen) continue;
-      const bool lookalike_nats = past.best().class_name == o.best().class_name;
-      const double shared = drives           ? (takesOver(o, past) ? 1.0 : 0.0)
-                            : lookalike_nats ? overlap(past.best().x, o.best().x, frame.view.up_W)
-                                             : 0.0;
-      if (shared >= most) most = shared, found = i;
+      const bool same_class = past.best().class_name == o.best().class_name;
+      const double shared = moves        ? (takesOver(o, past) ? 1.0 : 0.0)
+                            : same_class ? overlap(past.best().x, o.best().x, frame.view.up_W)
+                                         : 0.0;
+      if (shared >= most) most = shared, match = i;
     }
-    if (found == gone.size()) continue;
-    merges.push_back({gone[found].id, o.id, drives, !drives});
-    if (drives) {
-      takeOverIdentity(gone[found], std::move(o));
+    if (match == recently_deleted.size()) continue;
+    merges.push_back({recently_deleted[match].id, o.id, moves, !moves});
+    if (moves) {
+      takeOverIdentity(recently_deleted[match], std::move(o));
     } else {
-      resumeTrack(gone[found], o, frame);
+      resumeTrack(recently_deleted[match], o, frame);
     }
-    o = std::move(gone[found]);
-    gone.erase(gone.begin() + static_cast<std::ptrdiff_t>(found));
+    o = std::move(recently_deleted[match]);
+    recently_deleted.erase(recently_deleted.begin() + static_cast<std::ptrdiff_t>(match));
   }
   if (merges.empty()) return merges;
   std::stable_sort(tracks.begin(), tracks.end(),

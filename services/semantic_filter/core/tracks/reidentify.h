@@ -1,7 +1,6 @@
-// A newcomer that is no new thing: one that was moved, or drove off, while nobody could
-// applyCorrection it is missing where it stood, and a newcomer of its class is near by (DESIGN 5,
-// item 11); one that was believed gone because the network missed it again and again is found where
-// it was.
+// Re-identification: a new track is an old object that was moved, drove off, or was missed for too
+// long (paper, line 288; moving objects are out of its scope, line 68). Derivation:
+// tools/docs/maths/re_identification.md.
 #pragma once
 
 #include <vector>
@@ -10,22 +9,26 @@
 
 namespace perdure::semantic_filter {
 
-/// Gives the newcomer the id and the past of what is missing; its own id is absorbed. Newcomers are
-/// established and were first seen when the other was seen no more. One that moves must have been
-/// where the other stood when that was last seen; one that stands is of a class that is carried,
-/// near by, at a place that was looked at before, and empty. Wherever the other was believed to be,
-/// what drives in the box that it was last seen in, at once, is it. Each is taken with the nearest
-/// that would have it, too.
+/// Finds new tracks that are missing ones (confirmed once, now of little existence). The new track
+/// gets the id and the past of the missing one; its own id is absorbed. New tracks are established
+/// and were first detected when the missing one no longer was. Each of a pair must be nearest to
+/// the other.
+///
+/// A new track that moves must have been at the place of the missing one when that was last
+/// detected. A new track at rest must be near, of a class that is carried, and at a place that was
+/// in view and empty before. A new track that moves and begins, at once, in the last box of the
+/// missing one is the same object, wherever the missing one was believed to be.
 std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const FrameContext& frame);
 
-/// Keeps what was claimed at rest and is now believed gone, or has lost its shape, for `return_s`
-/// from then on.
-void keepDeleted(std::vector<Track>& gone, std::vector<Track> deleted, TimePoint now,
+/// Keeps deleted tracks that were confirmed once, at rest and of a known class, for
+/// `parameters.return_s`. They were deleted by existence or by the loss of every plausible size.
+void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters);
-/// Gives an established newcomer the id and the past of what is gone, of its class and in its
-/// place, and was not seen since the newcomer was; or that it takes over the box of, and drives.
-/// The newcomer's own id is absorbed.
-std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks, std::vector<Track>& gone,
+/// Gives an established new track the id and the past of a recently deleted one; its own id is
+/// absorbed. Both are of one class and overlap in space, or the new track moves and takes over the
+/// box of the deleted one. The deleted one was last detected before the new one was first detected.
+std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks,
+                                           std::vector<Track>& recently_deleted,
                                            const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -1,5 +1,5 @@
-// What exists and has lost its place and shape begins again from a box that is its own, under its
-// id.
+// Re-initialisation: state and shape of a track again, from a box assigned to it (paper,
+// "Initialization", line 284). Derivation: tools/docs/maths/initiation.md.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,9 @@
 
 namespace perdure::semantic_filter {
 
-/// Id, existence and known classes (`pmf`, of before the loss) stay; geometry and motion are those
-/// of a birth. False, and the track left as it is, where the box cannot fix one.
+/// Id, existence and known classes stay; geometry and motion are those of an initiation. `pmf`: of
+/// the track before it lost its shape. Returns false, and leaves the track as it is, if the box
+/// does not determine a track.
 bool reinitialise(Track& track, const std::vector<ClassNumber>& pmf, const BoxDetection& detection,
                   const std::optional<RangeHint>& range, const FrameContext& frame);
 

@@ -8,9 +8,9 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kLittleWorth = 0.1;  // of a look, below which it repeats earlier ones
+constexpr double kRepetition = 0.1;  // tempering exponent below which a hit is a repetition
 
-/// log Σ π_k A_k^exponent, A_k the mean of A over the hypotheses of class k.
+/// Returns log Σ π_k A_k^exponent, where A_k is the mean of A over the hypotheses of class k.
 double temperedLog(const Track& track, const std::vector<ClassNumber>& pmf,
                    const std::vector<double>& A, double exponent) {
   double mean = 0.0;
@@ -24,41 +24,43 @@ double temperedLog(const Track& track, const std::vector<ClassNumber>& pmf,
   return std::log(mean);
 }
 
-/// P(miss | unmapped_occluder) is 1: A = s + (1 - s) A', of which A' is the miss as if nothing
-/// unmapped_occluder it.
-double excusedByScreen(const Track& track, const std::vector<ClassNumber>& pmf,
-                       const std::vector<Shares>& shares, double exponent) {
+/// Returns the nats of a miss that an unmapped occluder excuses. With probability s it hides the
+/// object, and then a miss is certain: A = s + (1 - s) A', where A' is A without the occluder.
+double excusedByOccluder(const Track& track, const std::vector<ClassNumber>& pmf,
+                         const std::vector<Shares>& shares, double exponent) {
   constexpr double kLeast = 1e-6;
-  const double open = 1.0 - track.detectability.unmapped_occluder;
-  if (track.detectability.unmapped_occluder <= 0.0 || open < kLeast) return 0.0;
-  std::vector<double> A, unscreened;
+  const double unoccluded = 1.0 - track.detectability.unmapped_occluder;
+  if (track.detectability.unmapped_occluder <= 0.0 || unoccluded < kLeast) return 0.0;
+  std::vector<double> A, without_occluder;
   A.reserve(shares.size());
-  unscreened.reserve(shares.size());
+  without_occluder.reserve(shares.size());
   for (const Shares& s : shares) {
     A.push_back(s.A);
-    unscreened.push_back(std::max(1.0 + (s.A - 1.0) / open, kLeast));
+    without_occluder.push_back(std::max(1.0 + (s.A - 1.0) / unoccluded, kLeast));
   }
   const double nats =
-      temperedLog(track, pmf, A, exponent) - temperedLog(track, pmf, unscreened, exponent);
+      temperedLog(track, pmf, A, exponent) - temperedLog(track, pmf, without_occluder, exponent);
   return std::isfinite(nats) ? std::max(nats, 0.0) : 0.0;
 }
 
-/// log A of a class against the same look by a network that tells no class from clutter: each box
-/// without its g_k.
-double saidByNetwork(const Track& track, const std::vector<Shares>& shares,
-                     const std::string& class_name, const std::vector<std::size_t>& looked_at,
-                     const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
-  std::vector<double> unsaid;  // 1 / g_k, of each box
-  unsaid.reserve(looked_at.size());
-  for (const std::size_t z : looked_at) {
-    unsaid.push_back(std::exp(-logRatio(boxes[z], *frame.model, class_name, track.lookalike.nats)));
+/// Returns log(A / A without g_k) of a class. "Without g_k": the same boxes from a network that
+/// cannot tell classes from clutter.
+double activationNats(const Track& track, const std::vector<Shares>& shares,
+                      const std::string& class_name, const std::vector<std::size_t>& gated,
+                      const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
+  std::vector<double> inverse_ratio;  // 1 / g_k of each box
+  inverse_ratio.reserve(gated.size());
+  for (const std::size_t z : gated) {
+    inverse_ratio.push_back(
+        std::exp(-logRatio(boxes[z], *frame.model, class_name, track.lookalike.nats)));
   }
   double with = 0.0, without = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     if (track.hypotheses[i].class_name != class_name) continue;
     const double A = track.hypotheses[i].weight * shares[i].A;
     double rest = shares[i].none;
-    for (std::size_t z = 0; z < unsaid.size(); ++z) rest += shares[i].box[z] * unsaid[z];
+    for (std::size_t z = 0; z < inverse_ratio.size(); ++z)
+      rest += shares[i].box[z] * inverse_ratio[z];
     with += A;
     without += A * rest;
   }
@@ -68,23 +70,23 @@ double saidByNetwork(const Track& track, const std::vector<Shares>& shares,
 }  // namespace
 
 LookReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
-                      double tempering, double exponent, const std::vector<std::size_t>& looked_at,
+                      double tempering, double exponent, const std::vector<std::size_t>& gated,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
   LookReasons reasons;
   const auto pmf = classShares(track);
-  if (!(detected >= 0.5) || looked_at.empty()) {  // a number gone bad is no hit
+  if (!(detected >= 0.5) || gated.empty()) {  // NaN is no hit
     reasons.kind = ExistenceEvidence::kMiss;
-    reasons.excused = excusedByScreen(track, pmf, shares, exponent);
+    reasons.excused = excusedByOccluder(track, pmf, shares, exponent);
     return reasons;
   }
-  if (tempering < kLittleWorth) reasons.kind = ExistenceEvidence::kRepeated;
-  std::vector<ClassNumber> said;
-  said.reserve(pmf.size());
+  if (tempering < kRepetition) reasons.kind = ExistenceEvidence::kRepeated;
+  std::vector<ClassNumber> activation_nats;
+  activation_nats.reserve(pmf.size());
   for (const ClassNumber& c : pmf) {
-    said.push_back(
-        {c.name, exponent * saidByNetwork(track, shares, c.name, looked_at, boxes, frame)});
+    activation_nats.push_back(
+        {c.name, exponent * activationNats(track, shares, c.name, gated, boxes, frame)});
   }
-  reasons.activation = gains(pmf, said);
+  reasons.activation = gains(pmf, activation_nats);
   return reasons;
 }
 

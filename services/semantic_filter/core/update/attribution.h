@@ -1,6 +1,8 @@
-// What a look changed, and why: how the step of existence and PMF divides into what the network
-// said, what the geometry said, and what a screen excused. Only the ledger reads it; the step
-// itself is update.h's.
+// Attribution: the division of one update of existence and PMF among its causes, for the ledger
+// (the paper has no such account). Derivation: tools/docs/maths/ledger.md.
+//
+// The causes are the activations of the network, the geometry of the boxes, and an unmapped
+// occluder that excuses a miss. Attribution changes no belief; track_update.h does.
 #pragma once
 
 #include <optional>
@@ -10,30 +12,32 @@
 
 namespace perdure::semantic_filter {
 
-/// How one hypothesis divides a look among "no box" and the boxes.
+/// How one hypothesis divides an observation among "none of the boxes" and each box.
 struct Shares {
-  double A = 1.0;           ///< P(look | it) against P(look | nothing there)
-  double none = 1.0;        ///< posterior share of "none of the boxes"
-  std::vector<double> box;  ///< posterior share of each box of the look
+  double A = 1.0;           ///< P(frame | hypothesis) / P(frame | nothing there)
+  double none = 1.0;        ///< β_0, posterior share of "none of the boxes"
+  std::vector<double> box;  ///< β_z, posterior share of each gated box
 };
 
-/// What is known of a look before the weights change.
+/// The reasons of an observation. They are computed before the weights change.
 struct LookReasons {
   ExistenceEvidence kind = ExistenceEvidence::kHit;
-  double excused = 0.0;  ///< nats of a miss that a screen explains, >= 0
-  /// Of a look that shows the track: what the network's activations add to log π of each class.
+  double excused = 0.0;  ///< nats of a miss that an unmapped occluder excuses, >= 0
+  /// At a hit: what the activations of the network add to log π of each class, nats.
   std::vector<ClassNumber> activation;
 };
 
-/// `looked_at` are the look's boxes; `detected` is the probability that one of the boxes is the
-/// track's, `tempering` the look's where one is, `exponent` that of A between classes (update.h).
+/// `detected`: probability that one of the boxes is the track's. `tempering`: exponent τ of the
+/// observation, for a hit. `exponent`: that of A between classes. `gated`: indices of the boxes
+/// near the track.
 LookReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
-                      double tempering, double exponent, const std::vector<std::size_t>& looked_at,
+                      double tempering, double exponent, const std::vector<std::size_t>& gated,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
-/// Sets existence and books it.
+/// Sets existence to `r` and enters its reasons in the ledger.
 void bookExistence(Track& track, double r, const LookReasons& reasons);
-/// Divides the weights by their sum and books the classes. The numbers are sound.
+/// Normalises the weights and enters the reasons of the PMF in the ledger. The track is sound
+/// (belief/mixture_ops.h).
 void bookClasses(Track& track, const LookReasons& reasons);
 
 }  // namespace perdure::semantic_filter

@@ -12,10 +12,10 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-constexpr double kMaxHead = 6.0;  // nats
+constexpr double kMaxHeading = 6.0;  // nats
 
-/// Within each (class, static or moving) the azimuth may updateClassAndExistence the yaw modes;
-/// never across, so that neither existence nor class nor motion can learn from it.
+/// Multiplies the weights of yaw modes by the likelihood of the azimuths. Each group of one class
+/// and one motion keeps its total weight, so that existence, class and motion learn nothing.
 void weighYawModes(Track& track, const std::vector<double>& likelihood) {
   std::map<std::pair<std::string, bool>, std::pair<double, double>> totals;
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
@@ -34,17 +34,17 @@ void weighYawModes(Track& track, const std::vector<double>& likelihood) {
 }  // namespace
 
 void updateAzimuths(Track& track, const std::vector<Shares>& shares, double tempering,
-                    const std::vector<std::size_t>& looked_at,
-                    const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
-  const bool any = std::any_of(looked_at.begin(), looked_at.end(),
+                    const std::vector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
+                    const FrameContext& frame) {
+  const bool any = std::any_of(gated.begin(), gated.end(),
                                [&](std::size_t z) { return boxes[z].azimuth.has_value(); });
   if (!any) return;
   std::vector<double> likelihood(track.hypotheses.size(), 1.0);
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
     const ClassPrior& prior = frame.priors->of(track.hypotheses[i].class_name);
     if (!prior.has_yaw) continue;
-    for (std::size_t b = 0; b < looked_at.size(); ++b) {
-      const BoxDetection& box = boxes[looked_at[b]];
+    for (std::size_t b = 0; b < gated.size(); ++b) {
+      const BoxDetection& box = boxes[gated[b]];
       if (!box.azimuth || shares[i].box[b] < 0.2) continue;
       const double sigma = azimuthSigma(box.azimuth_sigma, prior);
       const double weight = shares[i].box[b] * std::sqrt(tempering);
@@ -60,7 +60,7 @@ double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double wei
   const AzimuthMatch match =
       matchAzimuth(azimuth, h.x, frame.view, sigma * sigma + h.P(kYaw, kYaw));
   h.heading_log_odds =
-      std::clamp(h.heading_log_odds + weight * headingOdds(match), -kMaxHead, kMaxHead);
+      std::clamp(h.heading_log_odds + weight * headingOdds(match), -kMaxHeading, kMaxHeading);
   const double R = sigma * sigma / std::max(weight * match.inlier, 1e-9);
   const double S = h.P(kYaw, kYaw) + R;
   const State K = h.P.col(kYaw) / S;

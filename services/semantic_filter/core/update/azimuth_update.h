@@ -1,4 +1,6 @@
-// A network's azimuth: it turns a hypothesis and weighs its yaw modes, and tells nothing else.
+// Update by the network's azimuth: it changes yaw, heading and the weights of yaw modes, and
+// nothing else. (The paper uses azimuths at initiation only: "Initialization", line 284.)
+// Derivation: tools/docs/maths/azimuth_and_heading.md.
 #pragma once
 
 #include <vector>
@@ -7,16 +9,16 @@
 
 namespace perdure::semantic_filter {
 
-/// A network's azimuth as a weak measurement of yaw modulo 180°, with `weight` in (0, 1]; head or
-/// tail is kept as log-odds. Returns the likelihood of the azimuth, for weighing yaw modes only.
+/// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. `azimuth`, `sigma`:
+/// rad. `weight`: in (0, 1]. Returns the likelihood of the azimuth, 1/rad. It is for the weights of
+/// yaw modes only.
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame);
 
-/// By the azimuths of the boxes that may be the track's. The errors of azimuths are less
-/// lookalike_nats from look to look than those of boxes: their exponent is the square root of the
-/// look's tempering.
+/// Updates all hypotheses by the azimuths of the boxes that may be the track's. Errors of azimuths
+/// are less correlated between observations than those of boxes. So their exponent is √`tempering`.
 void updateAzimuths(Track& track, const std::vector<Shares>& shares, double tempering,
-                    const std::vector<std::size_t>& looked_at,
-                    const std::vector<BoxDetection>& boxes, const FrameContext& frame);
+                    const std::vector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
+                    const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -10,14 +10,14 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Of A over the hypotheses, by a look's tempering and in full.
+/// Mean of A over the hypotheses, with tempering between classes and without.
 struct MeanA {
   double tempered = 0.0, full = 0.0;
 };
 
-/// π ∝ π A. Within a class the hypotheses differ by geometry alone, whose shared errors are in the
-/// state: A counts in full there. Between classes, and for existence, looks share what the network
-/// mistakes: A counts by the look's tempering. Returns the mean of A over the prior.
+/// π ∝ π A. Within a class, hypotheses differ by geometry only, whose lasting errors are in the
+/// state: there A counts in full. Between classes, and for existence, observations share the
+/// mistakes of the network: there A counts with the exponent τ. Returns the prior means of A.
 MeanA updateWeights(Track& track, const std::vector<Shares>& shares, double tempering) {
   std::map<std::string, std::pair<double, double>> classes;  // weight, Σ w A
   double mean_A = 0.0, tempered_A = 0.0;
@@ -40,13 +40,13 @@ MeanA updateWeights(Track& track, const std::vector<Shares>& shares, double temp
   return {tempered_A, mean_A};
 }
 
-/// Each mode of yaw that all looks have weighed (core/smooth) is linearised at a state of its own,
-/// and by the looks since then the filter would give up true ones before all looks are asked again.
-/// One that explains this look about as well as the best keeps `least` of its class until then; the
-/// class's own weight stays.
+/// Protects the yaw modes that a mode search (core/smoothing/mode_search.h) has weighed by all
+/// keyframes. Each is linearised at its own state, so the later observations alone would let the
+/// filter give up true modes before the next search. A mode that explains this observation about as
+/// well as the best one keeps at least `least` of its class. The weight of the class stays.
 void keepSearchedModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares,
                        double least) {
-  constexpr double kAsWell = 0.05;  // of the best one's A
+  constexpr double kComparable = 0.05;  // least ratio to the largest A of the class
   struct Class {
     double before = 0.0, after = 0.0, best_A = 0.0;
   };
@@ -59,7 +59,7 @@ void keepSearchedModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& s
   for (std::size_t i = 0; i < hs.size(); ++i) {
     Hypothesis& h = hs[i];
     Class& c = classes[h.class_name];
-    const bool kept = h.modes_searched && !h.moving && shares[i].A > kAsWell * c.best_A;
+    const bool kept = h.modes_searched && !h.moving && shares[i].A > kComparable * c.best_A;
     if (kept) h.weight = std::max(h.weight, least * c.before);
     c.after += h.weight;
   }
@@ -69,10 +69,10 @@ void keepSearchedModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& s
   }
 }
 
-/// Existence has two accounts. "It is a real thing": looks from one place share the network's
-/// mistakes, hits and misses lookalike_nats, so that A counts by the look's tempering. "It is there
-/// still": a patch of wall that passes for a chair does not go away, so that A counts in full, and
-/// one hit tells that the misses before it were the network's. The lower of the two is believed.
+/// Existence has two accounts; the smaller one is believed. "It is a real object": observations
+/// from one viewpoint share the mistakes of the network, hits as well as misses, so A counts with
+/// the exponent τ. "It is still there": a patch of wall that resembles a chair does not go away, so
+/// A counts in full, and one hit shows that the misses before it were mistakes of the network.
 double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
   const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
   const double most = logOdds(certain), now = logOdds(std::min<double>(track.existence, certain));

@@ -1,5 +1,5 @@
-// Weigh: what a look makes of π, of r, and of how well the track can be detected from here, from
-// the same A (eq. 7, DESIGN 5, items 3 and 5).
+// Update of PMF, existence and detectability by one observation, all from the same A (paper, eq. 4
+// and 9). Derivation: tools/docs/maths/class_and_existence_update.md.
 #pragma once
 
 #include <vector>
@@ -8,9 +8,10 @@
 
 namespace perdure::semantic_filter {
 
-/// `shares` are of each hypothesis, in order; `tempering` of the look beside earlier ones is within
-/// 0 … 1; `detected`: it more probably shows the track than not. Hypotheses' weights are left
-/// unnormalised. Returns existence as it is to become, at most `existenceCeiling`.
+/// `shares`: of each hypothesis, in order. `tempering`: exponent τ of the observation, 0 to 1.
+/// `detected`: one of the boxes is more probably the track's than not. Leaves the weights
+/// unnormalised. Returns the new existence, at most `existenceCeiling`; the track keeps the old
+/// one.
 double updateClassAndExistence(Track& track, const std::vector<Shares>& shares, double tempering,
                                bool detected, const Parameters& parameters);
 

@@ -15,7 +15,7 @@ namespace {
 using SideRows = Eigen::Matrix<double, 4, kVelocity>;  // no side depends on the velocity
 using Gains = Eigen::Matrix<double, kStateDim, 4>;
 
-/// The sides that take part; the others have a residual and derivatives of 0.
+/// Innovation of the four sides. A side that does not take part has zero residual and zero rows.
 struct Innovation {
   Eigen::Vector4d residual = Eigen::Vector4d::Zero(), variance = Eigen::Vector4d::Ones();
   SideRows H = SideRows::Zero();
@@ -23,7 +23,8 @@ struct Innovation {
   int count = 0;
 };
 
-/// Measured sides, and those cut sides whose prediction wrongly ends inside the cut.
+/// Uses the comparable sides, and cut or hidden sides whose prediction ends inside the box: that
+/// must be wrong.
 Innovation innovation(const BoxMeasurement& z, const ProjectedBox& p,
                       const std::array<bool, 4>& hidden) {
   Innovation y;
@@ -46,7 +47,7 @@ struct Gain {
   Eigen::Matrix4d L;
 };
 
-/// Nothing where S is not positive definite. `PHt` is P Hᵀ + C H_gᵀ, `S` without R.
+/// Returns nothing if S is not positive definite. `PHt`: P Hᵀ + C H_gᵀ. `S`: without the noise.
 std::optional<Gain> gainOf(const Gains& PHt, const Eigen::Matrix4d& S,
                            const Eigen::Vector4d& variance) {
   Gain gain{PHt, S};
@@ -56,7 +57,8 @@ std::optional<Gain> gainOf(const Gains& PHt, const Eigen::Matrix4d& S,
   return gain;
 }
 
-/// How much the noise of an outlier is widened: the weight of a t distribution, inverted.
+/// Returns the factor that widens the noise of an outlier: the inverse weight of a t distribution
+/// with `tail` degrees of freedom.
 double inflationOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
   Eigen::Vector4d whitened = y.residual;
   whiten(L, whitened);
@@ -65,8 +67,6 @@ double inflationOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
 
 }  // namespace
 
-/// Moment match of "no box" and each box by their shares, which are the parts' weights (the second
-/// half of PDA).
 void mix(Hypothesis& none, double share_none, std::vector<Hypothesis>& parts) {
   const bool negligible = share_none <= kNegligible;
   Hypothesis& result = negligible ? parts.front() : none;
@@ -78,7 +78,7 @@ void mix(Hypothesis& none, double share_none, std::vector<Hypothesis>& parts) {
 }
 
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
-                         const std::array<bool, 4>& hidden, double repeated,
+                         const std::array<bool, 4>& hidden, double repetition,
                          const FrameContext& frame, const ProjectedBox* at_prior) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   State x = prior.x;
@@ -93,7 +93,7 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
     }
     Innovation now = innovation(z, box ? *box : *at_prior, hidden);
     if (now.count == 0) break;
-    now.variance *= repeated * inflation;
+    now.variance *= repetition * inflation;
     const Gains PHt = leftTimesTransposed(prior.P, now.H) + timesTransposed(prior.C, now.H_pose);
     pose = timesTop<6>(now.H, prior.C) + timesTop<6>(now.H_pose, P_pose);
     const Eigen::Matrix4d S = timesTop<4>(now.H, PHt) + timesTransposed(now.H_pose, pose);
@@ -104,9 +104,9 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
       if (inflation > 1.0) next_gain = gainOf(PHt, S, now.variance);
     }
     if (!next_gain) break;
-    State back = prior.x - x;
-    back[kYaw] = wrapAngle(back[kYaw]);
-    Eigen::Vector4d whitened = now.residual - now.H.lazyProduct(back.head<kVelocity>());
+    State to_prior = prior.x - x;
+    to_prior[kYaw] = wrapAngle(to_prior[kYaw]);
+    Eigen::Vector4d whitened = now.residual - now.H.lazyProduct(to_prior.head<kVelocity>());
     whiten(next_gain->L, whitened);
     State next = prior.x + next_gain->W * whitened;
     next[kYaw] = wrapAngle(next[kYaw]);

@@ -1,4 +1,5 @@
-// The iterated consider-EKF: one hypothesis and the boxes that may be its own.
+// Iterated EKF of one hypothesis, with the pose error as a consider state (paper, eq. 9;
+// Bar-Shalom, Li 2001, ch. 10; Schmidt 1966). Derivation: tools/docs/maths/ekf.md.
 #pragma once
 
 #include <optional>
@@ -9,16 +10,18 @@
 
 namespace perdure::semantic_filter {
 
-/// One hypothesis against one box: the iterated consider-EKF. The box's variance counts `repeated`
-/// times, and more where the box is an outlier. `at_prior` is the projection of the prior where it
-/// is known already.
+/// Returns the posterior given that box `z` is the object's. `repetition`: factor >= 1 on the
+/// variance of the sides, for noise that repeats that of the last detection; an outlier is widened
+/// further. `hidden`: sides that are not compared because something hides them. `at_prior`:
+/// projection of the prior, if it is known.
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
-                         const std::array<bool, 4>& hidden, double repeated,
+                         const std::array<bool, 4>& hidden, double repetition,
                          const FrameContext& frame, const ProjectedBox* at_prior = nullptr);
 
-/// Moment match of "no box" and each box by their shares, which are the parts' weights (the second
-/// half of PDA).
+/// Mixes the prior `none` ("none of the boxes") and one posterior for each box to one Gaussian with
+/// the same two moments (probabilistic data association). The weights of `parts` are the posterior
+/// shares of their boxes. The result replaces `none`.
 void mix(Hypothesis& none, double share_none, std::vector<Hypothesis>& parts);
-inline constexpr double kNegligible = 0.01;  ///< share of a box in an update
+inline constexpr double kNegligible = 0.01;  ///< posterior share below which a box is left out
 
 }  // namespace perdure::semantic_filter

@@ -14,15 +14,17 @@ namespace {
 
 using Row = Eigen::Matrix<double, 1, kStateDim>;
 
-Row byState(const State& x, const Eigen::Vector3d& up) {
+/// Returns the derivative of the height of the underside by the state.
+Row undersideByState(const State& x, const Eigen::Vector3d& up) {
   Row a = Row::Zero();
   a.head<3>() = up.transpose();
   a[kSize + 2] = -0.5 * std::exp(x[kSize + 2]);
   return a;
 }
 
-/// Of a height at `place`, as it is believed, by the pose's error (core/birth.cpp, addPoseError).
-Eigen::Matrix<double, 1, 6> byPose(const Eigen::Vector3d& place, const View& view) {
+/// Returns the derivative of a believed height at `place` by the pose error, as addPoseError
+/// (core/tracks/cuboid_fit.cpp) has it.
+Eigen::Matrix<double, 1, 6> heightByPose(const Eigen::Vector3d& place, const View& view) {
   Eigen::Matrix<double, 1, 6> a;
   const Eigen::Vector3d p_B = view.T_WB.inverse() * place;
   a.head<3>() = -view.up_W.transpose() * view.T_WB.R() * skew(p_B);
@@ -30,13 +32,13 @@ Eigen::Matrix<double, 1, 6> byPose(const Eigen::Vector3d& place, const View& vie
   return a;
 }
 
-/// What the looks alone say of the underside, given the pose; nothing of what is not placed by
-/// parallax: sizes of one class err lookalike_nats.
+/// Returns what the boxes alone say of the underside, given the pose. It is nothing if parallax has
+/// not placed the object: sizes of one class have common errors.
 GroundContact groundContactOf(const Hypothesis& h, const FrameContext& frame) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
   if (placeSigma(h, P_pose) > frame.parameters->ground.resolved * distance) return {};
-  const Row a = byState(h.x, frame.view.up_W);
+  const Row a = undersideByState(h.x, frame.view.up_W);
   Eigen::Matrix<double, 1, 6> shared = a * h.C;
   Matrix6d L = P_pose;
   if (choleskyInPlace(L)) {
@@ -58,8 +60,8 @@ double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
   const auto ground = frame.ground->below(h.x.head<3>(), id);
   if (!ground) return 0.0;
   const Eigen::Vector3d up = frame.view.up_W.normalized();
-  const Row a = byState(h.x, up);
-  const Eigen::Matrix<double, 1, 6> g = byPose(h.x.head<3>(), frame.view);
+  const Row a = undersideByState(h.x, up);
+  const Eigen::Matrix<double, 1, 6> g = heightByPose(h.x.head<3>(), frame.view);
   const Matrix6d& P_pose = frame.pose_error.covariance;
   const double e = ground->mean - underside(h.x, up);
   const double own = ground->variance + p.sigma_m * p.sigma_m;

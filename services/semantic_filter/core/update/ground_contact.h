@@ -1,4 +1,5 @@
-// What stands on the ground: a consider update of its underside.
+// Ground contact: a consider update of a hypothesis by the height of the ground below it (Schmidt
+// 1966; the paper has none). Derivation: tools/docs/maths/ground_contact.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/state.h"
@@ -6,9 +7,10 @@
 
 namespace perdure::semantic_filter {
 
-/// Keeps what the hypothesis, as the looks alone have it, says of the ground (GroundContact), and
-/// then makes it stand there as far as its class does: a consider update. Returns log p(underside |
-/// the ground) against undersides anywhere within ground.span_m: 0 where nothing is known.
+/// First stores what the boxes alone say of the ground (GroundContact). Then updates the hypothesis
+/// by the ground below it, as far as objects of its class stand on the ground. What track `id`
+/// itself says of the ground is left out. Returns log p(underside | ground) against an underside
+/// that is uniform within ground.span_m, nats; 0 if nothing is known of the ground.
 double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

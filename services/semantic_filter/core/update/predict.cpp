@@ -16,7 +16,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Stationary deviation of b from this view, by the mean extent of the cuboid over all rays.
+/// Returns the stationary deviation of b in this view, for the mean extent of the cuboid over all
+/// directions.
 Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const ViewWalk& walk) {
   const double scale = walk.focal / std::max((x.head<3>() - T_WC.p).norm(), 1.0);
   const Eigen::Vector3d size = x.segment<3>(kSize).array().exp();
@@ -24,8 +25,8 @@ Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const
   return biasSigma(walk.lasting, width, std::max(scale * size.z(), 1.0));
 }
 
-/// b forgets with the change of the view: an Ornstein-Uhlenbeck process along the way. Its pixels
-/// become a lesser share of the box as the track comes nearer.
+/// b is an Ornstein-Uhlenbeck process along the view change. A pixel is a smaller share of the box
+/// when the object is nearer.
 void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const ViewWalk& walk) {
   const Eigen::Vector4d sigma = stationaryBias(h.x, walk.T_WC, walk);
   Eigen::Vector4d keep = Eigen::Vector4d::Zero();
@@ -41,8 +42,8 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
-/// What drove off unseen could be anywhere: it would claim any box. The track lives on as far as
-/// it may have stayed.
+/// Removes moving hypotheses whose position is lost: they would explain any box. Existence is
+/// multiplied by the share of the others.
 void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
   for (const auto& h : track.hypotheses.read()) {
@@ -51,15 +52,15 @@ void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   }
   if (kept >= 1.0 - 1e-9) return;
   track.existence.become(track.existence * kept, ExistenceEvidence::kLost, now);
-  if (kept <= 1e-9) return;  // nothing is left of it; it will be deleted
+  if (kept <= 1e-9) return;  // the track will be deleted
   std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {
     return h.moving && std::sqrt(h.P.topLeftCorner<2, 2>().trace()) >= lost_sigma_m;
   });
   normalise(track, ClassEvidence::kMotion);
 }
 
-/// What drives and is not seen turns off, parks or leaves.
-void decayUnseenMoving(Track& track, double dt, double survival_s) {
+/// A moving object that is not detected may turn off, park or leave.
+void decayUndetectedMoving(Track& track, double dt, double survival_s) {
   const double stays = std::exp(-dt / survival_s);
   double kept = 0.0;
   for (auto& h : track.hypotheses) {
@@ -76,7 +77,7 @@ void decayUnseenMoving(Track& track, double dt, double survival_s) {
 void predict(Track& track, TimePoint now, const PoseError& pose_error,
              const MotionParameters& parameters, const ViewWalk& walk) {
   const double dt = toSeconds(now - track.as_of);
-  // Where the transition is lost nothing is left of C.
+  // Without a usable transition C becomes 0.
   const Matrix6d transition =
       transitionBetween(track.pose.product, pose_error.product).value_or(Matrix6d::Zero());
   std::optional<Matrix6d> L_pose = pose_error.covariance;
@@ -87,9 +88,9 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
     h.C = timesTransposed(h.C, transition);
     keepConsistent(h, pose_error.covariance, L_pose);
   }
-  const bool unseen = track.life.last_seen < track.as_of ||
-                      track.unused.occluded.count + track.unused.out_of_view.count > 0;
-  if (unseen && dt > 0.0) decayUnseenMoving(track, dt, parameters.mover_survival_s);
+  const bool undetected = track.life.last_seen < track.as_of ||
+                          track.unused.occluded.count + track.unused.out_of_view.count > 0;
+  if (undetected && dt > 0.0) decayUndetectedMoving(track, dt, parameters.mover_survival_s);
   dropLostHypotheses(track, now, parameters.lost_sigma_m);
   if (dt > 0.0) {
     track.existence.become(track.existence * std::exp(-dt / parameters.survival_s),

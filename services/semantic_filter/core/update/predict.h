@@ -1,5 +1,8 @@
-// Predict, lazily (DESIGN 5, items 1, 2 and 11): process noise, motion, survival and the transition
-// of the pose error are applied when an track can next be seen; hidden beliefs stay untouched.
+// Prediction of a track to the time and view of a frame: process noise, motion, detector bias, pose
+// correlation, detectability and survival (Bar-Shalom, Li 2001, ch. 6). Derivation:
+// tools/docs/maths/state_and_mixture.md.
+//
+// A track is predicted when it is next visible. Until then its belief stays as it is.
 #pragma once
 
 #include <optional>
@@ -9,7 +12,7 @@
 
 namespace perdure::semantic_filter {
 
-/// Brings the track up to `now`: noise on every hypothesis, P_xg, survival of its existence.
+/// Predicts the track to `now` and to the view of `walk`.
 void predict(Track& track, TimePoint now, const PoseError& pose_error,
              const MotionParameters& parameters, const ViewWalk& walk);
 

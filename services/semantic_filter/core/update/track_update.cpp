@@ -18,13 +18,13 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-Shares sharesOf(const HypothesisScore& h, const std::vector<std::size_t>& looked_at,
+Shares sharesOf(const HypothesisScore& h, const std::vector<std::size_t>& gated,
                 const Eigen::VectorXd& eta) {
   Shares shares;
   shares.A = h.no_box;
-  shares.box.reserve(looked_at.size());
-  for (std::size_t i = 0; i < looked_at.size(); ++i) {
-    const double free = eta[static_cast<Eigen::Index>(looked_at[i])];
+  shares.box.reserve(gated.size());
+  for (std::size_t i = 0; i < gated.size(); ++i) {
+    const double free = eta[static_cast<Eigen::Index>(gated[i])];
     shares.box.push_back(h.detection_probability * free * h.matches[i].likelihood);
     shares.A += shares.box.back();
   }
@@ -35,7 +35,7 @@ Shares sharesOf(const HypothesisScore& h, const std::vector<std::size_t>& looked
 
 void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
                  const HypothesisScore& scored, const std::vector<BoxDetection>& boxes,
-                 double repeated, const FrameContext& frame) {
+                 double repetition, const FrameContext& frame) {
   const ProjectedBox* at_prior = scored.box ? &*scored.box : nullptr;
   thread_local std::vector<Hypothesis> parts;
   parts.clear();
@@ -45,7 +45,7 @@ void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
     auto hidden = score.visibility.hidden_sides;
     const int part = scored.matches[i].part;
     if (part >= 0) hidden[static_cast<std::size_t>(part)] = true;
-    parts.push_back(updateWithBox(h, z, hidden, repeated, frame, at_prior));
+    parts.push_back(updateWithBox(h, z, hidden, repetition, frame, at_prior));
     parts.back().weight = shares.box[i];
   }
   if (parts.empty()) return;
@@ -55,7 +55,7 @@ void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
 }
 
 /// Probability that one of the boxes is the track's, given that it exists.
-double probabilitySeen(const Track& track, const std::vector<Shares>& shares) {
+double probabilityDetected(const Track& track, const std::vector<Shares>& shares) {
   double detected = 0.0, total = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const double weight = track.hypotheses[i].weight * shares[i].A;
@@ -65,9 +65,10 @@ double probabilitySeen(const Track& track, const std::vector<Shares>& shares) {
   return total > 0.0 ? detected / total : 0.0;
 }
 
-/// The box of the score that is the track's beyond reasonable inflation.
+/// Returns the assigned box, as an index into TrackScore::boxes: its posterior share is at least
+/// kAssigned.
 std::optional<std::size_t> assignedBox(const Track& track, const std::vector<Shares>& shares) {
-  constexpr double kSurely = 0.8;
+  constexpr double kAssigned = 0.8;
   double total = 0.0;
   std::vector<double> box(shares.empty() ? 0 : shares.front().box.size(), 0.0);
   for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -76,7 +77,7 @@ std::optional<std::size_t> assignedBox(const Track& track, const std::vector<Sha
     for (std::size_t z = 0; z < box.size(); ++z) box[z] += weight * shares[i].box[z];
   }
   const auto best = std::max_element(box.begin(), box.end());
-  if (best == box.end() || *best < kSurely * total || total <= 0.0) return std::nullopt;
+  if (best == box.end() || *best < kAssigned * total || total <= 0.0) return std::nullopt;
   return static_cast<std::size_t>(best - box.begin());
 }
 
@@ -104,15 +105,16 @@ void count(Track& track, double detected, const std::vector<Shares>& shares,
   }
 }
 
-void countFound(Track& track, const TrackScore& score, bool found, const FrameContext& frame) {
+void countForDetectionRate(Track& track, const TrackScore& score, bool is_detected,
+                           const FrameContext& frame) {
   const ViewRay from = viewRayOf(track.best().x.head<3>(), frame.view.T_WC());
-  track.detectability.rate.add(from, score.hypotheses.front().expected, found,
+  track.detectability.rate.add(from, score.hypotheses.front().expected, is_detected,
                                detectabilityScales(frame.parameters->visibility));
 }
 
-/// By how much the noise of a score counts more because the last score had almost the same: that of
-/// a stationary process of first order, whose correlation fades with the view.
-double repetition(const Track& track, const FrameContext& frame) {
+/// Returns the factor on the noise of a box whose noise repeats that of the last detection. It is
+/// that of a stationary first-order process whose correlation falls with the view change.
+double noiseRepetition(const Track& track, const FrameContext& frame) {
   if (track.views.detected_from.observations <= 0.0) return 1.0;
   const double scale = frame.parameters->box.noise_view;
   const double change = viewChange(track.best().x.head<3>(), track.views.detected_from.T_WC,
@@ -121,10 +123,11 @@ double repetition(const Track& track, const FrameContext& frame) {
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
 }
 
-/// What a score is worth beside earlier ones. How much the view has changed depends on how far the
-/// track is: that is asked of the hypothesis that explains the score best.
+/// Tempering of an observation. The view change depends on the distance of the object, so it is
+/// taken for the hypothesis with the largest posterior.
 struct Tempering {
-  double exponent = 1.0, observations = 0.0;
+  double exponent = 1.0;
+  double observations = 0.0;  ///< earlier ones with correlated errors
 };
 
 Tempering temperingOf(const Track& track, const TrackScore& score,
@@ -147,14 +150,15 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   std::vector<Shares> shares;
   shares.reserve(score.hypotheses.size());
   for (const auto& h : score.hypotheses) shares.push_back(sharesOf(h, score.boxes, eta));
-  const double detected = probabilitySeen(track, shares);
+  const double detected = probabilityDetected(track, shares);
   const Tempering tempering =
       temperingOf(track, score, shares, frame.parameters->tempering.correlation);
   const auto assigned = assignedBox(track, shares);
   count(track, detected, shares, score);
-  const double repeated = repetition(track, frame);
+  const double repetition = noiseRepetition(track, frame);
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    updateState(track.hypotheses[i], shares[i], score, score.hypotheses[i], boxes, repeated, frame);
+    updateState(track.hypotheses[i], shares[i], score, score.hypotheses[i], boxes, repetition,
+                frame);
   }
   const LookReasons reasons = reasonsOf(track, shares, detected, tempering.exponent,
                                         tempering.exponent, score.boxes, boxes, frame);
@@ -163,11 +167,12 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
                                         *frame.parameters);
   if (detected >= 0.5) {
     track.history.existence_when_detected = next;
-  } else if (score.top_down) {
+  } else if (score.top_down) {  // an answer never raises existence above what the last hit left
     next = std::min(next, std::max(r, track.history.existence_when_detected));
   }
   bookExistence(track, next, reasons);
-  if (!score.top_down && !track.best().moving) countFound(track, score, detected >= 0.5, frame);
+  if (!score.top_down && !track.best().moving)
+    countForDetectionRate(track, score, detected >= 0.5, frame);
   updateAzimuths(track, shares, tempering.exponent, score.boxes, boxes, frame);
   if (assigned) {
     const BoxDetection& box = boxes[score.boxes[*assigned]];
@@ -177,7 +182,7 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   }
   if (detected >= 0.5)
     track.views.detected_from = {frame.view.T_WC(), 1.0 + tempering.observations};
-  if (detected >= 0.5 || !score.top_down) {  // to be asked again is no score of its assigned
+  if (detected >= 0.5 || !score.top_down) {  // a top-down answer is no observation
     track.views.observed_from = {frame.view.T_WC(),
                                  tempering.observations + std::min(1.0, score.visibility.fraction)};
   }

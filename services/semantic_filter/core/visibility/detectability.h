@@ -1,5 +1,6 @@
-// What makes the detection probability of one track differ from that of its class: something that
-// is not on the map may hide it, and from some views it is seldom found.
+// Detectability: what makes the detection probability of one track differ from that of its class:
+// an unmapped occluder, and views from which it is seldom detected (Mahler 2007; not in the paper).
+// Derivation: tools/docs/maths/detectability.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"
@@ -7,24 +8,27 @@
 
 namespace perdure::semantic_filter {
 
-/// By what P_D and what is visible are to be multiplied: what is unmapped_occluder is not found,
-/// what is hard_to_detect seldom.
+/// Returns the factor on v P_D: behind an unmapped occluder the object is not detected; where it is
+/// hard to detect, the share `hard_detection_share` of P_D is left.
 double detectableShare(const Track& track, double hard_detection_share);
 
-/// P_D of a class for an instance of this size in pixels (√ of its box's area), fully visible.
+/// Returns P_D of a class for a fully visible object. `size_px`: square root of the area of its
+/// box, px.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
-/// P_D of a hypothesis: what is of no known class and looks like one is found as often as those of
-/// that class.
+/// Returns P_D of a hypothesis. *Other* is detected as often as the class that it resembles, as far
+/// as it resembles it.
 double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
                               const FrameContext& frame);
-/// How often the track is found from here, beside P_D.
+/// Returns the factor on P_D by the detection rate of earlier visits at this viewpoint; 1 for a
+/// moving track.
 double detectionRateFactor(const Track& track, const FrameContext& frame);
 
-/// What may hide it from elsewhere is not known until it is seen from there.
+/// Moves the detectability towards its stationary value as the view changes: from another
+/// viewpoint, something else may hide the object.
 void predictDetectability(Track& track, const ViewWalk& walk);
 
-/// What a score says of why it did not show the track. `mean_A`: of A over the hypotheses.
+/// Updates the reasons of misses by an observation. `mean_A`: mean of A over the hypotheses.
 void updateDetectability(Track& track, double mean_A, double hard_detection_share);
 
 }  // namespace perdure::semantic_filter
