@@ -86,7 +86,7 @@ struct Detectability {
 
 /// A thing of no known class that the network takes for one.
 struct Lookalike {
-  double nats = 0.0;       ///< evidence for "it looks like a known class", if it is of none
+  double nats = 0.0;       ///< evidence for "it resembles a known class", if it is of none
   std::string class_name;  ///< the class that the network last saw in it; empty: none
 };
 

@@ -33,7 +33,7 @@ struct ClutterParameters {
   double min_size_px = 8.0;           ///< their sizes are log-uniform from here to the image
   double censored_probability = 0.1;  ///< that a given side of a false box is censored
   double max_log_ratio = 8.0;         ///< activations are clamped to it against clutter, nats
-  double other_lookalike = 0.2;  ///< share of objects of no known class that look like a known one
+  double other_lookalike = 0.2;  ///< share of objects of no known class that resemble a known one
   double other_prior = 0.01;     ///< probability of "other" at initiation
 };
 

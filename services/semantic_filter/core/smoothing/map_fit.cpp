@@ -237,7 +237,7 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
   if (!fit) return std::nullopt;
   auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
-  // With the covariance of another state, a motion of object and pose together looks like
+  // With the covariance of another state, a motion of object and pose together resembles
   // information.
   if (fit->covariance_at != fit->x && !isJointCovariance(*h, frame.pose_error.covariance)) {
     h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;

@@ -59,7 +59,7 @@ void mergeNearHypotheses(Track& track, double threshold) {
   }
 }
 
-/// Without parallax a toy looks like a car: until the distance is known, *other* stays.
+/// Without parallax a toy resembles a car: until the distance is known, *other* stays.
 bool scaleIsUnknown(const Track& track, const TrackParameters& parameters) {
   const double distance = (track.best().x.head<3>() - track.views.detected_from.T_WC.p).norm();
   const double variance = track.best().P.topLeftCorner<3, 3>().trace();

@@ -20,10 +20,10 @@ constexpr double kNineInTen = 1.645;  // deviations of a Gaussian, for an interv
 
 using Walk = std::vector<View>;  // one view for each frame, the present one first
 
-/// `pace`: factor on the translation.
-Walk walkOn(const View& now, const Way& way, double pace) {
+/// `way_scale`: factor on the translation.
+Walk walkOn(const View& now, const Way& way, double way_scale) {
   Walk walk{now};
-  const RigidTransform step(way.step.q, pace * way.step.p);
+  const RigidTransform step(way.step.q, way_scale * way.step.p);
   const auto frames = static_cast<std::size_t>(std::ceil(kHorizon_s / way.seconds));
   while (walk.size() <= frames) {
     walk.push_back(walk.back());
@@ -216,9 +216,9 @@ std::optional<ReappearanceInterval> reappearanceInterval(const std::vector<Track
   const std::size_t found = framesToFind(things, walk, *expected, parameters);
   spread.add(result.expected + way.seconds * static_cast<double>(found), result.expected);
   const double walked = way.speed_walk * std::sqrt(result.expected / 3.0) / std::max(speed, 1e-3);
-  const double pace = kNineInTen * walked;
-  const double slower = pace < 1.0 ? at(walkOn(now.view, way, 1.0 - pace)) : kHorizon_s;
-  spread.add(slower, at(walkOn(now.view, way, 1.0 + pace)));
+  const double way_scale = kNineInTen * walked;
+  const double slower = way_scale < 1.0 ? at(walkOn(now.view, way, 1.0 - way_scale)) : kHorizon_s;
+  spread.add(slower, at(walkOn(now.view, way, 1.0 + way_scale)));
   for (std::size_t i = 0; i < std::min<std::size_t>(things.size(), 2); ++i) {
     const State x = things[i].x;
     for (const State& d : deviationsOf(things[i], now.view.T_WC().p)) {
