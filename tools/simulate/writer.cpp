@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "common/base/errors.h"
+#include "common/replay/files/sensor_file.h"
 #include "common/sim/truth_files.h"
 
 namespace perdure::tools {
@@ -23,18 +24,6 @@ std::string transformYaml(const RigidTransform& T_BS) {
     }
   }
   return fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", numbers);
-}
-
-const char* nameOf(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kNone:
-      return "none";
-    case DistortionModel::kRadialTangential:
-      return "radial-tangential";
-    case DistortionModel::kEquidistant:
-      return "equidistant";
-  }
-  return "none";
 }
 
 }  // namespace
@@ -58,28 +47,13 @@ void writeWhole(const fs::path& file, std::span<const char> bytes) {
 }
 
 std::string cameraYaml(const CameraCalibration& camera) {
-  std::string text = fmt::format("sensor_type: camera\ncomment: simulated {}\n\n", camera.name);
-  text += transformYaml(camera.T_BC);
-  text += fmt::format("\nrate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\n",
-                      camera.rate_hz, camera.width, camera.height);
-  text += fmt::format("intrinsics: [{}, {}, {}, {}]\n", camera.fx, camera.fy, camera.cx, camera.cy);
-  text += fmt::format("distortion_model: {}\n", nameOf(camera.distortion));
-  if (camera.distortion != DistortionModel::kNone) {
-    const auto& d = camera.distortion_coefficients;
-    text += fmt::format("distortion_coefficients: [{}, {}, {}, {}]\n", d[0], d[1], d[2], d[3]);
-  }
-  return text + fmt::format(
-                    "time_offset_s: {}  # t_imu = t_image + this\n"
-                    "readout_s: {}  # first to last row; the stamp is the middle row's\n",
-                    camera.time_offset_s, camera.readout_s);
+  return fmt::format("sensor_type: camera\ncomment: simulated {}\n\n", camera.name) +
+         transformYaml(camera.T_BC) + "\n" + replay::cameraKeys(camera);
 }
 
 std::string imuYaml(const ImuCalibration& imu) {
-  return fmt::format(
-      "sensor_type: imu\ncomment: simulated\n\n{}\nrate_hz: {}\ngyroscope_noise_density: {}\n"
-      "gyroscope_random_walk: {}\naccelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
-      transformYaml({}), imu.rate_hz, imu.gyro_noise, imu.gyro_bias_walk, imu.accel_noise,
-      imu.accel_bias_walk);
+  return "sensor_type: imu\ncomment: simulated\n\n" + transformYaml({}) + "\n" +
+         replay::imuKeys(imu);
 }
 
 std::string speedYaml(const sim::SpeedErrors& speed) {

@@ -20,31 +20,10 @@ std::string transformText(const RigidTransform& T_BS) {
   return fmt::format("  T_BS:\n    cols: 4\n    rows: 4\n    data: [{}]\n", rows);
 }
 
-std::string cameraText(const CameraCalibration& camera) {
-  std::string text = fmt::format("{}:\n", camera.name) + transformText(camera.T_BC);
-  text += fmt::format("  rate_hz: {}\n  resolution: [{}, {}]\n  camera_model: pinhole\n",
-                      camera.rate_hz, camera.width, camera.height);
-  text +=
-      fmt::format("  intrinsics: [{}, {}, {}, {}]\n", camera.fx, camera.fy, camera.cx, camera.cy);
-  const auto& d = camera.distortion_coefficients;
-  if (camera.distortion == DistortionModel::kNone) {
-    text += "  distortion_model: none\n";
-  } else {
-    const bool equidistant = camera.distortion == DistortionModel::kEquidistant;
-    text += fmt::format("  distortion_model: {}\n  distortion_coefficients: [{}, {}, {}, {}]\n",
-                        equidistant ? "equidistant" : "radial-tangential", d[0], d[1], d[2], d[3]);
-  }
-  return text + fmt::format(
-                    "  time_offset_s: {}  # t_imu = t_image + this\n"
-                    "  readout_s: {}  # first to last row; the stamp is the middle row's\n",
-                    camera.time_offset_s, camera.readout_s);
-}
-
-std::string imuText(const ImuCalibration& imu) {
-  return fmt::format(
-      "imu0:\n  rate_hz: {}\n  gyroscope_noise_density: {}\n  gyroscope_random_walk: {}\n"
-      "  accelerometer_noise_density: {}\n  accelerometer_random_walk: {}\n",
-      imu.rate_hz, imu.gyro_noise, imu.gyro_bias_walk, imu.accel_noise, imu.accel_bias_walk);
+std::string indented(const std::string& text) {
+  std::string result, line;
+  for (std::istringstream lines(text); std::getline(lines, line);) result += "  " + line + "\n";
+  return result;
 }
 
 }  // namespace
@@ -72,8 +51,10 @@ Calibration readRig(const std::filesystem::path& path) {
 std::string rigText(const Calibration& rig, const std::string& comment) {
   std::string text, line;
   for (std::istringstream lines(comment); std::getline(lines, line);) text += "# " + line + "\n";
-  for (const auto& camera : rig.cameras) text += cameraText(camera);
-  return rig.imu ? text + imuText(*rig.imu) : text;
+  for (const auto& camera : rig.cameras) {
+    text += camera.name + ":\n" + transformText(camera.T_BC) + indented(cameraKeys(camera));
+  }
+  return rig.imu ? text + "imu0:\n" + indented(imuKeys(*rig.imu)) : text;
 }
 
 void applyRig(const Calibration& rig, const std::string& file, Calibration& calibration) {

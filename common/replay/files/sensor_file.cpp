@@ -1,5 +1,7 @@
 #include "common/replay/files/sensor_file.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/LU>
 #include <cmath>
 #include <fstream>
@@ -8,6 +10,21 @@
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
+namespace {
+
+const char* nameOf(DistortionModel model) {
+  switch (model) {
+    case DistortionModel::kNone:
+      return "none";
+    case DistortionModel::kRadialTangential:
+      return "radial-tangential";
+    case DistortionModel::kEquidistant:
+      return "equidistant";
+  }
+  return "none";
+}
+
+}  // namespace
 
 SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string()) {
   std::ifstream stream(file);
@@ -122,6 +139,29 @@ ImuCalibration readImuCalibration(const SensorFile& file) {
   imu.accel_bias_walk = file.number("accelerometer_random_walk", 0.0);
   imu.rate_hz = file.number("rate_hz", 1e-3);
   return imu;
+}
+
+std::string cameraKeys(const CameraCalibration& camera) {
+  std::string text = fmt::format(
+      "rate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: [{}, {}, {}, {}]\n"
+      "distortion_model: {}\n",
+      camera.rate_hz, camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+      nameOf(camera.distortion));
+  if (camera.distortion != DistortionModel::kNone) {
+    const auto& d = camera.distortion_coefficients;
+    text += fmt::format("distortion_coefficients: [{}, {}, {}, {}]\n", d[0], d[1], d[2], d[3]);
+  }
+  return text + fmt::format(
+                    "time_offset_s: {}  # t_imu = t_image + this\n"
+                    "readout_s: {}  # first to last row; the stamp is the middle row's\n",
+                    camera.time_offset_s, camera.readout_s);
+}
+
+std::string imuKeys(const ImuCalibration& imu) {
+  return fmt::format(
+      "rate_hz: {}\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
+      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+      imu.rate_hz, imu.gyro_noise, imu.gyro_bias_walk, imu.accel_noise, imu.accel_bias_walk);
 }
 
 }  // namespace perdure::replay

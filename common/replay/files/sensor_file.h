@@ -44,4 +44,8 @@ class SensorFile {
 CameraCalibration readCamera(const SensorFile& file, const std::string& name);
 ImuCalibration readImuCalibration(const SensorFile& file);
 
+/// What the two read, a key a line and all digits, but for T_BS.
+std::string cameraKeys(const CameraCalibration& camera);
+std::string imuKeys(const ImuCalibration& imu);
+
 }  // namespace perdure::replay
