@@ -9,6 +9,7 @@
 #include "common/bus/wait_loop.h"
 #include "tests/process/support.h"
 #include "tests/services/run_until.h"
+#include "tests/support/camera.h"
 
 namespace perdure {
 namespace {
@@ -18,17 +19,7 @@ using namespace std::chrono_literals;
 Calibration calibration() {
   Calibration c;
   c.source = 77;
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320;
-  camera.cy = 240;
-  Eigen::Matrix3d R;  // camera in body: z forward along body x, x right, y down
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_BC = RigidTransform(R, Eigen::Vector3d::Zero());
-  c.cameras.push_back(camera);
+  c.cameras = {tests::cameraAhead(640, 480, 500)};
   return c;
 }
 

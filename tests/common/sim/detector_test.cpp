@@ -8,24 +8,14 @@
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
+#include "tests/support/camera.h"
 
 namespace perdure::sim {
 namespace {
 
 constexpr std::uint64_t kFrames = 20000;
 
-CameraCalibration camera() {
-  CameraCalibration camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 380;
-  camera.cx = 320;
-  camera.cy = 240;
-  Eigen::Matrix3d R_BC;
-  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d::Zero());
-  return camera;
-}
+CameraCalibration camera() { return tests::cameraAhead(640, 480, 380); }
 
 TruthObject thing(std::uint64_t id, const std::string& class_name, const Eigen::Vector3d& centre,
                   double yaw) {

@@ -9,6 +9,7 @@
 #include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/visibility/detectability.h"
 #include "services/semantic_filter/priors.h"
+#include "tests/support/camera.h"
 #include "tools/pipeline/settings.h"
 
 namespace perdure::test {
@@ -24,17 +25,9 @@ constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // of azimuths, as core/u
 double normalCdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
 CameraCalibration makeCamera() {
-  CameraCalibration c;
-  c.name = "cam0";
-  c.width = 1242;
-  c.height = 375;
-  c.fx = c.fy = 720.0;
-  c.cx = 620.0;
-  c.cy = 180.0;
-  Eigen::Matrix3d R;  // camera in body: z forward along body x, x right, y down
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  c.T_BC = RigidTransform(R, Eigen::Vector3d(0.3, 0.0, 0.5));
-  return c;
+  CameraCalibration camera = tests::cameraAhead(1242, 375, 720.0, {0.3, 0.0, 0.5});
+  camera.cx = 620.0, camera.cy = 180.0;
+  return camera;
 }
 
 ModelInfo modelOf(const sim::DetectorModel& detector, const CameraModel& camera) {

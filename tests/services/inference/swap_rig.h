@@ -14,6 +14,7 @@
 #include "tests/process/support.h"
 #include "tests/services/inference/tiny_onnx.h"
 #include "tests/services/run_until.h"
+#include "tests/support/camera.h"
 
 namespace perdure::inference::testing {
 
@@ -133,17 +134,7 @@ class SwapRig {
   void sendCalibration() {
     Calibration c;
     c.source = 77;
-    CameraCalibration camera;
-    camera.name = "cam0";
-    camera.width = 64;
-    camera.height = 48;
-    camera.fx = camera.fy = 60;
-    camera.cx = 32;
-    camera.cy = 24;
-    Eigen::Matrix3d R;  // camera in body: z forward along body x, x right, y down
-    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-    camera.T_BC = RigidTransform(R, Eigen::Vector3d::Zero());
-    c.cameras.push_back(camera);
+    c.cameras.push_back(tests::cameraAhead(64, 48, 60));
     ASSERT_TRUE(calibration_.write(c));
   }
 

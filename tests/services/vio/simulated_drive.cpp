@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "common/math/so3.h"
+#include "tests/support/camera.h"
 
 namespace perdure::vio::test {
 
@@ -48,10 +49,7 @@ CameraCalibration testCamera(int index) {
   c.cy = 248.375;
   c.distortion = DistortionModel::kRadialTangential;
   c.distortion_coefficients = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
-  // Body x forward, y left, z up; camera z forward.
-  Matrix3d R;
-  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  c.T_BC = RigidTransform(R, Vector3d(0.05, 0.06 - 0.11 * index, 0.02));
+  c.T_BC = RigidTransform(tests::lookingAhead(), Vector3d(0.05, 0.06 - 0.11 * index, 0.02));
   c.rate_hz = 20.0;
   return c;
 }

@@ -8,6 +8,7 @@
 
 #include "common/math/so3.h"
 #include "tests/common/replay/tiny_datasets.h"
+#include "tests/support/camera.h"
 
 namespace perdure::tools {
 namespace {
@@ -17,12 +18,7 @@ using ::testing::HasSubstr;
 
 /// A body at (100, 50), heading north, that looks at the given objects in its only frame.
 SimulatedTruth lookingNorth() {
-  CameraCalibration camera;
-  camera.width = 640, camera.height = 480;
-  camera.fx = camera.fy = 500.0, camera.cx = 320.0, camera.cy = 240.0;
-  Eigen::Matrix3d R_BC;
-  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d(0.5, 0, 0));
+  const CameraCalibration camera = tests::cameraAhead(640, 480, 500.0, {0.5, 0, 0});
   const RigidTransform T_WB(rotationAboutZ(std::numbers::pi / 2), Eigen::Vector3d(100, 50, 1));
   return {{},
           replay::PoseFile(replay::PoseFormat::kTum, {{fromNanoseconds(0), T_WB}}),

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "common/base/errors.h"
+#include "tests/support/camera.h"
 #include "tools/outputs/geodesy.h"
 #include "tools/outputs/object_history.h"
 #include "tools/outputs/output_writer.h"
@@ -180,22 +181,9 @@ TEST(ObjectHistory, WhatIsFoundAgainAfterItWasGivenUpHasItsRowsOfBefore) {
   EXPECT_THAT(history.lastBeliefs(), SizeIs(1));
 }
 
-CameraCalibration aheadCamera() {
-  CameraCalibration camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320;
-  camera.cy = 240;
-  Eigen::Matrix3d R_BC;  // z of the camera ahead, x to the right
-  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d::Zero());
-  return camera;
-}
-
 TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
   ObjectHistory history;
-  history.setCamera(aheadCamera());
+  history.setCamera(tests::cameraAhead(640, 480, 500));
   Objects passed = messageAt(1, {carAt(1, 10)});
   passed.T_WB.p.x() = 20.0;  // the object now lies behind
   history.add(messageAt(0, {carAt(1, 10)}));
@@ -207,7 +195,7 @@ TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
 
 TEST(ObjectHistory, FinalDropsWhatIsLargelyBehindANearerObject) {
   ObjectHistory history;
-  history.setCamera(aheadCamera());
+  history.setCamera(tests::cameraAhead(640, 480, 500));
   ObjectBelief behind = carAt(2, 20), beside = carAt(3, 20);
   behind.classes[0].mean[1] = 4.0;  // in line with the car at x = 10, y = 2
   beside.classes[0].mean[1] = -4.0;

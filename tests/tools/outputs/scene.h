@@ -4,22 +4,14 @@
 #include <cmath>
 
 #include "common/types/sensors.h"
+#include "tests/support/camera.h"
 #include "tools/outputs/pictures/drive_log.h"
 
 namespace perdure::tools {
 
 inline CameraCalibration aheadCamera() {
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320;
-  camera.cy = 240;
+  CameraCalibration camera = tests::cameraAhead(640, 480, 500);
   camera.rate_hz = 10;
-  Eigen::Matrix3d R_BC;  // z of the camera ahead, x to the right
-  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d::Zero());
   return camera;
 }
 

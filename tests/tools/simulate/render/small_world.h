@@ -3,6 +3,7 @@
 #pragma once
 
 #include "common/sim/scene.h"
+#include "tests/support/camera.h"
 
 namespace perdure::tools {
 
@@ -14,16 +15,10 @@ inline sim::Scene emptyWorld(std::uint32_t width = 160, std::uint32_t height = 1
   scene.body = sim::Trajectory(
       RigidTransform(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), Eigen::Vector3d(0, 0, 1.2)));
   scene.roads = {{{-20.0, 0.0}, {60.0, 0.0}, 7.0}};
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.width = width, camera.height = height;
-  camera.fx = camera.fy = 0.6 * width;
-  camera.cx = 0.5 * width - 0.5, camera.cy = 0.5 * height - 0.5;
+  CameraCalibration camera = tests::cameraAhead(width, height, 0.6 * width);
+  camera.cx -= 0.5, camera.cy -= 0.5;
   camera.distortion = DistortionModel::kRadialTangential;
   camera.distortion_coefficients = {-0.1, 0.01, 1e-3, -1e-3};
-  Eigen::Matrix3d R_BC;
-  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.T_BC = RigidTransform(R_BC, Eigen::Vector3d::Zero());
   camera.rate_hz = 10.0;
   scene.rig.true_calibration.cameras = {camera};
   scene.rig.calibration = scene.rig.true_calibration;
