@@ -71,7 +71,7 @@ class Demo : public ::testing::Test {
     if (drive_.empty() || model_.empty()) {
       GTEST_SKIP() << "the drive and the network are not beside the sources (../shared/data)";
     }
-    if (std::system("command -v supervisord > /dev/null") != 0) {
+    if (!findProgram("supervisord")) {
       GTEST_SKIP() << "supervisord is not installed: deploy/install --runtime";
     }
     (void)ownNetwork();

@@ -3,12 +3,10 @@
 #include <fcntl.h>
 #include <net/if.h>
 #include <sched.h>
-#include <signal.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/mount.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -59,6 +57,11 @@ std::string environment(const char* name) {
   return value;
 }
 
+const std::string& emptied(const std::string& file) {
+  std::ofstream{file};
+  return file;
+}
+
 }  // namespace
 
 const bus::Options& ownNetwork() {
@@ -93,38 +96,10 @@ Folder::~Folder() {
   fs::remove_all(path_, ignored);
 }
 
-Child::Child(std::vector<std::string> command, std::string log) : log_(std::move(log)) {
-  std::vector<char*> arguments;
-  for (std::string& word : command) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  pid_ = fork();
-  if (pid_ != 0) return;
-  const int file = open(log_.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
-  dup2(file, STDOUT_FILENO);
-  dup2(file, STDERR_FILENO);
-  execvp(arguments[0], arguments.data());
-  _exit(127);
-}
+Child::Child(std::vector<std::string> command, std::string log)
+    : log_(std::move(log)), process_({.command = std::move(command), .log = emptied(log_)}) {}
 
-Child::~Child() {
-  if (ended_) return;
-  kill(pid_, SIGKILL);
-  waitpid(pid_, nullptr, 0);
-}
-
-void Child::signal(int number) const { kill(pid_, number); }
-
-int Child::wait(std::chrono::milliseconds longest) {
-  (void)eventually(longest, [this] {
-    int status = 0;
-    if (!ended_ && waitpid(pid_, &status, WNOHANG) == pid_) {
-      ended_ = true;
-      status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    }
-    return ended_;
-  });
-  return ended_ ? status_ : -1;
-}
+int Child::wait(std::chrono::milliseconds longest) { return process_.wait(longest).value_or(-1); }
 
 std::string Child::log() const { return contentsOf(log_); }
 

@@ -1,14 +1,13 @@
 // For tests of real programs: a network of their own, child processes, a folder that goes away.
 #pragma once
 
-#include <sys/types.h>
-
 #include <chrono>
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "common/base/subprocess.h"
 #include "common/bus/domain.h"
 
 namespace perdure::test {
@@ -44,21 +43,16 @@ class Child {
  public:
   /// Its standard output and error go to the file `log`.
   Child(std::vector<std::string> command, std::string log);
-  ~Child();
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
 
-  pid_t pid() const { return pid_; }
-  void signal(int number) const;
+  pid_t pid() const { return process_.pid(); }
+  void signal(int number) const { process_.signal(number); }
   /// Exit status, or 128 + the signal that ended it; -1 where it still runs after `longest`.
   int wait(std::chrono::milliseconds longest);
   std::string log() const;
 
  private:
   std::string log_;
-  pid_t pid_ = 0;
-  int status_ = -1;
-  bool ended_ = false;
+  Subprocess process_;
 };
 
 /// Asks every 20 ms until it is so; false after `longest`.

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,6 +15,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/ids.h"
+#include "common/base/subprocess.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/outputs/pictures/overlay_video.h"
@@ -62,30 +62,6 @@ bus::Options busOptions(const fs::path& root) {
   options.shared_memory_mb = 0;  // it reads no images
   options.identity.clear();
   return options;
-}
-
-std::string shellQuoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
-  return text + "'";
-}
-
-struct Answer {
-  int status = 0;
-  std::string text;
-};
-
-Answer answerOf(const std::string& command) {
-  Answer answer;
-  FILE* pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return {127, command};
-  char buffer[4096];
-  for (std::size_t n = 0; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
-    answer.text.append(buffer, n);
-  }
-  const int status = pclose(pipe);
-  answer.status = WIFEXITED(status) ? WEXITSTATUS(status) : 127;
-  return answer;
 }
 
 /// What a service said last, without the log's own lines.
@@ -169,16 +145,15 @@ void Demo::openData() {
 
 void Demo::checkConfigurations() {
   for (const ServicePlan& service : services_) {
-    std::string command;
-    for (const std::string& word : service.command) command += shellQuoted(word) + " ";
-    const std::string folder = shellQuoted(fs::absolute(options_.root).string());
-    const Answer answer = answerOf("cd " + folder + " && " + command + "--print-config 2>&1");
+    std::vector<std::string> command = service.command;
+    command.push_back("--print-config");
+    const ProgramAnswer answer =
+        runProgram({.command = command, .folder = fs::absolute(options_.root)});
     if (answer.status != 0) {
-      const auto code =
-          answer.status == 127 ? ExitCode::kUnavailable : static_cast<ExitCode>(answer.status);
-      throw StartupError(code, service.name + " cannot start: " + answer.text);
+      const auto code = static_cast<ExitCode>(answer.status);
+      throw StartupError(code, service.name + " cannot start: " + answer.output);
     }
-    configurations_ += answer.text;
+    configurations_ += answer.output;
   }
 }
 

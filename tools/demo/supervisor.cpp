@@ -1,11 +1,7 @@
 #include "tools/demo/supervisor.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -19,6 +15,8 @@
 namespace perdure::tools {
 namespace {
 
+constexpr std::chrono::seconds kPatienceAtEnd{15};
+
 /// The text of <value><TYPE>…</TYPE></value> that follows <name>`name`</name>.
 std::string member(const std::string& xml, const std::string& name) {
   const auto at = xml.find("<name>" + name + "</name>");
@@ -29,21 +27,6 @@ std::string member(const std::string& xml, const std::string& name) {
   if (type_end == std::string::npos) return {};
   const auto end = xml.find('<', type_end + 1);
   return end == std::string::npos ? std::string() : xml.substr(type_end + 1, end - type_end - 1);
-}
-
-/// In the child: supervisord in a session of its own (Ctrl-C is this program's business), which
-/// ends when this program dies.
-[[noreturn]] void becomeSupervisord(const std::string& config_file, const std::string& log) {
-  setsid();
-  prctl(PR_SET_PDEATHSIG, SIGTERM);
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
-  const int file = open(log.c_str(), O_CREAT | O_APPEND | O_WRONLY, 0644);
-  dup2(file, STDOUT_FILENO);
-  dup2(file, STDERR_FILENO);
-  execlp("supervisord", "supervisord", "-n", "-c", config_file.c_str(), nullptr);
-  _exit(127);
 }
 
 class Socket {
@@ -119,40 +102,30 @@ std::map<std::string, int> lastExits(const std::string& log) {
 Supervisor::Supervisor(const std::string& config_file, const std::string& socket,
                        const std::string& log)
     : socket_(socket) {
-  pid_ = fork();
-  if (pid_ == 0) becomeSupervisord(config_file, log);
+  const StartupError silent(ExitCode::kUnavailable,
+                            "supervisord does not answer; install it with deploy/install "
+                            "--runtime, and see " +
+                                log);
+  if (!findProgram("supervisord")) throw silent;
+  // In a session of its own: Ctrl-C is this program's business.
+  process_.emplace(ProgramOptions{.command = {"supervisord", "-n", "-c", config_file},
+                                  .log = log,
+                                  .own_session = true,
+                                  .ends_with_parent = true});
   constexpr std::chrono::seconds kPatience{20};
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!states()) {
-    if (alive() && std::chrono::steady_clock::now() < end) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      continue;
+    if (!alive() || std::chrono::steady_clock::now() >= end) {
+      process_->stop(kPatienceAtEnd);
+      throw silent;
     }
-    waitForEnd();
-    throw StartupError(ExitCode::kUnavailable,
-                       "supervisord does not answer; install it with deploy/install --runtime, "
-                       "and see " +
-                           log);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
 }
 
-Supervisor::~Supervisor() { waitForEnd(); }
+Supervisor::~Supervisor() { process_->stop(kPatienceAtEnd); }
 
-void Supervisor::waitForEnd() {
-  if (!alive()) return;
-  kill(pid_, SIGTERM);
-  constexpr std::chrono::seconds kPatience{15};
-  const auto end = std::chrono::steady_clock::now() + kPatience;
-  while (alive()) {
-    if (std::chrono::steady_clock::now() > end) kill(pid_, SIGKILL);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-}
-
-bool Supervisor::alive() {
-  if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == pid_) pid_ = 0;
-  return pid_ > 0;
-}
+bool Supervisor::alive() { return !process_->ended(); }
 
 Result<std::string> Supervisor::call(const std::string& method,
                                      const std::string& parameters) const {

@@ -1,14 +1,13 @@
 // supervisord as a child: started, asked and told over its unix socket (XML-RPC), ended.
 #pragma once
 
-#include <sys/types.h>
-
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/subprocess.h"
 
 namespace perdure::tools {
 
@@ -44,10 +43,9 @@ class Supervisor {
 
  private:
   Result<std::string> call(const std::string& method, const std::string& parameters) const;
-  void waitForEnd();
 
   std::string socket_;
-  pid_t pid_ = 0;
+  std::optional<Subprocess> process_;
 };
 
 }  // namespace perdure::tools

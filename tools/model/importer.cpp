@@ -1,12 +1,10 @@
 #include "tools/model/importer.h"
 
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <cstdlib>
 #include <optional>
 
 #include "common/base/errors.h"
+#include "common/base/subprocess.h"
 
 namespace perdure::tools {
 namespace {
@@ -28,21 +26,6 @@ std::optional<fs::path> pythonFolder() {
     }
   }
   return std::nullopt;
-}
-
-int run(const fs::path& folder, std::vector<std::string> words) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  const pid_t child = fork();
-  if (child == 0) {
-    setenv("PYTHONPATH", folder.c_str(), 1);
-    execv(kPython, arguments.data());
-    _exit(127);
-  }
-  int status = 0;
-  if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status)) return 1;
-  return WEXITSTATUS(status);
 }
 
 }  // namespace
@@ -70,12 +53,12 @@ int importNetwork(const ImportRequest& request) {
     words.insert(words.end(), {"--reference", request.reference.string()});
   }
   words.insert(words.end(), request.arguments.begin(), request.arguments.end());
-  const int status = run(*folder, words);
-  if (status == 127) {
+  if (!fs::exists(kPython)) {
     throw StartupError(ExitCode::kUnavailable,
                        std::string(kPython) + " is missing; apt-get install python3-onnx");
   }
-  return status;
+  Subprocess python({.command = words, .environment = {{"PYTHONPATH", folder->string()}}});
+  return python.waitForEnd();
 }
 
 }  // namespace perdure::tools

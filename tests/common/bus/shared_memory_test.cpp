@@ -38,7 +38,7 @@ class SharedMemory : public testing::Test {
 
   void SetUp() override {
     if (std::getenv("PERDURE_FRAME_PEER") == nullptr) GTEST_SKIP() << "run by ctest";
-    if (std::system("command -v iox-roudi > /dev/null") != 0) {
+    if (!findProgram("iox-roudi")) {
       GTEST_SKIP() << "iox-roudi is not installed: deploy/install --runtime";
     }
     test::ownNetwork();

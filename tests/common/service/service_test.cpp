@@ -3,15 +3,14 @@
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/un.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 
+#include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
 #include "tests/common/bus/isolation.h"
 
@@ -27,57 +26,16 @@ class Isolation : public testing::Environment {
 };
 const auto* const kIsolation = testing::AddGlobalTestEnvironment(new Isolation);
 
-struct Outcome {
-  int exit_code = -1;
-  std::string output;  // both streams
-};
+std::string probe() { return std::getenv("PERDURE_SERVICE_PROBE"); }
 
-Outcome runProbe(const std::string& arguments) {
-  const std::string command =
-      std::string(std::getenv("PERDURE_SERVICE_PROBE")) + " " + arguments + " 2>&1";
-  Outcome outcome;
-  FILE* pipe = popen(command.c_str(), "r");
-  std::array<char, 4096> buffer{};
-  for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
-    outcome.output.append(buffer.data(), n);
-  }
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
+ProgramAnswer runProbe(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), probe());
+  return runProgram({.command = std::move(arguments)});
 }
 
-/// The probe as a running process.
-class Probe {
- public:
-  Probe() {
-    pid_ = fork();
-    if (pid_ == 0) {
-      const char* program = std::getenv("PERDURE_SERVICE_PROBE");
-      execl(program, program, "--set", "log.level=off", nullptr);
-      _exit(127);
-    }
-  }
-  ~Probe() {
-    if (pid_ > 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-  }
-  Probe(const Probe&) = delete;
-  Probe& operator=(const Probe&) = delete;
-  pid_t pid() const { return pid_; }
-  /// Ends it by a signal; its exit status, or -1.
-  int end(int signal) {
-    kill(pid_, signal);
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = 0;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-
- private:
-  pid_t pid_ = 0;
-};
+ProgramOptions quietProbe(const std::map<std::string, std::string>& environment = {}) {
+  return {.command = {probe(), "--set", "log.level=off"}, .environment = environment};
+}
 
 class Service : public testing::Test {
  protected:
@@ -89,8 +47,8 @@ class Service : public testing::Test {
 TEST_F(Service, ChecksAConfigurationAndTellsEverythingThatIsWrongAtOnce) {
   const std::string path = testing::TempDir() + "perdure_service_test.yaml";
   std::ofstream(path) << "gian: 2\npoints: many\nlog:\n  level: loud\nbus: {domain: 999}\n";
-  const Outcome outcome = runProbe("--check-config --config " + path + " --set gain=-1");
-  EXPECT_EQ(outcome.exit_code, 78);
+  const ProgramAnswer outcome = runProbe({"--check-config", "--config", path, "--set", "gain=-1"});
+  EXPECT_EQ(outcome.status, 78);
   EXPECT_EQ(outcome.output, path + ":1:1: gian: is not a known key; did you mean gain?\n" + path +
                                 ":2:9: points: many is not a whole number\n" + path +
                                 ":4:10: log.level: loud is not one of trace, debug, info, "
@@ -101,25 +59,26 @@ TEST_F(Service, ChecksAConfigurationAndTellsEverythingThatIsWrongAtOnce) {
 }
 
 TEST_F(Service, AcceptsASoundConfigurationAndPrintsItBack) {
-  EXPECT_EQ(runProbe("--check-config --set gain=2 --set points=7").exit_code, 0);
-  const Outcome printed = runProbe("--print-config --set gain=2 --set points=7");
-  EXPECT_EQ(printed.exit_code, 0);
+  EXPECT_EQ(runProbe({"--check-config", "--set", "gain=2", "--set", "points=7"}).status, 0);
+  const ProgramAnswer printed =
+      runProbe({"--print-config", "--set", "gain=2", "--set", "points=7"});
+  EXPECT_EQ(printed.status, 0);
   EXPECT_THAT(printed.output, StartsWith("# factor [m/s] (> 0)\ngain: 2\n# how many"));
   EXPECT_THAT(printed.output, HasSubstr("bus:\n  # network interface"));
 }
 
 TEST_F(Service, ExplainsItselfAndRefusesAWrongCommandLine) {
-  EXPECT_EQ(runProbe("--help").exit_code, 0);
-  EXPECT_THAT(runProbe("--help").output, HasSubstr("A service for tests."));
-  EXPECT_EQ(runProbe("--version").exit_code, 0);
-  EXPECT_EQ(runProbe("--no-such-option").exit_code, 64);
-  EXPECT_EQ(runProbe("--config").exit_code, 64);
-  EXPECT_EQ(runProbe("--config /nonexistent.yaml").exit_code, 78);
+  EXPECT_EQ(runProbe({"--help"}).status, 0);
+  EXPECT_THAT(runProbe({"--help"}).output, HasSubstr("A service for tests."));
+  EXPECT_EQ(runProbe({"--version"}).status, 0);
+  EXPECT_EQ(runProbe({"--no-such-option"}).status, 64);
+  EXPECT_EQ(runProbe({"--config"}).status, 64);
+  EXPECT_EQ(runProbe({"--config", "/nonexistent.yaml"}).status, 78);
 }
 
 TEST_F(Service, SaysWhatToMendWhereItCannotStart) {
-  const Outcome outcome = runProbe("--set bus.interface=nosuch0");
-  EXPECT_EQ(outcome.exit_code, 69);
+  const ProgramAnswer outcome = runProbe({"--set", "bus.interface=nosuch0"});
+  EXPECT_EQ(outcome.status, 69);
   EXPECT_THAT(outcome.output, HasSubstr("bus.interface names an interface"));
 }
 
@@ -134,7 +93,7 @@ TEST_F(Service, WorksTellsItsHealthAndEndsInOrderAtSigterm) {
   int samples = 0;
   loop.on(health, [&](const Health& m) { last = m; });
   loop.on(speed, [&](const SpeedSample&) { ++samples; });
-  Probe probe;
+  Subprocess running(quietProbe());
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while ((samples == 0 || last.reasons.count("seen") == 0) &&
          std::chrono::steady_clock::now() < deadline) {
@@ -145,12 +104,13 @@ TEST_F(Service, WorksTellsItsHealthAndEndsInOrderAtSigterm) {
   }
   EXPECT_GT(samples, 0);
   EXPECT_EQ(last.process, "probe");
-  EXPECT_EQ(last.pid, static_cast<std::uint32_t>(probe.pid()));
+  EXPECT_EQ(last.pid, static_cast<std::uint32_t>(running.pid()));
   EXPECT_EQ(last.state, HealthState::kOk);
   EXPECT_GT(last.frames_in, 0u);
   EXPECT_EQ(last.frames_in, last.frames_out);
   EXPECT_GT(last.rss_bytes, 1u << 20);
-  EXPECT_EQ(probe.end(SIGTERM), 0);
+  running.signal(SIGTERM);
+  EXPECT_EQ(running.waitForEnd(), 0);
 }
 
 /// Where systemd would listen.
@@ -187,30 +147,28 @@ class NotifySocket {
 
 TEST_F(Service, TellsSystemdThatItIsReadyAliveAndStopping) {
   const NotifySocket systemd;
-  setenv("WATCHDOG_USEC", "2000000", 1);
-  Probe probe;
-  unsetenv("WATCHDOG_USEC");
+  Subprocess running(quietProbe({{"WATCHDOG_USEC", "2000000"}}));
   EXPECT_EQ(systemd.next(), "READY=1");
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
-  EXPECT_EQ(probe.end(SIGINT), 0);
+  running.signal(SIGINT);
+  EXPECT_EQ(running.waitForEnd(), 0);
 }
 
 TEST_F(Service, SaysNothingToAWatchdogThatDoesNotWatch) {
   const NotifySocket systemd;
-  Probe probe;
+  Subprocess running(quietProbe());
   EXPECT_EQ(systemd.next(), "READY=1");
   EXPECT_EQ(systemd.next(std::chrono::milliseconds(1500)), "");  // Health went out meanwhile
-  EXPECT_EQ(probe.end(SIGINT), 0);
+  running.signal(SIGINT);
+  EXPECT_EQ(running.waitForEnd(), 0);
 }
 
 class Hangs : public Service, public testing::WithParamInterface<std::uint64_t> {};
 
 TEST_P(Hangs, AndTheWatchdogIsNotFed) {
   const NotifySocket systemd;
-  setenv("WATCHDOG_USEC", "400000", 1);
-  Probe probe;
-  unsetenv("WATCHDOG_USEC");
+  Subprocess running(quietProbe({{"WATCHDOG_USEC", "400000"}}));
   const bus::Domain domain{bus::Options{}};
   const bus::Participant participant(domain, "test");
   bus::Writer<ImuSample> imu(participant, bus::topics::kImu);

@@ -16,7 +16,7 @@ using test::Child;
 using Rig = testing::ServiceRig;
 
 TEST(InferenceService, LooksAtImagesInSharedMemoryAndStillHearsItself) {
-  if (std::system("command -v iox-roudi > /dev/null") != 0) {
+  if (!findProgram("iox-roudi")) {
     GTEST_SKIP() << "iox-roudi is not installed: deploy/install --runtime";
   }
   if (!test::ownFiles())

@@ -1,16 +1,14 @@
 // The commands as a user runs them, against topics that this test publishes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
 #include "tests/common/bus/isolation.h"
 #include "tools/bus_tools/doctor/doctor.h"
@@ -28,21 +26,8 @@ class Isolation : public testing::Environment {
 };
 const auto* const kIsolation = testing::AddGlobalTestEnvironment(new Isolation);
 
-struct Outcome {
-  int exit_code = -1;
-  std::string output;
-};
-
-Outcome shell(const std::string& command) {
-  Outcome outcome;
-  FILE* pipe = popen(("(" + command + ") 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer{};
-  for (std::size_t n; (n = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
-    outcome.output.append(buffer.data(), n);
-  }
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
+ProgramAnswer run(const std::vector<std::string>& command) {
+  return runProgram({.command = command});
 }
 
 class BusTools : public testing::Test {
@@ -53,7 +38,7 @@ class BusTools : public testing::Test {
   }
 
   /// Runs a command while objects and odometry are published at 50 Hz.
-  Outcome shellWhilePublishing(const std::string& command) {
+  ProgramAnswer runWhilePublishing(const std::vector<std::string>& command) {
     std::atomic<bool> done = false;
     std::thread publisher([&] {
       const bus::Domain domain{bus::Options{}};
@@ -68,7 +53,7 @@ class BusTools : public testing::Test {
       });
       loop.run();
     });
-    Outcome outcome = shell(command);
+    const ProgramAnswer outcome = run(command);
     done = true;
     publisher.join();
     return outcome;
@@ -89,8 +74,9 @@ class BusTools : public testing::Test {
 };
 
 TEST_F(BusTools, EchoPrintsJsonLinesAndEndsAfterItsCount) {
-  const Outcome outcome = shellWhilePublishing(perdure + " echo objects --count 2 --seconds 20");
-  EXPECT_EQ(outcome.exit_code, 0);
+  const ProgramAnswer outcome =
+      runWhilePublishing({perdure, "echo", "objects", "--count", "2", "--seconds", "20"});
+  EXPECT_EQ(outcome.status, 0);
   std::istringstream lines(outcome.output);
   std::string line;
   int count = 0;
@@ -104,43 +90,44 @@ TEST_F(BusTools, EchoPrintsJsonLinesAndEndsAfterItsCount) {
 }
 
 TEST_F(BusTools, HzTellsTheRate) {
-  const Outcome outcome = shellWhilePublishing(perdure + " hz odometry --seconds 2.5");
-  EXPECT_EQ(outcome.exit_code, 0);
+  const ProgramAnswer outcome = runWhilePublishing({perdure, "hz", "odometry", "--seconds", "2.5"});
+  EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.output, HasSubstr("odometry: "));
   EXPECT_THAT(outcome.output, HasSubstr(" Hz, interval "));
 }
 
 TEST_F(BusTools, TopicsListsTheTableAndWhoIsThere) {
-  const Outcome outcome = shellWhilePublishing(perdure + " topics");
-  EXPECT_EQ(outcome.exit_code, 0);
+  const ProgramAnswer outcome = runWhilePublishing({perdure, "topics"});
+  EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.output, testing::ContainsRegex("objects +perdure::msg::Objects +reliable 8 "
                                                      "+10 Hz +1 \\(semantic_filter\\) +0"));
   EXPECT_THAT(outcome.output, testing::ContainsRegex("map/header +perdure::msg::MapHeader"));
 }
 
 TEST_F(BusTools, AnUnknownTopicIsRefusedWithTheKnownOnes) {
-  const Outcome outcome = shell(perdure + " echo objcts");
-  EXPECT_EQ(outcome.exit_code, 64);
+  const ProgramAnswer outcome = run({perdure, "echo", "objcts"});
+  EXPECT_EQ(outcome.status, 64);
   EXPECT_THAT(outcome.output, HasSubstr("there is no topic objcts; the topics are frame/<camera>"));
 }
 
 TEST_F(BusTools, TheEnvironmentLetsAProgramOfSomebodyElseFindTheTopics) {
   const std::string example = std::getenv("PERDURE_EXAMPLE");
-  const Outcome outcome = shellWhilePublishing("eval \"$(" + perdure + " env)\"; timeout 3 " +
-                                               example + " | head -n 1");
+  const ProgramAnswer outcome = runWhilePublishing(
+      {"sh", "-c", "eval \"$(\"$0\" env)\"; timeout 3 \"$1\" | head -n 1", perdure, example});
   EXPECT_EQ(outcome.output, "frame 9: object 5 is a car (100 %) at 1.0 1.0 1.0 m\n");
 }
 
 TEST_F(BusTools, TheEnvironmentSuitsOurOwnProgramsToo) {
-  const Outcome outcome = shellWhilePublishing("eval \"$(" + perdure + " env)\"; " + perdure +
-                                               " echo odometry --count 1 --seconds 20");
-  EXPECT_EQ(outcome.exit_code, 0);
+  const ProgramAnswer outcome = runWhilePublishing(
+      {"sh", "-c", "eval \"$(\"$0\" env)\"; \"$0\" echo odometry --count 1 --seconds 20", perdure});
+  EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.output, StartsWith("{\"stamp\":"));
 }
 
 TEST_F(BusTools, DoctorNamesWhoIsThereAndWhoIsNot) {
-  const Outcome outcome = shellWhilePublishing(perdure + " doctor --data-dir /nonexistent");
-  EXPECT_EQ(outcome.exit_code, 1);
+  const ProgramAnswer outcome =
+      runWhilePublishing({perdure, "doctor", "--data-dir", "/nonexistent"});
+  EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.output, HasSubstr("OK   semantic_filter is on the bus"));
   EXPECT_THAT(outcome.output, HasSubstr("WARN vio is not on the bus"));
   EXPECT_THAT(outcome.output, HasSubstr("FAIL /nonexistent is not a folder: `mkdir -p"));
@@ -148,15 +135,15 @@ TEST_F(BusTools, DoctorNamesWhoIsThereAndWhoIsNot) {
 }
 
 TEST_F(BusTools, StatusNamesWhatIsNotThereAndEndsWithTheWorst) {
-  const Outcome outcome = shellWhilePublishing(perdure + " status");
-  EXPECT_EQ(outcome.exit_code, 2);
+  const ProgramAnswer outcome = runWhilePublishing({perdure, "status"});
+  EXPECT_EQ(outcome.status, 2);
   EXPECT_THAT(outcome.output, testing::ContainsRegex("vio +failed +is not heard"));
   EXPECT_THAT(outcome.output, testing::ContainsRegex("objects +ok "));
 }
 
 TEST_F(BusTools, StatusWatchesAndSpeaksJson) {
-  const Outcome outcome =
-      shellWhilePublishing("timeout -s INT 5 " + perdure + " status --watch --json");
+  const ProgramAnswer outcome =
+      runWhilePublishing({"timeout", "-s", "INT", "5", perdure, "status", "--watch", "--json"});
   std::istringstream lines(outcome.output);
   std::string line;
   int count = 0;
@@ -172,16 +159,17 @@ TEST_F(BusTools, DoctorPacksAReportWithoutImages) {
   const std::string folder = testing::TempDir() + "perdure_report_test";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
-  const Outcome outcome =
-      shellWhilePublishing(perdure + " doctor --seconds 1 --report " + folder + "/r.tar.gz");
+  const ProgramAnswer outcome =
+      runWhilePublishing({perdure, "doctor", "--seconds", "1", "--report", folder + "/r.tar.gz"});
   EXPECT_THAT(outcome.output, HasSubstr("report: "));
-  const Outcome list = shell("tar -tzf " + folder + "/r.tar.gz");
+  const ProgramAnswer list = run({"tar", "-tzf", folder + "/r.tar.gz"});
   for (const char* file : {"versions.txt", "host.txt", "doctor.txt", "status.json", "status.txt",
                            "health.jsonl", "journal.txt", "configuration/capture.yaml"}) {
     EXPECT_THAT(list.output, HasSubstr(std::string("perdure-report/") + file));
   }
   EXPECT_THAT(list.output, Not(testing::ContainsRegex("p[gp]m")));
-  const Outcome status = shell("tar -xzOf " + folder + "/r.tar.gz perdure-report/status.json");
+  const ProgramAnswer status =
+      run({"tar", "-xzOf", folder + "/r.tar.gz", "perdure-report/status.json"});
   EXPECT_EQ(nlohmann::json::parse(status.output)["level"], "failed");
   std::filesystem::remove_all(folder);
 }

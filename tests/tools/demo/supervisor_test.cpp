@@ -104,7 +104,7 @@ TEST(SupervisorAnswers, GiveTheLastExitStatusFromTheLog) {
 class Supervision : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (std::system("command -v supervisord > /dev/null") != 0) {
+    if (!findProgram("supervisord")) {
       GTEST_SKIP() << "supervisord is not installed: deploy/install --runtime";
     }
     std::string name = (fs::temp_directory_path() / "perdure-sv-XXXXXX").string();

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/base/subprocess.h"
 #include "services/inference/node.h"
 
 namespace perdure::tools {
@@ -25,16 +26,16 @@ class CalibrateRun : public testing::Test {
   void SetUp() override {
     if (fromEnvironment("PERDURE_BIN").empty()) GTEST_SKIP() << "run by ctest";
     fs::create_directories(folder_);
-    ASSERT_EQ(run("simulate --scene random --seed 880001 --seconds 40 --rate 1 --quiet --out " +
-                  (folder_ / "frames").string()),
-              0);
+    const ProgramAnswer made =
+        run({"simulate", "--scene", "random", "--seed", "880001", "--seconds", "40", "--rate", "1",
+             "--quiet", "--out", (folder_ / "frames").string()});
+    ASSERT_EQ(made.status, 0) << made.output;
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  int run(const std::string& arguments) const {
-    return std::system(((fromEnvironment("PERDURE_BIN") / "perdure").string() + " " + arguments +
-                        " > " + (folder_ / "log").string())
-                           .c_str());
+  static ProgramAnswer run(std::vector<std::string> command) {
+    command.insert(command.begin(), (fromEnvironment("PERDURE_BIN") / "perdure").string());
+    return runProgram({.command = std::move(command)});
   }
   static nlohmann::json read(const fs::path& file) {
     return nlohmann::json::parse(std::ifstream(file));
@@ -43,12 +44,11 @@ class CalibrateRun : public testing::Test {
   nlohmann::json calibrated(const nlohmann::json& model, const std::string& name) {
     const fs::path description = folder_ / (name + ".json"), out = folder_ / (name + ".new.json");
     std::ofstream(description) << model.dump();
-    EXPECT_EQ(run("model calibrate " + network_.string() + " --quiet --frames " +
-                  (folder_ / "frames").string() + " --description " + description.string() +
-                  " --out " + out.string()),
-              0);
-    std::ifstream log(folder_ / "log");
-    std::string text(std::istreambuf_iterator<char>(log), {});
+    const ProgramAnswer answer = run({"model", "calibrate", network_.string(), "--quiet",
+                                      "--frames", (folder_ / "frames").string(), "--description",
+                                      description.string(), "--out", out.string()});
+    EXPECT_EQ(answer.status, 0) << answer.output;
+    const std::string& text = answer.output;
     std::istringstream(text.substr(text.find("calibration error") + 17)) >> error_before_;
     return read(out);
   }

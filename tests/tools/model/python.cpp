@@ -5,10 +5,14 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "common/base/subprocess.h"
+
 namespace perdure::tools::testing {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kPython = "/usr/bin/python3";
 
 fs::path source() {
   const char* folder = std::getenv("PERDURE_SOURCE");
@@ -17,17 +21,18 @@ fs::path source() {
 
 }  // namespace
 
-bool pythonHasOnnx() { return std::system("/usr/bin/python3 -c 'import onnx' 2> /dev/null") == 0; }
+bool pythonHasOnnx() { return runProgram({.command = {kPython, "-c", "import onnx"}}).status == 0; }
 
 fs::path generated(const std::string& script) {
   const fs::path folder =
       fs::temp_directory_path() /
       ("perdure_" + fs::path(script).stem().string() + "_" + std::to_string(getpid()));
   fs::remove_all(folder);
-  const std::string command =
-      "PYTHONPATH='" + (source() / "tools/model").string() + "' /usr/bin/python3 -B '" +
-      (source() / "tests/tools/model" / script).string() + "' '" + folder.string() + "'";
-  if (std::system(command.c_str()) != 0) throw std::runtime_error(command + " failed");
+  const auto answer =
+      runProgram({.command = {kPython, "-B", (source() / "tests/tools/model" / script).string(),
+                              folder.string()},
+                  .environment = {{"PYTHONPATH", (source() / "tools/model").string()}}});
+  if (answer.status != 0) throw std::runtime_error(script + " failed: " + answer.output);
   return folder;
 }
 

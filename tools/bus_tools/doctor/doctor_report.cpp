@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -8,6 +7,7 @@
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "common/base/subprocess.h"
 #include "common/vision/jpeg.h"
 #include "common/wire/json.h"
 #include "tools/bus_tools/common.h"
@@ -43,22 +43,12 @@ class Workshop {
   fs::path path_;
 };
 
-std::string quotedWord(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
-  return text + "'";
-}
-
-bool runs(const std::string& command) {
-  const int status = std::system(command.c_str());
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
-
 /// What the commands say, each under its own heading; those that are not here say so themselves.
+/// Some are lines of a shell, with its patterns and pipes.
 void writeAnswers(const fs::path& file, std::initializer_list<const char*> commands) {
   for (const char* command : commands) {
-    std::ofstream(file, std::ios::app) << "\n$ " << command << '\n';
-    (void)runs(fmt::format("({}) >> {} 2>&1", command, quotedWord(file.string())));
+    std::ofstream(file, std::ios::app) << "\n$ " << command << '\n'
+                                       << runProgram({.command = {"sh", "-c", command}}).output;
   }
 }
 
@@ -150,8 +140,9 @@ void writeReport(const ReportOptions& options, const Findings& findings) {
   const StatusSeen seen = writeBus(options, folder);
   if (options.images) writeImages(options.bus, seen, folder);
   const fs::path file = fs::absolute(options.file);
-  if (!runs(fmt::format("tar -C {} -czf {} perdure-report", quotedWord(workshop.path().string()),
-                        quotedWord(file.string())))) {
+  const auto packed = runProgram({.command = {"tar", "-C", workshop.path().string(), "-czf",
+                                              file.string(), "perdure-report"}});
+  if (packed.status != 0) {
     throw StartupError(ExitCode::kUnavailable, file.string() +
                                                    " cannot be written; give --report a file in a "
                                                    "folder that can be");
