@@ -69,10 +69,10 @@ double activationNats(const Track& track, const std::vector<Shares>& shares,
 
 }  // namespace
 
-LookReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
-                      double tempering, double exponent, const std::vector<std::size_t>& gated,
-                      const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
-  LookReasons reasons;
+UpdateReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
+                        double tempering, double exponent, const std::vector<std::size_t>& gated,
+                        const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
+  UpdateReasons reasons;
   const auto pmf = classShares(track);
   if (!(detected >= 0.5) || gated.empty()) {  // NaN is no hit
     reasons.kind = ExistenceEvidence::kMiss;
@@ -90,12 +90,12 @@ LookReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, dou
   return reasons;
 }
 
-void bookExistence(Track& track, double r, const LookReasons& reasons) {
+void bookExistence(Track& track, double r, const UpdateReasons& reasons) {
   track.existence.become(r, reasons.kind, track.as_of);
   track.existence.shift(reasons.kind, ExistenceEvidence::kScreened, reasons.excused, track.as_of);
 }
 
-void bookClasses(Track& track, const LookReasons& reasons) {
+void bookClasses(Track& track, const UpdateReasons& reasons) {
   const bool miss = reasons.kind == ExistenceEvidence::kMiss;
   normalise(track, miss ? ClassEvidence::kMiss : ClassEvidence::kGeometry);
   track.classes.shift(ClassEvidence::kGeometry, ClassEvidence::kActivation, reasons.activation);

@@ -20,7 +20,7 @@ struct Shares {
 };
 
 /// The reasons of an observation. They are computed before the weights change.
-struct LookReasons {
+struct UpdateReasons {
   ExistenceEvidence kind = ExistenceEvidence::kHit;
   double excused = 0.0;  ///< nats of a miss that an unmapped occluder excuses, >= 0
   /// At a hit: what the activations of the network add to log π of each class, nats.
@@ -30,14 +30,14 @@ struct LookReasons {
 /// `detected`: probability that one of the boxes is the track's. `tempering`: exponent τ of the
 /// observation, for a hit. `exponent`: that of A between classes. `gated`: indices of the boxes
 /// near the track.
-LookReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
-                      double tempering, double exponent, const std::vector<std::size_t>& gated,
-                      const std::vector<BoxDetection>& boxes, const FrameContext& frame);
+UpdateReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
+                        double tempering, double exponent, const std::vector<std::size_t>& gated,
+                        const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
 /// Sets existence to `r` and enters its reasons in the ledger.
-void bookExistence(Track& track, double r, const LookReasons& reasons);
+void bookExistence(Track& track, double r, const UpdateReasons& reasons);
 /// Normalises the weights and enters the reasons of the PMF in the ledger. The track is sound
 /// (belief/mixture_ops.h).
-void bookClasses(Track& track, const LookReasons& reasons);
+void bookClasses(Track& track, const UpdateReasons& reasons);
 
 }  // namespace perdure::semantic_filter

@@ -160,8 +160,8 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
     updateState(track.hypotheses[i], shares[i], score, score.hypotheses[i], boxes, repetition,
                 frame);
   }
-  const LookReasons reasons = reasonsOf(track, shares, detected, tempering.exponent,
-                                        tempering.exponent, score.boxes, boxes, frame);
+  const UpdateReasons reasons = reasonsOf(track, shares, detected, tempering.exponent,
+                                          tempering.exponent, score.boxes, boxes, frame);
   const double r = track.existence;
   double next = updateClassAndExistence(track, shares, tempering.exponent, detected >= 0.5,
                                         *frame.parameters);
