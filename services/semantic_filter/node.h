@@ -86,7 +86,7 @@ class Node {
   Outputs outputs_;
   ReasonCounts reasons_;
   History history_;
-  std::shared_ptr<const CameraModel> camera_;  // shared with the entries that were made with it
+  std::shared_ptr<const CameraModel> camera_;  // shared with the frames that were made with it
   std::string camera_name_;
   ModelBook models_;
   Probation probation_;

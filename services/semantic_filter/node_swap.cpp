@@ -35,7 +35,7 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
 }
 
 /// Whether these detections of a newcomer are kept back. What was kept before is used as soon as it
-/// sees one of the things again, or has been in inflation for so long that the old one would have
+/// sees one of the things again, or has been on trial for so long that the old one would have
 /// said.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;

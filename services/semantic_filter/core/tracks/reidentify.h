@@ -21,7 +21,7 @@ namespace perdure::semantic_filter {
 std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const FrameContext& frame);
 
 /// Keeps deleted tracks that were confirmed once, at rest and of a known class, for
-/// `parameters.return_s`. They were deleted by existence or by the loss of every plausible size.
+/// `parameters.reidentify_s`. They were deleted by existence or by the loss of every plausible size.
 void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters);
 /// Gives an established new track the id and the past of a recently deleted one; its own id is
