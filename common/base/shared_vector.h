@@ -1,8 +1,11 @@
 // A vector whose copies share their elements until one of them is written to (copy on write): what
 // is kept of every frame costs what the frame changed. To ask for an element of one that is not
 // const is to write; read() is for those who only look.
+//
+// Elements that no copy has any more leave their memory to the next ones of the thread.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
@@ -21,22 +24,36 @@ class SharedVector {
   using const_iterator = typename Vector::const_iterator;
 
   SharedVector() = default;
-  SharedVector(std::initializer_list<T> items) : items_(std::make_shared<Vector>(items)) {}
+  SharedVector(std::initializer_list<T> items) : SharedVector(Vector(items)) {}
   SharedVector(Vector items)  // NOLINT(google-explicit-constructor)
-      : items_(std::make_shared<Vector>(std::move(items))) {}
+      : block_(takeBlock()) {
+    block_->items = std::move(items);
+  }
+  SharedVector(const SharedVector& other) : block_(other.block_) {
+    if (block_) block_->owners.fetch_add(1, std::memory_order_relaxed);
+  }
+  SharedVector(SharedVector&& other) noexcept : block_(std::exchange(other.block_, nullptr)) {}
+  SharedVector& operator=(SharedVector other) noexcept {
+    std::swap(block_, other.block_);
+    return *this;
+  }
+  ~SharedVector() { leave(); }
 
   const Vector& read() const {
     static const Vector kEmpty;
-    return items_ ? *items_ : kEmpty;
+    return block_ ? block_->items : kEmpty;
   }
   /// Its own from now on. References to elements are void once a copy was made.
   Vector& write() {
-    if (!items_) {
-      items_ = std::make_shared<Vector>();
-    } else if (items_.use_count() > 1) {
-      items_ = std::make_shared<Vector>(*items_);
+    if (!block_) {
+      block_ = takeBlock();
+    } else if (block_->owners.load(std::memory_order_acquire) > 1) {
+      Block* own = takeBlock();
+      own->items = block_->items;
+      leave();
+      block_ = own;
     }
-    return *items_;
+    return block_->items;
   }
 
   std::size_t size() const { return read().size(); }
@@ -55,10 +72,48 @@ class SharedVector {
   void push_back(T item) { write().push_back(std::move(item)); }
   void assign(std::size_t count, const T& item) { write().assign(count, item); }
   void resize(std::size_t size) { write().resize(size); }
-  void clear() { items_.reset(); }
+  void clear() { leave(); }
 
  private:
-  std::shared_ptr<Vector> items_;
+  struct Block {
+    std::atomic<std::size_t> owners{1};
+    Vector items;
+  };
+  using Spare = std::vector<std::unique_ptr<Block>>;
+  static constexpr std::size_t kMostSpare = 512;
+
+  /// Null when the thread ends and its spare blocks are gone already.
+  static Spare* spare() {
+    struct Kept {
+      Spare blocks;
+      bool* gone;
+      ~Kept() { *gone = true; }
+    };
+    thread_local bool gone = false;
+    if (gone) return nullptr;
+    thread_local Kept kept{{}, &gone};
+    return &kept.blocks;
+  }
+
+  static Block* takeBlock() {
+    Spare* const blocks = spare();
+    if (!blocks || blocks->empty()) return new Block;
+    Block* block = blocks->back().release();
+    blocks->pop_back();
+    block->owners.store(1, std::memory_order_relaxed);
+    return block;
+  }
+
+  void leave() {
+    Block* const block = std::exchange(block_, nullptr);
+    if (!block || block->owners.fetch_sub(1, std::memory_order_acq_rel) > 1) return;
+    std::unique_ptr<Block> mine(block);
+    mine->items.clear();
+    Spare* const blocks = spare();
+    if (blocks && blocks->size() < kMostSpare) blocks->push_back(std::move(mine));
+  }
+
+  Block* block_ = nullptr;
 };
 
 }  // namespace perdure

@@ -1,7 +1,8 @@
 #include "services/semantic_filter/events.h"
 
 #include <algorithm>
-#include <set>
+
+#include "common/base/scratch.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -107,9 +108,9 @@ std::vector<Event> EventTracker::update(const Objects& objects,
     }
     known_.erase(it);
   }
-  std::set<ObjectId> present;
+  ScratchVector<ObjectId> present;
   for (const auto& o : objects.objects) {
-    present.insert(o.id);
+    present.push_back(o.id);
     const auto [it, fresh] = known_.try_emplace(o.id);
     if (fresh) {
       const auto back = recalled_.find(o.id);
@@ -125,8 +126,9 @@ std::vector<Event> EventTracker::update(const Objects& objects,
     }
     compare(o, it->second, events, blank);
   }
+  std::sort(present.begin(), present.end());
   for (auto it = known_.begin(); it != known_.end();) {
-    if (present.contains(it->first)) {
+    if (std::binary_search(present.begin(), present.end(), it->first)) {
       ++it;
       continue;
     }

@@ -24,10 +24,10 @@ std::string beyond(const Model& model, const Model& other, const std::string& ti
 }  // namespace
 
 Result<void> ModelBook::add(const ModelInfo& info) {
-  const auto [it, fresh] =
-      entries_.try_emplace(info.hash, Entry{info.name, makeModel(info, priors_)});
+  const auto [it, fresh] = entries_.try_emplace(
+      info.hash, Entry{info.name, std::make_shared<const Model>(makeModel(info, priors_))});
   if (!fresh) {
-    if (it->second.model.classes == info.classes) return {};
+    if (it->second.model->classes == info.classes) return {};
     return fail("model_contradicts_its_hash", info.name);
   }
   order_.push_back(info.hash);
@@ -41,9 +41,9 @@ Result<void> ModelBook::add(const ModelInfo& info) {
   return {};
 }
 
-const Model* ModelBook::find(std::uint64_t hash) const {
+std::shared_ptr<const Model> ModelBook::find(std::uint64_t hash) const {
   const auto it = entries_.find(hash);
-  return it == entries_.end() ? nullptr : &it->second.model;
+  return it == entries_.end() ? nullptr : it->second.model;
 }
 
 std::optional<std::string> ModelBook::use(std::uint64_t hash, TimePoint time) {
@@ -56,8 +56,8 @@ std::optional<std::string> ModelBook::use(std::uint64_t hash, TimePoint time) {
   if (first || from == entries_.end()) return std::nullopt;
   const Entry& to = entries_.at(hash);
   return to.name + " instead of " + from->second.name +
-         beyond(to.model, from->second.model, "new classes") +
-         beyond(from->second.model, to.model, "kept without new evidence");
+         beyond(*to.model, *from->second.model, "new classes") +
+         beyond(*from->second.model, *to.model, "kept without new evidence");
 }
 
 }  // namespace perdure::semantic_filter

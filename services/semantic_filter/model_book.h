@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -21,7 +22,7 @@ class ModelBook {
   /// Reason of failure: "model_contradicts_its_hash". The first information for a hash stays valid.
   Result<void> add(const ModelInfo& info);
   /// Returns nullptr if no model of this hash was added, or if too many were added since.
-  const Model* find(std::uint64_t hash) const;
+  std::shared_ptr<const Model> find(std::uint64_t hash) const;
   /// Detections of this (known) model are used in a frame at `time`. If the frame is the newest and
   /// the model has changed, returns a sentence that says what changes.
   std::optional<std::string> use(std::uint64_t hash, TimePoint time);
@@ -31,7 +32,7 @@ class ModelBook {
  private:
   struct Entry {
     std::string name;
-    Model model;
+    std::shared_ptr<const Model> model;
   };
   ClassPriors priors_;
   std::map<std::uint64_t, Entry> entries_;

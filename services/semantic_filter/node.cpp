@@ -106,7 +106,7 @@ const char* Node::refusalOf(const Detections& detections) const {
   if (camera_ && !detections.camera.empty() && detections.camera != camera_name_) {
     return "detections_of_other_camera";
   }
-  const Model* model = models_.find(detections.model_hash);
+  const auto model = models_.find(detections.model_hash);
   if (!model) return "detections_of_unknown_model";
   for (const auto& detection : detections.detections) {
     if (const char* flaw = flawOf(detection, *model)) return flaw;
@@ -128,21 +128,25 @@ bool Node::use(Frame& frame, const Detections& detections) {
     reasons_.add("detections_repeated");
     return false;
   }
-  frame.input.model = *models_.find(detections.model_hash);
+  frame.input.model = models_.find(detections.model_hash);
   if (const auto change = models_.use(detections.model_hash, frame.input.stamp.time)) {
     reportModelChange(frame.input.stamp, *change);
   }
-  if (detections.input_scale > 0.0) frame.input.model.input_width *= detections.input_scale;
-  frame.input.boxes.emplace();
+  if (detections.input_scale > 0.0 && detections.input_scale != 1.0) {
+    Model scaled = *frame.input.model;
+    scaled.input_width *= detections.input_scale;
+    frame.input.model = std::make_shared<const Model>(std::move(scaled));
+  }
+  frame.input.boxes.emplace().reserve(detections.detections.size());
   for (const auto& detection : detections.detections) {
     if (detection.primed) {
-      auto ratios = topDownRatios(detection, frame.input.model, config_.filter.clutter);
+      auto ratios = topDownRatios(detection, *frame.input.model, config_.filter.clutter);
       if (ratios) frame.input.top_down[detection.primed_for] = *std::move(ratios);
       if (!ratios) reasons_.add("primed_malformed");
       continue;
     }
     auto evidence =
-        makeBoxDetection(detection, frame.input.model, frame.camera->width(),
+        makeBoxDetection(detection, *frame.input.model, frame.camera->width(),
                          frame.camera->height(), config_.filter.box, config_.filter.clutter);
     if (evidence) {
       frame.input.boxes->push_back(std::move(*evidence));
@@ -201,7 +205,8 @@ void Node::flush() {
 }
 
 void Node::publish(const Frame& frame) {
-  Objects objects;
+  const ScratchScope scope;
+  Objects& objects = published_;
   objects.stamp = frame.input.stamp;
   objects.instance = instance_;
   objects.world = frame.world;
@@ -209,9 +214,12 @@ void Node::publish(const Frame& frame) {
   objects.up_W = frame.input.view.up_W;
   objects.next_id = history_.ids().next();
   const MotionParameters& motion = config_.filter.motion;
-  objects.objects.reserve(history_.belief().tracks.size());
-  for (const auto& object : history_.belief().tracks) {
-    ObjectBelief& belief = objects.objects.emplace_back(toBelief(object, motion.min_speed));
+  const std::vector<Track>& tracks = history_.belief().tracks;
+  objects.objects.resize(tracks.size());
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const Track& object = tracks[i];
+    ObjectBelief& belief = objects.objects[i];
+    toBelief(object, motion.min_speed, belief);
     if (belief.moving > 0.5) {
       const Track now = extrapolated(object, frame.input.stamp.time, motion);
       belief.classes = toBelief(now, motion.min_speed).classes;

@@ -1,7 +1,8 @@
 // The semantic filter as a node: odometry, landmarks, detections and recalled objects in; objects,
 // events and predictions out. Single-threaded; time enters by messages only.
 //
-// What is estimated is core/history's. The node checks messages, waits for detections, and publishes.
+// What is estimated is core/history's. The node checks messages, waits for detections, and
+// publishes.
 #pragma once
 
 #include <deque>
@@ -93,6 +94,7 @@ class Node {
   std::optional<WorldId> world_;
   std::deque<Detections> early_;
   std::optional<Recalled> waiting_recalled_;
+  Objects published_;  ///< the newest message, whose memory the next one takes
   EventTracker events_;
   ReappearanceMonitor returns_;
   Archive archive_;

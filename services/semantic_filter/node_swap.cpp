@@ -21,7 +21,7 @@ void Node::onSwap(const SwapNotice& notice) {
   }
   if (history_.empty()) return;
   reportModelChange(history_.newest().input.stamp,
-                  notice.model + " was rolled back, " + notice.reason + ": " + notice.detail);
+                    notice.model + " was rolled back, " + notice.reason + ": " + notice.detail);
 }
 
 void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail) {
@@ -39,7 +39,7 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
 /// said.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
-  const Model* model = models_.find(detections.model_hash);
+  const auto model = models_.find(detections.model_hash);
   std::vector<Prediction> expected;
   for (const Track& object : (frame.stepped ? frame.before : history_.belief()).tracks) {
     if (!object.life.confirmed || !model->names->contains(object.best().class_name)) continue;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
+#include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 
 namespace perdure::semantic_filter {
@@ -77,11 +77,11 @@ std::vector<Event> ReappearanceMonitor::update(const std::vector<Track>& objects
   if (!coming) return {};
   Way way{now.view.T_WB.inverse() * coming->view.T_WB, coming->seconds};
   addKeyframe(now, way);
-  std::set<ObjectId> hidden;
+  ScratchVector<ObjectId> hidden;
   std::vector<Event> events;
   for (const Track& o : objects) {
     if (!waits(o, parameters)) continue;
-    hidden.insert(o.id);
+    hidden.push_back(o.id);
     const auto [known, fresh] = waiting_.try_emplace(o.id);
     Waiting& waiting = known->second;
     if (fresh) waiting.hits = o.life.hits;
@@ -107,7 +107,10 @@ std::vector<Event> ReappearanceMonitor::update(const std::vector<Track>& objects
     e.returns_in_s = {foreseen->expected, foreseen->earliest, foreseen->latest};
     events.push_back(e);
   }
-  std::erase_if(waiting_, [&](const auto& entry) { return !hidden.contains(entry.first); });
+  std::sort(hidden.begin(), hidden.end());
+  std::erase_if(waiting_, [&](const auto& entry) {
+    return !std::binary_search(hidden.begin(), hidden.end(), entry.first);
+  });
   return events;
 }
 

@@ -25,8 +25,7 @@ namespace {
 
 /// A frame in which the track is not visible, for its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
-  if (track.unused.count() == 0)
-    stopSlowHypotheses(track, min_speed);
+  if (track.unused.count() == 0) stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
   LedgerEntry& entry = away ? track.unused.out_of_view : track.unused.occluded;
   if (entry.count++ == 0) entry.first = now;
@@ -36,7 +35,7 @@ void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_spee
 }  // namespace
 
 NoiseScale SemanticFilter::noiseScaleOf(const Belief& belief, const FrameInput& input) const {
-  const std::uint64_t model = input.model.hash;
+  const std::uint64_t model = input.model->hash;
   const BoxParameters& assumed = parameters_.box;
   return {model, belief.learned.sides.ratio(model, assumed.prior_sides),
           belief.learned.azimuths.ratio(model, assumed.prior_azimuths)};
@@ -46,21 +45,21 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
   const NoiseScale noise_scale = noiseScaleOf(belief, input);
   return {input.view,
           input.pose_error,
-          &input.model,
+          input.model.get(),
           &priors_,
           &parameters_,
           std::make_shared<const FrameView>(input.view, input.pose_error, input.stamp.time,
-                                            input.model.styles, noise_scale),
+                                            input.model->styles, noise_scale),
           noise_scale,
           std::make_shared<const GroundSurface>(belief.tracks, belief.path,
                                                 belief.learned.roughness_scale, input.view.up_W,
                                                 priors_, parameters_.ground)};
 }
 
-std::vector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
-                                                              const FrameInput& input) const {
+ScratchVector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
+                                                                const FrameInput& input) const {
   const Projector from(input.view);
-  std::vector<Outline> outlines;
+  ScratchVector<Outline> outlines;
   outlines.reserve(belief.tracks.size());
   for (const auto& o : belief.tracks) {
     outlines.push_back(
@@ -78,10 +77,10 @@ std::vector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
   return visibilities;
 }
 
-std::vector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
-    Belief& belief, const std::vector<TrackVisibility>& visibilities, const FrameInput& input,
+ScratchVector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
+    Belief& belief, const ScratchVector<TrackVisibility>& visibilities, const FrameInput& input,
     const FrameContext& frame) const {
-  std::vector<ScoredTrack> scored;
+  ScratchVector<ScoredTrack> scored;
   scored.reserve(static_cast<std::size_t>(
       std::count_if(visibilities.begin(), visibilities.end(),
                     [](const TrackVisibility& s) { return s.fraction > 0.0; })));
@@ -113,7 +112,8 @@ bool SemanticFilter::measuresDrift(const Track& track, const FrameContext& frame
          (best.x.head<3>() - frame.view.T_WB.p).norm() < parameters_.drift.within_m;
 }
 
-Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<ScoredTrack>& scored,
+Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
+                                                   ScratchVector<ScoredTrack>& scored,
                                                    const FrameInput& input,
                                                    const FrameContext& frame) const {
   const auto& boxes = *input.boxes;
@@ -132,7 +132,7 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief, std::vector<S
     }
   }
   const Association association = associate(psi, fresh);
-  std::vector<Track*> to_refit;
+  ScratchVector<Track*> to_refit;
   for (Eigen::Index j = 0; j < n; ++j) {
     ScoredTrack& s = scored[static_cast<std::size_t>(j)];
     Track& track = belief.tracks[s.track];
@@ -212,7 +212,7 @@ FrameInput SemanticFilter::withLearnedNoise(const Belief& belief, FrameInput inp
 }
 
 void SemanticFilter::manageAll(const Belief& before, Belief& belief,
-                               std::vector<ScoredTrack>& scored, const FrameInput& input,
+                               ScratchVector<ScoredTrack>& scored, const FrameInput& input,
                                const FrameContext& frame, StepReport& report) const {
   std::vector<Track> lost;
   for (auto& s : scored) {
@@ -253,6 +253,7 @@ void SemanticFilter::resolveIdentities(Belief& belief, const FrameContext& frame
 
 StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
                                 IdBook& ids) const {
+  const ScratchScope scope;
   StepReport report;
   const TimePoint now = heard.stamp.time;
   belief.path.go(heard.view.T_WB.p);

@@ -50,13 +50,13 @@ class SemanticFilter {
   FrameInput withLearnedNoise(const Belief& belief, FrameInput input) const;
   FrameContext contextOf(const Belief& belief, const FrameInput& input) const;
   /// Sets the visibility of all tracks; returns it, one for each.
-  std::vector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput& input) const;
+  ScratchVector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput& input) const;
   /// Predicts and scores the visible tracks.
-  std::vector<ScoredTrack> scoreAll(Belief& belief,
-                                    const std::vector<TrackVisibility>& visibilities,
-                                    const FrameInput& input, const FrameContext& frame) const;
+  ScratchVector<ScoredTrack> scoreAll(Belief& belief,
+                                      const ScratchVector<TrackVisibility>& visibilities,
+                                      const FrameInput& input, const FrameContext& frame) const;
   /// Updates the scored tracks; returns Association::explained.
-  Eigen::VectorXd associateAndUpdate(Belief& belief, std::vector<ScoredTrack>& scored,
+  Eigen::VectorXd associateAndUpdate(Belief& belief, ScratchVector<ScoredTrack>& scored,
                                      const FrameInput& input, const FrameContext& frame) const;
   /// Whether the track measures the map-relative drift in this frame: once for each visit.
   bool measuresDrift(const Track& track, const FrameContext& frame) const;
@@ -64,7 +64,7 @@ class SemanticFilter {
   /// update.
   Track asScored(const Track& was, const Track& now, const ScoredTrack& scored,
                  const FrameInput& input, const FrameContext& frame) const;
-  void manageAll(const Belief& before, Belief& belief, std::vector<ScoredTrack>& scored,
+  void manageAll(const Belief& before, Belief& belief, ScratchVector<ScoredTrack>& scored,
                  const FrameInput& input, const FrameContext& frame, StepReport& report) const;
   /// Reduces the mixture of one track after its update. Where nothing is left of it the assignment
   /// is undone, or its state begins anew; otherwise its existence is 0.

@@ -26,7 +26,7 @@ std::optional<double> BoxExplanations::fit(std::size_t j, const std::array<bool,
   if (!score) return std::nullopt;
   const Track& track = belief_.tracks[j];
   return score->log_density - logClutterOf(box, *score, input_.view, clutter_) +
-         logRatio(box, input_.model, track.best().class_name, track.lookalike.nats);
+         logRatio(box, *input_.model, track.best().class_name, track.lookalike.nats);
 }
 
 const BoxExplanations::Entry& BoxExplanations::entryOf(std::size_t j) {
@@ -36,7 +36,7 @@ const BoxExplanations::Entry& BoxExplanations::entryOf(std::size_t j) {
   const Track& track = belief_.tracks[j];
   const Hypothesis& best = track.best();
   const State x = stateAt(best, toSeconds(input_.stamp.time - track.as_of));
-  e.box = projectObserved(x, from_, input_.model.styles->of(best.class_name), best.heading());
+  e.box = projectObserved(x, from_, input_.model->styles->of(best.class_name), best.heading());
   if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
   return e;
 }

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <optional>
-#include <vector>
 
 #include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/belief/belief.h"
@@ -40,7 +39,7 @@ class BoxExplanations {
   Projector from_;
   const BoxParameters& parameters_;
   const ClutterParameters& clutter_;
-  std::vector<Entry> at_;
+  ScratchVector<Entry> at_;
 };
 
 }  // namespace perdure::semantic_filter

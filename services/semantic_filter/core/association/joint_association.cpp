@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "common/base/check.h"
+#include "common/base/scratch.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -19,8 +19,8 @@ struct Pair {
   double mu = 0.0;  ///< message from track j to box z: psi / (1 + sum over its other boxes)
 };
 
-std::vector<Pair> pairsOf(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) {
-  std::vector<Pair> pairs;
+ScratchVector<Pair> pairsOf(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh) {
+  ScratchVector<Pair> pairs;
   for (Eigen::Index z = 0; z < psi.cols(); ++z) {
     for (Eigen::Index j = 0; j < psi.rows(); ++j) {
       if (psi(j, z) > 0.0) pairs.push_back({j, z, psi(j, z), 1.0 / fresh[z]});
@@ -29,7 +29,7 @@ std::vector<Pair> pairsOf(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fre
   return pairs;
 }
 
-void offer(std::vector<Pair>& pairs, Eigen::VectorXd& by_object, Eigen::VectorXd& to_box) {
+void offer(ScratchVector<Pair>& pairs, Eigen::VectorXd& by_object, Eigen::VectorXd& to_box) {
   by_object.setZero();
   to_box.setZero();
   for (const Pair& p : pairs) by_object[p.j] += p.psi * p.eta;

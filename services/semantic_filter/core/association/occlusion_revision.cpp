@@ -15,9 +15,9 @@ constexpr double kMisjudged = 3.0;
 
 }  // namespace
 
-void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
+void reviseOcclusion(Belief& belief, ScratchVector<TrackVisibility>& visibilities,
                      const FrameInput& input, const Parameters& parameters) {
-  std::vector<std::size_t> hidden;
+  ScratchVector<std::size_t> hidden;
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     const bool solid = belief.tracks[j].existence >= parameters.visibility.solid;
     if (solid && visibilities[j].state == Visibility::kOccluded) hidden.push_back(j);
@@ -25,7 +25,7 @@ void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
   if (hidden.empty()) return;
   BoxExplanations expected(belief, input, parameters);
   for (const auto& e : *input.boxes) {
-    std::vector<std::size_t> candidates;
+    ScratchVector<std::size_t> candidates;
     double best_hidden = -std::numeric_limits<double>::infinity();
     for (const std::size_t j : hidden) {
       const auto fit = expected.fit(j, {}, e);
@@ -50,10 +50,10 @@ void reviseOcclusion(Belief& belief, std::vector<TrackVisibility>& visibilities,
   }
 }
 
-void explainPartialViews(const Belief& belief, const std::vector<TrackVisibility>& visibilities,
+void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors) {
-  std::vector<std::pair<std::size_t, double>> partial_views;  // and its expected number of boxes
+  ScratchVector<std::pair<std::size_t, double>> partial_views;  // and its expected number of boxes
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].residual_fraction <= 0.0) continue;
     const Track& o = belief.tracks[j];

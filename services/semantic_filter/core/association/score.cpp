@@ -66,7 +66,7 @@ struct Reach {
   }
 };
 
-Reach reachOf(const std::vector<HypothesisScore>& hypotheses,
+Reach reachOf(const ScratchVector<HypothesisScore>& hypotheses,
               const std::vector<BoxDetection>& boxes) {
   constexpr double kFar = 1e30, kReach = 5.01;  // deviations, a little more than mayOverlap takes
   double noise[2] = {0.0, 0.0};

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
 #include "services/semantic_filter/core/measurement/frame.h"
@@ -29,17 +30,18 @@ struct HypothesisScore {
   double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
   double undetected = 0.0;             ///< v (1 - P_D): probability of visible and not reported
   double no_box = 1.0;  ///< A without a box: 1 - v P_D, with a top-down answer if there is one
-  std::vector<BoxMatch> matches;  ///< for each of TrackScore::boxes
-  double expected = 0.0;          ///< v P_D without the detection rate of earlier visits
+  ScratchVector<BoxMatch> matches;  ///< for each of TrackScore::boxes
+  double expected = 0.0;            ///< v P_D without the detection rate of earlier visits
   /// number of earlier observations with correlated errors, given this hypothesis
   double correlated_observations = 0.0;
 };
 
+/// Lives within one step.
 struct TrackScore {
   TrackVisibility visibility;
-  bool top_down = false;           ///< a top-down answer is applied (association/top_down.h)
-  std::vector<std::size_t> boxes;  ///< indices of the frame's boxes that are near a hypothesis
-  std::vector<HypothesisScore> hypotheses;
+  bool top_down = false;             ///< a top-down answer is applied (association/top_down.h)
+  ScratchVector<std::size_t> boxes;  ///< indices of the frame's boxes that are near a hypothesis
+  ScratchVector<HypothesisScore> hypotheses;
 };
 
 /// Returns the log clutter density of the sides that were compared. With fewer sides it has other

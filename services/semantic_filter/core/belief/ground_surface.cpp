@@ -80,10 +80,10 @@ void GroundSurface::tell(GroundRoughness& roughness_scale, const Track& track, d
                         own, ratio_, std::min(share, 1.0));
 }
 
-std::vector<GroundSurface::Near> GroundSurface::around(const std::vector<Stand>& stands,
-                                                       const Eigen::Vector2d& here, ObjectId except,
-                                                       std::size_t most) const {
-  std::vector<Near> nearest;
+ScratchVector<GroundSurface::Near> GroundSurface::around(const std::vector<Stand>& stands,
+                                                         const Eigen::Vector2d& here,
+                                                         ObjectId except, std::size_t most) const {
+  ScratchVector<Near> nearest;
   for (const Stand& s : stands) {
     const double apart = (s.place - here).squaredNorm();
     const bool reaches = apart <= parameters_.reach_m * parameters_.reach_m;
@@ -99,9 +99,9 @@ std::vector<GroundSurface::Near> GroundSurface::around(const std::vector<Stand>&
 std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
                                                  ObjectId except) const {
   const Eigen::Vector2d here = horizontal(place);
-  std::vector<Near> tell = around(path_, here, except, BodyPath::kPlaces);
+  ScratchVector<Near> tell = around(path_, here, except, BodyPath::kPlaces);
   const std::size_t on_path = tell.size(), least = on_path > 0 ? 1 : kLeast;
-  const std::vector<Near> things = around(stands_, here, except, kNearest);
+  const ScratchVector<Near> things = around(stands_, here, except, kNearest);
   tell.insert(tell.end(), things.begin(), things.end());
   if (tell.size() < least) return std::nullopt;
   double level = 0.0;

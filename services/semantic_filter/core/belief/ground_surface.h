@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/base/inplace_vector.h"
+#include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/parameters.h"
@@ -85,8 +86,8 @@ class GroundSurface {
 
   /// Returns the `most` nearest of `stands` within reach of a place, nearest first, without
   /// `except`.
-  std::vector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
-                           ObjectId except, std::size_t most) const;
+  ScratchVector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
+                             ObjectId except, std::size_t most) const;
   Eigen::Vector2d horizontal(const Eigen::Vector3d& p) const { return axes_ * p; }
 
   GroundParameters parameters_;

@@ -25,7 +25,7 @@ void count(LedgerEntry& entry, const LedgerEntry& more) {
   entry.last = std::max(entry.last, more.last);
 }
 
-const ClassNumber* find(const std::vector<ClassNumber>& numbers, const std::string& name) {
+const ClassNumber* find(const ClassNumbers& numbers, const std::string& name) {
   const auto it =
       std::find_if(numbers.begin(), numbers.end(), [&](const auto& n) { return n.name == name; });
   return it == numbers.end() ? nullptr : &*it;
@@ -77,7 +77,7 @@ ClassAccount::Row& ClassAccount::rowOf(const std::string& name) {
   return rows_.back();
 }
 
-void ClassAccount::oust(const std::vector<ClassNumber>& pmf, TimePoint at) {
+void ClassAccount::oust(const ClassNumbers& pmf, TimePoint at) {
   const auto best = std::max_element(
       pmf.begin(), pmf.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
   if (best == pmf.end()) return;
@@ -92,7 +92,7 @@ void ClassAccount::oust(const std::vector<ClassNumber>& pmf, TimePoint at) {
   std::erase_if(rows_, [&](const Row& row) { return !find(pmf, row.name); });
 }
 
-void ClassAccount::book(const std::vector<ClassNumber>& pmf, ClassEvidence why, TimePoint at) {
+void ClassAccount::book(const ClassNumbers& pmf, ClassEvidence why, TimePoint at) {
   oust(pmf, at);
   for (const ClassNumber& c : pmf) {
     Nats& nats = rowOf(c.name).nats;
@@ -100,8 +100,7 @@ void ClassAccount::book(const std::vector<ClassNumber>& pmf, ClassEvidence why, 
   }
 }
 
-void ClassAccount::shift(ClassEvidence from, ClassEvidence to,
-                         const std::vector<ClassNumber>& nats) {
+void ClassAccount::shift(ClassEvidence from, ClassEvidence to, const ClassNumbers& nats) {
   for (Row& row : rows_) {
     const ClassNumber* c = find(nats, row.name);
     if (!c) continue;
@@ -110,26 +109,27 @@ void ClassAccount::shift(ClassEvidence from, ClassEvidence to,
   }
 }
 
-std::vector<ClassLedger> ClassAccount::published() const {
-  std::vector<ClassLedger> classes;
-  for (const Row& row : rows_) classes.push_back({row.name, {row.nats.begin(), row.nats.end()}});
-  return classes;
+void ClassAccount::publish(Ledger& to) const {
+  to.classes.resize(rows_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    to.classes[i].name = rows_[i].name;
+    to.classes[i].log_odds.assign(rows_[i].nats.begin(), rows_[i].nats.end());
+  }
+  to.ousted.resize(ousted_ ? 1 : 0);
+  if (!ousted_) return;
+  OustedClass& o = to.ousted.front();
+  o.name = ousted_->name, o.by = ousted_->by, o.at = ousted_->at;
+  o.log_odds.assign(ousted_->nats.begin(), ousted_->nats.end());
 }
 
-std::vector<OustedClass> ClassAccount::ousted() const {
-  if (!ousted_) return {};
-  return {{ousted_->name, ousted_->by, ousted_->at, {ousted_->nats.begin(), ousted_->nats.end()}}};
-}
-
-std::vector<ClassNumber> gains(const std::vector<ClassNumber>& pmf,
-                               const std::vector<ClassNumber>& log_likelihood) {
+ClassNumbers gains(const ClassNumbers& pmf, const ClassNumbers& log_likelihood) {
   double most = -1e300, evidence = 0.0;
   for (const ClassNumber& c : log_likelihood) most = std::max(most, c.value);
   for (const ClassNumber& c : log_likelihood) {
     const ClassNumber* prior = find(pmf, c.name);
     evidence += prior ? prior->value * std::exp(c.value - most) : 0.0;
   }
-  std::vector<ClassNumber> result = log_likelihood;
+  ClassNumbers result = log_likelihood;
   for (ClassNumber& c : result) c.value -= most + logOf(evidence);
   return result;
 }

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/scratch.h"
 #include "common/types/ledger.h"
 
 namespace perdure::semantic_filter {
@@ -34,7 +35,7 @@ class Existence {
   const LedgerEntry& of(ExistenceEvidence why) const {
     return entries_[static_cast<std::size_t>(why)];
   }
-  std::vector<LedgerEntry> published() const { return {entries_.begin(), entries_.end()}; }
+  void publish(std::vector<LedgerEntry>& to) const { to.assign(entries_.begin(), entries_.end()); }
 
  private:
   double r_ = 0.5;
@@ -47,6 +48,9 @@ struct ClassNumber {
   double value = 0.0;
 };
 
+/// Of the classes of a track; lives within one step.
+using ClassNumbers = ScratchVector<ClassNumber>;
+
 /// log π of each class, with its reasons.
 class ClassAccount {
  public:
@@ -55,12 +59,11 @@ class ClassAccount {
 
   /// `pmf` sums to 1. Classes that it no longer has leave the account. The one of them that came
   /// closest to the best class is kept as ousted.
-  void book(const std::vector<ClassNumber>& pmf, ClassEvidence why, TimePoint at);
+  void book(const ClassNumbers& pmf, ClassEvidence why, TimePoint at);
   /// Moves a part of entry `from` to entry `to`, for each class.
-  void shift(ClassEvidence from, ClassEvidence to, const std::vector<ClassNumber>& nats);
+  void shift(ClassEvidence from, ClassEvidence to, const ClassNumbers& nats);
 
-  std::vector<ClassLedger> published() const;
-  std::vector<OustedClass> ousted() const;
+  void publish(Ledger& to) const;
 
  private:
   using Nats = std::array<double, kClassEvidences>;
@@ -74,14 +77,13 @@ class ClassAccount {
     Nats nats{};
   };
   Row& rowOf(const std::string& name);
-  void oust(const std::vector<ClassNumber>& pmf, TimePoint at);
+  void oust(const ClassNumbers& pmf, TimePoint at);
 
   std::vector<Row> rows_;
   std::optional<Ousted> ousted_;
 };
 
 /// Returns what each class gains by Bayes' rule: log_likelihood - log Σ π exp(log_likelihood).
-std::vector<ClassNumber> gains(const std::vector<ClassNumber>& pmf,
-                               const std::vector<ClassNumber>& log_likelihood);
+ClassNumbers gains(const ClassNumbers& pmf, const ClassNumbers& log_likelihood);
 
 }  // namespace perdure::semantic_filter

@@ -55,8 +55,8 @@ bool sound(const Track& track) {
   return std::isfinite(sum) && sum > 0.0 && std::isfinite(track.existence);
 }
 
-std::vector<ClassNumber> classShares(const Track& track) {
-  std::vector<ClassNumber> pmf;
+ClassNumbers classShares(const Track& track) {
+  ClassNumbers pmf;
   pmf.reserve(track.hypotheses.size());
   double sum = 0.0;
   for (const auto& h : track.hypotheses) {

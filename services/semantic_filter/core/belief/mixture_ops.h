@@ -15,7 +15,7 @@ double classProbability(const Track& track, const std::string& class_name);
 /// Whether all numbers are finite and the sum of the weights is positive.
 bool sound(const Track& track);
 /// Returns π of each class, in the order of the first hypothesis of each. The sum is 1.
-std::vector<ClassNumber> classShares(const Track& track);
+ClassNumbers classShares(const Track& track);
 /// Enters the present PMF in the ledger, whatever the sum of the weights.
 void book(Track& track, ClassEvidence why);
 /// Divides the weights by their sum, sorts them (heaviest first, stable), and enters the PMF in the

@@ -39,9 +39,9 @@ Matrix7d definite(const Matrix7d& P) {
 
 /// The Gaussian of the heaviest hypothesis of a class. Its covariance holds the second moments of
 /// the others of the class about its mean.
-ClassBelief classBelief(const Track& track, const std::string& name) {
-  ClassBelief belief;
+void toClassBelief(const Track& track, const std::string& name, ClassBelief& belief) {
   belief.name = name;
+  belief.probability = 0.0;
   const Hypothesis* heaviest = nullptr;
   Matrix7d moments = Matrix7d::Zero();
   Eigen::Matrix<double, 7, 6> cross = Eigen::Matrix<double, 7, 6>::Zero();
@@ -64,24 +64,22 @@ ClassBelief classBelief(const Track& track, const std::string& name) {
     belief.covariance(kYaw, kYaw) = std::max(belief.covariance(kYaw, kYaw), kAnyYaw);
   }
   belief.cross_pose = cross / weight;
-  return belief;
 }
 
 }  // namespace
 
-ObjectBelief toBelief(const Track& track, double min_speed) {
-  ObjectBelief belief;
+void toBelief(const Track& track, double min_speed, ObjectBelief& belief) {
   belief.id = track.id;
   belief.existence = track.existence;
   belief.confirmed = track.life.confirmed;
-  std::vector<const std::string*> names;
+  ScratchVector<const std::string*> names;
   names.reserve(track.hypotheses.size());
   for (const auto& h : track.hypotheses) {
     const auto same = [&](const std::string* name) { return *name == h.class_name; };
     if (std::none_of(names.begin(), names.end(), same)) names.push_back(&h.class_name);
   }
-  belief.classes.reserve(names.size());
-  for (const std::string* name : names) belief.classes.push_back(classBelief(track, *name));
+  belief.classes.resize(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) toClassBelief(track, *names[i], belief.classes[i]);
   const auto likelier = [](const auto& a, const auto& b) { return a.probability > b.probability; };
   if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
     std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
@@ -95,9 +93,17 @@ ObjectBelief toBelief(const Track& track, double min_speed) {
   belief.hits = track.life.hits;
   belief.visible_misses = track.life.visible_misses;
   belief.moving = movingProbability(track, min_speed);
-  if (track.best().moving) belief.velocity = track.best().x.tail<3>();
+  const bool moves = track.best().moving;
+  belief.velocity = moves ? Eigen::Vector3d(track.best().x.tail<3>()) : Eigen::Vector3d::Zero();
+  belief.memory = Memory::kWorking;
   belief.recalled = track.life.recalled;
-  belief.why = {track.existence.published(), track.classes.published(), track.classes.ousted()};
+  track.existence.publish(belief.why.existence);
+  track.classes.publish(belief.why);
+}
+
+ObjectBelief toBelief(const Track& track, double min_speed) {
+  ObjectBelief belief;
+  toBelief(track, min_speed, belief);
   return belief;
 }
 

@@ -9,6 +9,8 @@ namespace perdure::semantic_filter {
 /// Publishes one Gaussian for each class: the mean of its heaviest hypothesis, and the second
 /// moments of the others about it. `min_speed`: m/s, above which a track counts as moving.
 ObjectBelief toBelief(const Track& track, double min_speed);
+/// The same into `belief`, whose memory it uses again.
+void toBelief(const Track& track, double min_speed, ObjectBelief& belief);
 
 /// Makes a track from a published belief, with one hypothesis for each class. `back`: kRestore or
 /// kRecall.

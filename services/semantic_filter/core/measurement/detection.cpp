@@ -80,11 +80,12 @@ std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const M
   BoxDetection e;
   const double zero = detection.activations[0];
   double best = -clutter.max_log_ratio, odds = 0.0;
+  std::vector<double>& log_ratio = e.log_ratio.write();
   for (std::size_t k = 0; k < model.classes.size(); ++k) {
     const double ratio = detection.activations[k + 1] - zero;
-    e.log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
-    best = std::max(best, e.log_ratio.back());
-    odds += std::exp(e.log_ratio.back());
+    log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
+    best = std::max(best, log_ratio.back());
+    odds += std::exp(log_ratio.back());
   }
   BoxNoise noise = boxNoise(model, width);
   noise.sides = detection.side_sigma;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/shared_vector.h"
 #include "common/types/detections.h"
 #include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/measurement/box_likelihood.h"
@@ -51,10 +52,10 @@ struct BoxDetection {
   double log_clutter = 0.0;
   /// Nats by which partial views of objects below visibility.minimum make such a box more frequent.
   double log_partial_views = 0.0;
-  std::vector<double> log_ratio;  ///< by class of the model, clamped
-  double log_ratio_best = 0.0;    ///< the largest of them
-  double log_ratio_other = 0.0;   ///< of *other*, at its first observation
-  double lookalike = 0.0;         ///< share of *other* objects that resemble a known class
+  SharedVector<double> log_ratio;  ///< by class of the model, clamped
+  double log_ratio_best = 0.0;     ///< the largest of them
+  double log_ratio_other = 0.0;    ///< of *other*, at its first observation
+  double lookalike = 0.0;          ///< share of *other* objects that resemble a known class
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
 };

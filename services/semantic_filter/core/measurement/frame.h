@@ -40,7 +40,8 @@ struct FrameInput {
   std::vector<LandmarkDepth> points;  ///< landmarks in this image
   std::optional<std::vector<BoxDetection>> boxes;
   TopDownAnswers top_down = {};  ///< for predictions that no box met
-  Model model;                   ///< the classes of the boxes refer to it
+  /// the classes of the boxes refer to it; never null
+  std::shared_ptr<const Model> model = std::make_shared<const Model>();
 };
 
 /// Noise scales of the boxes and azimuths of one network.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/scratch.h"
+
 namespace perdure::semantic_filter {
 namespace {
 
@@ -34,10 +36,10 @@ double changeBetween(const KeyframeView& a, const KeyframeView& b, const ViewSca
 /// object is estimated at the time of the newest.
 std::size_t mostSimilar(const Eigen::Vector3d& place, const Keyframes& all,
                         const ViewScales& scales) {
-  std::vector<KeyframeView> views;
+  ScratchVector<KeyframeView> views;
   views.reserve(all.size());
   for (const auto& k : all) views.push_back(keyframeViewOf(place, *k));
-  std::vector<double> least_change(all.size(), std::numeric_limits<double>::infinity());
+  ScratchVector<double> least_change(all.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       const double change = changeBetween(views[i], views[j], scales);

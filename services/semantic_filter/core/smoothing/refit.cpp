@@ -144,7 +144,7 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   return result;
 }
 
-void refitNeediest(std::vector<Track*>& tracks, Belief& belief, const FrameContext& frame) {
+void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameContext& frame) {
   const double fresh = frame.parameters->smoothing.fresh;
   std::stable_sort(tracks.begin(), tracks.end(), [fresh](const Track* a, const Track* b) {
     return refitNeed(*a, fresh) > refitNeed(*b, fresh);

@@ -24,6 +24,6 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame);
 
 /// Fits the tracks with the largest refitNeed, at most SmoothingParameters::per_frame, and learns
 /// noise scales and ground from them. The others wait.
-void refitNeediest(std::vector<Track*>& tracks, Belief& belief, const FrameContext& frame);
+void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

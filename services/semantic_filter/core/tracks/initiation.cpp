@@ -177,8 +177,8 @@ void bookInitiation(Track& track, const std::vector<Candidate>& kept, const BoxD
   const double other = frame.parameters->clutter.other_prior;
   double frequency = 0.0, activation_of_all = 0.0;
   for (const auto& c : kept) frequency += c.prior.frequency;
-  std::vector<ClassNumber> prior = {{kOtherClass, std::log(other)}};
-  std::vector<ClassNumber> activation = {{kOtherClass, detection.log_ratio_other}};
+  ClassNumbers prior = {{kOtherClass, std::log(other)}};
+  ClassNumbers activation = {{kOtherClass, detection.log_ratio_other}};
   for (const auto& c : kept) {
     prior.push_back({c.prior.name, std::log((1.0 - other) * c.prior.frequency / frequency)});
     activation.push_back({c.prior.name, c.log_weight - std::log(c.prior.frequency)});
@@ -201,7 +201,7 @@ bool sameObject(const BoxMeasurement& a, const BoxMeasurement& b) {
 
 /// Whether the box is the rest of an object that is almost out of the image.
 bool leavesView(BoxExplanations& expected, const Belief& belief,
-                const std::vector<TrackVisibility>& visibilities, const BoxDetection& box) {
+                const ScratchVector<TrackVisibility>& visibilities, const BoxDetection& box) {
   if (box.z.count() == 4) return false;  // what leaves is cut by the border
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].life.confirmed)
@@ -251,7 +251,7 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   return track;
 }
 
-void initiateTracks(Belief& belief, const std::vector<TrackVisibility>& visibilities,
+void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                     const Eigen::VectorXd& explained, const FrameInput& input,
                     const FrameContext& frame, IdBook& ids) {
   const auto& boxes = *input.boxes;

@@ -26,7 +26,7 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
                               TimePoint now, const FrameContext& frame);
 
 /// Adds tracks from the boxes that no track explains. `explained`: Association::explained.
-void initiateTracks(Belief& belief, const std::vector<TrackVisibility>& visibilities,
+void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                     const Eigen::VectorXd& explained, const FrameInput& input,
                     const FrameContext& frame, IdBook& ids);
 

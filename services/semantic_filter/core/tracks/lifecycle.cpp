@@ -58,6 +58,8 @@ std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameConte
   std::stable_sort(tracks.begin(), tracks.end(),
                    [](const auto& a, const auto& b) { return a.existence > b.existence; });
   tracks.resize(limit);
+  std::stable_sort(tracks.begin(), tracks.end(),
+                   [](const auto& a, const auto& b) { return a.id < b.id; });
   return deleted;
 }
 

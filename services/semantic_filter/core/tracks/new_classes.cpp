@@ -102,7 +102,7 @@ std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
 /// class relative to the best class (at most 1).
 struct Entrants {
   std::vector<Hypothesis> hypotheses;
-  std::vector<ClassNumber> fits;
+  ClassNumbers fits;
   double share = 0.0;  ///< sum of the weights
 };
 

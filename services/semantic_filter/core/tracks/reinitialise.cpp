@@ -7,7 +7,7 @@
 
 namespace perdure::semantic_filter {
 
-bool reinitialise(Track& track, const std::vector<ClassNumber>& pmf, const BoxDetection& detection,
+bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& detection,
                   const std::optional<RangeHint>& range, const FrameContext& frame) {
   auto initiated = initiate(detection, range, track.as_of, frame);
   if (!initiated) return false;

@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 /// Id, existence and known classes stay; geometry and motion are those of an initiation. `pmf`: of
 /// the track before it lost its shape. Returns false, and leaves the track as it is, if the box
 /// does not determine a track.
-bool reinitialise(Track& track, const std::vector<ClassNumber>& pmf, const BoxDetection& detection,
+bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& detection,
                   const std::optional<RangeHint>& range, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -11,8 +11,8 @@ namespace {
 constexpr double kRepetition = 0.1;  // tempering exponent below which a hit is a repetition
 
 /// Returns log Σ π_k A_k^exponent, where A_k is the mean of A over the hypotheses of class k.
-double temperedLog(const Track& track, const std::vector<ClassNumber>& pmf,
-                   const std::vector<double>& A, double exponent) {
+double temperedLog(const Track& track, const ClassNumbers& pmf, const ScratchVector<double>& A,
+                   double exponent) {
   double mean = 0.0;
   for (const ClassNumber& c : pmf) {
     double sum = 0.0;
@@ -26,12 +26,12 @@ double temperedLog(const Track& track, const std::vector<ClassNumber>& pmf,
 
 /// Returns the nats of a miss that an unmapped occluder excuses. With probability s it hides the
 /// object, and then a miss is certain: A = s + (1 - s) A', where A' is A without the occluder.
-double excusedByOccluder(const Track& track, const std::vector<ClassNumber>& pmf,
-                         const std::vector<Shares>& shares, double exponent) {
+double excusedByOccluder(const Track& track, const ClassNumbers& pmf, const AllShares& shares,
+                         double exponent) {
   constexpr double kLeast = 1e-6;
   const double unoccluded = 1.0 - track.detectability.unmapped_occluder;
   if (track.detectability.unmapped_occluder <= 0.0 || unoccluded < kLeast) return 0.0;
-  std::vector<double> A, without_occluder;
+  ScratchVector<double> A, without_occluder;
   A.reserve(shares.size());
   without_occluder.reserve(shares.size());
   for (const Shares& s : shares) {
@@ -45,10 +45,10 @@ double excusedByOccluder(const Track& track, const std::vector<ClassNumber>& pmf
 
 /// Returns log(A / A without g_k) of a class. "Without g_k": the same boxes from a network that
 /// cannot tell classes from clutter.
-double activationNats(const Track& track, const std::vector<Shares>& shares,
-                      const std::string& class_name, const std::vector<std::size_t>& gated,
+double activationNats(const Track& track, const AllShares& shares, const std::string& class_name,
+                      const ScratchVector<std::size_t>& gated,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
-  std::vector<double> inverse_ratio;  // 1 / g_k of each box
+  ScratchVector<double> inverse_ratio;  // 1 / g_k of each box
   inverse_ratio.reserve(gated.size());
   for (const std::size_t z : gated) {
     inverse_ratio.push_back(
@@ -69,8 +69,8 @@ double activationNats(const Track& track, const std::vector<Shares>& shares,
 
 }  // namespace
 
-UpdateReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
-                        double tempering, double exponent, const std::vector<std::size_t>& gated,
+UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double detected,
+                        double tempering, double exponent, const ScratchVector<std::size_t>& gated,
                         const std::vector<BoxDetection>& boxes, const FrameContext& frame) {
   UpdateReasons reasons;
   const auto pmf = classShares(track);
@@ -80,7 +80,7 @@ UpdateReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, d
     return reasons;
   }
   if (tempering < kRepetition) reasons.kind = ExistenceEvidence::kRepeated;
-  std::vector<ClassNumber> activation_nats;
+  ClassNumbers activation_nats;
   activation_nats.reserve(pmf.size());
   for (const ClassNumber& c : pmf) {
     activation_nats.push_back(

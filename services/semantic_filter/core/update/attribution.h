@@ -8,30 +8,33 @@
 #include <optional>
 #include <vector>
 
+#include "common/base/scratch.h"
 #include "services/semantic_filter/core/association/score.h"
 
 namespace perdure::semantic_filter {
 
 /// How one hypothesis divides an observation among "none of the boxes" and each box.
 struct Shares {
-  double A = 1.0;           ///< P(frame | hypothesis) / P(frame | nothing there)
-  double none = 1.0;        ///< β_0, posterior share of "none of the boxes"
-  std::vector<double> box;  ///< β_z, posterior share of each gated box
+  double A = 1.0;             ///< P(frame | hypothesis) / P(frame | nothing there)
+  double none = 1.0;          ///< β_0, posterior share of "none of the boxes"
+  ScratchVector<double> box;  ///< β_z, posterior share of each gated box
 };
+
+using AllShares = ScratchVector<Shares>;  ///< of the hypotheses of a track, in order
 
 /// The reasons of an observation. They are computed before the weights change.
 struct UpdateReasons {
   ExistenceEvidence kind = ExistenceEvidence::kHit;
   double excused = 0.0;  ///< nats of a miss that an unmapped occluder excuses, >= 0
   /// At a hit: what the activations of the network add to log π of each class, nats.
-  std::vector<ClassNumber> activation;
+  ClassNumbers activation;
 };
 
 /// `detected`: probability that one of the boxes is the track's. `tempering`: exponent τ of the
 /// observation, for a hit. `exponent`: that of A between classes. `gated`: indices of the boxes
 /// near the track.
-UpdateReasons reasonsOf(const Track& track, const std::vector<Shares>& shares, double detected,
-                        double tempering, double exponent, const std::vector<std::size_t>& gated,
+UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double detected,
+                        double tempering, double exponent, const ScratchVector<std::size_t>& gated,
                         const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
 /// Sets existence to `r` and enters its reasons in the ledger.

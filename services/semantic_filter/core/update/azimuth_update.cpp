@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <string_view>
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
@@ -16,8 +16,8 @@ constexpr double kMaxHeading = 6.0;  // nats
 
 /// Multiplies the weights of yaw modes by the likelihood of the azimuths. Each group of one class
 /// and one motion keeps its total weight, so that existence, class and motion learn nothing.
-void weighYawModes(Track& track, const std::vector<double>& likelihood) {
-  std::map<std::pair<std::string, bool>, std::pair<double, double>> totals;
+void weighYawModes(Track& track, const ScratchVector<double>& likelihood) {
+  ScratchMap<std::pair<std::string_view, bool>, std::pair<double, double>> totals;
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
     const auto& h = track.hypotheses[i];
     auto& [before, after] = totals[{h.class_name, h.moving}];
@@ -33,13 +33,13 @@ void weighYawModes(Track& track, const std::vector<double>& likelihood) {
 
 }  // namespace
 
-void updateAzimuths(Track& track, const std::vector<Shares>& shares, double tempering,
-                    const std::vector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
+void updateAzimuths(Track& track, const AllShares& shares, double tempering,
+                    const ScratchVector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
                     const FrameContext& frame) {
   const bool any = std::any_of(gated.begin(), gated.end(),
                                [&](std::size_t z) { return boxes[z].azimuth.has_value(); });
   if (!any) return;
-  std::vector<double> likelihood(track.hypotheses.size(), 1.0);
+  ScratchVector<double> likelihood(track.hypotheses.size(), 1.0);
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
     const ClassPrior& prior = frame.priors->of(track.hypotheses[i].class_name);
     if (!prior.has_yaw) continue;

@@ -17,8 +17,8 @@ double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double wei
 
 /// Updates all hypotheses by the azimuths of the boxes that may be the track's. Errors of azimuths
 /// are less correlated between observations than those of boxes. So their exponent is √`tempering`.
-void updateAzimuths(Track& track, const std::vector<Shares>& shares, double tempering,
-                    const std::vector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
+void updateAzimuths(Track& track, const AllShares& shares, double tempering,
+                    const ScratchVector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
                     const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <string_view>
 
 #include "services/semantic_filter/core/visibility/detectability.h"
 
@@ -18,8 +18,8 @@ struct MeanA {
 /// π ∝ π A. Within a class, hypotheses differ by geometry only, whose lasting errors are in the
 /// state: there A counts in full. Between classes, and for existence, observations share the
 /// mistakes of the network: there A counts with the exponent τ. Returns the prior means of A.
-MeanA updateWeights(Track& track, const std::vector<Shares>& shares, double tempering) {
-  std::map<std::string, std::pair<double, double>> classes;  // weight, Σ w A
+MeanA updateWeights(Track& track, const AllShares& shares, double tempering) {
+  ScratchMap<std::string_view, std::pair<double, double>> classes;  // weight, Σ w A
   double mean_A = 0.0, tempered_A = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     auto& [weight, sum] = classes[track.hypotheses[i].class_name];
@@ -44,13 +44,12 @@ MeanA updateWeights(Track& track, const std::vector<Shares>& shares, double temp
 /// keyframes. Each is linearised at its own state, so the later observations alone would let the
 /// filter give up true modes before the next search. A mode that explains this observation about as
 /// well as the best one keeps at least `least` of its class. The weight of the class stays.
-void keepSearchedModes(std::vector<Hypothesis>& hs, const std::vector<Shares>& shares,
-                       double least) {
+void keepSearchedModes(std::vector<Hypothesis>& hs, const AllShares& shares, double least) {
   constexpr double kComparable = 0.05;  // least ratio to the largest A of the class
   struct Class {
     double before = 0.0, after = 0.0, best_A = 0.0;
   };
-  std::map<std::string, Class> classes;
+  ScratchMap<std::string_view, Class> classes;
   for (std::size_t i = 0; i < hs.size(); ++i) {
     Class& c = classes[hs[i].class_name];
     c.before += hs[i].weight;
@@ -86,7 +85,7 @@ double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
 
 }  // namespace
 
-double updateClassAndExistence(Track& track, const std::vector<Shares>& shares, double tempering,
+double updateClassAndExistence(Track& track, const AllShares& shares, double tempering,
                                bool detected, const Parameters& parameters) {
   const MeanA mean_A = updateWeights(track, shares, tempering);
   if (detected)

@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 /// `detected`: one of the boxes is more probably the track's than not. Leaves the weights
 /// unnormalised. Returns the new existence, at most `existenceCeiling`; the track keeps the old
 /// one.
-double updateClassAndExistence(Track& track, const std::vector<Shares>& shares, double tempering,
+double updateClassAndExistence(Track& track, const AllShares& shares, double tempering,
                                bool detected, const Parameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
@@ -18,8 +17,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-Shares sharesOf(const HypothesisScore& h, const std::vector<std::size_t>& gated,
-                const Eigen::VectorXd& eta) {
+Shares sharesOf(const HypothesisScore& h, const ScratchVector<std::size_t>& gated,
+                const EtaRow& eta) {
   Shares shares;
   shares.A = h.no_box;
   shares.box.reserve(gated.size());
@@ -55,7 +54,7 @@ void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
 }
 
 /// Probability that one of the boxes is the track's, given that it exists.
-double probabilityDetected(const Track& track, const std::vector<Shares>& shares) {
+double probabilityDetected(const Track& track, const AllShares& shares) {
   double detected = 0.0, total = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const double weight = track.hypotheses[i].weight * shares[i].A;
@@ -67,10 +66,10 @@ double probabilityDetected(const Track& track, const std::vector<Shares>& shares
 
 /// Returns the assigned box, as an index into TrackScore::boxes: its posterior share is at least
 /// kAssigned.
-std::optional<std::size_t> assignedBox(const Track& track, const std::vector<Shares>& shares) {
+std::optional<std::size_t> assignedBox(const Track& track, const AllShares& shares) {
   constexpr double kAssigned = 0.8;
   double total = 0.0;
-  std::vector<double> box(shares.empty() ? 0 : shares.front().box.size(), 0.0);
+  ScratchVector<double> box(shares.empty() ? 0 : shares.front().box.size(), 0.0);
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const double weight = track.hypotheses[i].weight * shares[i].A;
     total += weight;
@@ -81,8 +80,7 @@ std::optional<std::size_t> assignedBox(const Track& track, const std::vector<Sha
   return static_cast<std::size_t>(best - box.begin());
 }
 
-void count(Track& track, double detected, const std::vector<Shares>& shares,
-           const TrackScore& score) {
+void count(Track& track, double detected, const AllShares& shares, const TrackScore& score) {
   const double visible = std::min(1.0, score.visibility.fraction);
   track.history.recent_share += 0.25 * visible * (detected - track.history.recent_share);
   if (detected < 0.5) {
@@ -130,8 +128,8 @@ struct Tempering {
   double observations = 0.0;  ///< earlier ones with correlated errors
 };
 
-Tempering temperingOf(const Track& track, const TrackScore& score,
-                      const std::vector<Shares>& shares, double correlation) {
+Tempering temperingOf(const Track& track, const TrackScore& score, const AllShares& shares,
+                      double correlation) {
   std::size_t best = 0;
   const auto posterior = [&](std::size_t i) { return track.hypotheses[i].weight * shares[i].A; };
   for (std::size_t i = 1; i < shares.size(); ++i) {
@@ -143,11 +141,11 @@ Tempering temperingOf(const Track& track, const TrackScore& score,
 
 }  // namespace
 
-std::optional<std::size_t> update(Track& track, const TrackScore& score, const Eigen::VectorXd& eta,
+std::optional<std::size_t> update(Track& track, const TrackScore& score, const EtaRow& eta,
                                   const std::vector<BoxDetection>& boxes,
                                   const FrameContext& frame) {
   if (score.visibility.fraction <= 0.0) return std::nullopt;
-  std::vector<Shares> shares;
+  AllShares shares;
   shares.reserve(score.hypotheses.size());
   for (const auto& h : score.hypotheses) shares.push_back(sharesOf(h, score.boxes, eta));
   const double detected = probabilityDetected(track, shares);
@@ -192,7 +190,7 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
 
 Track updateAsMissed(Track track, TrackScore score, const FrameContext& frame) {
   score.boxes.clear();
-  update(track, score, {}, {}, frame);
+  update(track, score, Eigen::RowVectorXd(), {}, frame);
   return track;
 }
 

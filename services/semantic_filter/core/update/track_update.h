@@ -17,10 +17,13 @@
 
 namespace perdure::semantic_filter {
 
+/// A row of Association::eta.
+using EtaRow = Eigen::Ref<const Eigen::RowVectorXd, 0, Eigen::InnerStride<>>;
+
 /// Updates one track; does nothing at v = 0 (score.visibility.fraction). `eta`: the track's row of
 /// Association::eta, one number for each box of the frame. Returns the index of the box that is
 /// assigned to the track, if there is one.
-std::optional<std::size_t> update(Track& track, const TrackScore& score, const Eigen::VectorXd& eta,
+std::optional<std::size_t> update(Track& track, const TrackScore& score, const EtaRow& eta,
                                   const std::vector<BoxDetection>& boxes,
                                   const FrameContext& frame);
 

@@ -142,11 +142,11 @@ class Blockers {
     all_.push_back({cell.blocker, nearer(cell, o_)});
     return all_.back();
   }
-  const std::vector<Blocked>& all() const { return all_; }
+  const ScratchVector<Blocked>& all() const { return all_; }
 
  private:
   const Outline& o_;
-  std::vector<Blocked> all_;
+  ScratchVector<Blocked> all_;
 };
 
 struct Tally {
@@ -304,11 +304,11 @@ DepthBuffer& begin(double width, double height, const VisibilityParameters& para
 
 }  // namespace
 
-double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
+double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double height,
                     const VisibilityParameters& parameters) {
   const Outline& first = outlines.front();
   if (!first.box) return 0.0;
-  std::vector<const Outline*> hiding;
+  ScratchVector<const Outline*> hiding;
   for (const Outline& o : outlines) {
     const bool hides = o.box && o.distance_m < first.distance_m && o.solidity >= parameters.solid;
     if (hides) hiding.push_back(&o);
@@ -334,17 +334,17 @@ double shareOfFirst(const std::vector<Outline>& outlines, double width, double h
   return cells > 0.0 ? in_image.share * (1.0 - hidden / cells) : 0.0;
 }
 
-std::vector<TrackVisibility> computeVisibility(const std::vector<Outline>& outlines,
-                                               const std::vector<LandmarkDepth>& points,
-                                               double width, double height,
-                                               const VisibilityParameters& parameters) {
-  std::vector<std::size_t> order(outlines.size());
+ScratchVector<TrackVisibility> computeVisibility(const ScratchVector<Outline>& outlines,
+                                                 const std::vector<LandmarkDepth>& points,
+                                                 double width, double height,
+                                                 const VisibilityParameters& parameters) {
+  ScratchVector<std::size_t> order(outlines.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
   DepthBuffer& buffer = begin(width, height, parameters);
-  std::vector<TrackVisibility> visibilities(outlines.size());
+  ScratchVector<TrackVisibility> visibilities(outlines.size());
   for (const std::size_t j : order) {
     const Outline& o = outlines[j];
     if (!o.box) continue;

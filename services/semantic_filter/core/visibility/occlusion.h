@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
 #include "services/semantic_filter/core/measurement/frame.h"
@@ -36,13 +37,13 @@ Outline outlineOf(const Track& track, const State& x, const Projector& from,
                   const Shape& shape = cuboidShape());
 
 /// Returns the visible fraction of the first outline, without landmarks and without a minimum.
-double shareOfFirst(const std::vector<Outline>& outlines, double width, double height,
+double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double height,
                     const VisibilityParameters& parameters);
 
 /// Returns the visibility of each outline, in the same order. `width`, `height`: of the image, px.
-std::vector<TrackVisibility> computeVisibility(const std::vector<Outline>& outlines,
-                                               const std::vector<LandmarkDepth>& points,
-                                               double width, double height,
-                                               const VisibilityParameters& parameters);
+ScratchVector<TrackVisibility> computeVisibility(const ScratchVector<Outline>& outlines,
+                                                 const std::vector<LandmarkDepth>& points,
+                                                 double width, double height,
+                                                 const VisibilityParameters& parameters);
 
 }  // namespace perdure::semantic_filter

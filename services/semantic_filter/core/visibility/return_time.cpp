@@ -39,7 +39,7 @@ struct Standing {
 };
 
 const Shape& shapeOf(const Track& track, const FrameInput& now) {
-  return now.model.styles->of(track.best().class_name).shape;
+  return now.model->styles->of(track.best().class_name).shape;
 }
 
 /// Returns the tracks that may hide it along the path: solid, nearer, and next to it in the image.
@@ -80,8 +80,9 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
   const Standing& first = things.front();
-  thread_local std::vector<Outline> outlines;
-  outlines.clear();
+  const ScratchScope scope;
+  ScratchVector<Outline> outlines;
+  outlines.reserve(things.size());
   outlines.push_back(outlineOf(*first.track, first.x, from, *first.shape));
   if (!outlines.front().box) return 0.0;
   const Eigen::Vector4d sides = outlines.front().box->sides;
