@@ -18,7 +18,7 @@ namespace {
 
 /// Highest index of a participant without multicast: so many processes fit on one host.
 constexpr int kMaxParticipantIndex = 60;
-constexpr double kMostSharedMemory = 256;  // MB; wire/bounds.h allows no larger images
+constexpr double kMostSharedMemory = 256;  // MB; wire/description/bounds.h allows no larger images
 
 std::string loopbackXml() {
   // Unicast only; large fragments and buffers, because nothing can be lost between hosts.

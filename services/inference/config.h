@@ -23,7 +23,7 @@ struct DetectionConfig {
   double merge_iou = 0.5;
   std::int64_t limit = 100;
   std::vector<std::string> classes;  ///< empty = all of the network's
-  bool prime = true;                 ///< answer predictions (core/prime.h)
+  bool prime = true;                 ///< answer predictions (core/decode/prime.h)
 };
 
 struct OwnershipConfig {

@@ -31,8 +31,8 @@ class Node {
 
   /// Boxes in pixels of the frame, as the network extrapolates them (not clipped to the image).
   /// An empty list is a result: nothing is there. `expected` says where objects should be: each
-  /// that no box meets gets a primed answer (core/prime.h), where the model is calibrated for it
-  /// and the predictions fit the frame. Reasons: "frame_malformed", "model_failed",
+  /// that no box meets gets a primed answer (core/decode/prime.h), where the model is calibrated
+  /// for it and the predictions fit the frame. Reasons: "frame_malformed", "model_failed",
   /// "model_output_shape", "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
 

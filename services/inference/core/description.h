@@ -81,15 +81,15 @@ struct BoxForm {
 /// Which of the columns of the scores says "nothing is here".
 enum class Background { kNone, kFirst, kLast };
 
-/// What the best candidate near a predicted place says where no box was reported (core/prime.h):
-/// posterior log-odds s of its class give `offset` + `slope`·s nats for the object, and no
-/// candidate of score `floor` or more gives `nothing`.
+/// What the best candidate near a predicted place says where no box was reported
+/// (core/decode/prime.h): posterior log-odds s of its class give `offset` + `slope`·s nats for the
+/// object, and no candidate of score `floor` or more gives `nothing`.
 struct PrimedCalibration {
   double floor = 0.0;  ///< in (0, 1), below the lax threshold; 0: not fitted, nothing is primed
   double slope = 0.0, offset = 0.0, nothing = 0.0;
 };
 
-/// From the network's score to a log-likelihood ratio against clutter (core/evidence.h).
+/// From the network's score to a log-likelihood ratio against clutter (core/decode/evidence.h).
 struct Calibration {
   double temperature = 1.0;   ///< > 0; above 1 the network was overconfident
   double clutter_rate = 0.5;  ///< in (0, 1): share of the emitted boxes that are clutter

@@ -71,7 +71,7 @@ class Trial {
   }
 
  private:
-  /// For `birth.odds`: boxes of things that no object follows, and those of nothing.
+  /// For `initiation.odds`: boxes of things that no object follows, and those of nothing.
   void countBoxes(const WorldFrame& frame) {
     std::vector<bool> known(visible_.size(), false);
     for (const auto& o : last_.objects) {

@@ -19,8 +19,8 @@ using namespace semantic_filter;  // NOLINT: most names here are the filter's
 
 // Errors that the looks from one place share, after one for each class.
 constexpr Eigen::Index kAlike = 0, kAzimuth = 1, kBlindAzimuth = 2, kMoreErrors = 3;
-constexpr double kNever = 1e9;  // as core/look.cpp: a change of view that never counts
-constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // of azimuths, as core/update.cpp is told
+constexpr double kNever = 1e9;  // as core/measurement/frame.cpp: a change of view that never counts
+constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // as core/measurement/azimuth.cpp
 
 double normalCdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -290,7 +290,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
 
 double World::azimuth(const Eigen::VectorXd& shared, double alpha) {
   const double sigma = told_.detector.azimuth_sigma;
-  // Less alike from look to look than what else is shared (core/update.cpp).
+  // Less alike from look to look than what else is shared.
   const double correlation = std::pow(told_.config.filter.tempering.correlation, 2.0);
   const auto mixed = [&](Eigen::Index i) {
     return std::sqrt(correlation) * shared[i] + std::sqrt(1.0 - correlation) * dice_.normal();

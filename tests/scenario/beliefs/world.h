@@ -51,7 +51,7 @@ struct Thing {
   semantic_filter::State x = semantic_filter::State::Zero();  ///< at t = 0; velocity with it
   double present_until_s = 1e9;
   /// It comes into visibility (round a corner) once its image is this large; sizes are log-uniform,
-  /// as those of false boxes are: `birth.odds` is told of boxes of any size.
+  /// as those of false boxes are: `initiation.odds` is told of boxes of any size.
   double comes_out_px = 0.0;
   bool moves() const { return x.tail<3>().squaredNorm() > 0.0; }
   semantic_filter::State at(double t_s) const;
