@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 
+#include "tests/architecture/document_rules.h"
 #include "tests/architecture/folder_rules.h"
 #include "tests/architecture/include_rules.h"
 #include "tests/architecture/vocabulary_rules.h"
@@ -94,6 +96,19 @@ TEST(VocabularyRules, FindFormerWordsInCodeAndComments) {
   EXPECT_THAT(formerWords("a.h", "double lookalike_nats;  // an outlook\n"), IsEmpty());
 }
 
+TEST(DocumentRules, FindLinksAndPathsThatLeadNowhere) {
+  const std::set<std::string> paths{"tools", "tools/a", "tools/a/b.h", "tools/README.md"};
+  const auto lost = [&](const std::string& text) {
+    return lostPaths("tools/README.md", text, paths);
+  };
+  EXPECT_THAT(lost("[b](a/b.h#part), [a](a/), [up](../tools), `a/b.h`, [far](https://a.b/c.md)"),
+              IsEmpty());
+  EXPECT_THAT(lost("`b.h`, `a/<name>.h`, `a/*.h`, `/etc/a.md`, `run a/c.h`"), IsEmpty());
+  EXPECT_THAT(lost("[b](b.h) `a/c.h` `ools/a/b.h`"),
+              ElementsAre(HasSubstr("the link b.h"), HasSubstr("no file is a/c.h"),
+                          HasSubstr("no file is ools/a/b.h")));
+}
+
 /// Every header and source file, relative to the project's root.
 std::vector<std::string> filesUnder(const std::filesystem::path& root,
                                     std::initializer_list<const char*> rooms) {
@@ -138,6 +153,33 @@ TEST_F(TheProject, KeepsTheWordsOfItsGlossary) {
 
 TEST_F(TheProject, KeepsItsFoldersSmall) {
   EXPECT_THAT(overfullFolders(filesUnder(root_, {"common", "services", "tools"})), IsEmpty());
+}
+
+/// Files and folders of the sources, relative to the root.
+std::set<std::string> pathsUnder(const std::filesystem::path& root) {
+  std::set<std::string> paths;
+  const auto add = [&](const auto& entry) {
+    paths.insert(entry.path().lexically_relative(root).string());
+  };
+  for (const auto& entry : std::filesystem::directory_iterator(root)) {
+    if (entry.is_regular_file()) add(entry);
+  }
+  for (const char* room :
+       {"cmake", "common", "config", "deploy", "idl", "models", "services", "tests", "tools"}) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(root / room)) add(entry);
+    paths.insert(room);
+  }
+  return paths;
+}
+
+TEST_F(TheProject, NamesFilesThatAreThere) {
+  const auto paths = pathsUnder(root_);
+  for (const std::string& path : paths) {
+    if (!path.ends_with(".md")) continue;
+    std::ifstream stream(root_ / path);
+    const std::string content{std::istreambuf_iterator<char>(stream), {}};
+    EXPECT_THAT(lostPaths(path, content, paths), IsEmpty());
+  }
 }
 
 }  // namespace
