@@ -34,6 +34,8 @@ class History {
   /// Keeps `frames` frames. Counts in `reasons`, which outlives this.
   History(const Parameters& parameters, const ClassPriors& priors, std::size_t frames,
           ReasonCounts& reasons);
+  History(const History&) = delete;
+  History& operator=(const History&) = delete;
 
   /// Another frame of reference begins: what was learned of networks and streets stays.
   void beginWorld();
