@@ -265,7 +265,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
   BoxNoise noise = boxNoise(read_model_, W);
   double odds = 0.0;
   for (std::size_t k = 1; k < activations.size(); ++k) odds += std::exp(double(activations[k]));
-  noise.inflation = 1.0 / (1.0 + odds);
+  noise.clutter_probability = 1.0 / (1.0 + odds);
   const BoxMeasurement z = measure(box, W, H, p, noise);
   double scale = 1.0;  // of a Gaussian, in a draw of the t distribution
   if (options_.tail > 0.0) {

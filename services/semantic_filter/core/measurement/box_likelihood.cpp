@@ -63,7 +63,7 @@ BoxMeasurement measure(const Box& box, double width, double height, const BoxPar
       std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
   const SideError lasting = lastingError(parameters, noise);
   SideError error = sideError(parameters, noise);
-  error.relative += parameters.sigma_weak * noise.inflation;
+  error.relative += parameters.sigma_weak * noise.clutter_probability;
   const double sx = error.at(z.width()), sy = error.at(z.height());
   for (int i = 0; i < 4; ++i) {
     const bool is_x = i % 2 == 0;

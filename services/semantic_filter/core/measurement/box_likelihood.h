@@ -30,10 +30,10 @@ struct BoxMeasurement {
 
 /// What a network says about the errors of its boxes; 0: nothing.
 struct BoxNoise {
-  double relative = 0.0;          ///< deviation of a side of a large box, in widths or heights
-  double pixel = 0.0;             ///< a pixel of the network's input, in image pixels
-  std::array<double, 4> sides{};  ///< deviations of this box's sides, in image pixels
-  double inflation = 0.0;         ///< probability of clutter: a network places doubtful boxes worse
+  double relative = 0.0;             ///< deviation of a side of a large box, in widths or heights
+  double pixel = 0.0;                ///< a pixel of the network's input, in image pixels
+  std::array<double, 4> sides{};     ///< deviations of this box's sides, in image pixels
+  double clutter_probability = 0.0;  ///< a network places doubtful boxes worse
 };
 
 /// Standard deviation of a side of a box.

@@ -89,7 +89,7 @@ std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const M
   }
   BoxNoise noise = boxNoise(model, width);
   noise.sides = detection.side_sigma;
-  noise.inflation = 1.0 / (1.0 + odds);
+  noise.clutter_probability = 1.0 / (1.0 + odds);
   e.z = measure(b, width, height, box, noise);
   if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
   e.log_clutter = logClutter(e.z, width, height, clutter);

@@ -86,8 +86,9 @@ TEST(BoxLikelihood, NoiseAndBiasAddUpToTheWholeError) {
 TEST(BoxLikelihood, ABoxThatMayBeClutterHasMoreNoise) {
   BoxParameters parameters;
   parameters.sigma_weak = 0.2;
-  const auto at = [&](double inflation) {
-    return measure({100, 100, 200, 180}, kWidth, kHeight, parameters, {.inflation = inflation})
+  const auto at = [&](double clutter) {
+    return measure({100, 100, 200, 180}, kWidth, kHeight, parameters,
+                   {.clutter_probability = clutter})
         .variance[0];
   };
   EXPECT_GT(at(0.5), at(0.0));
