@@ -124,7 +124,7 @@ bool Node::isNear(const ObjectBelief& belief) const {
                                                history_.mapFrame().inM(*history_.lastPose()).p);
 }
 
-/// What can be used of it, without its context; no id of it is given out again.
+/// What can be used of it; no id of it is given out again.
 std::vector<ObjectBelief> Node::soundOf(std::vector<ObjectBelief> beliefs) {
   const auto malformed =
       std::erase_if(beliefs, [](const ObjectBelief& b) { return b.classes.empty() || b.id == 0; });

@@ -1,4 +1,4 @@
-// Reads config/class_priors.yaml, and all priors that a configuration names.
+// Reads the file of class priors, config/class_priors.yaml.
 #pragma once
 
 #include <map>
@@ -10,8 +10,7 @@
 
 namespace perdure::semantic_filter {
 
-/// Loads the files that the configuration names: class priors, and context if there is one. Throws
-/// StartupError as the two readers do.
+/// Loads the file that the configuration names. Throws StartupError as loadClassPriors does.
 ClassPriors loadPriors(const Config& config);
 /// Throws StartupError: kUnavailable if the file cannot be read, kConfiguration with all its errors
 /// as file:line:col.
