@@ -17,7 +17,7 @@ const char* nameOf(ExistenceEvidence kind) {
       return "repeated";
     case ExistenceEvidence::kMiss:
       return "miss";
-    case ExistenceEvidence::kScreened:
+    case ExistenceEvidence::kUnmappedOccluder:
       return "screened";
     case ExistenceEvidence::kHidden:
       return "hidden";

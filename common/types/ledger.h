@@ -16,16 +16,16 @@ enum class ExistenceEvidence : std::uint8_t {
   kHit,        ///< looks that showed it
   kRepeated,   ///< looks that showed it from where it had been looked at: worth little
   kMiss,       ///< looks at its place that did not show it, as if nothing could be in the way
-  kScreened,   ///< what of that is excused, because something off the map may hide it
-  kHidden,     ///< looks that were not used: something on the map hid it (0 nats)
-  kAway,       ///< looks that were not used: it was outside the picture (0 nats)
-  kTime,       ///< survival: things leave
-  kMisshapen,  ///< beliefs in it that lost the size of their class
-  kLost,       ///< beliefs that it drove off, to where nobody knows
-  kShared,     ///< its first box may have been another object's
-  kMerge,      ///< what another object knew that turned out to be the same
-  kRestore,    ///< what was believed before this ledger, when a service was started again
-  kRecall,     ///< the same, when it came back from the map
+  kUnmappedOccluder,  ///< what of that is excused, because something off the map may hide it
+  kHidden,            ///< looks that were not used: something on the map hid it (0 nats)
+  kAway,              ///< looks that were not used: it was outside the picture (0 nats)
+  kTime,              ///< survival: things leave
+  kMisshapen,         ///< beliefs in it that lost the size of their class
+  kLost,              ///< beliefs that it drove off, to where nobody knows
+  kShared,            ///< its first box may have been another object's
+  kMerge,             ///< what another object knew that turned out to be the same
+  kRestore,           ///< what was believed before this ledger, when a service was started again
+  kRecall,            ///< the same, when it came back from the map
 };
 inline constexpr std::size_t kExistenceEvidences = 14;
 

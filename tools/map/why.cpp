@@ -36,7 +36,7 @@ std::string sentence(ExistenceEvidence kind, const LedgerEntry& entry) {
       return looks(n) + " more showed it from where it had been looked at: worth little";
     case ExistenceEvidence::kMiss:
       return looks(n) + " at its place did not show it";
-    case ExistenceEvidence::kScreened:
+    case ExistenceEvidence::kUnmappedOccluder:
       return "of these is excused: something off the map may have hidden it";
     case ExistenceEvidence::kHidden:
       return looks(n) + " not used: something hid it";

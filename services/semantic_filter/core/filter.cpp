@@ -256,7 +256,7 @@ StepReport SemanticFilter::step(const Belief& before, Belief& belief, const Fram
   const ScratchScope scope;
   StepReport report;
   const TimePoint now = heard.stamp.time;
-  belief.path.go(heard.view.T_WB.p);
+  belief.path.advance(heard.view.T_WB.p);
   // Visibility is published with every frame, evidence or not.
   auto visibilities = updateVisibility(belief, heard);
   if (!heard.boxes) return report;

@@ -29,7 +29,7 @@ ObjectBelief carBelief() {
   entryOf(o, ExistenceEvidence::kHit) = {9.2, 31, at(101.3), at(113.7)};
   entryOf(o, ExistenceEvidence::kRepeated) = {0.31, 1, at(104.0), at(104.0)};
   entryOf(o, ExistenceEvidence::kMiss) = {-2.1, 4, at(105.0), at(106.5)};
-  entryOf(o, ExistenceEvidence::kScreened) = {0.9, 4, at(105.0), at(106.5)};
+  entryOf(o, ExistenceEvidence::kUnmappedOccluder) = {0.9, 4, at(105.0), at(106.5)};
   entryOf(o, ExistenceEvidence::kHidden) = {0.0, 210, at(107.0), at(112.0)};
   entryOf(o, ExistenceEvidence::kTime) = {-0.004, 246, at(101.4), at(113.7)};
   o.existence = 1.0 / (1.0 + std::exp(-o.why.logOdds()));

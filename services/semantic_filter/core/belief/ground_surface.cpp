@@ -36,7 +36,7 @@ void GroundRoughness::learn(double above, const GroundHeight& others, double own
   things_ += weight;
 }
 
-void BodyPath::go(const Eigen::Vector3d& body) {
+void BodyPath::advance(const Eigen::Vector3d& body) {
   constexpr double kApart = 4.0;  // m
   if (!places_.empty() && (body - places_[places_.size() - 1]).norm() < kApart) return;
   if (places_.size() == kPlaces) {
@@ -70,7 +70,8 @@ GroundSurface::GroundSurface(const std::vector<Track>& tracks, const BodyPath& p
   }
 }
 
-void GroundSurface::tell(GroundRoughness& roughness_scale, const Track& track, double share) const {
+void GroundSurface::updateRoughness(GroundRoughness& roughness_scale, const Track& track,
+                                    double share) const {
   const Hypothesis& best = track.best();
   if (best.ground_contact.variance <= 0.0 || best.moving) return;
   const auto others = below(best.x.head<3>(), track.id);
@@ -99,26 +100,26 @@ ScratchVector<GroundSurface::Near> GroundSurface::around(const std::vector<Stand
 std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
                                                  ObjectId except) const {
   const Eigen::Vector2d here = horizontal(place);
-  ScratchVector<Near> tell = around(path_, here, except, BodyPath::kPlaces);
-  const std::size_t on_path = tell.size(), least = on_path > 0 ? 1 : kLeast;
+  ScratchVector<Near> points = around(path_, here, except, BodyPath::kPlaces);
+  const std::size_t on_path = points.size(), least = on_path > 0 ? 1 : kLeast;
   const ScratchVector<Near> things = around(stands_, here, except, kNearest);
-  tell.insert(tell.end(), things.begin(), things.end());
-  if (tell.size() < least) return std::nullopt;
+  points.insert(points.end(), things.begin(), things.end());
+  if (points.size() < least) return std::nullopt;
   double level = 0.0;
-  for (const Near& near : tell) level += near.stand->height / static_cast<double>(tell.size());
+  for (const Near& near : points) level += near.stand->height / static_cast<double>(points.size());
   const double slope = ratio_ * std::pow(parameters_.slope, 2);
   const double rough = ratio_ * std::pow(parameters_.roughness, 2);
   const double body = std::pow(parameters_.body_height_sigma_m, 2);
-  while (tell.size() >= least) {
-    const auto n = static_cast<Eigen::Index>(tell.size()), m = static_cast<Eigen::Index>(on_path);
+  while (points.size() >= least) {
+    const auto n = static_cast<Eigen::Index>(points.size()), m = static_cast<Eigen::Index>(on_path);
     Eigen::MatrixXd K(n, n);
     Eigen::VectorXd z(n);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const Stand& a = *tell[static_cast<std::size_t>(i)].stand;
+      const Stand& a = *points[static_cast<std::size_t>(i)].stand;
       const Eigen::Vector2d da = a.place - here;
       z[i] = a.height - level;
       for (Eigen::Index j = 0; j <= i; ++j) {
-        const Eigen::Vector2d db = tell[static_cast<std::size_t>(j)].stand->place - here;
+        const Eigen::Vector2d db = points[static_cast<std::size_t>(j)].stand->place - here;
         K(i, j) = K(j, i) = kLevelSigma * kLevelSigma + slope * da.dot(db) +
                             0.5 * rough * (da.norm() + db.norm() - (da - db).norm());
       }
@@ -137,14 +138,14 @@ std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
       if (off > most_off) worst = i, most_off = off;
     }
     if (most_off > kOutlier) {
-      tell.erase(tell.begin() + worst);
+      points.erase(points.begin() + worst);
       continue;
     }
     const double prior = kLevelSigma * kLevelSigma;
     const Eigen::VectorXd shares = prior * J.rowwise().sum();
     double noise = body * std::pow(shares.head(m).sum(), 2);
     for (Eigen::Index i = 0; i < n; ++i) {
-      noise += shares[i] * shares[i] * tell[static_cast<std::size_t>(i)].stand->variance;
+      noise += shares[i] * shares[i] * points[static_cast<std::size_t>(i)].stand->variance;
     }
     const double variance = std::max(prior * (1.0 - shares.sum()), noise);
     return GroundHeight{level + prior * weighed.sum(), variance, variance - noise};

@@ -48,7 +48,7 @@ class BodyPath {
  public:
   static constexpr std::size_t kPlaces = 6;
 
-  void go(const Eigen::Vector3d& body);
+  void advance(const Eigen::Vector3d& body);
 
   const Eigen::Vector3d* begin() const { return places_.begin(); }
   const Eigen::Vector3d* end() const { return places_.end(); }
@@ -66,7 +66,7 @@ class GroundSurface {
                 const ClassPriors& priors, const GroundParameters& parameters);
 
   /// Lets `roughness_scale` learn from the ground contact of the track.
-  void tell(GroundRoughness& roughness_scale, const Track& track, double share) const;
+  void updateRoughness(GroundRoughness& roughness_scale, const Track& track, double share) const;
   /// Returns the height of the ground below `place`, without the contribution of track `except`.
   /// Returns nothing if fewer than three objects contribute and the height of the body is not
   /// known.

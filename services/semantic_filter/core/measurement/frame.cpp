@@ -32,7 +32,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   walk.bias = biasScales(box);
   walk.unmapped_occluder = visibility.unmapped_occluder;
   walk.hard_to_detect = visibility.hard_to_detect;
-  walk.screen = detectabilityScales(visibility);
+  walk.detectability = detectabilityScales(visibility);
   return walk;
 }
 

@@ -118,9 +118,9 @@ struct ViewWalk {
   double focal = 1.0;   ///< px
   SideError lasting;    ///< stationary deviation of b
   ViewScales bias{1, 1, 1};
-  double unmapped_occluder = 0.0;  ///< stationary value of Track::unmapped_occluder
-  double hard_to_detect = 0.0;     ///< stationary value of Track::hard_to_detect
-  ViewScales screen{1, 1, 1};
+  double unmapped_occluder = 0.0;  ///< stationary probability that one hides it
+  double hard_to_detect = 0.0;     ///< the same, that the view makes it so
+  ViewScales detectability{1, 1, 1};
 };
 
 /// Returns the view changes after which the detector bias has fallen to 1/e.

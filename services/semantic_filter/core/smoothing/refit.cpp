@@ -157,7 +157,7 @@ void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameCon
       belief.learned.sides.learn(frame.noise_scale.model, residuals->sides);
       belief.learned.azimuths.learn(frame.noise_scale.model, residuals->azimuths);
     }
-    frame.ground->tell(belief.learned.roughness_scale, *track, share);
+    frame.ground->updateRoughness(belief.learned.roughness_scale, *track, share);
   }
 }
 

@@ -92,7 +92,8 @@ UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double dete
 
 void bookExistence(Track& track, double r, const UpdateReasons& reasons) {
   track.existence.become(r, reasons.kind, track.as_of);
-  track.existence.shift(reasons.kind, ExistenceEvidence::kScreened, reasons.excused, track.as_of);
+  track.existence.shift(reasons.kind, ExistenceEvidence::kUnmappedOccluder, reasons.excused,
+                        track.as_of);
 }
 
 void bookClasses(Track& track, const UpdateReasons& reasons) {

@@ -99,7 +99,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   if (dt > kAnotherVisit_s && track.unused.out_of_view.count > 0 &&
       track.unused.occluded.count == 0) {
     track.life.visit_began = now;
-    track.detectability.rate.beginVisit(walk.screen);
+    track.detectability.rate.beginVisit(walk.detectability);
   }
   track.existence.note(ExistenceEvidence::kHidden, std::exchange(track.unused.occluded, {}));
   track.existence.note(ExistenceEvidence::kAway, std::exchange(track.unused.out_of_view, {}));

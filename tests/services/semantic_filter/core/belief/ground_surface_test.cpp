@@ -66,7 +66,7 @@ TEST(GroundSurface, MovingOrDoubtfulObjectsOrThoseThatNeedNotStandDoNotContribut
 GroundSurface groundOfBody(double height, double metres, double slope,
                            const std::vector<Track>& cars) {
   BodyPath path;
-  for (double x = -metres; x <= 0.0; x += 0.5) path.go({x, 0, slope * x + height});
+  for (double x = -metres; x <= 0.0; x += 0.5) path.advance({x, 0, slope * x + height});
   GroundParameters parameters;
   parameters.body_height_m = height;
   return {cars, path, GroundRoughness{}, kUp, standing(), parameters};
@@ -96,7 +96,7 @@ TEST(GroundSurface, ContinuesTheSlopeOfTheBodysPath) {
 /// If the given height is wrong, all points of the path have the same error.
 TEST(GroundSurface, ObjectsCorrectAWrongHeightOfTheBody) {
   BodyPath path;
-  for (double x = -30.0; x <= 0.0; x += 0.5) path.go({x, 0, 1.5});
+  for (double x = -30.0; x <= 0.0; x += 0.5) path.advance({x, 0, 1.5});
   GroundParameters parameters;
   parameters.body_height_m = 1.3;
   const auto cars = street([](double, double) { return 0.0; });

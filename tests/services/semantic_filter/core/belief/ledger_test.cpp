@@ -23,7 +23,7 @@ TEST(Existence, SumsToTheLogOddsOverAMillionChanges) {
   for (int i = 0; i < 1'000'000; ++i) {
     const double next = any(random);
     r.become(next, next > r ? ExistenceEvidence::kHit : ExistenceEvidence::kMiss, {});
-    r.shift(ExistenceEvidence::kMiss, ExistenceEvidence::kScreened, 0.1 * next, {});
+    r.shift(ExistenceEvidence::kMiss, ExistenceEvidence::kUnmappedOccluder, 0.1 * next, {});
   }
   double sum = 0.0;
   for (const auto& entry : r.published()) sum += entry.log_odds;

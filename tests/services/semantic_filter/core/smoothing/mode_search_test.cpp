@@ -46,7 +46,7 @@ TEST(ModeSearch, FindsTheYawThatTheFilterPruned) {
 bool mayMoveOver(double height, const Passing& scene) {
   FrameContext frame = scene.frame();
   BodyPath path;
-  for (double x = 0.0; x <= 24.0; x += 4.0) path.go({x, 0.0, 1.2});
+  for (double x = 0.0; x <= 24.0; x += 4.0) path.advance({x, 0.0, 1.2});
   GroundParameters ground;
   ground.body_height_m = 1.2 - height;
   frame.ground = std::make_shared<const GroundSurface>(

@@ -123,13 +123,13 @@ TEST_F(Attribution, AnUnmappedOccluderExcusesPartOfAMiss) {
   computeVisibility({});
   const double miss = object.existence.of(ExistenceEvidence::kMiss).log_odds;
   EXPECT_LT(miss, -1.0);
-  EXPECT_EQ(object.existence.of(ExistenceEvidence::kScreened).count, 0U);
+  EXPECT_EQ(object.existence.of(ExistenceEvidence::kUnmappedOccluder).count, 0U);
   std::swap(open, object);
   object.detectability.unmapped_occluder = 0.5;
   computeVisibility({});
   EXPECT_NEAR(object.existence.of(ExistenceEvidence::kMiss).log_odds, miss, 1e-9);
-  EXPECT_GT(object.existence.of(ExistenceEvidence::kScreened).log_odds, 0.5);
-  EXPECT_NEAR(object.existence.of(ExistenceEvidence::kScreened).log_odds + miss,
+  EXPECT_GT(object.existence.of(ExistenceEvidence::kUnmappedOccluder).log_odds, 0.5);
+  EXPECT_NEAR(object.existence.of(ExistenceEvidence::kUnmappedOccluder).log_odds + miss,
               logOdds(object.existence) - logOdds(0.6), 1e-9);
 }
 

@@ -85,11 +85,11 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNoBias) {
 TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;
-  walk.screen = {0.15, 0.3, 1e9};
+  walk.detectability = {0.15, 0.3, 1e9};
   const CameraModel camera{testing::makeCamera()};
   View view;
   view.camera = &camera;
-  const auto screenedAt = [&](double metres_aside) {
+  const auto occludedAt = [&](double metres_aside) {
     Track object = biasedCar(walk);
     Keyframe seen;
     seen.from = std::make_shared<const FrameView>(view, PoseError{}, fromNanoseconds(1), nullptr);
@@ -103,9 +103,9 @@ TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
     predict(object, object.as_of + std::chrono::seconds(5), PoseError{}, MotionParameters{}, now);
     return object.detectability.unmapped_occluder;
   };
-  EXPECT_LT(screenedAt(0.0), 1e-6);
-  EXPECT_LT(screenedAt(0.5), 0.01);
-  EXPECT_GT(screenedAt(40.0), 0.19);
+  EXPECT_LT(occludedAt(0.0), 1e-6);
+  EXPECT_LT(occludedAt(0.5), 0.01);
+  EXPECT_GT(occludedAt(40.0), 0.19);
 }
 
 /// How often it was detected from here says little about other viewpoints.
@@ -113,7 +113,7 @@ TEST(Predict, DetectabilityFromAnotherViewpointReturnsToItsPrior) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;
   walk.hard_to_detect = 0.05;
-  walk.screen = {0.15, 0.3, 1e9};
+  walk.detectability = {0.15, 0.3, 1e9};
   for (const double now : {0.0, 0.7}) {
     Track object = biasedCar(walk);
     object.detectability.unmapped_occluder = 0.1;
