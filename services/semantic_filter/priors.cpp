@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 #include "common/base/errors.h"
@@ -14,6 +15,16 @@
 
 namespace perdure::semantic_filter {
 namespace {
+
+/// The numbers of a list; nothing where it is no list of numbers.
+std::optional<std::vector<double>> numbersOf(const YAML::Node& list) {
+  if (!list.IsSequence()) return std::nullopt;
+  std::vector<double> numbers;
+  for (const YAML::Node& item : list) {
+    if (!YAML::convert<double>::decode(item, numbers.emplace_back())) return std::nullopt;
+  }
+  return numbers;
+}
 
 class PriorsReader {
  public:
@@ -55,6 +66,13 @@ class PriorsReader {
       }
       target[static_cast<Eigen::Index>(i)] = value;
     }
+  }
+
+  /// Of a class or a key; empty where it is none.
+  std::string name(const YAML::Node& node) {
+    if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
+    complain(node, "names of classes and keys are texts; write NAME: VALUE");
+    return {};
   }
 
   ClassPrior prior(const YAML::Node& node, const ClassPrior& standard) {
@@ -105,10 +123,9 @@ class PriorsReader {
     }
     std::vector<ShapeLevel> levels;
     for (const YAML::Node& item : node) {
-      std::vector<double> v;
-      if (!YAML::convert<std::vector<double>>::decode(item, v) || v.size() < 4 || v.size() > 5) {
-        return wrong(item);
-      }
+      const auto numbers = numbersOf(item);
+      if (!numbers || numbers->size() < 4 || numbers->size() > 5) return wrong(item);
+      const std::vector<double>& v = *numbers;
       const bool shares =
           std::all_of(v.begin() + 1, v.begin() + 4, [](double s) { return s >= 0.05 && s <= 1.0; });
       const double forward = v.size() == 5 ? v[4] : 0.0;
@@ -124,8 +141,8 @@ class PriorsReader {
         "size",          "spread", "common",    "frequency", "moving", "speed",
         "azimuth_sigma", "yaw",    "detection", "shape",     "stands"};
     for (const auto& item : node) {
-      const auto key = item.first.as<std::string>();
-      if (std::find(known.begin(), known.end(), key) == known.end()) {
+      const std::string key = name(item.first);
+      if (!key.empty() && std::find(known.begin(), known.end(), key) == known.end()) {
         complain(item.first, key +
                                  ": unknown; keys are size, spread, common, frequency, "
                                  "detection, moving, speed, azimuth_sigma, yaw, shape, stands");
@@ -164,7 +181,7 @@ ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
   priors.other.name = kOtherClass;
   for (const auto& item : root["classes"]) {
     ClassPrior p = reader.prior(item.second, priors.fallback);
-    p.name = item.first.as<std::string>();
+    p.name = reader.name(item.first);
     if (!isLowerCase(p.name)) reader.complain(item.first, p.name + ": names are lower-case");
     priors.classes.push_back(p);
   }

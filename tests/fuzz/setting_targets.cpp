@@ -1,7 +1,5 @@
 // What services read at their start: configuration, priors, a network's description, and the states
 // that they left behind.
-#include <yaml-cpp/yaml.h>
-
 #include "common/base/ids.h"
 #include "common/config/fields.h"
 #include "services/capture/core/run_state.h"
@@ -65,17 +63,8 @@ constexpr char kPriors[] =
     "        shape: [[-1, 0.63, 0.92, 1], [0, 1, 1, 0.79], [1, 0.25, 0.61, 1, -0.32]]}\n"
     "  van: {azimuth_sigma: 0.3}\n";
 
-/// What is no text or number where one is due is refused with yaml-cpp's own exception.
-bool unlessRefusedByYaml(const std::function<void()>& read) {
-  try {
-    return unlessRefused(read);
-  } catch (const YAML::Exception&) {
-    return false;
-  }
-}
-
 bool takePriors(View bytes) {
-  return unlessRefusedByYaml([&] {
+  return unlessRefused([&] {
     const auto priors = semantic_filter::parseClassPriors(textOf(bytes), "priors.yaml");
     for (const auto& prior : priors.classes) {
       require(prior.log_size.allFinite() && prior.log_size_covariance.allFinite(),

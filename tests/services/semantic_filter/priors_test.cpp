@@ -76,7 +76,9 @@ TEST(ClassPriors, ShapesLieWithinTheCuboidAndFillItsLengthAndWidth) {
 TEST(ClassPriors, NamesAnInvalidShapeWithItsPlace) {
   for (const char* wrong :
        {"7", "[]", "[[0, 1, 1]]", "[[0, 1, 1, 2]]", "[[-2, 1, 1, 1]]", "[[0, 0.8, 1, 1, 0.3]]",
-        "[[0, 1, 1, 1, 0, 0]]", "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]"}) {
+        "[[0, 1, 1, 1, 0, 0]]", "[[0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1], [0, 1, 1, 1]]",
+        "[[0, 1, wide, 1]]", "[[0, 1, [1], 1]]", "[[0, 1, , 1]]", "[{a: 1}]",
+        "[[.nan, 1, 1, 1]]"}) {
     const std::string yaml =
         std::string("fallback: {}\nother: {}\nclasses:\n  car: {shape: ") + wrong + "}\n";
     try {
@@ -85,6 +87,20 @@ TEST(ClassPriors, NamesAnInvalidShapeWithItsPlace) {
     } catch (const StartupError& e) {
       EXPECT_NE(std::string(e.what()).find("priors.yaml:4:"), std::string::npos) << e.what();
       EXPECT_NE(std::string(e.what()).find("shape: one to three levels"), std::string::npos);
+    }
+  }
+}
+
+TEST(ClassPriors, NamesAKeyThatIsNoText) {
+  for (const char* wrong : {"  [car]: {}", "  ~: {}", "  \"\": {}", "  car: {[size]: 1}"}) {
+    const std::string yaml = std::string("fallback: {}\nother: {}\nclasses:\n") + wrong + "\n";
+    try {
+      parseClassPriors(yaml, "priors.yaml");
+      ADD_FAILURE() << "accepted " << wrong;
+    } catch (const StartupError& e) {
+      EXPECT_EQ(e.code(), ExitCode::kConfiguration);
+      EXPECT_NE(std::string(e.what()).find("priors.yaml:4:"), std::string::npos) << e.what();
+      EXPECT_NE(std::string(e.what()).find("are texts"), std::string::npos) << e.what();
     }
   }
 }
