@@ -81,7 +81,9 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
     if (m.restore && m.client == context.instance()) gate.open();
   });
   context.on(topics::kOdometry, [&](const Odometry& m) {
-    if (!odometry_once.first(m.stamp.source, m.stamp.sequence)) return;
+    if (!odometry_once.first(m.stamp.source, m.stamp.sequence)) {
+      return lost.add("odometry_repeated");
+    }
     const auto missed = odometry_gaps.before(m.stamp.source, m.stamp.sequence);
     if (missed > 0) lost.add("odometry_missed", missed);
     context.health().frameIn();

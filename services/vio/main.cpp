@@ -44,7 +44,7 @@ void serve(service::Context& context, const vio::Config& config) {
   std::vector<bus::Gaps> gaps(config.cameras.size());
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
     context.on(topics::frame(config.cameras[i]), [&, i](const Frame& m) {
-      if (!once[i].first(m.stamp.source, m.stamp.sequence)) return;
+      if (!once[i].first(m.stamp.source, m.stamp.sequence)) return own.add("frames_repeated");
       const auto missed = gaps[i].before(m.stamp.source, m.stamp.sequence);
       if (missed > 0) own.add("frames_missed", missed);
       if (i == 0) context.health().frameIn();
