@@ -8,17 +8,34 @@
 
 namespace perdure::inference {
 
-std::vector<std::string> linesOf(const std::filesystem::path& path) {
-  std::ifstream in(path);
+std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
+  namespace fs = std::filesystem;
   std::vector<std::string> lines;
+  std::error_code error;
+  // Devices and pipes have no end, or none that is known.
+  const bool regular = fs::is_regular_file(list.path, error);
+  const auto bytes = regular ? fs::file_size(list.path, error) : 0;
+  if (!error && bytes > list.most_bytes) {
+    reader.complain(list.key, list.path.string() + " is larger than " +
+                                  std::to_string(list.most_bytes >> 20U) +
+                                  " MiB; name a file with " + list.what + ", one a line");
+    return {};
+  }
+  std::ifstream in;
+  if (regular && !error) in.open(list.path);
   for (std::string line; std::getline(in, line);) {
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
     if (!line.empty()) lines.push_back(line);
+  }
+  if (lines.empty()) {
+    reader.complain(list.key, list.path.string() + " is missing or holds no " + list.what);
   }
   return lines;
 }
 
 namespace {
+
+constexpr std::uintmax_t kMostPriorBytes = 16U << 20U;  // 300,000 priors
 
 void readAzimuth(const Json& json, JsonReader& parent, ModelDescription& model) {
   JsonReader reader(json, "azimuth.", parent.problems());
@@ -81,7 +98,7 @@ void readPriors(JsonReader& reader, const std::string& file, BoxForm& form) {
   const std::string name = reader.text("priors_file", true);
   if (name.empty()) return;
   const auto path = std::filesystem::path(file).parent_path() / name;
-  const auto lines = linesOf(path);
+  const auto lines = linesOf({"priors_file", path, "priors", kMostPriorBytes}, reader);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     std::istringstream words(lines[i]);
     std::array<double, 4> prior{};
@@ -92,9 +109,6 @@ void readPriors(JsonReader& reader, const std::string& file, BoxForm& form) {
                                                 ": is not \"x y width height\" in shares");
     }
     form.priors.push_back(prior);
-  }
-  if (lines.empty()) {
-    reader.complain("priors_file", path.string() + " is missing or holds no priors");
   }
 }
 

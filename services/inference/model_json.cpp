@@ -14,6 +14,7 @@ namespace perdure::inference {
 namespace {
 
 constexpr double kMostInset = 0.45;
+constexpr std::uintmax_t kMostClassBytes = 1U << 20U;
 
 /// One number, or one for each channel.
 void readScale(JsonReader& reader, Input& input) {
@@ -61,10 +62,7 @@ void readClasses(JsonReader& reader, const std::string& file, ModelDescription& 
     }
   } else if (!beside.empty()) {
     const auto path = std::filesystem::path(file).parent_path() / beside;
-    model.classes = linesOf(path);
-    if (model.classes.empty()) {
-      reader.complain("classes_file", path.string() + " is missing or holds no names");
-    }
+    model.classes = linesOf({"classes_file", path, "names", kMostClassBytes}, reader);
   }
   std::set<std::string> seen;
   for (std::string& name : model.classes) {

@@ -29,9 +29,10 @@ ModelDescription parsed(const std::string& family, const std::string& rest,
       file);
 }
 
-std::string faultsOf(const std::string& family, const std::string& rest) {
+std::string faultsOf(const std::string& family, const std::string& rest,
+                     const std::string& file = "m.json") {
   try {
-    parsed(family, rest);
+    parsed(family, rest, file);
   } catch (const StartupError& e) {
     return e.what();
   }
@@ -266,6 +267,32 @@ TEST(DecodeBoxes, RefusesWhatIsNotAsMany) {
   const auto wide = decode(model, {0.05, {0, 1}}, {{{1, 3, 4}, boxes}, {{1, 2, 3}, Values(6)}});
   ASSERT_FALSE(wide);
   EXPECT_THAT(wide.error().detail, HasSubstr("s is 1x2x3, not 1xNx2"));
+}
+
+/// A list that some other file was named for is not read to its end.
+TEST(DescriptionOfFamilies, RefusesListsThatAreTooLarge) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "perdure_large_lists";
+  fs::create_directories(folder);
+  for (const char* name : {"priors.txt", "classes.txt"}) std::ofstream(folder / name) << "a\n";
+  fs::resize_file(folder / "priors.txt", (16U << 20U) + 1);
+  fs::resize_file(folder / "classes.txt", (1U << 20U) + 1);
+  const std::string file = (folder / "m.json").string();
+  EXPECT_THAT(faultsOf("ssd", R"("activation": {"class": "softmax"},
+      "outputs": {"boxes": "b", "scores": "s"},
+      "boxes": {"form": "offsets", "priors_file": "priors.txt", "variances": [0.1, 0.2]})",
+                       file),
+              HasSubstr("priors.txt is larger than 16 MiB; name a file with priors, one a line"));
+  const auto classesOf = [&](const std::string& list) -> std::string {
+    try {
+      parseModelDescription(R"({"family": "yolox", "classes_file": ")" + list + "\"}", file);
+    } catch (const StartupError& e) {
+      return e.what();
+    }
+    return "it was taken";
+  };
+  EXPECT_THAT(classesOf("classes.txt"), HasSubstr("classes.txt is larger than 1 MiB"));
+  EXPECT_THAT(classesOf("/dev/zero"), HasSubstr("/dev/zero is missing or holds no names"));
+  fs::remove_all(folder);
 }
 
 TEST(DescriptionOfFamilies, TellsAllFaultsAtOnce) {
