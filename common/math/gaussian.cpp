@@ -6,8 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "common/math/dense_kernels.h"
-
 namespace perdure {
 
 double logGaussian(const VectorView& residual, const MatrixView& S) {
@@ -40,6 +38,8 @@ Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B) {
 
 Eigen::MatrixXd inverse(const MatrixView& A) { return Eigen::MatrixXd(A).inverse(); }
 
+Eigen::Matrix<double, 6, 6> inverse(const Eigen::Matrix<double, 6, 6>& A) { return A.inverse(); }
+
 Eigen::MatrixXd withLeastEigenvalue(const MatrixView& S, double least) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (S + S.transpose()));
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(least).asDiagonal() *
@@ -56,36 +56,6 @@ bool choleskyInPlace(Eigen::Ref<Eigen::MatrixXd> S) {
 
 void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B) {
   L.triangularView<Eigen::Lower>().solveInPlace(B);
-}
-
-Cholesky::Cholesky(Eigen::MatrixXd S)
-    : L_(std::move(S)), positive_(dense::factorise(L_.data(), L_.rows(), L_.rows())) {}
-
-Eigen::MatrixXd Cholesky::whiten(const MatrixView& B) const {
-  Eigen::MatrixXd W = B;
-  dense::whiten(L_.data(), L_.rows(), L_.rows(), W.data(), W.cols());
-  return W;
-}
-
-Eigen::VectorXd Cholesky::unwhiten(Eigen::VectorXd w) const {
-  L_.triangularView<Eigen::Lower>().adjoint().solveInPlace(w);
-  return w;
-}
-
-Eigen::MatrixXd Cholesky::solve(const MatrixView& B) const {
-  Eigen::MatrixXd x = whiten(B);
-  L_.triangularView<Eigen::Lower>().adjoint().solveInPlace(x);
-  return x;
-}
-
-double Cholesky::logDeterminant() const { return 2.0 * L_.diagonal().array().log().sum(); }
-
-bool isCovariance(const MatrixView& P) {
-  if (P.rows() != P.cols() || !P.allFinite()) return false;
-  if ((P - P.transpose()).cwiseAbs().maxCoeff() > 1e-6 * (1e-12 + P.cwiseAbs().maxCoeff())) {
-    return false;
-  }
-  return Cholesky(P).positive();
 }
 
 }  // namespace perdure

@@ -4,7 +4,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <type_traits>
 #include <utility>
+
+#include "common/math/dense_kernels.h"
 
 namespace perdure {
 
@@ -29,6 +32,7 @@ Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B);
 
 /// A⁻¹ of any square A; not finite where there is none.
 Eigen::MatrixXd inverse(const MatrixView& A);
+Eigen::Matrix<double, 6, 6> inverse(const Eigen::Matrix<double, 6, 6>& A);
 
 /// The nearest symmetric matrix to S whose eigenvalues are `least` or more.
 Eigen::MatrixXd withLeastEigenvalue(const MatrixView& S, double least);
@@ -43,23 +47,56 @@ bool choleskyInPlace(Eigen::Ref<Eigen::MatrixXd> S);
 /// B ← L⁻¹ B with L in the lower triangle of an n × n matrix; B is n × m.
 void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B);
 
-/// S = L Lᵀ.
+/// What an expression is kept in, by columns.
+template <class Derived>
+using ByColumns =
+    Eigen::Matrix<double, Derived::RowsAtCompileTime, Derived::ColsAtCompileTime, Eigen::ColMajor,
+                  Derived::MaxRowsAtCompileTime, Derived::MaxColsAtCompileTime>;
+
+/// S = L Lᵀ. `Matrix` is what S is kept in; results have the type of the argument. So what has a
+/// fixed or bounded size stays off the heap.
+template <class Matrix>
 class Cholesky {
  public:
   Cholesky() = default;
-  explicit Cholesky(Eigen::MatrixXd S);
-  bool positive() const { return positive_; }         ///< if not, nothing else may be asked
-  Eigen::MatrixXd whiten(const MatrixView& B) const;  ///< L⁻¹ B
-  Eigen::VectorXd unwhiten(Eigen::VectorXd w) const;  ///< L⁻ᵀ w
-  Eigen::MatrixXd solve(const MatrixView& B) const;   ///< S⁻¹ B
-  double logDeterminant() const;                      ///< log |S|
-  /// Its storage, for the next one.
-  Eigen::MatrixXd release() && { return std::move(L_); }
+  explicit Cholesky(std::type_identity_t<Matrix> S) : L_(std::move(S)) { factorise(); }
+
+  /// S, to be filled where it is kept; then factorise().
+  Matrix& matrix() { return L_; }
+  void factorise() { positive_ = dense::factorise(L_.data(), L_.rows(), L_.rows()); }
+
+  bool positive() const { return positive_; }  ///< if not, nothing else may be asked
+  /// Returns L⁻¹ B.
+  template <class Derived>
+  ByColumns<Derived> whiten(const Eigen::MatrixBase<Derived>& B) const {
+    ByColumns<Derived> W = B;
+    dense::whiten(L_.data(), L_.rows(), L_.rows(), W.data(), W.cols());
+    return W;
+  }
+  /// Returns L⁻ᵀ B.
+  template <class Derived>
+  ByColumns<Derived> unwhiten(const Eigen::MatrixBase<Derived>& B) const {
+    ByColumns<Derived> x = B;
+    for (Eigen::Index j = L_.rows() - 1; j >= 0; --j) {
+      const Eigen::Index below = L_.rows() - 1 - j;
+      x.row(j) -= L_.col(j).tail(below).transpose().lazyProduct(x.bottomRows(below));
+      x.row(j) /= L_(j, j);
+    }
+    return x;
+  }
+  /// Returns S⁻¹ B.
+  template <class Derived>
+  ByColumns<Derived> solve(const Eigen::MatrixBase<Derived>& B) const {
+    return unwhiten(whiten(B));
+  }
+  double logDeterminant() const { return 2.0 * L_.diagonal().array().log().sum(); }  ///< log |S|
 
  private:
-  Eigen::MatrixXd L_;
+  Matrix L_;
   bool positive_ = false;
 };
+template <class Derived>
+explicit Cholesky(const Eigen::MatrixBase<Derived>&) -> Cholesky<ByColumns<Derived>>;
 
 template <class Matrix>
 void makeSymmetric(Matrix& P) {
@@ -67,6 +104,13 @@ void makeSymmetric(Matrix& P) {
 }
 
 /// Finite, symmetric within 1e-6 relative, and positive definite.
-bool isCovariance(const MatrixView& P);
+template <class Derived>
+bool isCovariance(const Eigen::MatrixBase<Derived>& P) {
+  if (P.rows() != P.cols() || !P.allFinite()) return false;
+  if ((P - P.transpose()).cwiseAbs().maxCoeff() > 1e-6 * (1e-12 + P.cwiseAbs().maxCoeff())) {
+    return false;
+  }
+  return Cholesky(P).positive();
+}
 
 }  // namespace perdure

@@ -140,7 +140,7 @@ void describeExpertTracks(Parameters& p, Fields& fields) {
   fields.number("tracks.merge_overlap", p.tracks.merge_overlap, between(0, 1),
                 {"shared over joint volume at which two tracks are one object"});
   auto& s = p.smoothing;
-  fields.integer("smoothing.keyframes", s.keyframes, between(0, 100),
+  fields.integer("smoothing.keyframes", s.keyframes, between(0, kMostKeyframes),
                  {"kept for one track at most; 0: no batch estimate"});
   fields.integer("smoothing.per_frame", s.per_frame, between(1, 10000),
                  {"tracks that are fitted in one frame at most; the others wait"});
@@ -158,8 +158,8 @@ void describeFormer(Fields& fields) {
                              {"box.assumed_sides", "box.prior_sides"},
                              {"box.assumed_azimuths", "box.prior_azimuths"},
                              {"birth.part", "box.partial_view"},
-      {"box.min_height_px", "box.min_size_px, the root of the area"},
-      {"birth.odds", "initiation.odds"},
+                             {"box.min_height_px", "box.min_size_px, the root of the area"},
+                             {"birth.odds", "initiation.odds"},
                              {"birth.min_log_ratio", "initiation.min_log_ratio"},
                              {"looks.correlation", "tempering.correlation"},
                              {"looks.found_prior", "tempering.detection_rate_prior"},

@@ -137,14 +137,18 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
     ScoredTrack& s = scored[static_cast<std::size_t>(j)];
     Track& track = belief.tracks[s.track];
     const auto before = measuresDrift(track, frame) ? std::optional(track.best()) : std::nullopt;
-    s.near_box = track.life.once_confirmed && !track.best().moving && !s.score.boxes.empty();
+    const bool near_box =
+        track.life.once_confirmed && !track.best().moving && !s.score.boxes.empty();
+    if (near_box) s.before = track;
     s.assigned = update(track, s.score, association.eta.row(j), boxes, frame);
-    if (before && s.assigned && s.score.hypotheses[0].box) {
+    if (before && s.assigned && s.score.hypotheses[0].predicted) {
       track.pose.drift_measured_at = track.as_of;
-      s.drift = driftMeasurement(*before, *s.score.hypotheses[0].box, boxes[*s.assigned].z,
-                                 hiddenSides(s.score, *s.assigned), frame.pose_error.covariance);
+      s.drift =
+          driftMeasurement(*before, s.score.hypotheses[0].predicted->box, boxes[*s.assigned].z,
+                           hiddenSides(s.score, *s.assigned), frame.pose_error.covariance);
     }
-    if (s.assigned && sound(track) &&
+    s.sound = sound(track);
+    if (s.assigned && s.sound &&
         considerKeyframe(track, boxes[*s.assigned], hiddenSides(s.score, *s.assigned), frame)) {
       to_refit.push_back(&track);
     }
@@ -153,22 +157,12 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
   return association.explained;
 }
 
-Track SemanticFilter::asScored(const Track& was, const Track& now, const ScoredTrack& scored,
-                               const FrameInput& input, const FrameContext& frame) const {
-  Track track = was;
-  track.visibility = now.visibility;
-  predict(track, input.stamp.time, input.pose_error, parameters_.motion, viewWalkOf(frame));
-  const TrackScore first = scoreTrack(track, scored.score.visibility, *input.boxes, frame);
-  admitNewClasses(track, first, *input.boxes, frame);
-  return track;
-}
-
-void SemanticFilter::manage(Track& track, const Track& was, ScoredTrack& scored,
-                            const FrameInput& input, const FrameContext& frame) const {
+void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput& input,
+                            const FrameContext& frame) const {
   const auto pmf = classShares(track);
   reduceMixture(track, priors_, parameters_);
-  if (track.hypotheses.empty() && scored.near_box) {
-    track = updateAsMissed(asScored(was, track, scored, input, frame), scored.score, frame);
+  if (track.hypotheses.empty() && scored.before) {
+    track = updateAsMissed(*scored.before, scored.score, frame);
     scored.drift.reset();
     if (sound(track)) reduceMixture(track, priors_, parameters_);
   }
@@ -211,17 +205,14 @@ FrameInput SemanticFilter::withLearnedNoise(const Belief& belief, FrameInput inp
   return input;
 }
 
-void SemanticFilter::manageAll(const Belief& before, Belief& belief,
-                               ScratchVector<ScoredTrack>& scored, const FrameInput& input,
-                               const FrameContext& frame, StepReport& report) const {
+void SemanticFilter::manageAll(Belief& belief, ScratchVector<ScoredTrack>& scored,
+                               const FrameInput& input, const FrameContext& frame,
+                               StepReport& report) const {
   std::vector<Track> lost;
   for (auto& s : scored) {
     Track& track = belief.tracks[s.track];
-    const Track& was = before.tracks[s.track];
-    if (sound(track)) manage(track, was, s, input, frame);
-    if (track.hypotheses.empty() && s.near_box) {
-      lost.push_back(asScored(was, track, s, input, frame));
-    }
+    if (s.sound) manage(track, s, input, frame);
+    if (track.hypotheses.empty() && s.before) lost.push_back(*std::move(s.before));
     if (s.drift) report.drift.push_back(*s.drift);
   }
   keepDeleted(belief.recently_deleted, std::move(lost), input.stamp.time, parameters_.tracks);
@@ -229,7 +220,9 @@ void SemanticFilter::manageAll(const Belief& before, Belief& belief,
 
 void SemanticFilter::dropBroken(Belief& belief, StepReport& report) {
   std::erase_if(belief.tracks, [](const Track& t) { return t.hypotheses.empty(); });
-  report.broken = std::erase_if(belief.tracks, [](const Track& t) { return !sound(t); });
+  report.broken = std::erase_if(belief.tracks, [](const Track& t) {
+    return t.visibility.fraction > 0.0 && !sound(t);  // nothing changed in the others
+  });
 }
 
 void SemanticFilter::recordDetections(Belief& belief, TimePoint now) {
@@ -245,14 +238,12 @@ void SemanticFilter::resolveIdentities(Belief& belief, const FrameContext& frame
     report.merges.insert(report.merges.end(), merges.begin(), merges.end());
   };
   add(mergeObjects(belief.tracks, frame));
-  add(reidentifyMoved(belief.tracks, frame));
   keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), now,
               parameters_.tracks);
-  add(reidentifyDeleted(belief.tracks, belief.recently_deleted, frame));
+  add(reidentify(belief.tracks, belief.recently_deleted, frame));
 }
 
-StepReport SemanticFilter::step(const Belief& before, Belief& belief, const FrameInput& heard,
-                                IdBook& ids) const {
+StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook& ids) const {
   const ScratchScope scope;
   StepReport report;
   const TimePoint now = heard.stamp.time;
@@ -269,7 +260,7 @@ StepReport SemanticFilter::step(const Belief& before, Belief& belief, const Fram
   auto scored = scoreAll(belief, visibilities, input, frame);
   const auto explained = associateAndUpdate(belief, scored, input, frame);
   // A track that lost its shape may take its box again before that box starts another track.
-  manageAll(before, belief, scored, input, frame, report);
+  manageAll(belief, scored, input, frame, report);
   initiateTracks(belief, visibilities, explained, input, frame, ids);
   dropBroken(belief, report);
   // Identity asks who was detected in this frame, and new tracks take part.

@@ -26,8 +26,8 @@ class SemanticFilter {
   SemanticFilter(const Parameters& parameters, const ClassPriors& priors)
       : parameters_(parameters), priors_(priors) {}
 
-  /// Makes `belief`, a copy of that `before` the frame, the one after it.
-  StepReport step(const Belief& before, Belief& belief, const FrameInput& heard, IdBook& ids) const;
+  /// Makes the belief before a frame the one after it.
+  StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
   /// Of two tracks that are known to be one, `id` goes on with what both knew, as of that frame.
   /// Nothing happens where one of them is not there, or their classes exclude each other.
   std::optional<MergeRecord> join(Belief& belief, ObjectId id, ObjectId absorbed,
@@ -40,9 +40,12 @@ class SemanticFilter {
   struct ScoredTrack {
     std::size_t track;  ///< index in Belief::tracks
     TrackScore score;
-    std::optional<std::size_t> assigned = {};    ///< box of the frame
-    bool near_box = false;                       ///< it was confirmed, is static, and a box is near
-    std::optional<DriftMeasurement> drift = {};  ///< none once its assignment was undone
+    std::optional<std::size_t> assigned = {};  ///< box of the frame
+    /// The track before its update, if it was confirmed, is static, and a box is near: one bad box
+    /// must not deform it.
+    std::optional<Track> before = {};
+    bool sound = true;  ///< after its update
+    std::optional<DriftMeasurement> drift = {};
   };
 
   NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input) const;
@@ -60,15 +63,11 @@ class SemanticFilter {
                                      const FrameInput& input, const FrameContext& frame) const;
   /// Whether the track measures the map-relative drift in this frame: once for each visit.
   bool measuresDrift(const Track& track, const FrameContext& frame) const;
-  /// The track as it was scored, before its update. `was`: before the frame; `now`: after the
-  /// update.
-  Track asScored(const Track& was, const Track& now, const ScoredTrack& scored,
-                 const FrameInput& input, const FrameContext& frame) const;
-  void manageAll(const Belief& before, Belief& belief, ScratchVector<ScoredTrack>& scored,
-                 const FrameInput& input, const FrameContext& frame, StepReport& report) const;
-  /// Reduces the mixture of one track after its update. Where nothing is left of it the assignment
-  /// is undone, or its state begins anew; otherwise its existence is 0.
-  void manage(Track& track, const Track& was, ScoredTrack& scored, const FrameInput& input,
+  void manageAll(Belief& belief, ScratchVector<ScoredTrack>& scored, const FrameInput& input,
+                 const FrameContext& frame, StepReport& report) const;
+  /// Reduces the mixture of one track after its update. Where nothing is left of it, the box counts
+  /// as a miss, or the state begins anew from the box; otherwise existence is 0.
+  void manage(Track& track, ScoredTrack& scored, const FrameInput& input,
               const FrameContext& frame) const;
   static void dropBroken(Belief& belief, StepReport& report);
   static void recordDetections(Belief& belief, TimePoint now);

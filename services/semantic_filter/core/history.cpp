@@ -58,7 +58,7 @@ void History::step(HistoryFrame& frame) {
   const std::size_t n = belief_.tracks.size();
   if (frame.before.tracks.capacity() < n) frame.before.tracks.reserve(n + n / 4);
   frame.before = belief_;
-  StepReport report = filter_.step(frame.before, belief_, frame.input, ids_);
+  StepReport report = filter_.step(belief_, frame.input, ids_);
   frame.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
   if (frame.input.boxes && !std::exchange(frame.drift_measured, true) && !report.drift.empty() &&

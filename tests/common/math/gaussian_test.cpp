@@ -126,10 +126,28 @@ TEST(Gaussian, LeastEigenvalueIsRaisedAndTheRestKept) {
   EXPECT_LT((T - Eigen::MatrixXd(Eigen::Vector3d(2.0, 1e-3, 1e-3).asDiagonal())).norm(), 1e-12);
 }
 
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+TEST(Gaussian, CholeskyOfABoundedSizeSolvesAndWhitens) {
+  using Bounded = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 9>;
+  for (int n = 1; n <= 9; ++n) {
+    const Eigen::MatrixXd B = random(n, n, n);
+    const Bounded S = B * B.transpose() + Eigen::MatrixXd::Identity(n, n);
+    const Cholesky chol(S);
+    ASSERT_TRUE(chol.positive());
+    const Bounded inverse_S = chol.solve(Bounded::Identity(n, n));
+    EXPECT_LT((S * inverse_S - Bounded::Identity(n, n)).norm(), 1e-9) << n;
+    EXPECT_LT((chol.unwhiten(chol.whiten(S)) - Bounded::Identity(n, n)).norm(), 1e-9) << n;
+  }
+}
+
 TEST(Gaussian, InverseOfASingularMatrixIsNotFinite) {
-  EXPECT_LT((inverse(random(6, 6, 7)) * random(6, 6, 7) - Eigen::MatrixXd::Identity(6, 6)).norm(),
-            1e-9);
-  EXPECT_FALSE(inverse(Eigen::Matrix2d::Zero()).allFinite());
+  const Eigen::MatrixXd A = random(6, 6, 7), singular = Eigen::Matrix2d::Zero();
+  const Matrix6d six = A;
+  EXPECT_LT((inverse(MatrixView(A)) * A - Matrix6d::Identity()).norm(), 1e-9);
+  EXPECT_LT((inverse(six) * six - Matrix6d::Identity()).norm(), 1e-9);
+  EXPECT_FALSE(inverse(MatrixView(singular)).allFinite());
+  EXPECT_FALSE(inverse(Matrix6d(Matrix6d::Zero())).allFinite());
 }
 
 }  // namespace

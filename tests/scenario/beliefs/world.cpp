@@ -191,7 +191,7 @@ Odometry World::odometry(std::uint64_t frame, double t_s) {
 }
 
 void World::computeVisibility(WorldFrame& frame) {
-  std::vector<Outline> outlines;
+  ScratchVector<Outline> outlines;
   const double W = camera_.width(), H = camera_.height();
   for (std::size_t i = 0; i < things_.size(); ++i) {
     Outline o;
@@ -221,7 +221,7 @@ void World::changeView(std::size_t thing, const State& x, const RigidTransform& 
   Errors& e = errors_[thing];
   const Parameters& p = told_.config.filter;
   const auto keep = [&](const ViewScales& scales) {
-    return e.last_T_WC ? std::exp(-viewChange(x.head<3>(), *e.last_T_WC, T_WC, scales)) : 0.0;
+    return e.last_T_WC ? viewCorrelation(x.head<3>(), *e.last_T_WC, T_WC, scales) : 0.0;
   };
   e.box.draw(dice_, keep({p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle}));
   e.noise_stays *= keep({p.box.noise_view, p.box.noise_view, 0.5 * p.box.noise_view});

@@ -62,8 +62,8 @@ struct WorldFrame {
   double t_s = 0.0;
   Odometry odometry;
   Detections detections;
-  semantic_filter::View true_view;                             ///< with the true pose
-  std::vector<semantic_filter::TrackVisibility> visibilities;  ///< of each thing
+  semantic_filter::View true_view;                               ///< with the true pose
+  ScratchVector<semantic_filter::TrackVisibility> visibilities;  ///< of each thing
   std::vector<std::optional<Box>> outlines;  ///< the part within the image, whatever hides it
   std::vector<int> origins;                  ///< of each box: the thing, or -1
 };

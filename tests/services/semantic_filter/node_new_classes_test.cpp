@@ -90,7 +90,9 @@ TEST(NodeNewClasses, EnterATrackAtTheirPriorWhenItIsNextDetected) {
   EXPECT_EQ(after.id, before.id);
   EXPECT_GT(classProbability(after, "van"), 0.0);
   EXPECT_NEAR(sumOfWeights(after), 1.0, 1e-12);
-  const auto ledger = after.classes.published();
+  Ledger published;
+  after.classes.publish(published);
+  const auto& ledger = published.classes;
   const auto van = std::find_if(ledger.begin(), ledger.end(),
                                 [](const ClassLedger& c) { return c.name == "van"; });
   ASSERT_NE(van, ledger.end());

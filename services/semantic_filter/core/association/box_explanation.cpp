@@ -9,8 +9,7 @@ BoxExplanations::BoxExplanations(const Belief& belief, const FrameInput& input,
     : belief_(belief),
       input_(input),
       from_(input.view),
-      parameters_(parameters.box),
-      clutter_(parameters.clutter),
+      judge_{input.model.get(), &input.view, &parameters},
       at_(belief.tracks.size()) {}
 
 bool BoxExplanations::matches(std::size_t j, const std::array<bool, 4>& hidden,
@@ -21,12 +20,11 @@ bool BoxExplanations::matches(std::size_t j, const std::array<bool, 4>& hidden,
 std::optional<double> BoxExplanations::fit(std::size_t j, const std::array<bool, 4>& hidden,
                                            const BoxDetection& box) {
   const Entry& e = entryOf(j);
-  if (!e.box || !mayOverlap(box.z, *e.box, e.covariance)) return std::nullopt;
-  const auto score = scoreBox(box.z, *e.box, e.covariance, hidden, parameters_);
-  if (!score) return std::nullopt;
+  if (!e.predicted) return std::nullopt;
   const Track& track = belief_.tracks[j];
-  return score->log_density - logClutterOf(box, *score, input_.view, clutter_) +
-         logRatio(box, *input_.model, track.best().class_name, track.lookalike.nats);
+  const auto why =
+      explain(box, *e.predicted, hidden, track.best().class_name, track.lookalike.nats, judge_);
+  return why ? std::optional(why->log_ratio) : std::nullopt;
 }
 
 const BoxExplanations::Entry& BoxExplanations::entryOf(std::size_t j) {
@@ -36,8 +34,8 @@ const BoxExplanations::Entry& BoxExplanations::entryOf(std::size_t j) {
   const Track& track = belief_.tracks[j];
   const Hypothesis& best = track.best();
   const State x = stateAt(best, toSeconds(input_.stamp.time - track.as_of));
-  e.box = projectObserved(x, from_, input_.model->styles->of(best.class_name), best.heading());
-  if (e.box) e.covariance = predictedCovariance(best, *e.box, input_.pose_error.covariance);
+  e.predicted =
+      predictBox(best, x, from_, input_.model->styles->of(best.class_name), input_.pose_error);
   return e;
 }
 

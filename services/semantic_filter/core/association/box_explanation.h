@@ -28,8 +28,7 @@ class BoxExplanations {
  private:
   struct Entry {
     bool known = false;
-    std::optional<ProjectedBox> box;
-    Eigen::Matrix4d covariance;
+    std::optional<PredictedBox> predicted;
   };
 
   const Entry& entryOf(std::size_t j);
@@ -37,8 +36,7 @@ class BoxExplanations {
   const Belief& belief_;
   const FrameInput& input_;
   Projector from_;
-  const BoxParameters& parameters_;
-  const ClutterParameters& clutter_;
+  Judge judge_;
   ScratchVector<Entry> at_;
 };
 

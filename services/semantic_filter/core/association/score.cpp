@@ -13,20 +13,28 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kMaxDetection = 0.98;      // of v without an unmapped occluder
 
+/// Returns the log clutter density of the sides that were compared. With fewer sides it has other
+/// units.
+double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
+                    const ClutterParameters& parameters) {
+  const auto& ignored = score.ignored;
+  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) {
+    return e.log_clutter + e.log_partial_views;
+  }
+  return e.log_partial_views +
+         logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
+}
+
 void scoreBoxes(HypothesisScore& h, const std::string& class_name, double lookalike_nats,
                 const TrackScore& score, const std::vector<BoxDetection>& boxes,
                 const FrameContext& frame) {
   for (std::size_t i = 0; i < score.boxes.size(); ++i) {
-    const BoxDetection& e = boxes[score.boxes[i]];
-    if (!mayOverlap(e.z, *h.box, h.covariance)) continue;
-    const auto box_score =
-        scoreBox(e.z, *h.box, h.covariance, score.visibility.hidden_sides, frame.parameters->box);
-    if (!box_score) continue;
-    const double log_l = logRatio(e, *frame.model, class_name, lookalike_nats) +
-                         box_score->log_density -
-                         logClutterOf(e, *box_score, frame.view, frame.parameters->clutter);
-    h.matches[i] = {std::exp(std::min(log_l, kMaxLogLikelihood)), box_score->nis / box_score->dof,
-                    box_score->part};
+    const auto why =
+        explain(boxes[score.boxes[i]], *h.predicted, score.visibility.hidden_sides, class_name,
+                lookalike_nats, {frame.model, &frame.view, frame.parameters});
+    if (!why) continue;
+    h.matches[i] = {std::exp(std::min(why->log_ratio, kMaxLogLikelihood)),
+                    why->sides.nis / why->sides.dof, why->sides.part};
   }
 }
 
@@ -34,14 +42,13 @@ HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track
                                 const TrackVisibility& visibility, const Projector& from,
                                 const FrameContext& frame) {
   HypothesisScore h;
-  h.box = projectObserved(hypothesis.x, from, frame.styleOf(hypothesis.class_name),
-                          hypothesis.heading());
+  h.predicted = predictBox(hypothesis, hypothesis.x, from, frame.styleOf(hypothesis.class_name),
+                           frame.pose_error);
   h.correlated_observations = correlatedObservations(
       hypothesis.x.head<3>(), track.views.observed_from, frame.view, frame.parameters->tempering);
-  if (!h.box) return h;
-  h.covariance = predictedCovariance(hypothesis, *h.box, frame.pose_error.covariance);
-  const double size =
-      std::sqrt((h.box->sides[2] - h.box->sides[0]) * (h.box->sides[3] - h.box->sides[1]));
+  if (!h.predicted) return h;
+  const Eigen::Vector4d& sides = h.predicted->box.sides;
+  const double size = std::sqrt((sides[2] - sides[0]) * (sides[3] - sides[1]));
   const double v = visibility.fraction * (1.0 - track.detectability.unmapped_occluder);
   h.expected = visibility.fraction *
                detectableShare(track, frame.parameters->visibility.hard_detection_share) *
@@ -75,11 +82,13 @@ Reach reachOf(const ScratchVector<HypothesisScore>& hypotheses,
   }
   Reach reach{{kFar, kFar}, {-kFar, -kFar}};
   for (const HypothesisScore& h : hypotheses) {
-    if (!h.box) continue;
+    if (!h.predicted) continue;
+    const Eigen::Vector4d& sides = h.predicted->box.sides;
+    const Eigen::Matrix4d& covariance = h.predicted->covariance;
     for (int axis = 0; axis < 2; ++axis) {
-      const double variance = std::max(h.covariance(axis, axis), h.covariance(axis + 2, axis + 2));
+      const double variance = std::max(covariance(axis, axis), covariance(axis + 2, axis + 2));
       const double far = kReach * std::sqrt(std::max(variance + noise[axis], 0.0));
-      const double least = h.box->sides[axis] - far, most = h.box->sides[axis + 2] + far;
+      const double least = sides[axis] - far, most = sides[axis + 2] + far;
       if (!std::isfinite(least + most)) return {{-kFar, -kFar}, {kFar, kFar}};
       reach.least[axis] = std::min(reach.least[axis], least);
       reach.most[axis] = std::max(reach.most[axis], most);
@@ -90,14 +99,25 @@ Reach reachOf(const ScratchVector<HypothesisScore>& hypotheses,
 
 }  // namespace
 
-double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
-                    const ClutterParameters& parameters) {
-  const auto& ignored = score.ignored;
-  if (std::none_of(ignored.begin(), ignored.end(), [](bool i) { return i; })) {
-    return e.log_clutter + e.log_partial_views;
-  }
-  return e.log_partial_views +
-         logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
+std::optional<PredictedBox> predictBox(const Hypothesis& h, const State& x, const Projector& from,
+                                       const BoxStyle& style, const PoseError& pose_error) {
+  std::optional<PredictedBox> predicted;
+  const auto box = projectObserved(x, from, style, h.heading());
+  if (box) predicted = {*box, predictedCovariance(h, *box, pose_error.covariance)};
+  return predicted;
+}
+
+std::optional<Explanation> explain(const BoxDetection& detection, const PredictedBox& predicted,
+                                   const std::array<bool, 4>& hidden, const std::string& class_name,
+                                   double lookalike_nats, const Judge& judge) {
+  const auto& [box, covariance] = predicted;
+  if (!mayOverlap(detection.z, box, covariance)) return std::nullopt;
+  const auto sides = scoreBox(detection.z, box, covariance, hidden, judge.parameters->box);
+  if (!sides) return std::nullopt;
+  const double log_ratio = logRatio(detection, *judge.model, class_name, lookalike_nats) +
+                           sides->log_density -
+                           logClutterOf(detection, *sides, *judge.view, judge.parameters->clutter);
+  return Explanation{log_ratio, *sides};
 }
 
 TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
@@ -113,16 +133,16 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
   const Reach reach = reachOf(result.hypotheses, boxes);
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (!reach.touches(boxes[z].z)) continue;
-    const bool near = std::any_of(result.hypotheses.begin(), result.hypotheses.end(),
-                                  [&](const HypothesisScore& h) {
-                                    return h.box && mayOverlap(boxes[z].z, *h.box, h.covariance);
-                                  });
+    const bool near = std::any_of(
+        result.hypotheses.begin(), result.hypotheses.end(), [&](const HypothesisScore& h) {
+          return h.predicted && mayOverlap(boxes[z].z, h.predicted->box, h.predicted->covariance);
+        });
     if (near) result.boxes.push_back(z);
   }
   for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {
     HypothesisScore& h = result.hypotheses[i];
     h.matches.assign(result.boxes.size(), {});
-    if (h.box)
+    if (h.predicted)
       scoreBoxes(h, track.hypotheses[i].class_name, track.lookalike.nats, result, boxes, frame);
   }
   return result;

@@ -15,6 +15,33 @@
 
 namespace perdure::semantic_filter {
 
+/// What a hypothesis of a class should be detected as.
+struct PredictedBox {
+  ProjectedBox box;
+  /// of the predicted sides, without noise, px²
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+};
+/// Returns nothing if no part of the object is before the camera.
+std::optional<PredictedBox> predictBox(const Hypothesis& h, const State& x, const Projector& from,
+                                       const BoxStyle& style, const PoseError& pose_error);
+
+/// Who judges how a box is explained: the network, the view and what is assumed of both.
+struct Judge {
+  const Model* model;
+  const View* view;
+  const Parameters* parameters;
+};
+/// A box, explained by a prediction.
+struct Explanation {
+  double log_ratio = 0.0;  ///< of the likelihoods of the box, sides and class, to clutter, nats
+  BoxScore sides;
+};
+/// Returns nothing outside the gate. `hidden`: sides that a nearer object hides. `class_name`,
+/// `lookalike_nats`: as for logRatio.
+std::optional<Explanation> explain(const BoxDetection& detection, const PredictedBox& predicted,
+                                   const std::array<bool, 4>& hidden, const std::string& class_name,
+                                   double lookalike_nats, const Judge& judge);
+
 /// How a hypothesis explains one box.
 struct BoxMatch {
   double likelihood = 0.0;  ///< L(z), 0 outside the gate
@@ -24,9 +51,7 @@ struct BoxMatch {
 
 /// One hypothesis in one frame.
 struct HypothesisScore {
-  std::optional<ProjectedBox> box;
-  /// of the predicted sides, without noise, px²
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  std::optional<PredictedBox> predicted;
   double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
   double undetected = 0.0;             ///< v (1 - P_D): probability of visible and not reported
   double no_box = 1.0;  ///< A without a box: 1 - v P_D, with a top-down answer if there is one
@@ -43,11 +68,6 @@ struct TrackScore {
   ScratchVector<std::size_t> boxes;  ///< indices of the frame's boxes that are near a hypothesis
   ScratchVector<HypothesisScore> hypotheses;
 };
-
-/// Returns the log clutter density of the sides that were compared. With fewer sides it has other
-/// units.
-double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
-                    const ClutterParameters& parameters);
 
 TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame);

@@ -9,10 +9,10 @@ namespace perdure::semantic_filter {
 double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
                               const View& view, const TemperingParameters& parameters) {
   if (last.observations <= 0.0) return 0.0;
-  const double change =
-      viewChange(position, last.T_WC, view.T_WC(),
-                 {parameters.angle, parameters.log_distance, parameters.image_angle});
-  return last.observations * std::exp(-change);
+  const double correlation =
+      viewCorrelation(position, last.T_WC, view.T_WC(),
+                      {parameters.angle, parameters.log_distance, parameters.image_angle});
+  return last.observations * correlation;
 }
 
 double temperingExponent(double observations, double correlation) {

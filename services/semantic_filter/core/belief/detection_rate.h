@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/base/shared_vector.h"
 #include "services/semantic_filter/core/belief/view_change.h"
 
 namespace perdure::semantic_filter {
@@ -34,14 +35,14 @@ class DetectionRate {
 
  private:
   struct Count {
-    Eigen::Vector3f ray_W;
-    float log_distance = 0.0F, expected = 0.0F, found = 0.0F;
+    ViewRay from;
+    double expected = 0.0, found = 0.0;
   };
   using Counts = std::vector<Count>;
   static void addTo(Counts& counts, const Count& count, const ViewScales& scales);
 
   std::shared_ptr<const Counts> before_;
-  Counts now_;
+  SharedVector<Count> now_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -6,14 +6,19 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/parameters.h"
+
 namespace perdure::semantic_filter {
 
 namespace {
 
 constexpr std::size_t kNearest = 12, kLeast = 3;
+constexpr int kMostHeights = static_cast<int>(kNearest + BodyPath::kPlaces);
+using PerHeight = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostHeights, 1>;
+using HeightMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostHeights, kMostHeights>;
 // m, of the ground beside the mean of the contributing heights
 constexpr double kLevelSigma = 10.0;
-constexpr double kOutlier = 12.0;      // squared deviations from what the others say
 constexpr double kBounce = 0.03;       // m, variation of the body's height as it moves
 constexpr double kSurelyStands = 0.9;  // of a class whose objects contribute
 
@@ -60,6 +65,7 @@ GroundSurface::GroundSurface(const std::vector<Track>& tracks, const BodyPath& p
       path_.push_back({0, horizontal(p), up_.dot(p) - parameters.body_height_m, kBounce * kBounce});
     }
   }
+  stands_.reserve(tracks.size());
   for (const Track& o : tracks) {
     const Hypothesis& best = o.best();
     if (best.ground_contact.variance <= 0.0 || best.moving || best.weight < kHalf) continue;
@@ -112,8 +118,8 @@ std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
   const double body = std::pow(parameters_.body_height_sigma_m, 2);
   while (points.size() >= least) {
     const auto n = static_cast<Eigen::Index>(points.size()), m = static_cast<Eigen::Index>(on_path);
-    Eigen::MatrixXd K(n, n);
-    Eigen::VectorXd z(n);
+    HeightMatrix K(n, n);
+    PerHeight z(n);
     for (Eigen::Index i = 0; i < n; ++i) {
       const Stand& a = *points[static_cast<std::size_t>(i)].stand;
       const Eigen::Vector2d da = a.place - here;
@@ -128,8 +134,8 @@ std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
     K.topLeftCorner(m, m).array() += body;
     const Cholesky S(K);
     if (!S.positive()) return std::nullopt;
-    const Eigen::MatrixXd J = S.solve(Eigen::MatrixXd::Identity(n, n));
-    const Eigen::VectorXd weighed = J * z;
+    const HeightMatrix J = S.solve(HeightMatrix::Identity(n, n));
+    const PerHeight weighed = J * z;
     // The difference of each object from what the others say.
     Eigen::Index worst = 0;
     double most_off = 0.0;
@@ -137,12 +143,12 @@ std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
       const double off = weighed[i] * weighed[i] / J(i, i);
       if (off > most_off) worst = i, most_off = off;
     }
-    if (most_off > kOutlier) {
+    if (most_off > gates::kGroundOutlier) {
       points.erase(points.begin() + worst);
       continue;
     }
     const double prior = kLevelSigma * kLevelSigma;
-    const Eigen::VectorXd shares = prior * J.rowwise().sum();
+    const PerHeight shares = prior * J.rowwise().sum();
     double noise = body * std::pow(shares.head(m).sum(), 2);
     for (Eigen::Index i = 0; i < n; ++i) {
       noise += shares[i] * shares[i] * points[static_cast<std::size_t>(i)].stand->variance;

@@ -70,11 +70,12 @@ ClassAccount::ClassAccount(const std::vector<ClassLedger>& known,
 }
 
 ClassAccount::Row& ClassAccount::rowOf(const std::string& name) {
+  std::vector<Row>& rows = rows_.write();
   const auto it =
-      std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.name == name; });
-  if (it != rows_.end()) return *it;
-  rows_.push_back({name, {}});
-  return rows_.back();
+      std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.name == name; });
+  if (it != rows.end()) return *it;
+  rows.push_back({name, {}});
+  return rows.back();
 }
 
 void ClassAccount::oust(const ClassNumbers& pmf, TimePoint at) {
@@ -82,14 +83,14 @@ void ClassAccount::oust(const ClassNumbers& pmf, TimePoint at) {
       pmf.begin(), pmf.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
   if (best == pmf.end()) return;
   const Nats winner = rowOf(best->name).nats;
-  for (const Row& row : rows_) {
+  for (const Row& row : rows_.read()) {
     if (find(pmf, row.name)) continue;
     const double behind = sumOf(winner) - sumOf(row.nats);
     if (ousted_ && ousted_->by == best->name && sumOf(ousted_->nats) <= behind) continue;
     ousted_ = {row.name, best->name, at, {}};
     for (std::size_t i = 0; i < kClassEvidences; ++i) ousted_->nats[i] = winner[i] - row.nats[i];
   }
-  std::erase_if(rows_, [&](const Row& row) { return !find(pmf, row.name); });
+  std::erase_if(rows_.write(), [&](const Row& row) { return !find(pmf, row.name); });
 }
 
 void ClassAccount::book(const ClassNumbers& pmf, ClassEvidence why, TimePoint at) {

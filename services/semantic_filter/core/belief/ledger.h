@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/base/scratch.h"
+#include "common/base/shared_vector.h"
 #include "common/types/ledger.h"
 
 namespace perdure::semantic_filter {
@@ -35,7 +36,7 @@ class Existence {
   const LedgerEntry& of(ExistenceEvidence why) const {
     return entries_[static_cast<std::size_t>(why)];
   }
-  void publish(std::vector<LedgerEntry>& to) const { to.assign(entries_.begin(), entries_.end()); }
+  const std::array<LedgerEntry, kExistenceEvidences>& entries() const { return entries_; }
 
  private:
   double r_ = 0.5;
@@ -63,6 +64,7 @@ class ClassAccount {
   /// Moves a part of entry `from` to entry `to`, for each class.
   void shift(ClassEvidence from, ClassEvidence to, const ClassNumbers& nats);
 
+  /// Writes the classes and the ousted one, and uses the memory of `to` again.
   void publish(Ledger& to) const;
 
  private:
@@ -79,7 +81,7 @@ class ClassAccount {
   Row& rowOf(const std::string& name);
   void oust(const ClassNumbers& pmf, TimePoint at);
 
-  std::vector<Row> rows_;
+  SharedVector<Row> rows_;
   std::optional<Ousted> ousted_;
 };
 

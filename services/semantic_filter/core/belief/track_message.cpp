@@ -97,7 +97,8 @@ void toBelief(const Track& track, double min_speed, ObjectBelief& belief) {
   belief.velocity = moves ? Eigen::Vector3d(track.best().x.tail<3>()) : Eigen::Vector3d::Zero();
   belief.memory = Memory::kWorking;
   belief.recalled = track.life.recalled;
-  track.existence.publish(belief.why.existence);
+  const auto& entries = track.existence.entries();
+  belief.why.existence.assign(entries.begin(), entries.end());
   track.classes.publish(belief.why);
 }
 

@@ -18,9 +18,13 @@ double viewChange(const ViewRay& a, const ViewRay& b, const ViewScales& scales) 
          std::abs(a.log_distance - b.log_distance) / scales.log_distance;
 }
 
-double viewChange(const Eigen::Vector3d& position, const RigidTransform& a, const RigidTransform& b,
-                  const ViewScales& scales) {
-  return viewChange(viewRayOf(position, a), viewRayOf(position, b), scales);
+double viewCorrelation(const ViewRay& a, const ViewRay& b, const ViewScales& scales) {
+  return std::exp(-viewChange(a, b, scales));
+}
+
+double viewCorrelation(const Eigen::Vector3d& position, const RigidTransform& a,
+                       const RigidTransform& b, const ViewScales& scales) {
+  return viewCorrelation(viewRayOf(position, a), viewRayOf(position, b), scales);
 }
 
 }  // namespace perdure::semantic_filter

@@ -20,7 +20,9 @@ struct ViewRay {
 };
 ViewRay viewRayOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);
 double viewChange(const ViewRay& a, const ViewRay& b, const ViewScales& scales);
-double viewChange(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
-                  const RigidTransform& T_WC_b, const ViewScales& scales);
+/// Returns the correlation of two observations from these views, 0 to 1.
+double viewCorrelation(const ViewRay& a, const ViewRay& b, const ViewScales& scales);
+double viewCorrelation(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
+                       const RigidTransform& T_WC_b, const ViewScales& scales);
 
 }  // namespace perdure::semantic_filter

@@ -6,6 +6,7 @@
 #include "common/math/chi2.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -223,7 +224,6 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
                                  const Eigen::Matrix4d& covariance,
                                  const std::array<bool, 4>& hidden,
                                  const BoxParameters& parameters) {
-  constexpr double kFits = 9.0;  // squared deviations up to which no partial view is tried
   Sides use = comparableSides(z, predicted, hidden), whole = use, ignored{};
   double log_shown = 0.0;
   for (int i = 0; i < 4; ++i) {
@@ -242,7 +242,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
   const auto consider = [&](const Sides& sides, double log_share, int part) {
     auto score = scoreSides(z, predicted, covariance, sides, parameters);
     if (!score) return;
-    fits = fits || score->nis < kFits;
+    fits = fits || score->nis < gates::kWholeView;
     score->part = part;
     keepLikelier(best, score, log_share);
   };

@@ -22,6 +22,10 @@ struct PoseError {
   /// Product of the transitions of all frames so far. A track updated at product A has the
   /// cross-covariance C (B A⁻¹)ᵀ at product B.
   Matrix6d product = Matrix6d::Identity();
+  /// The covariance is what odometry reports. Its corrections shrink it, so that it and a
+  /// cross-covariance are no longer of one covariance (belief/pose_correlation.h). A walk only
+  /// grows.
+  bool reported = false;
 };
 
 /// A landmark in the image. It lies before or behind an object.

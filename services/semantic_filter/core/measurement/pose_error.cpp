@@ -12,6 +12,7 @@ void advancePoseError(PoseError& error, const Odometry& odometry,
                       const std::optional<RigidTransform>& last_T_WB,
                       const PoseParameters& parameters) {
   const auto walk = poseWalkOf(odometry, parameters);
+  error.reported = !walk;
   if (!walk) {
     error.covariance = odometry.covariance.topLeftCorner<6, 6>();
     error.product = (odometry.transition * error.product).eval();

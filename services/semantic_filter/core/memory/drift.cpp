@@ -6,12 +6,10 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {
-
-constexpr double kOutlier = 25.0;      // squared deviations of a box
-constexpr double kSignificant = 12.0;  // squared deviations of four numbers: 1 in 58 by chance
 
 /// d[θ, p] by d[yaw, p].
 Eigen::Matrix<double, 6, 4> level(const RigidTransform& T_MB) {
@@ -45,7 +43,8 @@ std::optional<DriftMeasurement> driftMeasurement(const Hypothesis& h, const Proj
   Eigen::MatrixXd S = H * P * H.transpose();
   S.diagonal() += variance;
   if (!isCovariance(S)) return std::nullopt;
-  if (squaredMahalanobis(residual, S + D * P_pose * D.transpose()) > kOutlier) return std::nullopt;
+  if (squaredMahalanobis(residual, S + D * P_pose * D.transpose()) > gates::kDriftOutlier)
+    return std::nullopt;
   const Eigen::MatrixXd W = solveSymmetric(S, D);
   return DriftMeasurement{D.transpose() * W, W.transpose() * residual};
 }
@@ -87,7 +86,8 @@ std::optional<PoseCorrection> DriftEstimator::correct(const RigidTransform& T_MB
   if (g_.tail<3>().norm() < parameters_.position && std::abs(g_[0]) < parameters_.rotation) {
     return std::nullopt;
   }
-  if (squaredMahalanobis(g_, P_) < kSignificant || !isCovariance(pose_error.covariance)) {
+  if (squaredMahalanobis(g_, P_) < gates::kSignificantDrift ||
+      !isCovariance(pose_error.covariance)) {
     return std::nullopt;
   }
   const Eigen::Matrix<double, 6, 4> G = level(T_MB);

@@ -1,5 +1,6 @@
 #include "services/semantic_filter/core/smoothing/batch_problem.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -69,15 +70,12 @@ void KeyframeBatch::pairUp(const PoseError& now) {
   }
 }
 
-void KeyframeBatch::poseCovariance(const std::vector<PoseJacobian>& J,
-                                   Eigen::MatrixXd& result) const {
+void KeyframeBatch::poseCovariance(const ScratchVector<PoseJacobian>& J, SideMatrix& result) const {
   const auto n = static_cast<Eigen::Index>(size());
   result.resize(4 * n, 4 * n);
   if (pairs_.empty()) {
-    thread_local Eigen::Matrix<double, Eigen::Dynamic, 6> later;
-    thread_local Eigen::Matrix<double, 6, Eigen::Dynamic> earlier;
-    later.resize(4 * n, 6);
-    earlier.resize(6, 4 * n);
+    SideColumns<6> later(4 * n, 6);
+    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMostSides> earlier(6, 4 * n);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto k = static_cast<std::size_t>(i);
       later.middleRows<4>(4 * i) = J[k].lazyProduct(onto_[k]);
@@ -105,7 +103,7 @@ BatchProblem::BatchProblem(const KeyframeBatch& batch, bool moving, const std::s
       dim_(moving ? kMostFree : kGeometry) {
   // *Other* is initiated with three sizes; here one Gaussian has to cover them.
   if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
-  size_information_ = inverseSymmetric(prior_.log_size_covariance);
+  size_information_ = prior_.log_size_covariance.inverse();
   const auto& box = frame.parameters->box;
   scales_ = biasScales(box);
   heading_ = headingOf(logHeading(start));
@@ -115,7 +113,7 @@ BatchProblem::BatchProblem(const KeyframeBatch& batch, bool moving, const std::s
   Eigen::Matrix3d P = s2 * along * along.transpose();
   P.diagonal().head<2>().array() += kAcross * kAcross * s2;
   P(2, 2) = kUpwards * kUpwards;
-  speed_information_ = inverseSymmetric(P);
+  speed_information_ = P.inverse();
 }
 
 State BatchProblem::at(const State& x, const FreeVector& step) const {
@@ -129,7 +127,7 @@ State BatchProblem::at(const State& x, const FreeVector& step) const {
 std::optional<Stack> BatchProblem::linearise(const State& x) const {
   const auto n = static_cast<Eigen::Index>(batch_.size());
   Stack s;
-  s.rows = Eigen::MatrixXd::Zero(4 * n, dim_ + 1);
+  s.rows = SideRows::Zero(4 * n, dim_ + 1);
   s.J_pose.assign(batch_.size(), PoseJacobian::Zero());
   s.counts.assign(batch_.size(), {});
   const BoxStyles* styles = nullptr;
@@ -165,8 +163,9 @@ void BatchProblem::covariance(const State& x, const Stack& s, SideCovariance& re
   result.own.resize(n, n);
   result.pose.resize(0, 0);
   if (!batch_.exactPoses()) batch_.poseCovariance(s.J_pose, result.pose);
-  std::vector<ViewRay> rays;
-  std::vector<Eigen::Vector4d> bias_sigma;  // deviations of b, px; 0 for a side that does not count
+  ScratchVector<ViewRay> rays;
+  ScratchVector<Eigen::Vector4d>
+      bias_sigma;  // deviations of b, px; 0 for a side that does not count
   rays.reserve(batch_.size());
   bias_sigma.reserve(batch_.size());
   for (std::size_t i = 0; i < batch_.size(); ++i) {
@@ -177,7 +176,7 @@ void BatchProblem::covariance(const State& x, const Stack& s, SideCovariance& re
   }
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      const double correlation = std::exp(-viewChange(rays[i], rays[j], scales_));
+      const double correlation = viewCorrelation(rays[i], rays[j], scales_);
       const auto row = static_cast<Eigen::Index>(4 * i), column = static_cast<Eigen::Index>(4 * j);
       Eigen::Matrix4d own =
           moving() ? acceleration(s, i, j) : Eigen::Matrix4d(Eigen::Matrix4d::Zero());
@@ -192,7 +191,7 @@ void BatchProblem::covariance(const State& x, const Stack& s, SideCovariance& re
   }
 }
 
-Gram gramOf(const Eigen::MatrixXd& whitened) {
+Gram gramOf(const SideRows& whitened) {
   const Eigen::Index n = whitened.cols();
   Gram gram(n, n);
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -203,7 +202,8 @@ Gram gramOf(const Eigen::MatrixXd& whitened) {
   return gram;
 }
 
-Cholesky SideCovariance::with(const Eigen::VectorXd& inflations, Eigen::MatrixXd R) const {
+void SideCovariance::factorise(const PerKeyframe& inflations, Cholesky<SideMatrix>& sum) const {
+  SideMatrix& R = sum.matrix();
   R.resize(own.rows(), own.cols());
   const Eigen::Index n = own.rows();
   for (Eigen::Index j = 0; j < inflations.size(); ++j) {
@@ -214,16 +214,15 @@ Cholesky SideCovariance::with(const Eigen::VectorXd& inflations, Eigen::MatrixXd
     if (pose.size() == 0) continue;
     R.block(4 * j, 4 * j, n - 4 * j, 4) += pose.block(4 * j, 4 * j, n - 4 * j, 4);
   }
-  return Cholesky(std::move(R));
+  sum.factorise();
 }
 
-Eigen::VectorXd SideCovariance::withoutPose(const Eigen::VectorXd& residual,
-                                            const Eigen::VectorXd& explained) const {
+PerSide SideCovariance::withoutPose(const PerSide& residual, const PerSide& explained) const {
   if (pose.size() == 0) return residual;
   return residual - pose.selfadjointView<Eigen::Lower>() * explained;
 }
 
-double SideCovariance::deviation(const Eigen::VectorXd& residual, Eigen::Index keyframe) const {
+double SideCovariance::deviation(const PerSide& residual, Eigen::Index keyframe) const {
   Eigen::Matrix4d L = own.block<4, 4>(4 * keyframe, 4 * keyframe);
   Eigen::Vector4d r = residual.segment<4>(4 * keyframe);
   if (!choleskyInPlace(L)) return 0.0;
@@ -292,7 +291,7 @@ double BatchProblem::logSpeedPrior() const {
 
 double BatchProblem::logSizePrior() const { return std::log(size_information_.determinant()); }
 
-double BatchProblem::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& inflations) const {
+double BatchProblem::logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const Keyframe& k = *batch_.keyframes()[i];
@@ -307,28 +306,27 @@ double BatchProblem::logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& infl
   return sum;
 }
 
-Eigen::MatrixXd BatchProblem::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
-                                      const Eigen::VectorXd& inflations) const {
-  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(4, s.rows.rows());
+SideColumns<4> BatchProblem::biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
+                                     const PerKeyframe& inflations) const {
+  SideColumns<4> c = SideColumns<4>::Zero(s.rows.rows(), 4);
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const Keyframe& k = *batch_.keyframes()[i];
-    const double rho =
-        std::exp(-viewChange(x.head<3>(), k.from->T_WC, frame_.view.T_WC(), scales_));
+    const double rho = viewCorrelation(x.head<3>(), k.from->T_WC, frame_.view.T_WC(), scales_);
     for (int a = 0; a < 4; ++a) {
       if (!s.counts[i][a]) continue;
       const auto row = static_cast<Eigen::Index>(4 * i) + a;
-      c(a, row) =
+      c(row, a) =
           rho * sigma[a] * std::sqrt(lasting(k)[a] * inflations[static_cast<Eigen::Index>(i)]);
     }
   }
   return c;
 }
 
-Eigen::MatrixXd BatchProblem::poseNow(const Stack& s) const {
-  Eigen::MatrixXd c = Eigen::MatrixXd::Zero(6, s.rows.rows());
+SideColumns<6> BatchProblem::poseNow(const Stack& s) const {
+  SideColumns<6> c(s.rows.rows(), 6);
   for (std::size_t i = 0; i < batch_.size(); ++i) {
-    c.middleCols<4>(static_cast<Eigen::Index>(4 * i)) =
-        batch_.poseNow(i).lazyProduct(s.J_pose[i].transpose());
+    c.middleRows<4>(static_cast<Eigen::Index>(4 * i)) =
+        s.J_pose[i].lazyProduct(batch_.poseNow(i).transpose());
   }
   return c;
 }
@@ -358,8 +356,8 @@ Eigen::Matrix4d BatchProblem::acceleration(const Stack& s, std::size_t i, std::s
              .lazyProduct(s.rows.block<4, 3>(static_cast<Eigen::Index>(4 * j), 0).transpose());
 }
 
-std::vector<AzimuthMatch> BatchProblem::azimuths(const State& x) const {
-  std::vector<AzimuthMatch> matches;
+ScratchVector<AzimuthMatch> BatchProblem::azimuths(const State& x) const {
+  ScratchVector<AzimuthMatch> matches;
   for (const auto& k : batch_.keyframes()) {
     if (!prior_.has_yaw || !k->azimuth) continue;
     matches.push_back(matchAzimuth(*k->azimuth, x, k->from->view, azimuthVariance(*k)));

@@ -17,6 +17,16 @@ namespace perdure::semantic_filter {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
+/// The matrices of a batch have bounded sizes, so that they stay off the
+/// heap.
+inline constexpr int kMostSides = 4 * kMostKeyframes;
+/// One number for each keyframe.
+using PerKeyframe = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
+/// One number for each side, four sides a keyframe.
+using PerSide = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostSides, 1>;
+/// Covariance of all sides.
+using SideMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostSides, kMostSides>;
+
 using PoseJacobian = Eigen::Matrix<double, 4, 6>;
 
 /// The keyframes of one track, with the covariances of their pose errors: of all pairs, and with
@@ -32,7 +42,7 @@ class KeyframeBatch {
   bool exactPoses() const { return exact_; }
   /// Computes the covariance that the pose errors cause in all sides, px²; only its lower triangle.
   /// `J`: derivatives of the sides by the pose error, for each keyframe.
-  void poseCovariance(const std::vector<PoseJacobian>& J, Eigen::MatrixXd& result) const;
+  void poseCovariance(const ScratchVector<PoseJacobian>& J, SideMatrix& result) const;
   /// Returns the covariance of the present pose error with that of keyframe i.
   const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
 
@@ -45,9 +55,9 @@ class KeyframeBatch {
 
   /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i. Keyframe i and an earlier keyframe
   /// j have the covariance Φ_i (Φ_j⁻¹ P_j). Empty where a Φ_i has no usable inverse.
-  std::vector<Matrix6d> onto_, from_;
-  std::vector<Matrix6d> pairs_;  ///< in that case: the covariances of i and j <= i
-  std::vector<Matrix6d> now_;    ///< of the present pose error with keyframe i
+  ScratchVector<Matrix6d> onto_, from_;
+  ScratchVector<Matrix6d> pairs_;  ///< in that case: the covariances of i and j <= i
+  ScratchVector<Matrix6d> now_;    ///< of the present pose error with keyframe i
   bool exact_ = true;
 };
 
@@ -56,13 +66,17 @@ inline constexpr int kMostFree = kGeometry + 3;
 using FreeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFree, 1>;
 using FreeMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree, kMostFree>;
 
+/// Four rows for each keyframe; a column for each dimension, and the residual.
+using SideRows =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostSides, kMostFree + 1>;
+
 /// The measurement, linearised at one state: four rows for each keyframe.
 struct Stack {
   /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for a side that does not
   /// count.
-  Eigen::MatrixXd rows;
-  std::vector<PoseJacobian> J_pose;
-  std::vector<std::array<bool, 4>> counts;
+  SideRows rows;
+  ScratchVector<PoseJacobian> J_pose;
+  ScratchVector<std::array<bool, 4>> counts;
 
   auto J() const { return rows.leftCols(rows.cols() - 1); }
   auto residual() const { return rows.col(rows.cols() - 1); }
@@ -71,24 +85,25 @@ struct Stack {
 /// [J r]ᵀ R⁻¹ [J r].
 using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFree + 1, kMostFree + 1>;
 /// `whitened`: L⁻¹ [J r], where R = L Lᵀ.
-Gram gramOf(const Eigen::MatrixXd& whitened);
+Gram gramOf(const SideRows& whitened);
 
 /// Covariance of the rows of a Stack, given the cuboid, in two parts, px². Only lower triangles.
 struct SideCovariance {
-  Eigen::MatrixXd own;   ///< of noise, b and acceleration
-  Eigen::MatrixXd pose;  ///< of the pose errors; empty where poses are exact
+  SideMatrix own;   ///< of noise, b and acceleration
+  SideMatrix pose;  ///< of the pose errors; empty where poses are exact
 
-  /// Returns the sum R, with `own` widened by the inflations of the keyframes. `pose` is not
+  /// Factorises the sum R, with `own` widened by the inflations of the keyframes. `pose` is not
   /// widened: a common pose error that every keyframe scales differently would seem observed.
-  /// `storage`: memory to use for R.
-  Cholesky with(const Eigen::VectorXd& inflations, Eigen::MatrixXd storage = {}) const;
+  void factorise(const PerKeyframe& inflations, Cholesky<SideMatrix>& R) const;
   /// Returns the residuals r without the pose errors that are estimated from them. So a common pose
   /// error contradicts nothing. `explained`: R⁻¹ r.
-  Eigen::VectorXd withoutPose(const Eigen::VectorXd& residual,
-                              const Eigen::VectorXd& explained) const;
+  PerSide withoutPose(const PerSide& residual, const PerSide& explained) const;
   /// Returns the squared Mahalanobis distance of the residuals of one keyframe, given `own`.
-  double deviation(const Eigen::VectorXd& residual, Eigen::Index keyframe) const;
+  double deviation(const PerSide& residual, Eigen::Index keyframe) const;
 };
+
+template <int Columns>
+using SideColumns = Eigen::Matrix<double, Eigen::Dynamic, Columns, 0, kMostSides, Columns>;
 
 struct Quadratic {
   FreeMatrix G;  ///< information
@@ -130,13 +145,13 @@ class BatchProblem {
   double logSizePrior() const;
   /// Returns the part of log |R| that belongs to no density: a cut side has a probability (that it
   /// lies beyond the cut), and whether it counts depends on the state.
-  double logVolumeOfCuts(const Stack& s, const Eigen::VectorXd& inflations) const;
-  /// Returns the covariance of the present b with all rows. `sigma`: present deviations of b, in
+  double logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const;
+  /// Returns the covariance of all rows with the present b. `sigma`: present deviations of b, in
   /// widths and heights.
-  Eigen::MatrixXd biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
-                          const Eigen::VectorXd& inflations) const;
-  /// Returns the covariance of the present pose error with all rows.
-  Eigen::MatrixXd poseNow(const Stack& s) const;
+  SideColumns<4> biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
+                         const PerKeyframe& inflations) const;
+  /// Returns the covariance of all rows with the present pose error.
+  SideColumns<6> poseNow(const Stack& s) const;
 
  private:
   /// Returns the seconds from a keyframe to the newest one, whose time the position has; 0 at rest.
@@ -147,7 +162,7 @@ class BatchProblem {
   /// Returns the covariance of the sides of keyframe i and an earlier or equal j that white
   /// acceleration causes between them and the newest keyframe, px².
   Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
-  std::vector<AzimuthMatch> azimuths(const State& x) const;
+  ScratchVector<AzimuthMatch> azimuths(const State& x) const;
   double azimuthVariance(const Keyframe& k) const;  ///< rad², with the present noise scale
   /// Returns the weight of each azimuth, given that their errors are correlated.
   double azimuthWeight() const;

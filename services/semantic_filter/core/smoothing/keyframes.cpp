@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/scratch.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -71,14 +72,13 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
   const Keyframes& known = track.batch.keyframes.read();
   if (std::any_of(known.rbegin(), known.rend(), same)) return false;
   Keyframes& all = track.batch.keyframes.write();
+  all.reserve(kMostKeyframes + 1);
   all.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
   thin(place, all, scales, static_cast<std::size_t>(parameters.keyframes));
   return true;
 }
 
 bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters) {
-  // χ² with four degrees of freedom exceeds it once in 140 times.
-  constexpr double kContradicted = 14.0;
   const FrameView& from = *keyframe.from;
   State cuboid = h.x;
   cuboid.segment<4>(kBias).setZero();
@@ -90,7 +90,7 @@ bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters
                       box->H_pose * from.error.covariance * box->H_pose.transpose();
   S.diagonal() += keyframe.z.lasting;
   const auto score = scoreBox(keyframe.z, *box, S, keyframe.hidden, parameters);
-  return score && score->nis < kContradicted;
+  return score && score->nis < gates::kForeignBox;
 }
 
 void mergeBatches(Track& a, const Track& b, const ViewScales& scales,

@@ -8,25 +8,25 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {
 
 constexpr int kRounds = 12;
-constexpr double kContradicted = 25.0;  // squared deviations of a keyframe, of about four sides
-constexpr double kEnough = 0.02;        // least gain of a further step, squared deviations
+constexpr double kEnough = 0.02;  // least gain of a further step, squared deviations
 
 }  // namespace
 
 struct MapFit::Fit {
   State x;
   Stack stack;
-  std::shared_ptr<const SideCovariance> covariance;  ///< fits of the same batch share it
-  State covariance_at;                               ///< the x that it was computed at
-  Eigen::VectorXd inflations;
-  Eigen::ArrayXi contradicted;
-  std::shared_ptr<const Cholesky> R;
-  Eigen::MatrixXd whitened;  ///< L⁻¹ times the rows of the stack, R = L Lᵀ
+  std::shared_ptr<SideCovariance> covariance;  ///< fits of the same batch share it
+  State covariance_at;                         ///< the x that it was computed at
+  PerKeyframe inflations;
+  KeyframeCounts contradicted;
+  std::shared_ptr<Cholesky<SideMatrix>> R;
+  SideRows whitened;  ///< L⁻¹ times the rows of the stack, R = L Lᵀ
 
   double squaredResidual() const { return whitened.rightCols<1>().squaredNorm(); }
 };
@@ -39,7 +39,7 @@ using Fit = MapFit::Fit;
 /// Returns whether an inflation changed enough to matter.
 bool inflateKeyframes(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
-  const Eigen::VectorXd residual = fit.covariance->withoutPose(
+  const PerSide residual = fit.covariance->withoutPose(
       fit.stack.residual(), fit.R->unwhiten(fit.whitened.rightCols<1>()));
   fit.contradicted.resize(fit.inflations.size());
   bool matters = false;
@@ -50,7 +50,7 @@ bool inflateKeyframes(Fit& fit, double tail) {
     const double inflation = std::max(1.0, (tail + nis) / (tail + n));
     matters = matters || std::abs(inflation - fit.inflations[i]) > kMatters * fit.inflations[i];
     fit.inflations[i] = inflation;
-    fit.contradicted[i] = nis > kContradicted ? 1 : 0;
+    fit.contradicted[i] = nis > gates::kContradiction ? 1 : 0;
   }
   return matters;
 }
@@ -63,14 +63,21 @@ bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
   return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance;
 }
 
+/// Returns a value of its own, whose memory is used again.
+template <class T>
+T& ownOf(std::shared_ptr<T>& shared) {
+  if (!shared || shared.use_count() > 1) {
+    shared = std::allocate_shared_for_overwrite<T>(ScratchAllocator<T>());
+  }
+  return *shared;
+}
+
 bool factorise(const BatchProblem& model, Fit& fit, bool anew) {
   if (anew) {
-    auto covariance = std::make_shared<SideCovariance>();
-    model.covariance(fit.x, fit.stack, *covariance);
-    fit.covariance = std::move(covariance);
+    model.covariance(fit.x, fit.stack, ownOf(fit.covariance));
     fit.covariance_at = fit.x;
   }
-  fit.R = std::make_shared<const Cholesky>(fit.covariance->with(fit.inflations));
+  fit.covariance->factorise(fit.inflations, ownOf(fit.R));
   if (!fit.R->positive()) return false;
   fit.whitened = fit.R->whiten(fit.stack.rows);
   return true;
@@ -100,9 +107,11 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& pred
   for (int attempt = 0; attempt < 6; ++attempt) {
     FreeMatrix damped = q.G;
     damped.diagonal() *= 1.0 + damping.value();
-    const FreeVector step = solveSymmetric(damped, q.g);
+    const Cholesky information(damped);
+    const FreeVector step =
+        information.positive() ? information.solve(q.g) : FreeVector(FreeVector::Zero(model.dim()));
     const State next = model.at(fit.x, step);
-    auto stack = step.allFinite() ? model.linearise(next) : std::nullopt;
+    auto stack = information.positive() && step.allFinite() ? model.linearise(next) : std::nullopt;
     if (stack) {
       auto whitened = fit.R->whiten(stack->rows);
       const double then = whitened.rightCols<1>().squaredNorm() + model.priorCost(next);
@@ -120,12 +129,11 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& pred
   return false;
 }
 
-bool isOneOf(const std::vector<const Hypothesis*>& found, const State& x) {
-  constexpr double kSameMode = 0.25;  // squared deviations
+bool isOneOf(const ScratchVector<const Hypothesis*>& found, const State& x) {
   return std::any_of(found.begin(), found.end(), [&](const Hypothesis* mode) {
     Hypothesis h = *mode;
     h.x = x;
-    return distance2(*mode, h) < kSameMode;
+    return distance2(*mode, h) < gates::kSameFit;
   });
 }
 
@@ -133,10 +141,10 @@ bool isOneOf(const std::vector<const Hypothesis*>& found, const State& x) {
 /// inflations.
 std::optional<Fit> fitKeyframes(const BatchProblem& model, const State& start,
                                 const KeyframeBatch& batch, double tail, const Fit* like,
-                                const std::vector<const Hypothesis*>& found) {
+                                const ScratchVector<const Hypothesis*>& found) {
   Fit fit;
   fit.x = start;
-  fit.inflations = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(batch.size()));
+  fit.inflations = PerKeyframe::Ones(static_cast<Eigen::Index>(batch.size()));
   auto stack = model.linearise(fit.x);
   if (!stack) return std::nullopt;
   fit.stack = std::move(*stack);
@@ -174,7 +182,7 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
   const auto rw = fit.whitened.rightCols<1>();
   const Cholesky information(model.quadratic(fit.x, gramOf(fit.whitened)).G);
   if (!information.positive()) return std::nullopt;
-  const Eigen::MatrixXd P = information.solve(Eigen::MatrixXd::Identity(model.dim(), model.dim()));
+  const FreeMatrix P = information.solve(FreeMatrix::Identity(model.dim(), model.dim()));
   const double distance = (fit.x.head<3>() - frame.view.T_WC().p).norm();
   if (!P.allFinite()) return std::nullopt;
   const auto now = projectCuboid(fit.x, frame.projector());
@@ -183,12 +191,13 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
       biasSigma(viewWalkOf(frame).lasting, std::max(now->sides[2] - now->sides[0], 1.0),
                 std::max(now->sides[3] - now->sides[1], 1.0))
           .cwiseMax(1e-6);
-  const Eigen::MatrixXd Bw =
-      fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.inflations).transpose());
-  const Eigen::MatrixXd Ew = fit.R->whiten(model.poseNow(fit.stack).transpose());
+  using FreeColumns = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, kMostFree, 6>;
+  using FourFree = Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, kMostFree>;
+  const auto Bw = fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.inflations));
+  const auto Ew = fit.R->whiten(model.poseNow(fit.stack));
   // The factors are tall and narrow: to pack them for Eigen's product costs more than the sums.
-  const Eigen::MatrixXd BJ = Bw.transpose().lazyProduct(Jw);
-  const Eigen::MatrixXd C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
+  const FourFree BJ = Bw.transpose().lazyProduct(Jw);
+  const FreeColumns C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
 
   // State order: geometry, b, velocity.
   const int g = kGeometry;
@@ -201,7 +210,7 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
   h.P.block<4, 4>(kBias, kBias) =
       BJ.lazyProduct(P.lazyProduct(BJ.transpose()).eval()) - Bw.transpose().lazyProduct(Bw);
   h.P.block<4, 4>(kBias, kBias).diagonal() += sigma.cwiseAbs2();
-  const Eigen::MatrixXd cross = -BJ.lazyProduct(P);
+  const FourFree cross = -BJ.lazyProduct(P);
   h.P.block(kBias, 0, 4, g) = cross.leftCols(g);
   h.P.block(0, kBias, g, 4) = cross.leftCols(g).transpose();
   h.C.setZero();
@@ -228,7 +237,7 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
 
 std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch& batch,
                                    const FrameContext& frame, const MapFit* like,
-                                   const std::vector<const Hypothesis*>& found) {
+                                   const ScratchVector<const Hypothesis*>& found) {
   const BatchProblem model(batch, start.moving, start.class_name, start.x, frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
@@ -246,7 +255,7 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
   MapFit result(batch, frame);
   result.hypothesis_ = *h;
   result.start_ = start.x;
-  result.fit_ = std::make_shared<const Fit>(std::move(*fit));
+  result.fit_ = std::allocate_shared<const Fit>(ScratchAllocator<Fit>(), std::move(*fit));
   return result;
 }
 
@@ -254,9 +263,9 @@ BatchProblem MapFit::modelOf() const {
   return {*batch_, hypothesis_.moving, hypothesis_.class_name, start_, *frame_};
 }
 
-const Eigen::VectorXd& MapFit::inflations() const { return fit_->inflations; }
+const PerKeyframe& MapFit::inflations() const { return fit_->inflations; }
 
-const Eigen::ArrayXi& MapFit::contradictions() const { return fit_->contradicted; }
+const KeyframeCounts& MapFit::contradictions() const { return fit_->contradicted; }
 
 std::size_t MapFit::sides() const {
   std::size_t sum = 0;
@@ -281,15 +290,15 @@ ResidualRatio MapFit::azimuthResidualRatio() const {
 
 double MapFit::logHeading() const { return modelOf().logHeading(fit_->x); }
 
-double MapFit::logEvidence(const Eigen::VectorXd& inflations, bool of_yaw) const {
+double MapFit::logEvidence(const PerKeyframe& inflations, bool of_yaw) const {
   constexpr double kImpossible = -1e6;
   const BatchProblem model = modelOf();
   const Stack& stack = fit_->stack;
   // R is computed at exactly this state: its determinant of a hundred dimensions depends on it.
   thread_local SideCovariance covariance;
-  thread_local Eigen::MatrixXd storage;
   model.covariance(fit_->x, stack, covariance);
-  Cholesky R = covariance.with(inflations, std::move(storage));
+  thread_local Cholesky<SideMatrix> R;
+  covariance.factorise(inflations, R);
   if (!R.positive()) return kImpossible;
   const Gram gram = gramOf(R.whiten(stack.rows));
   const Quadratic q = model.quadratic(fit_->x, gram);
@@ -300,7 +309,6 @@ double MapFit::logEvidence(const Eigen::VectorXd& inflations, bool of_yaw) const
   const double free = (model.dim() - kGeometry) * std::log(2.0 * M_PI);
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
   const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, inflations);
-  storage = std::move(R).release();
   const double priors = model.logSpeedPrior() + model.logSizePrior();
   return yaw + 0.5 * (free + priors - cost - volume - G.logDeterminant());
 }

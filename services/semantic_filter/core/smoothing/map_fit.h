@@ -20,7 +20,10 @@
 
 namespace perdure::semantic_filter {
 
-/// One hypothesis, fitted to all keyframes. The batch and the frame outlive it.
+using KeyframeCounts = Eigen::Array<int, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
+
+/// One hypothesis, fitted to all keyframes. The batch and the frame outlive it; it lives within one
+/// step.
 class MapFit {
  public:
   struct Fit;
@@ -31,11 +34,11 @@ class MapFit {
   /// covariance.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
-                                    const std::vector<const Hypothesis*>& found = {});
+                                    const ScratchVector<const Hypothesis*>& found = {});
 
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// Returns the inflation of each keyframe, d >= 1 (t distribution).
-  const Eigen::VectorXd& inflations() const;
+  const PerKeyframe& inflations() const;
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
   /// Returns the residuals of the sides, relative to the first assumption. Their count is the
@@ -46,11 +49,11 @@ class MapFit {
   /// Returns the number of sides that count, of all keyframes.
   std::size_t sides() const;
   /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
-  const Eigen::ArrayXi& contradictions() const;
+  const KeyframeCounts& contradictions() const;
   /// Returns the log marginal likelihood, log p(boxes | class, motion), by Laplace's method. Two
   /// fits are compared with the same inflations. `of_yaw`: for modes of yaw; with the azimuths and
   /// without the yaw prior around the start.
-  double logEvidence(const Eigen::VectorXd& inflations, bool of_yaw = false) const;
+  double logEvidence(const PerKeyframe& inflations, bool of_yaw = false) const;
   /// Returns the log-odds, by the azimuths, that its yaw is not turned by 180°.
   double logHeading() const;
 

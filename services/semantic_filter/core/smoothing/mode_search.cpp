@@ -6,6 +6,7 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
+#include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/update/ground_contact.h"
 
 namespace perdure::semantic_filter {
@@ -13,13 +14,12 @@ namespace perdure::semantic_filter {
 namespace {
 
 bool sameMode(const Hypothesis& a, const Hypothesis& b) {
-  constexpr double kSameMode = 1.0;  // squared deviations
-  return std::min(distance2(a, b), distance2(b, a)) < kSameMode;
+  return std::min(distance2(a, b), distance2(b, a)) < gates::kSameMode;
 }
 
 /// Returns starts at rest that no hypothesis may have: yaw turned by 45°, 90° and 135°, usual size.
-std::vector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
-  std::vector<Hypothesis> starts;
+ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
+  ScratchVector<Hypothesis> starts;
   if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
   for (int k = 1; k < 4; ++k) {
     starts.push_back(best);
@@ -35,7 +35,7 @@ std::vector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& pr
 
 std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
                           const FrameContext& frame, const MapFit* like,
-                          const std::vector<const Hypothesis*>& found) {
+                          const ScratchVector<const Hypothesis*>& found) {
   auto map_fit = MapFit::make(start, batch, frame, like, found);
   const bool taken = map_fit && map_fit->contradicted() <= frame.parameters->smoothing.contradicted;
   return taken ? std::move(map_fit) : std::nullopt;
@@ -65,7 +65,7 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
   constexpr double kMaxLogOdds = 15.0;  // nats
   const ClassPrior& prior = frame.priors->of(name);
   const auto& motion = frame.parameters->motion;
-  const Eigen::VectorXd inflations = static_fit.inflations().cwiseMin(moving_fit.inflations());
+  const PerKeyframe inflations = static_fit.inflations().cwiseMin(moving_fit.inflations());
   const double speed_prior_ratio =
       motion.creeping + (1.0 - motion.creeping) * fasterThan(moving_fit.hypothesis(),
                                                              motion.slow_share * prior.speed_sigma);
@@ -88,10 +88,10 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
 
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
   if (fits.size() < 2) return;
-  Eigen::VectorXd inflations = fits.front().map_fit.inflations();
+  PerKeyframe inflations = fits.front().map_fit.inflations();
   for (const auto& f : fits) inflations = inflations.cwiseMin(f.map_fit.inflations());
   constexpr double kNone = -1e9;
-  std::vector<double> log_evidence;
+  ScratchVector<double> log_evidence;
   double largest = kNone, all = 0.0, sum = 0.0;
   for (auto f = fits.begin(); f != fits.end(); ++f) {
     all += hs[f->index].weight;
@@ -121,7 +121,7 @@ std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits) {
 void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits) {
   const Hypothesis best = track.hypotheses[fits.front().index];
   for (const auto& start : otherStarts(best, frame.priors->of(best.class_name))) {
-    std::vector<const Hypothesis*> found;
+    ScratchVector<const Hypothesis*> found;
     for (const Fitted& f : fits) found.push_back(&f.map_fit.hypothesis());
     auto map_fit = fit(start, batch, frame, &fits.front().map_fit, found);
     if (!map_fit) continue;
@@ -163,11 +163,11 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
   Hypothesis start = other;
   start.class_name = track.lookalike.class_name;
   start.x.segment<3>(kSize) = prior.log_size;
-  std::vector<Hypothesis> starts = otherStarts(start, prior);
+  ScratchVector<Hypothesis> starts = otherStarts(start, prior);
   starts.push_back(start);
-  std::vector<MapFit> fits;
+  ScratchVector<MapFit> fits;
   for (const Hypothesis& one : starts) {
-    std::vector<const Hypothesis*> found;
+    ScratchVector<const Hypothesis*> found;
     for (const MapFit& f : fits) found.push_back(&f.hypothesis());
     auto map_fit = fit(one, batch, frame, fits.empty() ? nullptr : &fits.front(), found);
     // A fit with fewer compared sides is refused: one whose sides are all cut fits any box.
@@ -177,7 +177,7 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
     }
   }
   if (fits.empty()) return;
-  Eigen::VectorXd inflations = as_other->inflations();
+  PerKeyframe inflations = as_other->inflations();
   for (const MapFit& one : fits) inflations = inflations.cwiseMin(one.inflations());
   const double other_evidence = as_other->logEvidence(inflations);
   const double initial_log_odds = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -

@@ -17,12 +17,12 @@ struct Fitted {
   MapFit map_fit;
   double ground;  ///< log-likelihood ratio of its ground contact, nats
 };
-using Fits = std::vector<Fitted>;
+using Fits = ScratchVector<Fitted>;
 
 /// As MapFit::make; also returns nothing if too many keyframes contradict the fit.
 std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
                           const FrameContext& frame, const MapFit* like = nullptr,
-                          const std::vector<const Hypothesis*>& found = {});
+                          const ScratchVector<const Hypothesis*>& found = {});
 /// Adds `h` with its ground contact to the track and returns it with its fit.
 Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame);
 /// Returns a start at rest for a moving hypothesis: its position at the middle keyframe.

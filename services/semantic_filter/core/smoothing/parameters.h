@@ -5,6 +5,8 @@
 
 namespace perdure::semantic_filter {
 
+inline constexpr int kMostKeyframes = 32;  ///< keyframes of a track, whatever is configured
+
 struct SmoothingParameters {
   std::int64_t keyframes = 24;  ///< kept for one track at most; 0: no batch estimate
   std::int64_t least = 5;       ///< with fewer the EKF's state stays

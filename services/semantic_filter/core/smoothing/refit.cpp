@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
 
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
+#include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/smoothing/mode_search.h"
 #include "services/semantic_filter/core/update/ground_contact.h"
 
@@ -18,9 +17,9 @@ namespace {
 /// How many of the accepted fits contradict each keyframe.
 struct ContradictionCounts {
   int fits = 0;
-  Eigen::ArrayXi counts;
-  void add(const Eigen::ArrayXi& contradictions) {
-    counts = fits++ == 0 ? contradictions : Eigen::ArrayXi(counts + contradictions);
+  KeyframeCounts counts;
+  void add(const KeyframeCounts& contradictions) {
+    counts = fits++ == 0 ? contradictions : KeyframeCounts(counts + contradictions);
   }
 };
 
@@ -112,19 +111,22 @@ double refitNeed(const Track& track, double fresh) {
 }
 
 std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
+  const ScratchScope scope;
   const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smoothing.patience);
-  constexpr double kLittle = 1.0;  // squared deviations of seven dimensions
   const auto& p = *frame.parameters;
   const double fresh = track.batch.fresh / static_cast<double>(track.batch.keyframes.size());
   track.batch.fresh = 0;
   const Hypothesis before = track.best();
   const KeyframeBatch batch(track.batch.keyframes.read(), frame.pose_error);
-  std::set<std::string> names;
-  for (const auto& h : track.hypotheses.read()) names.insert(h.class_name);
+  ScratchVector<std::string> names;  // a fit may add hypotheses
+  for (const auto& h : track.hypotheses.read()) {
+    const auto at = std::lower_bound(names.begin(), names.end(), h.class_name);
+    if (at == names.end() || *at != h.class_name) names.insert(at, h.class_name);
+  }
   const bool search = track.batch.seen >= track.batch.mode_search_due;
   if (search) track.batch.mode_search_due = 2 * track.batch.seen;
   ContradictionCounts contradictions;
-  std::map<std::string, ResidualRatios> residuals;
+  ScratchMap<std::string, ResidualRatios> residuals;
   for (const auto& name : names) {
     const auto residual = refitClass(track, name, batch, frame, search, contradictions);
     if (residual) residuals[name] = *residual;
@@ -135,7 +137,7 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   dropContradicted(track, contradictions, static_cast<std::size_t>(p.smoothing.least));
   const bool same =
       before.class_name == track.best().class_name && before.moving == track.best().moving;
-  const bool settled = same && distance2(before, track.best()) < kLittle;
+  const bool settled = same && distance2(before, track.best()) < gates::kUnchanged;
   track.batch.patience = settled ? std::min(2 * track.batch.patience, most_patience) : 1;
   const auto of_best = residuals.find(track.best().class_name);
   if (of_best == residuals.end() || !informsNoiseScale(track, frame)) return std::nullopt;

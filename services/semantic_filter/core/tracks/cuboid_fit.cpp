@@ -178,7 +178,7 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
   fit.hypothesis.x[kYaw] = wrapAngle(x[kYaw]);
   fit.hypothesis.P.setZero();
   fit.hypothesis.P.topLeftCorner<kFree, kFree>() =
-      hessian.solve(Eigen::MatrixXd::Identity(kFree, kFree));
+      hessian.solve(Eigen::Matrix<double, kFree, kFree>::Identity());
   addPoseError(fit.hypothesis, frame);
   if (!fit.hypothesis.P.allFinite()) return std::nullopt;
   return fit;

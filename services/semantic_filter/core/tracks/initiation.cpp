@@ -23,12 +23,12 @@ struct YawStart {
 };
 
 /// Returns four starts that cover a half turn: a cuboid is the same when turned by 180°.
-std::vector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& frame,
-                                const Eigen::Vector3d& ray) {
+ScratchVector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& frame,
+                                  const Eigen::Vector3d& ray) {
   const Eigen::Vector3d level = levelling(frame.view.up_W) * ray;
   const double bearing = std::atan2(level.y(), level.x());
   if (!prior.has_yaw) return {{bearing, 1.0, 1.0}};
-  std::vector<YawStart> starts;
+  ScratchVector<YawStart> starts;
   for (int i = 0; i < 4; ++i) starts.push_back({wrapAngle(bearing + i * M_PI / 4), 0.39, 0.25});
   return starts;
 }
@@ -49,7 +49,7 @@ void addMovingCopy(Track& track, const Hypothesis& at_rest, const ClassPrior& pr
 
 /// Updates the yaw starts of one class by the azimuth and weighs them. The total weight of the
 /// class stays. The azimuth counts half, because a single one may be far off.
-void weighByAzimuth(std::vector<Hypothesis>& fits, const BoxDetection& detection,
+void weighByAzimuth(ScratchVector<Hypothesis>& fits, const BoxDetection& detection,
                     const ClassPrior& prior, const FrameContext& frame) {
   if (!detection.azimuth || !prior.has_yaw) return;
   const double sigma = azimuthSigma(detection.azimuth_sigma, prior);
@@ -101,9 +101,9 @@ double groundRatio(Hypothesis& h, const FrameContext& frame) {
 }
 
 void addClass(Track& track, const ClassPrior& prior, double ratio, const BoxDetection& detection,
-              const std::vector<YawStart>& starts, const std::optional<RangeHint>& range,
+              const ScratchVector<YawStart>& starts, const std::optional<RangeHint>& range,
               const FrameContext& frame) {
-  std::vector<Hypothesis> fits;
+  ScratchVector<Hypothesis> fits;
   for (const auto& start : starts) {
     const auto fit = fitCuboid(detection, prior, start.yaw, start.sigma, range, frame);
     if (!fit) continue;
@@ -138,8 +138,8 @@ struct Candidate {
   double log_weight;
 };
 
-std::vector<Candidate> candidates(const BoxDetection& detection, const FrameContext& frame) {
-  std::vector<Candidate> all;
+ScratchVector<Candidate> candidates(const BoxDetection& detection, const FrameContext& frame) {
+  ScratchVector<Candidate> all;
   for (const auto& name : frame.model->classes) {
     ClassPrior prior = frame.priors->of(name);
     prior.name = name;
@@ -166,8 +166,8 @@ double frequencies(const FrameContext& frame) {
 
 /// Sets existence from the weights, normalises them, and enters the reasons of both in the ledger:
 /// the prior, the activations and, for the PMF, the geometry of the fits.
-void bookInitiation(Track& track, const std::vector<Candidate>& kept, const BoxDetection& detection,
-                    const FrameContext& frame) {
+void bookInitiation(Track& track, const ScratchVector<Candidate>& kept,
+                    const BoxDetection& detection, const FrameContext& frame) {
   const double odds = frame.parameters->initiation.odds;
   double ratio = 0.0;
   for (const auto& h : track.hypotheses) ratio += h.weight;
@@ -255,9 +255,9 @@ void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibi
                     const Eigen::VectorXd& explained, const FrameInput& input,
                     const FrameContext& frame, IdBook& ids) {
   const auto& boxes = *input.boxes;
-  std::vector<Track> initiated;
+  ScratchVector<Track> initiated;
   BoxExplanations expected(belief, input, *frame.parameters);
-  std::vector<std::size_t> accepted;
+  ScratchVector<std::size_t> accepted;
   for (std::size_t z = 0; z < boxes.size(); ++z) {
     if (explained[static_cast<Eigen::Index>(z)] > frame.parameters->initiation.explained)
       accepted.push_back(z);

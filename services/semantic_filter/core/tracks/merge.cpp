@@ -8,6 +8,7 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/measurement/polygon.h"
+#include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "services/semantic_filter/core/update/predict.h"
 
@@ -38,14 +39,13 @@ bool hasEnoughHits(const Track& known, const Track& other) {
 /// Whether two beliefs contradict each other. Then their mean would be wrong and more certain than
 /// either. The mean of two cuboids that are turned against each other has the shape of neither.
 bool contradict(const Hypothesis& a, const Hypothesis& b) {
-  constexpr double kGate = 24.3;  // χ² with seven dimensions exceeds it once in a thousand times
   constexpr double kTurned = 0.35;  // rad
   if (a.moving) return false;
   const Vector7d d = geometryDifference(a, b);
   if (std::abs(d[kYaw]) > kTurned) return true;
   const Cholesky P(a.P.topLeftCorner<kGeometry, kGeometry>() +
                    b.P.topLeftCorner<kGeometry, kGeometry>());
-  return !P.positive() || P.whiten(d).squaredNorm() > kGate;
+  return !P.positive() || P.whiten(d).squaredNorm() > gates::kNoFusion;
 }
 
 /// Keeps the hypotheses of both, weighted by their numbers of hits. Later observations decide.

@@ -1,8 +1,9 @@
 #include "services/semantic_filter/core/tracks/reidentify.h"
 
 #include <algorithm>
-#include <limits>
+#include <optional>
 
+#include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
@@ -16,7 +17,12 @@ constexpr double kDriven_s = 2.0;   // from the last detection of one to the fir
 constexpr double kTraced_s = 3.0;   // over which a velocity shows where an object came from
 constexpr double kCarried_m = 2.5;  // by which objects are carried
 constexpr int kLeastKeyframes = 3;  // that had the empty place in the image
-constexpr double kTooFar = std::numeric_limits<double>::infinity();
+
+/// A track that was confirmed once and is no longer believed.
+struct Missing {
+  Track* track;
+  bool deleted;
+};
 
 bool isMissing(const Track& o) { return o.life.once_confirmed && o.existence < kMissing; }
 
@@ -53,38 +59,35 @@ bool takesOver(const Track& new_track, const Track& missing) {
              kSameBox;
 }
 
-/// Returns the distance, m, between the place of the missing track and where the new one was then;
-/// infinite if they cannot be one object.
-double distanceBetween(const Track& missing, const Track& new_track, const FrameContext& frame) {
+/// How a new track is a missing one.
+struct Match {
+  double metres;  ///< between the place of the missing track and where the new one was then
+  bool returned;  ///< it stands where it stood
+};
+
+std::optional<Match> matchOf(const Missing& missing, const Track& new_track,
+                             const FrameContext& frame) {
+  const Track& was = *missing.track;
   const Hypothesis& h = new_track.best();
-  if (!confirmedOrEstablished(new_track, frame) || h.class_name == kOtherClass) return kTooFar;
-  if (takesOver(new_track, missing)) return 0.0;
-  if (h.class_name != missing.best().class_name) return kTooFar;
-  const double since = toSeconds(new_track.life.first_seen - missing.life.last_seen);
-  if (since < -kOverlap_s) return kTooFar;
+  if (!confirmedOrEstablished(new_track, frame) || h.class_name == kOtherClass) return std::nullopt;
+  if (takesOver(new_track, was)) return Match{0.0, false};
+  if (h.class_name != was.best().class_name) return std::nullopt;
+  const double since = toSeconds(new_track.life.first_seen - was.life.last_seen);
+  const double ago = toSeconds(new_track.as_of - was.life.last_seen);
+  const double metres = (stateAt(h, -ago) - was.best().x).head<3>().norm();
+  if (missing.deleted && !h.moving && !was.best().moving && since > 0.0 &&
+      new_track.visibility.fraction > 0.0 &&
+      overlap(was.best().x, h.x, frame.view.up_W) >= frame.parameters->tracks.merge_overlap) {
+    return Match{metres, true};
+  }
+  if (since < -kOverlap_s) return std::nullopt;
   const bool carried =
-      frame.priors->of(h.class_name).moving <= 0.0 && wasInView(h.x.head<3>(), missing);
-  if (h.moving ? since > kDriven_s : !carried) return kTooFar;
-  const double ago = toSeconds(new_track.as_of - missing.life.last_seen);
-  if (h.moving && ago > kTraced_s) return kTooFar;
-  const State then = stateAt(h, -ago);
-  const double metres = (then - missing.best().x).head<3>().norm();
+      frame.priors->of(h.class_name).moving <= 0.0 && wasInView(h.x.head<3>(), was);
+  if (h.moving ? since > kDriven_s || ago > kTraced_s : !carried) return std::nullopt;
   // A belief at rest follows an object that drives off for a while.
   const double length = h.x.segment<3>(kSize).array().exp().maxCoeff();
-  return metres < (h.moving ? 0.75 * length : kCarried_m) ? metres : kTooFar;
-}
-
-std::size_t nearest(const std::vector<Track>& tracks, std::size_t of, bool among_missing,
-                    const FrameContext& frame) {
-  std::size_t best = tracks.size();
-  double least = kTooFar;
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (i == of || isMissing(tracks[i]) != among_missing) continue;
-    const double d = among_missing ? distanceBetween(tracks[i], tracks[of], frame)
-                                   : distanceBetween(tracks[of], tracks[i], frame);
-    if (d < least) least = d, best = i;
-  }
-  return best;
+  if (metres >= (h.moving ? 0.75 * length : kCarried_m)) return std::nullopt;
+  return Match{metres, false};
 }
 
 /// The new track keeps its belief and takes over the id, the first times and the counts of the old
@@ -113,62 +116,55 @@ void resumeTrack(Track& past, Track& now, const FrameContext& frame) {
 
 }  // namespace
 
-std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const FrameContext& frame) {
-  std::vector<MergeRecord> merges;
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (!isMissing(tracks[i])) continue;
-    const std::size_t j = nearest(tracks, i, false, frame);
-    if (j == tracks.size() || nearest(tracks, j, true, frame) != i) continue;
-    merges.push_back({tracks[i].id, tracks[j].id, true, false});
-    takeOverIdentity(tracks[i], std::move(tracks[j]));
-    tracks.erase(tracks.begin() + static_cast<std::ptrdiff_t>(j));
-    if (j < i) --i;
-  }
-  return merges;
-}
-
 void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters) {
   std::erase_if(recently_deleted,
                 [&](const Track& o) { return toSeconds(now - o.as_of) > parameters.reidentify_s; });
   for (Track& o : deleted) {
-    const Hypothesis& best = o.best();
-    if (!o.life.once_confirmed || best.moving || best.class_name == kOtherClass) continue;
+    if (!o.life.once_confirmed) continue;
     o.visibility.fraction = 0.0;
     recently_deleted.push_back(std::move(o));
   }
 }
 
-std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks,
-                                           std::vector<Track>& recently_deleted,
-                                           const FrameContext& frame) {
+std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
+                                    std::vector<Track>& recently_deleted,
+                                    const FrameContext& frame) {
+  ScratchVector<Missing> missing;
+  ScratchVector<Track*> fresh;
+  for (Track& o : tracks) isMissing(o) ? missing.push_back({&o, false}) : fresh.push_back(&o);
+  for (Track& o : recently_deleted) missing.push_back({&o, true});
+  struct Pair {
+    std::size_t missing, fresh;
+    Match match;
+  };
+  ScratchVector<Pair> pairs;
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    for (std::size_t j = 0; j < fresh.size(); ++j) {
+      if (const auto match = matchOf(missing[i], *fresh[j], frame)) pairs.push_back({i, j, *match});
+    }
+  }
   std::vector<MergeRecord> merges;
-  for (Track& o : tracks) {
-    if (recently_deleted.empty()) break;
-    if (!confirmedOrEstablished(o, frame) || o.visibility.fraction <= 0.0) continue;
-    const bool moves = o.best().moving;
-    std::size_t match = recently_deleted.size();
-    double most = frame.parameters->tracks.merge_overlap;
-    for (std::size_t i = 0; i < recently_deleted.size(); ++i) {
-      const Track& past = recently_deleted[i];
-      if (o.life.first_seen <= past.life.last_seen) continue;
-      const bool same_class = past.best().class_name == o.best().class_name;
-      const double shared = moves        ? (takesOver(o, past) ? 1.0 : 0.0)
-                            : same_class ? overlap(past.best().x, o.best().x, frame.view.up_W)
-                                         : 0.0;
-      if (shared >= most) most = shared, match = i;
-    }
-    if (match == recently_deleted.size()) continue;
-    merges.push_back({recently_deleted[match].id, o.id, moves, !moves});
-    if (moves) {
-      takeOverIdentity(recently_deleted[match], std::move(o));
+  const auto nearer = [](const Pair& a, const Pair& b) { return a.match.metres < b.match.metres; };
+  std::stable_sort(pairs.begin(), pairs.end(), nearer);
+  // Nearest pairs first: then each of a pair is nearest to the other among those that are left.
+  ScratchVector<bool> found(missing.size(), false), used(fresh.size(), false);
+  for (const Pair& pair : pairs) {
+    Track &past = *missing[pair.missing].track, &now = *fresh[pair.fresh];
+    if (found[pair.missing] || used[pair.fresh]) continue;
+    found[pair.missing] = used[pair.fresh] = true;
+    merges.push_back({past.id, now.id, !pair.match.returned, pair.match.returned});
+    if (pair.match.returned) {
+      resumeTrack(past, now, frame);
     } else {
-      resumeTrack(recently_deleted[match], o, frame);
+      takeOverIdentity(past, std::move(now));
     }
-    o = std::move(recently_deleted[match]);
-    recently_deleted.erase(recently_deleted.begin() + static_cast<std::ptrdiff_t>(match));
+    now = std::move(past);
   }
   if (merges.empty()) return merges;
+  const auto given_up = [](const Track& o) { return o.hypotheses.empty(); };
+  std::erase_if(tracks, given_up);
+  std::erase_if(recently_deleted, given_up);
   std::stable_sort(tracks.begin(), tracks.end(),
                    [](const Track& a, const Track& b) { return a.id < b.id; });
   return merges;

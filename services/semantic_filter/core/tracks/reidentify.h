@@ -9,26 +9,23 @@
 
 namespace perdure::semantic_filter {
 
-/// Finds new tracks that are missing ones (confirmed once, now of little existence). The new track
-/// gets the id and the past of the missing one; its own id is absorbed. New tracks are established
-/// and were first detected when the missing one no longer was. Each of a pair must be nearest to
-/// the other.
-///
-/// A new track that moves must have been at the place of the missing one when that was last
-/// detected. A new track at rest must be near, of a class that is carried, and at a place that was
-/// in view and empty before. A new track that moves and begins, at once, in the last box of the
-/// missing one is the same object, wherever the missing one was believed to be.
-std::vector<MergeRecord> reidentifyMoved(std::vector<Track>& tracks, const FrameContext& frame);
-
-/// Keeps deleted tracks that were confirmed once, at rest and of a known class, for
-/// `parameters.reidentify_s`. They were deleted by existence or by the loss of every plausible size.
+/// Keeps deleted tracks that were confirmed once, for `parameters.reidentify_s`.
 void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters);
-/// Gives an established new track the id and the past of a recently deleted one; its own id is
-/// absorbed. Both are of one class and overlap in space, or the new track moves and takes over the
-/// box of the deleted one. The deleted one was last detected before the new one was first detected.
-std::vector<MergeRecord> reidentifyDeleted(std::vector<Track>& tracks,
-                                           std::vector<Track>& recently_deleted,
-                                           const FrameContext& frame);
+
+/// Gives new tracks the ids and the past of missing ones; their own ids are absorbed. Missing is
+/// what was confirmed once and is of little existence or deleted by now. A new track is established
+/// and of a known class, and was first detected when the missing one no longer was. Pairs are taken
+/// from the nearest to the farthest. One of these must hold:
+/// - It moves and begins, at once, in the last box of the missing one, wherever that was believed.
+/// - It moves and was at the place of the missing one when that was last detected; same class.
+/// - It stands in the place of a deleted one; same class.
+/// - It stands near, is of a class that is carried, and its place was in view and empty before;
+/// same
+///   class.
+/// Where it stands in the old place, both beliefs are merged; else the new one holds.
+std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
+                                    std::vector<Track>& recently_deleted,
+                                    const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

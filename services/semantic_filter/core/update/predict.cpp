@@ -32,7 +32,7 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   Eigen::Vector4d keep = Eigen::Vector4d::Zero();
   double correlation = 0.0;
   if (last) {
-    correlation = std::exp(-viewChange(h.x.head<3>(), *last, walk.T_WC, walk.bias));
+    correlation = viewCorrelation(h.x.head<3>(), *last, walk.T_WC, walk.bias);
     keep = correlation * sigma.cwiseQuotient(stationaryBias(h.x, *last, walk).cwiseMax(1e-12));
   }
   h.x.segment<4>(kBias) = keep.asDiagonal() * h.x.segment<4>(kBias);
@@ -80,13 +80,15 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   // Without a usable transition C becomes 0.
   const Matrix6d transition =
       transitionBetween(track.pose.product, pose_error.product).value_or(Matrix6d::Zero());
-  std::optional<Matrix6d> L_pose = pose_error.covariance;
-  if (!choleskyInPlace(*L_pose)) L_pose.reset();
+  const bool may_disagree = pose_error.reported || track.life.recalled;
+  std::optional<Matrix6d> L_pose;
+  if (may_disagree) L_pose = pose_error.covariance;
+  if (L_pose && !choleskyInPlace(*L_pose)) L_pose.reset();
   for (auto& h : track.hypotheses) {
     if (dt > 0.0) predictHypothesis(h, dt, parameters);
     predictBias(h, track.views.predicted_from, walk);
     h.C = timesTransposed(h.C, transition);
-    keepConsistent(h, pose_error.covariance, L_pose);
+    if (may_disagree) keepConsistent(h, pose_error.covariance, L_pose);
   }
   const bool undetected = track.life.last_seen < track.as_of ||
                           track.unused.occluded.count + track.unused.out_of_view.count > 0;

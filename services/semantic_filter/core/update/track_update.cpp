@@ -35,7 +35,7 @@ Shares sharesOf(const HypothesisScore& h, const ScratchVector<std::size_t>& gate
 void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
                  const HypothesisScore& scored, const std::vector<BoxDetection>& boxes,
                  double repetition, const FrameContext& frame) {
-  const ProjectedBox* at_prior = scored.box ? &*scored.box : nullptr;
+  const ProjectedBox* at_prior = scored.predicted ? &scored.predicted->box : nullptr;
   thread_local std::vector<Hypothesis> parts;
   parts.clear();
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
@@ -115,9 +115,9 @@ void countForDetectionRate(Track& track, const TrackScore& score, bool is_detect
 double noiseRepetition(const Track& track, const FrameContext& frame) {
   if (track.views.detected_from.observations <= 0.0) return 1.0;
   const double scale = frame.parameters->box.noise_view;
-  const double change = viewChange(track.best().x.head<3>(), track.views.detected_from.T_WC,
-                                   frame.view.T_WC(), {scale, scale, 0.5 * scale});
-  const double correlation = std::exp(-change);
+  const double correlation =
+      viewCorrelation(track.best().x.head<3>(), track.views.detected_from.T_WC, frame.view.T_WC(),
+                      {scale, scale, 0.5 * scale});
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
 }
 

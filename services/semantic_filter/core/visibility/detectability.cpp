@@ -16,8 +16,7 @@ double stationaryOccluder(const Track& track, const Eigen::Vector3d& place, cons
   double unmapped_occluder = walk.unmapped_occluder;
   for (const auto& k : track.batch.keyframes.read()) {
     if (k->from->time >= track.life.visit_began) break;  // keyframes are in order of time
-    unmapped_occluder *=
-        1.0 - std::exp(-viewChange(place, k->from->T_WC, walk.T_WC, walk.detectability));
+    unmapped_occluder *= 1.0 - viewCorrelation(place, k->from->T_WC, walk.T_WC, walk.detectability);
   }
   return unmapped_occluder;
 }
@@ -62,7 +61,7 @@ void predictDetectability(Track& track, const ViewWalk& walk) {
   const Eigen::Vector3d place = track.best().x.head<3>();
   const double keep =
       track.views.predicted_from
-          ? std::exp(-viewChange(place, *track.views.predicted_from, walk.T_WC, walk.detectability))
+          ? viewCorrelation(place, *track.views.predicted_from, walk.T_WC, walk.detectability)
           : 0.0;
   const double stationary = stationaryOccluder(track, place, walk);
   track.detectability.unmapped_occluder =

@@ -18,7 +18,7 @@ constexpr double kMayBeFound = 0.5;
 constexpr double kSliver = 0.01;      // visible fraction that is never detected
 constexpr double kNineInTen = 1.645;  // deviations of a Gaussian, for an interval of nine in ten
 
-using Walk = std::vector<View>;  // one view for each frame, the present one first
+using Walk = ScratchVector<View>;  // one view for each frame, the present one first
 
 /// `way_scale`: factor on the translation.
 Walk walkOn(const View& now, const Way& way, double way_scale) {
@@ -43,11 +43,11 @@ const Shape& shapeOf(const Track& track, const FrameInput& now) {
 }
 
 /// Returns the tracks that may hide it along the path: solid, nearer, and next to it in the image.
-std::vector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& hidden,
-                                 const FrameInput& now, const VisibilityParameters& parameters) {
+ScratchVector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& hidden,
+                                   const FrameInput& now, const VisibilityParameters& parameters) {
   const Eigen::Vector3d eye = now.view.T_WC().p;
   const Eigen::Vector3d ray = hidden.best().x.head<3>() - eye;
-  std::vector<std::pair<double, Standing>> near;
+  ScratchVector<std::pair<double, Standing>> near;
   for (const Track& o : tracks) {
     if (o.id == hidden.id || o.existence * o.history.recent_share < parameters.solid) continue;
     const State x = stateAt(o.best(), toSeconds(now.stamp.time - o.as_of));
@@ -59,7 +59,7 @@ std::vector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& 
   const std::size_t kept = std::min(near.size(), kMostBlockers);
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(kept), near.end(),
                     [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<Standing> result;
+  ScratchVector<Standing> result;
   for (std::size_t i = 0; i < kept; ++i) result.push_back(near[i].second);
   return result;
 }
@@ -76,7 +76,7 @@ Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
 
 /// Returns the visible fraction of the first of `things`; the others hide it. The depth buffer is
 /// finer than that of a frame, because a tenth of a small object decides which frame it is.
-double shareInSight(const std::vector<Standing>& things, const View& view,
+double shareInSight(const ScratchVector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
   const Standing& first = things.front();
@@ -102,7 +102,7 @@ double shareInSight(const std::vector<Standing>& things, const View& view,
 
 /// Returns the visible fraction from which the first of `things` may be detected. If so much is
 /// visible already and it was not detected, the fraction is required at which a miss counts.
-double shareToBeFound(const std::vector<Standing>& things, const View& now,
+double shareToBeFound(const ScratchVector<Standing>& things, const View& now,
                       const VisibilityParameters& parameters) {
   const double sure = std::max(parameters.minimum, kSliver), least = kMayBeFound * sure;
   return shareInSight(things, now, parameters) < least ? least : sure;
@@ -110,7 +110,7 @@ double shareToBeFound(const std::vector<Standing>& things, const View& now,
 
 /// Returns the first frame after the present one in which the first of `things` has the visible
 /// fraction `share`.
-std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, const Walk& walk,
+std::optional<std::size_t> firstInSight(const ScratchVector<Standing>& things, const Walk& walk,
                                         double share, double frame_s,
                                         const VisibilityParameters& parameters) {
   const auto inSight = [&](std::size_t n) {
@@ -128,7 +128,7 @@ std::optional<std::size_t> firstInSight(const std::vector<Standing>& things, con
 
 /// Returns the frames after `first` until it is almost surely detected. An object of which little
 /// is visible is detected late.
-std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, std::size_t first,
+std::size_t framesToFind(const ScratchVector<Standing>& things, const Walk& walk, std::size_t first,
                          const VisibilityParameters& parameters) {
   constexpr double kMissed = 0.05;
   double missed = 1.0;
@@ -141,12 +141,12 @@ std::size_t framesToFind(const std::vector<Standing>& things, const Walk& walk, 
 
 /// Returns deviations of state, one standard deviation each, that move the edges which hide the
 /// object.
-std::vector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
+ScratchVector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
   const StateCovariance& P = thing.track->best().P;
   const Eigen::Vector3d ray = (thing.x.head<3>() - eye).normalized();
   Eigen::Vector3d across = ray.cross(Eigen::Vector3d::UnitZ());
   across = across.norm() > 1e-6 ? Eigen::Vector3d(across.normalized()) : Eigen::Vector3d::UnitX();
-  std::vector<State> deviations;
+  ScratchVector<State> deviations;
   for (const Eigen::Vector3d& axis : {ray, across}) {
     State d = State::Zero();
     d.head<3>() = std::sqrt(std::max(axis.dot(P.topLeftCorner<3, 3>() * axis), 0.0)) * axis;
@@ -173,11 +173,11 @@ struct Spread {
 
 bool goes(const Way& way) { return way.seconds > 0.0 && way.step.p.allFinite(); }
 
-std::vector<Standing> inPlay(const std::vector<Track>& tracks, const Track& hidden,
-                             const FrameInput& now, const VisibilityParameters& parameters) {
-  std::vector<Standing> things{{&hidden,
-                                stateAt(hidden.best(), toSeconds(now.stamp.time - hidden.as_of)),
-                                &shapeOf(hidden, now)}};
+ScratchVector<Standing> inPlay(const std::vector<Track>& tracks, const Track& hidden,
+                               const FrameInput& now, const VisibilityParameters& parameters) {
+  ScratchVector<Standing> things{{&hidden,
+                                  stateAt(hidden.best(), toSeconds(now.stamp.time - hidden.as_of)),
+                                  &shapeOf(hidden, now)}};
   const auto blockers = blockersOf(tracks, hidden, now, parameters);
   things.insert(things.end(), blockers.begin(), blockers.end());
   return things;

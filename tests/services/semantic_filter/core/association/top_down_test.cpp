@@ -119,7 +119,7 @@ TEST_F(TopDown, EveryPredictedBoxIsAValidMessage) {
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   FrameInput now;
   now.view = frame.view;
-  now.model = model;
+  now.model = std::make_shared<const Model>(model);
   ComingFrame coming{frame.view, 0.1};
   int sent = 0;
   for (int i = 0; i < 5000; ++i) {

@@ -46,7 +46,7 @@ class Walk {
   std::vector<PoseError> errors;
   PoseError now;
   Keyframes keyframes;
-  std::vector<PoseJacobian> J;
+  ScratchVector<PoseJacobian> J;
 
  private:
   CameraModel camera_{testing::makeCamera()};
@@ -57,7 +57,7 @@ class Walk {
 /// Largest difference in the lower triangle, relative to the largest element.
 double worstShare(const Walk& walk) {
   const KeyframeBatch looks(walk.keyframes, walk.now);
-  Eigen::MatrixXd covariance;
+  SideMatrix covariance;
   looks.poseCovariance(walk.J, covariance);
   double worst = 0.0, largest = 0.0;
   for (std::size_t i = 0; i < walk.errors.size(); ++i) {

@@ -223,7 +223,8 @@ TEST(BatchProblem, WhetherACensoredSideCountsDoesNotChangeTheVolume) {
         Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));
     SideCovariance covariance;
     model.covariance(scene.truth(), *stack, covariance);
-    const Cholesky R(covariance.with(inflations));
+    Cholesky<SideMatrix> R;
+    covariance.factorise(inflations, R);
     EXPECT_EQ(stack->counts[9][2], cut_at > 0.0);
     return std::pair(R.logDeterminant(), model.logVolumeOfCuts(*stack, inflations));
   };

@@ -46,6 +46,7 @@ class Reidentify : public ::testing::Test, protected testing::UsualFrame {
     return o;
   }
 
+  std::vector<Track> none;  ///< deleted
   const State here = makeState(5, 0, 0.4, 0, 0.5, 0.5, 0.9);
   const State beside = makeState(5, 1.4, 0.4, 0, 0.5, 0.5, 0.9);
 };
@@ -53,7 +54,7 @@ class Reidentify : public ::testing::Test, protected testing::UsualFrame {
 TEST_F(Reidentify, AMissingChairAndANewOneNearByAreOneThatWasMoved) {
   std::vector<Track> objects = {missing(3, "chair", here, 8.0),
                                 thing(9, "chair", beside, 18.0, 19.0)};
-  const auto merges = reidentifyMoved(objects, frame);
+  const auto merges = reidentify(objects, none, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(merges[0].absorbed, 9u);
@@ -75,7 +76,7 @@ TEST_F(Reidentify, APresentChairOrAnotherClassOrAnEarlierTrackIsNotTheMissingOne
            {missing(3, "chair", here, 8.0),
             thing(9, "chair", makeState(5, 4.0, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)}}) {
     auto objects = pair;
-    EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
+    EXPECT_TRUE(reidentify(objects, none, frame).empty());
     EXPECT_EQ(objects.size(), 2u);
   }
 }
@@ -84,14 +85,14 @@ TEST_F(Reidentify, ANewTrackInAPlaceNeverInViewWasNotMoved) {
   std::vector<Track> objects = {
       missing(3, "chair", makeState(1.2, 0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
       thing(9, "chair", makeState(-0.6, 0.5, 0.4, 0, 0.5, 0.5, 0.9), 18.0, 19.0)};
-  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentify(objects, none, frame).empty());
 }
 
 TEST_F(Reidentify, OfTwoMissingTracksTheNearestIsTheOneThatWasMoved) {
   std::vector<Track> objects = {missing(2, "chair", makeState(5, -1.0, 0.4, 0, 0.5, 0.5, 0.9), 8.0),
                                 missing(3, "chair", here, 8.0),
                                 thing(9, "chair", beside, 18.0, 19.0)};
-  const auto merges = reidentifyMoved(objects, frame);
+  const auto merges = reidentify(objects, none, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_EQ(merges[0].survivor, 3u);
   EXPECT_EQ(objects.size(), 2u);
@@ -104,16 +105,16 @@ TEST_F(Reidentify, ACarThatDrivesFromThePlaceOfAMissingOneIsThatCar) {
   Track newcomer = thing(9, "car", driving, 8.2, 9.0);
   newcomer.hypotheses[0].moving = true;
   std::vector<Track> objects = {missing(3, "car", parked, 8.0), newcomer};
-  EXPECT_EQ(reidentifyMoved(objects, frame).size(), 1u);
+  EXPECT_EQ(reidentify(objects, none, frame).size(), 1u);
   objects = {missing(3, "car", parked, 8.0), newcomer};
   objects[1].hypotheses[0].x[kVelocity] = -4.0;  // it comes from another place
-  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentify(objects, none, frame).empty());
   objects = {missing(3, "car", parked, 4.0), newcomer};  // missing for too long
-  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentify(objects, none, frame).empty());
   objects = {missing(3, "car", parked, 8.0), newcomer};
   objects[1].as_of = at(12.0);  // its later motion does not follow from its present velocity
   objects[1].hypotheses[0].x[0] = 36.0;
-  EXPECT_TRUE(reidentifyMoved(objects, frame).empty());
+  EXPECT_TRUE(reidentify(objects, none, frame).empty());
 }
 
 /// A track whose place is wrong, and a new moving track at the true place.
@@ -134,7 +135,7 @@ class ReidentifyByBox : public Reidentify {
   }
   std::vector<MergeRecord> reunited(const TakenOver& two) {
     objects = {two.past, two.now};
-    return reidentifyMoved(objects, frame);
+    return reidentify(objects, none, frame);
   }
   std::vector<Track> objects;
 };
@@ -172,7 +173,7 @@ TEST_F(ReidentifyByBox, HoldsForRecentlyDeletedTracksToo) {
   keepDeleted(recently_deleted, {two.past}, at(8.1), parameters.tracks);
   objects = {two.now};
   objects[0].visibility.fraction = 1.0;
-  const auto merges = reidentifyDeleted(objects, recently_deleted, frame);
+  const auto merges = reidentify(objects, recently_deleted, frame);
   ASSERT_EQ(merges.size(), 1u);
   EXPECT_TRUE(merges[0].moved);
   EXPECT_FALSE(merges[0].returned);
@@ -194,7 +195,7 @@ class ReidentifyDeleted : public Reidentify {
   std::vector<MergeRecord> after(std::vector<Track> past, const Track& newcomer) {
     objects = {newcomer};
     objects[0].visibility.fraction = 1.0;
-    return reidentifyDeleted(objects, past, frame);
+    return reidentify(objects, past, frame);
   }
   std::vector<Track> objects;
 };
@@ -229,21 +230,43 @@ TEST_F(ReidentifyDeleted, AnEstablishedTrackNeedsNoConfirmation) {
 }
 
 TEST_F(ReidentifyDeleted, NoOtherTrackIsTakenForIt) {
+  const State out_of_reach = makeState(5, 3.0, 0.4, 0, 0.5, 0.5, 0.9);
   EXPECT_TRUE(
-      after(recently_deleted("chair", here), thing(9, "chair", beside, 11.0, 12.0)).empty());
+      after(recently_deleted("chair", here), thing(9, "chair", out_of_reach, 11.0, 12.0)).empty());
   EXPECT_TRUE(after(recently_deleted("car", here), thing(9, "chair", here, 11.0, 12.0)).empty());
   EXPECT_TRUE(after(recently_deleted("chair", here), thing(9, "chair", here, 7.0, 12.0)).empty())
       << "both were seen";
   EXPECT_TRUE(after(recently_deleted("chair", here), missing(9, "chair", here, 12.0)).empty());
 }
 
+TEST_F(ReidentifyDeleted, WhatWasCarriedWhileItWasDeletedIsThatTrack) {
+  const auto merges = after(recently_deleted("chair", here), thing(9, "chair", beside, 11.0, 12.0));
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_TRUE(merges[0].moved);
+  ASSERT_EQ(objects.size(), 1u);
+  EXPECT_EQ(objects[0].id, 3u);
+  EXPECT_NEAR(objects[0].best().x[1], 1.4, 1e-9) << "the old place says nothing of the new one";
+}
+
+TEST_F(ReidentifyDeleted, TheNearestPairIsTakenFirst) {
+  std::vector<Track> past = recently_deleted("chair", here);
+  objects = {thing(8, "chair", beside, 11.0, 12.0),
+             thing(9, "chair", makeState(5.05, 0.05, 0.4, 0, 0.5, 0.5, 0.9), 11.0, 12.0)};
+  for (Track& o : objects) o.visibility.fraction = 1.0;
+  const auto merges = reidentify(objects, past, frame);
+  ASSERT_EQ(merges.size(), 1u);
+  EXPECT_EQ(merges[0].absorbed, 9u);
+  ASSERT_EQ(objects.size(), 2u);
+  EXPECT_EQ(objects[0].id, 3u);
+  EXPECT_EQ(objects[1].id, 8u);
+  EXPECT_TRUE(past.empty());
+}
+
 TEST_F(ReidentifyDeleted, TracksNeverConfirmedOrLongDeletedAreForgotten) {
   Track guess = missing(3, "chair", here, 8.0);
   guess.life.once_confirmed = false;
-  Track driver = missing(4, "car", here, 8.0);
-  driver.hypotheses[0].moving = true;
   std::vector<Track> list;
-  keepDeleted(list, {guess, driver}, at(10.0), parameters.tracks);
+  keepDeleted(list, {guess}, at(10.0), parameters.tracks);
   EXPECT_TRUE(list.empty());
   list = recently_deleted("chair", here);
   ASSERT_EQ(list.size(), 1u);

@@ -73,13 +73,12 @@ TEST_F(Reinitialise, OneBoxDoesNotReinitialiseAConfirmedTrackAtRest) {
     FrameInput input;
     input.stamp = testing::stampOf(1);
     input.view = frame.view;
-    input.model = model;
+    input.model = std::make_shared<const Model>(model);
     input.boxes = {{*makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box,
                                       parameters.clutter)}};
     IdBook ids;
     ids.atLeast(10);
-    const Belief before = belief;
-    SemanticFilter(parameters, priors).step(before, belief, input, ids);
+    SemanticFilter(parameters, priors).step(belief, input, ids);
     return belief.tracks.at(0);
   };
   const Track guess = after(false);

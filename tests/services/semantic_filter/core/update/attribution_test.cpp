@@ -18,7 +18,9 @@ using testing::makePriors;
 using testing::makeState;
 
 double natsOf(const ClassAccount& account, const std::string& name, ClassEvidence kind) {
-  for (const auto& c : account.published()) {
+  Ledger ledger;
+  account.publish(ledger);
+  for (const auto& c : ledger.classes) {
     if (c.name == name) return c.log_odds[static_cast<std::size_t>(kind)];
   }
   ADD_FAILURE() << "no class " << name;

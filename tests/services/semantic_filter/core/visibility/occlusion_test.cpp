@@ -24,8 +24,8 @@ class Occlusion : public ::testing::Test {
             0.5 * std::exp(x[4]),
             projectOutline(x, view)};
   }
-  std::vector<TrackVisibility> seeThem(const std::vector<Outline>& o,
-                                       const std::vector<LandmarkDepth>& points = {}) const {
+  ScratchVector<TrackVisibility> seeThem(const ScratchVector<Outline>& o,
+                                         const std::vector<LandmarkDepth>& points = {}) const {
     return computeVisibility(o, points, camera.width(), camera.height(), {});
   }
   CameraModel camera{makeCamera()};
@@ -55,7 +55,7 @@ TEST_F(Occlusion, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
 TEST_F(Occlusion, PaintingOnAnotherGridLeavesNothingBehind) {
   const auto rear = outline(7, makeState(30, 1.5, 0.75, M_PI / 2, 4.2, 1.7, 1.5));
   const auto front = outline(3, makeState(10, 1.3, 0.75, 0, 3.0, 1.8, 2.5));
-  const auto share = [&](const std::vector<Outline>& things, std::int64_t cell_px) {
+  const auto share = [&](const ScratchVector<Outline>& things, std::int64_t cell_px) {
     VisibilityParameters parameters;
     parameters.cell_px = cell_px;
     return computeVisibility(things, {}, camera.width(), camera.height(), parameters)

@@ -94,7 +94,9 @@ TEST_F(ReturnTime, RoundObjectsHideLessThanTheirCuboids) {
   const auto of_cuboids = foresee();
   auto styles = std::make_shared<BoxStyles>();
   styles->by_class["car"].shape = shapeOf({{-1.0, 0.8, 0.8, 0.7}, {1.0, 0.8, 0.8, 0.7}});
-  now.model.styles = styles;
+  Model model;
+  model.styles = styles;
+  now.model = std::make_shared<const Model>(std::move(model));
   const auto of_shapes = foresee();
   ASSERT_TRUE(of_cuboids && of_shapes);
   EXPECT_LT(of_shapes->expected, of_cuboids->expected - 0.5 * kFrame_s);

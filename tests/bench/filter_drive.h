@@ -1,0 +1,55 @@
+// The drive of filter_bench: a field of chairs, people and cars that a camera drives through, seen
+// by a network that misses one in ten and makes false boxes, poses that drift and say so.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <random>
+#include <vector>
+
+#include "services/semantic_filter/node.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter::bench {
+
+/// Things at random on both sides of the way, as many in view at any time as asked.
+class Field {
+ public:
+  Field(std::size_t in_view, std::uint32_t seed);
+  /// What stands within visibility of `x`, new things ahead.
+  const std::deque<testing::TrueObject>& near(double x);
+
+ private:
+  void plant();
+
+  std::mt19937 random_;
+  double density_, planted_ = 4.0;
+  std::deque<testing::TrueObject> things_;
+};
+
+struct Sample {
+  double cpu_ms = 0.0;
+  std::uint64_t allocations = 0;
+  std::size_t in_view = 0, objects = 0, boxes = 0;
+};
+
+class Drive {
+ public:
+  Drive(const Config& config, std::size_t in_view, std::uint32_t seed);
+  /// Frame k: frames come in order, from 0.
+  Sample frame(std::uint64_t k);
+
+ private:
+  void count(const Objects& message);
+  Detections look(std::uint64_t k, const RigidTransform& T_WB);
+
+  Field field_;
+  std::mt19937 random_;
+  CameraCalibration camera_;
+  CameraModel model_;
+  std::size_t objects_ = 0, in_view_ = 0;  ///< of the newest message
+  Node node_;
+};
+
+}  // namespace perdure::semantic_filter::bench
