@@ -8,8 +8,10 @@ namespace {
 
 constexpr std::size_t kAlignment = 32, kBytes = std::size_t{8} << 20;
 
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__)
 constexpr bool kHeapOnly = true;
+#elif defined(__clang__)
+constexpr bool kHeapOnly = __has_feature(address_sanitizer);
 #else
 constexpr bool kHeapOnly = false;
 #endif
