@@ -49,7 +49,7 @@ Table makeTable() {
       row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
       row(kCalibration, latched(1), 0, kRecorded, kCapture, kVio | kSemanticFilter | kSubscriber),
       row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio,
-          kSemanticFilter | kCapture | kSubscriber),  // capture follows it (pace.mode)
+          kSemanticFilter | kCapture | kMapStore | kSubscriber),  // capture follows it (pace.mode)
       row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio, kSemanticFilter | kSubscriber),
       row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded, kInference,
           kInference | kSemanticFilter | kCapture | kSubscriber),

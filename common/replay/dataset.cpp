@@ -176,4 +176,16 @@ void Dataset::seek(std::uint64_t index) {
   next_speed_ = firstAfter(recording_.speed);
 }
 
+std::optional<std::uint64_t> Dataset::skip(Duration after) {
+  std::optional<TimePoint> first;
+  for (const auto& frame : recording_.frames) {
+    if (frame.camera != 0) continue;
+    if (!first) first = frame.time;
+    if (frame.time - *first < after) continue;
+    seek(frame.index);
+    return frame.index;
+  }
+  return std::nullopt;
+}
+
 }  // namespace perdure::replay

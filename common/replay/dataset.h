@@ -83,6 +83,9 @@ class Dataset {
   const std::string& lastProblem() const { return last_problem_; }
   /// Continues at frame `index` with the samples that follow the frame before it.
   void seek(std::uint64_t index);
+  /// seek() to the first frame of cam0 that comes `after` the first one by so much, and its index;
+  /// nothing where there is none.
+  std::optional<std::uint64_t> skip(Duration after);
 
  private:
   std::optional<Frame> decodeFrame(const Recording::FrameFile& file);

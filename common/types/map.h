@@ -87,6 +87,12 @@ struct Recalled {
   /// Time of the newest frame of the client's whose working set is on the disk; 0: none.
   TimePoint kept;
   bool truncated = false;  ///< there are more near that place: these are the nearest
+  /// The beliefs were laid where they are by the map's graph: covariances are relative to the body,
+  /// and cross_pose is zero. False: as they were in W.
+  bool laid = false;
+  /// The map's graph takes the drift of the odometry out, so that the filter does not.
+  bool graph = false;
+  std::vector<MergeOrder> merges;  ///< to be done once `objects` are in the working set
 };
 
 }  // namespace perdure

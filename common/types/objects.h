@@ -67,6 +67,16 @@ struct Objects {
   Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
   ObjectId next_id = 1;  ///< ids below it were given out
   std::vector<ObjectBelief> objects;
+  /// Of [θ, p] as in Odometry: what `cross_pose` of objects detected in this frame refers to. Zero:
+  /// not known.
+  Eigen::Matrix<double, 6, 6> pose_error = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+/// Two objects that a loop in the map shows to be one.
+struct MergeOrder {
+  std::uint64_t loop = 0;  ///< counts from 1 within a map
+  ObjectId survivor = 0;   ///< the older one
+  ObjectId absorbed = 0;
 };
 
 /// The newest state of one object of the working set; latched on `object_state`, keyed by its id,

@@ -37,6 +37,8 @@ TEST(IncludeRules, ForbidWhatCrossesLayers) {
               ElementsAre(HasSubstr("only those below it")));
   EXPECT_THAT(including("common/wire/a.h", "common/bus/topics.h"),
               ElementsAre(HasSubstr("only those below it")));
+  EXPECT_THAT(including("common/mapping/frames/a.h", "common/mapping/graph/b.h"),
+              ElementsAre(HasSubstr("a layer of a folder")));
   EXPECT_THAT(including("services/vio/core/tracks/a.h", "services/vio/core/update/b.h"),
               ElementsAre(HasSubstr("a layer of a folder")));
   EXPECT_THAT(including("services/vio/core/estimator.h", "services/vio/core/start/a.h"),

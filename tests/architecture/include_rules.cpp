@@ -9,8 +9,8 @@ namespace perdure::tests {
 namespace {
 
 /// Bottom to top: a folder uses only itself and those before it.
-constexpr std::array kCommon{"base",   "math", "types", "camera", "sim",    "config",
-                             "vision", "wire", "bus",   "replay", "service"};
+constexpr std::array kCommon{"base",   "math",   "types", "camera", "mapping", "sim",
+                             "config", "vision", "wire",  "bus",    "replay",  "service"};
 
 /// Folders with layers of their own: their sub-folders from bottom to top; "" is the folder itself.
 struct Layers {
@@ -20,6 +20,7 @@ struct Layers {
 const std::vector<Layers> kLayers{
     {"common/wire/", {"description", ""}},
     {"common/bus/", {"security", ""}},
+    {"common/mapping/", {"frames", "graph", "places", ""}},
     {"common/replay/", {"files", "recordings", ""}},
     {"common/sim/scenes/", {"parts", ""}},
     {"services/semantic_filter/core/",
@@ -29,6 +30,7 @@ const std::vector<Layers> kLayers{
     {"services/inference/core/", {"", "network", "decode", "takeover"}},
     {"tools/bus_tools/", {"", "status", "doctor"}},
     {"tools/calibrate/", {"estimate", ""}},
+    {"tools/evaluate/", {"", "memory"}},
     {"tools/outputs/", {"pictures", ""}},
     {"tools/simulate/", {"shapes", "render", ""}}};
 

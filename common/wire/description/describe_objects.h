@@ -84,6 +84,7 @@ void describe(A& a, D& d, W& w) {
   a.unit("up_W", d.up_W, w.up_W);
   a.value("next_id", d.next_id, w.next_object_id);
   a.list("objects", d.objects, w.items, kObjects);
+  a.symmetric("pose_error", d.pose_error, w.pose_error);
 }
 
 template <class A, Is<ObjectState> D, class W>
@@ -94,6 +95,15 @@ void describe(A& a, D& d, W& w) {
   a.object("object", d.object, w.belief);
   a.value("id", d.object.id, w.object_id);  // the key: all that a dispose carries
   a.ensureWire("id", "size_mismatch", [&] { return w.object_id == w.belief.object_id; });
+}
+
+template <class A, Is<MergeOrder> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("loop", d.loop, w.loop);
+  a.value("survivor", d.survivor, w.survivor);
+  a.value("absorbed", d.absorbed, w.absorbed);
+  a.ensure("absorbed", "out_of_range",
+           [&] { return d.survivor != 0 && d.absorbed != 0 && d.survivor != d.absorbed; });
 }
 
 template <class A, Is<Recalled> D, class W>
@@ -107,6 +117,9 @@ void describe(A& a, D& d, W& w) {
   a.value("request", d.request, w.request);
   a.time("kept_ns", d.kept, w.kept_ns);
   a.value("truncated", d.truncated, w.truncated);
+  a.value("laid", d.laid, w.laid);
+  a.value("graph", d.graph, w.graph);
+  a.list("merges", d.merges, w.merges, kObjects);
 }
 
 template <class A, Is<Event> D, class W>

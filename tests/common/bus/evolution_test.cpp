@@ -82,6 +82,9 @@ TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedger) {
   for (const Recalled& read : got) {
     ASSERT_EQ(read.objects.size(), 2u);
     EXPECT_EQ(read.client, 99u);
+    EXPECT_FALSE(read.laid);
+    EXPECT_FALSE(read.graph);
+    EXPECT_TRUE(read.merges.empty());
     for (std::size_t i = 0; i < 2; ++i) {
       EXPECT_EQ(read.objects[i].id, 10 + i);
       EXPECT_EQ(read.objects[i].best().name, "car");
@@ -103,6 +106,7 @@ TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedger) {
   Recalled message;
   while (message.objects.size() < 3) message.objects.push_back(examples.belief());
   ASSERT_FALSE(message.objects[0].why.empty());
+  message.merges = {examples.mergeOrder(), examples.mergeOrder()};
   ASSERT_TRUE(writer.write(message));
   void* sample = nullptr;
   dds_sample_info_t info{};

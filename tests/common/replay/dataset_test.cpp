@@ -118,5 +118,19 @@ TEST(Dataset, SeekGoesOnWhereAnotherStopped) {
   EXPECT_FALSE(late->next());
 }
 
+TEST(Dataset, SkipGoesToTheFirstFrameThatIsSoLate) {
+  const auto dataset = Dataset::open({.path = tinyEuroc("skip", true)});  // frames each 50 ms
+  EXPECT_EQ(dataset->skip(std::chrono::milliseconds(60)), 2U);
+  const auto first = dataset->next();
+  ASSERT_TRUE(first);
+  const auto* imu = std::get_if<ImuSample>(&*first);
+  ASSERT_NE(imu, nullptr) << "the samples since the frame before come first";
+  EXPECT_GT(imu->time, *dataset->frameTime(1));
+  EXPECT_THAT(frameIndices(*dataset), ElementsAre(2, 2, 3, 3, 4, 4));
+  EXPECT_EQ(dataset->skip(Duration(0)), 0U);
+  EXPECT_EQ(dataset->skip(std::chrono::milliseconds(200)), 4U);
+  EXPECT_FALSE(dataset->skip(std::chrono::milliseconds(201)));
+}
+
 }  // namespace
 }  // namespace perdure::replay

@@ -83,6 +83,9 @@ TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
   const auto object = toJson(objects)["objects"][0];
   EXPECT_EQ(object.size(), members<ObjectBelief>());
   EXPECT_EQ(object["classes"][0].size(), members<ClassBelief>());
+  Recalled recalled;
+  recalled.merges = {examples.mergeOrder()};
+  EXPECT_EQ(toJson(recalled)["merges"][0].size(), members<MergeOrder>());
   Objects explained;
   explained.objects = {examples.belief()};
   Ledger& ledger = explained.objects[0].why;

@@ -185,12 +185,23 @@ class Examples {
     return b;
   }
   void fill(Objects& m) {
-    m = {stamp(), bits(), world(), pose(), unit(), bits(), several([&] { return belief(); })};
+    m = {stamp(),
+         bits(),
+         world(),
+         pose(),
+         unit(),
+         bits(),
+         several([&] { return belief(); }),
+         covariance<Matrix6d>()};
+  }
+  MergeOrder mergeOrder() {
+    const ObjectId survivor = 1 + below(99);
+    return {bits(), survivor, survivor + 1 + below(99)};
   }
   void fill(ObjectState& m) { m = {stamp(), bits(), world(), belief()}; }
   void fill(Recalled& m) {
     m = {bits(), world(), coin(), bits(), bits(), several([&] { return belief(); }),
-         bits(), time(),  coin()};
+         bits(), time(),  coin(), coin(), coin(), several([&] { return mergeOrder(); })};
   }
   void fill(Event& m) {
     m = {stamp(), bits(),        world(), static_cast<EventKind>(below(15)), bits(), bits(),

@@ -128,6 +128,24 @@ TEST(Refusals, OfCovariancesThatAreNone) {
             "bad_covariance object.classes[0].covariance");
 }
 
+TEST(Refusals, OfPoseErrorsThatAreNone) {
+  Objects objects = example<Objects>();
+  objects.pose_error(2, 2) = -1;
+  EXPECT_EQ(refusal(objects), "bad_covariance pose_error");
+  objects.pose_error.setZero();  // not known
+  EXPECT_EQ(refusal(objects), "");
+}
+
+TEST(Refusals, OfMergesOfNothingAndOfOneObjectWithItself) {
+  Recalled recalled = example<Recalled>();
+  recalled.merges = {{3, 7, 9}, {3, 8, 10}};
+  EXPECT_EQ(refusal(recalled), "");
+  recalled.merges[1].absorbed = 8;
+  EXPECT_EQ(refusal(recalled), "out_of_range merges[1].absorbed");
+  recalled.merges[1] = {3, 0, 10};
+  EXPECT_EQ(refusal(recalled), "out_of_range merges[1].absorbed");
+}
+
 TEST(Refusals, OfRotationsThatAreNone) {
   Odometry odometry = example<Odometry>();
   odometry.T_WB.q.coeffs() *= 1.1;

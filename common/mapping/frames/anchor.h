@@ -1,0 +1,24 @@
+// Anchor: a place on the way of the body to which long-term memory is tied. Objects keep their
+// pose relative to an anchor. When the graph moves anchors, objects move with them.
+#pragma once
+
+#include <cstdint>
+
+#include "common/base/ids.h"
+#include "common/mapping/frames/level_pose.h"
+
+namespace perdure::mapping {
+
+using AnchorId = std::uint64_t;  ///< 0: none. Ids grow with time within a session
+
+struct Anchor {
+  AnchorId id = 0;
+  AnchorId previous = 0;  ///< of the same session; 0: the first one
+  WorldId session;        ///< the odometry's frame of reference W
+  FrameStamp stamp;
+  RigidTransform T_WA;          ///< z against gravity; never changes
+  LevelGaussian from_previous;  ///< T_previous,A by odometry
+  double way_m = 0.0;           ///< driven in the session so far
+};
+
+}  // namespace perdure::mapping

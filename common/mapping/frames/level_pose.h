@@ -1,0 +1,52 @@
+// Poses in frames whose z axes are against gravity: position and yaw. What roll and pitch a vehicle
+// has is known from gravity at each place; it does not drift.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/math/rigid_transform.h"
+
+namespace perdure::mapping {
+
+/// T_AB: x_A = R_z(yaw) x_B + p.
+struct LevelPose {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< m
+  double yaw = 0.0;                             ///< rad, (-π, π]
+
+  Eigen::Matrix3d R() const;
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return R() * x + p; }
+  LevelPose operator*(const LevelPose& other) const;
+  LevelPose inverse() const;
+  RigidTransform rigid() const { return RigidTransform(R(), p); }
+};
+
+/// Errors are [δp, δyaw] with p = p̂ + δp (axes of A) and yaw = ŷ + δyaw; m and rad.
+using LevelError = Eigen::Vector4d;
+/// `a` minus `b`.
+LevelError difference(const LevelPose& a, const LevelPose& b);
+
+/// T_AB with the covariance of its error.
+struct LevelGaussian {
+  LevelPose mean;
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+};
+
+/// T_AB T_BC of independent errors.
+LevelGaussian compose(const LevelGaussian& T_AB, const LevelGaussian& T_BC);
+LevelGaussian inverse(const LevelGaussian& T_AB);
+
+/// d(error of T_AB T_BC) by the error of T_AB, and of T_BC.
+Eigen::Matrix4d composedByFirst(const LevelPose& T_AB, const LevelPose& T_BC);
+Eigen::Matrix4d composedBySecond(const LevelPose& T_AB);
+/// d(error of T_AB⁻¹) by the error of T_AB.
+Eigen::Matrix4d invertedBy(const LevelPose& T_AB);
+
+/// Position and yaw of a transform between frames that are both level, or nearly.
+LevelPose levelOf(const RigidTransform& T_AB);
+
+/// The frame at the place of B whose z axis is `up_A` and whose x axis is B's x, made level. Where
+/// B's x is within 17° of the vertical it is B's z, along which a camera looks. Both in A; `up_A`
+/// is a unit vector.
+RigidTransform levelled(const RigidTransform& T_AB, const Eigen::Vector3d& up_A);
+
+}  // namespace perdure::mapping

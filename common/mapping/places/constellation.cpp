@@ -1,0 +1,516 @@
+#include "common/mapping/places/constellation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <unordered_map>
+
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
+
+namespace perdure::mapping {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kGate = 3.0;      // deviations of a pair's distance
+constexpr double kStreet_m = 6.0;  // deviation of the chance density around the map's objects
+constexpr double kReach_m = 4.0 * kStreet_m;
+// m⁻²; chance density where the map has no objects: one in a disc of 100 m radius
+constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
+constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
+constexpr std::size_t kMostSeen = 48, kMostVotes = 500'000, kCandidates = 64;
+// beyond this, a way is another one
+constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
+constexpr double kSure = 0.9;
+constexpr double kDefaultShare = 1e-3;  // of a class that one of the two PMFs does not name
+
+double wrapHalfTurn(double angle) { return 0.5 * wrapAngle(2.0 * angle); }
+
+double planeVariance(const PlacedObject& o) {
+  return 0.5 * o.covariance.topLeftCorner<2, 2>().trace();
+}
+
+/// log-likelihood ratio of a yaw known modulo 180°, against any yaw.
+double logSameYaw(double difference, double variance) {
+  const double d = wrapHalfTurn(difference);
+  double density = 0.0;
+  for (const double turn : {-kPi, 0.0, kPi}) {
+    density += std::exp(-0.5 * (d + turn) * (d + turn) / variance);
+  }
+  return std::log(std::max(density * std::sqrt(kPi / (2.0 * variance)), 1e-6));
+}
+
+bool anotherWay(const LevelPose& a, const LevelPose& b) {
+  return (a.p - b.p).head<2>().norm() > kOther_m || std::abs(wrapAngle(a.yaw - b.yaw)) > kOther_rad;
+}
+
+std::uint32_t mostProbable(const PlacedObject& o) {
+  return std::max_element(
+             o.pmf.begin(), o.pmf.end(),
+             [](const auto& a, const auto& b) { return a.probability < b.probability; })
+      ->name;
+}
+
+/// Indices of places in the plane, by squares as wide as the reach of a search.
+class Grid {
+ public:
+  Grid(double width, const std::vector<PlacedObject>& objects) : width_(width) {
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      cells_[keyOf(cell(objects[k].p.x()), cell(objects[k].p.y()))].push_back(k);
+    }
+  }
+  /// Calls `visit` for all within `width`, and some beyond.
+  template <class Visit>
+  void around(const Eigen::Vector2d& p, const Visit& visit) const {
+    for (std::int64_t x = cell(p.x()) - 1; x <= cell(p.x()) + 1; ++x) {
+      for (std::int64_t y = cell(p.y()) - 1; y <= cell(p.y()) + 1; ++y) {
+        const auto found = cells_.find(keyOf(x, y));
+        if (found == cells_.end()) continue;
+        for (const std::size_t k : found->second) visit(k);
+      }
+    }
+  }
+
+ private:
+  std::int64_t cell(double v) const { return static_cast<std::int64_t>(std::floor(v / width_)); }
+  static std::int64_t keyOf(std::int64_t x, std::int64_t y) { return x * 0x100000 + y; }
+
+  double width_;
+  std::unordered_map<std::int64_t, std::vector<std::size_t>> cells_;
+};
+
+class Search {
+ public:
+  Search(PlaceQuery query, const PlaceParameters& parameters)
+      : parameters_(parameters),
+        prior_(query.prior),
+        seen_(std::move(query.seen)),
+        map_(std::move(query.map)),
+        driven_(std::move(query.driven)),
+        prior_information_(inverseSymmetric(prior_.covariance)),
+        grid_(kReach_m, map_) {
+    keepTheSurest();
+    compareClasses();
+  }
+
+  std::optional<PlaceMatch> best() const {
+    struct Way {
+      LevelPose x;
+      double score;
+    };
+    std::vector<Way> ways;
+    for (const LevelPose& start : proposals()) {
+      const LevelPose x = settled(start);
+      ways.push_back({x, scoreOf(x)});
+    }
+    if (ways.empty()) return std::nullopt;
+    std::stable_sort(ways.begin(), ways.end(),
+                     [](const Way& a, const Way& b) { return a.score > b.score; });
+    const Way& first = ways.front();
+    const auto next = std::find_if(ways.begin(), ways.end(),
+                                   [&](const Way& w) { return anotherWay(w.x, first.x); });
+    PlaceMatch match;
+    match.T_MB.mean = first.x;
+    match.score = first.score;
+    match.cells = cells();
+    match.next = std::max(next == ways.end() ? -1e9 : next->score, scoreOfNone());
+    MatchEquations equations;
+    for (const auto& [k, i] : surePairs(first.x)) {
+      equations.add(seen_[i], map_[k], first.x, 1.0, 0.0);
+      match.pairs.emplace_back(map_[k].id, seen_[i].id);
+    }
+    if (match.pairs.empty()) return std::nullopt;
+    // What the pairs say alone.
+    const Eigen::Vector4d step = equations.step();
+    match.T_MB.mean.p += step.head<3>();
+    match.T_MB.mean.yaw = wrapAngle(match.T_MB.mean.yaw + step[3]);
+    match.T_MB.covariance = equations.covariance();
+    return match;
+  }
+
+ private:
+  struct Cell {
+    double votes = 0.0;
+    Eigen::Vector2d place = Eigen::Vector2d::Zero();
+    Eigen::Vector2d heading = Eigen::Vector2d::Zero();
+  };
+  using Cells = std::unordered_map<std::uint64_t, Cell>;
+
+  void keepTheSurest() {
+    std::stable_sort(seen_.begin(), seen_.end(), [](const PlacedObject& a, const PlacedObject& b) {
+      return planeVariance(a) < planeVariance(b);
+    });
+    if (seen_.size() > kMostSeen) seen_.resize(kMostSeen);
+  }
+
+  /// log of p(one object has both PMFs) against p(two objects have them), for all of both.
+  void compareClasses() {
+    std::map<std::uint32_t, double> common;
+    for (const PlacedObject& o : map_) {
+      for (const ClassShare& c : o.pmf) {
+        common[c.name] += c.probability / static_cast<double>(map_.size());
+      }
+    }
+    same_class_.resize(static_cast<Eigen::Index>(seen_.size()),
+                       static_cast<Eigen::Index>(map_.size()));
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      std::map<std::uint32_t, double> weights;
+      for (const ClassShare& c : seen_[i].pmf) {
+        const auto share = common.find(c.name);
+        if (share != common.end() && share->second > 0.0)
+          weights[c.name] = c.probability / share->second;
+      }
+      for (std::size_t k = 0; k < map_.size(); ++k) {
+        double ratio = kDefaultShare;
+        for (const ClassShare& c : map_[k].pmf) {
+          const auto weight = weights.find(c.name);
+          if (weight != weights.end()) ratio += weight->second * c.probability;
+        }
+        same_class_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = std::log(ratio);
+      }
+    }
+  }
+
+  double sameClass(std::size_t i, std::size_t k) const {
+    return same_class_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+  }
+
+  double deviations2(const LevelPose& x) const {
+    const LevelError d = difference(x, prior_.mean);
+    return d.dot(prior_information_ * d);
+  }
+
+  bool insidePrior(const LevelPose& x) const {
+    const LevelError d = difference(x, prior_.mean);
+    const auto g = parameters_.gate_sigmas;
+    const double plane =
+        prior_.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff() + kCell_m * kCell_m;
+    return d.head<2>().squaredNorm() < g * g * 2.0 * plane &&
+           std::abs(d[3]) < g * std::sqrt(prior_.covariance(3, 3)) + kCell_rad;
+  }
+
+  /// How many ways the prior leaves that are different places: each a metre, three degrees.
+  double cells() const {
+    constexpr double kDistinct_m = 1.0, kDistinct_rad = 3.0 * kPi / 180.0;
+    const double area =
+        2.0 * kPi * std::sqrt(std::max(prior_.covariance.topLeftCorner<2, 2>().determinant(), 0.0));
+    const double turn = std::min(std::sqrt(2.0 * kPi * prior_.covariance(3, 3)), 2.0 * kPi);
+    return std::max(1.0, area / (kDistinct_m * kDistinct_m)) * std::max(1.0, turn / kDistinct_rad);
+  }
+
+  bool yawsAgree(const PlacedObject& seen, const PlacedObject& known, double turn) const {
+    const double deviation = std::sqrt(seen.covariance(3, 3) + known.covariance(3, 3));
+    return std::abs(wrapHalfTurn(known.yaw - seen.yaw - turn)) < kGate * deviation + 0.05;
+  }
+
+  void vote(Cells& cells, const LevelPose& x, double votes) const {
+    if (!insidePrior(x)) return;
+    const auto bits = [](double value) {
+      return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(value)) & 0xfffff);
+    };
+    Cell& cell = cells[bits(x.p.x() / kCell_m) | bits(x.p.y() / kCell_m) << 20 |
+                       bits((x.yaw + kPi) / kCell_rad) << 40];
+    cell.votes += votes;
+    cell.place += votes * x.p.head<2>();
+    cell.heading += votes * Eigen::Vector2d(std::cos(x.yaw), std::sin(x.yaw));
+  }
+
+  /// Each pair of seen objects and each like pair of the map, nearest distances first.
+  void votePairs(Cells& cells) const {
+    struct MapPair {
+      double distance;
+      std::size_t c, d;
+    };
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<MapPair>> pairs;
+    for (std::size_t c = 0; c < map_.size(); ++c) {
+      for (std::size_t d = 0; d < map_.size(); ++d) {
+        const double distance = (map_[c].p - map_[d].p).head<2>().norm();
+        if (c == d || distance < parameters_.pair_least_m || distance > parameters_.pair_most_m)
+          continue;
+        pairs[{mostProbable(map_[c]), mostProbable(map_[d])}].push_back({distance, c, d});
+      }
+    }
+    for (auto& [classes, list] : pairs) {
+      std::sort(list.begin(), list.end(), [](const MapPair& a, const MapPair& b) {
+        return std::tie(a.distance, a.c, a.d) < std::tie(b.distance, b.c, b.d);
+      });
+    }
+    struct SeenPair {
+      std::size_t a, b;
+      std::vector<MapPair>::const_iterator from, to;
+    };
+    std::vector<SeenPair> all;
+    for (std::size_t a = 0; a < seen_.size(); ++a) {
+      for (std::size_t b = a + 1; b < seen_.size(); ++b) {
+        const double distance = (seen_[a].p - seen_[b].p).head<2>().norm();
+        if (distance < parameters_.pair_least_m || distance > parameters_.pair_most_m) continue;
+        const auto found = pairs.find({mostProbable(seen_[a]), mostProbable(seen_[b])});
+        if (found == pairs.end()) continue;
+        const double slack =
+            kGate * std::sqrt(2.0 * (planeVariance(seen_[a]) + planeVariance(seen_[b]))) + 0.3;
+        const auto from =
+            std::lower_bound(found->second.begin(), found->second.end(), distance - slack,
+                             [](const MapPair& p, double d) { return p.distance < d; });
+        const auto to = std::upper_bound(from, found->second.end(), distance + slack,
+                                         [](double d, const MapPair& p) { return d < p.distance; });
+        if (from != to) all.push_back({a, b, from, to});
+      }
+    }
+    std::stable_sort(all.begin(), all.end(), [](const SeenPair& a, const SeenPair& b) {
+      return a.to - a.from < b.to - b.from;
+    });
+    std::size_t votes = 0;
+    for (const SeenPair& pair : all) {
+      if (votes > kMostVotes) return;
+      const PlacedObject &a = seen_[pair.a], &b = seen_[pair.b];
+      const Eigen::Vector2d between = (b.p - a.p).head<2>();
+      const double bearing = std::atan2(between.y(), between.x());
+      for (auto it = pair.from; it != pair.to; ++it, ++votes) {
+        const PlacedObject &c = map_[it->c], &d = map_[it->d];
+        const Eigen::Vector2d on_map = (d.p - c.p).head<2>();
+        LevelPose x;
+        x.yaw = wrapAngle(std::atan2(on_map.y(), on_map.x()) - bearing);
+        if (!yawsAgree(a, c, x.yaw) || !yawsAgree(b, d, x.yaw)) continue;
+        x.p = 0.5 * (c.p + d.p) - x.R() * (0.5 * (a.p + b.p));
+        vote(cells, x, 1.0);
+      }
+    }
+  }
+
+  /// Each object alone, where the prior knows the yaw.
+  void voteSingles(Cells& cells) const {
+    if (prior_.covariance(3, 3) > kCell_rad * kCell_rad) return;
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      for (std::size_t k = 0; k < map_.size(); ++k) {
+        if (mostProbable(seen_[i]) != mostProbable(map_[k])) continue;
+        if (!yawsAgree(seen_[i], map_[k], prior_.mean.yaw)) continue;
+        LevelPose x = prior_.mean;
+        x.p = map_[k].p - x.R() * seen_[i].p;
+        vote(cells, x, 1.0);
+      }
+    }
+  }
+
+  std::vector<LevelPose> proposals() const {
+    Cells cells;
+    votePairs(cells);
+    voteSingles(cells);
+    std::vector<std::pair<std::uint64_t, Cell>> most(cells.begin(), cells.end());
+    const auto more = [](const auto& a, const auto& b) {
+      return a.second.votes > b.second.votes ||
+             (a.second.votes == b.second.votes && a.first < b.first);
+    };
+    const std::size_t count = std::min(kCandidates, most.size());
+    std::partial_sort(most.begin(), most.begin() + static_cast<std::ptrdiff_t>(count), most.end(),
+                      more);
+    most.resize(count);
+    std::vector<LevelPose> result;
+    if (deviations2(prior_.mean) == 0.0 && !map_.empty()) result.push_back(prior_.mean);
+    for (const auto& [key, cell] : most) {
+      LevelPose x;
+      x.yaw = std::atan2(cell.heading.y(), cell.heading.x());
+      x.p << cell.place / cell.votes, prior_.mean.p.z();
+      x.p.z() = height(x);
+      result.push_back(x);
+    }
+    return result;
+  }
+
+  /// Height of the body at which objects stand as high as those of their class on the map.
+  double height(const LevelPose& x) const {
+    std::vector<double> heights;
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      const Eigen::Vector3d arm = x.R() * seen_[i].p;
+      const Eigen::Vector2d at = (x.p + arm).head<2>();
+      grid_.around(at, [&](std::size_t k) {
+        if (mostProbable(seen_[i]) != mostProbable(map_[k])) return;
+        if ((at - map_[k].p.head<2>()).norm() < kCell_m + 1.0) {
+          heights.push_back(map_[k].p.z() - arm.z());
+        }
+      });
+    }
+    if (heights.empty()) return x.p.z();
+    const auto half = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+    std::nth_element(heights.begin(), half, heights.end());
+    return *half;
+  }
+
+  struct Likelihood {
+    double of_map = 0.0;     ///< density if it is an object of the map
+    double by_chance = 0.0;  ///< density of an object there by chance
+    std::size_t object = 0;  ///< the likeliest
+    double of_object = 0.0;
+    double known = 0.0;  ///< probability that an object there is on the map
+  };
+
+  /// How much of what stands at a place the map holds: falls with the distance to where the body
+  /// drove when the map was made.
+  double knownShare(const Eigen::Vector2d& at) const {
+    double nearest = 1e9;
+    for (const Eigen::Vector2d& d : driven_) nearest = std::min(nearest, (d - at).squaredNorm());
+    const double reach = parameters_.known_within_m;
+    return 0.02 + parameters_.known_share * std::exp(-0.5 * nearest / (reach * reach));
+  }
+
+  /// Densities of the object's place, m⁻².
+  Likelihood likelihoodOf(std::size_t i, const LevelPose& x, const Eigen::Matrix3d& R,
+                          double blur) const {
+    const PlacedObject& seen = seen_[i];
+    const Eigen::Vector3d at = x.p + R * seen.p;
+    const Eigen::Matrix2d turned = R.topLeftCorner<2, 2>() * seen.covariance.topLeftCorner<2, 2>() *
+                                   R.topLeftCorner<2, 2>().transpose();
+    Likelihood l;
+    grid_.around(at.head<2>(), [&](std::size_t k) {
+      const PlacedObject& known = map_[k];
+      const Eigen::Vector2d off = (at - known.p).head<2>();
+      const double squared = off.squaredNorm();
+      if (squared > kReach_m * kReach_m) return;
+      l.by_chance +=
+          std::exp(-0.5 * squared / (kStreet_m * kStreet_m)) / (2.0 * kPi * kStreet_m * kStreet_m);
+      Eigen::Matrix2d S = known.covariance.topLeftCorner<2, 2>() + turned;
+      S.diagonal().array() += blur * blur;
+      const double determinant = S.determinant();
+      const double mahalanobis = (S(1, 1) * off.x() * off.x() - 2.0 * S(0, 1) * off.x() * off.y() +
+                                  S(0, 0) * off.y() * off.y()) /
+                                 determinant;
+      if (mahalanobis > 25.0) return;
+      const double density = std::exp(-0.5 * mahalanobis + sameClass(i, k) +
+                                      logSameYaw(known.yaw - seen.yaw - x.yaw,
+                                                 seen.covariance(3, 3) + known.covariance(3, 3))) /
+                             (2.0 * kPi * std::sqrt(determinant));
+      l.of_map += density;
+      if (density > l.of_object) {
+        l.of_object = density;
+        l.object = k;
+      }
+    });
+    l.known = knownShare(at.head<2>());
+    return l;
+  }
+
+  /// The most probable map object of a seen one, and its probability.
+  std::pair<std::size_t, double> matchOf(std::size_t i, const LevelPose& x,
+                                         const Eigen::Matrix3d& R, double blur) const {
+    const Likelihood l = likelihoodOf(i, x, R, blur);
+    const double all = (1.0 - l.known) * (l.by_chance + kFloor) + l.known * l.of_map;
+    return {l.object, l.known * l.of_object / all};
+  }
+
+  /// Map objects, each with the seen object that it surely is. If two seen objects match one map
+  /// object, neither makes a pair: they may be neighbours.
+  std::map<std::size_t, std::size_t> surePairs(const LevelPose& x) const {
+    const Eigen::Matrix3d R = x.R();
+    std::map<std::size_t, std::size_t> pairs;
+    std::set<std::size_t> twice;
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      const auto [k, share] = matchOf(i, x, R, 0.0);
+      if (share >= kSure && !pairs.emplace(k, i).second) twice.insert(k);
+    }
+    for (const std::size_t k : twice) pairs.erase(k);
+    return pairs;
+  }
+
+  double scoreOf(const LevelPose& x) const {
+    const Eigen::Matrix3d R = x.R();
+    double sum = -0.5 * deviations2(x);
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      const Likelihood l = likelihoodOf(i, x, R, 0.0);
+      sum += std::log1p(-l.known + l.known * l.of_map / (l.by_chance + kFloor));
+    }
+    return sum;
+  }
+
+  /// The best score inside the prior if nothing of what is seen is on the map.
+  double scoreOfNone() const {
+    const double reach = 2.0 * std::sqrt(prior_.covariance.topLeftCorner<2, 2>().trace());
+    double best = -1e9;
+    for (const Eigen::Vector2d& way :
+         {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0),
+          Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
+      LevelPose x = prior_.mean;
+      x.p.head<2>() += reach * way;
+      const Eigen::Matrix3d R = x.R();
+      double sum = 0.0;
+      for (const PlacedObject& seen : seen_) {
+        sum += std::log1p(-knownShare((x.p + R * seen.p).head<2>()));
+      }
+      best = std::max(best, sum);
+    }
+    return best;
+  }
+
+  LevelPose settled(LevelPose x) const {
+    for (const double blur : {1.5, 1.0, 0.5, 0.2, 0.0, 0.0}) {
+      MatchEquations equations;
+      equations.information = prior_information_;
+      equations.pull = prior_information_ * difference(prior_.mean, x);
+      const Eigen::Matrix3d R = x.R();
+      for (std::size_t i = 0; i < seen_.size(); ++i) {
+        const auto [k, share] = matchOf(i, x, R, blur);
+        if (share < 0.1) continue;
+        equations.add(seen_[i], map_[k], x, share, blur);
+      }
+      if (equations.weights == 0.0) break;
+      const Eigen::Vector4d step = equations.step();
+      x.p += step.head<3>();
+      x.yaw = wrapAngle(x.yaw + step[3]);
+    }
+    return x;
+  }
+
+  PlaceParameters parameters_;
+  LevelGaussian prior_;
+  std::vector<PlacedObject> seen_, map_;
+  std::vector<Eigen::Vector2d> driven_;
+  Eigen::Matrix4d prior_information_;
+  Grid grid_;
+  Eigen::MatrixXd same_class_;  ///< log ratios, by seen and map object
+};
+
+}  // namespace
+
+void MatchEquations::add(const PlacedObject& seen, const PlacedObject& known, const LevelPose& x,
+                         double weight, double blur) {
+  const Eigen::Matrix3d R = x.R();
+  const Eigen::Vector3d arm = R * seen.p;
+  Eigen::Vector4d residual;
+  residual << known.p - (x.p + arm), wrapHalfTurn(known.yaw - seen.yaw - x.yaw);
+  Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
+  G.topLeftCorner<3, 3>() = R;
+  Eigen::Matrix4d S = known.covariance + G * seen.covariance * G.transpose();
+  S.diagonal().head<3>().array() += blur * blur;
+  const Eigen::Matrix4d W = inverseSymmetric(S);
+  Eigen::Matrix4d J = Eigen::Matrix4d::Identity();
+  J(0, 3) = -arm.y();
+  J(1, 3) = arm.x();
+  information += weight * J.transpose() * W * J;
+  pull += weight * J.transpose() * W * residual;
+  chi2 += weight * residual.dot(W * residual);
+  weights += weight;
+}
+
+Eigen::Vector4d MatchEquations::step() const { return inverseSymmetric(information) * pull; }
+
+Eigen::Matrix4d MatchEquations::covariance() const {
+  const double freedom = 4.0 * weights - 4.0;
+  const double scale = freedom > 0.0 ? std::max(1.0, chi2 / freedom) : 1.0;
+  return scale * inverseSymmetric(information);
+}
+
+PlacedObject transformed(const LevelPose& T_AB, PlacedObject object) {
+  Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
+  G.topLeftCorner<3, 3>() = T_AB.R();
+  object.p = T_AB * object.p;
+  object.yaw = wrapAngle(object.yaw + T_AB.yaw);
+  object.covariance = (G * object.covariance * G.transpose()).eval();
+  return object;
+}
+
+std::optional<PlaceMatch> bestMatch(PlaceQuery query, const PlaceParameters& parameters) {
+  if (query.seen.empty() || query.map.empty()) return std::nullopt;
+  return Search(std::move(query), parameters).best();
+}
+
+}  // namespace perdure::mapping

@@ -1,0 +1,192 @@
+#include "common/mapping/graph/marginals.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace perdure::mapping {
+namespace {
+
+Eigen::Matrix4d deviations(double metres, double yaw) {
+  return Eigen::Vector4d(metres * metres, metres * metres, metres * metres, yaw * yaw).asDiagonal();
+}
+
+const LevelGaussian kStep{{{12.0, 1.0, 0.2}, 0.1}, deviations(0.1, 0.002)};
+
+PoseGraph chain(std::size_t anchors, const LevelGaussian& step = kStep) {
+  PoseGraph graph{{}};
+  graph.addFirst(1, {{3.0, 4.0, 0.0}, 1.0});
+  for (std::size_t i = 2; i <= anchors; ++i) graph.add(i, i - 1, step);
+  return graph;
+}
+
+/// An edge as the anchors lie, with errors that are alike in no two axes.
+Edge loop(const PoseGraph& graph, AnchorId a, AnchorId b) {
+  Eigen::Matrix4d S = deviations(0.2, 0.01);
+  S(0, 1) = S(1, 0) = 0.01;
+  S(1, 3) = S(3, 1) = 0.0005;
+  S(2, 2) = 0.09;
+  return {a, b, {graph.pose(a).inverse() * graph.pose(b), S}, EdgeKind::kLoop};
+}
+
+/// What the optimiser adds to the covariance of each edge.
+Eigen::Matrix4d floorOfEdges() { return deviations(1e-3, 1e-5); }
+
+/// d(error of T_AB) by the errors of the poses of A and of B.
+struct Jacobians {
+  Eigen::Matrix4d by_a, by_b;
+};
+Jacobians jacobians(const LevelPose& a, const LevelPose& b) {
+  return {composedByFirst(a.inverse(), b) * invertedBy(a), composedBySecond(a.inverse())};
+}
+
+/// Covariance of T_from,to by the inverse of the whole normal equations, whose one fixed anchor is
+/// the first.
+Eigen::Matrix4d dense(const PoseGraph& graph, AnchorId from, AnchorId to) {
+  std::map<AnchorId, Eigen::Index> rows;
+  for (const auto& [id, pose] : graph.poses()) {
+    const auto row = static_cast<Eigen::Index>(4 * rows.size());
+    rows[id] = row;
+  }
+  const auto n = static_cast<Eigen::Index>(4 * rows.size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+  for (const auto& [id, edge] : graph.edges()) {
+    const Jacobians J = jacobians(graph.pose(edge.a), graph.pose(edge.b));
+    Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(4, n);
+    whole.middleCols<4>(rows.at(edge.a)) = J.by_a;
+    whole.middleCols<4>(rows.at(edge.b)) = J.by_b;
+    H += graph.weight(id) * whole.transpose() * (edge.T_ab.covariance + floorOfEdges()).inverse() *
+         whole;
+  }
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(n, n);
+  S.bottomRightCorner(n - 4, n - 4) = H.bottomRightCorner(n - 4, n - 4).inverse();
+  const Jacobians J = jacobians(graph.pose(from), graph.pose(to));
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(4, n);
+  whole.middleCols<4>(rows.at(from)) = J.by_a;
+  whole.middleCols<4>(rows.at(to)) = J.by_b;
+  return whole * S * whole.transpose();
+}
+
+/// Places and yaw each by its own size.
+double relative(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
+  const Eigen::Matrix4d off = a - b;
+  return std::max(off.norm() / b.norm(), std::abs(off(3, 3)) / b(3, 3));
+}
+
+TEST(Marginals, AreTheDenseInverseOfTheSameNormalEquations) {
+  PoseGraph graph = chain(14);
+  graph.add(loop(graph, 2, 9));
+  graph.add(loop(graph, 4, 14));
+  graph.add(loop(graph, 5, 12));
+  for (const AnchorId from : {14, 7, 1}) {
+    const Marginals marginals(graph, from);
+    for (const auto& [id, pose] : graph.poses()) {
+      const auto known = marginals.to(id);
+      ASSERT_TRUE(known) << from << " " << id;
+      EXPECT_LT(difference(known->mean, graph.pose(from).inverse() * pose).norm(), 1e-9);
+      if (id == from) continue;
+      const Eigen::Matrix4d expected = dense(graph, from, id);
+      EXPECT_LT(relative(known->covariance, expected), 1e-9) << from << " " << id;
+    }
+  }
+}
+
+TEST(Marginals, ComposeAlongAChainWithoutLoops) {
+  LevelGaussian step = kStep;
+  const PoseGraph graph = chain(9, step);
+  step.covariance += floorOfEdges();
+  LevelGaussian expected;
+  for (int i = 0; i < 8; ++i) expected = compose(expected, step);
+  const auto forward = Marginals(graph, 1).to(9);
+  ASSERT_TRUE(forward);
+  EXPECT_LT(difference(forward->mean, expected.mean).norm(), 1e-9);
+  EXPECT_LT(relative(forward->covariance, expected.covariance), 1e-9);
+  const auto backward = Marginals(graph, 9).to(1);
+  ASSERT_TRUE(backward);
+  EXPECT_LT(difference(backward->mean, inverse(expected).mean).norm(), 1e-9);
+  EXPECT_LT(relative(backward->covariance, inverse(expected).covariance), 1e-9);
+  // Also where neither end is the one that is held fast.
+  LevelGaussian part;
+  for (int i = 0; i < 3; ++i) part = compose(part, step);
+  const auto middle = Marginals(graph, 4).to(7);
+  ASSERT_TRUE(middle);
+  EXPECT_LT(relative(middle->covariance, part.covariance), 1e-9);
+}
+
+TEST(Marginals, AreNothingAtTheirBeginning) {
+  const PoseGraph graph = chain(3);
+  for (const AnchorId id : {1, 2}) {
+    const auto self = Marginals(graph, id).to(id);
+    ASSERT_TRUE(self);
+    EXPECT_EQ(self->covariance.norm(), 0.0);
+    EXPECT_LT(difference(self->mean, {}).norm(), 1e-12);
+  }
+}
+
+TEST(Marginals, OfTwoIndependentWaysAreTighterThanTheBetterOne) {
+  PoseGraph graph = chain(2, {{{10.0, 0.0, 0.0}, 0.0}, deviations(0.3, 0.01)});
+  const double one = Marginals(graph, 1).to(2)->covariance(0, 0);
+  const LevelPose apart = graph.pose(1).inverse() * graph.pose(2);
+  graph.add({1, 2, {apart, deviations(0.4, 0.02)}, EdgeKind::kLoop});
+  const Eigen::Matrix4d two = Marginals(graph, 1).to(2)->covariance;
+  EXPECT_NEAR(one, 0.09, 1e-5);
+  EXPECT_NEAR(two(0, 0), 1.0 / (1.0 / 0.09 + 1.0 / 0.16), 1e-5);
+  EXPECT_NEAR(two(3, 3), 1.0 / (1.0 / 1e-4 + 1.0 / 4e-4), 1e-8);
+}
+
+TEST(Marginals, KnowWhatALoopMeasures) {
+  PoseGraph graph = chain(60);
+  const double along = Marginals(graph, 60).to(1)->covariance.trace();
+  EXPECT_GT(along, 1.0);
+  const LevelPose apart = graph.pose(60).inverse() * graph.pose(1);
+  graph.add({60, 1, {apart, deviations(0.05, 0.001)}, EdgeKind::kLoop});
+  const Marginals marginals(graph, 60);
+  const double closed = marginals.to(1)->covariance.trace();
+  EXPECT_LT(closed, 3.0 * 0.051 * 0.051);
+  EXPECT_GT(closed, 3.0 * 0.04 * 0.04);
+  // The other side of the loop is known worst, and much better than along half of it before.
+  const double half = marginals.to(30)->covariance.trace();
+  EXPECT_GT(half, 10.0 * closed);
+  EXPECT_LT(half, 0.5 * Marginals(chain(60), 60).to(30)->covariance.trace());
+}
+
+TEST(Marginals, DoNotCountALoopThatTheOptimiserDoesNotBelieve) {
+  PoseGraph graph = chain(20);
+  const Eigen::Matrix4d along = Marginals(graph, 1).to(20)->covariance;
+  LevelPose apart = graph.pose(1).inverse() * graph.pose(20);
+  apart.p.x() += 100.0;
+  const EdgeId wrong = graph.add({1, 20, {apart, deviations(0.05, 0.001)}, EdgeKind::kLoop});
+  graph.optimise();
+  ASSERT_LT(graph.weight(wrong), kBelieved);
+  EXPECT_NEAR(Marginals(graph, 1).to(20)->covariance.trace(), along.trace(), 0.02 * along.trace());
+}
+
+TEST(Marginals, SayNothingOfWhatCannotBeReached) {
+  PoseGraph graph = chain(5);
+  graph.addFirst(100, {});
+  graph.add(101, 100, kStep);
+  const Marginals marginals(graph, 5);
+  EXPECT_TRUE(marginals.to(1));
+  EXPECT_FALSE(marginals.to(100));
+  EXPECT_FALSE(marginals.to(101));
+  EXPECT_FALSE(marginals.to(555));
+  EXPECT_FALSE(Marginals(graph, 555).to(1));
+  // Two that are held fast do not know of each other by that.
+  EXPECT_FALSE(Marginals(graph, 1).to(100));
+  EXPECT_LT(relative(Marginals(graph, 100).to(101)->covariance,
+                     compose({}, {kStep.mean, kStep.covariance + floorOfEdges()}).covariance),
+            1e-9);
+}
+
+TEST(Marginals, OfOneAnchorAlone) {
+  const PoseGraph graph = chain(1);
+  const Marginals marginals(graph, 1);
+  EXPECT_TRUE(marginals.to(1));
+  EXPECT_FALSE(marginals.to(2));
+}
+
+}  // namespace
+}  // namespace perdure::mapping
