@@ -21,6 +21,21 @@ void describe(Config& c, config::Fields& fields) {
                  {"a reply holds at most this many objects, whatever the query asks for", "", ""});
   fields.integer("query.cached_replies", c.cached_replies, config::between(1, 10000),
                  {"answers kept for requests that come again", "", ""});
+  fields.boolean("graph.enabled", c.graph,
+                 {"objects belong to anchors along the way, and a pose graph corrects these where "
+                  "objects show that the body came past before"});
+  mapping::Parameters& m = c.mapping;
+  fields.number("graph.walk_position", m.anchor.walk_position, config::between(1e-4, 1.0),
+                {"walk of poses that come without increments; loops scale it", "m/√m", ""});
+  fields.number("graph.walk_yaw", m.anchor.walk_yaw, config::between(1e-6, 0.1),
+                {"the same of yaw", "rad/√m", ""});
+  fields.number(
+      "graph.hold_back", m.loop.hold_back_m, config::between(0.1, 10.0),
+      {"objects come back where their place relative to the body is known better", "m", ""});
+  fields.number("loop.nats", m.loop.nats, config::between(1.0, 100.0),
+                {"by how much a loop must be likelier than any other way to lay what is seen, "
+                 "where the body is known worse than within 1.6 m",
+                 "nats", ""});
 }
 
 }  // namespace perdure::map_store

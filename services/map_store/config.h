@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/config/fields.h"
+#include "common/mapping/parameters.h"
 
 namespace perdure::map_store {
 
@@ -17,6 +18,8 @@ struct Config {
   double tile_period_s = 1.0;
   std::int64_t query_limit = 1000;
   std::int64_t cached_replies = 64;
+  bool graph = false;  ///< anchors, pose graph and loops
+  mapping::Parameters mapping;
 };
 
 void describe(Config& config, config::Fields& fields);

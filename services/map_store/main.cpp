@@ -18,6 +18,7 @@ void serve(service::Context& context, const map_store::Config& config) {
                         .header = context.sink(topics::kMapHeader),
                         .reply = context.sink(topics::kMapReply),
                         .recalled = context.sink(topics::kRecalled)});
+  context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
   context.on(topics::kEvents, [&](const Event& event) { node.onEvent(event); });
   context.on(topics::kObjects, [&](const Objects& objects) {
     context.health().frameIn();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/mapping/frames/laid_belief.h"
+
 namespace perdure::map_store {
 namespace {
 
@@ -49,6 +51,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       instance_(instance),
       outputs_(std::move(outputs)),
       database_(storeOptions(config)),
+      mapper_(config.mapping),
       replies_(static_cast<std::size_t>(config.cached_replies)),
       notice_(database_.notice()) {
   if (!notice_.empty()) reasons_.add("map_set_aside");
@@ -83,6 +86,12 @@ void Node::onObjects(const Objects& objects) {
     return;
   }
   Objects next = objects;
+  if (config_.graph) {
+    // Where the graph laid what has not been seen since is not a new observation.
+    for (const auto& belief : next.objects) {
+      if (!belief.recalled) laid_.erase(belief.id);
+    }
+  }
   std::erase_if(next.objects, [this](const ObjectBelief& b) { return !acceptable(b); });
   leaveBehind(next);
   if (newest_ && !same_filter) previous_ = std::move(newest_);
@@ -90,6 +99,47 @@ void Node::onObjects(const Objects& objects) {
   next_id_ = same_filter ? next.next_id : std::max(next_id_, next.next_id);
   newest_ = std::move(next);
   dirty_ = true;
+  if (!config_.graph) return;
+  mapper_.onObjects(*newest_);
+  const auto change = mapper_.takeChange();
+  if (change.loops.empty()) return;
+  commit();  // what is laid is read from the file
+  constexpr double kAround_m = 70.0;
+  recallLaid(newest_->T_WB.p, kAround_m, change.merges, true);
+}
+
+void Node::onOdometry(const Odometry& odometry) {
+  if (config_.graph) mapper_.onOdometry(odometry);
+}
+
+void Node::recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
+                      const std::vector<MergeOrder>& merges, bool lay_again) {
+  Recalled recalled;
+  recalled.instance = instance_;
+  recalled.world = newest_->world;
+  recalled.client = newest_->instance;
+  recalled.next_id = next_id_;
+  recalled.laid = recalled.graph = true;
+  recalled.merges = merges;
+  std::set<ObjectId> working;
+  for (const auto& belief : newest_->objects) working.insert(belief.id);
+  for (const mapping::Recallable& there : mapper_.near(centre_W, radius_m)) {
+    const bool again = lay_again && laid_.contains(there.id);
+    if (!there.T_now || (working.contains(there.id) && !again)) continue;
+    MapQuery query;
+    query.kind = MapQueryKind::kById;
+    query.object_id = there.id;
+    auto found = database_.reader().find(query, newest_->world, 1);
+    if (!found) return blame(found.error());
+    if (found->beliefs.empty()) continue;
+    ObjectBelief belief = mapping::turned(
+        *there.T_now, mapping::relativeToBody(found->beliefs.front(), there.pose_error));
+    laid_.insert(there.id);
+    recalled.objects.push_back(
+        mapping::withFrameError(std::move(belief), there.covariance, there.about_W));
+  }
+  if (recalled.objects.empty() && merges.empty()) return;
+  outputs_.recalled(recalled);
 }
 
 /// Confirmed objects that `next` no longer holds: their last belief may not have been written.
@@ -99,11 +149,17 @@ void Node::leaveBehind(const Objects& next) {
   for (const ObjectId id : alive) left_.erase(id);
   if (!newest_) return;
   for (auto& belief : newest_->objects) {
-    if (belief.confirmed && !alive.contains(belief.id)) left_[belief.id] = {newest_->world, belief};
+    if (alive.contains(belief.id)) continue;
+    const bool as_it_was = laid_.erase(belief.id) > 0;  // laid, and left without being seen
+    if (belief.confirmed && !as_it_was) left_[belief.id] = {newest_->world, belief};
   }
 }
 
 void Node::onEvent(const Event& event) {
+  if (config_.graph && event.kind == EventKind::kGone) mapper_.onGone(event.object_id);
+  if (config_.graph && event.kind == EventKind::kMerged) {
+    mapper_.onMerged(event.object_id, event.other_id);
+  }
   if (event.kind == EventKind::kGone) {
     removed_[event.object_id] = {event.kind, event.stamp.time, 0};
   } else if (event.kind == EventKind::kMerged) {
@@ -138,7 +194,7 @@ void Node::commit() {
     dirty_ = false;
     return;
   }
-  const auto written = database_.write({&*newest_, left_, removed_});
+  const auto written = database_.write({&*newest_, left_, removed_, laid_});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
@@ -247,6 +303,18 @@ void Node::recall(const MapQuery& query) {
   auto found = database_.reader().longTermNear(query.low, query.radius, query.world, limit);
   if (!found) return blame(found.error());
   if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
+  // A filter that looks for the map of a frame that has ended lays it by itself.
+  const bool by_graph = config_.graph && newest_ && query.world == newest_->world;
+  if (by_graph) {
+    constexpr double kAround_m = 10.0;  // places in M and in W differ
+    std::set<ObjectId> as_stored;
+    for (const mapping::Recallable& there : mapper_.near(query.low, query.radius + kAround_m)) {
+      if (!there.T_now) as_stored.insert(there.id);
+    }
+    std::erase_if(found->beliefs, [&](const ObjectBelief& b) {
+      return mapper_.holds(b.id) && !as_stored.contains(b.id);
+    });
+  }
   Recalled recalled;
   recalled.instance = instance_;
   recalled.world = query.world;
@@ -254,9 +322,11 @@ void Node::recall(const MapQuery& query) {
   recalled.next_id = next_id_;
   recalled.objects = std::move(found->beliefs);
   recalled.request = query.request;
+  recalled.graph = config_.graph;
   if (kept_of_ == query.client) recalled.kept = kept_;
   recalled.truncated = found->truncated;
   outputs_.recalled(recalled);
+  if (by_graph) recallLaid(query.low, query.radius, {}, false);
 }
 
 void Node::blame(const Reason& reason) {

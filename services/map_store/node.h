@@ -11,6 +11,7 @@
 #include "common/base/ids.h"
 #include "common/base/result.h"
 #include "common/base/sink.h"
+#include "common/mapping/mapper.h"
 #include "common/types/map.h"
 #include "common/types/objects.h"
 #include "services/map_store/config.h"
@@ -38,6 +39,7 @@ class Node {
 
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
+  void onOdometry(const Odometry& odometry);
   void onQuery(const MapQuery& query);
   /// Commits and publishes what is due. `now`: a monotonic time since any origin; call it ten
   /// times a second or more often.
@@ -46,6 +48,7 @@ class Node {
   void flush();
 
   const ReasonCounts& reasons() const { return reasons_; }
+  const mapping::Mapper& mapper() const { return mapper_; }
   /// What a person should know: a sentence with the mend, or nothing.
   std::string trouble() const { return failure_.empty() ? notice_ : failure_; }
   std::uint64_t received() const { return received_; }
@@ -60,6 +63,9 @@ class Node {
   MapReply answer(const MapQuery& query);
   void restore(const MapQuery& query);
   void recall(const MapQuery& query);
+  /// Sends what the graph has laid near a place, with the merges of new loops.
+  void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
+                  const std::vector<MergeOrder>& merges, bool lay_again);
   const Objects* workingSetFor(const MapQuery& query) const;
   void blame(const Reason& reason);
 
@@ -67,6 +73,7 @@ class Node {
   const InstanceId instance_;
   const Outputs outputs_;
   MapDatabase database_;
+  mapping::Mapper mapper_;
   ReplyCache replies_;
   TileBook tiles_;
   std::set<Square> stale_squares_;
@@ -74,6 +81,7 @@ class Node {
   std::optional<Objects> previous_;  ///< the last one of the filter before this one
   std::map<ObjectId, PlacedBelief> left_;
   std::map<ObjectId, Removal> removed_;
+  std::set<ObjectId> laid_;  ///< by the graph, and not seen since
   ObjectId next_id_ = 1;
   InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk
   TimePoint kept_;          ///< of its newest frame there

@@ -213,6 +213,7 @@ void Node::publish(const Frame& frame) {
   objects.T_WB = history_.mapFrame().inW(frame.input.view.T_WB);
   objects.up_W = frame.input.view.up_W;
   objects.next_id = history_.ids().next();
+  objects.pose_error = frame.input.pose_error.covariance;
   const MotionParameters& motion = config_.filter.motion;
   const std::vector<Track>& tracks = history_.belief().tracks;
   objects.objects.resize(tracks.size());

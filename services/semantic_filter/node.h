@@ -72,6 +72,7 @@ class Node {
   void insertRecalled(const Recalled& recalled);
   void restore(const ObjectBelief& belief);
   void recall(const ObjectBelief& belief);
+  void insertLaid(const Recalled& recalled);
   bool isNear(const ObjectBelief& belief) const;
   void recallLaid(const ObjectBelief& belief);
   void onRecalledOfFormer(const Recalled& recalled);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/node.h"
 
@@ -144,6 +145,36 @@ void Node::insertRecalled(const Recalled& recalled) {
   }
 }
 
+/// What the map's graph has laid beside the body, and which of it is one with what was taken for
+/// new.
+void Node::insertLaid(const Recalled& recalled) {
+  if (history_.empty()) return;
+  const FrameInput& input = history_.newest().input;
+  for (const ObjectBelief& belief : soundOf(recalled.objects)) {
+    if (belief.moving > 0.5) {
+      reasons_.add("recalled_moving");
+      continue;
+    }
+    const auto same = [&](const Track& o) { return o.id == belief.id; };
+    const std::vector<Track>& tracks = history_.belief().tracks;
+    const auto there = std::find_if(tracks.begin(), tracks.end(), same);
+    const bool again = there != tracks.end();
+    // What was seen since is better known than by the graph.
+    if (again ? !there->life.recalled : !isNear(history_.mapFrame().inM(belief))) continue;
+    if (again) history_.erase({belief.id});
+    Track track = fromBelief(history_.mapFrame().inM(belief), history_.poseError().product,
+                             ExistenceEvidence::kRecall);
+    for (Hypothesis& h : track.hypotheses) {
+      addPoseError(h, input.view.T_WB, input.view.up_W, history_.poseError().covariance);
+    }
+    history_.insert(track);
+    if (!again) events_.recalled(belief.id, false);
+  }
+  for (const MergeOrder& merge : recalled.merges) {
+    history_.join(merge.survivor, merge.absorbed, input);
+  }
+}
+
 void Node::onRecalled(const Recalled& recalled) {
   const bool for_all = recalled.client == 0 && !recalled.restore;
   if (recalled.client != instance_ && !for_all) return;
@@ -153,6 +184,8 @@ void Node::onRecalled(const Recalled& recalled) {
     return;
   }
   if (recalled.world != *world_) return onRecalledOfFormer(recalled);
+  if (recalled.graph) history_.leaveDriftToTheMap();
+  if (recalled.laid) return insertLaid(recalled);
   const bool asked = recalled.restore || for_all;
   if (!asked && !archive_.answered(recalled.request, recalled.kept, recalled.truncated)) {
     return reasons_.add("recalled_unasked");

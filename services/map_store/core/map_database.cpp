@@ -168,7 +168,7 @@ Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
     if (!done) return done;
   }
   for (const auto& belief : batch.working->objects) {
-    if (!belief.confirmed) continue;
+    if (!belief.confirmed || batch.laid.contains(belief.id)) continue;
     const auto done = put({batch.working->world, belief}, now, change);
     if (!done) return done;
   }

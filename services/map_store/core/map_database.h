@@ -41,6 +41,8 @@ struct Batch {
   const Objects* working = nullptr;  ///< not null
   std::map<ObjectId, PlacedBelief> left;
   std::map<ObjectId, Removal> removed;
+  /// Of the working set: laid by the graph and not seen since. What is stored of them stays.
+  std::set<ObjectId> laid = {};
 };
 
 struct Written {

@@ -84,6 +84,7 @@ bool History::isLevel(const HistoryFrame& frame) {
 }
 
 void History::correctDrift() {
+  if (drift_is_taken_out_) return;
   const auto correction = drift_.correct(frames_.back().input.view.T_WB, pose_error_);
   if (!correction) return;
   const Matrix6d F = regressOn(correction->before, correction->after);

@@ -47,6 +47,8 @@ class History {
   void stepAgainFrom(std::size_t index);
   /// Takes a significant drift out of all that refers to the pose.
   void correctDrift();
+  /// The map's graph does that.
+  void leaveDriftToTheMap() { drift_is_taken_out_ = true; }
   /// Whether the frame is level enough to ask where the map lies; counts once a world if not.
   bool isLevel(const HistoryFrame& frame);
 
@@ -91,6 +93,7 @@ class History {
   DriftEstimator drift_;
   std::vector<MergeRecord> late_merges_;
   bool told_not_level_ = false;
+  bool drift_is_taken_out_ = false;
 };
 
 }  // namespace perdure::semantic_filter

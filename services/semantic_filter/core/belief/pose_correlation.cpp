@@ -6,6 +6,8 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
+#include "common/math/so3.h"
+
 namespace perdure::semantic_filter {
 
 namespace {
@@ -75,6 +77,19 @@ void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<M
   const Eigen::MatrixXd whitened = pose.whiten(P.whiten(h.C.topRows(n)).transpose());
   const double explained = eigenvalues(whitened * whitened.transpose()).maxCoeff();
   if (explained > kExplained) h.C *= std::sqrt(kExplained / explained);
+}
+
+void addPoseError(Hypothesis& h, const RigidTransform& T_WB, const Eigen::Vector3d& up_W,
+                  const Matrix6d& P_pose) {
+  Eigen::Matrix<double, kStateDim, 6> A = Eigen::Matrix<double, kStateDim, 6>::Zero();
+  const Eigen::Matrix3d R_WB = T_WB.R();
+  const Eigen::Vector3d p_B = T_WB.inverse() * Eigen::Vector3d(h.x.head<3>());
+  A.block<3, 3>(0, 0) = -R_WB * skew(p_B);
+  A.block<3, 3>(0, 3).setIdentity();
+  A.block<1, 3>(kYaw, 0) = up_W.transpose() * R_WB;
+  h.C = A * P_pose;
+  h.P += A * P_pose * A.transpose();
+  makeSymmetric(h.P);
 }
 
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose) {

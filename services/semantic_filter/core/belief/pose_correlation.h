@@ -19,6 +19,11 @@ bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose);
 /// stays a covariance. `L_pose`: Cholesky factor of P_pose, if it has one.
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose);
 
+/// Adds the error of the body's pose to what is known relative to the body: δp = p - R_WB [p_B]x θ,
+/// δψ = up · R_WB θ. C becomes what follows from that alone.
+void addPoseError(Hypothesis& h, const RigidTransform& T_WB, const Eigen::Vector3d& up_W,
+                  const Matrix6d& P_pose);
+
 /// Returns the standard deviation of the position given the pose error, m.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
 /// The same for a track: it includes the distances between its hypotheses.

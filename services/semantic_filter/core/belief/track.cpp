@@ -9,6 +9,7 @@ void Lifecycle::merge(const Lifecycle& other) {
   hits += other.hits;
   confirmed = confirmed || other.confirmed;
   once_confirmed = once_confirmed || other.once_confirmed;
+  recalled = recalled && other.recalled;
   last_seen = std::max(last_seen, other.last_seen);
 }
 

@@ -93,23 +93,6 @@ FrameAlignment refined(const FrameAlignment& start,
   return result;
 }
 
-ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief) {
-  const Eigen::Matrix3d R = T_AB.R();
-  const double yaw = yawOf(R);
-  Matrix7d G = Matrix7d::Identity();
-  G.topLeftCorner<3, 3>() = R;
-  for (ClassBelief& c : belief.classes) {
-    c.mean.head<3>() = (T_AB * Eigen::Vector3d(c.mean.head<3>())).eval();
-    c.mean[kYaw] = wrapAngle(c.mean[kYaw] + yaw);
-    c.covariance = (G * c.covariance * G.transpose()).eval();
-    makeSymmetric(c.covariance);
-    c.cross_pose = (G * c.cross_pose).eval();
-    c.cross_pose.rightCols<3>() = (c.cross_pose.rightCols<3>() * R.transpose()).eval();
-  }
-  belief.velocity = R * belief.velocity;
-  return belief;
-}
-
 ObjectBelief laidInto(const FrameAlignment& alignment, ObjectBelief belief) {
   const Eigen::Matrix3d R = rotationAboutZ(alignment.yaw);
   belief = turned(RigidTransform(R, alignment.p), std::move(belief));

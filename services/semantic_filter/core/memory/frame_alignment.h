@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/mapping/frames/laid_belief.h"
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {
@@ -60,8 +61,7 @@ struct AlignmentEquations {
 FrameAlignment refined(const FrameAlignment& start,
                        const std::vector<std::pair<PlacedThing, PlacedThing>>& pairs);
 
-/// Transforms a belief from frame B into frame A; both are level.
-ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief);
+using mapping::turned;
 
 /// Transforms a belief into W. Its covariance includes the error of the alignment. Its
 /// cross-covariance with the pose error is unknown and set to zero.

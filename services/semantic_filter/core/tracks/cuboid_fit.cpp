@@ -7,6 +7,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
 namespace perdure::semantic_filter {
 
 namespace {
@@ -102,19 +103,6 @@ std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& p
   return std::nullopt;
 }
 
-/// Adds the pose error [θ, p] of the body: δp = p - R_WB [p_B]x θ, δψ = up · R_WB θ.
-void addPoseError(Hypothesis& h, const FrameContext& frame) {
-  Eigen::Matrix<double, kStateDim, 6> A = Eigen::Matrix<double, kStateDim, 6>::Zero();
-  const Eigen::Matrix3d R_WB = frame.view.T_WB.R();
-  const Eigen::Vector3d p_B = frame.view.T_WB.inverse() * Eigen::Vector3d(h.x.head<3>());
-  A.block<3, 3>(0, 0) = -R_WB * skew(p_B);
-  A.block<3, 3>(0, 3).setIdentity();
-  A.block<1, 3>(kYaw, 0) = frame.view.up_W.transpose() * R_WB;
-  h.C = A * frame.pose_error.covariance;
-  h.P += A * frame.pose_error.covariance * A.transpose();
-  makeSymmetric(h.P);
-}
-
 }  // namespace
 
 std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view) {
@@ -179,7 +167,7 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
   fit.hypothesis.P.setZero();
   fit.hypothesis.P.topLeftCorner<kFree, kFree>() =
       hessian.solve(Eigen::Matrix<double, kFree, kFree>::Identity());
-  addPoseError(fit.hypothesis, frame);
+  addPoseError(fit.hypothesis, frame.view.T_WB, frame.view.up_W, frame.pose_error.covariance);
   if (!fit.hypothesis.P.allFinite()) return std::nullopt;
   return fit;
 }
