@@ -10,6 +10,7 @@ void addEvaluateCommand(CLI::App& app) {
   addEvaluateObjects(*evaluate);
   addEvaluateTrajectory(*evaluate);
   addEvaluateConsistency(*evaluate);
+  addEvaluateMemory(*evaluate);
 }
 
 }  // namespace perdure::tools

@@ -1,5 +1,5 @@
-// `perdure evaluate {objects,trajectory,consistency}`: objects and trajectory against the truth,
-// and whether their covariances are as large as their errors.
+// `perdure evaluate {objects,trajectory,consistency,memory}`: objects and trajectory against the
+// truth, whether their covariances are as large as their errors, and whether ids last.
 #pragma once
 
 namespace CLI {
@@ -12,5 +12,6 @@ void addEvaluateCommand(CLI::App& app);
 void addEvaluateObjects(CLI::App& evaluate);
 void addEvaluateTrajectory(CLI::App& evaluate);
 void addEvaluateConsistency(CLI::App& evaluate);
+void addEvaluateMemory(CLI::App& evaluate);
 
 }  // namespace perdure::tools

@@ -37,11 +37,12 @@ nlohmann::ordered_json toReport(const ObjectScore& score) {
           {"position_error_m", at_one_metre.positionError()}};
 }
 
-nlohmann::ordered_json reportSimulated(const fs::path& folder, const fs::path& out) {
+nlohmann::ordered_json reportSimulated(const fs::path& folder, const fs::path& out,
+                                       std::uint64_t first_frame) {
   const SimulatedTruth truth = readSimulatedTruth(folder);
-  const SimulatedRun run =
-      pairWithTruth(truth, readObjectRows(out / "objects_final.csv"),
-                    replay::PoseFile::read(out / "trajectory.tum").poses(), "");
+  SimulatedRun run = pairWithTruth(truth, readObjectRows(out / "objects_final.csv"),
+                                   replay::PoseFile::read(out / "trajectory.tum").poses(), "");
+  run.frames.erase(run.frames.begin(), run.frames.lower_bound(first_frame));
   const ObjectScore score = scoreFrames(run.frames, {.frame_interval_s = truth.frameInterval()});
   auto report = toReport(score);
   report["objects"] = score.objects;

@@ -13,9 +13,10 @@ namespace perdure::tools {
 nlohmann::ordered_json toReport(const ObjectScore& score);
 
 /// Copies all of the simulated folder but its images to OUT/truth, which is then a simulated folder
-/// for `perdure evaluate`, and scores OUT/objects_final.csv, all classes together. Throws
-/// StartupError where the folder or OUT lacks a part.
+/// for `perdure evaluate`, and scores OUT/objects_final.csv, all classes together, from
+/// `first_frame` on. Throws StartupError where the folder or OUT lacks a part.
 nlohmann::ordered_json reportSimulated(const std::filesystem::path& folder,
-                                       const std::filesystem::path& out);
+                                       const std::filesystem::path& out,
+                                       std::uint64_t first_frame = 0);
 
 }  // namespace perdure::tools

@@ -77,6 +77,24 @@ struct Compared {
   std::size_t expected = 0;
 };
 
+Alignment alignmentOf(const std::string& name) {
+  if (name == "start") return Alignment::kStart;
+  return name == "yaw" ? Alignment::kYaw : Alignment::kRigid;
+}
+
+/// For people.
+const char* nameOf(Alignment alignment) {
+  switch (alignment) {
+    case Alignment::kYaw:
+      return "aligned in position and yaw";
+    case Alignment::kRigid:
+      return "aligned in position and rotation";
+    case Alignment::kStart:
+      return "aligned at the start";
+  }
+  return "";
+}
+
 Compared compare(const TrajectoryOptions& options) {
   const Truth truth = readTruth(options);
   const PoseFile file = PoseFile::read(options.tum);
@@ -100,8 +118,7 @@ Compared compare(const TrajectoryOptions& options) {
                            "where the truth has no times");
   }
   Compared result;
-  result.score =
-      scoreTrajectory(pairs, options.align == "yaw" ? Alignment::kYaw : Alignment::kRigid);
+  result.score = scoreTrajectory(pairs, alignmentOf(options.align));
   // Frames that ought to have a pose: those of the dataset that the truth spans.
   const auto expected = [&](TimePoint t) {
     return t >= begin && t >= poses.front().time && t <= poses.back().time;
@@ -136,9 +153,8 @@ void print(const Compared& result, const TrajectoryOptions& options) {
   const TrajectoryScore& s = result.score;
   std::printf("poses %zu of %zu frames (coverage %.4f), %.1f m\n", s.poses, result.expected,
               result.coverage, s.length_m);
-  std::printf("ATE (aligned in position and %s): RMSE %.4f m, max %.4f m, rotation %.3f deg\n",
-              options.align == "yaw" ? "yaw" : "rotation", s.ate_rmse_m, s.ate_max_m,
-              s.ate_rotation_deg);
+  std::printf("ATE (%s): RMSE %.4f m, max %.4f m, rotation %.3f deg\n",
+              nameOf(alignmentOf(options.align)), s.ate_rmse_m, s.ate_max_m, s.ate_rotation_deg);
   std::printf("RPE over 1 s: %.4f m, %.3f deg; drift at the end %.4f m\n", s.rpe_m, s.rpe_deg,
               s.end_drift_m);
   std::printf("KITTI: t_err %.3f %%, r_err %.5f deg/m (%zu segments of %g to %g m)\n",
@@ -156,8 +172,9 @@ void addEvaluateTrajectory(CLI::App& evaluate_app) {
       ->required();
   app->add_option("--sequence", options->sequence, "Of a KITTI tracking folder");
   app->add_option("--data", options->data, "Dataset folder whose frames time KITTI's pose lines");
-  app->add_option("--align", options->align, "Alignment besides position")
-      ->check(CLI::IsMember({"yaw", "rigid"}))
+  app->add_option("--align", options->align,
+                  "Alignment besides position; start: the first pose's position and yaw alone")
+      ->check(CLI::IsMember({"yaw", "rigid", "start"}))
       ->capture_default_str();
   app->add_option("--skip", options->skip_s, "Seconds at the start to leave out")
       ->check(CLI::NonNegativeNumber)

@@ -75,6 +75,11 @@ SegmentError scoreSegments(const std::vector<PosePair>& pairs) {
 
 RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment) {
   check(!pairs.empty(), "alignment needs poses");
+  const double first_yaw = wrapAngle(yawOf(pairs[0].truth.R()) - yawOf(pairs[0].estimate.R()));
+  if (alignment == Alignment::kStart) {
+    const Eigen::Matrix3d R = rotationAboutZ(first_yaw);
+    return RigidTransform(R, Eigen::Vector3d(pairs[0].truth.p - R * pairs[0].estimate.p));
+  }
   const auto n = static_cast<Eigen::Index>(pairs.size());
   Eigen::Matrix3Xd estimate(3, n), truth(3, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -91,8 +96,7 @@ RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment) {
   // The yaw that maximises trace(Rz' C); a body that stood still is turned by its first attitude.
   const double s = C(1, 0) - C(0, 1), c = C(0, 0) + C(1, 1);
   const bool moved = std::hypot(s, c) > 1e-4 * static_cast<double>(n);
-  const double yaw = moved ? std::atan2(s, c)
-                           : wrapAngle(yawOf(pairs[0].truth.R()) - yawOf(pairs[0].estimate.R()));
+  const double yaw = moved ? std::atan2(s, c) : first_yaw;
   const Eigen::Matrix3d R = rotationAboutZ(yaw);
   return RigidTransform(R, Eigen::Vector3d(mean_t - R * mean_e));
 }

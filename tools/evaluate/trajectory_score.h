@@ -16,9 +16,14 @@ struct PosePair {
   RigidTransform estimate, truth;  ///< T_WB, each in its own W
 };
 
-enum class Alignment { kYaw, kRigid };  ///< position and yaw, or position and rotation
+enum class Alignment {
+  kYaw,    ///< position and yaw
+  kRigid,  ///< position and rotation
+  kStart,  ///< position and yaw, of the first pose alone
+};
 
-/// T_GE with T_GE · estimate ≈ truth in the least-squares sense of positions. At least one pair.
+/// T_GE with T_GE · estimate ≈ truth in the least-squares sense of positions, or of the first pair
+/// alone. At least one pair.
 RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 struct SegmentError {

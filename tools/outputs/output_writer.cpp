@@ -61,6 +61,14 @@ Json featureOf(const ObjectBelief& belief, const GeoReference& reference) {
             {"memory", belief.memory == Memory::kWorking ? "working" : "long_term"}}}};
 }
 
+std::string tumLine(TimePoint time, const RigidTransform& T_WB) {
+  const std::int64_t ns = toNanoseconds(time);
+  const auto& [q, p] = T_WB;
+  return fmt::format("{}.{:09d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                     ns / 1'000'000'000, ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(), q.y(),
+                     q.z(), q.w());
+}
+
 }  // namespace
 
 Json toJson(const Event& event) {
@@ -210,12 +218,26 @@ void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectR
 
 void OutputWriter::writeTrajectory() const {
   std::ofstream file = openForWriting(folder_ / "trajectory.tum");
+  for (const auto& [frame, pose] : poses_) file << tumLine(pose.time, pose.T_WB);
+}
+
+void OutputWriter::writeMapTrajectory(
+    const std::vector<std::pair<TimePoint, RigidTransform>>& along) const {
+  if (along.empty()) return;
+  std::ofstream file = openForWriting(folder_ / "trajectory_map.tum");
+  std::size_t next = 0;
   for (const auto& [frame, pose] : poses_) {
-    const std::int64_t ns = toNanoseconds(pose.time);
-    const auto& [q, p] = pose.T_WB;
-    file << fmt::format("{}.{:09d} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
-                        ns / 1'000'000'000, ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(), q.y(),
-                        q.z(), q.w());
+    while (next < along.size() && along[next].first <= pose.time) ++next;
+    RigidTransform T_MW = along[next == 0 ? 0 : next - 1].second;
+    if (next > 0 && next < along.size()) {
+      // Both corrections as they act on the pose itself: they may turn about a far origin.
+      const auto& [t0, from] = along[next - 1];
+      const auto& [t1, to] = along[next];
+      const double s = toSeconds(pose.time - t0) / toSeconds(t1 - t0);
+      file << tumLine(pose.time, interpolate(from * pose.T_WB, to * pose.T_WB, s));
+    } else {
+      file << tumLine(pose.time, T_MW * pose.T_WB);
+    }
   }
 }
 

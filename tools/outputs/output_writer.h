@@ -41,6 +41,9 @@ class OutputWriter {
 
   /// Writes everything but events.jsonl and odometry.csv, which are written as their messages come.
   void finish();
+  /// trajectory_map.tum: the way as the map's graph has it in the end. `along`: T_MW at times, in
+  /// order; between them it is interpolated.
+  void writeMapTrajectory(const std::vector<std::pair<TimePoint, RigidTransform>>& along) const;
   /// Any further file: timing.json, report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
 

@@ -21,7 +21,8 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "Rig file of perdure calibrate, instead of the drive's own calibration");
   app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000");
   app.add_option("--odometry", options.odometry,
-                 "vio, truth, a pose file (TUM or KITTI lines), or recorded")
+                 "vio, truth, drifting (truth with a drift, --set drifting.KEY=VALUE), a pose file "
+                 "(TUM or KITTI lines), or recorded")
       ->required();
   app.add_option("--detections", options.detections, "model, none, simulated, a CSV, or recorded")
       ->required();
@@ -36,15 +37,18 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
       ->expected(2)
       ->check(CLI::Range(1, 65535));
   app.add_option("--out", options.out, "Folder for the results")->required();
+  app.add_option("--from", options.from, "Begin so many seconds after the first frame")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--seconds", options.seconds, "Stop after so many seconds of data")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--seed", options.seed, "Of --detections simulated")
+  app.add_option("--seed", options.seed, "Of --detections simulated and --odometry drifting")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--config", options.configs, "service=FILE in place of config/service.yaml")
       ->take_all();
-  app.add_option("--set", options.assignments,
-                 "service.key=value; services are vio, semantic_filter, inference, map_store and "
-                 "detector, the simulated one")
+  app.add_option(
+         "--set", options.assignments,
+         "service.key=value; services are vio, semantic_filter, inference, map_store, detector "
+         "(the simulated one) and drifting (odometry)")
       ->take_all();
   app.add_flag("--pictures", options.pictures, "Also overlay.mp4: the frames with the objects");
   app.add_flag(

@@ -34,6 +34,10 @@ MapMemory::MapMemory(map_store::Config config, const std::filesystem::path& file
                      InstanceId instance, Sink<Recalled> recalled)
     : node_(emptyMap(std::move(config), file), instance, toFilter(std::move(recalled))) {}
 
+void MapMemory::onOdometry(const Odometry& odometry) {
+  waiting_.push_back([this, odometry] { node_.onOdometry(odometry); });
+}
+
 void MapMemory::onObjects(const Objects& objects) {
   waiting_.push_back([this, objects] {
     node_.onObjects(objects);

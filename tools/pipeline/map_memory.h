@@ -16,6 +16,7 @@ class MapMemory {
   MapMemory(map_store::Config config, const std::filesystem::path& file, InstanceId instance,
             Sink<Recalled> recalled);
 
+  void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onQuery(const MapQuery& query);
@@ -25,6 +26,7 @@ class MapMemory {
   void finish();
 
   const ReasonCounts& reasons() const { return node_.reasons(); }
+  const mapping::Mapper& mapper() const { return node_.mapper(); }
 
  private:
   map_store::Node node_;

@@ -28,13 +28,18 @@ std::string sequenceName(const PipelineOptions& options) {
   return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
+bool usesTruth(const PipelineOptions& options) {
+  return options.odometry == "truth" || options.odometry == "drifting";
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const PipelineOptions& options)
     : options_(options), configs_(readServiceConfigs(options)) {
   cv::setNumThreads(1);
   checkRecorded();
-  if (options.odometry != "vio" && options.odometry != "truth" && !recorded_) {
+  const bool of_data = options.odometry == "vio" || usesTruth(options);
+  if (!of_data && !recorded_) {
     pose_file_ = replay::PoseFile::read(options.odometry);
   }
   openData();
@@ -121,12 +126,21 @@ replay::DatasetOptions Pipeline::dataOptions() const {
   return data;
 }
 
-void Pipeline::openData() { dataset_ = replay::Dataset::open(dataOptions()); }
+void Pipeline::openData() {
+  dataset_ = replay::Dataset::open(dataOptions());
+  if (options_.from <= 0.0) return;
+  const auto first = dataset_->skip(durationFromSeconds(options_.from));
+  if (!first) {
+    throw StartupError(ExitCode::kUsage,
+                       options_.data + " has no frame as late as --from says; give fewer seconds");
+  }
+  first_index_ = *first;
+}
 
 void Pipeline::openOdometry(const PipelineOptions& options) {
   if (recorded_) return;
   PoseAccuracy accuracy;
-  if (options.odometry == "truth") {
+  if (usesTruth(options)) {
     if (!dataset_->truth()) {
       throw StartupError(
           ExitCode::kUnavailable,
@@ -136,7 +150,13 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
     accuracy = isSimulated(options.data) ? ofExactTruth() : ofMeasuredTruth();
   }
   if (pose_file_) {
-    poses_ = std::make_unique<PoseOdometry>(*pose_file_, kVio, accuracy);
+    const auto serve = [this](auto source) {
+      pose_at_ = [source](const FrameStamp& stamp) mutable { return source.at(stamp); };
+    };
+    if (options.odometry == "drifting")
+      serve(DriftingOdometry(*pose_file_, kVio, accuracy, configs_.drifting));
+    else
+      serve(PoseOdometry(*pose_file_, kVio, accuracy));
     return;
   }
   uses_vio_ = true;
@@ -234,8 +254,8 @@ void Pipeline::handleFrame(const Frame& frame) {
       timer_.timeTowardsNext("vio", work);
   }
   if (!first_camera) return deliver();
-  if (poses_) {
-    if (const auto odometry = poses_->at(frame.stamp))
+  if (pose_at_) {
+    if (const auto odometry = pose_at_(frame.stamp))
       new_odometry_.push_back(*odometry);
     else
       reasons_.add("frame_without_pose");
@@ -295,6 +315,7 @@ void Pipeline::deliver() {
     outputs_->onOdometry(odometry);
     keep("odometry", odometry, odometry.stamp.time);
     if (odometry.state != OdometryState::kInitialising) ++counts_.odometry;
+    timer_.timeTowardsNext("map_store", [&] { map_->onOdometry(odometry); });
     timer_.timeTowardsNext("semantic_filter", [&] { filter_->onOdometry(odometry); });
     const auto landmarks = landmarks_.find(frame);
     if (landmarks != landmarks_.end()) {
@@ -328,6 +349,11 @@ void Pipeline::finish() {
   if (auto truth = pictureTruth(*dataset_, dataOptions(), outputs_->poses()))
     outputs_->setTruth(*std::move(truth));
   outputs_->finish();
+  if (configs_.map_store.graph) {
+    std::vector<std::pair<TimePoint, RigidTransform>> along;
+    for (const auto& [time, T_MW] : map_->mapper().along({1, 0})) along.emplace_back(time, T_MW);
+    outputs_->writeMapTrajectory(along);
+  }
   if (run_) {
     if (const auto kept = run_->finish(); !kept) reasons_.add("run_" + kept.error().code);
   }

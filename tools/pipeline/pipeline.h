@@ -20,7 +20,6 @@
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
 #include "tools/pipeline/map_memory.h"
-#include "tools/pipeline/odometry_source.h"
 #include "tools/pipeline/settings.h"
 
 namespace perdure::tools {
@@ -52,6 +51,8 @@ class Pipeline {
   const OutputWriter& outputs() const { return *outputs_; }
   OutputWriter& outputs() { return *outputs_; }
   std::uint64_t configurationDigest() const { return configs_.digest; }
+  /// Index of the first frame of the data that is used.
+  std::uint64_t firstFrame() const { return first_index_; }
   bool usesVio() const { return uses_vio_; }
   bool usesModel() const { return inference_ != nullptr; }
   /// Counted reasons by service.
@@ -95,7 +96,7 @@ class Pipeline {
   std::map<std::string, ShapePoints> shapes_;  ///< of the class priors
   std::unique_ptr<replay::RecordingWriter> run_;
   std::int64_t run_ns_ = 0;
-  std::unique_ptr<PoseOdometry> poses_;
+  std::function<std::optional<Odometry>(const FrameStamp&)> pose_at_;  ///< none: vio's
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;
   std::unique_ptr<inference::Node> inference_;
@@ -108,6 +109,7 @@ class Pipeline {
   bus::Once odometry_once_;  // of the recording, as the service has it
   std::uint64_t model_hash_ = 0;
   std::optional<TimePoint> first_frame_;
+  std::uint64_t first_index_ = 0;                 ///< in the data, by --from
   double frames_seconds_ = 0.0;                   // of the recording, since its first frame
   std::vector<Odometry> new_odometry_;            // of vio, not yet handed on
   std::map<std::uint64_t, Landmarks> landmarks_;  // by frame, waiting for the filter

@@ -52,7 +52,8 @@ void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequ
   }
 }
 
-Json objectScore(const PipelineOptions& options, const fs::path& labels_file) {
+Json objectScore(const PipelineOptions& options, const fs::path& labels_file,
+                 std::uint64_t first_frame) {
   const fs::path out = options.out;
   const auto labels = replay::readKittiLabels(labels_file);
   auto calibration = replay::readTrackingCalibration(fs::path(options.data) / "calib" /
@@ -63,7 +64,8 @@ Json objectScore(const PipelineOptions& options, const fs::path& labels_file) {
   auto rows = readObjectRows(out / "objects_final.csv");
   const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
   std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
-  const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+  auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+  truth.erase(truth.begin(), truth.lower_bound(first_frame));
   return toReport(scoreObjects(rows, truth, poses, calibration, {}));
 }
 
@@ -85,9 +87,10 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
   const bool has_truth =
       pipeline.dataset().kind() == replay::DatasetKind::kKittiTracking && fs::exists(labels);
   if (pipeline.outputs().odometryFrames() == 0) return report;
-  if (isSimulated(options.data)) report["objects"] = reportSimulated(options.data, options.out);
+  if (isSimulated(options.data))
+    report["objects"] = reportSimulated(options.data, options.out, pipeline.firstFrame());
   if (has_truth) {
-    report["objects"] = objectScore(options, labels);
+    report["objects"] = objectScore(options, labels, pipeline.firstFrame());
     copyTruth(options.data, fs::path(options.out) / "truth", options.sequence);
   }
   return report;

@@ -21,12 +21,14 @@ std::vector<Service> describeAll(ServiceConfigs& configs) {
                                 {"semantic_filter", "semantic_filter.yaml", {}},
                                 {"inference", "inference.yaml", {}},
                                 {"map_store", "map_store.yaml", {}},
-                                {"detector", "simulated_detector.yaml", {}}};
+                                {"detector", "simulated_detector.yaml", {}},
+                                {"drifting", "drifting_odometry.yaml", {}}};
   vio::describe(configs.vio, services[0].fields);
   semantic_filter::describe(configs.semantic_filter, services[1].fields);
   inference::describe(configs.inference, services[2].fields);
   map_store::describe(configs.map_store, services[3].fields);
   describe(configs.detector, services[4].fields);
+  describe(configs.drifting, services[5].fields);
   return services;
 }
 
@@ -98,7 +100,7 @@ ServiceConfigs readServiceConfigs(const PipelineOptions& options) {
     const auto found = config::assign(service.fields, assignment.substr(service.name.size() + 1));
     problems.insert(problems.end(), found.begin(), found.end());
   }
-  if (options.seed) configs.detector.seed = *options.seed;
+  if (options.seed) configs.detector.seed = configs.drifting.seed = *options.seed;
   config::refuse(problems);
   auto& priors = configs.semantic_filter.class_priors;
   if (!fs::exists(priors)) priors = (configFolder() / fs::path(priors).filename()).string();

@@ -11,20 +11,22 @@
 #include "services/map_store/config.h"
 #include "services/semantic_filter/config.h"
 #include "services/vio/config.h"
+#include "tools/pipeline/drifting_odometry.h"
 #include "tools/pipeline/simulated_source.h"
 
 namespace perdure::tools {
 
 struct PipelineOptions {
   std::string data, sequence, rig, out;
-  std::string odometry;    ///< vio, truth, recorded, or a pose file
+  std::string odometry;    ///< vio, truth, drifting, recorded, or a pose file
   std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
   double box_origin = 0.0;
   bool outline_boxes = false;
+  double from = 0.0;  ///< seconds after the first frame at which to begin
   std::optional<double> seconds;
-  std::optional<std::int64_t> seed;      ///< of --detections simulated
+  std::optional<std::int64_t> seed;      ///< of --detections simulated and --odometry drifting
   std::vector<std::string> configs;      ///< service=FILE
   std::vector<std::string> assignments;  ///< service.key=value
   bool quiet = false;
@@ -39,6 +41,7 @@ struct ServiceConfigs {
   inference::Config inference;
   map_store::Config map_store;  ///< its path is OUT/map.sqlite, whatever it says
   DetectorConfig detector;      ///< of --detections simulated; service `detector`
+  DriftConfig drifting;         ///< of --odometry drifting
   std::uint64_t digest = 0;     ///< of all values
 };
 

@@ -37,6 +37,17 @@ TEST(TrajectoryScore, AShiftAndAYawAreAlignedAway) {
   }
 }
 
+TEST(TrajectoryScore, AlignedAtTheStartOnlyTheFirstPoseLies) {
+  auto pairs = loop(100);
+  const RigidTransform T_EG(rotationAboutZ(1.1), {5, -3, 2});
+  for (auto& pair : pairs) pair.estimate = T_EG * pair.truth;
+  EXPECT_LT(scoreTrajectory(pairs, Alignment::kStart).ate_rmse_m, 1e-9);
+  for (std::size_t i = 1; i < pairs.size(); ++i) pairs[i].estimate.p.z() += 2.0;
+  const auto s = scoreTrajectory(pairs, Alignment::kStart);
+  EXPECT_NEAR(s.ate_rmse_m, 2.0 * std::sqrt(0.99), 1e-9);
+  EXPECT_LT(scoreTrajectory(pairs, Alignment::kYaw).ate_rmse_m, 0.3);
+}
+
 TEST(TrajectoryScore, ATiltIsAlignedAwayOnlyByARigidAlignment) {
   const RigidTransform tilt(expQuaternion({0.05, 0, 0}), Eigen::Vector3d::Zero());
   auto pairs = loop(200);

@@ -178,6 +178,29 @@ TEST(Pipeline, SecondsEndTheRun) {
   EXPECT_EQ(poses.size(), 11U);
 }
 
+TEST(Pipeline, FromBeginsLaterAndLeavesTheNumbersOfTheFrames) {
+  const auto street = makeStreet("from");
+  auto options = streetOptions(street, "whole");
+  runPipeline(options);
+  options.out = (street / "late").string();
+  options.from = 0.95;
+  options.seconds = 3.0;
+  runPipeline(options);
+  const auto whole = replay::PoseFile::read(street / "whole/trajectory.tum").poses();
+  const auto late = replay::PoseFile::read(street / "late/trajectory.tum").poses();
+  ASSERT_EQ(late.size(), 31U);
+  EXPECT_EQ(late.front().time, whole[10].time);
+  EXPECT_EQ(late.front().T_WB.p, whole[10].T_WB.p);
+  const auto rows = readObjectRows(street / "late/objects_inst.csv");
+  ASSERT_FALSE(rows.empty());
+  EXPECT_GE(rows.front().frame, 10U);
+  EXPECT_LE(rows.back().frame, 40U);
+  options.from = 6.0;
+  EXPECT_THAT(errorOf(options), HasSubstr("give fewer seconds"));
+  options.odometry = options.detections = "recorded";
+  EXPECT_THAT(errorOf(options), HasSubstr("--from"));
+}
+
 TEST(Pipeline, FramesWithoutAPoseAreCountedAndLeaveNoLine) {
   const auto street = makeStreet("few_poses");
   std::string tum;
@@ -215,8 +238,9 @@ TEST(Pipeline, WhatCannotStartSaysTheMend) {
   EXPECT_THAT(errorOf(options), HasSubstr("no inertial samples"));
   options = streetOptions(street, "out");
   options.assignments = {"planner.speed=3"};
-  EXPECT_THAT(errorOf(options),
-              HasSubstr("services are vio, semantic_filter, inference, map_store, detector"));
+  EXPECT_THAT(
+      errorOf(options),
+      HasSubstr("services are vio, semantic_filter, inference, map_store, detector, drifting"));
   options.assignments = {"semantic_filter.no_such_key=3"};
   EXPECT_THAT(errorOf(options), HasSubstr("no_such_key"));
   options = streetOptions(street, "out");

@@ -1,0 +1,188 @@
+// `perdure evaluate memory`: whether objects that are seen again keep their ids, in a run that
+// drifts, and in a run that begins with the map of another one.
+#include "tools/evaluate/command.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
+#include "tools/evaluate/memory/visits.h"
+#include "tools/evaluate/trajectory_score.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct MemoryCommand {
+  std::string run, truth, map_run;
+  bool json = false;
+};
+
+struct TrajectoryErrors {
+  TrajectoryScore from_start, aligned;
+};
+
+struct MemoryResult {
+  MemoryScore memory;
+  TrajectoryErrors trajectory;
+  std::optional<TrajectoryErrors> map_trajectory;
+  std::optional<ReturnScore> returned;
+};
+
+std::vector<MemoryFrame> framesOf(const fs::path& run, const SimulatedTruth& truth,
+                                  const MemoryOptions& options) {
+  for (const char* file : {"objects_inst.csv", "trajectory.tum"}) {
+    if (fs::exists(run / file)) continue;
+    replay::throwMissing(run / file, "a part of the run",
+                         "name a folder that `perdure pipeline --out` made");
+  }
+  auto frames = besideTheBody(truth, readObjectRows(run / "objects_inst.csv"),
+                              replay::PoseFile::read(run / "trajectory.tum").poses(), options);
+  if (frames.size() < 2) {
+    throw StartupError(ExitCode::kUnavailable,
+                       (run / "trajectory.tum").string() +
+                           " has fewer than two times in common with the truth; name the "
+                           "simulated folder over which the run went");
+  }
+  return frames;
+}
+
+TrajectoryErrors trajectoryErrors(const fs::path& file, const SimulatedTruth& truth) {
+  std::vector<PosePair> pairs;
+  const auto poses = replay::PoseFile::read(file).poses();
+  for (const auto& pose : poses) {
+    if (const auto there = truth.body.at(0, pose.time))
+      pairs.push_back({pose.time, pose.T_WB, *there});
+  }
+  if (pairs.size() < 2) {
+    throw StartupError(ExitCode::kUnavailable,
+                       file.string() + " has fewer than two times in common with the truth");
+  }
+  return {scoreTrajectory(pairs, Alignment::kStart), scoreTrajectory(pairs, Alignment::kYaw)};
+}
+
+MemoryResult evaluateMemory(const MemoryCommand& command) {
+  const MemoryOptions options;
+  const SimulatedTruth truth = readSimulatedTruth(command.truth);
+  const fs::path run = command.run;
+  const auto frames = framesOf(run, truth, options);
+  MemoryResult result;
+  result.memory = scoreMemory(truth, frames, options);
+  result.trajectory = trajectoryErrors(run / "trajectory.tum", truth);
+  if (const auto map = run / "trajectory_map.tum"; fs::exists(map))
+    result.map_trajectory = trajectoryErrors(map, truth);
+  if (!command.map_run.empty())
+    result.returned = scoreReturn(framesOf(command.map_run, truth, options), frames, options);
+  return result;
+}
+
+Json toJson(const TrajectoryErrors& errors) {
+  return {{"length_m", errors.aligned.length_m},
+          {"ate_from_start_m", errors.from_start.ate_rmse_m},
+          {"ate_from_start_max_m", errors.from_start.ate_max_m},
+          {"ate_aligned_m", errors.aligned.ate_rmse_m},
+          {"ate_aligned_max_m", errors.aligned.ate_max_m}};
+}
+
+Json toJson(const ReturnScore& score) {
+  Json json = {{"ids", score.ids},       {"known_objects", score.known},
+               {"seen", score.seen},     {"reported", score.reported},
+               {"kept", score.kept},     {"kept_share", score.keptShare()},
+               {"wrong", score.wrong},   {"first_s", nullptr},
+               {"first_way_m", nullptr}, {"first_objects", nullptr}};
+  if (score.first) {
+    json["first_s"] = score.first->seconds;
+    json["first_way_m"] = score.first->way_m;
+    json["first_objects"] = score.first->objects;
+  }
+  return json;
+}
+
+Json toJson(const MemoryResult& result) {
+  const MemoryScore& s = result.memory;
+  Json json = {{"frames", s.frames},
+               {"objects", s.objects},
+               {"seen_twice", s.seen_twice},
+               {"reported_twice", s.reported_twice},
+               {"ids_kept", s.kept},
+               {"ids_kept_share", s.keptShare()},
+               {"drift_between_visits_m", s.drift_m},
+               {"sightings", s.sightings},
+               {"recall", s.recall()},
+               {"recall_second_half", s.lateRecall()},
+               {"objects_reported", s.objects_matched},
+               {"ids_per_object", s.idsPerObject()},
+               {"objects_with_more_ids", s.with_more_ids},
+               {"trajectory", toJson(result.trajectory)}};
+  if (result.map_trajectory) json["trajectory_map"] = toJson(*result.map_trajectory);
+  if (result.returned) json["map_run"] = toJson(*result.returned);
+  return json;
+}
+
+using Count = unsigned long long;
+
+void print(const char* name, const TrajectoryErrors& errors) {
+  std::printf("%s: ATE %.3f m from the start, %.3f m aligned in position and yaw, over %.0f m\n",
+              name, errors.from_start.ate_rmse_m, errors.aligned.ate_rmse_m,
+              errors.aligned.length_m);
+}
+
+void print(const ReturnScore& s) {
+  std::printf("map of the run before: %llu ids; %llu of its objects are seen here\n",
+              static_cast<Count>(s.ids), static_cast<Count>(s.known));
+  if (!s.first) {
+    std::printf("no id of it appears\n");
+    return;
+  }
+  std::printf("first id of it after %.1f s, %.1f m and %llu objects in view\n", s.first->seconds,
+              s.first->way_m, static_cast<Count>(s.first->objects));
+  std::printf(
+      "from then on: %llu seen, %llu reported, %llu with their id (%.3f of all), %llu with "
+      "another object's\n",
+      static_cast<Count>(s.seen), static_cast<Count>(s.reported), static_cast<Count>(s.kept),
+      s.keptShare(), static_cast<Count>(s.wrong));
+}
+
+void print(const MemoryResult& result) {
+  const MemoryScore& s = result.memory;
+  std::printf("%llu frames, %llu objects; %llu seen twice, %llu reported twice\n",
+              static_cast<Count>(s.frames), static_cast<Count>(s.objects),
+              static_cast<Count>(s.seen_twice), static_cast<Count>(s.reported_twice));
+  std::printf("ids kept: %.3f of %llu; the frame drifted by %.2f m between visits (median)\n",
+              s.keptShare(), static_cast<Count>(s.reported_twice), s.drift_m);
+  std::printf("recall within 25 m: %.3f of %llu; in the second half %.3f\n", s.recall(),
+              static_cast<Count>(s.sightings), s.lateRecall());
+  std::printf("ids per reported object: %.3f; %llu of %llu have more than one\n", s.idsPerObject(),
+              static_cast<Count>(s.with_more_ids), static_cast<Count>(s.objects_matched));
+  print("trajectory", result.trajectory);
+  if (result.map_trajectory) print("trajectory in the map", *result.map_trajectory);
+  if (result.returned) print(*result.returned);
+}
+
+}  // namespace
+
+void addEvaluateMemory(CLI::App& evaluate_app) {
+  auto options = std::make_shared<MemoryCommand>();
+  CLI::App* app = evaluate_app.add_subcommand(
+      "memory", "Whether objects keep their ids from one visit to the next, and after a restart");
+  app->add_option("run", options->run, "Folder of a run: objects_inst.csv, trajectory.tum")
+      ->required();
+  app->add_option("--truth", options->truth, "Simulated folder")->required();
+  app->add_option("--map-run", options->map_run,
+                  "Folder of the run, over the same simulated folder, with whose map RUN began");
+  app->add_flag("--json", options->json, "Print JSON");
+  app->callback([options] {
+    const MemoryResult result = evaluateMemory(*options);
+    if (options->json)
+      std::cout << toJson(result).dump(2) << std::endl;
+    else
+      print(result);
+  });
+}
+
+}  // namespace perdure::tools
