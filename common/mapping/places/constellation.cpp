@@ -26,8 +26,6 @@ constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
 constexpr double kDefaultShare = 1e-3;  // of a class that one of the two PMFs does not name
 
-double wrapHalfTurn(double angle) { return 0.5 * wrapAngle(2.0 * angle); }
-
 double planeVariance(const PlacedObject& o) {
   return 0.5 * o.covariance.topLeftCorner<2, 2>().trace();
 }
@@ -470,43 +468,6 @@ class Search {
 };
 
 }  // namespace
-
-void MatchEquations::add(const PlacedObject& seen, const PlacedObject& known, const LevelPose& x,
-                         double weight, double blur) {
-  const Eigen::Matrix3d R = x.R();
-  const Eigen::Vector3d arm = R * seen.p;
-  Eigen::Vector4d residual;
-  residual << known.p - (x.p + arm), wrapHalfTurn(known.yaw - seen.yaw - x.yaw);
-  Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
-  G.topLeftCorner<3, 3>() = R;
-  Eigen::Matrix4d S = known.covariance + G * seen.covariance * G.transpose();
-  S.diagonal().head<3>().array() += blur * blur;
-  const Eigen::Matrix4d W = inverseSymmetric(S);
-  Eigen::Matrix4d J = Eigen::Matrix4d::Identity();
-  J(0, 3) = -arm.y();
-  J(1, 3) = arm.x();
-  information += weight * J.transpose() * W * J;
-  pull += weight * J.transpose() * W * residual;
-  chi2 += weight * residual.dot(W * residual);
-  weights += weight;
-}
-
-Eigen::Vector4d MatchEquations::step() const { return inverseSymmetric(information) * pull; }
-
-Eigen::Matrix4d MatchEquations::covariance() const {
-  const double freedom = 4.0 * weights - 4.0;
-  const double scale = freedom > 0.0 ? std::max(1.0, chi2 / freedom) : 1.0;
-  return scale * inverseSymmetric(information);
-}
-
-PlacedObject transformed(const LevelPose& T_AB, PlacedObject object) {
-  Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
-  G.topLeftCorner<3, 3>() = T_AB.R();
-  object.p = T_AB * object.p;
-  object.yaw = wrapAngle(object.yaw + T_AB.yaw);
-  object.covariance = (G * object.covariance * G.transpose()).eval();
-  return object;
-}
 
 std::optional<PlaceMatch> bestMatch(PlaceQuery query, const PlaceParameters& parameters) {
   if (query.seen.empty() || query.map.empty()) return std::nullopt;
