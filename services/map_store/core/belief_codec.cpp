@@ -1,8 +1,5 @@
 #include "services/map_store/core/belief_codec.h"
 
-#include <bit>
-#include <concepts>
-#include <cstring>
 #include <string>
 
 namespace perdure::map_store {
@@ -10,97 +7,8 @@ namespace {
 
 constexpr std::size_t kMostClasses = 4096;
 constexpr std::size_t kMostKinds = 4096;  // of evidence
-constexpr std::size_t kLongestName = 4096;
 
-class Writer {
- public:
-  template <std::unsigned_integral T>
-  void put(T value) {
-    for (std::size_t i = 0; i < sizeof(T); ++i) {
-      bytes_.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-    }
-  }
-  void put(std::int64_t value) { put(static_cast<std::uint64_t>(value)); }
-  void put(double value) { put(std::bit_cast<std::uint64_t>(value)); }
-  void put(bool value) { put(static_cast<std::uint8_t>(value)); }
-  void put(TimePoint value) { put(toNanoseconds(value)); }
-  void put(const std::string& value) {
-    put(static_cast<std::uint32_t>(value.size()));
-    bytes_.insert(bytes_.end(), value.begin(), value.end());
-  }
-  template <class Derived>
-  void put(const Eigen::MatrixBase<Derived>& m) {
-    for (Eigen::Index c = 0; c < m.cols(); ++c) {
-      for (Eigen::Index r = 0; r < m.rows(); ++r) put(static_cast<double>(m(r, c)));
-    }
-  }
-  Bytes take() { return std::move(bytes_); }
-
- private:
-  Bytes bytes_;
-};
-
-/// Reads past the end give zero and leave ok() false.
-class Reader {
- public:
-  explicit Reader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
-
-  template <std::unsigned_integral T>
-  T take() {
-    if (!has(sizeof(T))) return T{};
-    std::uint64_t value = 0;
-    for (std::size_t i = 0; i < sizeof(T); ++i) {
-      value |= static_cast<std::uint64_t>(bytes_[at_ + i]) << (8 * i);
-    }
-    at_ += sizeof(T);
-    return static_cast<T>(value);
-  }
-  std::int64_t takeSigned() { return static_cast<std::int64_t>(take<std::uint64_t>()); }
-  double takeReal() { return std::bit_cast<double>(take<std::uint64_t>()); }
-  bool takeFlag() { return take<std::uint8_t>() != 0; }
-  TimePoint takeTime() { return fromNanoseconds(takeSigned()); }
-  std::string takeText() {
-    const std::size_t size = take<std::uint32_t>();
-    if (size > kLongestName || !has(size)) {
-      ok_ = false;
-      return {};
-    }
-    std::string value(reinterpret_cast<const char*>(bytes_.data() + at_), size);
-    at_ += size;
-    return value;
-  }
-  /// Of a list; nothing, and not ok(), where there are more than `most`.
-  std::size_t takeCount(std::size_t most) {
-    const std::size_t count = take<std::uint32_t>();
-    if (count > most) ok_ = false;
-    return ok_ ? count : 0;
-  }
-  template <class Derived>
-  void takeInto(Eigen::MatrixBase<Derived>& m) {
-    for (Eigen::Index c = 0; c < m.cols(); ++c) {
-      for (Eigen::Index r = 0; r < m.rows(); ++r) m(r, c) = takeReal();
-    }
-  }
-  template <class Enum>
-  Enum takeEnum(Enum last) {
-    const auto value = take<std::uint8_t>();
-    if (value > static_cast<std::uint8_t>(last)) ok_ = false;
-    return ok_ ? static_cast<Enum>(value) : Enum{};
-  }
-  bool ok() const { return ok_; }
-  bool finished() const { return ok_ && at_ == bytes_.size(); }
-
- private:
-  bool has(std::size_t size) {
-    if (!ok_ || bytes_.size() - at_ < size) ok_ = false;
-    return ok_;
-  }
-  std::span<const std::uint8_t> bytes_;
-  std::size_t at_ = 0;
-  bool ok_ = true;
-};
-
-void putClass(Writer& out, const ClassBelief& belief) {
+void putClass(ByteWriter& out, const ClassBelief& belief) {
   out.put(belief.name);
   out.put(belief.probability);
   out.put(belief.mean);
@@ -108,7 +16,7 @@ void putClass(Writer& out, const ClassBelief& belief) {
   out.put(belief.cross_pose);
 }
 
-ClassBelief takeClass(Reader& in) {
+ClassBelief takeClass(ByteReader& in) {
   ClassBelief belief;
   belief.name = in.takeText();
   belief.probability = in.takeReal();
@@ -118,18 +26,18 @@ ClassBelief takeClass(Reader& in) {
   return belief;
 }
 
-void putNats(Writer& out, const std::vector<double>& nats) {
+void putNats(ByteWriter& out, const std::vector<double>& nats) {
   out.put(static_cast<std::uint32_t>(nats.size()));
   for (const double each : nats) out.put(each);
 }
 
-std::vector<double> takeNats(Reader& in) {
+std::vector<double> takeNats(ByteReader& in) {
   std::vector<double> nats(in.takeCount(kMostKinds));
   for (double& each : nats) each = in.takeReal();
   return nats;
 }
 
-void putLedger(Writer& out, const Ledger& ledger) {
+void putLedger(ByteWriter& out, const Ledger& ledger) {
   out.put(static_cast<std::uint32_t>(ledger.existence.size()));
   for (const LedgerEntry& entry : ledger.existence) {
     out.put(entry.log_odds);
@@ -151,7 +59,7 @@ void putLedger(Writer& out, const Ledger& ledger) {
   }
 }
 
-Ledger takeLedger(Reader& in) {
+Ledger takeLedger(ByteReader& in) {
   Ledger ledger;
   ledger.existence.resize(in.takeCount(kMostKinds));
   for (LedgerEntry& entry : ledger.existence) {
@@ -177,7 +85,7 @@ Ledger takeLedger(Reader& in) {
 
 bool known(std::uint16_t version) { return version >= 1 && version <= kBeliefFormat; }
 
-tl::unexpected<Reason> malformed(const Reader& in, std::uint16_t version) {
+tl::unexpected<Reason> malformed(const ByteReader& in, std::uint16_t version) {
   if (!known(version)) {
     return fail("belief_malformed", "format " + std::to_string(version) + " is not known here");
   }
@@ -187,7 +95,7 @@ tl::unexpected<Reason> malformed(const Reader& in, std::uint16_t version) {
 }  // namespace
 
 Bytes encodeBelief(const ObjectBelief& belief) {
-  Writer out;
+  ByteWriter out;
   out.put(kBeliefFormat);
   out.put(belief.id);
   out.put(belief.existence);
@@ -209,7 +117,7 @@ Bytes encodeBelief(const ObjectBelief& belief) {
 }
 
 Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes) {
-  Reader in(bytes);
+  ByteReader in(bytes);
   const auto version = in.take<std::uint16_t>();
   if (!known(version)) return malformed(in, version);
   ObjectBelief belief;
@@ -235,7 +143,7 @@ Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes) {
 }
 
 Bytes encodeHeader(const Objects& objects) {
-  Writer out;
+  ByteWriter out;
   out.put(kBeliefFormat);
   out.put(objects.stamp.source);
   out.put(objects.stamp.sequence);
@@ -252,7 +160,7 @@ Bytes encodeHeader(const Objects& objects) {
 }
 
 Result<Objects> decodeHeader(std::span<const std::uint8_t> bytes) {
-  Reader in(bytes);
+  ByteReader in(bytes);
   const auto version = in.take<std::uint16_t>();
   if (!known(version)) return malformed(in, version);
   Objects objects;

@@ -3,14 +3,12 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "common/base/result.h"
 #include "common/types/objects.h"
+#include "services/map_store/core/byte_io.h"
 
 namespace perdure::map_store {
-
-using Bytes = std::vector<std::uint8_t>;
 
 /// The first two bytes of every blob. A reader refuses versions that it does not know. 1 has no
 /// ledger.

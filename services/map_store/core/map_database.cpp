@@ -210,7 +210,12 @@ Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& ch
       asStored(id), 1 + static_cast<std::int64_t>(removal.kind), toNanoseconds(removal.time),
       asStored(removal.merged_into));
   if (!done) return done;
-  return runOnce(connection_, "DELETE FROM positions WHERE id = ?1", asStored(id));
+  for (const char* sql :
+       {"DELETE FROM positions WHERE id = ?1", "DELETE FROM sightings WHERE id = ?1"}) {
+    const auto deleted = runOnce(connection_, sql, asStored(id));
+    if (!deleted) return deleted;
+  }
+  return {};
 }
 
 Result<void> MapDatabase::putWorking(const Objects& working, const Change& change) {
@@ -243,10 +248,30 @@ Result<Written> MapDatabase::write(const Batch& batch) {
   Change change;
   auto written = putAll(batch, change);
   if (!written) return written;
+  if (batch.graph != nullptr) {
+    const auto unsound = putGraph(*batch.graph);
+    if (!unsound) return tl::unexpected<Reason>(unsound.error());
+    written->unsound = *unsound;
+  }
   const auto done = transaction->commit();
   if (!done) return tl::unexpected<Reason>(done.error());
   remember(*batch.working, change);
+  graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;
   return written;
+}
+
+Result<SavedGraph> MapDatabase::takeGraph() {
+  auto graph = reader().graph();
+  graph_is_whole_ = graph && graph->malformed == 0;
+  return graph;
+}
+
+Result<std::uint64_t> MapDatabase::putGraph(const mapping::Unsaved& graph) {
+  if (!graph_is_whole_) {
+    const auto swept = sweepGraph(connection_);
+    if (!swept) return tl::unexpected<Reason>(swept.error());
+  }
+  return writeGraph(connection_, graph);
 }
 
 Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {

@@ -13,6 +13,7 @@
 #include "common/types/map.h"
 #include "common/types/objects.h"
 #include "services/map_store/core/belief_codec.h"
+#include "services/map_store/core/graph_tables.h"
 #include "services/map_store/core/schema.h"
 #include "services/map_store/core/sqlite.h"
 
@@ -43,11 +44,13 @@ struct Batch {
   std::map<ObjectId, Removal> removed;
   /// Of the working set: laid by the graph and not seen since. What is stored of them stays.
   std::set<ObjectId> laid = {};
+  const mapping::Unsaved* graph = nullptr;  ///< what of it has changed; null: nothing
 };
 
 struct Written {
   std::vector<Square> squares;  ///< whose contents changed, each once
   std::uint64_t revision = 0;
+  std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; left as they are stored
 };
 
 struct Found {
@@ -78,6 +81,8 @@ class MapReader {
   Result<std::map<Square, std::uint32_t>> squares() const;  ///< with counts of objects
   /// The working set as it was at the last commit; nothing on an empty map.
   Result<std::optional<Objects>> working() const;
+  /// The pose graph as it was at the last commit; an empty one on a map without.
+  Result<SavedGraph> graph() const { return readGraph(*connection_); }
   Result<std::uint64_t> revision() const;
   Result<ObjectId> largestId() const;
 
@@ -93,6 +98,10 @@ class MapDatabase {
   /// All of it or nothing, durable when it returns. Beliefs that did not change are not written;
   /// nor are those of objects removed at `working`'s time or later.
   Result<Written> write(const Batch& batch);
+
+  /// The graph to go on with. What had to be left out of it is deleted at the next write of a
+  /// graph, because its ids are given again.
+  Result<SavedGraph> takeGraph();
 
   MapReader reader() const { return MapReader(&connection_); }
   const std::string& notice() const { return notice_; }
@@ -120,6 +129,7 @@ class MapDatabase {
   Result<void> putWorking(const Objects& working, const Change& change);
   Result<Written> putAll(const Batch& batch, Change& change);
   Result<Written> nextRevision(const Change& change);
+  Result<std::uint64_t> putGraph(const mapping::Unsaved& graph);
   void remember(const Objects& working, const Change& change);
 
   Connection connection_;
@@ -127,6 +137,7 @@ class MapDatabase {
   double tile_size_m_;
   /// Of the confirmed objects of the working set, as committed.
   std::map<ObjectId, Row> committed_;
+  bool graph_is_whole_ = false;  ///< nothing in the file that readGraph leaves out
 };
 
 }  // namespace perdure::map_store

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/base/errors.h"
+#include "services/map_store/core/graph_tables.h"
 
 namespace perdure::map_store {
 namespace {
@@ -34,10 +35,15 @@ CREATE VIRTUAL TABLE positions USING rtree(id, x0, x1, y0, y1, z0, z1);
 CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief BLOB);
 )sql";
 
+std::string mendOfUse(const Reason& reason) {
+  if (reason.code == "disk_full") return "free space, or raise store.max_size.";
+  if (reason.code == "busy") return "end the other program that writes it.";
+  return "set store.path to a file in a folder that this user may write.";
+}
+
 [[noreturn]] void cannotUse(const std::string& path, const Reason& reason) {
-  throw StartupError(ExitCode::kUnavailable,
-                     "The map " + path + " cannot be used (" + reason.code + ": " + reason.detail +
-                         "); set store.path to a file in a folder that this user may write.");
+  throw StartupError(ExitCode::kUnavailable, "The map " + path + " cannot be used (" + reason.code +
+                                                 ": " + reason.detail + "); " + mendOfUse(reason));
 }
 
 bool damaged(const Reason& reason) {
@@ -65,31 +71,6 @@ std::string setAside(const std::string& path) {
     if (fs::exists(path + suffix)) fs::rename(path + suffix, aside + suffix);
   }
   return aside;
-}
-
-Result<void> wholeFileIsSound(const Connection& connection) {
-  auto statement = connection.prepare("PRAGMA quick_check(1)");
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  const auto row = statement->step();
-  if (!row) return tl::unexpected<Reason>(row.error());
-  if (*row && statement->text(0) == "ok") return {};
-  return fail("corrupt", *row ? statement->text(0) : "no answer to the check");
-}
-
-struct Identity {
-  std::int64_t application = 0, version = 0, tables = 0;
-  bool empty() const { return application == 0 && version == 0 && tables == 0; }
-};
-
-Result<Identity> identityOf(const Connection& connection) {
-  Identity identity;
-  const auto application = connection.integer("PRAGMA application_id");
-  const auto version = connection.integer("PRAGMA user_version");
-  const auto tables = connection.integer("SELECT count(*) FROM sqlite_master");
-  for (const auto* value : {&application, &version, &tables}) {
-    if (!*value) return tl::unexpected<Reason>(value->error());
-  }
-  return Identity{*application, *version, *tables};
 }
 
 void refuseForeign(const std::string& path, const Identity& identity) {
@@ -122,17 +103,27 @@ Result<void> prepareForWriting(const Connection& connection, const StoreOptions&
 Result<void> create(const Connection& connection) {
   auto transaction = Transaction::begin(connection);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto made = connection.execute(
-      std::string(kSchema) + "PRAGMA application_id=" + std::to_string(kApplicationId) +
-      "; PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
+  const auto made =
+      connection.execute(std::string(kSchema) + kGraphSchema +
+                         "PRAGMA application_id=" + std::to_string(kApplicationId) +
+                         "; PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
   if (!made) return made;
   return transaction->commit();
 }
 
-/// Older tables are the same; their beliefs are read as they are.
+/// Tables of older versions are the same, and their beliefs are read as they are; those of the
+/// graph are new. All or nothing.
 Result<void> adopt(const Connection& connection, const Identity& identity) {
   if (identity.version == kSchemaVersion) return {};
-  return connection.execute("PRAGMA user_version=" + std::to_string(kSchemaVersion));
+  auto transaction = Transaction::begin(connection);
+  if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  const auto version = connection.integer("PRAGMA user_version");
+  if (!version) return tl::unexpected<Reason>(version.error());
+  if (*version == kSchemaVersion) return {};  // another process was first
+  const auto made = connection.execute(
+      std::string(kGraphSchema) + "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
+  if (!made) return made;
+  return transaction->commit();
 }
 
 /// A reason where the file is damaged; StartupError where it is not ours.
@@ -161,6 +152,26 @@ void makeFolderOf(const std::string& path) {
 }
 
 }  // namespace
+
+Result<Identity> identityOf(const Connection& connection) {
+  Identity identity;
+  const auto application = connection.integer("PRAGMA application_id");
+  const auto version = connection.integer("PRAGMA user_version");
+  const auto tables = connection.integer("SELECT count(*) FROM sqlite_master");
+  for (const auto* value : {&application, &version, &tables}) {
+    if (!*value) return tl::unexpected<Reason>(value->error());
+  }
+  return Identity{*application, *version, *tables};
+}
+
+Result<void> wholeFileIsSound(const Connection& connection) {
+  auto statement = connection.prepare("PRAGMA quick_check(1)");
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  const auto row = statement->step();
+  if (!row) return tl::unexpected<Reason>(row.error());
+  if (*row && statement->text(0) == "ok") return {};
+  return fail("corrupt", *row ? statement->text(0) : "no answer to the check");
+}
 
 OpenedStore openStore(const StoreOptions& options) {
   makeFolderOf(options.path);

@@ -1,6 +1,7 @@
 // The map's file: opened, checked, created; what is damaged is set aside and never overwritten.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "services/map_store/core/sqlite.h"
@@ -9,8 +10,9 @@ namespace perdure::map_store {
 
 /// "PERD" in the database's header: tells our files from other programs'.
 inline constexpr int kApplicationId = 0x50455244;
-/// 2: beliefs with ledgers. A map of version 1 is read, and becomes one of 2 when it is written.
-inline constexpr int kSchemaVersion = 2;
+/// 2: beliefs with ledgers. 3: the pose graph. Older maps are read as they are, and become one of 3
+/// when they are opened to be written.
+inline constexpr int kSchemaVersion = 3;
 
 struct StoreOptions {
   std::string path;
@@ -23,6 +25,16 @@ struct OpenedStore {
   Connection connection;
   std::string notice;  ///< a sentence where a damaged file was set aside, else empty
 };
+
+/// What a database says of itself.
+struct Identity {
+  std::int64_t application = 0, version = 0, tables = 0;
+  bool empty() const { return application == 0 && version == 0 && tables == 0; }
+};
+Result<Identity> identityOf(const Connection& connection);
+
+/// Reads the whole file: "corrupt" where it is damaged.
+Result<void> wholeFileIsSound(const Connection& connection);
 
 /// Opens for the service. Throws StartupError with the mend where the place cannot be written, the
 /// file is not a map of Perdure's, or a newer version made it.

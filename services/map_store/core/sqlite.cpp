@@ -132,6 +132,11 @@ bool Statement::isNull(int column) const {
   return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
 }
 
+bool Statement::isNumber(int column) const {
+  const int type = sqlite3_column_type(statement_.get(), column);
+  return type == SQLITE_FLOAT || type == SQLITE_INTEGER;
+}
+
 void Connection::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
 
 Result<Connection> Connection::open(const std::string& path, Mode mode) {
@@ -166,6 +171,17 @@ Result<std::int64_t> Connection::integer(std::string_view sql) const {
   if (!row) return tl::unexpected<Reason>(row.error());
   if (!*row) return fail("database_error", "a query that must have one row has none");
   return statement->integer(0);
+}
+
+Result<void> Connection::copyInto(const Connection& target) const {
+  constexpr int kAllPages = -1;
+  sqlite3* to = target.connection_.get();
+  sqlite3_backup* backup = sqlite3_backup_init(to, "main", connection_.get(), "main");
+  if (backup == nullptr) return failure(sqlite3_errcode(to), to);
+  const int stepped = sqlite3_backup_step(backup, kAllPages);
+  const int finished = sqlite3_backup_finish(backup);
+  if (stepped == SQLITE_DONE && finished == SQLITE_OK) return {};
+  return failure(stepped == SQLITE_DONE ? finished : stepped, nullptr);
 }
 
 Result<Transaction> Transaction::begin(const Connection& connection) {

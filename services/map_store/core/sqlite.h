@@ -44,6 +44,7 @@ class Statement {
   /// Valid until the next step or reset.
   std::span<const std::uint8_t> blob(int column) const;
   bool isNull(int column) const;
+  bool isNumber(int column) const;
 
  private:
   friend class Connection;
@@ -64,6 +65,8 @@ class Connection {
   Result<void> execute(const std::string& sql) const;
   /// The first column of the first row of a query that has one.
   Result<std::int64_t> integer(std::string_view sql) const;
+  /// Makes `target` the same, page by page: one state, also while others write this one.
+  Result<void> copyInto(const Connection& target) const;
 
  private:
   struct Close {

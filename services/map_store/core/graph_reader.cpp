@@ -1,0 +1,187 @@
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "services/map_store/core/graph_tables.h"
+
+namespace perdure::map_store {
+namespace {
+
+using mapping::AnchorId;
+using mapping::SavedMap;
+
+/// Calls `take` at each row; false from it: the row is malformed.
+template <class Take>
+Result<void> takeRows(const Connection& connection, std::string_view sql, std::uint64_t& malformed,
+                      Take take) {
+  auto rows = connection.prepare(sql);
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return {};
+    if (!take(*rows)) ++malformed;
+  }
+}
+
+/// Names by their numbers from 0 on; those after a gap cannot be placed.
+Result<void> readClasses(const Connection& connection, SavedGraph& graph) {
+  auto& classes = graph.map.classes;
+  return takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number",
+                  graph.malformed, [&](const Statement& row) {
+                    const auto name = row.blob(1);
+                    const bool next = row.id(0) == classes.size() && name.size() <= kLongestText;
+                    if (next) classes.emplace_back(name.begin(), name.end());
+                    return next;
+                  });
+}
+
+/// Where a column holds no number the pose is not finite.
+double numberAt(const Statement& row, int column) {
+  return row.isNumber(column) ? row.real(column) : std::nan("");
+}
+
+Result<void> readAnchors(const Connection& connection, SavedGraph& graph) {
+  return takeRows(connection,
+                  "SELECT a.id, a.anchor, p.x, p.y, p.z, p.yaw, p.held_fast FROM anchors a "
+                  "LEFT JOIN anchor_poses p ON p.id = a.id ORDER BY a.id",
+                  graph.malformed, [&](const Statement& row) {
+                    auto anchor = decodeAnchor(row.blob(1));
+                    if (!anchor || anchor->id != row.id(0)) return false;
+                    mapping::SavedAnchor saved;
+                    saved.anchor = *std::move(anchor);
+                    saved.T_MA.p = {numberAt(row, 2), numberAt(row, 3), numberAt(row, 4)};
+                    saved.T_MA.yaw = numberAt(row, 5);
+                    saved.held_fast = row.integer(6) != 0;
+                    if (!isSound(saved.T_MA)) return false;
+                    graph.map.anchors.emplace_hint(graph.map.anchors.end(), row.id(0),
+                                                   std::move(saved));
+                    return true;
+                  });
+}
+
+Result<void> readEdges(const Connection& connection, SavedGraph& graph) {
+  return takeRows(connection, "SELECT id, edge, weight FROM edges ORDER BY id", graph.malformed,
+                  [&](const Statement& row) {
+                    auto edge = decodeEdge(row.blob(1));
+                    const double weight = numberAt(row, 2);
+                    if (!edge || row.id(0) == 0 || !std::isfinite(weight)) return false;
+                    graph.map.edges.emplace_hint(graph.map.edges.end(), row.id(0),
+                                                 mapping::SavedEdge{*std::move(edge), weight});
+                    return true;
+                  });
+}
+
+Result<void> readRecords(const Connection& connection, SavedGraph& graph) {
+  auto& records = graph.map.records;
+  return takeRows(connection, "SELECT id, record FROM sightings ORDER BY id", graph.malformed,
+                  [&](const Statement& row) {
+                    auto record = decodeRecord(row.blob(1));
+                    if (!record || row.id(0) == 0) return false;
+                    records.emplace_hint(records.end(), row.id(0), *std::move(record));
+                    return true;
+                  });
+}
+
+/// A predecessor comes before, so that what hangs on one that was left out is left out too.
+void leaveOutBrokenChains(SavedGraph& graph) {
+  auto& anchors = graph.map.anchors;
+  for (auto at = anchors.begin(); at != anchors.end();) {
+    const mapping::Anchor& anchor = at->second.anchor;
+    const auto previous = anchors.find(anchor.previous);
+    const bool whole = anchor.previous == 0 || (previous != anchors.end() &&
+                                                previous->second.anchor.session == anchor.session);
+    graph.malformed += whole ? 0 : 1;
+    at = whole ? std::next(at) : anchors.erase(at);
+  }
+}
+
+bool isKnown(const mapping::Sighting& sighting, const SavedMap& map) {
+  for (const auto& share : sighting.in_anchor.pmf) {
+    if (share.name >= map.classes.size()) return false;
+  }
+  return map.anchors.contains(sighting.anchor);
+}
+
+void leaveOutDangling(SavedGraph& graph) {
+  SavedMap& map = graph.map;
+  graph.malformed += std::erase_if(map.edges, [&](const auto& each) {
+    const mapping::Edge& edge = each.second.edge;
+    return !map.anchors.contains(edge.a) || !map.anchors.contains(edge.b);
+  });
+  graph.malformed += std::erase_if(
+      map.records, [&](const auto& each) { return !isKnown(each.second.sighting, map); });
+  for (auto& [id, record] : map.records) {
+    if (!record.earlier || isKnown(*record.earlier, map)) continue;
+    record.earlier.reset();
+    graph.shortened.insert(id);
+    ++graph.malformed;
+  }
+}
+
+/// The first anchor of each component, over the edges between them.
+class Components {
+ public:
+  explicit Components(const SavedMap& map) {
+    for (const auto& [id, anchor] : map.anchors) first_.emplace_hint(first_.end(), id, id);
+    for (const auto& [id, saved] : map.edges) join(saved.edge.a, saved.edge.b);
+  }
+  AnchorId firstOf(AnchorId id) {
+    while (first_.at(id) != id) id = first_[id] = first_.at(first_.at(id));
+    return id;
+  }
+
+ private:
+  void join(AnchorId a, AnchorId b) {
+    const auto [first, second] = std::minmax({firstOf(a), firstOf(b)});
+    first_[second] = first;
+  }
+  std::map<AnchorId, AnchorId> first_;
+};
+
+/// Where the anchor that was held fast, or an edge that led to it, has been left out.
+void holdEachComponent(SavedMap& map) {
+  Components components(map);
+  std::set<AnchorId> held;
+  for (const auto& [id, saved] : map.anchors) {
+    if (saved.held_fast) held.insert(components.firstOf(id));
+  }
+  for (auto& [id, saved] : map.anchors) {
+    if (components.firstOf(id) == id && !held.contains(id)) saved.held_fast = true;
+  }
+}
+
+Result<void> readAll(const Connection& connection, SavedGraph& graph) {
+  const auto version = connection.integer("PRAGMA user_version");
+  if (!version) return tl::unexpected<Reason>(version.error());
+  if (*version < kFirstSchemaWithGraph) return {};
+  auto done = readClasses(connection, graph);
+  if (done) done = readAnchors(connection, graph);
+  if (done) done = readEdges(connection, graph);
+  if (done) done = readRecords(connection, graph);
+  return done;
+}
+
+}  // namespace
+
+Result<SavedGraph> readGraph(const Connection& connection) {
+  // A savepoint is a transaction of its own where there is none: the tables belong together.
+  auto done = connection.execute("SAVEPOINT graph");
+  if (!done) return tl::unexpected<Reason>(done.error());
+  SavedGraph graph;
+  done = readAll(connection, graph);
+  const auto released = connection.execute("RELEASE graph");
+  if (!done) return tl::unexpected<Reason>(done.error());
+  if (!released) return tl::unexpected<Reason>(released.error());
+  leaveOutBrokenChains(graph);
+  leaveOutDangling(graph);
+  holdEachComponent(graph.map);
+  return graph;
+}
+
+}  // namespace perdure::map_store

@@ -1,0 +1,196 @@
+#include "services/map_store/core/graph_tables.h"
+
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace perdure::map_store {
+
+// Blobs are what core/graph_codec.h says, and the columns beside them repeat what they hold, to be
+// asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
+// weight. These have no type: REAL would lose the sign of zero.
+const char* const kGraphSchema = R"sql(
+CREATE TABLE graph_classes(number INTEGER PRIMARY KEY, name TEXT NOT NULL);
+CREATE TABLE anchors(
+  id INTEGER PRIMARY KEY, previous INTEGER NOT NULL, world INTEGER NOT NULL,
+  epoch INTEGER NOT NULL, source INTEGER NOT NULL, sequence INTEGER NOT NULL,
+  time_ns INTEGER NOT NULL, way_m REAL NOT NULL, anchor BLOB NOT NULL);
+CREATE TABLE anchor_poses(
+  id INTEGER PRIMARY KEY, x NOT NULL, y NOT NULL, z NOT NULL, yaw NOT NULL,
+  held_fast INTEGER NOT NULL);
+CREATE TABLE edges(
+  id INTEGER PRIMARY KEY, a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT NULL,
+  weight NOT NULL, edge BLOB NOT NULL);
+CREATE TABLE sightings(
+  id INTEGER PRIMARY KEY, anchor INTEGER NOT NULL, world INTEGER NOT NULL, epoch INTEGER NOT NULL,
+  last_seen_ns INTEGER NOT NULL, x REAL NOT NULL, y REAL NOT NULL, z REAL NOT NULL,
+  yaw REAL NOT NULL, record BLOB NOT NULL);
+CREATE VIEW objects_in_map AS
+  SELECT id, class, x, y, z, turn - pi() * ceil(turn / pi() - 0.5) AS yaw FROM (
+    SELECT o.id AS id, o.class AS class,
+      p.x + cos(p.yaw) * s.x - sin(p.yaw) * s.y AS x,
+      p.y + sin(p.yaw) * s.x + cos(p.yaw) * s.y AS y,
+      p.z + s.z AS z, p.yaw + s.yaw AS turn
+    FROM objects o JOIN sightings s ON s.id = o.id JOIN anchor_poses p ON p.id = s.anchor
+    WHERE o.gone = 0);
+)sql";
+
+namespace {
+
+constexpr char kPutAnchor[] =
+    "INSERT INTO anchors VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) ON CONFLICT(id) DO UPDATE SET "
+    "previous = ?2, world = ?3, epoch = ?4, source = ?5, sequence = ?6, time_ns = ?7, way_m = ?8, "
+    "anchor = ?9 WHERE anchor <> ?9";
+constexpr char kPutPose[] = "REPLACE INTO anchor_poses VALUES(?1, ?2, ?3, ?4, ?5, ?6)";
+constexpr char kPutEdge[] = "REPLACE INTO edges VALUES(?1, ?2, ?3, ?4, ?5, ?6)";
+constexpr char kPutSighting[] =
+    "REPLACE INTO sightings VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
+constexpr char kPutClass[] =
+    "INSERT INTO graph_classes VALUES(?1, ?2) ON CONFLICT(number) DO UPDATE SET name = ?2 "
+    "WHERE name <> ?2";
+
+/// Runs `sql` for each element, bound by `bind`.
+template <class All, class Bind>
+Result<void> runForEach(const Connection& connection, std::string_view sql, const All& all,
+                        Bind bind) {
+  if (all.empty()) return {};
+  auto statement = connection.prepare(sql);
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  for (const auto& each : all) {
+    bind(*statement, each);
+    const auto done = statement->run();
+    if (!done) return done;
+  }
+  return {};
+}
+
+using AnchorRow = std::pair<const mapping::AnchorId, mapping::SavedAnchor>;
+using EdgeRow = std::pair<const mapping::EdgeId, mapping::SavedEdge>;
+using SightingRow = std::pair<const ObjectId, mapping::ObjectRecord>;
+
+void bindAnchor(Statement& to, const AnchorRow& row) {
+  const mapping::Anchor& anchor = row.second.anchor;
+  to.bindId(1, row.first).bindId(2, anchor.previous);
+  to.bindId(3, anchor.session.world).bind(4, std::int64_t{anchor.session.epoch});
+  to.bindId(5, anchor.stamp.source).bindId(6, anchor.stamp.sequence);
+  to.bind(7, toNanoseconds(anchor.stamp.time)).bind(8, anchor.way_m);
+  to.bind(9, std::span<const std::uint8_t>(encodeAnchor(anchor)));
+}
+
+void bindPose(Statement& to, const AnchorRow& row) {
+  const mapping::LevelPose& T_MA = row.second.T_MA;
+  to.bindId(1, row.first).bind(2, T_MA.p.x()).bind(3, T_MA.p.y()).bind(4, T_MA.p.z());
+  to.bind(5, T_MA.yaw).bind(6, std::int64_t{row.second.held_fast});
+}
+
+void bindEdge(Statement& to, const EdgeRow& row) {
+  const mapping::Edge& edge = row.second.edge;
+  to.bindId(1, row.first).bindId(2, edge.a).bindId(3, edge.b);
+  to.bind(4, static_cast<std::int64_t>(edge.kind)).bind(5, row.second.weight);
+  to.bind(6, std::span<const std::uint8_t>(encodeEdge(edge)));
+}
+
+void bindSighting(Statement& to, const SightingRow& row) {
+  const mapping::ObjectRecord& record = row.second;
+  const mapping::PlacedObject& object = record.sighting.in_anchor;
+  to.bindId(1, row.first).bindId(2, record.sighting.anchor);
+  to.bindId(3, record.session.world).bind(4, std::int64_t{record.session.epoch});
+  to.bind(5, toNanoseconds(record.last_seen)).bind(6, object.p.x()).bind(7, object.p.y());
+  to.bind(8, object.p.z()).bind(9, object.yaw);
+  to.bind(10, std::span<const std::uint8_t>(encodeRecord(record)));
+}
+
+/// Elements of `all` that may be written; how many may not is added to `refused`.
+template <class All, class MayBeWritten>
+std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
+    const All& all, std::uint64_t& refused, MayBeWritten mayBeWritten) {
+  std::vector<std::reference_wrapper<const typename All::value_type>> sound;
+  for (const auto& each : all) {
+    if (mayBeWritten(each.second)) {
+      sound.emplace_back(each);
+    } else {
+      ++refused;
+    }
+  }
+  return sound;
+}
+
+Result<void> putClasses(const Connection& connection, const std::vector<std::string>& classes) {
+  std::int64_t number = 0;
+  return runForEach(connection, kPutClass, classes, [&](Statement& to, const std::string& name) {
+    to.bind(1, number++).bind(2, std::string_view(name));
+  });
+}
+
+Result<void> deleteFrom(const Connection& connection, const std::string& table,
+                        const std::set<std::uint64_t>& ids) {
+  return runForEach(connection, "DELETE FROM " + table + " WHERE id = ?1", ids,
+                    [](Statement& to, std::uint64_t id) { to.bindId(1, id); });
+}
+
+/// Rows of a table whose id is not among those of `known`.
+template <class Known>
+Result<void> deleteOthers(const Connection& connection, const std::string& table,
+                          const Known& known) {
+  std::set<std::uint64_t> others;
+  {
+    auto rows = connection.prepare("SELECT id FROM " + table);
+    if (!rows) return tl::unexpected<Reason>(rows.error());
+    for (;;) {
+      const auto row = rows->step();
+      if (!row) return tl::unexpected<Reason>(row.error());
+      if (!*row) break;
+      if (!known.contains(rows->id(0))) others.insert(rows->id(0));
+    }
+  }
+  return deleteFrom(connection, table, others);
+}
+
+}  // namespace
+
+Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Unsaved& unsaved) {
+  const mapping::SavedMap& changed = unsaved.changed;
+  std::uint64_t refused = 0;
+  const auto anchors = soundOnes(changed.anchors, refused, [](const mapping::SavedAnchor& saved) {
+    return isSound(saved.anchor) && isSound(saved.T_MA);
+  });
+  const auto edges = soundOnes(changed.edges, refused, [](const mapping::SavedEdge& saved) {
+    return isSound(saved.edge) && std::isfinite(saved.weight);
+  });
+  std::uint64_t unconfirmed = 0;
+  const auto records = soundOnes(changed.records, refused, [&](const mapping::ObjectRecord& r) {
+    unconfirmed += r.confirmed ? 0 : 1;
+    return r.confirmed && isSound(r);
+  });
+  auto done = putClasses(connection, changed.classes);
+  if (done) done = deleteFrom(connection, "edges", unsaved.edges_gone);
+  if (done) done = deleteFrom(connection, "sightings", unsaved.records_gone);
+  if (done) done = runForEach(connection, kPutAnchor, anchors, bindAnchor);
+  if (done) done = runForEach(connection, kPutPose, anchors, bindPose);
+  if (done) done = runForEach(connection, kPutEdge, edges, bindEdge);
+  if (done) done = runForEach(connection, kPutSighting, records, bindSighting);
+  if (!done) return tl::unexpected<Reason>(done.error());
+  return refused - unconfirmed;
+}
+
+Result<void> sweepGraph(const Connection& connection) {
+  const auto whole = readGraph(connection);
+  if (!whole) return tl::unexpected<Reason>(whole.error());
+  if (whole->malformed == 0) return {};
+  const mapping::SavedMap& map = whole->map;
+  mapping::Unsaved shortened;
+  for (const ObjectId id : whole->shortened) shortened.changed.records[id] = map.records.at(id);
+  auto done = connection.execute("DELETE FROM graph_classes WHERE number >= " +
+                                 std::to_string(map.classes.size()));
+  if (done) done = deleteOthers(connection, "anchors", map.anchors);
+  if (done) done = deleteOthers(connection, "anchor_poses", map.anchors);
+  if (done) done = deleteOthers(connection, "edges", map.edges);
+  if (done) done = deleteOthers(connection, "sightings", map.records);
+  if (!done) return done;
+  const auto written = writeGraph(connection, shortened);
+  if (!written) return tl::unexpected<Reason>(written.error());
+  return {};
+}
+
+}  // namespace perdure::map_store

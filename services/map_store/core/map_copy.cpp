@@ -1,0 +1,143 @@
+#include "services/map_store/core/map_copy.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "common/base/errors.h"
+#include "services/map_store/core/schema.h"
+
+namespace perdure::map_store {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What SQLite may leave beside a file.
+constexpr const char* kBeside[] = {"-wal", "-shm", "-journal"};
+
+[[noreturn]] void cannotRead(const std::string& from, const Reason& reason) {
+  const std::string why = " (" + reason.code + ": " + reason.detail + ")";
+  if (reason.code == "not_a_database") {
+    throw StartupError(ExitCode::kConfiguration,
+                       from + " is not a map of Perdure's, or its beginning is damaged" + why +
+                           "; give the file that map_store writes (its store.path).");
+  }
+  if (reason.code == "corrupt") {
+    throw StartupError(ExitCode::kUnavailable,
+                       "The map " + from + " is damaged" + why +
+                           "; give another one. What can be read of it: sqlite3 " + from +
+                           " .recover");
+  }
+  throw StartupError(ExitCode::kUnavailable,
+                     "The map " + from + " cannot be read" + why +
+                         "; this user must be able to read it and to write to its folder.");
+}
+
+[[noreturn]] void cannotWrite(const std::string& to, const Reason& reason) {
+  throw StartupError(
+      ExitCode::kUnavailable,
+      "The map cannot be copied to " + to + " (" + reason.code + ": " + reason.detail + "); " +
+          (reason.code == "disk_full" ? "free space there, or name a file on another disk."
+                                      : "name a file in a folder that this user may write."));
+}
+
+Connection openSource(const std::string& from) {
+  if (!fs::exists(from)) {
+    throw StartupError(
+        ExitCode::kUnavailable,
+        "There is no map " + from + "; give the file that map_store writes (its store.path).");
+  }
+  auto connection = Connection::open(from, Connection::Mode::kReadOnly);
+  if (!connection) cannotRead(from, connection.error());
+  (void)connection->execute("PRAGMA busy_timeout=1000");
+  const auto identity = identityOf(*connection);
+  if (!identity) cannotRead(from, identity.error());
+  if (identity->application != kApplicationId) {
+    throw StartupError(ExitCode::kConfiguration,
+                       from +
+                           " is not a map of Perdure's; give the file that map_store writes "
+                           "(its store.path).");
+  }
+  if (identity->version > kSchemaVersion) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "The map " + from + " has schema " + std::to_string(identity->version) +
+                           ", this program knows up to " + std::to_string(kSchemaVersion) +
+                           "; use the newer Perdure, or give another map.");
+  }
+  return *std::move(connection);
+}
+
+/// The log of another database would be taken for the copy's.
+void refuseWhatIsThere(const std::string& to) {
+  const auto refuse = [](const std::string& file) {
+    if (!fs::exists(fs::symlink_status(file))) return;
+    throw StartupError(ExitCode::kConfiguration,
+                       file +
+                           " is there already and is not overwritten; remove it, or name "
+                           "another file for the new map.");
+  };
+  refuse(to);
+  for (const char* suffix : kBeside) refuse(to + suffix);
+}
+
+/// A file that is removed at the end, with what lies beside it, unless it was renamed.
+class Draft {
+ public:
+  explicit Draft(std::string path) : path_(std::move(path)) { remove(); }
+  ~Draft() { remove(); }
+  Draft(const Draft&) = delete;
+  Draft& operator=(const Draft&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  void remove() const {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
+    for (const char* suffix : kBeside) fs::remove(path_ + suffix, ignored);
+  }
+  std::string path_;
+};
+
+/// The draft is closed, so that all of it is in its one file.
+void writeDraft(const std::string& from, const std::string& to, const Draft& draft) {
+  const Connection source = openSource(from);
+  const auto target = Connection::open(draft.path(), Connection::Mode::kReadWriteCreate);
+  if (!target) cannotWrite(to, target.error());
+  const auto copied = source.copyInto(*target);
+  const auto damaged = [](const Reason& reason) {
+    return reason.code == "corrupt" || reason.code == "not_a_database";
+  };
+  if (!copied && damaged(copied.error())) cannotRead(from, copied.error());
+  if (!copied) cannotWrite(to, copied.error());
+  const auto sound = wholeFileIsSound(*target);
+  if (!sound && damaged(sound.error())) cannotRead(from, sound.error());
+  if (!sound) cannotWrite(to, sound.error());
+}
+
+bool sync(const fs::path& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool synced = fsync(file) == 0;
+  close(file);
+  return synced;
+}
+
+}  // namespace
+
+void copyMap(const std::string& from, const std::string& to) {
+  const fs::path folder = fs::absolute(to).parent_path();
+  std::error_code error;
+  refuseWhatIsThere(to);
+  (void)openSource(from);
+  fs::create_directories(folder, error);
+  if (error) cannotWrite(to, {"cannot_open", folder.string() + ": " + error.message()});
+  const Draft draft(to + ".part");
+  writeDraft(from, to, draft);
+  fs::rename(draft.path(), to, error);
+  if (error) cannotWrite(to, {"io_error", error.message()});
+  if (!sync(to) || !sync(folder)) cannotWrite(to, {"io_error", "it cannot be synced"});
+}
+
+}  // namespace perdure::map_store
