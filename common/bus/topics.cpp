@@ -34,7 +34,7 @@ Qos exclusive(int depth, double rate_hz) {
   return {.depth = depth, .exclusive = true, .lease_s = leaseFor(rate_hz)};
 }
 
-using Table = std::array<TopicInfo, 19>;
+using Table = std::array<TopicInfo, 20>;
 
 /// After the rate: who writes, and who reads besides those that record and watch.
 Table makeTable() {
@@ -59,11 +59,13 @@ Table makeTable() {
           kMapStore | kVio | kSubscriber),  // vio masks what moves (input.moving_mask)
       row(kObjectState, latched(1), 0, kNotRecorded, kSemanticFilter, kSubscriber),
       row(kRecalled, reliable(8), 0, kRecorded, kMapStore, kSemanticFilter),
-      row(kEvents, latched(256), 0, kRecorded, kSemanticFilter, kMapStore | kSubscriber),
+      row(kEvents, latched(256), 0, kRecorded, kSemanticFilter | kMapStore,
+          kMapStore | kSubscriber),  // map_store: loops of the graph
       row(kPredictions, bestEffort(1), kCameraHz, kRecorded, kSemanticFilter,
           kInference | kSubscriber),
       row(kMap, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
       row(kMapHeader, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
+      row(kMapFrame, latched(1), 0, kRecorded, kMapStore, kSubscriber),
       row(kMapQuery, reliable(16), 0, kRecorded, kSemanticFilter | kOperator | kSubscriber,
           kMapStore),
       row(kMapReply, reliable(16), 0, kRecorded, kMapStore, kSubscriber),

@@ -65,6 +65,7 @@ inline const Topic<Event> kEvents{"events"};
 inline const Topic<Predictions> kPredictions{"predictions"};
 inline const Topic<MapTile> kMap{"map"};
 inline const Topic<MapHeader> kMapHeader{"map/header"};
+inline const Topic<MapFrame> kMapFrame{"map/frame"};
 inline const Topic<MapQuery> kMapQuery{"map/query"};
 inline const Topic<MapReply> kMapReply{"map/reply"};
 inline const Topic<Health> kHealth{"health"};
@@ -87,8 +88,8 @@ bool withTopic(const std::string& name, Visit visit) {
   offer(kImu), offer(kSpeed), offer(kCalibration), offer(kOdometry), offer(kLandmarks);
   offer(kDetections), offer(kModel), offer(kSwap), offer(kObjects), offer(kObjectState),
       offer(kRecalled);
-  offer(kEvents), offer(kPredictions), offer(kMap), offer(kMapHeader), offer(kMapQuery);
-  offer(kMapReply), offer(kHealth);
+  offer(kEvents), offer(kPredictions), offer(kMap), offer(kMapHeader), offer(kMapFrame);
+  offer(kMapQuery), offer(kMapReply), offer(kHealth);
   return found;
 }
 

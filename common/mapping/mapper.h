@@ -17,9 +17,11 @@
 #include "common/mapping/frames/anchor_builder.h"
 #include "common/mapping/graph/drift_scale.h"
 #include "common/mapping/graph/marginals.h"
-#include "common/mapping/graph/pose_graph.h"
+#include "common/mapping/loop_search.h"
+#include "common/mapping/map_state.h"
 #include "common/mapping/parameters.h"
-#include "common/mapping/places/constellation.h"
+#include "common/mapping/saved_map.h"
+#include "common/mapping/tracked_ties.h"
 #include "common/types/objects.h"
 
 namespace perdure::mapping {
@@ -29,6 +31,7 @@ struct LoopClosure {
   EdgeId id = 0;
   AnchorId a = 0, b = 0;  ///< b: where the body was
   PlaceMatch match;
+  bool joins = false;         ///< a session that belonged to nothing, with the map
   double correction_m = 0.0;  ///< how far the body's place in M moved
 };
 
@@ -52,7 +55,8 @@ struct Recallable {
 
 class Mapper {
  public:
-  explicit Mapper(const Parameters& parameters);
+  /// `saved`: what was known at the last end.
+  explicit Mapper(const Parameters& parameters, SavedMap saved = {});
 
   /// Poses come before the working set of the same frame.
   void onOdometry(const Odometry& odometry);
@@ -65,11 +69,26 @@ class Mapper {
   /// to be taken for what is seen there.
   std::vector<Recallable> near(const Eigen::Vector3d& centre_W, double radius_m);
 
-  /// Whether the object belongs to an anchor. What was stored before this process began does not.
+  /// Whether the object belongs to an anchor.
   bool holds(ObjectId id) const;
+  /// Its record, if it belongs to one.
+  const ObjectRecord* recordOf(ObjectId id) const;
+
+  /// What is to be saved, and that it has been.
+  Unsaved unsaved() const { return state_.unsaved(); }
+  void markSaved() { state_.markSaved(); }
 
   /// How today's W lies in M beside the body.
   RigidTransform T_MW() const;
+  /// All of that frame: nothing before the first pose.
+  struct Frame {
+    WorldId map;  ///< M: W of the first session of the component
+    RigidTransform T_MW;
+    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the body in M, [δp, δyaw]
+    std::uint32_t sessions = 0;                            ///< of the component
+    std::uint32_t loops = 0;                               ///< believed, of all
+  };
+  std::optional<Frame> frame();
   /// The same along the way of a session, at each anchor.
   struct Along {
     TimePoint time;
@@ -77,55 +96,38 @@ class Mapper {
   };
   std::vector<Along> along(const WorldId& session) const;
 
-  const PoseGraph& graph() const { return graph_; }
-  const std::map<AnchorId, Anchor>& anchors() const { return anchors_; }
+  const PoseGraph& graph() const { return state_.graph(); }
+  const std::map<AnchorId, Anchor>& anchors() const { return state_.anchors(); }
   std::uint64_t revision() const { return revision_; }
 
  private:
-  struct Sighting {
-    AnchorId anchor = 0;
-    PlacedObject in_anchor;
-  };
-  struct Record {
-    WorldId session;
-    double way_m = 0.0;  ///< of the session when it was last detected
-    TimePoint last_seen;
-    Matrix6d pose_error = Matrix6d::Zero();  ///< then
-    Sighting sighting;                       ///< the newest
-    std::optional<Sighting> earlier;         ///< of the visit before, if it came back
-    bool confirmed = false;                  ///< once: it is on the map
-  };
-
   void begin(const Odometry& odometry);
+  Whereabouts body();
   void see(const ObjectBelief& belief, const Objects& objects);
-  bool isOld(const Record& record) const;
   PlacedObject placedOf(const ObjectBelief& belief, const Matrix6d& pose_error);
-  std::uint32_t numberOf(const std::string& class_name);
-  PlacedObject inM(const Sighting& sighting) const;
-  std::vector<PlacedObject> seenOfLate();
-  std::optional<LevelGaussian> addMapAround(PlaceQuery& query);
-  const Sighting* sightingOfBefore(const Record& record) const;
+  bool isOld(const ObjectRecord& record) const;
+  void forgetUnconfirmed();
+  bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
+  void tie();
   void search();
-  bool isBelieved(const PlaceMatch& match, double sigma_m) const;
+  void graphMoved();
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
-  /// `prior`: of T_Mb before the loop.
-  void close(const PlaceMatch& match, const LevelGaussian& prior);
+  void close(const LoopSearch::Found& found);
+  /// The anchor of before that most of the matched objects belong to.
+  AnchorId homeOf(const PlaceMatch& match);
   void learnDrift(const PlaceMatch& match, const LevelGaussian& prior);
   Edge edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const;
-  void optimise();
+  void bringTogether(const Edge& edge);
   const Marginals& marginals();
 
   Parameters parameters_;
+  MapState state_;
   AnchorBuilder builder_;
-  PoseGraph graph_;
+  LoopSearch loop_search_;
+  TrackedTies tracked_ties_;
   DriftScale drift_scale_;
-  double odometry_variance_ = 1.0;  ///< by which the graph's odometry edges are multiplied
-  double learned_at_m_ = 0.0;
-  std::map<AnchorId, Anchor> anchors_;
-  std::map<ObjectId, Record> records_;
-  std::map<std::string, std::uint32_t> class_numbers_;
+  double odometry_variance_ = 1.0;  ///< by which the session's odometry edges are multiplied
   std::optional<WorldId> session_;
-  AnchorId next_anchor_ = 1;
   std::unique_ptr<Marginals> marginals_;  ///< from the newest anchor
   MapChange change_;
   /// The newest loop. One that rests on the same objects takes its place.
@@ -134,7 +136,7 @@ class Mapper {
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
-  double searched_at_m_ = 0.0;
+  double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };
 

@@ -33,10 +33,17 @@ struct LoopParameters {
   double fresh_m = 30.0;       ///< something must have been detected on this way
   double view_m = 60.0;        ///< objects that the map has of anchors this far
   double search_each_m = 0.5;  ///< driven between two searches
-  double nats = 8.0;           ///< log-odds against the best other way, above those of the prior
-  double near_m = 1.6;         ///< where the body is known within this deviation,
-  double near_nats = 2.5;      ///< the same of which object is which
-  double far_m = 2.5;          ///< where it is known worse, four objects are needed
+  /// The same where nothing says where on the map the body is, and the objects that it takes.
+  double elsewhere_each_m = 4.0;
+  std::uint64_t least_elsewhere = 4;
+  double nats = 8.0;       ///< log-odds against the best other way, above those of the prior
+  double near_m = 1.6;     ///< where the body is known within this deviation,
+  double near_nats = 2.5;  ///< the same of which object is which
+  double far_m = 2.5;      ///< where it is known worse, four objects are needed
+  /// Objects seen again under their old ids that tie the body to where they were seen before, and
+  /// how well they must know its place, as a share of the deviation that the graph says.
+  std::uint64_t least_tracked = 2;
+  double tracked_gain = 0.7;
   double floor_m = 0.1, floor_rad = 0.005;  ///< least deviation of a loop
   /// An object is recalled where its place relative to the body is known better than that.
   double hold_back_m = 1.0, hold_back_rad = 0.035;

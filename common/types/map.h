@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/math/rigid_transform.h"
 #include "common/types/objects.h"
 
 namespace perdure {
@@ -22,6 +23,8 @@ struct MapObject {
   std::uint32_t hits = 0;
   Visibility visibility = Visibility::kOutOfView;
   Memory memory = Memory::kWorking;
+  /// Of a session that is not found on the map of before yet: it may be an object of it.
+  bool provisional = false;
 };
 
 inline constexpr std::size_t kMapTileCapacity = 128;
@@ -39,6 +42,22 @@ struct MapHeader {
   std::uint64_t revision = 0;
   double tile_size_m = 0.0;
   std::uint32_t tiles = 0, objects = 0;
+};
+
+/// How W, the odometry's frame of reference, lies in M, in which the map is one: without the drift
+/// beside the body. W never jumps; T_MW does when a loop is closed.
+struct MapFrame {
+  FrameStamp stamp;  ///< of the frame beside whose pose it holds
+  InstanceId instance = 0;
+  WorldId world;  ///< W
+  WorldId map;    ///< M: it begins as the W of the oldest session that hangs together with this one
+  RigidTransform T_MW;
+  /// Of the body's place and yaw in M, [δp, δyaw], m and rad; the first anchor of M is exact.
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  std::uint64_t revision = 0;  ///< counts changes of the graph
+  std::uint32_t sessions = 0;  ///< that hang together with this one, itself included
+  std::uint32_t loops = 0;     ///< that are believed, of all sessions
+  std::uint32_t anchors = 0;   ///< of all sessions
 };
 
 enum class MapQueryKind : std::uint8_t {

@@ -21,6 +21,9 @@ const char* nameOf(EventKind kind) {
     case EventKind::kPredictedReturn: return "predicted_return";
     case EventKind::kModelChanged: return "model_changed";
     case EventKind::kRestored: return "restored";
+    case EventKind::kLoopClosed: return "loop_closed";
+    case EventKind::kLoopWithdrawn: return "loop_withdrawn";
+    case EventKind::kRelocalised: return "relocalised";
   }
   failCheck("an event kind is one of those declared", std::source_location::current());
 }

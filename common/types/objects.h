@@ -105,6 +105,9 @@ enum class EventKind : std::uint8_t {
   kPredictedReturn,
   kModelChanged,
   kRestored,
+  kLoopClosed,     ///< by the map's graph; so are the two below
+  kLoopWithdrawn,  ///< what a loop had said is taken back
+  kRelocalised,    ///< a session was found on a map of before
 };
 const char* nameOf(EventKind kind);    ///< "born", "class_resolved", …
 const char* nameOf(Visibility value);  ///< "visible", "out_of_view", …

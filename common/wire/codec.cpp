@@ -75,6 +75,7 @@ template struct Instances<Event>;
 template struct Instances<Predictions>;
 template struct Instances<MapTile>;
 template struct Instances<MapHeader>;
+template struct Instances<MapFrame>;
 template struct Instances<MapQuery>;
 template struct Instances<MapReply>;
 template struct Instances<Health>;

@@ -161,6 +161,7 @@ template Json toJson(const Event&);
 template Json toJson(const Predictions&);
 template Json toJson(const MapTile&);
 template Json toJson(const MapHeader&);
+template Json toJson(const MapFrame&);
 template Json toJson(const MapQuery&);
 template Json toJson(const MapReply&);
 template Json toJson(const Health&);

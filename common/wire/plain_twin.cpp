@@ -43,6 +43,8 @@ const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name) {
        checked<perdure_msg_MapTile, perdure_fin_MapTile>(perdure_fin_MapTile_desc)},
       {"perdure::msg::MapHeader",
        checked<perdure_msg_MapHeader, perdure_fin_MapHeader>(perdure_fin_MapHeader_desc)},
+      {"perdure::msg::MapFrame",
+       checked<perdure_msg_MapFrame, perdure_fin_MapFrame>(perdure_fin_MapFrame_desc)},
       {"perdure::msg::MapQuery",
        checked<perdure_msg_MapQuery, perdure_fin_MapQuery>(perdure_fin_MapQuery_desc)},
       {"perdure::msg::MapReply",

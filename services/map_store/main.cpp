@@ -17,7 +17,9 @@ void serve(service::Context& context, const map_store::Config& config) {
                         .emptied = [&](const MapTile& key) { (void)tiles.dispose(key); },
                         .header = context.sink(topics::kMapHeader),
                         .reply = context.sink(topics::kMapReply),
-                        .recalled = context.sink(topics::kRecalled)});
+                        .recalled = context.sink(topics::kRecalled),
+                        .frame = context.sink(topics::kMapFrame),
+                        .event = context.sink(topics::kEvents)});
   context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
   context.on(topics::kEvents, [&](const Event& event) { node.onEvent(event); });
   context.on(topics::kObjects, [&](const Objects& objects) {

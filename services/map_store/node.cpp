@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "common/mapping/frames/laid_belief.h"
-
 namespace perdure::map_store {
 namespace {
 
@@ -69,6 +67,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
     next_id_ = std::max(next_id_, newest_->next_id);
   }
   if (next_id_ > 1) next_id_ += kIdReserve;
+  if (config_.graph) loadGraph();
 }
 
 bool Node::acceptable(const ObjectBelief& belief) {
@@ -100,46 +99,7 @@ void Node::onObjects(const Objects& objects) {
   newest_ = std::move(next);
   dirty_ = true;
   if (!config_.graph) return;
-  mapper_.onObjects(*newest_);
-  const auto change = mapper_.takeChange();
-  if (change.loops.empty()) return;
-  commit();  // what is laid is read from the file
-  constexpr double kAround_m = 70.0;
-  recallLaid(newest_->T_WB.p, kAround_m, change.merges, true);
-}
-
-void Node::onOdometry(const Odometry& odometry) {
-  if (config_.graph) mapper_.onOdometry(odometry);
-}
-
-void Node::recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
-                      const std::vector<MergeOrder>& merges, bool lay_again) {
-  Recalled recalled;
-  recalled.instance = instance_;
-  recalled.world = newest_->world;
-  recalled.client = newest_->instance;
-  recalled.next_id = next_id_;
-  recalled.laid = recalled.graph = true;
-  recalled.merges = merges;
-  std::set<ObjectId> working;
-  for (const auto& belief : newest_->objects) working.insert(belief.id);
-  for (const mapping::Recallable& there : mapper_.near(centre_W, radius_m)) {
-    const bool again = lay_again && laid_.contains(there.id);
-    if (!there.T_now || (working.contains(there.id) && !again)) continue;
-    MapQuery query;
-    query.kind = MapQueryKind::kById;
-    query.object_id = there.id;
-    auto found = database_.reader().find(query, newest_->world, 1);
-    if (!found) return blame(found.error());
-    if (found->beliefs.empty()) continue;
-    ObjectBelief belief = mapping::turned(
-        *there.T_now, mapping::relativeToBody(found->beliefs.front(), there.pose_error));
-    laid_.insert(there.id);
-    recalled.objects.push_back(
-        mapping::withFrameError(std::move(belief), there.covariance, there.about_W));
-  }
-  if (recalled.objects.empty() && merges.empty()) return;
-  outputs_.recalled(recalled);
+  followGraph();
 }
 
 /// Confirmed objects that `next` no longer holds: their last belief may not have been written.
@@ -156,6 +116,7 @@ void Node::leaveBehind(const Objects& next) {
 }
 
 void Node::onEvent(const Event& event) {
+  if (event.instance == instance_) return;
   if (config_.graph && event.kind == EventKind::kGone) mapper_.onGone(event.object_id);
   if (config_.graph && event.kind == EventKind::kMerged) {
     mapper_.onMerged(event.object_id, event.other_id);
@@ -194,11 +155,15 @@ void Node::commit() {
     dirty_ = false;
     return;
   }
-  const auto written = database_.write({&*newest_, left_, removed_, laid_});
+  const mapping::Unsaved graph = config_.graph ? mapper_.unsaved() : mapping::Unsaved();
+  const auto written =
+      database_.write({&*newest_, left_, removed_, laid_, config_.graph ? &graph : nullptr});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
   }
+  if (config_.graph) mapper_.markSaved();
+  if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);
   failure_.clear();
   dirty_ = false;
   kept_of_ = newest_->instance;
@@ -224,6 +189,7 @@ void Node::publish() {
     publishSquare(square);
   }
   header_stale_ = false;
+  if (config_.graph) tellFrame();
   outputs_.header({instance_, revision_, config_.tile_size_m, tiles_.tiles(), tiles_.objects()});
 }
 

@@ -30,6 +30,8 @@ struct Outputs {
   Sink<MapHeader> header;
   Sink<MapReply> reply;
   Sink<Recalled> recalled;
+  Sink<MapFrame> frame = [](const MapFrame&) {};
+  Sink<Event> event = [](const Event&) {};  ///< of the graph
 };
 
 class Node {
@@ -55,6 +57,16 @@ class Node {
   std::uint64_t commits() const { return commits_; }
 
  private:
+  // In node_graph.cpp.
+  void loadGraph();
+  void followGraph();
+  void tellLoops(const mapping::MapChange& change);
+  void tellFrame();
+  /// Sends what the graph has laid near a place, with the merges of new loops.
+  void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
+                  const std::vector<MergeOrder>& merges, bool lay_again);
+  std::optional<ObjectBelief> laidNow(const mapping::Recallable& there);
+
   void leaveBehind(const Objects& next);
   bool acceptable(const ObjectBelief& belief);
   void commit();
@@ -63,9 +75,6 @@ class Node {
   MapReply answer(const MapQuery& query);
   void restore(const MapQuery& query);
   void recall(const MapQuery& query);
-  /// Sends what the graph has laid near a place, with the merges of new loops.
-  void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
-                  const std::vector<MergeOrder>& merges, bool lay_again);
   const Objects* workingSetFor(const MapQuery& query) const;
   void blame(const Reason& reason);
 
@@ -82,6 +91,13 @@ class Node {
   std::map<ObjectId, PlacedBelief> left_;
   std::map<ObjectId, Removal> removed_;
   std::set<ObjectId> laid_;  ///< by the graph, and not seen since
+  struct ToldFrame {
+    WorldId world;
+    std::uint64_t revision = 0;
+    std::size_t anchors = 0;
+    bool operator==(const ToldFrame&) const = default;
+  };
+  std::optional<ToldFrame> told_frame_;
   ObjectId next_id_ = 1;
   InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk
   TimePoint kept_;          ///< of its newest frame there

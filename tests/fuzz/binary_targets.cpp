@@ -61,7 +61,7 @@ const std::vector<WireType>& allTypes() {
   static const auto types =
       wireTypes<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
                 ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions, MapTile,
-                MapHeader, MapQuery, MapReply, Health>();
+                MapHeader, MapFrame, MapQuery, MapReply, Health>();
   return types;
 }
 

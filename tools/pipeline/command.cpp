@@ -37,6 +37,8 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
       ->expected(2)
       ->check(CLI::Range(1, 65535));
   app.add_option("--out", options.out, "Folder for the results")->required();
+  app.add_option("--map", options.map,
+                 "Begin with a stored map: it is copied to OUT/map.sqlite and stays as it is");
   app.add_option("--from", options.from, "Begin so many seconds after the first frame")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--seconds", options.seconds, "Stop after so many seconds of data")

@@ -133,7 +133,7 @@ Odometry DriftingOdometry::tell(const FrameStamp& stamp) const {
   Odometry odometry;
   odometry.stamp = stamp;
   odometry.instance = instance_;
-  odometry.world = {1, 0};
+  odometry.world = session_;
   odometry.state = OdometryState::kTracking;
   odometry.T_WB = T_WB_;
   odometry.v_WB = v_WB_;

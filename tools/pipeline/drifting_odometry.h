@@ -46,8 +46,8 @@ class DriftCovariance {
 class DriftingOdometry {
  public:
   /// `accuracy`: what is declared of the poses before they drift.
-  DriftingOdometry(replay::PoseFile truth, InstanceId instance, const PoseAccuracy& accuracy,
-                   const DriftConfig& config);
+  DriftingOdometry(replay::PoseFile truth, InstanceId instance, const WorldId& session,
+                   const PoseAccuracy& accuracy, const DriftConfig& config);
   /// Nothing where there is no pose for the frame. Frames come in order.
   std::optional<Odometry> at(const FrameStamp& stamp);
 
@@ -58,6 +58,7 @@ class DriftingOdometry {
 
   replay::PoseFile truth_;
   InstanceId instance_;
+  WorldId session_;
   PoseAccuracy accuracy_;
   DriftConfig config_;
   sim::Dice dice_;

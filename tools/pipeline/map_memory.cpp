@@ -2,37 +2,74 @@
 
 #include <utility>
 
+#include "common/base/errors.h"
+#include "services/map_store/core/map_copy.h"
+#include "services/map_store/core/map_database.h"
+#include "services/map_store/core/schema.h"
+
 namespace perdure::tools {
 namespace {
 
-/// Of an earlier run into the same folder.
-void removeMap(const std::filesystem::path& file) {
+map_store::Config withFile(map_store::Config config, const std::filesystem::path& file) {
+  config.store_path = file.string();
+  return config;
+}
+
+map_store::Outputs toFilter(Sink<Recalled> recalled, Sink<Event> events) {
+  map_store::Outputs outputs;
+  outputs.tile = outputs.emptied = [](const MapTile&) {};
+  outputs.header = [](const MapHeader&) {};
+  outputs.reply = [](const MapReply&) {};
+  outputs.recalled = std::move(recalled);
+  outputs.event = std::move(events);
+  return outputs;
+}
+
+}  // namespace
+
+void MapMemory::clear(const std::filesystem::path& file) {
   std::error_code ignored;
   for (const char* part : {"", "-wal", "-shm"}) {
     std::filesystem::remove(file.string() + part, ignored);
   }
 }
 
-map_store::Config emptyMap(map_store::Config config, const std::filesystem::path& file) {
-  removeMap(file);
-  config.store_path = file.string();
-  return config;
+std::uint64_t MapMemory::newWorld(const std::filesystem::path& map) {
+  const auto connection = map_store::openStoreForReading(map.string());
+  const auto known = map_store::MapReader(&connection).worlds();
+  if (!known) {
+    throw StartupError(ExitCode::kUnavailable, "The map " + map.string() + " cannot be read (" +
+                                                   known.error().detail + "); give another --map");
+  }
+  std::uint64_t world = 1;
+  while (known->contains(world)) ++world;
+  return world;
 }
 
-map_store::Outputs toFilter(Sink<Recalled> recalled) {
-  map_store::Outputs outputs;
-  outputs.tile = outputs.emptied = [](const MapTile&) {};
-  outputs.header = [](const MapHeader&) {};
-  outputs.reply = [](const MapReply&) {};
-  outputs.recalled = std::move(recalled);
-  return outputs;
+void MapMemory::copy(const std::filesystem::path& from, const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(from, file, ignored)) {
+    throw StartupError(ExitCode::kUsage, from.string() +
+                                             " is this run's own map; give another --out, or copy "
+                                             "it first");
+  }
+  clear(file);
+  map_store::copyMap(from.string(), file.string());
 }
-
-}  // namespace
 
 MapMemory::MapMemory(map_store::Config config, const std::filesystem::path& file,
-                     InstanceId instance, Sink<Recalled> recalled)
-    : node_(emptyMap(std::move(config), file), instance, toFilter(std::move(recalled))) {}
+                     InstanceId instance, Sink<Recalled> recalled, Sink<Event> events)
+    : node_(withFile(std::move(config), file), instance,
+            toFilter(std::move(recalled), std::move(events))) {}
+
+void MapMemory::giveIds(InstanceId filter, const WorldId& session) {
+  MapQuery query;
+  query.kind = MapQueryKind::kRestore;
+  query.client = filter;
+  query.world = session;
+  query.limit = 1;
+  node_.onQuery(query);
+}
 
 void MapMemory::onOdometry(const Odometry& odometry) {
   waiting_.push_back([this, odometry] { node_.onOdometry(odometry); });

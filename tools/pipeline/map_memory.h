@@ -12,10 +12,20 @@ namespace perdure::tools {
 
 class MapMemory {
  public:
-  /// Begins an empty map. `recalled` gets the answers. Throws StartupError.
-  MapMemory(map_store::Config config, const std::filesystem::path& file, InstanceId instance,
-            Sink<Recalled> recalled);
+  /// Removes the map of an earlier run.
+  static void clear(const std::filesystem::path& file);
+  /// A world that a stored map does not know. Throws StartupError.
+  static std::uint64_t newWorld(const std::filesystem::path& map);
+  /// Begins `file` as a copy of a stored map. Throws StartupError.
+  static void copy(const std::filesystem::path& from, const std::filesystem::path& file);
 
+  /// Opens the map, or begins an empty one. `recalled` gets the answers, `events` what the
+  /// map's graph has found. Throws StartupError.
+  MapMemory(map_store::Config config, const std::filesystem::path& file, InstanceId instance,
+            Sink<Recalled> recalled, Sink<Event> events);
+
+  /// Tells a filter which ids are taken.
+  void giveIds(InstanceId filter, const WorldId& session);
   void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);

@@ -13,8 +13,9 @@ Matrix9d declaredCovariance(const PoseAccuracy& accuracy) {
 
 }  // namespace
 
-PoseOdometry::PoseOdometry(replay::PoseFile poses, InstanceId instance, PoseAccuracy accuracy)
-    : poses_(std::move(poses)), instance_(instance), accuracy_(accuracy) {}
+PoseOdometry::PoseOdometry(replay::PoseFile poses, InstanceId instance, const WorldId& session,
+                           PoseAccuracy accuracy)
+    : poses_(std::move(poses)), instance_(instance), session_(session), accuracy_(accuracy) {}
 
 std::optional<Odometry> PoseOdometry::at(const FrameStamp& stamp) {
   const auto T_WB = poses_.at(stamp.sequence, stamp.time);
@@ -22,7 +23,7 @@ std::optional<Odometry> PoseOdometry::at(const FrameStamp& stamp) {
   Odometry odometry;
   odometry.stamp = stamp;
   odometry.instance = instance_;
-  odometry.world = {1, 0};
+  odometry.world = session_;
   odometry.state = OdometryState::kTracking;
   odometry.T_WB = *T_WB;
   odometry.covariance = declaredCovariance(accuracy_);

@@ -35,7 +35,8 @@ inline PoseAccuracy ofExactTruth() {
 /// W is the poses' frame, never re-levelled; velocity comes from the pose before.
 class PoseOdometry {
  public:
-  PoseOdometry(replay::PoseFile poses, InstanceId instance, PoseAccuracy accuracy = {});
+  PoseOdometry(replay::PoseFile poses, InstanceId instance, const WorldId& session,
+               PoseAccuracy accuracy = {});
   /// Nothing where there is no pose for the frame. Frames come in order.
   std::optional<Odometry> at(const FrameStamp& stamp);
 
@@ -44,6 +45,7 @@ class PoseOdometry {
 
   replay::PoseFile poses_;
   InstanceId instance_;
+  WorldId session_;
   PoseAccuracy accuracy_;
   Eigen::Vector3d up_sum_ = Eigen::Vector3d::Zero();
   std::optional<Odometry> last_;

@@ -14,8 +14,9 @@
 namespace perdure::tools {
 namespace {
 
-// Fixed, so that nothing in the outputs depends on the run.
+// Fixed, so that nothing in the outputs depends on the run; another run on the same map has others.
 constexpr InstanceId kCapture = 1, kVio = 2, kInference = 3, kFilter = 4, kMapStore = 5;
+constexpr InstanceId kInstancesOfARun = 16;
 
 double wallMs() {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
@@ -42,6 +43,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   if (!of_data && !recorded_) {
     pose_file_ = replay::PoseFile::read(options.odometry);
   }
+  if (!options.map.empty()) session_.world = MapMemory::newWorld(options.map);
   openData();
   openOdometry(options);
   openDetections(options);
@@ -96,11 +98,22 @@ void Pipeline::openFilter() {
     timer_.timeTowardsNext("map_store", [&] { map_->onQuery(query); });
   };
   sinks.predictions = [this](const Predictions& predictions) { expected_ = predictions; };
-  filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors, kFilter,
-                                                    std::move(sinks));
-  map_ =
-      std::make_unique<MapMemory>(configs_.map_store, outputs_->folder() / "map.sqlite", kMapStore,
-                                  [this](const Recalled& m) { filter_->onRecalled(m); });
+  filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors,
+                                                    instanceOf(kFilter), std::move(sinks));
+  const auto file = outputs_->folder() / "map.sqlite";
+  options_.map.empty() ? MapMemory::clear(file) : MapMemory::copy(options_.map, file);
+  map_ = std::make_unique<MapMemory>(
+      configs_.map_store, file, instanceOf(kMapStore),
+      [this](const Recalled& m) { filter_->onRecalled(m); },
+      [this](const Event& event) {
+        keep("events", event, event.stamp.time);
+        outputs_->onEvent(event);
+      });
+  if (!options_.map.empty()) map_->giveIds(instanceOf(kFilter), session_);
+}
+
+InstanceId Pipeline::instanceOf(InstanceId service) const {
+  return service + kInstancesOfARun * (session_.world - 1);
 }
 
 /// What the filter has said reaches the map, and its questions are answered.
@@ -120,7 +133,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
   if (pose_file_ && pose_file_->format() == replay::PoseFormat::kKitti) {
     data.frame_count = pose_file_->poses().size();
   }
-  data.source = kCapture;
+  data.source = instanceOf(kCapture);
   data.second_encoding = ImageEncoding::kMono8;
   data.decode = options.odometry == "vio" || options.detections == "model";
   return data;
@@ -154,9 +167,9 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
       pose_at_ = [source](const FrameStamp& stamp) mutable { return source.at(stamp); };
     };
     if (options.odometry == "drifting")
-      serve(DriftingOdometry(*pose_file_, kVio, accuracy, configs_.drifting));
+      serve(DriftingOdometry(*pose_file_, instanceOf(kVio), session_, accuracy, configs_.drifting));
     else
-      serve(PoseOdometry(*pose_file_, kVio, accuracy));
+      serve(PoseOdometry(*pose_file_, instanceOf(kVio), session_, accuracy));
     return;
   }
   uses_vio_ = true;
@@ -171,8 +184,8 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
     landmarks_[landmarks.stamp.sequence] = landmarks;
     outputs_->onLandmarks(landmarks);
   };
-  vio_ = std::make_unique<vio::Node>(configs_.vio, kVio, std::move(sinks));
-  vio_->setWorld({1, 0});
+  vio_ = std::make_unique<vio::Node>(configs_.vio, instanceOf(kVio), std::move(sinks));
+  vio_->setWorld(session_);
   vio_->onCalibration(dataset_->calibration());
 }
 
@@ -180,7 +193,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
   if (options.detections == "none" || recorded_) return;
   if (options.detections == "simulated") {
     simulated_ = std::make_unique<SimulatedDetections>(configs_.detector, options.data, *dataset_,
-                                                       kInference);
+                                                       instanceOf(kInference));
     return;
   }
   if (options.detections != "model") {
@@ -205,7 +218,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
                            " has no images (image_02), which --detections model needs; "
                            "give --detections a CSV");
   }
-  inference_ = std::make_unique<inference::Node>(configs_.inference, kInference);
+  inference_ = std::make_unique<inference::Node>(configs_.inference, instanceOf(kInference));
 }
 
 void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
@@ -291,7 +304,7 @@ void Pipeline::detect(const Frame& frame) {
   Detections detections;
   detections.stamp = frame.stamp;
   detections.camera = frame.camera;
-  detections.instance = kInference;
+  detections.instance = instanceOf(kInference);
   detections.model_hash = model.hash;
   detections.detections = *found;
   offer(std::move(detections));
@@ -351,7 +364,7 @@ void Pipeline::finish() {
   outputs_->finish();
   if (configs_.map_store.graph) {
     std::vector<std::pair<TimePoint, RigidTransform>> along;
-    for (const auto& [time, T_MW] : map_->mapper().along({1, 0})) along.emplace_back(time, T_MW);
+    for (const auto& [time, T_MW] : map_->mapper().along(session_)) along.emplace_back(time, T_MW);
     outputs_->writeMapTrajectory(along);
   }
   if (run_) {

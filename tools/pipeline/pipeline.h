@@ -62,6 +62,7 @@ class Pipeline {
   void openOdometry(const PipelineOptions& options);
   void openDetections(const PipelineOptions& options);
   void openData();
+  InstanceId instanceOf(InstanceId service) const;
   void openFilter();
   void openRun();
   void learn(const ModelInfo& model);
@@ -89,6 +90,7 @@ class Pipeline {
   void deliverDetections(std::uint64_t frame);
 
   PipelineOptions options_;
+  WorldId session_{1, 0};
   ServiceConfigs configs_;
   StageTimer timer_;
   std::unique_ptr<replay::Dataset> dataset_;

@@ -18,6 +18,7 @@ namespace perdure::tools {
 
 struct PipelineOptions {
   std::string data, sequence, rig, out;
+  std::string map;         ///< a stored map to begin with; empty: an empty one
   std::string odometry;    ///< vio, truth, drifting, recorded, or a pose file
   std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;

@@ -9,6 +9,18 @@ constexpr double kDeadBandMetres = 0.02;
 constexpr double kLeastMetres = 1.0;
 }  // namespace
 
+void AnchorBuilder::resume(const Anchor& last) {
+  last_ = last;
+  way_m_ = last.way_m;
+  counted_W_ = last.T_WA.p;
+  since_ = LevelGaussian{};
+  before_.emplace();
+  before_->stamp = last.stamp;
+  before_->T_WB = last.T_WA;
+  before_->up_W = last.T_WA.R().col(2);
+  error_.begin(*before_);
+}
+
 std::optional<Anchor> AnchorBuilder::add(const Odometry& odometry, AnchorId next) {
   if (odometry.state == OdometryState::kInitialising) return std::nullopt;
   if (!last_) return setAnchor(odometry, next);

@@ -16,6 +16,10 @@ class AnchorBuilder {
   explicit AnchorBuilder(const AnchorParameters& parameters)
       : parameters_(parameters), error_({parameters.walk_position, parameters.walk_yaw}) {}
 
+  /// Goes on from the newest anchor of a session after a break: the way since it is taken for
+  /// straight, and for walked as by poses that come without increments.
+  void resume(const Anchor& last);
+
   /// Returns an anchor at the body if one is due: at the first pose, then by way, turn or
   /// uncertainty of yaw since the last one. `next` is its id. None at rest but the first, none
   /// while the odometry initialises.

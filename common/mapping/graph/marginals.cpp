@@ -1,5 +1,6 @@
 #include "common/mapping/graph/marginals.h"
 
+#include "common/mapping/graph/components.h"
 #include "common/mapping/graph/edge_cost.h"
 #include "common/math/gaussian.h"
 
@@ -7,18 +8,12 @@ namespace perdure::mapping {
 namespace {
 
 using RowMajor4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-
-AnchorId rootOf(std::map<AnchorId, AnchorId>& parents, AnchorId id) {
-  while (parents.at(id) != id) id = parents[id] = parents.at(parents.at(id));
-  return id;
-}
-
 }  // namespace
 
-Marginals::Marginals(const PoseGraph& graph, AnchorId from) : graph_(&graph), from_(from) {
+Marginals::Marginals(const PoseGraph& graph, AnchorId from)
+    : graph_(&graph), from_(from), components_(componentsOf(graph)) {
   for (const auto& [id, pose] : graph.poses()) {
-    components_[id] = id;
-    if (!graph.isFixed(id)) {
+    if (!graph.isHeldFast(id)) {
       const auto row = static_cast<Eigen::Index>(4 * rows_.size());
       rows_[id] = row;
     }
@@ -32,7 +27,6 @@ Marginals::Marginals(const PoseGraph& graph, AnchorId from) : graph_(&graph), fr
   for (const auto& [id, edge] : graph.edges()) {
     const double weight = graph.weight(id);
     if (weight < kBelieved) continue;
-    components_[rootOf(components_, edge.a)] = rootOf(components_, edge.b);
     const Eigen::Vector4d a = stateOf(graph.pose(edge.a)), b = stateOf(graph.pose(edge.b));
     const double* states[] = {a.data(), b.data()};
     Eigen::Vector4d residual;
@@ -47,7 +41,6 @@ Marginals::Marginals(const PoseGraph& graph, AnchorId from) : graph_(&graph), fr
       add(at_b->second, at_a->second, weight * J_b.transpose() * J_a);
     }
   }
-  for (auto& [id, component] : components_) component = rootOf(components_, id);
   const auto n = static_cast<Eigen::Index>(4 * rows_.size());
   if (n == 0) return;
   Eigen::SparseMatrix<double> H(n, n);

@@ -30,7 +30,7 @@ class Marginals {
   const PoseGraph* graph_;
   AnchorId from_;
   std::map<AnchorId, Eigen::Index> rows_;    ///< of anchors that are not held fast
-  std::map<AnchorId, AnchorId> components_;  ///< each anchor's, by one of its anchors
+  std::map<AnchorId, AnchorId> components_;  ///< each anchor's, by its first anchor
   Factor factor_;
   bool usable_ = false;
   Eigen::MatrixXd from_columns_;

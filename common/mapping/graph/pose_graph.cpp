@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "common/mapping/graph/components.h"
 #include "common/mapping/graph/edge_cost.h"
 #include "common/math/so3.h"
 
@@ -66,7 +67,7 @@ class LeastSquares {
         problem_(borrowing()) {
     for (const auto& [id, edge] : graph.edges()) add(edge, graph.isNew(id));
     for (auto& [id, state] : states_) {
-      if (graph.isFixed(id) && problem_.HasParameterBlock(state.data())) {
+      if (graph.isHeldFast(id) && problem_.HasParameterBlock(state.data())) {
         problem_.SetParameterBlockConstant(state.data());
       }
     }
@@ -141,7 +142,7 @@ class LeastSquares {
 
 void PoseGraph::addFirst(AnchorId id, const LevelPose& T_MA) {
   poses_[id] = T_MA;
-  fixed_[id] = true;
+  held_fast_.insert(id);
 }
 
 void PoseGraph::add(AnchorId id, AnchorId previous, const LevelGaussian& from_previous) {
@@ -154,15 +155,28 @@ EdgeId PoseGraph::add(const Edge& edge) {
   return next_++;
 }
 
+void PoseGraph::restore(EdgeId id, const Edge& edge, double weight) {
+  edges_[id] = edge;
+  weights_[id] = weight;
+  next_ = std::max(next_, id + 1);
+}
+
 void PoseGraph::remove(EdgeId id) {
   edges_.erase(id);
   weights_.erase(id);
 }
 
-void PoseGraph::scaleOdometry(double factor) {
+void PoseGraph::scaleOdometry(double factor, const std::set<AnchorId>& anchors) {
   for (auto& [id, edge] : edges_) {
-    if (edge.kind == EdgeKind::kOdometry) edge.T_ab.covariance *= factor;
+    if (edge.kind == EdgeKind::kOdometry && anchors.contains(edge.b)) {
+      edge.T_ab.covariance *= factor;
+    }
   }
+}
+
+void PoseGraph::holdFirstAnchors() {
+  held_fast_.clear();
+  for (const auto& [id, first] : componentsOf(*this)) held_fast_.insert(first);
 }
 
 double PoseGraph::weight(EdgeId id) const {
@@ -180,6 +194,7 @@ double PoseGraph::chi2(const Edge& edge) const {
 
 OptimiseReport PoseGraph::optimise() {
   OptimiseReport report;
+  holdFirstAnchors();
   LeastSquares problem(*this, parameters_);
   const States start = problem.states();
   report.cost = problem.descend();
@@ -197,6 +212,7 @@ OptimiseReport PoseGraph::optimise() {
   }
   report.iterations = problem.iterations();
   take(problem.states(), report);
+  holdFirstAnchors();
   return report;
 }
 

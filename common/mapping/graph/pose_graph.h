@@ -5,7 +5,7 @@
 
 #include <cstdint>
 #include <map>
-#include <vector>
+#include <set>
 
 #include "common/mapping/frames/anchor.h"
 #include "common/mapping/parameters.h"
@@ -41,16 +41,21 @@ class PoseGraph {
  public:
   explicit PoseGraph(const GraphParameters& parameters) : parameters_(parameters) {}
 
-  /// Adds an anchor where its increment puts it in M. The first one of a session that joins
-  /// nothing begins a component at `T_MA`, and is held fast there.
+  /// Adds the first anchor of a session at `T_MA`. Of each component (anchors that hang together
+  /// by believed edges) the first anchor is held fast; a session begins one of its own.
   void addFirst(AnchorId id, const LevelPose& T_MA);
-  /// Adds the anchor and its odometry edge. `previous` must be in the graph.
+  /// Adds an anchor where its increment puts it in M, and its odometry edge. `previous` must be in
+  /// the graph.
   void add(AnchorId id, AnchorId previous, const LevelGaussian& from_previous);
   /// Adds an edge between two anchors of the graph; nothing moves before optimise().
   EdgeId add(const Edge& edge);
+  /// Adds it as it was, with the id that it had. Ids of new edges go on above.
+  void restore(EdgeId id, const Edge& edge, double weight);
   void remove(EdgeId id);
-  /// Multiplies the covariances of all odometry edges.
-  void scaleOdometry(double factor);
+  /// Multiplies the covariances of odometry edges that lead to `anchors`.
+  void scaleOdometry(double factor, const std::set<AnchorId>& anchors);
+  /// Holds the first anchor of each component fast, and no other. optimise() does so by itself.
+  void holdFirstAnchors();
 
   /// Lowest cost from the present poses on. Where the kernel would reject a new edge from there,
   /// also by way of wider kernels: a true loop after much drift looks like a wrong one.
@@ -67,17 +72,14 @@ class PoseGraph {
   bool isNew(EdgeId id) const;
   /// Of an edge between anchors of the graph, where they are now.
   double chi2(const Edge& edge) const;
-  bool isFixed(AnchorId id) const { return fixed_.contains(id); }
-  /// When components are joined one of their first anchors is let go. Each component keeps one that
-  /// is held fast.
-  void release(AnchorId id) { fixed_.erase(id); }
+  bool isHeldFast(AnchorId id) const { return held_fast_.contains(id); }
 
  private:
   void take(const std::map<AnchorId, Eigen::Vector4d>& states, OptimiseReport& report);
 
   GraphParameters parameters_;
   std::map<AnchorId, LevelPose> poses_;
-  std::map<AnchorId, bool> fixed_;
+  std::set<AnchorId> held_fast_;
   std::map<EdgeId, Edge> edges_;
   std::map<EdgeId, double> weights_;
   EdgeId next_ = 1;

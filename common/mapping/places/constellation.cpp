@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 #include <unordered_map>
+#include <utility>
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
@@ -16,7 +17,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kGate = 3.0;      // deviations of a pair's distance
 constexpr double kStreet_m = 6.0;  // deviation of the chance density around the map's objects
-constexpr double kReach_m = 4.0 * kStreet_m;
+constexpr double kReach_m = MapIndex::kReach_m;
 // m⁻²; chance density where the map has no objects: one in a disc of 100 m radius
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
@@ -44,51 +45,16 @@ bool anotherWay(const LevelPose& a, const LevelPose& b) {
   return (a.p - b.p).head<2>().norm() > kOther_m || std::abs(wrapAngle(a.yaw - b.yaw)) > kOther_rad;
 }
 
-std::uint32_t mostProbable(const PlacedObject& o) {
-  return std::max_element(
-             o.pmf.begin(), o.pmf.end(),
-             [](const auto& a, const auto& b) { return a.probability < b.probability; })
-      ->name;
-}
-
-/// Indices of places in the plane, by squares as wide as the reach of a search.
-class Grid {
- public:
-  Grid(double width, const std::vector<PlacedObject>& objects) : width_(width) {
-    for (std::size_t k = 0; k < objects.size(); ++k) {
-      cells_[keyOf(cell(objects[k].p.x()), cell(objects[k].p.y()))].push_back(k);
-    }
-  }
-  /// Calls `visit` for all within `width`, and some beyond.
-  template <class Visit>
-  void around(const Eigen::Vector2d& p, const Visit& visit) const {
-    for (std::int64_t x = cell(p.x()) - 1; x <= cell(p.x()) + 1; ++x) {
-      for (std::int64_t y = cell(p.y()) - 1; y <= cell(p.y()) + 1; ++y) {
-        const auto found = cells_.find(keyOf(x, y));
-        if (found == cells_.end()) continue;
-        for (const std::size_t k : found->second) visit(k);
-      }
-    }
-  }
-
- private:
-  std::int64_t cell(double v) const { return static_cast<std::int64_t>(std::floor(v / width_)); }
-  static std::int64_t keyOf(std::int64_t x, std::int64_t y) { return x * 0x100000 + y; }
-
-  double width_;
-  std::unordered_map<std::int64_t, std::vector<std::size_t>> cells_;
-};
-
 class Search {
  public:
-  Search(PlaceQuery query, const PlaceParameters& parameters)
+  Search(std::vector<PlacedObject> seen, const MapIndex& map, const LevelGaussian& prior,
+         const PlaceParameters& parameters)
       : parameters_(parameters),
-        prior_(query.prior),
-        seen_(std::move(query.seen)),
-        map_(std::move(query.map)),
-        driven_(std::move(query.driven)),
-        prior_information_(inverseSymmetric(prior_.covariance)),
-        grid_(kReach_m, map_) {
+        prior_(prior),
+        seen_(std::move(seen)),
+        index_(map),
+        map_(map.objects()),
+        prior_information_(inverseSymmetric(prior_.covariance)) {
     keepTheSurest();
     compareClasses();
   }
@@ -145,20 +111,13 @@ class Search {
 
   /// log of p(one object has both PMFs) against p(two objects have them), for all of both.
   void compareClasses() {
-    std::map<std::uint32_t, double> common;
-    for (const PlacedObject& o : map_) {
-      for (const ClassShare& c : o.pmf) {
-        common[c.name] += c.probability / static_cast<double>(map_.size());
-      }
-    }
     same_class_.resize(static_cast<Eigen::Index>(seen_.size()),
                        static_cast<Eigen::Index>(map_.size()));
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       std::map<std::uint32_t, double> weights;
       for (const ClassShare& c : seen_[i].pmf) {
-        const auto share = common.find(c.name);
-        if (share != common.end() && share->second > 0.0)
-          weights[c.name] = c.probability / share->second;
+        const double share = index_.commonShare(c.name);
+        if (share > 0.0) weights[c.name] = c.probability / share;
       }
       for (std::size_t k = 0; k < map_.size(); ++k) {
         double ratio = kDefaultShare;
@@ -217,42 +176,25 @@ class Search {
 
   /// Each pair of seen objects and each like pair of the map, nearest distances first.
   void votePairs(Cells& cells) const {
-    struct MapPair {
-      double distance;
-      std::size_t c, d;
-    };
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<MapPair>> pairs;
-    for (std::size_t c = 0; c < map_.size(); ++c) {
-      for (std::size_t d = 0; d < map_.size(); ++d) {
-        const double distance = (map_[c].p - map_[d].p).head<2>().norm();
-        if (c == d || distance < parameters_.pair_least_m || distance > parameters_.pair_most_m)
-          continue;
-        pairs[{mostProbable(map_[c]), mostProbable(map_[d])}].push_back({distance, c, d});
-      }
-    }
-    for (auto& [classes, list] : pairs) {
-      std::sort(list.begin(), list.end(), [](const MapPair& a, const MapPair& b) {
-        return std::tie(a.distance, a.c, a.d) < std::tie(b.distance, b.c, b.d);
-      });
-    }
     struct SeenPair {
       std::size_t a, b;
-      std::vector<MapPair>::const_iterator from, to;
+      std::vector<MapIndex::Pair>::const_iterator from, to;
     };
     std::vector<SeenPair> all;
     for (std::size_t a = 0; a < seen_.size(); ++a) {
       for (std::size_t b = a + 1; b < seen_.size(); ++b) {
         const double distance = (seen_[a].p - seen_[b].p).head<2>().norm();
         if (distance < parameters_.pair_least_m || distance > parameters_.pair_most_m) continue;
-        const auto found = pairs.find({mostProbable(seen_[a]), mostProbable(seen_[b])});
-        if (found == pairs.end()) continue;
+        const auto* like = index_.pairsOf(mostProbable(seen_[a]), mostProbable(seen_[b]));
+        if (like == nullptr) continue;
         const double slack =
             kGate * std::sqrt(2.0 * (planeVariance(seen_[a]) + planeVariance(seen_[b]))) + 0.3;
         const auto from =
-            std::lower_bound(found->second.begin(), found->second.end(), distance - slack,
-                             [](const MapPair& p, double d) { return p.distance < d; });
-        const auto to = std::upper_bound(from, found->second.end(), distance + slack,
-                                         [](double d, const MapPair& p) { return d < p.distance; });
+            std::lower_bound(like->begin(), like->end(), distance - slack,
+                             [](const MapIndex::Pair& p, double d) { return p.distance < d; });
+        const auto to =
+            std::upper_bound(from, like->end(), distance + slack,
+                             [](double d, const MapIndex::Pair& p) { return d < p.distance; });
         if (from != to) all.push_back({a, b, from, to});
       }
     }
@@ -322,7 +264,7 @@ class Search {
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       const Eigen::Vector3d arm = x.R() * seen_[i].p;
       const Eigen::Vector2d at = (x.p + arm).head<2>();
-      grid_.around(at, [&](std::size_t k) {
+      index_.around(at, [&](std::size_t k) {
         if (mostProbable(seen_[i]) != mostProbable(map_[k])) return;
         if ((at - map_[k].p.head<2>()).norm() < kCell_m + 1.0) {
           heights.push_back(map_[k].p.z() - arm.z());
@@ -343,15 +285,6 @@ class Search {
     double known = 0.0;  ///< probability that an object there is on the map
   };
 
-  /// How much of what stands at a place the map holds: falls with the distance to where the body
-  /// drove when the map was made.
-  double knownShare(const Eigen::Vector2d& at) const {
-    double nearest = 1e9;
-    for (const Eigen::Vector2d& d : driven_) nearest = std::min(nearest, (d - at).squaredNorm());
-    const double reach = parameters_.known_within_m;
-    return 0.02 + parameters_.known_share * std::exp(-0.5 * nearest / (reach * reach));
-  }
-
   /// Densities of the object's place, m⁻².
   Likelihood likelihoodOf(std::size_t i, const LevelPose& x, const Eigen::Matrix3d& R,
                           double blur) const {
@@ -360,7 +293,7 @@ class Search {
     const Eigen::Matrix2d turned = R.topLeftCorner<2, 2>() * seen.covariance.topLeftCorner<2, 2>() *
                                    R.topLeftCorner<2, 2>().transpose();
     Likelihood l;
-    grid_.around(at.head<2>(), [&](std::size_t k) {
+    index_.around(at.head<2>(), [&](std::size_t k) {
       const PlacedObject& known = map_[k];
       const Eigen::Vector2d off = (at - known.p).head<2>();
       const double squared = off.squaredNorm();
@@ -384,7 +317,7 @@ class Search {
         l.object = k;
       }
     });
-    l.known = knownShare(at.head<2>());
+    l.known = index_.knownShare(at.head<2>());
     return l;
   }
 
@@ -432,7 +365,7 @@ class Search {
       const Eigen::Matrix3d R = x.R();
       double sum = 0.0;
       for (const PlacedObject& seen : seen_) {
-        sum += std::log1p(-knownShare((x.p + R * seen.p).head<2>()));
+        sum += std::log1p(-index_.knownShare((x.p + R * seen.p).head<2>()));
       }
       best = std::max(best, sum);
     }
@@ -460,18 +393,19 @@ class Search {
 
   PlaceParameters parameters_;
   LevelGaussian prior_;
-  std::vector<PlacedObject> seen_, map_;
-  std::vector<Eigen::Vector2d> driven_;
+  std::vector<PlacedObject> seen_;
+  const MapIndex& index_;
+  const std::vector<PlacedObject>& map_;
   Eigen::Matrix4d prior_information_;
-  Grid grid_;
   Eigen::MatrixXd same_class_;  ///< log ratios, by seen and map object
 };
 
 }  // namespace
 
-std::optional<PlaceMatch> bestMatch(PlaceQuery query, const PlaceParameters& parameters) {
-  if (query.seen.empty() || query.map.empty()) return std::nullopt;
-  return Search(std::move(query), parameters).best();
+std::optional<PlaceMatch> bestMatch(std::vector<PlacedObject> seen, const MapIndex& map,
+                                    const LevelGaussian& prior, const PlaceParameters& parameters) {
+  if (seen.empty() || map.objects().empty()) return std::nullopt;
+  return Search(std::move(seen), map, prior, parameters).best();
 }
 
 }  // namespace perdure::mapping

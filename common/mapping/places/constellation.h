@@ -11,17 +11,10 @@
 #include <vector>
 
 #include "common/mapping/parameters.h"
+#include "common/mapping/places/map_index.h"
 #include "common/mapping/places/placed_object.h"
 
 namespace perdure::mapping {
-
-/// What is seen, and where it may be.
-struct PlaceQuery {
-  std::vector<PlacedObject> seen;       ///< in the body's level frame B
-  std::vector<PlacedObject> map;        ///< in M, around where the body may be
-  std::vector<Eigen::Vector2d> driven;  ///< places in M from which the map's objects were seen
-  LevelGaussian prior;                  ///< T_MB by odometry and graph
-};
 
 /// A way to lay what is seen onto the map.
 struct PlaceMatch {
@@ -35,7 +28,9 @@ struct PlaceMatch {
 };
 
 /// Returns the best way, whether good enough or not; nothing if no object is surely one of the
-/// map's.
-std::optional<PlaceMatch> bestMatch(PlaceQuery query, const PlaceParameters& parameters);
+/// map's. `seen` in the body's level frame B; `prior`: T_MB as it is known before. Where nothing is
+/// known it is as wide as the map.
+std::optional<PlaceMatch> bestMatch(std::vector<PlacedObject> seen, const MapIndex& map,
+                                    const LevelGaussian& prior, const PlaceParameters& parameters);
 
 }  // namespace perdure::mapping

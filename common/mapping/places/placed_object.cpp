@@ -2,12 +2,20 @@
 
 #include <algorithm>
 
+#include "common/mapping/frames/level_errors.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::mapping {
 
 double wrapHalfTurn(double angle) { return 0.5 * wrapAngle(2.0 * angle); }
+
+PlacedObject laid(const LevelGaussian& T_AB, const PlacedObject& object) {
+  PlacedObject o = transformed(T_AB.mean, object);
+  const Eigen::Matrix4d J = byFrame(o.p - T_AB.mean.p);
+  o.covariance += J * T_AB.covariance * J.transpose();
+  return o;
+}
 
 void MatchEquations::add(const PlacedObject& seen, const PlacedObject& known, const LevelPose& x,
                          double weight, double blur) {

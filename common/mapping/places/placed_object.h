@@ -30,6 +30,8 @@ struct PlacedObject {
 };
 /// The object of frame B in frame A. The transform's own error is not added.
 PlacedObject transformed(const LevelPose& T_AB, PlacedObject object);
+/// The object of frame B in frame A, with the error of T_AB.
+PlacedObject laid(const LevelGaussian& T_AB, const PlacedObject& object);
 
 /// Normal equations of T_MB from objects of known identity.
 struct MatchEquations {

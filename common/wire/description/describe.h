@@ -202,6 +202,7 @@ void describe(A& a, D& d, W& w) {
   a.value("hits", d.hits, w.hits);
   a.choice("visibility", d.visibility, w.visibility, Visibility::kBehind);
   a.choice("memory", d.memory, w.memory, Memory::kLongTerm);
+  a.value("provisional", d.provisional, w.provisional);
 }
 
 template <class A, Is<MapTile> D, class W>
@@ -222,6 +223,20 @@ void describe(A& a, D& d, W& w) {
   a.number("tile_size_m", d.tile_size_m, w.tile_size_m, kPositive);
   a.value("tiles", d.tiles, w.tile_count);
   a.value("objects", d.objects, w.object_count);
+}
+
+template <class A, Is<MapFrame> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.value("instance", d.instance, w.source);
+  a.object("world", d.world, w.reference);
+  a.object("map", d.map, w.map_reference);
+  a.pose("T_MW", d.T_MW, w.T_MW);
+  a.symmetric("covariance", d.covariance, w.covariance);
+  a.value("revision", d.revision, w.revision);
+  a.value("sessions", d.sessions, w.session_count);
+  a.value("loops", d.loops, w.loop_count);
+  a.value("anchors", d.anchors, w.anchor_count);
 }
 
 template <class A, Is<MapQuery> D, class W>

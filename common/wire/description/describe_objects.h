@@ -127,7 +127,7 @@ void describe(A& a, D& d, W& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
-  a.choice("kind", d.kind, w.kind, EventKind::kRestored);
+  a.choice("kind", d.kind, w.kind, EventKind::kRelocalised);
   a.value("object_id", d.object_id, w.object_id);
   a.value("other_id", d.other_id, w.other_id);
   a.text("class_name", d.class_name, w.class_name, kNameLength);

@@ -59,6 +59,8 @@ struct Type<MapTile> : TypeOf<perdure_msg_MapTile, &perdure_msg_MapTile_desc> {}
 template <>
 struct Type<MapHeader> : TypeOf<perdure_msg_MapHeader, &perdure_msg_MapHeader_desc> {};
 template <>
+struct Type<MapFrame> : TypeOf<perdure_msg_MapFrame, &perdure_msg_MapFrame_desc> {};
+template <>
 struct Type<MapQuery> : TypeOf<perdure_msg_MapQuery, &perdure_msg_MapQuery_desc> {};
 template <>
 struct Type<MapReply> : TypeOf<perdure_msg_MapReply, &perdure_msg_MapReply_desc> {};

@@ -83,6 +83,8 @@ class MapReader {
   Result<std::optional<Objects>> working() const;
   /// The pose graph as it was at the last commit; an empty one on a map without.
   Result<SavedGraph> graph() const { return readGraph(*connection_); }
+  /// Frames of reference that the map has something of.
+  Result<std::set<std::uint64_t>> worlds() const;
   Result<std::uint64_t> revision() const;
   Result<ObjectId> largestId() const;
 

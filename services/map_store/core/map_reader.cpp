@@ -216,6 +216,26 @@ Result<std::optional<Objects>> MapReader::working() const {
   return std::optional<Objects>(std::move(*working));
 }
 
+Result<std::set<std::uint64_t>> MapReader::worlds() const {
+  const auto has_graph =
+      connection_->integer("SELECT count(*) FROM sqlite_master WHERE name = 'anchors'");
+  if (!has_graph) return tl::unexpected<Reason>(has_graph.error());
+  auto rows = connection_->prepare(std::string("SELECT DISTINCT world FROM objects") +
+                                   (*has_graph > 0 ? " UNION SELECT world FROM anchors" : ""));
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  std::set<std::uint64_t> worlds;
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) break;
+    worlds.insert(rows->id(0));
+  }
+  const auto last = working();
+  if (!last) return tl::unexpected<Reason>(last.error());
+  if (*last) worlds.insert((*last)->world.world);
+  return worlds;
+}
+
 Result<std::uint64_t> MapReader::revision() const {
   const auto value =
       connection_->integer("SELECT coalesce((SELECT value FROM meta WHERE key = 'revision'), 0)");

@@ -14,6 +14,19 @@
 namespace perdure::mapping {
 namespace {
 
+/// What is seen, and where it may be.
+struct PlaceQuery {
+  std::vector<PlacedObject> seen;       ///< in the body's level frame B
+  std::vector<PlacedObject> map;        ///< in M
+  std::vector<Eigen::Vector2d> driven;  ///< places in M from which the map's objects were seen
+  LevelGaussian prior;
+};
+
+std::optional<PlaceMatch> bestMatch(const PlaceQuery& query, const PlaceParameters& parameters) {
+  const MapIndex index(query.map, query.driven, parameters);
+  return mapping::bestMatch(query.seen, index, query.prior, parameters);
+}
+
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr PlaceParameters kPlace;
 constexpr LoopParameters kLoop;

@@ -23,9 +23,10 @@ Result<T> decoded(std::vector<std::uint8_t> message) {
 template <class T>
 class Cdr : public testing::Test {};
 
-using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
-                                Detections, ModelInfo, SwapNotice, Objects, ObjectState, Recalled,
-                                Event, Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+using Messages =
+    testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
+                   ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions,
+                   MapTile, MapHeader, MapFrame, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Cdr, Messages);
 
 TYPED_TEST(Cdr, BringsEveryFieldThroughBytesAndBack) {

@@ -11,9 +11,10 @@ namespace {
 template <class T>
 class Codec : public testing::Test {};
 
-using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
-                                Detections, ModelInfo, SwapNotice, Objects, ObjectState, Recalled,
-                                Event, Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+using Messages =
+    testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
+                   ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions,
+                   MapTile, MapHeader, MapFrame, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Codec, Messages);
 
 TYPED_TEST(Codec, BringsEveryFieldThereAndBackToTheBit) {

@@ -204,7 +204,7 @@ class Examples {
          bits(), time(),  coin(), coin(), coin(), several([&] { return mergeOrder(); })};
   }
   void fill(Event& m) {
-    m = {stamp(), bits(),        world(), static_cast<EventKind>(below(15)), bits(), bits(),
+    m = {stamp(), bits(),        world(), static_cast<EventKind>(below(18)), bits(), bits(),
          word(),  uniform(0, 1), word()};
     for (double& seconds : m.returns_in_s) seconds = uniform(0, 9);
   }
@@ -228,7 +228,8 @@ class Examples {
             time(),
             below(99),
             static_cast<Visibility>(below(5)),
-            coin() ? Memory::kWorking : Memory::kLongTerm};
+            coin() ? Memory::kWorking : Memory::kLongTerm,
+            coin()};
   }
   void fill(MapTile& m) {
     m = {bits(),
@@ -239,6 +240,10 @@ class Examples {
          several([&] { return mapObject(); })};
   }
   void fill(MapHeader& m) { m = {bits(), bits(), uniform(1, 99), below(99), below(99)}; }
+  void fill(MapFrame& m) {
+    m = {stamp(), bits(),    world(),   world(),  pose(), covariance<Eigen::Matrix4d>(),
+         bits(),  below(99), below(99), below(99)};
+  }
   void fill(MapQuery& m) {
     m = {bits(),
          bits(),

@@ -126,9 +126,10 @@ class Vandal {
 
 template <class T>
 class Damaged : public testing::Test {};
-using Messages = testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks,
-                                Detections, ModelInfo, SwapNotice, Objects, ObjectState, Recalled,
-                                Event, Predictions, MapTile, MapHeader, MapQuery, MapReply, Health>;
+using Messages =
+    testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
+                   ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions,
+                   MapTile, MapHeader, MapFrame, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Damaged, Messages);
 
 TYPED_TEST(Damaged, MessagesGiveASoundValueOrAReason) {

@@ -1,0 +1,156 @@
+#include "common/mapping/loop_search.h"
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "common/mapping/frames/level_errors.h"
+#include "common/mapping/graph/components.h"
+
+namespace perdure::mapping {
+namespace {
+
+/// As wide as a map of which nothing says where in it the body is.
+LevelGaussian anywhereOn(const MapIndex& map) {
+  LevelGaussian prior;
+  prior.mean.p << map.centre(), 0.0;
+  constexpr double kBeyond_m = 20.0, kHeight_m = 1000.0, kTurns_rad = 10.0;
+  prior.covariance.setZero();
+  prior.covariance.diagonal() << map.spread2().array() + kBeyond_m * kBeyond_m,
+      kHeight_m * kHeight_m, kTurns_rad * kTurns_rad;
+  return prior;
+}
+
+}  // namespace
+
+bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
+  return record.session != here().session || way.way_m() - record.way_m > visit_m;
+}
+
+const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
+                                 double visit_m) {
+  if (body.isOld(record, visit_m)) return &record.sighting;
+  return record.earlier ? &*record.earlier : nullptr;
+}
+
+PlacedObject inM(const MapState& state, const Sighting& sighting) {
+  return transformed(state.graph().pose(sighting.anchor), sighting.in_anchor);
+}
+
+/// What was detected on the way of late, in the body's newest anchor: without what is known to have
+/// been seen before.
+std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const {
+  std::vector<PlacedObject> seen;
+  bool fresh = false;
+  for (const auto& [id, record] : body.state.records()) {
+    if (body.isOld(record, parameters_.loop.visit_m)) continue;
+    if (record.earlier && body.relative.to(record.earlier->anchor)) continue;
+    const auto T_bA = body.relative.to(record.sighting.anchor);
+    if (!T_bA) continue;
+    seen.push_back(laid(*T_bA, record.sighting.in_anchor));
+    fresh = fresh || body.way.way_m() - record.way_m < parameters_.loop.fresh_m;
+  }
+  if (!fresh) seen.clear();
+  return seen;
+}
+
+LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
+  const LoopParameters& loop = parameters_.loop;
+  Around around;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  std::set<AnchorId> anchors;
+  for (const auto& [id, anchor] : body.state.anchors()) {
+    const bool of_this_visit =
+        anchor.session == body.here().session && body.way.way_m() - anchor.way_m < loop.visit_m;
+    if (of_this_visit) continue;
+    const auto T_ba = body.relative.to(id);
+    if (!T_ba) continue;
+    const double distance = T_ba->mean.p.head<2>().norm();
+    const double sigma = planeSigma(T_ba->covariance);
+    if (distance > loop.view_m + parameters_.place.gate_sigmas * sigma) continue;
+    anchors.insert(id);
+    around.driven.push_back(body.state.graph().pose(id).p.head<2>());
+    if (distance - sigma < nearest_m) {
+      nearest_m = distance - sigma;
+      around.nearest = T_ba;
+    }
+  }
+  if (anchors.empty()) return around;
+  for (const auto& [id, record] : body.state.records()) {
+    const Sighting* known = sightingOfBefore(record, body, loop.visit_m);
+    if (record.confirmed && known != nullptr && anchors.contains(known->anchor)) {
+      around.objects.push_back(inM(body.state, *known));
+    }
+  }
+  return around;
+}
+
+std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) const {
+  auto seen = seenOfLate(body);
+  if (seen.empty()) return std::nullopt;
+  Around around = mapAround(body);
+  if (around.objects.empty()) return std::nullopt;
+  // T_Mb as the earlier anchors see it: their own errors in M do not count.
+  const LevelGaussian& T_ba = *around.nearest;
+  LevelGaussian prior;
+  prior.mean = body.state.graph().pose(body.here().id);
+  prior.covariance = turnedBy((prior.mean * T_ba.mean).R(), mapping::inverse(T_ba).covariance);
+  addFloor(prior.covariance, parameters_.loop.floor_m, parameters_.loop.floor_rad);
+  const double sigma_m = planeSigma(T_ba.covariance);
+  const MapIndex index(std::move(around.objects), std::move(around.driven), parameters_.place);
+  auto match = bestMatch(std::move(seen), index, prior, parameters_.place);
+  if (!match || !isBelieved(*match, sigma_m)) return std::nullopt;
+  return Found{std::move(*match), prior, sigma_m};
+}
+
+/// Where the body is known well, what is asked is only which object is which.
+bool LoopSearch::isBelieved(const PlaceMatch& match, double sigma_m) const {
+  const LoopParameters& loop = parameters_.loop;
+  const bool near = sigma_m < loop.near_m;
+  const std::size_t least = near ? 1 : sigma_m < loop.far_m ? 2 : 4;
+  const double nats = near ? loop.near_nats : loop.nats;
+  return match.pairs.size() >= least && match.score - match.next >= nats + std::log(match.cells);
+}
+
+void LoopSearch::indexOthers(const Whereabouts& body) {
+  const auto components = componentsOf(body.state.graph());
+  const AnchorId own = components.at(body.here().id);
+  std::map<AnchorId, std::vector<PlacedObject>> objects;
+  std::map<AnchorId, std::vector<Eigen::Vector2d>> driven;
+  for (const auto& [id, record] : body.state.records()) {
+    if (!record.confirmed) continue;
+    const Sighting* known = &record.sighting;
+    if (components.at(known->anchor) == own && record.earlier) known = &*record.earlier;
+    if (components.at(known->anchor) == own) continue;
+    objects[components.at(known->anchor)].push_back(inM(body.state, *known));
+  }
+  for (const auto& [anchor, component] : components) {
+    if (component != own) driven[component].push_back(body.state.graph().pose(anchor).p.head<2>());
+  }
+  for (auto& [component, of_it] : objects) {
+    indices_[component] = std::make_unique<MapIndex>(
+        std::move(of_it), std::move(driven.at(component)), parameters_.place);
+  }
+}
+
+std::optional<LoopSearch::Found> LoopSearch::elsewhere(const Whereabouts& body) {
+  const auto seen = seenOfLate(body);
+  if (seen.size() < parameters_.loop.least_elsewhere) return std::nullopt;
+  if (indices_.empty()) indexOthers(body);
+  std::optional<PlaceMatch> best;
+  for (const auto& [component, index] : indices_) {
+    auto match = bestMatch(seen, *index, anywhereOn(*index), parameters_.place);
+    if (!match) continue;
+    // Another component is another way to lay it.
+    if (best) match->next = std::max(match->next, best->score);
+    if (!best || match->score > best->score) {
+      best = std::move(match);
+    } else {
+      best->next = std::max(best->next, match->score);
+    }
+  }
+  if (!best || !isBelieved(*best, std::numeric_limits<double>::infinity())) return std::nullopt;
+  return Found{std::move(*best), std::nullopt, std::numeric_limits<double>::infinity()};
+}
+
+}  // namespace perdure::mapping

@@ -1,0 +1,67 @@
+// Looks for the body among the objects of earlier visits and of other sessions, and says which are
+// what it sees.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/mapping/frames/anchor_builder.h"
+#include "common/mapping/graph/marginals.h"
+#include "common/mapping/map_state.h"
+#include "common/mapping/parameters.h"
+#include "common/mapping/places/constellation.h"
+
+namespace perdure::mapping {
+
+/// Where the body is, and what has been asked of it.
+struct Whereabouts {
+  const MapState& state;
+  const AnchorBuilder& way;
+  const Marginals& relative;  ///< to the body's newest anchor
+
+  const Anchor& here() const { return *way.last(); }
+  /// Of another session, or not detected within `visit_m` of way.
+  bool isOld(const ObjectRecord& record, double visit_m) const;
+};
+
+/// What is known of an object from before this visit; nothing if it is new.
+const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
+                                 double visit_m);
+/// The object in M.
+PlacedObject inM(const MapState& state, const Sighting& sighting);
+
+class LoopSearch {
+ public:
+  explicit LoopSearch(const Parameters& parameters) : parameters_(parameters) {}
+
+  struct Found {
+    PlaceMatch match;                    ///< T_MB in the M of the component that it is found in
+    std::optional<LevelGaussian> prior;  ///< by odometry and graph; nothing: it was nowhere known
+    double sigma_m = 0.0;                ///< deviation of the prior in the plane
+  };
+
+  /// Among what hangs together with the body by the graph. Returns what is believed.
+  std::optional<Found> nearby(const Whereabouts& body) const;
+  /// In the components of the graph that the body's session does not hang together with.
+  std::optional<Found> elsewhere(const Whereabouts& body);
+  /// The graph or the objects of other components have changed.
+  void forget() { indices_.clear(); }
+
+ private:
+  std::vector<PlacedObject> seenOfLate(const Whereabouts& body) const;
+  struct Around {
+    std::vector<PlacedObject> objects;
+    std::vector<Eigen::Vector2d> driven;
+    std::optional<LevelGaussian> nearest;  ///< T_ba of its nearest place
+  };
+  Around mapAround(const Whereabouts& body) const;
+  bool isBelieved(const PlaceMatch& match, double sigma_m) const;
+  void indexOthers(const Whereabouts& body);
+
+  Parameters parameters_;
+  std::map<AnchorId, std::unique_ptr<MapIndex>> indices_;  ///< of other components
+};
+
+}  // namespace perdure::mapping

@@ -1,0 +1,129 @@
+#include "common/mapping/map_state.h"
+
+#include <utility>
+#include <vector>
+
+namespace perdure::mapping {
+
+MapState::MapState(const GraphParameters& parameters, SavedMap saved)
+    : graph_(parameters), records_(std::move(saved.records)) {
+  for (std::size_t k = 0; k < saved.classes.size(); ++k) {
+    class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
+  }
+  // Loops first: they keep their ids.
+  std::map<AnchorId, LevelPose> poses;
+  for (const auto& [id, edge] : saved.edges) {
+    if (edge.edge.kind == EdgeKind::kOdometry) continue;
+    graph_.restore(id, edge.edge, edge.weight);
+    saved_edges_[id] = edge.weight;
+  }
+  for (const auto& [id, saved_anchor] : saved.anchors) {
+    const Anchor& anchor = saved_anchor.anchor;
+    add(anchor);
+    graph_.setPose(id, saved_anchor.T_MA);
+    saved_anchors_[id] = {saved_anchor.T_MA, anchor.from_previous.covariance(0, 0)};
+  }
+  graph_.holdFirstAnchors();
+}
+
+std::uint32_t MapState::numberOf(const std::string& class_name) {
+  return class_numbers_.try_emplace(class_name, class_numbers_.size()).first->second;
+}
+
+void MapState::add(const Anchor& anchor) {
+  anchors_[anchor.id] = anchor;
+  if (anchor.previous == 0) {
+    const RigidTransform T_WM = levelled(RigidTransform(), anchor.T_WA.R().col(2));
+    graph_.addFirst(anchor.id, levelOf(T_WM.inverse() * anchor.T_WA));
+  } else {
+    graph_.add(anchor.id, anchor.previous, anchor.from_previous);
+  }
+}
+
+std::optional<Anchor> MapState::newestOf(const WorldId& session) const {
+  for (auto it = anchors_.rbegin(); it != anchors_.rend(); ++it) {
+    if (it->second.session == session) return it->second;
+  }
+  return std::nullopt;
+}
+
+void MapState::removeLoop(EdgeId id) { graph_.remove(id); }
+
+void MapState::scaleOdometry(double factor, const WorldId& session) {
+  std::set<AnchorId> of_session;
+  for (auto& [id, anchor] : anchors_) {
+    if (anchor.session != session) continue;
+    anchor.from_previous.covariance *= factor;
+    of_session.insert(id);
+  }
+  graph_.scaleOdometry(factor, of_session);
+}
+
+void MapState::move(const std::set<AnchorId>& anchors, const LevelPose& T_MN) {
+  for (const AnchorId id : anchors) graph_.setPose(id, T_MN * graph_.pose(id));
+}
+
+ObjectRecord& MapState::record(ObjectId id) {
+  touched_.insert(id);
+  erased_.erase(id);
+  return records_[id];
+}
+
+void MapState::erase(ObjectId id) {
+  const auto at = records_.find(id);
+  if (at == records_.end()) return;
+  if (at->second.confirmed) erased_.insert(id);
+  touched_.erase(id);
+  records_.erase(at);
+}
+
+SavedAnchor MapState::savedAnchor(AnchorId id) const {
+  return {anchors_.at(id), graph_.pose(id), graph_.isHeldFast(id)};
+}
+
+bool MapState::isSaved(AnchorId id) const {
+  const auto at = saved_anchors_.find(id);
+  if (at == saved_anchors_.end()) return false;
+  const LevelPose& now = graph_.pose(id);
+  return at->second.T_MA.p == now.p && at->second.T_MA.yaw == now.yaw &&
+         at->second.variance == anchors_.at(id).from_previous.covariance(0, 0);
+}
+
+Unsaved MapState::unsaved() const {
+  Unsaved result;
+  result.changed.classes.resize(class_numbers_.size());
+  for (const auto& [name, number] : class_numbers_) result.changed.classes[number] = name;
+  for (const auto& [id, anchor] : anchors_) {
+    if (!isSaved(id)) result.changed.anchors[id] = savedAnchor(id);
+  }
+  for (const auto& [id, edge] : graph_.edges()) {
+    if (edge.kind == EdgeKind::kOdometry) continue;
+    const auto at = saved_edges_.find(id);
+    if (at == saved_edges_.end() || at->second != graph_.weight(id)) {
+      result.changed.edges[id] = {edge, graph_.weight(id)};
+    }
+  }
+  for (const auto& [id, weight] : saved_edges_) {
+    if (!graph_.edges().contains(id)) result.edges_gone.insert(id);
+  }
+  for (const ObjectId id : touched_) {
+    const ObjectRecord& record = records_.at(id);
+    if (record.confirmed) result.changed.records[id] = record;
+  }
+  result.records_gone = erased_;
+  return result;
+}
+
+void MapState::markSaved() {
+  for (const auto& [id, anchor] : anchors_) {
+    saved_anchors_[id] = {graph_.pose(id), anchor.from_previous.covariance(0, 0)};
+  }
+  saved_edges_.clear();
+  for (const auto& [id, edge] : graph_.edges()) {
+    if (edge.kind != EdgeKind::kOdometry) saved_edges_[id] = graph_.weight(id);
+  }
+  touched_.clear();
+  erased_.clear();
+}
+
+}  // namespace perdure::mapping

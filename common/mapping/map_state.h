@@ -1,0 +1,62 @@
+// What the mapper knows: anchors, the graph over them, and where each object was seen from. Keeps
+// book of what has changed since it was saved.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+
+#include "common/mapping/graph/pose_graph.h"
+#include "common/mapping/saved_map.h"
+
+namespace perdure::mapping {
+
+class MapState {
+ public:
+  MapState(const GraphParameters& parameters, SavedMap saved);
+
+  std::uint32_t numberOf(const std::string& class_name);
+
+  AnchorId nextAnchor() const { return anchors_.empty() ? 1 : anchors_.rbegin()->first + 1; }
+  /// Its increment's covariance as it is to count.
+  void add(const Anchor& anchor);
+  const std::map<AnchorId, Anchor>& anchors() const { return anchors_; }
+  /// The newest anchor of a session.
+  std::optional<Anchor> newestOf(const WorldId& session) const;
+
+  const PoseGraph& graph() const { return graph_; }
+  EdgeId addLoop(const Edge& edge) { return graph_.add(edge); }
+  void removeLoop(EdgeId id);
+  void scaleOdometry(double factor, const WorldId& session);
+  void optimise() { (void)graph_.optimise(); }
+  /// Moves a component as one: T_MA = T_MN T_NA.
+  void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);
+
+  const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
+  /// To be changed; made where it is missing.
+  ObjectRecord& record(ObjectId id);
+  void erase(ObjectId id);
+
+  Unsaved unsaved() const;
+  void markSaved();
+
+ private:
+  /// As it was saved last.
+  struct Kept {
+    LevelPose T_MA;
+    double variance = 0.0;  ///< of the increment's x
+  };
+  SavedAnchor savedAnchor(AnchorId id) const;
+  bool isSaved(AnchorId id) const;
+
+  PoseGraph graph_;
+  std::map<AnchorId, Anchor> anchors_;
+  std::map<ObjectId, ObjectRecord> records_;
+  std::map<std::string, std::uint32_t> class_numbers_;
+  std::map<AnchorId, Kept> saved_anchors_;
+  std::map<EdgeId, double> saved_edges_;  ///< weights of loops
+  std::set<ObjectId> touched_, erased_;
+};
+
+}  // namespace perdure::mapping

@@ -1,0 +1,90 @@
+// Objects of a map to be searched: by place, and pairs of them by their classes and distance.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "common/mapping/parameters.h"
+#include "common/mapping/places/placed_object.h"
+
+namespace perdure::mapping {
+
+/// Indices of places in the plane, by squares.
+class PlaceGrid {
+ public:
+  PlaceGrid(double width, const std::vector<Eigen::Vector2d>& places);
+
+  /// Calls `visit` for all within the squares' width of p, and some beyond.
+  template <class Visit>
+  void around(const Eigen::Vector2d& p, const Visit& visit) const {
+    for (std::int64_t x = cell(p.x()) - 1; x <= cell(p.x()) + 1; ++x) {
+      for (std::int64_t y = cell(p.y()) - 1; y <= cell(p.y()) + 1; ++y) {
+        const auto found = cells_.find(keyOf(x, y));
+        if (found == cells_.end()) continue;
+        for (const std::size_t k : found->second) visit(k);
+      }
+    }
+  }
+
+ private:
+  std::int64_t cell(double v) const { return static_cast<std::int64_t>(std::floor(v / width_)); }
+  static std::int64_t keyOf(std::int64_t x, std::int64_t y) { return x * 0x100000 + y; }
+
+  double width_;
+  std::unordered_map<std::int64_t, std::vector<std::size_t>> cells_;
+};
+
+class MapIndex {
+ public:
+  /// Beyond it from an object nothing of it counts.
+  static constexpr double kReach_m = 24.0;
+
+  /// `objects` in M; `driven`: places in M from which they were seen.
+  MapIndex(std::vector<PlacedObject> objects, std::vector<Eigen::Vector2d> driven,
+           const PlaceParameters& parameters);
+
+  const std::vector<PlacedObject>& objects() const { return objects_; }
+  /// Calls `visit` with the number of each object within kReach_m of a place, and of some beyond.
+  template <class Visit>
+  void around(const Eigen::Vector2d& p, const Visit& visit) const {
+    by_place_.around(p, visit);
+  }
+
+  struct Pair {
+    double distance;   ///< in the plane
+    std::size_t c, d;  ///< numbers of objects
+  };
+  /// Ordered pairs of two classes, by distance; nothing where there are none.
+  const std::vector<Pair>* pairsOf(std::uint32_t class_c, std::uint32_t class_d) const;
+
+  /// Probability that what stands at a place is on the map: falls with the distance to where the
+  /// body drove when the map was made.
+  double knownShare(const Eigen::Vector2d& at) const;
+  /// Share of a class among the objects, [0, 1].
+  double commonShare(std::uint32_t class_number) const;
+
+  /// Middle of the objects, and the mean square of their distance from it along each axis.
+  Eigen::Vector2d centre() const { return centre_; }
+  Eigen::Vector2d spread2() const { return spread2_; }
+
+ private:
+  void pairUp(const PlaceParameters& parameters);
+
+  PlaceParameters parameters_;
+  std::vector<PlacedObject> objects_;
+  std::vector<Eigen::Vector2d> driven_;
+  PlaceGrid by_place_, by_way_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Pair>> pairs_;
+  std::map<std::uint32_t, double> common_;
+  Eigen::Vector2d centre_ = Eigen::Vector2d::Zero(), spread2_ = Eigen::Vector2d::Zero();
+};
+
+/// Number of the likeliest class; the PMF must not be empty.
+std::uint32_t mostProbable(const PlacedObject& object);
+
+}  // namespace perdure::mapping

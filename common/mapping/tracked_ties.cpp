@@ -1,0 +1,67 @@
+#include "common/mapping/tracked_ties.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/mapping/frames/level_errors.h"
+#include "common/math/so3.h"
+
+namespace perdure::mapping {
+namespace {
+
+/// Above it, of its variance, what is known of an object's place came from where it was laid.
+constexpr double kMostLaid = 0.25;
+
+double planeVariance(const PlacedObject& o) {
+  return 0.5 * o.covariance.topLeftCorner<2, 2>().trace();
+}
+
+}  // namespace
+
+bool TrackedTies::isUsed(ObjectId id, double way_m) const {
+  const auto at = used_at_m_.find(id);
+  return at != used_at_m_.end() && way_m - at->second < parameters_.loop.visit_m;
+}
+
+/// An object's posterior holds what it was laid with, once: with the share r of the information,
+/// detections alone have the covariance P / (1 − r).
+std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const {
+  const LoopParameters& loop = parameters_.loop;
+  const double way_m = body.way.way_m();
+  const LevelPose x = body.state.graph().pose(body.here().id);
+  MatchEquations equations;
+  std::map<AnchorId, std::size_t> homes;
+  Tie tie;
+  double laid_m = 0.0;
+  for (const auto& [id, record] : body.state.records()) {
+    if (!record.confirmed || !record.earlier || body.isOld(record, loop.visit_m)) continue;
+    if (isUsed(id, way_m) || way_m - record.way_m > loop.fresh_m) continue;
+    const auto T_ba = body.relative.to(record.earlier->anchor);
+    const auto T_bA = body.relative.to(record.sighting.anchor);
+    if (!T_ba || !T_bA) continue;
+    PlacedObject seen = laid(*T_bA, record.sighting.in_anchor);
+    const double share =
+        planeVariance(seen) / planeVariance(laid(*T_ba, record.earlier->in_anchor));
+    if (share > kMostLaid) continue;
+    seen.covariance /= 1.0 - share;
+    equations.add(seen, inM(body.state, *record.earlier), x);
+    laid_m = std::max(laid_m, planeSigma(T_ba->covariance));
+    ++homes[record.earlier->anchor];
+    tie.objects.push_back(id);
+  }
+  if (tie.objects.size() < loop.least_tracked) return std::nullopt;
+  const Eigen::Vector4d step = equations.step();
+  tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
+  tie.T_Mb.covariance = equations.covariance();
+  if (planeSigma(tie.T_Mb.covariance) > loop.tracked_gain * laid_m) return std::nullopt;
+  tie.home = std::max_element(homes.begin(), homes.end(), [](const auto& a, const auto& b) {
+               return a.second < b.second;
+             })->first;
+  return tie;
+}
+
+void TrackedTies::use(const Tie& tie, double way_m) {
+  for (const ObjectId id : tie.objects) used_at_m_[id] = way_m;
+}
+
+}  // namespace perdure::mapping

@@ -1,0 +1,148 @@
+// What the map's graph does to what is stored: it is loaded, followed, and told.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/mapping/frames/laid_belief.h"
+#include "services/map_store/node.h"
+
+namespace perdure::map_store {
+namespace {
+
+constexpr double kAroundALoop_m = 70.0;
+constexpr std::size_t kMostNamed = 8;  // objects, in the words of an event
+
+std::string namesOf(const mapping::PlaceMatch& match) {
+  std::string names;
+  for (std::size_t k = 0; k < std::min(match.pairs.size(), kMostNamed); ++k) {
+    names += fmt::format("{}{}", k == 0 ? "" : ", ", match.pairs[k].first);
+  }
+  return match.pairs.size() > kMostNamed ? names + ", …" : names;
+}
+
+/// Of another session, whose clock may have been another one.
+ObjectBelief notLaterThan(TimePoint now, ObjectBelief belief) {
+  belief.last_seen = std::min(belief.last_seen, now);
+  belief.first_seen = std::min(belief.first_seen, belief.last_seen);
+  belief.as_of = std::min(belief.as_of, now);
+  return belief;
+}
+
+}  // namespace
+
+void Node::loadGraph() {
+  auto saved = database_.takeGraph();
+  if (!saved) return blame(saved.error());
+  if (saved->malformed > 0) reasons_.add("graph_malformed", saved->malformed);
+  mapper_ = mapping::Mapper(config_.mapping, std::move(saved->map));
+  if (!newest_) return;
+  // What the graph had laid when it was written last is in the working set alone: what is stored
+  // of it in its own session's W is another belief.
+  for (const ObjectBelief& belief : newest_->objects) {
+    const mapping::ObjectRecord* record = mapper_.recordOf(belief.id);
+    if (!belief.recalled || record == nullptr) continue;
+    MapQuery query;
+    query.kind = MapQueryKind::kById;
+    query.object_id = belief.id;
+    const auto stored = database_.reader().find(query, newest_->world, 1);
+    if (!stored || stored->beliefs.empty()) continue;
+    if (stored->beliefs.front().best().mean != belief.best().mean) laid_.insert(belief.id);
+  }
+}
+
+void Node::onOdometry(const Odometry& odometry) {
+  if (config_.graph) mapper_.onOdometry(odometry);
+}
+
+void Node::followGraph() {
+  mapper_.onObjects(*newest_);
+  const auto change = mapper_.takeChange();
+  if (change.loops.empty()) return;
+  commit();  // what is laid is read from the file
+  tellLoops(change);
+  recallLaid(newest_->T_WB.p, kAroundALoop_m, change.merges, true);
+}
+
+void Node::tellLoops(const mapping::MapChange& change) {
+  for (const mapping::LoopClosure& loop : change.loops) {
+    Event event;
+    event.stamp = newest_->stamp;
+    event.instance = instance_;
+    event.world = newest_->world;
+    event.kind = loop.joins ? EventKind::kRelocalised : EventKind::kLoopClosed;
+    event.probability = 1.0 / (1.0 + std::exp(loop.match.next - loop.match.score));
+    event.detail = fmt::format(
+        "loop {}, by {} objects ({}), {:.1f} nats likelier than the best other way; the body's "
+        "place "
+        "on the map moved by {:.2f} m; anchors {} and {}",
+        loop.id, loop.match.pairs.size(), namesOf(loop.match), loop.match.score - loop.match.next,
+        loop.correction_m, loop.a, loop.b);
+    outputs_.event(event);
+    reasons_.add(loop.joins ? "relocalised" : "loops_closed");
+  }
+}
+
+/// Where it changes: after a loop, in a new session, and now and then as the way goes on.
+void Node::tellFrame() {
+  if (!newest_) return;
+  const ToldFrame now{newest_->world, mapper_.revision(), mapper_.anchors().size()};
+  if (told_frame_ == now) return;
+  const auto whole = mapper_.frame();
+  if (!whole) return;
+  told_frame_ = now;
+  MapFrame frame;
+  frame.stamp = newest_->stamp;
+  frame.instance = instance_;
+  frame.world = newest_->world;
+  frame.map = whole->map;
+  frame.T_MW = whole->T_MW;
+  frame.covariance = whole->covariance;
+  frame.revision = now.revision;
+  frame.sessions = whole->sessions;
+  frame.loops = whole->loops;
+  frame.anchors = static_cast<std::uint32_t>(now.anchors);
+  outputs_.frame(frame);
+}
+
+std::optional<ObjectBelief> Node::laidNow(const mapping::Recallable& there) {
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = there.id;
+  auto found = database_.reader().find(query, newest_->world, 1);
+  if (!found) {
+    blame(found.error());
+    return std::nullopt;
+  }
+  if (found->beliefs.empty()) return std::nullopt;
+  ObjectBelief belief = mapping::turned(
+      *there.T_now, mapping::relativeToBody(found->beliefs.front(), there.pose_error));
+  belief = mapping::withFrameError(std::move(belief), there.covariance, there.about_W);
+  return notLaterThan(newest_->stamp.time, std::move(belief));
+}
+
+void Node::recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
+                      const std::vector<MergeOrder>& merges, bool lay_again) {
+  Recalled recalled;
+  recalled.instance = instance_;
+  recalled.world = newest_->world;
+  recalled.client = newest_->instance;
+  recalled.next_id = next_id_;
+  recalled.laid = recalled.graph = true;
+  recalled.merges = merges;
+  std::set<ObjectId> working;
+  for (const auto& belief : newest_->objects) working.insert(belief.id);
+  for (const mapping::Recallable& there : mapper_.near(centre_W, radius_m)) {
+    const bool again = lay_again && laid_.contains(there.id);
+    if (!there.T_now || (working.contains(there.id) && !again)) continue;
+    auto belief = laidNow(there);
+    if (!belief) continue;
+    laid_.insert(there.id);
+    recalled.objects.push_back(std::move(*belief));
+  }
+  if (recalled.objects.empty() && merges.empty()) return;
+  outputs_.recalled(recalled);
+}
+
+}  // namespace perdure::map_store
