@@ -24,7 +24,7 @@ LevelGaussian anywhereOn(const MapIndex& map) {
 }  // namespace
 
 bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
-  return record.session != here().session || way.way_m() - record.way_m > visit_m;
+  return record.session != here().session || std::abs(way.way_m() - record.way_m) > visit_m;
 }
 
 const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
@@ -48,7 +48,7 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
     const auto T_bA = body.relative.to(record.sighting.anchor);
     if (!T_bA) continue;
     seen.push_back(laid(*T_bA, record.sighting.in_anchor));
-    fresh = fresh || body.way.way_m() - record.way_m < parameters_.loop.fresh_m;
+    fresh = fresh || std::abs(body.way.way_m() - record.way_m) < parameters_.loop.fresh_m;
   }
   if (!fresh) seen.clear();
   return seen;
@@ -60,8 +60,8 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
   double nearest_m = std::numeric_limits<double>::infinity();
   std::set<AnchorId> anchors;
   for (const auto& [id, anchor] : body.state.anchors()) {
-    const bool of_this_visit =
-        anchor.session == body.here().session && body.way.way_m() - anchor.way_m < loop.visit_m;
+    const bool of_this_visit = anchor.session == body.here().session &&
+                               std::abs(body.way.way_m() - anchor.way_m) < loop.visit_m;
     if (of_this_visit) continue;
     const auto T_ba = body.relative.to(id);
     if (!T_ba) continue;

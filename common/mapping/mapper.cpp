@@ -39,6 +39,29 @@ void Mapper::begin(const Odometry& odometry) {
   tracked_ties_.begin();
 }
 
+void Mapper::stand(const Anchor& anchor) {
+  builder_ = AnchorBuilder(parameters_.anchor);
+  builder_.resume(anchor);
+  marginals_.reset();
+}
+
+void Mapper::replay(const WorldId& session) {
+  std::vector<AnchorId> way;
+  for (const auto& [id, anchor] : state_.anchors()) {
+    if (anchor.session == session) way.push_back(id);
+  }
+  if (way.empty()) return;
+  session_ = session;
+  active_.reset();
+  tracked_ties_.begin();
+  searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
+  loop_search_.forget();
+  for (const AnchorId id : way) {
+    stand(state_.anchors().at(id));
+    search();
+  }
+}
+
 void Mapper::onOdometry(const Odometry& odometry) {
   if (odometry.state == OdometryState::kInitialising) return;
   if (session_ != odometry.world) begin(odometry);
@@ -52,7 +75,8 @@ void Mapper::onOdometry(const Odometry& odometry) {
 Whereabouts Mapper::body() { return {state_, builder_, marginals()}; }
 
 bool Mapper::isOld(const ObjectRecord& record) const {
-  return record.session != *session_ || builder_.way_m() - record.way_m > parameters_.loop.visit_m;
+  return record.session != *session_ ||
+         std::abs(builder_.way_m() - record.way_m) > parameters_.loop.visit_m;
 }
 
 /// Given the pose: what the pose error explains of the covariance is not the object's.

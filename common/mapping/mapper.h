@@ -63,7 +63,14 @@ class Mapper {
   void onObjects(const Objects& objects);
   void onMerged(ObjectId survivor, ObjectId absorbed);
   void onGone(ObjectId id);
+  /// Drives along a saved session again and looks for its places on the rest of the map, with what
+  /// was seen a little later, too. For maps that are brought together. Afterwards the mapper stands
+  /// at its end.
+  void replay(const WorldId& session);
   MapChange takeChange() { return std::exchange(change_, {}); }
+
+  /// Whether it hears the odometry of this frame of reference.
+  bool follows(const WorldId& world) const { return session_ == world && builder_.last(); }
 
   /// Objects within radius_m of a place in W whose place relative to the body is known well enough
   /// to be taken for what is seen there.
@@ -107,6 +114,7 @@ class Mapper {
   PlacedObject placedOf(const ObjectBelief& belief, const Matrix6d& pose_error);
   bool isOld(const ObjectRecord& record) const;
   void forgetUnconfirmed();
+  void stand(const Anchor& anchor);
   bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   void tie();
   void search();

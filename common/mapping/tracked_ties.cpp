@@ -12,10 +12,6 @@ namespace {
 /// Above it, of its variance, what is known of an object's place came from where it was laid.
 constexpr double kMostLaid = 0.25;
 
-double planeVariance(const PlacedObject& o) {
-  return 0.5 * o.covariance.topLeftCorner<2, 2>().trace();
-}
-
 }  // namespace
 
 bool TrackedTies::isUsed(ObjectId id, double way_m) const {

@@ -18,7 +18,7 @@ struct Config {
   double tile_period_s = 1.0;
   std::int64_t query_limit = 1000;
   std::int64_t cached_replies = 64;
-  bool graph = false;  ///< anchors, pose graph and loops
+  bool graph = true;  ///< anchors, pose graph and loops
   mapping::Parameters mapping;
 };
 

@@ -270,7 +270,8 @@ void Node::recall(const MapQuery& query) {
   if (!found) return blame(found.error());
   if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
   // A filter that looks for the map of a frame that has ended lays it by itself.
-  const bool by_graph = config_.graph && newest_ && query.world == newest_->world;
+  const bool by_graph = config_.graph && newest_ && query.world == newest_->world &&
+                        mapper_.follows(query.world);
   if (by_graph) {
     constexpr double kAround_m = 10.0;  // places in M and in W differ
     std::set<ObjectId> as_stored;
@@ -288,7 +289,7 @@ void Node::recall(const MapQuery& query) {
   recalled.next_id = next_id_;
   recalled.objects = std::move(found->beliefs);
   recalled.request = query.request;
-  recalled.graph = config_.graph;
+  recalled.graph = by_graph;
   if (kept_of_ == query.client) recalled.kept = kept_;
   recalled.truncated = found->truncated;
   outputs_.recalled(recalled);

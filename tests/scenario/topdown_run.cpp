@@ -84,7 +84,7 @@ TopDownRun driveThrough(const TopDownSetting& setting) {
                                 .predictions = [&](const Predictions& m) { expected = m; }});
   filter.onCalibration(dataset->calibration());
   filter.onModel(network.model());
-  tools::PoseOdometry poses(*dataset->truth(), 2, tools::ofExactTruth());
+  tools::PoseOdometry poses(*dataset->truth(), 2, {1, 0}, tools::ofExactTruth());
   while (const auto message = dataset->next()) {
     const Frame* frame = std::get_if<Frame>(&*message);
     if (frame == nullptr || frame->camera != "cam0") continue;

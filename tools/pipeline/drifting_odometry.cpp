@@ -86,9 +86,11 @@ void DriftCovariance::advance(const Eigen::Vector3d& step_W, double sigma_yaw) {
 }
 
 DriftingOdometry::DriftingOdometry(replay::PoseFile truth, InstanceId instance,
-                                   const PoseAccuracy& accuracy, const DriftConfig& config)
+                                   const WorldId& session, const PoseAccuracy& accuracy,
+                                   const DriftConfig& config)
     : truth_(std::move(truth)),
       instance_(instance),
+      session_(session),
       accuracy_(accuracy),
       config_(config),
       dice_(sim::seedOf("drift", {static_cast<std::uint64_t>(config.seed)})),

@@ -27,10 +27,6 @@ constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
 constexpr double kDefaultShare = 1e-3;  // of a class that one of the two PMFs does not name
 
-double planeVariance(const PlacedObject& o) {
-  return 0.5 * o.covariance.topLeftCorner<2, 2>().trace();
-}
-
 /// log-likelihood ratio of a yaw known modulo 180°, against any yaw.
 double logSameYaw(double difference, double variance) {
   const double d = wrapHalfTurn(difference);

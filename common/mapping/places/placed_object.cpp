@@ -10,6 +10,10 @@ namespace perdure::mapping {
 
 double wrapHalfTurn(double angle) { return 0.5 * wrapAngle(2.0 * angle); }
 
+double planeVariance(const PlacedObject& object) {
+  return 0.5 * object.covariance.topLeftCorner<2, 2>().trace();
+}
+
 PlacedObject laid(const LevelGaussian& T_AB, const PlacedObject& object) {
   PlacedObject o = transformed(T_AB.mean, object);
   const Eigen::Matrix4d J = byFrame(o.p - T_AB.mean.p);

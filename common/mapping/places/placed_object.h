@@ -28,6 +28,9 @@ struct PlacedObject {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of [p, yaw], m and rad
   std::vector<ClassShare> pmf;
 };
+/// Of its place, m², the mean of x and y.
+double planeVariance(const PlacedObject& object);
+
 /// The object of frame B in frame A. The transform's own error is not added.
 PlacedObject transformed(const LevelPose& T_AB, PlacedObject object);
 /// The object of frame B in frame A, with the error of T_AB.

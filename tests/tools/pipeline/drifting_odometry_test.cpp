@@ -36,7 +36,7 @@ replay::PoseFile bends(std::size_t frames) {
 }
 
 std::vector<Odometry> driven(const replay::PoseFile& truth, const DriftConfig& config) {
-  DriftingOdometry source(truth, 2, ofExactTruth(), config);
+  DriftingOdometry source(truth, 2, {1, 0}, ofExactTruth(), config);
   std::vector<Odometry> all;
   for (std::size_t i = 0; i < truth.poses().size(); ++i) all.push_back(*source.at(stampAt(i)));
   return all;
@@ -44,7 +44,7 @@ std::vector<Odometry> driven(const replay::PoseFile& truth, const DriftConfig& c
 
 TEST(DriftingOdometry, WithoutDriftItIsTheTruth) {
   const auto truth = bends(200);
-  PoseOdometry exact(truth, 2, ofExactTruth());
+  PoseOdometry exact(truth, 2, {1, 0}, ofExactTruth());
   for (const auto& odometry : driven(truth, {.scale = 0.0, .yaw_walk = 0.0})) {
     const auto expected = *exact.at(odometry.stamp);
     EXPECT_LT(boxMinus(odometry.T_WB, expected.T_WB).norm(), 1e-9);

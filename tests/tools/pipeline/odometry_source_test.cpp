@@ -18,7 +18,7 @@ FrameStamp stampOf(std::uint64_t frame) {
 TEST(PoseOdometry, SaysWhatAFileOfPosesKnowsAndNoMore) {
   std::vector<replay::StampedPose> poses(2);
   poses[1].T_WB.p = Eigen::Vector3d(1, 0, 0);
-  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2);
+  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2, {1, 0});
   ASSERT_TRUE(source.at(stampOf(0)));
   const auto odometry = source.at(stampOf(1));
   ASSERT_TRUE(odometry);
@@ -33,7 +33,7 @@ TEST(PoseOdometry, UpIsTheMeanOfTheBodysZAxisSoFar) {
   std::vector<replay::StampedPose> poses(3);
   poses[1].T_WB.q = expQuaternion({0.2, 0, 0});
   poses[2].T_WB.q = expQuaternion({-0.2, 0, 0});
-  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2);
+  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2, {1, 0});
   EXPECT_TRUE(source.at(stampOf(0))->up_W.isApprox(Eigen::Vector3d::UnitZ()));
   const Eigen::Vector3d tilted = source.at(stampOf(1))->up_W;
   EXPECT_NEAR(std::atan2(-tilted.y(), tilted.z()), 0.1, 1e-9);
@@ -44,7 +44,8 @@ TEST(PoseOdometry, TruthHasAnErrorThatStaysInTheWorldAndAWorldWhoseZIsUp) {
   std::vector<replay::StampedPose> poses(2);
   poses[0].T_WB.q = expQuaternion({0.2, 0, 0});
   poses[1].T_WB.q = expQuaternion({0.2, 0, 0}) * expQuaternion({0, 0, 0.3});
-  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2, ofExactTruth());
+  PoseOdometry source(replay::PoseFile(replay::PoseFormat::kKitti, poses), 2, {1, 0},
+                      ofExactTruth());
   const auto first = source.at(stampOf(0));
   EXPECT_FALSE(first->has_increment) << "nothing was before it";
   const auto second = source.at(stampOf(1));
