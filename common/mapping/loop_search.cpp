@@ -1,6 +1,8 @@
 #include "common/mapping/loop_search.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <set>
 
@@ -9,6 +11,9 @@
 
 namespace perdure::mapping {
 namespace {
+
+/// Than from the first anchor of its component no place is known worse than by this factor.
+constexpr double kFarther = 1.5;
 
 /// As wide as a map of which nothing says where in it the body is.
 LevelGaussian anywhereOn(const MapIndex& map) {
@@ -27,6 +32,33 @@ bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
   return record.session != here().session || std::abs(way.way_m() - record.way_m) > visit_m;
 }
 
+/// Ids of a session's anchors follow each other.
+std::vector<AnchorId> Whereabouts::anchorsOfVisit(double visit_m) const {
+  std::vector<AnchorId> ids;
+  const auto& all = state.anchors();
+  const auto of_visit = [&](const Anchor& a) {
+    return a.session == here().session && std::abs(way.way_m() - a.way_m) <= visit_m;
+  };
+  auto it = all.find(here().id);
+  while (it != all.begin() && of_visit(std::prev(it)->second)) --it;
+  for (; it != all.end() && of_visit(it->second); ++it) ids.push_back(it->first);
+  return ids;
+}
+
+std::vector<ObjectId> Whereabouts::objectsOfVisit(double visit_m) const {
+  std::vector<ObjectId> ids;
+  // An object belongs to the anchor before the place from which it was detected.
+  constexpr double kAnchors_m = 15.0;
+  for (const AnchorId anchor : anchorsOfVisit(visit_m + kAnchors_m)) {
+    for (const ObjectId id : state.seenFrom(anchor)) {
+      const ObjectRecord& record = state.records().at(id);
+      if (record.sighting.anchor == anchor && !isOld(record, visit_m)) ids.push_back(id);
+    }
+  }
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
 const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
                                  double visit_m) {
   if (body.isOld(record, visit_m)) return &record.sighting;
@@ -42,8 +74,8 @@ PlacedObject inM(const MapState& state, const Sighting& sighting) {
 std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const {
   std::vector<PlacedObject> seen;
   bool fresh = false;
-  for (const auto& [id, record] : body.state.records()) {
-    if (body.isOld(record, parameters_.loop.visit_m)) continue;
+  for (const ObjectId id : body.objectsOfVisit(parameters_.loop.visit_m)) {
+    const ObjectRecord& record = body.state.records().at(id);
     if (record.earlier && body.relative.to(record.earlier->anchor)) continue;
     const auto T_bA = body.relative.to(record.sighting.anchor);
     if (!T_bA) continue;
@@ -54,33 +86,49 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   return seen;
 }
 
+/// Anchors of earlier visits, nearest first, as far as the body may be off. How far that is, is
+/// asked of the first anchor of its component: nearer ones are known better.
+std::vector<std::pair<double, AnchorId>> LoopSearch::anchorsOfBefore(
+    const Whereabouts& body) const {
+  const PoseGraph& graph = body.state.graph();
+  const Eigen::Vector3d here = graph.pose(body.here().id).p;
+  const auto of_late = body.anchorsOfVisit(parameters_.loop.visit_m);
+  std::vector<std::pair<double, AnchorId>> anchors;
+  for (const auto& [id, pose] : graph.poses()) {
+    if (id >= of_late.front() && id <= of_late.back()) continue;
+    anchors.emplace_back((pose.p - here).head<2>().norm(), id);
+  }
+  const double far_m =
+      parameters_.loop.view_m + parameters_.place.gate_sigmas * kFarther * body.deviation_m;
+  std::erase_if(anchors, [&](const auto& a) { return a.first > far_m; });
+  std::sort(anchors.begin(), anchors.end());
+  return anchors;
+}
+
 LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
   const LoopParameters& loop = parameters_.loop;
   Around around;
   double nearest_m = std::numeric_limits<double>::infinity();
-  std::set<AnchorId> anchors;
-  for (const auto& [id, anchor] : body.state.anchors()) {
-    const bool of_this_visit = anchor.session == body.here().session &&
-                               std::abs(body.way.way_m() - anchor.way_m) < loop.visit_m;
-    if (of_this_visit) continue;
+  std::set<ObjectId> ids;
+  for (const auto& [distance, id] : anchorsOfBefore(body)) {
     const auto T_ba = body.relative.to(id);
     if (!T_ba) continue;
-    const double distance = T_ba->mean.p.head<2>().norm();
     const double sigma = planeSigma(T_ba->covariance);
     if (distance > loop.view_m + parameters_.place.gate_sigmas * sigma) continue;
-    anchors.insert(id);
     around.driven.push_back(body.state.graph().pose(id).p.head<2>());
     if (distance - sigma < nearest_m) {
       nearest_m = distance - sigma;
       around.nearest = T_ba;
     }
-  }
-  if (anchors.empty()) return around;
-  for (const auto& [id, record] : body.state.records()) {
-    const Sighting* known = sightingOfBefore(record, body, loop.visit_m);
-    if (record.confirmed && known != nullptr && anchors.contains(known->anchor)) {
-      around.objects.push_back(inM(body.state, *known));
+    for (const ObjectId object : body.state.seenFrom(id)) {
+      const ObjectRecord& record = body.state.records().at(object);
+      const Sighting* known = sightingOfBefore(record, body, loop.visit_m);
+      if (record.confirmed && known != nullptr && known->anchor == id) ids.insert(object);
     }
+  }
+  for (const ObjectId id : ids) {
+    const ObjectRecord& record = body.state.records().at(id);
+    around.objects.push_back(inM(body.state, *sightingOfBefore(record, body, loop.visit_m)));
   }
   return around;
 }

@@ -20,10 +20,15 @@ struct Whereabouts {
   const MapState& state;
   const AnchorBuilder& way;
   const Marginals& relative;  ///< to the body's newest anchor
+  double deviation_m = 0.0;   ///< in the plane, from the first anchor of its component
 
   const Anchor& here() const { return *way.last(); }
   /// Of another session, or not detected within `visit_m` of way.
   bool isOld(const ObjectRecord& record, double visit_m) const;
+  /// Anchors of the session within so much way, in order.
+  std::vector<AnchorId> anchorsOfVisit(double visit_m) const;
+  /// Objects that were detected within so much way, by id.
+  std::vector<ObjectId> objectsOfVisit(double visit_m) const;
 };
 
 /// What is known of an object from before this visit; nothing if it is new.
@@ -50,6 +55,7 @@ class LoopSearch {
   void forget() { indices_.clear(); }
 
  private:
+  std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body) const;
   std::vector<PlacedObject> seenOfLate(const Whereabouts& body) const;
   struct Around {
     std::vector<PlacedObject> objects;

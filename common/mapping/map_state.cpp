@@ -11,7 +11,6 @@ MapState::MapState(const GraphParameters& parameters, SavedMap saved)
     class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
   }
   // Loops first: they keep their ids.
-  std::map<AnchorId, LevelPose> poses;
   for (const auto& [id, edge] : saved.edges) {
     if (edge.edge.kind == EdgeKind::kOdometry) continue;
     graph_.restore(id, edge.edge, edge.weight);
@@ -24,6 +23,7 @@ MapState::MapState(const GraphParameters& parameters, SavedMap saved)
     saved_anchors_[id] = {saved_anchor.T_MA, anchor.from_previous.covariance(0, 0)};
   }
   graph_.holdFirstAnchors();
+  for (const auto& [id, record] : records_) index(id, record);
 }
 
 std::uint32_t MapState::numberOf(const std::string& class_name) {
@@ -63,10 +63,29 @@ void MapState::move(const std::set<AnchorId>& anchors, const LevelPose& T_MN) {
   for (const AnchorId id : anchors) graph_.setPose(id, T_MN * graph_.pose(id));
 }
 
-ObjectRecord& MapState::record(ObjectId id) {
+void MapState::index(ObjectId id, const ObjectRecord& record) {
+  seen_from_[record.sighting.anchor].insert(id);
+  if (record.earlier) seen_from_[record.earlier->anchor].insert(id);
+}
+
+void MapState::unindex(ObjectId id, const ObjectRecord& record) {
+  seen_from_[record.sighting.anchor].erase(id);
+  if (record.earlier) seen_from_[record.earlier->anchor].erase(id);
+}
+
+const std::set<ObjectId>& MapState::seenFrom(AnchorId id) const {
+  static const std::set<ObjectId> kNone;
+  const auto at = seen_from_.find(id);
+  return at == seen_from_.end() ? kNone : at->second;
+}
+
+void MapState::put(ObjectId id, ObjectRecord record) {
   touched_.insert(id);
   erased_.erase(id);
-  return records_[id];
+  const auto at = records_.find(id);
+  if (at != records_.end()) unindex(id, at->second);
+  index(id, record);
+  records_.insert_or_assign(id, std::move(record));
 }
 
 void MapState::erase(ObjectId id) {
@@ -74,6 +93,7 @@ void MapState::erase(ObjectId id) {
   if (at == records_.end()) return;
   if (at->second.confirmed) erased_.insert(id);
   touched_.erase(id);
+  unindex(id, at->second);
   records_.erase(at);
 }
 

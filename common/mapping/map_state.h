@@ -34,9 +34,10 @@ class MapState {
   void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);
 
   const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
-  /// To be changed; made where it is missing.
-  ObjectRecord& record(ObjectId id);
+  void put(ObjectId id, ObjectRecord record);
   void erase(ObjectId id);
+  /// Objects that were seen from an anchor, on the newest visit or on the one before.
+  const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
   Unsaved unsaved() const;
   void markSaved();
@@ -47,12 +48,15 @@ class MapState {
     LevelPose T_MA;
     double variance = 0.0;  ///< of the increment's x
   };
+  void index(ObjectId id, const ObjectRecord& record);
+  void unindex(ObjectId id, const ObjectRecord& record);
   SavedAnchor savedAnchor(AnchorId id) const;
   bool isSaved(AnchorId id) const;
 
   PoseGraph graph_;
   std::map<AnchorId, Anchor> anchors_;
   std::map<ObjectId, ObjectRecord> records_;
+  std::map<AnchorId, std::set<ObjectId>> seen_from_;
   std::map<std::string, std::uint32_t> class_numbers_;
   std::map<AnchorId, Kept> saved_anchors_;
   std::map<EdgeId, double> saved_edges_;  ///< weights of loops

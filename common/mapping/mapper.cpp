@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/mapping/graph/components.h"
@@ -72,7 +73,10 @@ void Mapper::onOdometry(const Odometry& odometry) {
   marginals_.reset();
 }
 
-Whereabouts Mapper::body() { return {state_, builder_, marginals()}; }
+Whereabouts Mapper::body() {
+  const auto to_first = marginals().to(marginals().first());
+  return {state_, builder_, marginals(), to_first ? planeSigma(to_first->covariance) : 0.0};
+}
 
 bool Mapper::isOld(const ObjectRecord& record) const {
   return record.session != *session_ ||
@@ -106,15 +110,19 @@ void Mapper::see(const ObjectBelief& belief, const Objects& objects) {
   const Eigen::Matrix4d J = byFrame(o.p - builder_.sinceLast()->mean.p);
   o.covariance += J * builder_.sinceLast()->covariance * J.transpose();
 
-  const bool is_new = !state_.records().contains(belief.id);
-  ObjectRecord& record = state_.record(belief.id);
-  if (!is_new && isOld(record)) record.earlier = record.sighting;
+  ObjectRecord record;
+  const auto known = state_.records().find(belief.id);
+  if (known != state_.records().end()) {
+    record = known->second;
+    if (isOld(record)) record.earlier = record.sighting;
+  }
   record.session = *session_;
   record.way_m = builder_.way_m();
   record.last_seen = belief.last_seen;
   record.confirmed = record.confirmed || belief.confirmed;
   record.pose_error = objects.pose_error;
   record.sighting = {anchor.id, std::move(o)};
+  state_.put(belief.id, std::move(record));
 }
 
 void Mapper::onObjects(const Objects& objects) {
@@ -153,21 +161,24 @@ bool Mapper::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
 void Mapper::onMerged(ObjectId survivor, ObjectId absorbed) {
   const auto from = state_.records().find(absorbed);
   if (from == state_.records().end()) return;
-  const ObjectRecord other = from->second;
-  const bool is_new = !state_.records().contains(survivor);
-  ObjectRecord& record = state_.record(survivor);
-  const bool confirmed = record.confirmed || other.confirmed;
-  // What is seen now is seen of the survivor.
-  if (is_new || isNewer(other, record)) {
-    const bool came_back = !is_new && isOld(record);
-    ObjectRecord merged = other;
-    if (came_back) merged.earlier = record.sighting;
-    if (!is_new && !came_back && !merged.earlier) merged.earlier = record.earlier;
-    record = std::move(merged);
+  ObjectRecord merged = from->second;
+  const auto into = state_.records().find(survivor);
+  if (into != state_.records().end()) {
+    const ObjectRecord& record = into->second;
+    const bool confirmed = merged.confirmed || record.confirmed;
+    // What is seen now is seen of the survivor.
+    if (!isNewer(merged, record)) {
+      merged = record;
+    } else if (isOld(record)) {
+      merged.earlier = record.sighting;
+    } else if (!merged.earlier) {
+      merged.earlier = record.earlier;
+    }
+    merged.confirmed = confirmed;
   }
-  record.confirmed = confirmed;
-  record.sighting.in_anchor.id = survivor;
-  if (record.earlier) record.earlier->in_anchor.id = survivor;
+  merged.sighting.in_anchor.id = survivor;
+  if (merged.earlier) merged.earlier->in_anchor.id = survivor;
+  state_.put(survivor, std::move(merged));
   state_.erase(absorbed);
 }
 
@@ -293,17 +304,21 @@ std::vector<Recallable> Mapper::near(const Eigen::Vector3d& centre_W, double rad
   if (!builder_.last()) return result;
   const Anchor& here = *builder_.last();
   const Eigen::Vector3d centre_M = state_.graph().pose(here.id) * (here.T_WA.inverse() * centre_W);
-  std::map<AnchorId, std::optional<Recallable>> by_anchor;
-  for (const auto& [id, record] : state_.records()) {
-    const Eigen::Vector3d p_M =
-        state_.graph().pose(record.sighting.anchor) * record.sighting.in_anchor.p;
-    if (!record.confirmed || (p_M - centre_M).norm() > radius_m) continue;
-    const auto [at, is_new] = by_anchor.try_emplace(record.sighting.anchor);
-    if (is_new) at->second = relativeTo(here, state_.anchors().at(record.sighting.anchor));
-    if (!at->second) continue;
-    result.push_back(*at->second);
-    result.back().id = id;
-    result.back().pose_error = record.pose_error;
+  constexpr double kSeenWithin_m = 60.0;  // of the anchor from which an object was seen
+  for (const auto& [anchor, pose] : state_.graph().poses()) {
+    if ((pose.p - centre_M).norm() > radius_m + kSeenWithin_m) continue;
+    std::optional<Recallable> of_anchor;
+    bool asked = false;
+    for (const ObjectId id : state_.seenFrom(anchor)) {
+      const ObjectRecord& record = state_.records().at(id);
+      if (!record.confirmed || record.sighting.anchor != anchor) continue;
+      if ((pose * record.sighting.in_anchor.p - centre_M).norm() > radius_m) continue;
+      if (!std::exchange(asked, true)) of_anchor = relativeTo(here, state_.anchors().at(anchor));
+      if (!of_anchor) break;
+      result.push_back(*of_anchor);
+      result.back().id = id;
+      result.back().pose_error = record.pose_error;
+    }
   }
   return result;
 }

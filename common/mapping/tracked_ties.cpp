@@ -29,9 +29,9 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   std::map<AnchorId, std::size_t> homes;
   Tie tie;
   double laid_m = 0.0;
-  for (const auto& [id, record] : body.state.records()) {
-    if (!record.confirmed || !record.earlier || body.isOld(record, loop.visit_m)) continue;
-    if (isUsed(id, way_m) || way_m - record.way_m > loop.fresh_m) continue;
+  for (const ObjectId id : body.objectsOfVisit(loop.fresh_m)) {
+    const ObjectRecord& record = body.state.records().at(id);
+    if (!record.confirmed || !record.earlier || isUsed(id, way_m)) continue;
     const auto T_ba = body.relative.to(record.earlier->anchor);
     const auto T_bA = body.relative.to(record.sighting.anchor);
     if (!T_ba || !T_bA) continue;

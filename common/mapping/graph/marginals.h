@@ -17,6 +17,8 @@ class Marginals {
   /// by their weights of the last optimise(). The graph must outlive this.
   Marginals(const PoseGraph& graph, AnchorId from);
 
+  /// The first anchor of the component of `from`.
+  AnchorId first() const { return components_.at(from_); }
   /// T_from,anchor with its covariance; nothing where no way leads there.
   std::optional<LevelGaussian> to(AnchorId anchor) const;
 

@@ -52,7 +52,7 @@ class Search {
         map_(map.objects()),
         prior_information_(inverseSymmetric(prior_.covariance)) {
     keepTheSurest();
-    compareClasses();
+    weighClasses();
   }
 
   std::optional<PlaceMatch> best() const {
@@ -105,29 +105,27 @@ class Search {
     if (seen_.size() > kMostSeen) seen_.resize(kMostSeen);
   }
 
-  /// log of p(one object has both PMFs) against p(two objects have them), for all of both.
-  void compareClasses() {
-    same_class_.resize(static_cast<Eigen::Index>(seen_.size()),
-                       static_cast<Eigen::Index>(map_.size()));
-    for (std::size_t i = 0; i < seen_.size(); ++i) {
-      std::map<std::uint32_t, double> weights;
-      for (const ClassShare& c : seen_[i].pmf) {
+  /// Of each seen object and class: probability by the share of the class on the map.
+  void weighClasses() {
+    for (const PlacedObject& o : seen_) {
+      std::vector<double>& weights = class_weights_.emplace_back();
+      for (const ClassShare& c : o.pmf) {
         const double share = index_.commonShare(c.name);
-        if (share > 0.0) weights[c.name] = c.probability / share;
-      }
-      for (std::size_t k = 0; k < map_.size(); ++k) {
-        double ratio = kDefaultShare;
-        for (const ClassShare& c : map_[k].pmf) {
-          const auto weight = weights.find(c.name);
-          if (weight != weights.end()) ratio += weight->second * c.probability;
-        }
-        same_class_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = std::log(ratio);
+        if (share <= 0.0) continue;
+        if (weights.size() <= c.name) weights.resize(c.name + 1, 0.0);
+        weights[c.name] = c.probability / share;
       }
     }
   }
 
+  /// p(one object has both PMFs) by p(two objects have them).
   double sameClass(std::size_t i, std::size_t k) const {
-    return same_class_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+    const std::vector<double>& weights = class_weights_[i];
+    double ratio = kDefaultShare;
+    for (const ClassShare& c : map_[k].pmf) {
+      if (c.name < weights.size()) ratio += weights[c.name] * c.probability;
+    }
+    return ratio;
   }
 
   double deviations2(const LevelPose& x) const {
@@ -303,7 +301,8 @@ class Search {
                                   S(0, 0) * off.y() * off.y()) /
                                  determinant;
       if (mahalanobis > 25.0) return;
-      const double density = std::exp(-0.5 * mahalanobis + sameClass(i, k) +
+      const double density = sameClass(i, k) *
+                             std::exp(-0.5 * mahalanobis +
                                       logSameYaw(known.yaw - seen.yaw - x.yaw,
                                                  seen.covariance(3, 3) + known.covariance(3, 3))) /
                              (2.0 * kPi * std::sqrt(determinant));
@@ -393,7 +392,7 @@ class Search {
   const MapIndex& index_;
   const std::vector<PlacedObject>& map_;
   Eigen::Matrix4d prior_information_;
-  Eigen::MatrixXd same_class_;  ///< log ratios, by seen and map object
+  std::vector<std::vector<double>> class_weights_;
 };
 
 }  // namespace
