@@ -61,6 +61,10 @@ const std::vector<Entry>& entries() {
         "The cost of a frame depends on what is in view, not on the 500 vehicles of a map of four "
         "kilometres of streets."},
        makeTown},
+      {{"blocks",
+        "In a town whose blocks are equal but for a few things, a body that comes back is known to "
+        "be where it is, and never one block off."},
+       makeBlocks},
       {{"random",
         "Single views for training, one a second: each looks at a thing of a class drawn evenly, "
         "from any side and as large in the image as may be; the body rests in between."},

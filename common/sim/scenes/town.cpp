@@ -1,6 +1,5 @@
 // A grid of streets, four kilometres in all, and a drive through nearly all of them.
 #include <algorithm>
-#include <limits>
 
 #include "common/sim/path.h"
 #include "common/sim/scenes/parts/rigs.h"
@@ -52,26 +51,6 @@ std::vector<Eigen::Vector2d> turns() {
   return points;
 }
 
-/// On the right-hand lane; right turns are tighter than left ones.
-GroundPath wayThrough(const std::vector<Eigen::Vector2d>& points) {
-  const auto rightOf = [](const Eigen::Vector2d& way) {
-    return Eigen::Vector2d(way.y(), -way.x());
-  };
-  std::vector<Corner> corners;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector2d in = (points[i] - points[i > 0 ? i - 1 : 0]).normalized();
-    const Eigen::Vector2d out =
-        (points[std::min(i + 1, points.size() - 1)] - points[i]).normalized();
-    const bool end = i == 0 || i + 1 == points.size();
-    const bool ahead = !end && in.dot(out) > 0.9;
-    if (ahead) continue;
-    const bool left = in.x() * out.y() - in.y() * out.x() > 0;
-    const Eigen::Vector2d offset = end ? rightOf(i == 0 ? out : in) : rightOf(in) + rightOf(out);
-    corners.push_back({points[i] + kLane * offset, left ? 14.0 : 8.0});
-  }
-  return GroundPath(corners, false);
-}
-
 /// Takes away vehicles anywhere until as many are left as the town is to have.
 void thinOut(SceneBuilder& builder) {
   auto& objects = builder.scene().objects;
@@ -92,7 +71,7 @@ void thinOut(SceneBuilder& builder) {
 Scene makeTown(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("town", seed, options);
   const double seconds = builder.seconds(kTownSeconds);
-  const GroundPath way = wayThrough(turns());
+  const GroundPath way = laneThrough(turns());
   const SpeedLimits limits{10.5, 2.4, 1.7, 1.9};
   const Drive driven = drive(way, limits, 8.0, way.length() - 8.0, 1.2, seconds + 2.0);
   putOnWheels(builder, way, driven, seconds, options);

@@ -313,6 +313,100 @@ TEST(Town, HasFourKilometresAndFiveHundredVehicles) {
   EXPECT_GT(driven, 4000.0);
 }
 
+/// What stands in one block of the scene of blocks, relative to its south-west crossing.
+struct BlockContents {
+  std::vector<const SceneObject*> objects;
+  std::vector<RigidTransform> places;
+};
+
+std::map<std::pair<int, int>, BlockContents> contentsOfBlocks(const Scene& scene) {
+  constexpr double kPitchX = 52.0, kPitchY = 46.0;
+  std::map<std::pair<int, int>, BlockContents> blocks;
+  for (const SceneObject& object : scene.objects) {
+    RigidTransform T = object.motion.poseAt(0);
+    const std::pair block(static_cast<int>(std::floor(T.p.x() / kPitchX)),
+                          static_cast<int>(std::floor(T.p.y() / kPitchY)));
+    T.p -= Eigen::Vector3d(kPitchX * block.first, kPitchY * block.second, 0);
+    blocks[block].objects.push_back(&object);
+    blocks[block].places.push_back(T);
+  }
+  return blocks;
+}
+
+/// How many things of `a` have no like of the same size at the same place in `b`.
+std::size_t missingIn(const BlockContents& a, const BlockContents& b) {
+  std::size_t missing = 0;
+  for (std::size_t i = 0; i < a.objects.size(); ++i) {
+    bool found = false;
+    for (std::size_t k = 0; k < b.objects.size() && !found; ++k) {
+      found = a.objects[i]->class_name == b.objects[k]->class_name &&
+              a.objects[i]->size == b.objects[k]->size &&
+              boxMinus(a.places[i], b.places[k]).norm() < 1e-6;
+    }
+    missing += found ? 0 : 1;
+  }
+  return missing;
+}
+
+TEST(Blocks, AreEqualButForAFewThingsAndInAMinorityForMany) {
+  for (const auto seed : kSeeds) {
+    const auto blocks = contentsOfBlocks(makeScene("blocks", seed, {}));
+    ASSERT_EQ(blocks.size(), 56u);
+    // The design: the block that most others are equal to.
+    std::size_t equal = 0, few = 0, many = 0;
+    const BlockContents* design = nullptr;
+    for (const auto& [at, block] : blocks) {
+      std::size_t like = 0;
+      for (const auto& [other_at, other] : blocks)
+        like += missingIn(block, other) + missingIn(other, block) == 0;
+      if (like > equal) equal = like, design = &block;
+    }
+    std::size_t vehicles = 0;
+    for (const SceneObject* object : design->objects)
+      vehicles += object->class_name == "car" || object->class_name == "van";
+    EXPECT_GE(vehicles, 8u) << seed;
+    for (const auto& [at, block] : blocks) {
+      const std::size_t differ = missingIn(block, *design) + missingIn(*design, block);
+      few += differ == 1 || differ == 2;
+      many += differ >= 5;
+    }
+    EXPECT_GE(equal, 20u) << seed;
+    EXPECT_GE(few, 24u) << seed;
+    EXPECT_GE(many, 6u) << seed;
+    EXPECT_LE(many, 8u) << seed;
+  }
+}
+
+TEST(Blocks, AreLongOutOfSightAndThenSeenAgainFromBothDirections) {
+  for (const auto seed : kSeeds) {
+    const Scene scene = makeScene("blocks", seed, {});
+    std::vector<RigidTransform> way;  // a second apart
+    double driven = 0.0;
+    for (double t = 0.0; t < scene.seconds; t += 1.0) {
+      way.push_back(scene.body.poseAt(t));
+      if (way.size() > 1) driven += (way.back().p - way[way.size() - 2].p).norm();
+    }
+    EXPECT_GT(driven, 2500.0) << seed;
+    EXPECT_LT(driven, 4000.0) << seed;
+    EXPECT_LT(scene.body.at(scene.seconds - 1.0).velocity_W.norm(), 0.1) << "it has arrived";
+    std::size_t same = 0, against = 0, across = 0;
+    for (std::size_t i = 0; i < way.size(); ++i) {
+      bool was_same = false, was_against = false, was_across = false;
+      for (std::size_t k = 0; k + 60 < i; ++k) {
+        if ((way[i].p - way[k].p).norm() > 8.0) continue;
+        const double turn = std::abs(wrapAngle(yawOf(way[i].R()) - yawOf(way[k].R())));
+        was_same |= turn < 0.3;
+        was_against |= turn > M_PI - 0.3;
+        was_across |= std::abs(turn - M_PI_2) < 0.3;
+      }
+      same += was_same, against += was_against, across += was_across;
+    }
+    EXPECT_GT(same, 25u) << seed;
+    EXPECT_GT(against, 25u) << seed;
+    EXPECT_GT(across, 10u) << seed;
+  }
+}
+
 TEST(Random, ShowsAllClassesAtAllSizesUpright) {
   SceneOptions options;
   options.width = 320, options.height = 240;

@@ -6,9 +6,12 @@
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "common/base/errors.h"
 #include "common/replay/files/text_file.h"
+#include "services/map_store/core/map_database.h"
+#include "tools/evaluate/memory/loops.h"
 #include "tools/evaluate/memory/visits.h"
 #include "tools/evaluate/trajectory_score.h"
 
@@ -32,6 +35,7 @@ struct MemoryResult {
   TrajectoryErrors trajectory;
   std::optional<TrajectoryErrors> map_trajectory;
   std::optional<ReturnScore> returned;
+  std::optional<LoopScore> loops;  ///< where the run kept a graph
 };
 
 std::vector<MemoryFrame> framesOf(const fs::path& run, const SimulatedTruth& truth,
@@ -66,6 +70,21 @@ TrajectoryErrors trajectoryErrors(const fs::path& file, const SimulatedTruth& tr
   return {scoreTrajectory(pairs, Alignment::kStart), scoreTrajectory(pairs, Alignment::kYaw)};
 }
 
+/// The map's graph; nothing where the run kept none.
+std::optional<mapping::SavedMap> graphOf(const fs::path& run) {
+  const fs::path file = run / "map.sqlite";
+  if (!fs::exists(file)) return std::nullopt;
+  const auto connection = map_store::openStoreForReading(file);
+  auto graph = map_store::MapReader(&connection).graph();
+  if (!graph) {
+    throw StartupError(ExitCode::kUnavailable,
+                       file.string() + " cannot be read: " + graph.error().detail +
+                           "; name a folder whose pipeline run came to its end");
+  }
+  if (graph->map.anchors.empty()) return std::nullopt;
+  return std::move(graph->map);
+}
+
 MemoryResult evaluateMemory(const MemoryCommand& command) {
   const MemoryOptions options;
   const SimulatedTruth truth = readSimulatedTruth(command.truth);
@@ -76,6 +95,8 @@ MemoryResult evaluateMemory(const MemoryCommand& command) {
   result.trajectory = trajectoryErrors(run / "trajectory.tum", truth);
   if (const auto map = run / "trajectory_map.tum"; fs::exists(map))
     result.map_trajectory = trajectoryErrors(map, truth);
+  if (const auto map = graphOf(run))
+    result.loops = scoreLoops(*map, truth.body, frames, options, LoopOptions{});
   if (!command.map_run.empty())
     result.returned = scoreReturn(framesOf(command.map_run, truth, options), frames, options);
   return result;
@@ -103,6 +124,31 @@ Json toJson(const ReturnScore& score) {
   return json;
 }
 
+Json toJson(const JudgedLoop& loop) {
+  return {{"edge", loop.id},
+          {"from_ns", toNanoseconds(loop.from)},
+          {"to_ns", toNanoseconds(loop.to)},
+          {"off_m", loop.off_m},
+          {"off_deg", loop.off_rad * 180.0 / std::numbers::pi},
+          {"sigma_m", loop.sigma_m},
+          {"weight", loop.weight}};
+}
+
+Json toJson(const LoopScore& score) {
+  const LoopJudgement& judgement = score.judgement;
+  Json json = {{"all", judgement.loops.size()},     {"believed", judgement.believed()},
+               {"wrong", judgement.wrong()},        {"wrong_believed", judgement.wrongBelieved()},
+               {"unjudged", judgement.unjudged},    {"returns", score.returns.size()},
+               {"returns_without", score.missed()}, {"way_to_close_m", nullptr},
+               {"anchors", score.anchors.anchors},  {"ate_odometry_m", score.anchors.odometry_m},
+               {"ate_map_m", score.anchors.map_m},  {"wrong_loops", Json::array()}};
+  if (const auto way = score.wayToClose()) json["way_to_close_m"] = *way;
+  for (const JudgedLoop& loop : judgement.loops) {
+    if (loop.wrong) json["wrong_loops"].push_back(toJson(loop));
+  }
+  return json;
+}
+
 Json toJson(const MemoryResult& result) {
   const MemoryScore& s = result.memory;
   Json json = {{"frames", s.frames},
@@ -120,6 +166,7 @@ Json toJson(const MemoryResult& result) {
                {"objects_with_more_ids", s.with_more_ids},
                {"trajectory", toJson(result.trajectory)}};
   if (result.map_trajectory) json["trajectory_map"] = toJson(*result.map_trajectory);
+  if (result.loops) json["loops"] = toJson(*result.loops);
   if (result.returned) json["map_run"] = toJson(*result.returned);
   return json;
 }
@@ -148,6 +195,30 @@ void print(const ReturnScore& s) {
       s.keptShare(), static_cast<Count>(s.wrong));
 }
 
+void print(const LoopScore& score) {
+  const LoopJudgement& judgement = score.judgement;
+  std::printf("loops: %zu, of these wrong %llu; believed: %llu, of these wrong %llu\n",
+              judgement.loops.size(), static_cast<Count>(judgement.wrong()),
+              static_cast<Count>(judgement.believed()),
+              static_cast<Count>(judgement.wrongBelieved()));
+  if (judgement.unjudged > 0)
+    std::printf("loops without a true pose: %llu\n", static_cast<Count>(judgement.unjudged));
+  for (const JudgedLoop& loop : judgement.loops) {
+    if (!loop.wrong) continue;
+    std::printf("wrong: edge %llu, off by %.2f m (deviation %.2f m) and %.1f°, weight %.2f%s\n",
+                static_cast<Count>(loop.id), loop.off_m, loop.sigma_m,
+                loop.off_rad * 180.0 / std::numbers::pi, loop.weight,
+                loop.believed ? "" : ", not believed");
+  }
+  std::printf("returns: %zu, without a loop %llu", score.returns.size(),
+              static_cast<Count>(score.missed()));
+  const auto way = score.wayToClose();
+  std::printf(way ? "; a loop after %.1f m (median)\n" : "\n", way.value_or(0.0));
+  std::printf("%llu anchors: ATE %.3f m by odometry, %.3f m in the map\n",
+              static_cast<Count>(score.anchors.anchors), score.anchors.odometry_m,
+              score.anchors.map_m);
+}
+
 void print(const MemoryResult& result) {
   const MemoryScore& s = result.memory;
   std::printf("%llu frames, %llu objects; %llu seen twice, %llu reported twice\n",
@@ -161,6 +232,7 @@ void print(const MemoryResult& result) {
               static_cast<Count>(s.with_more_ids), static_cast<Count>(s.objects_matched));
   print("trajectory", result.trajectory);
   if (result.map_trajectory) print("trajectory in the map", *result.map_trajectory);
+  if (result.loops) print(*result.loops);
   if (result.returned) print(*result.returned);
 }
 

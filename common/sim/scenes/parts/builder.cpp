@@ -7,15 +7,15 @@
 #include "common/math/so3.h"
 
 namespace perdure::sim {
-namespace {
-
 RigidTransform poseOf(const Place& place, double height) {
   return RigidTransform(
       expQuaternion({0, 0, place.yaw}),
       Eigen::Vector3d(place.point.x(), place.point.y(), place.low + 0.5 * height));
 }
 
-}  // namespace
+Solid solidAt(const Place& place, const Eigen::Vector3d& size) {
+  return {place.point, place.yaw, 0.5 * size.head<2>(), place.low, place.low + size.z()};
+}
 
 SceneBuilder::SceneBuilder(const std::string& name, std::uint64_t seed, const SceneOptions& options)
     : options_(options), dice_(seedOf(name, {seed, seedOf(options.look_set, {})})) {

@@ -16,6 +16,9 @@ struct Place {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();
   double yaw = 0.0, low = 0.0;
 };
+/// Of the centre of a thing of this height.
+RigidTransform poseOf(const Place& place, double height);
+Solid solidAt(const Place& place, const Eigen::Vector3d& size);
 
 class SceneBuilder {
  public:

@@ -17,10 +17,6 @@ Solid areaOf(const Road& road) {
           Eigen::Vector2d(0.5 * way.norm(), 0.5 * road.width_m), 0.0, 1e3};
 }
 
-Solid solidAt(const Place& place, const Eigen::Vector3d& size) {
-  return {place.point, place.yaw, 0.5 * size.head<2>(), place.low, place.low + size.z()};
-}
-
 double lengthOf(const Road& road) { return (road.to - road.from).norm(); }
 
 }  // namespace
@@ -171,6 +167,25 @@ void Streets::people(const Road& road, int side) {
   };
   along_the_pavement("person", furnishing_.person_every);
   along_the_pavement("bicycle", furnishing_.bicycle_every);
+}
+
+GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points) {
+  const auto rightOf = [](const Eigen::Vector2d& way) {
+    return Eigen::Vector2d(way.y(), -way.x());
+  };
+  std::vector<Corner> corners;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector2d in = (points[i] - points[i > 0 ? i - 1 : 0]).normalized();
+    const Eigen::Vector2d out =
+        (points[std::min(i + 1, points.size() - 1)] - points[i]).normalized();
+    const bool end = i == 0 || i + 1 == points.size();
+    const bool ahead = !end && in.dot(out) > 0.9;
+    if (ahead) continue;
+    const bool left = in.x() * out.y() - in.y() * out.x() > 0;
+    const Eigen::Vector2d offset = end ? rightOf(i == 0 ? out : in) : rightOf(in) + rightOf(out);
+    corners.push_back({points[i] + kLane * offset, left ? 14.0 : 8.0});
+  }
+  return GroundPath(corners, false);
 }
 
 void drawDaylight(SceneBuilder& builder) {

@@ -47,6 +47,9 @@ class Streets {
   Furnishing furnishing_;
 };
 
+/// A way on the right-hand lane that turns at these crossings, the first and the last point are its
+/// ends; right turns are tighter than left ones.
+GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points);
 /// A light of the day: sun and sky.
 void drawDaylight(SceneBuilder& builder);
 /// The body as a car that drives so for `seconds`, with a car's sensors, by day.
