@@ -12,9 +12,11 @@
 #include "common/wire/cdr.h"
 #include "common/wire/json.h"
 #include "services/map_store/core/belief_codec.h"
+#include "services/map_store/core/graph_codec.h"
 #include "tests/common/wire/examples.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/target.h"
+#include "tests/services/map_store/graphs.h"
 
 namespace perdure::fuzz {
 namespace {
@@ -233,6 +235,41 @@ std::vector<Bytes> headers() {
   return {map_store::encodeHeader(objects)};
 }
 
+/// The first byte says whether it is an anchor, an edge or a sighting.
+bool takeGraph(View bytes) {
+  if (bytes.empty()) return false;
+  const View blob = bytes.subspan(1);
+  const auto isTaken = [&](auto decode, auto encode) {
+    const auto value = decode(blob);
+    if (!value) return false;
+    require(map_store::isSound(*value), "what was taken is sound");
+    require(decode(encode(*value)).has_value(), "a part of the graph reads back");
+    return true;
+  };
+  switch (bytes[0] % 3) {
+    case 0:
+      return isTaken(map_store::decodeAnchor, map_store::encodeAnchor);
+    case 1:
+      return isTaken(map_store::decodeEdge, map_store::encodeEdge);
+    default:
+      return isTaken(map_store::decodeRecord, map_store::encodeRecord);
+  }
+}
+
+std::vector<Bytes> graphs() {
+  const auto map = map_store::test::RandomGraph(1).map({});
+  std::vector<Bytes> seeds;
+  for (const std::uint64_t id : {1U, 2U, 3U}) {
+    seeds.push_back(map_store::encodeAnchor(map.anchors.at(id).anchor));
+    seeds.push_back(map_store::encodeEdge(map.edges.at(id).edge));
+    seeds.push_back(map_store::encodeRecord(map.records.at(id)));
+  }
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    seeds[i].insert(seeds[i].begin(), static_cast<std::uint8_t>(i % 3));
+  }
+  return seeds;
+}
+
 }  // namespace
 
 std::vector<Target> binaryTargets() {
@@ -243,7 +280,8 @@ std::vector<Target> binaryTargets() {
           {"mcap_records", 18000, recordSeeds, takeRecords},
           {"jpeg", 9000, jpegs, takeJpeg},
           {"map_belief", 18000, beliefs, takeBelief},
-          {"map_header", 9000, headers, takeHeader}};
+          {"map_header", 9000, headers, takeHeader},
+          {"map_graph", 18000, graphs, takeGraph}};
 }
 
 }  // namespace perdure::fuzz

@@ -35,12 +35,16 @@ constexpr const char* kBeside[] = {"-wal", "-shm", "-journal"};
                          "; this user must be able to read it and to write to its folder.");
 }
 
+std::string mendOfWriting(const Reason& reason) {
+  if (reason.code == "disk_full") return "free space there, or name a file on another disk.";
+  if (reason.code == "io_error") return "look at the disk there, or name a file on another one.";
+  return "name a file in a folder that this user may write.";
+}
+
 [[noreturn]] void cannotWrite(const std::string& to, const Reason& reason) {
-  throw StartupError(
-      ExitCode::kUnavailable,
-      "The map cannot be copied to " + to + " (" + reason.code + ": " + reason.detail + "); " +
-          (reason.code == "disk_full" ? "free space there, or name a file on another disk."
-                                      : "name a file in a folder that this user may write."));
+  throw StartupError(ExitCode::kUnavailable, "The map cannot be copied to " + to + " (" +
+                                                 reason.code + ": " + reason.detail + "); " +
+                                                 mendOfWriting(reason));
 }
 
 Connection openSource(const std::string& from) {
@@ -135,9 +139,10 @@ void copyMap(const std::string& from, const std::string& to) {
   if (error) cannotWrite(to, {"cannot_open", folder.string() + ": " + error.message()});
   const Draft draft(to + ".part");
   writeDraft(from, to, draft);
+  if (!sync(draft.path())) cannotWrite(to, {"io_error", "it cannot be synced"});
   fs::rename(draft.path(), to, error);
   if (error) cannotWrite(to, {"io_error", error.message()});
-  if (!sync(to) || !sync(folder)) cannotWrite(to, {"io_error", "it cannot be synced"});
+  (void)sync(folder);  // not every file system can
 }
 
 }  // namespace perdure::map_store

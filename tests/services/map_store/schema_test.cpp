@@ -6,6 +6,7 @@
 #include "common/base/errors.h"
 #include "services/map_store/core/map_database.h"
 #include "tests/services/map_store/beliefs.h"
+#include "tests/services/map_store/graphs.h"
 
 namespace perdure::map_store {
 namespace {
@@ -115,20 +116,102 @@ TEST(Schema, RefusesAMapOfANewerVersion) {
   EXPECT_THAT(refusalOf([&] { openStore({path}); }).what(), HasSubstr("schema 99"));
 }
 
-TEST(Schema, TakesOverAMapOfTheFirstVersion) {
+/// As Perdure made maps of schemas 1 and 2.
+constexpr char kSecondSchema[] = R"sql(
+CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
+CREATE TABLE objects(
+  id INTEGER PRIMARY KEY, world INTEGER NOT NULL, epoch INTEGER NOT NULL,
+  class TEXT NOT NULL, class_probability REAL NOT NULL, existence REAL NOT NULL,
+  x REAL NOT NULL, y REAL NOT NULL, z REAL NOT NULL, yaw REAL NOT NULL,
+  length REAL NOT NULL, width REAL NOT NULL, height REAL NOT NULL,
+  first_seen_ns INTEGER NOT NULL, last_seen_ns INTEGER NOT NULL, hits INTEGER NOT NULL,
+  visibility INTEGER NOT NULL, memory INTEGER NOT NULL,
+  tile_x INTEGER NOT NULL, tile_y INTEGER NOT NULL,
+  gone INTEGER NOT NULL DEFAULT 0, gone_ns INTEGER, merged_into INTEGER,
+  belief BLOB NOT NULL);
+CREATE INDEX objects_by_class ON objects(class);
+CREATE INDEX objects_by_tile ON objects(tile_x, tile_y);
+CREATE VIRTUAL TABLE positions USING rtree(id, x0, x1, y0, y1, z0, z1);
+CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief BLOB);
+PRAGMA application_id=1346720324; PRAGMA user_version=2; PRAGMA journal_mode=WAL;
+)sql";
+
+/// A map of schema 2 or 1 with `count` objects in it.
+void makeOlder(const std::string& path, std::int64_t count, int version) {
+  const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
+  ASSERT_TRUE(connection->execute(kSecondSchema).has_value());
+  ASSERT_TRUE(connection->execute("PRAGMA user_version=" + std::to_string(version)).has_value());
+  auto insert = connection->prepare(
+      "INSERT INTO objects VALUES(?1,77,1,'car',0.9,0.97,?1,0,0,0.3,4.2,1.7,1.5,1,2,7,0,0,0,0,"
+      "0,NULL,NULL,?2)");
+  ASSERT_TRUE(insert.has_value()) << insert.error().detail;
+  for (std::int64_t id = 1; id <= count; ++id) {
+    const auto belief = encodeBelief(carAt(static_cast<ObjectId>(id), {1.0 * double(id), 0, 0}));
+    insert->bind(1, id).bind(2, std::span<const std::uint8_t>(belief));
+    ASSERT_TRUE(insert->run().has_value());
+  }
+  ASSERT_TRUE(connection
+                  ->execute("INSERT INTO positions SELECT id, x, x, y, y, z, z FROM objects;"
+                            "INSERT INTO meta VALUES('tile_size_m', '32.000000')")
+                  .has_value());
+}
+
+std::int64_t versionOf(const std::string& path) {
+  return openStoreForReading(path).integer("PRAGMA user_version").value();
+}
+
+TEST(Schema, TakesOverMapsOfOlderVersionsWithAllTheirObjects) {
+  for (const int version : {1, 2}) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("map.sqlite");
+    makeOlder(path, 60, version);
+    {
+      const Connection reading = openStoreForReading(path);
+      const MapReader reader(&reading);
+      EXPECT_EQ(reader.beliefs().value().size(), 60u);
+      EXPECT_TRUE(reader.graph().value().map.anchors.empty());
+    }
+    EXPECT_EQ(versionOf(path), version);  // a reader changes nothing
+    MapDatabase database({path});
+    EXPECT_TRUE(database.notice().empty());
+    EXPECT_EQ(versionOf(path), 3);
+    const auto beliefs = database.reader().beliefs().value();
+    ASSERT_EQ(beliefs.size(), 60u);
+    EXPECT_EQ(encodeBelief(beliefs[6].belief), encodeBelief(carAt(7, {7, 0, 0})));
+    EXPECT_TRUE(database.takeGraph().value().map.anchors.empty());
+    const mapping::Unsaved graph{test::RandomGraph(1).map({}), {}, {}};
+    const Objects objects = workingSet(1, {});
+    Batch batch{&objects, {}, {}};
+    batch.graph = &graph;
+    ASSERT_TRUE(database.write(batch).has_value());
+    EXPECT_TRUE(test::bitsOf(database.reader().graph().value().map) == test::bitsOf(graph.changed));
+  }
+}
+
+TEST(Schema, LeavesAnOlderMapAsItWasWhereItCannotBeTakenOver) {
   const TemporaryFolder folder;
   const std::string path = folder.file("map.sqlite");
-  fill(path, 3);
-  const auto version = [&](const char* set) {
+  makeOlder(path, 400, 2);
+  {
+    // Not a page is left within 1 MiB, and the tables of the graph need some.
     const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
-    EXPECT_TRUE(connection->execute(set).has_value());
-    return connection->integer("PRAGMA user_version").value();
-  };
-  EXPECT_EQ(version("PRAGMA user_version=1"), 1);
-  EXPECT_EQ(openStoreForReading(path).integer("SELECT count(*) FROM objects").value(), 3);
-  EXPECT_EQ(version("SELECT 1"), 1);  // a reader changes nothing
-  EXPECT_TRUE(openStore({path}).notice.empty());
-  EXPECT_EQ(version("SELECT 1"), 2);
+    ASSERT_TRUE(connection->execute("CREATE TABLE filler(x)").has_value());
+    const auto page = connection->integer("PRAGMA page_size").value();
+    while (connection->integer("PRAGMA page_count").value() < (1 << 20) / page) {
+      ASSERT_TRUE(connection->execute("INSERT INTO filler VALUES(zeroblob(3000))").has_value());
+    }
+    ASSERT_EQ(connection->integer("PRAGMA freelist_count").value(), 0);
+  }
+  const auto refusal = refusalOf([&] { openStore({path, 32.0, 1}); });
+  EXPECT_EQ(refusal.code(), ExitCode::kUnavailable);
+  EXPECT_THAT(refusal.what(), HasSubstr("disk_full"));
+  EXPECT_THAT(refusal.what(), HasSubstr("store.max_size"));
+  EXPECT_EQ(versionOf(path), 2);
+  const Connection reading = openStoreForReading(path);
+  EXPECT_EQ(MapReader(&reading).beliefs().value().size(), 400u);
+  EXPECT_EQ(reading.integer("SELECT count(*) FROM sqlite_master WHERE name = 'anchors'").value(),
+            0);
+  EXPECT_EQ(MapDatabase({path}).reader().beliefs().value().size(), 400u);
 }
 
 TEST(Schema, SaysTheMendWhereTheFolderCannotBeMade) {
