@@ -69,6 +69,11 @@ PlacedObject inM(const MapState& state, const Sighting& sighting) {
   return transformed(state.graph().pose(sighting.anchor), sighting.in_anchor);
 }
 
+LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba) {
+  const LevelPose T_Mb = body.state.graph().pose(body.here().id);
+  return {T_Mb, turnedBy((T_Mb * T_ba.mean).R(), mapping::inverse(T_ba).covariance)};
+}
+
 /// What was detected on the way of late, in the body's newest anchor: without what is known to have
 /// been seen before.
 std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const {
@@ -138,11 +143,8 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   if (seen.empty()) return std::nullopt;
   Around around = mapAround(body);
   if (around.objects.empty()) return std::nullopt;
-  // T_Mb as the earlier anchors see it: their own errors in M do not count.
   const LevelGaussian& T_ba = *around.nearest;
-  LevelGaussian prior;
-  prior.mean = body.state.graph().pose(body.here().id);
-  prior.covariance = turnedBy((prior.mean * T_ba.mean).R(), mapping::inverse(T_ba).covariance);
+  LevelGaussian prior = bodyByGraph(body, T_ba);
   addFloor(prior.covariance, parameters_.loop.floor_m, parameters_.loop.floor_rad);
   const double sigma_m = planeSigma(T_ba.covariance);
   const MapIndex index(std::move(around.objects), std::move(around.driven), parameters_.place);

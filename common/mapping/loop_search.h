@@ -37,6 +37,9 @@ const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& 
 /// The object in M.
 PlacedObject inM(const MapState& state, const Sighting& sighting);
 
+/// T_Mb as an anchor sees it: the anchor's own error in M does not count.
+LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba);
+
 class LoopSearch {
  public:
   explicit LoopSearch(const Parameters& parameters) : parameters_(parameters) {}

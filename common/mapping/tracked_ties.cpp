@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/mapping/frames/level_errors.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::mapping {
@@ -46,13 +47,16 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
     tie.objects.push_back(id);
   }
   if (tie.objects.size() < loop.least_tracked) return std::nullopt;
-  const Eigen::Vector4d step = equations.step();
-  tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
-  tie.T_Mb.covariance = equations.covariance();
-  if (planeSigma(tie.T_Mb.covariance) > loop.tracked_gain * laid_m) return std::nullopt;
   tie.home = std::max_element(homes.begin(), homes.end(), [](const auto& a, const auto& b) {
                return a.second < b.second;
              })->first;
+  LevelGaussian by_graph = bodyByGraph(body, *body.relative.to(tie.home));
+  addFloor(by_graph.covariance, loop.floor_m, loop.floor_rad);
+  const Eigen::Vector4d step =
+      equations.stepNear(inverseSymmetric(by_graph.covariance), Eigen::Vector4d::Zero());
+  tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
+  tie.T_Mb.covariance = equations.covariance();
+  if (planeSigma(tie.T_Mb.covariance) > loop.tracked_gain * laid_m) return std::nullopt;
   return tie;
 }
 

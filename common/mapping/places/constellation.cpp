@@ -82,8 +82,9 @@ class Search {
       match.pairs.emplace_back(map_[k].id, seen_[i].id);
     }
     if (match.pairs.empty()) return std::nullopt;
-    // What the pairs say alone.
-    const Eigen::Vector4d step = equations.step();
+    // What the pairs say alone; where they say little, the mean stays near the prior's.
+    const Eigen::Vector4d step =
+        equations.stepNear(prior_information_, difference(prior_.mean, first.x));
     match.T_MB.mean.p += step.head<3>();
     match.T_MB.mean.yaw = wrapAngle(match.T_MB.mean.yaw + step[3]);
     match.T_MB.covariance = equations.covariance();

@@ -43,6 +43,12 @@ void MatchEquations::add(const PlacedObject& seen, const PlacedObject& known, co
 
 Eigen::Vector4d MatchEquations::step() const { return inverseSymmetric(information) * pull; }
 
+Eigen::Vector4d MatchEquations::stepNear(const Eigen::Matrix4d& prior_information,
+                                         const Eigen::Vector4d& to_prior) const {
+  const Eigen::Matrix4d weak = 0.1 * prior_information;
+  return inverseSymmetric(Eigen::Matrix4d(information + weak)) * (pull + weak * to_prior);
+}
+
 Eigen::Matrix4d MatchEquations::covariance() const {
   const double freedom = 4.0 * weights - 4.0;
   const double scale = freedom > 0.0 ? std::max(1.0, chi2 / freedom) : 1.0;

@@ -47,6 +47,10 @@ struct MatchEquations {
   void add(const PlacedObject& seen, const PlacedObject& known, const LevelPose& x,
            double weight = 1.0, double blur = 0.0);
   Eigen::Vector4d step() const;
+  /// The same where some directions may not be seen at all: these go by a prior, whose mean lies
+  /// `to_prior` from x. It counts by a tenth of its information, so that it pulls at nothing else.
+  Eigen::Vector4d stepNear(const Eigen::Matrix4d& prior_information,
+                           const Eigen::Vector4d& to_prior) const;
   /// Is widened where errors are larger than assumed.
   Eigen::Matrix4d covariance() const;
 };
