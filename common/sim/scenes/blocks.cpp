@@ -79,7 +79,7 @@ void closeRoads(const std::vector<Road>& roads, SceneBuilder& builder) {
     const Eigen::Vector2d way = (road.to - road.from).normalized();
     const double heading = std::atan2(way.y(), way.x());
     for (const bool at_end : {false, true}) {
-      const Eigen::Vector3d size(kRoadWidth + 8.0, kDepth, builder.dice().uniform(6.0, 12.0));
+      const Eigen::Vector3d size(kRoadWidth + 6.0, kDepth, builder.dice().uniform(6.0, 12.0));
       builder.mustPut(PropKind::kFacade, size,
                       {at_end ? Eigen::Vector2d(road.to + kFromEnd * way)
                               : Eigen::Vector2d(road.from - kFromEnd * way),

@@ -350,7 +350,8 @@ std::size_t missingIn(const BlockContents& a, const BlockContents& b) {
 
 TEST(Blocks, AreEqualButForAFewThingsAndInAMinorityForMany) {
   for (const auto seed : kSeeds) {
-    const auto blocks = contentsOfBlocks(makeScene("blocks", seed, {}));
+    const Scene scene = makeScene("blocks", seed, {});
+    const auto blocks = contentsOfBlocks(scene);
     ASSERT_EQ(blocks.size(), 56u);
     // The design: the block that most others are equal to.
     std::size_t equal = 0, few = 0, many = 0;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/mapping/frames/anchor_builder.h"
 #include "common/mapping/saved_map.h"
 #include "common/replay/files/pose_file.h"
 #include "tools/evaluate/memory/visits.h"
