@@ -35,6 +35,7 @@ void Mapper::begin(const Odometry& odometry) {
   odometry_variance_ = 1.0;
   searched_at_m_ = searched_elsewhere_at_m_ = learned_at_m_ = builder_.way_m();
   active_.reset();
+  tentative_.reset();
   marginals_.reset();
   loop_search_.forget();
   tracked_ties_.begin();
@@ -54,6 +55,7 @@ void Mapper::replay(const WorldId& session) {
   if (way.empty()) return;
   session_ = session;
   active_.reset();
+  tentative_.reset();
   tracked_ties_.begin();
   searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
   loop_search_.forget();
@@ -223,6 +225,7 @@ void Mapper::search() {
   if (!found && due) {
     searched_elsewhere_at_m_ = builder_.way_m();
     found = loop_search_.elsewhere(here);
+    if (found && !isAgreedOn(*found)) return;
   }
   if (!found) return;
   if (active_ && active_->pairs == pairsOf(found->match)) return;  // nothing new
@@ -239,6 +242,24 @@ void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
   const double variance = drift_scale_.variance();
   state_.scaleOdometry(variance / odometry_variance_, *session_);
   odometry_variance_ = variance;
+}
+
+/// In streets that are alike one search may find the wrong one. The next one sees more objects.
+bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
+  constexpr double kSame_m = 3.0, kSame_rad = 0.1;
+  const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
+  const AnchorId component = componentsOf(state_.graph()).at(homeOf(found.match));
+  const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m()};
+  if (tentative_ && tentative_->component == component) {
+    const double apart_m = now.way_m - tentative_->way_m;
+    const LevelError d = difference(tentative_->T_MN * T_Nb, found.match.T_MB.mean);
+    const bool same = d.head<2>().norm() < kSame_m && std::abs(d[3]) < kSame_rad;
+    const LoopParameters& loop = parameters_.loop;
+    if (same && apart_m < loop.agree_after_m) return false;
+    if (same && apart_m < loop.agree_within_m) return true;
+  }
+  tentative_ = now;
+  return false;
 }
 
 AnchorId Mapper::homeOf(const PlaceMatch& match) {

@@ -120,6 +120,7 @@ class Mapper {
   void search();
   void graphMoved();
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
+  bool isAgreedOn(const LoopSearch::Found& found);
   void close(const LoopSearch::Found& found);
   /// The anchor of before that most of the matched objects belong to.
   AnchorId homeOf(const PlaceMatch& match);
@@ -144,6 +145,13 @@ class Mapper {
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
+  /// Where a session that belongs to nothing lies by one search.
+  struct Tentative {
+    LevelPose T_MN;
+    AnchorId component = 0;
+    double way_m = 0.0;
+  };
+  std::optional<Tentative> tentative_;
   double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };

@@ -85,7 +85,7 @@ void Node::onObjects(const Objects& objects) {
     return;
   }
   Objects next = objects;
-  if (config_.graph) {
+  if (graph_) {
     // Where the graph laid what has not been seen since is not a new observation.
     for (const auto& belief : next.objects) {
       if (!belief.recalled) laid_.erase(belief.id);
@@ -98,7 +98,7 @@ void Node::onObjects(const Objects& objects) {
   next_id_ = same_filter ? next.next_id : std::max(next_id_, next.next_id);
   newest_ = std::move(next);
   dirty_ = true;
-  if (!config_.graph) return;
+  if (!graph_) return;
   followGraph();
 }
 
@@ -117,8 +117,8 @@ void Node::leaveBehind(const Objects& next) {
 
 void Node::onEvent(const Event& event) {
   if (event.instance == instance_) return;
-  if (config_.graph && event.kind == EventKind::kGone) mapper_.onGone(event.object_id);
-  if (config_.graph && event.kind == EventKind::kMerged) {
+  if (graph_ && event.kind == EventKind::kGone) mapper_.onGone(event.object_id);
+  if (graph_ && event.kind == EventKind::kMerged) {
     mapper_.onMerged(event.object_id, event.other_id);
   }
   if (event.kind == EventKind::kGone) {
@@ -155,14 +155,14 @@ void Node::commit() {
     dirty_ = false;
     return;
   }
-  const mapping::Unsaved graph = config_.graph ? mapper_.unsaved() : mapping::Unsaved();
+  const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
   const auto written =
-      database_.write({&*newest_, left_, removed_, laid_, config_.graph ? &graph : nullptr});
+      database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
   }
-  if (config_.graph) mapper_.markSaved();
+  if (graph_) mapper_.markSaved();
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);
   failure_.clear();
   dirty_ = false;
@@ -189,7 +189,7 @@ void Node::publish() {
     publishSquare(square);
   }
   header_stale_ = false;
-  if (config_.graph) tellFrame();
+  if (graph_) tellFrame();
   outputs_.header({instance_, revision_, config_.tile_size_m, tiles_.tiles(), tiles_.objects()});
 }
 
@@ -270,8 +270,8 @@ void Node::recall(const MapQuery& query) {
   if (!found) return blame(found.error());
   if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
   // A filter that looks for the map of a frame that has ended lays it by itself.
-  const bool by_graph = config_.graph && newest_ && query.world == newest_->world &&
-                        mapper_.follows(query.world);
+  const bool by_graph =
+      graph_ && newest_ && query.world == newest_->world && mapper_.follows(query.world);
   if (by_graph) {
     constexpr double kAround_m = 10.0;  // places in M and in W differ
     std::set<ObjectId> as_stored;

@@ -83,6 +83,7 @@ class Node {
   const Outputs outputs_;
   MapDatabase database_;
   mapping::Mapper mapper_;
+  bool graph_ = false;  ///< it is on, and what is stored of it was read
   ReplyCache replies_;
   TileBook tiles_;
   std::set<Square> stale_squares_;

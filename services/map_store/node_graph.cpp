@@ -34,7 +34,13 @@ ObjectBelief notLaterThan(TimePoint now, ObjectBelief belief) {
 
 void Node::loadGraph() {
   auto saved = database_.takeGraph();
-  if (!saved) return blame(saved.error());
+  if (!saved) {  // a new graph would be written over it
+    notice_ =
+        "The map's graph cannot be read (" + saved.error().detail +
+        "); objects are kept without it. Restart map_store once the disk of store.path is well.";
+    return reasons_.add(saved.error());
+  }
+  graph_ = true;
   if (saved->malformed > 0) reasons_.add("graph_malformed", saved->malformed);
   mapper_ = mapping::Mapper(config_.mapping, std::move(saved->map));
   if (!newest_) return;
@@ -53,7 +59,7 @@ void Node::loadGraph() {
 }
 
 void Node::onOdometry(const Odometry& odometry) {
-  if (config_.graph) mapper_.onOdometry(odometry);
+  if (graph_) mapper_.onOdometry(odometry);
 }
 
 void Node::followGraph() {

@@ -21,7 +21,8 @@ constexpr double kReach_m = MapIndex::kReach_m;
 // m⁻²; chance density where the map has no objects: one in a disc of 100 m radius
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
-constexpr std::size_t kMostSeen = 48, kMostVotes = 500'000, kCandidates = 64;
+constexpr std::size_t kMostSeen = 48, kMostVotes = 500'000, kCandidates = 128;
+constexpr std::size_t kMostCells = 4096;  // of which candidates are chosen, one of each place
 // beyond this, a way is another one
 constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
@@ -237,7 +238,7 @@ class Search {
       return a.second.votes > b.second.votes ||
              (a.second.votes == b.second.votes && a.first < b.first);
     };
-    const std::size_t count = std::min(kCandidates, most.size());
+    const std::size_t count = std::min(kMostCells, most.size());
     std::partial_sort(most.begin(), most.begin() + static_cast<std::ptrdiff_t>(count), most.end(),
                       more);
     most.resize(count);
@@ -247,8 +248,15 @@ class Search {
       LevelPose x;
       x.yaw = std::atan2(cell.heading.y(), cell.heading.x());
       x.p << cell.place / cell.votes, prior_.mean.p.z();
+      // The votes of one way spread over cells that touch.
+      const bool another = std::all_of(result.begin(), result.end(), [&](const LevelPose& chosen) {
+        return (chosen.p - x.p).head<2>().norm() > kCell_m ||
+               std::abs(wrapAngle(chosen.yaw - x.yaw)) > kCell_rad;
+      });
+      if (!another) continue;
       x.p.z() = height(x);
       result.push_back(x);
+      if (result.size() == kCandidates) break;
     }
     return result;
   }
