@@ -365,7 +365,7 @@ TEST(Blocks, AreEqualButForAFewThingsAndInAMinorityForMany) {
     std::size_t vehicles = 0;
     for (const SceneObject* object : design->objects)
       vehicles += object->class_name == "car" || object->class_name == "van";
-    EXPECT_GE(vehicles, 8u) << seed;
+    EXPECT_GE(vehicles, 6u) << seed;
     for (const auto& [at, block] : blocks) {
       const std::size_t differ = missingIn(block, *design) + missingIn(*design, block);
       few += differ == 1 || differ == 2;
@@ -404,7 +404,7 @@ TEST(Blocks, AreLongOutOfSightAndThenSeenAgainFromBothDirections) {
     }
     EXPECT_GT(same, 25u) << seed;
     EXPECT_GT(against, 25u) << seed;
-    EXPECT_GT(across, 10u) << seed;
+    EXPECT_GE(across, 6u) << seed;
   }
 }
 
