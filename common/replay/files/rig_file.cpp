@@ -80,7 +80,9 @@ void applyRig(const Calibration& rig, const std::string& file, Calibration& cali
       stop(fmt::format("{} is for images of {}x{}, the drive's are {}x{}; calibrate at that size",
                        camera.name, given->width, given->height, camera.width, camera.height));
     }
+    const double rate_hz = given->rate_hz > 0.0 ? given->rate_hz : camera.rate_hz;
     camera = *given;
+    camera.rate_hz = rate_hz;
   }
   if (rig.imu) calibration.imu = rig.imu;
 }

@@ -150,10 +150,11 @@ std::vector<std::string> SensorFile::unknownKeys() const {
 }
 
 std::string cameraKeys(const CameraCalibration& camera) {
-  std::string text = fmt::format(
-      "rate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: [{}, {}, {}, {}]\n"
+  std::string text = camera.rate_hz > 0.0 ? fmt::format("rate_hz: {}\n", camera.rate_hz) : "";
+  text += fmt::format(
+      "resolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: [{}, {}, {}, {}]\n"
       "distortion_model: {}\n",
-      camera.rate_hz, camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+      camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
       nameOf(camera.distortion));
   if (camera.distortion != DistortionModel::kNone) {
     text += fmt::format("distortion_coefficients: [{}]\n",

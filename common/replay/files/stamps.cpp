@@ -188,7 +188,8 @@ StampOrder orderOf(const std::vector<TimePoint>& stamps) {
       stray[i] = line.isStray(i);
     }
     const auto strays = static_cast<std::size_t>(std::count(stray.begin(), stray.end(), true));
-    if (areFew(strays, stamps.size())) {
+    const bool mostly_sorted = order.moved <= std::max(kFew, stamps.size() / 5);
+    if (mostly_sorted && areFew(strays, stamps.size())) {
       order.strays = strays;
       order.moved -= strays;
       std::erase_if(order.kept, [&](std::size_t i) { return stray[i]; });

@@ -29,10 +29,10 @@ struct StampOrder {
 };
 
 /// Stamps that increase are all kept. Else those that are out of line are strays where they are few
-/// (a fiftieth, or three) and far outside of their neighbours' stamps, and fill no hole elsewhere;
-/// with more of them the list was not sorted, and nothing is left out. Also strays: up to three
-/// stamps before the first or behind the last of the others, with a pause that is longer than ten
-/// seconds and a thousand usual intervals.
+/// (a fiftieth, or three, where a fifth at most is out of line) and far outside of their
+/// neighbours' stamps, and fill no hole elsewhere; with more of them the list was not sorted, and
+/// nothing is left out. Also strays: up to three stamps before the first or behind the last of the
+/// others, with a pause that is longer than ten seconds and a thousand usual intervals.
 StampOrder orderOf(const std::vector<TimePoint>& stamps);
 
 }  // namespace perdure::replay

@@ -24,7 +24,7 @@ CameraCalibration calibrationWith(DistortionModel model) {
   } else if (model == DistortionModel::kEquidistant) {
     c.distortion_coefficients = {-0.0143, 0.0048, -0.0031, 0.0007};
   } else if (model == DistortionModel::kRational) {
-    c.distortion_coefficients = {0.32, -0.11, 0.0007, -0.0004, 0.004, 0.62, -0.05, 0.01};
+    c.distortion_coefficients = {0.45, 0.09, 0.0007, -0.0004, 0.002, 0.72, 0.16, 0.008};
   }
   return c;
 }
@@ -86,8 +86,8 @@ TEST(CameraModel, WithoutItsLastFourCoefficientsTheRationalModelIsBrowns) {
 TEST(CameraModel, TheRationalModelIsTheQuotientOfItsDefinition) {
   const CameraModel camera(calibrationWith(DistortionModel::kRational));
   const auto radial = [](double r2) {
-    return (1 + r2 * (0.32 + r2 * (-0.11 + r2 * 0.004))) /
-           (1 + r2 * (0.62 + r2 * (-0.05 + r2 * 0.01)));
+    return (1 + r2 * (0.45 + r2 * (0.09 + r2 * 0.002))) /
+           (1 + r2 * (0.72 + r2 * (0.16 + r2 * 0.008)));
   };
   const double x = 0.4, y = -0.3, r2 = 0.25, p1 = 0.0007, p2 = -0.0004;
   const Eigen::Vector2d expected(

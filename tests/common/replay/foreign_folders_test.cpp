@@ -19,7 +19,7 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-std::string errorOf(const fs::path& path) {
+std::string errorOfFolder(const fs::path& path) {
   return startupErrorOf([&] { Dataset::open({.path = path}); });
 }
 
@@ -49,7 +49,8 @@ void expectAll(const fs::path& root, std::size_t frames = 5, std::size_t samples
 }
 
 /// Lines of a text file, changed one by one; the head stays.
-void changeLines(const fs::path& file, const std::function<std::string(std::size_t, std::string)>& to) {
+void changeLines(const fs::path& file,
+                 const std::function<std::string(std::size_t, std::string)>& to) {
   std::istringstream lines(readText(file));
   std::string line, text;
   for (std::size_t i = 0; std::getline(lines, line); ++i) {
@@ -97,8 +98,8 @@ TEST(ForeignFolder, WhereNoNameAgreesBothAreShown) {
   for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
     fs::rename(entry.path(), root / "mav0/cam0/data" / ("x" + entry.path().filename().string()));
   }
-  EXPECT_THAT(errorOf(root), AllOf(HasSubstr("names 5 images"), HasSubstr("holds 5"),
-                                   HasSubstr("`left1.png`"), HasSubstr("`x1000000000.png`")));
+  EXPECT_THAT(errorOfFolder(root), AllOf(HasSubstr("names 5 images"), HasSubstr("holds 5"),
+                                         HasSubstr("`left1.png`"), HasSubstr("`x1000000000.png`")));
 }
 
 TEST(ForeignFolder, ListsThatAreNotSortedAre) {
@@ -149,7 +150,8 @@ TEST(ForeignFolder, StampsInSecondsAreNamedByLine) {
   changeLines(root / "mav0/imu0/data.csv", [](std::size_t i, const std::string& line) {
     return "1000000000." + std::to_string(1000000 + i) + line.substr(line.find(','));
   });
-  EXPECT_THAT(errorOf(root), AllOf(HasSubstr("imu0/data.csv:2:"), HasSubstr("looks like seconds")));
+  EXPECT_THAT(errorOfFolder(root),
+              AllOf(HasSubstr("imu0/data.csv:2:"), HasSubstr("looks like seconds")));
 }
 
 TEST(ForeignFolder, TenColumnsAreRefusedAndSevenNamed) {
@@ -158,7 +160,8 @@ TEST(ForeignFolder, TenColumnsAreRefusedAndSevenNamed) {
     const auto at = line.find(',');
     return line.substr(0, at) + ",1,0,0,0" + line.substr(at);
   });
-  EXPECT_THAT(errorOf(root), AllOf(HasSubstr("11 columns"), HasSubstr("seven columns are awaited")));
+  EXPECT_THAT(errorOfFolder(root),
+              AllOf(HasSubstr("11 columns"), HasSubstr("seven columns are awaited")));
 }
 
 TEST(ForeignFolder, AHeadThatNamesAccelerationsFirstIsBelieved) {

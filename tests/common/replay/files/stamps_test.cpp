@@ -14,8 +14,8 @@ using testing::HasSubstr;
 std::vector<TimePoint> every(std::int64_t interval_ns, std::size_t count) {
   std::vector<TimePoint> stamps;
   for (std::size_t i = 0; i < count; ++i) {
-    stamps.push_back(fromNanoseconds(1'000'000'000'000'000'000 +
-                                     interval_ns * static_cast<std::int64_t>(i)));
+    stamps.push_back(
+        fromNanoseconds(1'000'000'000'000'000'000 + interval_ns * static_cast<std::int64_t>(i)));
   }
   return stamps;
 }

@@ -42,7 +42,8 @@ enum Feature : unsigned {
 };
 
 std::string nameOf(unsigned features) {
-  constexpr const char* kNames[] = {"ch", "mx", "chx", "st", "rsh", "rch", "ax", "mdx", "sum", "pad"};
+  constexpr const char* kNames[] = {"ch",  "mx", "chx", "st",  "rsh",
+                                    "rch", "ax", "mdx", "sum", "pad"};
   std::string name;
   for (unsigned i = 0; i < 10; ++i) {
     if (features & (1u << i)) name += std::string("-") + kNames[i];
@@ -274,7 +275,8 @@ class FileMaker {
 class McapConformance : public testing::TestWithParam<Content> {
  protected:
   void SetUp() override {
-    file_ = fs::path(testing::TempDir()) / (std::string("conformance-") + GetParam().name + ".mcap");
+    file_ =
+        fs::path(testing::TempDir()) / (std::string("conformance-") + GetParam().name + ".mcap");
   }
   void TearDown() override { fs::remove(file_); }
   void write(const Buffer& bytes) const {
@@ -354,13 +356,13 @@ TEST_P(McapConformance, RecordsOfUnknownKindsArePassedOver) {
   expectAllOfIt("unknown kinds");
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Contents, McapConformance,
-    testing::Values(Content{"NoData"}, Content{"OneMessage", 1}, Content{"TenMessages", 10},
-                    Content{"OneSchemalessMessage", 1, false},
-                    Content{"OneAttachment", 0, true, true},
-                    Content{"OneMetadata", 0, true, false, true}),
-    [](const auto& info) { return std::string(info.param.name); });
+INSTANTIATE_TEST_SUITE_P(Contents, McapConformance,
+                         testing::Values(Content{"NoData"}, Content{"OneMessage", 1},
+                                         Content{"TenMessages", 10},
+                                         Content{"OneSchemalessMessage", 1, false},
+                                         Content{"OneAttachment", 0, true, true},
+                                         Content{"OneMetadata", 0, true, false, true}),
+                         [](const auto& one) { return std::string(one.param.name); });
 
 TEST(McapOfOthers, AChunkThatCannotBeReadSaysWhy) {
   const fs::path file = fs::path(testing::TempDir()) / "conformance-lz4.mcap";
@@ -375,7 +377,8 @@ TEST(McapOfOthers, AChunkThatCannotBeReadSaysWhy) {
   put.bytes(Buffer{1, 2});
   Put(bytes).record(Op::kChunk, chunk);
   std::ofstream(file, std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      .write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
   try {
     RecordedMessages recording(file);
     FAIL();
