@@ -10,7 +10,9 @@ enum class ExitCode : int {
   kOk = 0,
   kFailure = 1,
   kUsage = 64,          ///< wrong command line
+  kData = 65,           ///< the data are there, but cannot be used as they are
   kUnavailable = 69,    ///< a device, file or folder is missing or unreadable
+  kInputOutput = 74,    ///< something cannot be written: the disk is full
   kConfiguration = 78,  ///< the configuration is wrong
 };
 

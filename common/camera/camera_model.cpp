@@ -11,13 +11,31 @@ namespace {
 
 constexpr double kMinDepth = 1e-3;
 
-Eigen::Vector2d distortRadTan(const std::array<double, 4>& d, const Eigen::Vector2d& n,
-                              Eigen::Matrix2d* J) {
+using Coefficients = std::array<double, 8>;
+
+/// The factor of a squared radius, and its derivative.
+struct Radial {
+  double value, slope;
+};
+
+Radial radialOf(DistortionModel model, const Coefficients& d, double r2) {
+  const double k1 = d[0], k2 = d[1];
+  const Radial brown{1.0 + k1 * r2 + k2 * r2 * r2, k1 + 2.0 * k2 * r2};
+  if (model != DistortionModel::kRational) return brown;
+  const double k3 = d[4], k4 = d[5], k5 = d[6], k6 = d[7], r4 = r2 * r2, r6 = r4 * r2;
+  const double above = brown.value + k3 * r6, below = 1.0 + k4 * r2 + k5 * r4 + k6 * r6;
+  const double above_slope = brown.slope + 3.0 * k3 * r4;
+  const double below_slope = k4 + 2.0 * k5 * r2 + 3.0 * k6 * r4;
+  return {above / below, (above_slope * below - above * below_slope) / (below * below)};
+}
+
+Eigen::Vector2d distortRadTan(DistortionModel model, const Coefficients& d,
+                              const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
   const double x = n.x(), y = n.y(), r2 = x * x + y * y;
-  const auto [k1, k2, p1, p2] = d;
-  const double radial = 1.0 + k1 * r2 + k2 * r2 * r2;
+  const double p1 = d[2], p2 = d[3];
+  const auto [radial, slope] = radialOf(model, d, r2);
   if (J) {
-    const double dr = 2.0 * (k1 + 2.0 * k2 * r2);  // d radial / d(r²) · 2
+    const double dr = 2.0 * slope;
     (*J)(0, 0) = radial + x * x * dr + 2.0 * p1 * y + 6.0 * p2 * x;
     (*J)(0, 1) = x * y * dr + 2.0 * p1 * x + 2.0 * p2 * y;
     (*J)(1, 0) = (*J)(0, 1);
@@ -27,7 +45,7 @@ Eigen::Vector2d distortRadTan(const std::array<double, 4>& d, const Eigen::Vecto
           y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
 }
 
-Eigen::Vector2d distortEquidistant(const std::array<double, 4>& d, const Eigen::Vector2d& n,
+Eigen::Vector2d distortEquidistant(const Coefficients& d, const Eigen::Vector2d& n,
                                    Eigen::Matrix2d* J) {
   const double r = n.norm();
   if (r < 1e-9) {
@@ -47,13 +65,13 @@ Eigen::Vector2d distortEquidistant(const std::array<double, 4>& d, const Eigen::
 }
 
 // The squared radius at which the radial distortion stops growing: beyond it points fold back.
-double monotoneRadius2(const CameraCalibration& c) {
-  if (c.distortion != DistortionModel::kRadialTangential) {
-    return std::numeric_limits<double>::infinity();
-  }
-  const double k1 = c.distortion_coefficients[0], k2 = c.distortion_coefficients[1];
+double monotoneRadius2(DistortionModel model, const Coefficients& d) {
+  const bool radial =
+      model == DistortionModel::kRadialTangential || model == DistortionModel::kRational;
+  if (!radial) return std::numeric_limits<double>::infinity();
   for (double r2 = 0.01; r2 < 25.0; r2 += 0.01) {
-    if (1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2 * r2 <= 0.05) return r2;
+    const auto [value, slope] = radialOf(model, d, r2);
+    if (!(value + 2.0 * r2 * slope > 0.05)) return r2;  // d (r · value) / d r
   }
   return std::numeric_limits<double>::infinity();
 }
@@ -61,13 +79,19 @@ double monotoneRadius2(const CameraCalibration& c) {
 }  // namespace
 
 CameraModel::CameraModel(const CameraCalibration& c)
-    : calibration_(c), width_(c.width), height_(c.height), fx_(c.fx), fy_(c.fy), cx_(c.cx),
-      cy_(c.cy), T_BC_(c.T_BC) {
+    : calibration_(c),
+      width_(c.width),
+      height_(c.height),
+      fx_(c.fx),
+      fy_(c.fy),
+      cx_(c.cx),
+      cy_(c.cy),
+      T_BC_(c.T_BC) {
   check(c.fx > 0 && c.fy > 0, "focal lengths are positive");
-  const std::size_t wanted = c.distortion == DistortionModel::kNone ? 0 : 4;
-  check(c.distortion_coefficients.size() >= wanted, "a distortion model has four coefficients");
+  const std::size_t wanted = coefficientsOf(c.distortion);
+  check(c.distortion_coefficients.size() >= wanted, "a distortion model has all its coefficients");
   std::copy_n(c.distortion_coefficients.begin(), wanted, d_.begin());
-  max_radius2_ = monotoneRadius2(c);
+  max_radius2_ = monotoneRadius2(c.distortion, d_);
 }
 
 Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& n, Eigen::Matrix2d* J) const {
@@ -76,8 +100,13 @@ Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& n, Eigen::Matrix2d* 
     case DistortionModel::kNone:
       if (J) J->setIdentity();
       break;
-    case DistortionModel::kRadialTangential: distorted = distortRadTan(d_, n, J); break;
-    case DistortionModel::kEquidistant: distorted = distortEquidistant(d_, n, J); break;
+    case DistortionModel::kRadialTangential:
+    case DistortionModel::kRational:
+      distorted = distortRadTan(calibration_.distortion, d_, n, J);
+      break;
+    case DistortionModel::kEquidistant:
+      distorted = distortEquidistant(d_, n, J);
+      break;
   }
   if (J) {
     J->row(0) *= fx_;

@@ -1,6 +1,6 @@
 // Projection of points of the camera frame (z forward, x right, y down) into pixels, with
-// Jacobians. Models: pinhole with no, radial-tangential (Brown) or equidistant (Kannala-Brandt)
-// distortion, as OpenCV and EuRoC define them.
+// Jacobians. Models: pinhole with no, radial-tangential (Brown), rational or equidistant
+// (Kannala-Brandt) distortion, as OpenCV and EuRoC define them.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,19 +13,20 @@ namespace perdure {
 
 class CameraModel {
  public:
-  /// Checks that the calibration is usable (focal lengths > 0, 0 or 4 coefficients).
+  /// Checks that the calibration is usable (focal lengths > 0, as many coefficients as the model
+  /// has).
   explicit CameraModel(const CameraCalibration& calibration);
 
   /// Pixel of a point in C; nothing when the point is not in front (z < 1e-3 m) or lies outside
-  /// the range in which the distortion is invertible. J_point (2×3) = d pixel / d point, when given.
+  /// the range in which the distortion is invertible. J_point (2×3) = d pixel / d point, when
+  /// given.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_C,
                                          Eigen::Matrix<double, 2, 3>* J_point = nullptr) const;
   /// Normalised, undistorted image point (x/z, y/z) of a pixel, by Newton's iteration.
   /// Nothing where the iteration does not converge.
   std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
   /// Distorted pixel of a normalised point; J (2×2) = d pixel / d normalised.
-  Eigen::Vector2d distort(const Eigen::Vector2d& normalised,
-                          Eigen::Matrix2d* J = nullptr) const;
+  Eigen::Vector2d distort(const Eigen::Vector2d& normalised, Eigen::Matrix2d* J = nullptr) const;
 
   bool inImage(const Eigen::Vector2d& pixel, double margin_px = 0.0) const {
     return pixel.x() >= margin_px && pixel.y() >= margin_px && pixel.x() < width() - margin_px &&
@@ -43,7 +44,7 @@ class CameraModel {
  private:
   CameraCalibration calibration_;
   double width_, height_, fx_, fy_, cx_, cy_;
-  std::array<double, 4> d_{};
+  std::array<double, 8> d_{};
   double max_radius2_;  ///< squared normalised radius up to which the distortion is monotone
   RigidTransform T_BC_;
 };

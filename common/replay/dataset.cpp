@@ -69,7 +69,8 @@ Recording readRecording(const DatasetOptions& options) {
 std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
   Recording recording = readRecording(options);
   if (!options.rig.empty()) {
-    applyRig(readRig(options.rig), options.rig.string(), recording.calibration);
+    const Calibration rig = readRig(options.rig, &recording.notes);
+    applyRig(rig, options.rig.string(), recording.calibration);
   }
   return std::make_unique<Dataset>(options, std::move(recording));
 }
@@ -139,8 +140,8 @@ std::optional<Frame> Dataset::decodeFrame(const Recording::FrameFile& file) {
   frame.height = camera.height;
   if ((file.path.empty() && !file.load) || !options_.decode) return frame;
   const auto encoding = file.camera == 0 ? options_.encoding : options_.second_encoding;
-  const auto image =
-      file.load ? recordedImage(file, encoding) : vision::decodeImageFile(file.path, encoding);
+  const auto image = file.load ? recordedImage(file, encoding)
+                               : vision::decodeImageFile(file.path, encoding, bitsOf(file));
   if (!image) {
     count(image.error());
     return std::nullopt;
@@ -155,6 +156,21 @@ std::optional<Frame> Dataset::decodeFrame(const Recording::FrameFile& file) {
     return std::nullopt;
   }
   return frame;
+}
+
+/// By the brightest of five images over the drive: one factor for all, so that nothing flickers.
+int Dataset::bitsOf(const Recording::FrameFile& file) {
+  const auto known = bits_.find(file.camera);
+  if (known != bits_.end()) return known->second;
+  int& bits = bits_[file.camera] = vision::usedBits(file.path);
+  if (bits == 16) return bits;
+  constexpr std::size_t kLooks = 5;
+  const auto& frames = recording_.frames;
+  for (std::size_t i = 0; i < kLooks; ++i) {
+    const auto& one = frames[i * (frames.size() - 1) / (kLooks - 1)];
+    if (one.camera == file.camera) bits = std::max(bits, vision::usedBits(one.path));
+  }
+  return bits;
 }
 
 void Dataset::count(const Reason& reason) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -54,6 +55,8 @@ struct Recording {
   /// Of the body, in a world whose z is up. Of a KITTI drive: by OXTS, east, north and up.
   std::optional<PoseFile> truth;
   ReasonCounts reasons;  ///< what was left out while reading
+  std::vector<std::string> notes =
+      {};  ///< for people: what was mended or is not known, a sentence each
 };
 
 class Dataset {
@@ -72,6 +75,8 @@ class Dataset {
   /// image is missing or wrong (counted as by next()).
   std::optional<Frame> frameAt(std::uint64_t index);
   const std::optional<PoseFile>& truth() const { return recording_.truth; }
+  /// All that was found: frames without their pixels, samples, notes.
+  const Recording& recording() const { return recording_; }
 
   /// The next message, or nothing at the end. Frames that cannot be decoded are counted
   /// (image_missing, image_truncated, image_corrupt, image_size) and left out; their index is
@@ -89,12 +94,14 @@ class Dataset {
 
  private:
   std::optional<Frame> decodeFrame(const Recording::FrameFile& file);
+  int bitsOf(const Recording::FrameFile& file);
   ImuSample takeImu();
   void count(const Reason& reason);
 
   DatasetOptions options_;
   Recording recording_;
   Duration usual_interval_{0};
+  std::map<std::size_t, int> bits_;  ///< that images of 16 bits use, by camera
   std::size_t next_imu_ = 0, next_speed_ = 0, next_frame_ = 0;
   ReasonCounts reasons_;
   std::string last_problem_;

@@ -3,9 +3,13 @@
 // The body is the IMU: where imu0's T_BS is not the identity, everything is moved to it.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "common/base/errors.h"
+#include "common/replay/files/image_folder.h"
+#include "common/replay/files/rig_file.h"
 #include "common/replay/files/sensor_file.h"
+#include "common/replay/files/sensor_table.h"
 #include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
 
@@ -14,100 +18,184 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Calls `row` with the stamp and the fields of each line that has at least `count` fields and
-/// a stamp; counts `code` for the others.
-template <class Row>
-void readCsv(const fs::path& file, std::size_t count, const char* code, ReasonCounts& reasons,
-             Row&& row) {
-  for (const auto& line : readLines(file, "EuRoC keeps data.csv in each sensor's folder")) {
-    if (line.text.starts_with('#')) continue;
-    const auto fields = split(line.text, ',');
-    const auto stamp = parseInteger(fields[0]);
-    if (fields.size() < count || !stamp || *stamp < 0) {
-      reasons.add(code);
-    } else if (!row(fromNanoseconds(*stamp), fields)) {
-      reasons.add(code);
-    }
-  }
+constexpr char kImuColumns[] =
+    "seven columns are awaited: timestamp [ns], w_x, w_y, w_z [rad/s], a_x, a_y, a_z [m/s^2]";
+
+using Fields = std::vector<std::string_view>;
+
+void addNotes(const SensorTable& table, Recording& recording) {
+  for (const auto& [reason, n] : table.reasons().all()) recording.reasons.add(reason, n);
+  const auto& notes = table.notes();
+  recording.notes.insert(recording.notes.end(), notes.begin(), notes.end());
+}
+
+std::string judgeImu(const Fields& fields) {
+  if (fields.size() != 7) return std::to_string(fields.size()) + " columns; " + kImuColumns;
+  if (!parseNumbers({fields.begin() + 1, fields.end()}))
+    return std::string("not seven numbers; ") + kImuColumns;
+  return {};
+}
+
+/// Whether the head names accelerations first, then rates of turn.
+bool namesForceFirst(const std::vector<std::string>& head) {
+  if (head.size() != 7) return false;
+  const auto isForce = [](const std::string& name) {
+    return (name.starts_with('a') && !name.starts_with("ang")) || name.starts_with("lin");
+  };
+  const auto isTurn = [](const std::string& name) {
+    return name.starts_with('w') || name.starts_with('g') || name.starts_with("omega") ||
+           name.starts_with("ang");
+  };
+  return std::all_of(head.begin() + 1, head.begin() + 4, isForce) &&
+         std::all_of(head.begin() + 4, head.end(), isTurn);
 }
 
 void readImu(const fs::path& folder, Recording& recording) {
-  const auto row = [&](TimePoint time, const std::vector<std::string_view>& fields) {
-    const auto v = parseNumbers({fields.begin() + 1, fields.begin() + 7});
-    if (!v) return false;
+  const fs::path file = folder / "data.csv";
+  const SensorTable table(file, "imu", judgeImu);
+  addNotes(table, recording);
+  if (table.rows().empty()) throwMissing(file, "any inertial sample", "fetch it again");
+  const bool force_first = namesForceFirst(table.head());
+  if (force_first) {
+    recording.notes.push_back(file.string() +
+                              ": its head names accelerations before rates of turn; taken so");
+  }
+  for (const TableRow& row : table.rows()) {
+    const auto v = parseNumbers({row.fields.begin() + 1, row.fields.end()});
     ImuSample sample;
-    sample.time = time;
-    sample.gyro = Eigen::Map<const Eigen::Vector3d>(v->data());
-    sample.accel = Eigen::Map<const Eigen::Vector3d>(v->data() + 3);
-    appendImu(recording, sample);
-    return true;
-  };
-  readCsv(folder / "data.csv", 7, "imu_malformed", recording.reasons, row);
-  if (recording.imu.empty())
-    throwMissing(folder / "data.csv", "any inertial sample", "fetch it again");
+    sample.time = row.time;
+    sample.gyro = Eigen::Map<const Eigen::Vector3d>(v->data() + (force_first ? 3 : 0));
+    sample.accel = Eigen::Map<const Eigen::Vector3d>(v->data() + (force_first ? 0 : 3));
+    sample.sequence = recording.imu.size();
+    recording.imu.push_back(sample);
+  }
 }
 
 void readSpeed(const fs::path& folder, Recording& recording) {
   const double sigma = SensorFile(folder / "sensor.yaml").number("sigma", 1e-6);
-  const auto row = [&](TimePoint time, const std::vector<std::string_view>& fields) {
-    const auto value = parseNumber(fields[1]);
-    if (!value || (!recording.speed.empty() && time <= recording.speed.back().time)) return false;
+  const SensorTable table(folder / "data.csv", "speed", [](const Fields& fields) {
+    const bool whole = fields.size() >= 2 && parseNumber(fields[1]);
+    return whole ? "" : "not two numbers; timestamp [ns] and speed [m/s] are awaited";
+  });
+  addNotes(table, recording);
+  for (const TableRow& row : table.rows()) {
     SpeedSample sample;
-    sample.time = time;
+    sample.time = row.time;
     sample.sequence = recording.speed.size();
-    sample.speed = *value;
+    sample.speed = *parseNumber(row.fields[1]);
     sample.sigma = sigma;
     recording.speed.push_back(sample);
-    return true;
-  };
-  readCsv(folder / "data.csv", 2, "speed_malformed", recording.reasons, row);
+  }
   recording.calibration.has_speed = !recording.speed.empty();
 }
 
-/// Frames of one camera; cam1's frames take the index of cam0's frame at the same time.
-void readFrames(const fs::path& folder, std::size_t camera, Recording& recording) {
+/// The camera's list of frames, with the paths of its images.
+class FrameList {
+ public:
+  /// `look`: whether images must be there.
+  FrameList(const fs::path& folder, bool look)
+      : folder_(folder), look_(look), images_(look ? folder / "data" : fs::path()) {}
+
+  std::string pathOf(const TableRow& row) {
+    const std::string_view name = row.fields.size() > 1 ? row.fields[1] : std::string_view();
+    const fs::path written = folder_ / "data" / name;
+    ++named_;
+    if (!look_) return written.string();
+    const auto found = images_.find(name, row.time);
+    if (found) ++found_;
+    if (found_ == 0 && named_ == 1) first_ = std::string(name);
+    return found ? found->string() : written.string();
+  }
+
+  /// Throws where no image that is named is there; else says what was found by other names.
+  void close(Recording& recording) const {
+    if (!look_ || named_ == 0) return;
+    const std::string images = (folder_ / "data").string();
+    if (found_ == 0) {
+      throw StartupError(ExitCode::kData, (folder_ / "data.csv").string() + " names " +
+                                              std::to_string(named_) + " images, " + images +
+                                              " holds " + std::to_string(images_.size()) +
+                                              ", and none agrees: the first of the list is `" +
+                                              first_ + "`, that of the folder `" + images_.first() +
+                                              "`; the second column must hold the names of the "
+                                              "files, or the stamps must be their names");
+    }
+    if (images_.foundOtherwise() == 0) return;
+    recording.notes.push_back((folder_ / "data.csv").string() + ": " +
+                              std::to_string(images_.foundOtherwise()) + " of " +
+                              std::to_string(named_) +
+                              " images are not there by the name in the list and were found by its "
+                              "stem or stamp");
+  }
+
+ private:
+  fs::path folder_;
+  bool look_;
+  ImageFolder images_;
+  std::size_t named_ = 0, found_ = 0;
+  std::string first_;
+};
+
+/// The frame of cam0 that was taken at the same time.
+const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
   constexpr Duration kSame = std::chrono::milliseconds(5);
-  std::vector<Recording::FrameFile> first = recording.frames;
-  const auto row = [&](TimePoint time, const std::vector<std::string_view>& fields) {
-    Recording::FrameFile frame{time, recording.frame_count, camera,
-                               (folder / "data" / fields[1]).string()};
-    if (camera == 0) {
-      if (!recording.frames.empty() && time <= recording.frames.back().time) return false;
-      ++recording.frame_count;
-    } else {
-      const auto pair = std::find_if(first.begin(), first.end(), [&](const auto& other) {
-        return std::abs((other.time - time).count()) <= kSame.count();
-      });
-      if (pair == first.end()) return false;
+  const auto at =
+      std::lower_bound(first.begin(), first.end(), time - kSame,
+                       [](const auto& frame, TimePoint begin) { return frame.time < begin; });
+  return at != first.end() && at->time - time <= kSame ? &*at : nullptr;
+}
+
+/// Frames of one camera; cam1's frames take the index of cam0's frame at the same time.
+void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording& recording) {
+  const SensorTable table(folder / "data.csv", camera == 0 ? "frame" : "stereo",
+                          [](const Fields&) { return std::string(); });
+  addNotes(table, recording);
+  const std::vector<Recording::FrameFile> first = recording.frames;
+  FrameList list(folder, look);
+  if (camera == 0) recording.frame_count = table.lines();
+  for (const TableRow& row : table.rows()) {
+    // A row that is left out keeps its number; a list that was sorted is counted anew.
+    const std::uint64_t number = table.wasSorted() ? row.number : recording.frames.size();
+    Recording::FrameFile frame{row.time, number, camera, list.pathOf(row)};
+    if (camera != 0) {
+      const auto* pair = pairOf(first, row.time);
+      if (!pair) {
+        recording.reasons.add("stereo_unmatched");
+        continue;
+      }
       frame.index = pair->index;
       frame.time = pair->time;
     }
     recording.frames.push_back(std::move(frame));
-    return true;
-  };
-  readCsv(folder / "data.csv", 2, camera == 0 ? "frame_malformed" : "stereo_unmatched",
-          recording.reasons, row);
+  }
+  list.close(recording);
 }
 
-PoseFile readGroundTruth(const fs::path& file, const RigidTransform& T_BI, ReasonCounts& reasons) {
-  std::vector<StampedPose> poses;
-  const auto row = [&](TimePoint time, const std::vector<std::string_view>& fields) {
-    const auto v = parseNumbers({fields.begin() + 1, fields.begin() + 8});
-    if (!v || (!poses.empty() && time <= poses.back().time)) return false;
-    const Eigen::Quaterniond q((*v)[3], (*v)[4], (*v)[5], (*v)[6]);
-    if (std::abs(q.norm() - 1.0) > 1e-2) return false;
-    poses.push_back({time, RigidTransform(q, {(*v)[0], (*v)[1], (*v)[2]}) * T_BI});
-    return true;
+PoseFile readGroundTruth(const fs::path& file, const RigidTransform& T_BI, Recording& recording) {
+  const auto unitOf = [](const std::vector<double>& v) {
+    return Eigen::Quaterniond(v[3], v[4], v[5], v[6]);
   };
-  readCsv(file, 8, "truth_malformed", reasons, row);
+  const SensorTable table(file, "truth", [&](const Fields& fields) -> std::string {
+    if (fields.size() < 8) return "fewer than eight columns: timestamp [ns], p, q (w x y z)";
+    const auto v = parseNumbers({fields.begin() + 1, fields.begin() + 8});
+    if (!v) return "not eight numbers";
+    return std::abs(unitOf(*v).norm() - 1.0) > 1e-2 ? "the quaternion's norm is not 1" : "";
+  });
+  addNotes(table, recording);
+  std::vector<StampedPose> poses;
+  for (const TableRow& row : table.rows()) {
+    const auto v = *parseNumbers({row.fields.begin() + 1, row.fields.begin() + 8});
+    poses.push_back({row.time, RigidTransform(unitOf(v), {v[0], v[1], v[2]}) * T_BI});
+  }
   return PoseFile(PoseFormat::kTum, std::move(poses));
 }
 
 void readTruth(const fs::path& mav0, const RigidTransform& T_BI, Recording& recording) {
-  const fs::path euroc = mav0 / "state_groundtruth_estimate0" / "data.csv";
+  fs::path euroc = mav0 / "state_groundtruth_estimate0" / "data.csv";
+  if (!fs::exists(euroc)) euroc = mav0 / "mocap0" / "data.csv";  // TUM-VI's
   const fs::path tum = mav0.parent_path() / "gt_tum.txt";
   if (fs::exists(euroc)) {
-    recording.truth = readGroundTruth(euroc, T_BI, recording.reasons);
+    recording.truth = readGroundTruth(euroc, T_BI, recording);
   } else if (fs::exists(tum)) {
     std::vector<StampedPose> poses = PoseFile::read(tum).poses();
     for (auto& pose : poses) pose.T_WB = pose.T_WB * T_BI;
@@ -116,18 +204,98 @@ void readTruth(const fs::path& mav0, const RigidTransform& T_BI, Recording& reco
   if (recording.truth && recording.truth->poses().empty()) recording.truth.reset();
 }
 
+/// Without the slash that a shell's completion leaves.
+fs::path cleanOf(const fs::path& folder) {
+  const fs::path path = fs::absolute(folder).lexically_normal();
+  return path.has_filename() ? path : path.parent_path();
+}
+
 fs::path mav0Of(const fs::path& folder) {
   return fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
+}
+
+/// What Kalibr left of the cameras ("camchain") or of the IMU ("imu"), in the folder or where
+/// TUM-VI has it; nothing where there is none.
+std::optional<fs::path> findFile(const fs::path& mav0, const std::string& of) {
+  constexpr char kChain[] = "camchain";
+  for (const fs::path& folder : {mav0, mav0.parent_path(), mav0.parent_path() / "dso"}) {
+    std::vector<fs::path> found;
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+      const fs::path& file = entry.path();
+      const std::string name = file.filename().string();
+      const bool is_yaml = file.extension() == ".yaml" || file.extension() == ".yml";
+      const bool is_chain = name.find(kChain) != std::string::npos;
+      if (is_yaml && name.find(of) != std::string::npos && is_chain == (of == kChain))
+        found.push_back(file);
+    }
+    if (!found.empty()) return *std::min_element(found.begin(), found.end());
+  }
+  return std::nullopt;
+}
+
+void noteKeys(const SensorFile& file, Recording& recording) {
+  const auto keys = file.unknownKeys();
+  recording.notes.insert(recording.notes.end(), keys.begin(), keys.end());
+}
+
+/// Where a folder's calibration comes from: each sensor's sensor.yaml, else the rig file that was
+/// given, else what Kalibr left (camchain*.yaml, imu*.yaml).
+class EurocCalibration {
+ public:
+  EurocCalibration(const fs::path& mav0, const fs::path& rig) : mav0_(mav0) {
+    if (!rig.empty()) rig_ = readRig(rig);
+    if (const auto chain = findFile(mav0, "camchain"); chain && !rig_) rig_ = readRig(*chain);
+  }
+
+  ImuCalibration imu(Recording& recording) {
+    fs::path path = mav0_ / "imu0" / "sensor.yaml";
+    if (!fs::exists(path) && rig_ && rig_->imu) return *rig_->imu;
+    if (!fs::exists(path)) {
+      if (const auto kalibr = findFile(mav0_, "imu")) path = *kalibr;
+    }
+    SensorFile file(path);
+    if (file.has("imu0")) file = file.section("imu0");
+    T_BI_ = file.T_BS();
+    const ImuCalibration imu = readImuCalibration(file);
+    noteKeys(file, recording);
+    return imu;
+  }
+
+  CameraCalibration camera(const std::string& name, Recording& recording) const {
+    const fs::path path = mav0_ / name / "sensor.yaml";
+    const CameraCalibration* in_rig = rig_ ? rig_->camera(name) : nullptr;
+    if (!fs::exists(path) && in_rig) return *in_rig;
+    SensorFile file(path);
+    if (file.has(name)) file = file.section(name);
+    CameraCalibration camera = readCamera(file, name);
+    noteKeys(file, recording);
+    camera.T_BC = T_BI_.inverse() * camera.T_BC;
+    return camera;
+  }
+
+  const RigidTransform& T_BI() const { return T_BI_; }
+
+ private:
+  fs::path mav0_;
+  std::optional<Calibration> rig_;
+  RigidTransform T_BI_;  ///< of EuRoC's body, which everything is moved from
+};
+
+double rateOf(const std::vector<Recording::FrameFile>& frames) {
+  if (frames.size() < 2) return 1.0;
+  const double seconds = toSeconds(frames.back().time - frames.front().time);
+  return seconds > 0.0 ? static_cast<double>(frames.size() - 1) / seconds : 1.0;
 }
 
 }  // namespace
 
 bool looksLikeEuroc(const fs::path& folder) {
-  return fs::is_directory(folder / "mav0") || folder.filename() == "mav0";
+  return fs::is_directory(folder / "mav0") || cleanOf(folder).filename() == "mav0";
 }
 
 Recording readEuroc(const DatasetOptions& options) {
-  const fs::path mav0 = mav0Of(fs::absolute(options.path).lexically_normal());
+  const fs::path mav0 = mav0Of(cleanOf(options.path));
   Recording recording;
   recording.kind = DatasetKind::kEuroc;
   for (const char* sensor : {"cam0", "imu0"}) {
@@ -135,8 +303,8 @@ Recording readEuroc(const DatasetOptions& options) {
       throwMissing(mav0 / sensor / "data.csv", "a part of the EuRoC folder", "unpack it whole");
     }
   }
-  const SensorFile imu(mav0 / "imu0" / "sensor.yaml");
-  recording.calibration.imu = readImuCalibration(imu);
+  EurocCalibration calibration(mav0, options.rig);
+  recording.calibration.imu = calibration.imu(recording);
   readImu(mav0 / "imu0", recording);
   for (const std::string name : {"cam0", "cam1"}) {
     if (!fs::exists(mav0 / name / "data.csv")) continue;
@@ -144,15 +312,14 @@ Recording readEuroc(const DatasetOptions& options) {
       throwMissing(mav0 / name / "data", "the folder of images",
                    "unpack the images (or the video) into it");
     }
-    const SensorFile file(mav0 / name / "sensor.yaml");
-    recording.calibration.cameras.push_back(readCamera(file, name));
-    CameraCalibration& camera = recording.calibration.cameras.back();
-    camera.T_BC = imu.T_BS().inverse() * camera.T_BC;
-    readFrames(mav0 / name, recording.calibration.cameras.size() - 1, recording);
+    recording.calibration.cameras.push_back(calibration.camera(name, recording));
+    readFrames(mav0 / name, recording.calibration.cameras.size() - 1, options.decode, recording);
+    double& rate = recording.calibration.cameras.back().rate_hz;
+    if (rate <= 0.0) rate = rateOf(recording.frames);
   }
   if (fs::exists(mav0 / "speed0" / "data.csv")) readSpeed(mav0 / "speed0", recording);
   sortFrames(recording);
-  readTruth(mav0, imu.T_BS(), recording);
+  readTruth(mav0, calibration.T_BI(), recording);
   return recording;
 }
 

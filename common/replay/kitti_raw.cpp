@@ -59,11 +59,12 @@ std::optional<TimePoint> parseStamp(const std::string& text) {
   return TimePoint(since + Duration(*fraction));
 }
 
-/// One stamp a line; nothing where a line is not a stamp.
+/// The stamp of record k stands in line k; nothing where a line is not a stamp, or empty.
 std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
   std::vector<std::optional<TimePoint>> stamps;
   for (const auto& line : readLines(file, "KITTI keeps timestamps.txt in each sensor's folder")) {
-    stamps.push_back(parseStamp(line.text));
+    stamps.resize(line.number);
+    stamps.back() = parseStamp(line.text);
   }
   return stamps;
 }
@@ -97,7 +98,8 @@ struct OxtsRecord {
   std::vector<double> values;
 };
 
-std::vector<OxtsRecord> readOxts(const fs::path& folder, ReasonCounts& reasons) {
+std::vector<OxtsRecord> readOxts(const fs::path& folder, Recording& recording) {
+  ReasonCounts& reasons = recording.reasons;
   std::vector<OxtsRecord> records;
   const auto stamps = readStamps(folder / "timestamps.txt");
   for (std::size_t i = 0; i < stamps.size(); ++i) {
@@ -114,6 +116,7 @@ std::vector<OxtsRecord> readOxts(const fs::path& folder, ReasonCounts& reasons) 
     }
     records.push_back({*stamps[i], *values});
   }
+  orderByTime(records, "imu", recording, [](const OxtsRecord& record) { return record.time; });
   return records;
 }
 
@@ -137,7 +140,6 @@ RigidTransform poseOf(const OxtsRecord& record, const OxtsRecord& first) {
 PoseFile truthOf(const std::vector<OxtsRecord>& records) {
   std::vector<StampedPose> poses;
   for (const auto& record : records) {
-    if (!poses.empty() && record.time <= poses.back().time) continue;
     poses.push_back({record.time, poseOf(record, records.front())});
   }
   return PoseFile(PoseFormat::kTum, std::move(poses));
@@ -150,8 +152,8 @@ void addOxts(const std::vector<OxtsRecord>& records, Recording& recording) {
     sample.time = record.time;
     sample.accel = Eigen::Vector3d(v[kAx], v[kAx + 1], v[kAx + 2]);
     sample.gyro = Eigen::Vector3d(v[kWx], v[kWx + 1], v[kWx + 2]);
-    appendImu(recording, sample);
-    if (recording.imu.back().time != record.time) continue;
+    sample.sequence = recording.imu.size();
+    recording.imu.push_back(sample);
     SpeedSample speed;
     speed.time = record.time;
     speed.sequence = recording.speed.size();
@@ -174,14 +176,16 @@ void addCamera(const fs::path& folder, const std::vector<std::optional<TimePoint
                const CameraCalibration& camera, Recording& recording) {
   const std::size_t number = recording.calibration.cameras.size();
   recording.calibration.cameras.push_back(camera);
+  std::vector<Recording::FrameFile> frames;
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     if (!stamps[i]) {
       recording.reasons.add("frame_malformed");
       continue;
     }
-    recording.frames.push_back(
-        {*stamps[i], i, number, imagePath(folder / "data", tenDigits(i)).string()});
+    frames.push_back({*stamps[i], i, number, imagePath(folder / "data", tenDigits(i)).string()});
   }
+  orderByTime(frames, "frame", recording, [](const auto& frame) { return frame.time; });
+  recording.frames.insert(recording.frames.end(), frames.begin(), frames.end());
 }
 
 }  // namespace
@@ -208,7 +212,7 @@ Recording readKittiRaw(const DatasetOptions& options) {
     addCamera(drive / "image_03", stamps, calibration.camera("cam1"), recording);
   }
   sortFrames(recording);
-  const auto records = readOxts(drive / "oxts", recording.reasons);
+  const auto records = readOxts(drive / "oxts", recording);
   if (records.empty()) throwMissing(drive / "oxts" / "data", "any OXTS record", "fetch it again");
   addOxts(records, recording);
   recording.truth = truthOf(records);

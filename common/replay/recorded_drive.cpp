@@ -65,9 +65,11 @@ class DriveReader {
     while (const auto message = messages_.next()) take(*message);
     for (const auto& [reason, n] : messages_.reasons().all()) recording_.reasons.add(reason, n);
     if (recording_.calibration.cameras.empty()) {
+      const std::string& problem = messages_.lastProblem();
       throwMissing(path_, "the calibration in the recording",
-                   "record while capture runs: it gives one");
+                   problem.empty() ? "record while capture runs: it gives one" : problem);
     }
+    orderSamples();
     recording_.kind = DatasetKind::kRecording;
     recording_.calibration.has_speed = !recording_.speed.empty();
     if (images_.empty()) images_ = std::move(looks_);
@@ -88,9 +90,9 @@ class DriveReader {
     if (message.topic == "calibration") {
       if (auto value = valueIn<Calibration>(message)) recording_.calibration = *std::move(value);
     } else if (message.topic == "imu") {
-      if (const auto value = valueIn<ImuSample>(message)) appendImu(recording_, *value);
+      if (const auto value = valueIn<ImuSample>(message)) recording_.imu.push_back(*value);
     } else if (message.topic == "speed") {
-      if (const auto value = valueIn<SpeedSample>(message)) takeSpeed(*value);
+      if (const auto value = valueIn<SpeedSample>(message)) recording_.speed.push_back(*value);
     } else if (message.topic == "odometry") {
       if (const auto value = valueIn<Odometry>(message)) {
         looks_.push_back({value->stamp, {}, message.log_ns});
@@ -100,12 +102,10 @@ class DriveReader {
     }
   }
 
-  void takeSpeed(SpeedSample sample) {
-    if (!recording_.speed.empty() && sample.time <= recording_.speed.back().time) {
-      return recording_.reasons.add("speed_not_increasing");
-    }
-    sample.sequence = recording_.speed.size();
-    recording_.speed.push_back(sample);
+  void orderSamples() {
+    orderImu(recording_);
+    orderByTime(recording_.speed, "speed", recording_, [](const auto& one) { return one.time; });
+    for (std::size_t i = 0; i < recording_.speed.size(); ++i) recording_.speed[i].sequence = i;
   }
 
   /// Cameras in their order; nothing where the calibration has none of the name.

@@ -32,13 +32,23 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
   return std::nullopt;
 }
 
-void appendImu(Recording& recording, const ImuSample& sample) {
-  if (!recording.imu.empty() && sample.time <= recording.imu.back().time) {
-    recording.reasons.add("imu_not_increasing");
-    return;
-  }
-  recording.imu.push_back(sample);
-  recording.imu.back().sequence = recording.imu.size() - 1;
+void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
+               Recording& recording) {
+  const auto note = [&](std::size_t count, const char* reason, const char* what) {
+    if (count == 0) return;
+    recording.reasons.add(kind + reason, count);
+    if (what == nullptr) return;
+    recording.notes.push_back(kind + ": " + std::to_string(count) + " of " + std::to_string(all) +
+                              what);
+  };
+  note(order.repeated, "_not_increasing", nullptr);
+  note(order.strays, "_stray", " have a stamp far from their neighbours' and were left out");
+  note(order.moved, "_unsorted", " were not in the order of their stamps and were sorted");
+}
+
+void orderImu(Recording& recording) {
+  orderByTime(recording.imu, "imu", recording, [](const ImuSample& sample) { return sample.time; });
+  for (std::size_t i = 0; i < recording.imu.size(); ++i) recording.imu[i].sequence = i;
 }
 
 void sortFrames(Recording& recording) {

@@ -8,8 +8,13 @@
 #include <vector>
 
 #include "common/replay/dataset.h"
+#include "common/replay/files/stamps.h"
 
 namespace perdure::replay {
+
+/// Counts what an order leaves out or moves, and says it.
+void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
+               Recording& recording);
 
 /// Whether the folder looks like one of a kind; `reader` then says what is missing in it.
 bool looksLikeEuroc(const std::filesystem::path& folder);
@@ -27,8 +32,21 @@ std::filesystem::path imagePath(const std::filesystem::path& folder, const std::
 /// Width and height of the first image that decodes; nothing where there is none.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder);
-/// Appends the sample if its time follows the last one's, else counts imu_not_increasing.
-void appendImu(Recording& recording, const ImuSample& sample);
+/// Brings the samples into the order of their times and numbers them. What is left out is counted:
+/// imu_not_increasing, imu_stray; what was moved: imu_unsorted (files/stamps.h).
+void orderImu(Recording& recording);
+/// Brings items with stamps into order, and counts KIND_not_increasing, KIND_stray, KIND_unsorted.
+template <class Item, class TimeOf>
+void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& recording,
+                 TimeOf&& timeOf) {
+  std::vector<TimePoint> stamps;
+  for (const Item& item : items) stamps.push_back(timeOf(item));
+  const StampOrder order = orderOf(stamps);
+  noteOrder(order, kind, items.size(), recording);
+  std::vector<Item> ordered;
+  for (const std::size_t i : order.kept) ordered.push_back(std::move(items[i]));
+  items = std::move(ordered);
+}
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
 

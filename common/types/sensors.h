@@ -55,14 +55,19 @@ enum class DistortionModel : std::uint8_t {
   kNone = 0,
   kRadialTangential = 1,  ///< k1 k2 p1 p2 (OpenCV, EuRoC "radial-tangential")
   kEquidistant = 2,       ///< k1 k2 k3 k4 (Kannala-Brandt, OpenCV fisheye)
+  kRational = 3,  ///< k1 k2 p1 p2 k3 k4 k5 k6 (OpenCV); radial-tangential with k3: k4 … are 0
 };
+
+constexpr std::size_t coefficientsOf(DistortionModel model) {
+  return model == DistortionModel::kNone ? 0 : model == DistortionModel::kRational ? 8 : 4;
+}
 
 struct CameraCalibration {
   std::string name;  ///< "cam0"
   std::uint32_t width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
   DistortionModel distortion = DistortionModel::kNone;
-  std::vector<double> distortion_coefficients;  ///< 0 or 4
+  std::vector<double> distortion_coefficients;  ///< as many as coefficientsOf() says
   RigidTransform T_BC;                          ///< camera in body
   double time_offset_s = 0.0;                   ///< t_imu = t_image + time_offset_s
   double readout_s = 0.0;                       ///< rolling shutter, first to last row; 0 = global

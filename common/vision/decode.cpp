@@ -30,14 +30,17 @@ int readFlags(std::optional<ImageEncoding> encoding) {
 
 }  // namespace
 
-Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding) {
+Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding,
+                            int bits) {
   if (bytes.empty()) return fail("image_truncated", "the file is empty");
   if (!endsAsItShould(bytes)) return fail("image_truncated", "the end of the image is missing");
   auto* data = const_cast<char*>(bytes.data());
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, data);
   cv::Mat image;
   try {
-    image = cv::imdecode(raw, readFlags(encoding));
+    const bool scaled = bits < 16;
+    image = cv::imdecode(raw, readFlags(encoding) | (scaled ? cv::IMREAD_ANYDEPTH : 0));
+    if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / (1 << (bits - 8)));
   } catch (const cv::Exception& error) {
     return fail("image_corrupt", error.what());
   }
@@ -45,15 +48,32 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
   return image;
 }
 
-Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding) {
+Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
+                                int bits) {
   std::ifstream file(path, std::ios::binary);
   if (!file || std::filesystem::is_directory(path)) {
     return fail("image_missing", path + " cannot be read");
   }
   const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  auto image = decodeImage(bytes, encoding);
+  auto image = decodeImage(bytes, encoding, bits);
   if (!image) return fail(image.error().code, path + ": " + image.error().detail);
   return image;
+}
+
+int usedBits(const std::string& path) {
+  cv::Mat image;
+  try {
+    image = cv::imread(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    return 16;
+  }
+  if (image.empty() || image.depth() != CV_16U) return 16;
+  double brightest = 0.0;
+  cv::minMaxLoc(image, nullptr, &brightest);
+  for (int bits = 8; bits < 16; bits += 2) {
+    if (brightest < (1 << bits)) return bits;
+  }
+  return 16;
 }
 
 }  // namespace perdure::vision

@@ -11,10 +11,16 @@
 
 namespace perdure::vision {
 
-/// Decodes into CV_8UC1 or CV_8UC3 (BGR): `encoding` where given, else as the file is.
-/// Reasons: image_truncated (no end mark of JPEG or PNG), image_corrupt (does not decode).
-Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding);
+/// Decodes into CV_8UC1 or CV_8UC3 (BGR): `encoding` where given, else as the file is. Of images
+/// with 16 bits the lower `bits` (8 … 16) are used, and of these the upper eight. Reasons:
+/// image_truncated (no end mark of JPEG or PNG), image_corrupt (does not decode).
+Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding,
+                            int bits = 16);
 /// The same from a file; reason image_missing where it cannot be read.
-Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding);
+Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
+                                int bits = 16);
+/// Of an image with 16 bits: 8, 10, 12, 14 or 16, the fewest that hold its brightest value. Of
+/// other images and of what is no image: 16.
+int usedBits(const std::string& path);
 
 }  // namespace perdure::vision

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/errors.h"
+#include "common/replay/data_check.h"
 #include "common/vision/jpeg.h"
 
 namespace perdure::capture {
@@ -65,7 +66,9 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
   options.source = source;
   options.encoding = encodingOf(config.image.cam0);
   options.second_encoding = encodingOf(config.image.cam1);
-  requireImages(*replay::Dataset::open(options), config.dataset.path);
+  const auto looked_at = replay::Dataset::open(options);
+  replay::refuseFatal(replay::checkData(looked_at->recording(), {}), config.dataset.path);
+  requireImages(*looked_at, config.dataset.path);
   return replay::Dataset::open(options);
 }
 

@@ -11,7 +11,9 @@ namespace {
 
 DistortionModel modelOf(const CalibrateOptions& options, const CameraCalibration& prior) {
   const bool tells = prior.fx > 0.0 && prior.distortion != DistortionModel::kNone;
-  return options.lens.value_or(tells ? prior.distortion : DistortionModel::kRadialTangential);
+  // The rational lens is read, but not estimated: Brown's model stands for it.
+  const bool radial = !tells || prior.distortion == DistortionModel::kRational;
+  return options.lens.value_or(radial ? DistortionModel::kRadialTangential : prior.distortion);
 }
 
 /// A recording that says nothing of its IMU's noise has that of vio's configuration.

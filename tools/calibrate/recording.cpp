@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "common/base/errors.h"
+#include "common/replay/data_check.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/text_file.h"
 #include "common/vision/image.h"
@@ -108,6 +109,7 @@ void readDataset(const Board& board, const ReadOptions& options, CalibrationDriv
   wanted.path = options.data, wanted.sequence = options.sequence, wanted.rig = options.rig;
   wanted.encoding = wanted.second_encoding = ImageEncoding::kMono8;
   const auto dataset = replay::Dataset::open(wanted);
+  replay::refuseFatal(replay::checkData(dataset->recording(), {}), options.data.string());
   for (const auto& camera : dataset->calibration().cameras)
     drive.cameras.push_back({camera, 0, {}});
   drive.imu = dataset->calibration().imu;

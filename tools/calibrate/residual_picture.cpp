@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "common/base/errors.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/outputs/pictures/chart.h"
+#include "tools/outputs/pictures/drawing.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -120,10 +119,7 @@ void drawResiduals(const CalibratedCamera& camera, const std::filesystem::path& 
   }
   std::error_code error;
   std::filesystem::create_directories(file.parent_path(), error);
-  if (!cv::imwrite(file.string(), picture)) {
-    throw StartupError(ExitCode::kUnavailable,
-                       file.string() + " cannot be written; is the disk full or read-only?");
-  }
+  tools::writePicture(picture, file);
 }
 
 }  // namespace perdure::calibrate

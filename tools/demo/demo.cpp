@@ -16,6 +16,7 @@
 #include "common/base/errors.h"
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
+#include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/outputs/pictures/overlay_video.h"
@@ -135,7 +136,13 @@ replay::DatasetOptions Demo::dataOptions() const {
 }
 
 void Demo::openData() {
-  frames_ = replay::Dataset::open(dataOptions())->frameCount();
+  replay::DatasetOptions with_images = dataOptions();
+  with_images.decode = true;
+  const auto dataset = replay::Dataset::open(with_images);
+  frames_ = dataset->frameCount();
+  const auto findings = checkDrive(dataset->recording(), {});
+  replay::refuseFatal(findings, options_.data);
+  printDoubts(dataset->recording(), findings);
   if (!fs::exists(options_.model)) {
     throw StartupError(ExitCode::kUnavailable,
                        options_.model + " does not exist; give --model a network, FILE.onnx");

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <fstream>
 #include <ostream>
 #include <vector>
 
-#include "common/base/errors.h"
+#include "common/base/checked_file.h"
 #include "common/replay/dataset.h"
 #include "services/inference/node.h"
 
@@ -58,11 +57,8 @@ DetectSummary detect(const DetectOptions& options,
   data.path = options.data;
   const auto dataset = replay::Dataset::open(data);
   inference::Node node(options.inference, 1);
-  std::ofstream out(options.out);
-  if (!out) {
-    throw StartupError(ExitCode::kUnavailable,
-                       options.out.string() + " cannot be written; give --out a file elsewhere");
-  }
+  CheckedFile file(options.out);
+  std::ostream& out = file.stream();
   out.precision(7);
   writeDetectionHeader(out, node.model());
   DetectSummary summary;
@@ -85,6 +81,7 @@ DetectSummary detect(const DetectOptions& options,
     }
     if (report) report(summary.frames, dataset->frameCount());
   }
+  file.close();
   summary.cpu_ms_median = medianOf(std::move(times));
   return summary;
 }

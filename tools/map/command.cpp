@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <numbers>
 #include <vector>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "tools/bus_tools/common.h"
 #include "tools/map/map_source.h"
@@ -120,15 +120,6 @@ std::optional<GeoAnchor> anchorOf(const Request& request) {
   return GeoAnchor{{}, a[0], a[1], a[2], a[3] * std::numbers::pi / 180.0};
 }
 
-void write(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::trunc);
-  if (!(file << text)) {
-    throw StartupError(ExitCode::kUnavailable, path +
-                                                   " cannot be written; give --out a "
-                                                   "file in a folder that you may write");
-  }
-}
-
 void exportMap(const Request& request) {
   const MapReply reply = ask(request);
   const auto json =
@@ -137,7 +128,7 @@ void exportMap(const Request& request) {
     std::cout << json.dump(1) << "\n";
     return;
   }
-  write(request.out, json.dump(1) + "\n");
+  writeChecked(request.out, json.dump(1) + "\n");
 }
 
 void addSource(CLI::App& command, Request& request) {

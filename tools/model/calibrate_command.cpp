@@ -7,6 +7,7 @@
 #include <memory>
 #include <sstream>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "services/inference/model_file.h"
 #include "tools/model/calibrate.h"
@@ -42,19 +43,6 @@ std::string textOf(const fs::path& file) {
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
-}
-
-void writeText(const fs::path& file, const std::string& text) {
-  const fs::path part = file.string() + ".part";
-  std::ofstream out(part, std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) fs::rename(part, file, error);
-  if (!out || error) {
-    throw StartupError(ExitCode::kUnavailable,
-                       file.string() + " cannot be written; give --out a file elsewhere");
-  }
 }
 
 void print(const CalibrationResult& r) {
@@ -116,8 +104,8 @@ void run(const CalibrateRequest& request) {
   const fs::path out = request.out.empty() ? description : request.out;
   const std::string text = withCalibration(old, result);
   (void)inference::parseModelDescription(text, description.string());
-  if (request.out.empty()) writeText(description.string() + ".before", old);
-  writeText(out, text);
+  if (request.out.empty()) writeChecked(description.string() + ".before", old);
+  writeChecked(out, text);
   std::printf("%-24s %s\n", "written", out.c_str());
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/math/so3.h"
 #include "tools/outputs/geodesy.h"
@@ -26,16 +27,6 @@ Json numbersOf(const Eigen::MatrixBase<Derived>& vector) {
   Json list = Json::array();
   for (Eigen::Index i = 0; i < vector.size(); ++i) list.push_back(rounded(vector(i)));
   return list;
-}
-
-std::ofstream openForWriting(const std::filesystem::path& path) {
-  std::ofstream file(path, std::ios::trunc);
-  if (!file) {
-    throw StartupError(ExitCode::kUnavailable,
-                       fmt::format("{}: cannot be written; give --out a folder that you may write",
-                                   path.string()));
-  }
-  return file;
 }
 
 Json featureOf(const ObjectBelief& belief, const GeoReference& reference) {
@@ -119,8 +110,8 @@ OutputWriter::OutputWriter(std::filesystem::path folder, std::string sequence)
                        fmt::format("{}: cannot be made: {}; give --out another folder",
                                    folder_.string(), error.message()));
   }
-  events_ = openForWriting(folder_ / "events.jsonl");
-  odometry_ = openForWriting(folder_ / "odometry.csv");
+  open(events_, "events.jsonl");
+  open(odometry_, "odometry.csv");
   odometry_ << "frame,timestamp_ns,epoch,degraded,x,y,z,qx,qy,qz,qw,vx,vy,vz";
   for (const char* bias : {"bg", "ba"}) {
     for (const char axis : {'x', 'y', 'z'}) odometry_ << "," << bias << axis;
@@ -129,6 +120,14 @@ OutputWriter::OutputWriter(std::filesystem::path folder, std::string sequence)
     for (int j = 0; j <= i; ++j) odometry_ << ",P" << i << j;
   }
   odometry_ << "\n";
+}
+
+void OutputWriter::open(std::ofstream& stream, const char* name) const {
+  stream.open(folder_ / name, std::ios::trunc);
+  if (stream) return;
+  throw StartupError(ExitCode::kUnavailable,
+                     fmt::format("{}: cannot be written; give --out a folder that you may write",
+                                 (folder_ / name).string()));
 }
 
 void OutputWriter::onCalibration(const Calibration& calibration) {
@@ -173,12 +172,12 @@ void OutputWriter::onEvent(const Event& event) {
 }
 
 void OutputWriter::writeJson(const std::string& name, const Json& json) const {
-  openForWriting(folder_ / name) << json.dump(1) << "\n";
+  writeChecked(folder_ / name, json.dump(1) + "\n");
 }
 
 void OutputWriter::finish() {
-  events_.flush();
-  odometry_.flush();
+  flushChecked(events_, folder_ / "events.jsonl");
+  flushChecked(odometry_, folder_ / "odometry.csv");
   writeTable("objects_inst.csv", history_.inst());
   writeTable("objects_final.csv", history_.finalRows());
   writeTrajectory();
@@ -206,7 +205,8 @@ void OutputWriter::writePictures() const {
 }
 
 void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const {
-  std::ofstream file = openForWriting(folder_ / name);
+  CheckedFile checked(folder_ / name);
+  std::ostream& file = checked.stream();
   file << "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible\n";
   for (const ObjectRow& r : rows) {
     file << fmt::format(
@@ -214,17 +214,20 @@ void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectR
         r.frame, toNanoseconds(r.time), r.object_id, r.class_name, r.score, r.p_W.x(), r.p_W.y(),
         r.p_W.z(), r.size.x(), r.size.y(), r.size.z(), r.yaw, r.visible ? 1 : 0);
   }
+  checked.close();
 }
 
 void OutputWriter::writeTrajectory() const {
-  std::ofstream file = openForWriting(folder_ / "trajectory.tum");
-  for (const auto& [frame, pose] : poses_) file << tumLine(pose.time, pose.T_WB);
+  CheckedFile file(folder_ / "trajectory.tum");
+  for (const auto& [frame, pose] : poses_) file.stream() << tumLine(pose.time, pose.T_WB);
+  file.close();
 }
 
 void OutputWriter::writeMapTrajectory(
     const std::vector<std::pair<TimePoint, RigidTransform>>& along) const {
   if (along.empty()) return;
-  std::ofstream file = openForWriting(folder_ / "trajectory_map.tum");
+  CheckedFile checked(folder_ / "trajectory_map.tum");
+  std::ostream& file = checked.stream();
   std::size_t next = 0;
   for (const auto& [frame, pose] : poses_) {
     while (next < along.size() && along[next].first <= pose.time) ++next;
@@ -239,6 +242,7 @@ void OutputWriter::writeMapTrajectory(
       file << tumLine(pose.time, T_MW * pose.T_WB);
     }
   }
+  checked.close();
 }
 
 void OutputWriter::writeObjects() const {

@@ -40,6 +40,7 @@ class OutputWriter {
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
 
   /// Writes everything but events.jsonl and odometry.csv, which are written as their messages come.
+  /// Throws StartupError(kInputOutput) with the file that could not be written whole.
   void finish();
   /// trajectory_map.tum: the way as the map's graph has it in the end. `along`: T_MW at times, in
   /// order; between them it is interpolated.
@@ -55,6 +56,7 @@ class OutputWriter {
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
+  void open(std::ofstream& stream, const char* name) const;
   void writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const;
   void writeTrajectory() const;
   void writeObjects() const;

@@ -1,7 +1,11 @@
 // The `perdure` command: each subcommand is one line here and lives in its own folder of tools/.
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <exception>
 #include <iostream>
+#include <string>
 
 #include "common/base/errors.h"
 #include "tools/bus_tools/command.h"
@@ -18,6 +22,18 @@
 #include "tools/simulate/command.h"
 
 namespace {
+
+/// What was printed has arrived: a full disk or a file that is closed is no success.
+int checkedOutput(int status) {
+  errno = 0;
+  std::cout.flush();
+  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
+  if (written || status != static_cast<int>(perdure::ExitCode::kOk)) return status;
+  std::cerr << "perdure: standard output could not be written whole"
+            << (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : std::string())
+            << "; free space, or send it elsewhere" << std::endl;
+  return static_cast<int>(perdure::ExitCode::kInputOutput);
+}
 
 int run(CLI::App& app, int argc, char** argv) {
   try {
@@ -56,5 +72,5 @@ int main(int argc, char** argv) {
   perdure::tools::addPlayCommand(app);
   perdure::tools::addSecurityCommand(app);
   perdure::tools::addBusCommands(app);
-  return run(app, argc, argv);
+  return checkedOutput(run(app, argc, argv));
 }

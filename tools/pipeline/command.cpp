@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "tools/data_check/data_check.h"
 #include "tools/pipeline/pipeline.h"
 #include "tools/pipeline/report.h"
 
@@ -81,6 +82,7 @@ void drawOverlay(const Pipeline& pipeline, bool quiet) {
 
 void run(const PipelineOptions& options) {
   Pipeline pipeline(options);
+  printDoubts(pipeline.dataset().recording(), pipeline.findings());
   pipeline.run([&](const PipelineCounts& counts) {
     if (!options.quiet) showProgress(pipeline, counts);
   });
@@ -99,6 +101,7 @@ void run(const PipelineOptions& options) {
               static_cast<unsigned long long>(pipeline.counts().odometry),
               static_cast<unsigned long long>(pipeline.counts().detections),
               pipeline.outputs().history().lastBeliefs().size(), options.out.c_str());
+  pipeline.refuseNothing();
 }
 
 }  // namespace

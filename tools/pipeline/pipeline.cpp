@@ -141,6 +141,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
 
 void Pipeline::openData() {
   dataset_ = replay::Dataset::open(dataOptions());
+  checkData();
   if (options_.from <= 0.0) return;
   const auto first = dataset_->skip(durationFromSeconds(options_.from));
   if (!first) {
@@ -204,7 +205,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
     file.box_origin = options.box_origin;
     if (options.outline_boxes) file.boxes = BoxExtent::kOutline;
     detection_file_ = replay::DetectionFile::read(file, aliases);
-    return;
+    return checkDetectionFile();
   }
   if (options.model.empty() && configs_.inference.model.path.empty()) {
     throw StartupError(ExitCode::kUsage,
@@ -371,6 +372,7 @@ void Pipeline::finish() {
     if (const auto kept = run_->finish(); !kept) reasons_.add("run_" + kept.error().code);
   }
   outputs_->writeJson("timing.json", timer_.toJson());
+  refuseUnwritten();
 }
 
 std::string Pipeline::drawOverlay(

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "common/bus/once.h"
+#include "common/replay/data_check.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/detection_file.h"
 #include "common/replay/recordings/recorded_messages.h"
@@ -41,8 +42,11 @@ class Pipeline {
   void listen(std::function<void(const Objects&)> listener) { listener_ = std::move(listener); }
   /// Until the data or --seconds end; `progress` is called after each frame of cam0.
   void run(const std::function<void(const PipelineCounts&)>& progress);
-  /// Writes every file but report.json.
+  /// Writes every file but report.json. Throws StartupError(kInputOutput) where one is not whole.
   void finish();
+  /// Throws StartupError(kData) with the cause and the mend where nothing came out: no frame could
+  /// be used, no pose came, or there were to be detections and nothing is on the map.
+  void refuseNothing() const;
   /// Writes overlay.mp4; returns what became of it, as a sentence. After finish().
   std::string drawOverlay(const std::function<void(std::size_t, std::size_t)>& progress) const;
 
@@ -51,6 +55,8 @@ class Pipeline {
   const OutputWriter& outputs() const { return *outputs_; }
   OutputWriter& outputs() { return *outputs_; }
   std::uint64_t configurationDigest() const { return configs_.digest; }
+  /// What was doubtful of the data before the run.
+  const replay::DataFindings& findings() const { return findings_; }
   /// Index of the first frame of the data that is used.
   std::uint64_t firstFrame() const { return first_index_; }
   bool usesVio() const { return uses_vio_; }
@@ -67,6 +73,10 @@ class Pipeline {
   void openRun();
   void learn(const ModelInfo& model);
   void hear(const ModelInfo& model);
+  // In pipeline_checks.cpp.
+  void checkData();
+  void checkDetectionFile() const;
+  void refuseUnwritten() const;
   // In pipeline_recorded.cpp.
   void checkRecorded();
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
@@ -94,6 +104,7 @@ class Pipeline {
   ServiceConfigs configs_;
   StageTimer timer_;
   std::unique_ptr<replay::Dataset> dataset_;
+  replay::DataFindings findings_;
   std::unique_ptr<OutputWriter> outputs_;
   std::map<std::string, ShapePoints> shapes_;  ///< of the class priors
   std::unique_ptr<replay::RecordingWriter> run_;

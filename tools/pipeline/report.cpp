@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/base/ids.h"
+#include "tools/data_check/data_check.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -80,6 +81,8 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
                  {"odometry", options.odometry},
                  {"detections", options.detections},
                  {"model", options.model}};
+  report["data_check"] = {{"notes", pipeline.dataset().recording().notes},
+                          {"findings", toJson(pipeline.findings())}};
   const auto& latency = pipeline.counts().latency_ms;
   report["services"] = services(pipeline, pipeline.reasons());
   report["latency_ms"] = {{"median", quantile(latency, 0.5)}, {"p99", quantile(latency, 0.99)}};

@@ -81,20 +81,31 @@ Result<void> addPlain(replay::RecordingWriter& file, const replay::RecordedMessa
 
 }  // namespace
 
+void refuseNothing(const replay::RecordedMessages& recording, const fs::path& path) {
+  const std::string& problem = recording.lastProblem();
+  throw StartupError(ExitCode::kData, problem.empty()
+                                          ? path.string() +
+                                                ": none of its messages was wanted; "
+                                                "`perdure record info` tells what it holds"
+                                          : problem);
+}
+
 ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
   replay::RecordedMessages recording(from);
+  auto message = recording.next();
+  if (!message) refuseNothing(recording, from);
   replay::RecordingWriter file(to);
   ReasonCounts reasons;
-  while (const auto message = recording.next()) {
+  for (; message; message = recording.next()) {
     const auto added = addPlain(file, *message);
     if (added) continue;
     if (added.error().code == "disk_full" || added.error().code == "file") {
-      throw StartupError(ExitCode::kUnavailable, added.error().detail);
+      throw StartupError(ExitCode::kInputOutput, added.error().detail);
     }
     reasons.add(message->topic + "_" + added.error().code);
   }
   if (const auto finished = file.finish(); !finished) {
-    throw StartupError(ExitCode::kUnavailable, finished.error().detail);
+    throw StartupError(ExitCode::kInputOutput, finished.error().detail);
   }
   for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
   return reasons;

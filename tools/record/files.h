@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "common/base/result.h"
+#include "common/replay/recordings/recorded_messages.h"
 
 namespace CLI {
 class App;
@@ -17,5 +18,9 @@ void addFileCommands(CLI::App& record);
 /// final), for readers without delimited XCDR2. What cannot be read is counted. Throws
 /// StartupError.
 ReasonCounts exportPlain(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// Of a recording that gave no message: throws StartupError(kData) with the reason that it has.
+[[noreturn]] void refuseNothing(const replay::RecordedMessages& recording,
+                                const std::filesystem::path& path);
 
 }  // namespace perdure::tools

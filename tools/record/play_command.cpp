@@ -6,6 +6,7 @@
 #include "common/service/signals.h"
 #include "tools/bus_tools/common.h"
 #include "tools/record/command.h"
+#include "tools/record/files.h"
 #include "tools/record/player.h"
 
 namespace perdure::tools {
@@ -32,6 +33,7 @@ void runPlay(const Options& options) {
   for (const auto* reasons : {&player.reasons(), &recording.reasons()}) {
     for (const auto& [reason, n] : reasons->all()) fmt::print("{}: {}\n", reason, n);
   }
+  if (player.played() == 0 && !loop.stopped()) refuseNothing(recording, options.path);
 }
 
 }  // namespace

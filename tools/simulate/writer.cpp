@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "common/base/errors.h"
+#include "common/base/checked_file.h"
 #include "common/replay/files/sensor_file.h"
 #include "common/sim/truth_files.h"
 
@@ -31,19 +30,7 @@ std::string transformYaml(const RigidTransform& T_BS) {
 void writeWhole(const fs::path& file, std::span<const char> bytes) {
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
-  fs::path unfinished = file;
-  unfinished += ".part";
-  {
-    std::ofstream stream(unfinished, std::ios::binary | std::ios::trunc);
-    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    stream.close();
-    if (!stream) {
-      throw StartupError(
-          ExitCode::kUnavailable,
-          unfinished.string() + " cannot be written; is the disk full or read-only?");
-    }
-  }
-  fs::rename(unfinished, file);
+  writeChecked(file, {bytes.data(), bytes.size()});
 }
 
 std::string cameraYaml(const CameraCalibration& camera) {

@@ -208,6 +208,12 @@ std::vector<std::string> DetectionFile::classesAt(std::uint64_t frame) const {
   return classes;
 }
 
+std::size_t DetectionFile::rows() const {
+  std::size_t count = 0;
+  for (const auto& [frame, rows] : rows_) count += rows.size();
+  return count;
+}
+
 ModelInfo DetectionFile::modelAt(std::uint64_t frame) const {
   ModelInfo model;
   model.name = options_.file.filename().string();

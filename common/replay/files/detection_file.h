@@ -43,7 +43,10 @@ class DetectionFile {
   ModelInfo modelAt(std::uint64_t frame) const;
   /// Nothing where the file makes no statement about the frame.
   std::optional<std::vector<Detection>> at(std::uint64_t frame) const;
+  std::uint64_t firstFrame() const { return rows_.empty() ? 0 : rows_.begin()->first; }
   std::uint64_t lastFrame() const { return rows_.empty() ? 0 : rows_.rbegin()->first; }
+  /// How many detections it holds.
+  std::size_t rows() const;
 
   struct Row {
     Detection detection;     ///< activations still empty where logits are not in the file

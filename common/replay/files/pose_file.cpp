@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "common/base/errors.h"
 #include "common/replay/files/text_file.h"
@@ -80,8 +81,14 @@ PoseFile PoseFile::read(const std::filesystem::path& file) {
   const auto lines = readLines(file, "--odometry takes `vio`, `truth` or a file of poses");
   Complaints wrong(file);
   std::vector<StampedPose> poses;
-  std::size_t columns = 0;
+  std::size_t columns = 0, last_line = 0;
   for (const auto& line : lines) {
+    const std::size_t expected = std::exchange(last_line, line.number) + 1;
+    // A line without time is the pose of the frame of its number.
+    if (columns > 8 && line.number != expected && !poses.empty()) {
+      wrong.add(expected,
+                "the line is empty, and poses are counted by lines; write the frame's pose");
+    }
     if (line.text.starts_with('#')) continue;
     const auto fields = split(line.text, line.text.find(',') != std::string::npos ? ',' : ' ');
     if (columns == 0) columns = fields.size();

@@ -26,9 +26,15 @@ std::string indented(const std::string& text) {
   return result;
 }
 
+void addNotes(const SensorFile& file, std::vector<std::string>* notes) {
+  if (!notes) return;
+  const auto keys = file.unknownKeys();
+  notes->insert(notes->end(), keys.begin(), keys.end());
+}
+
 }  // namespace
 
-Calibration readRig(const std::filesystem::path& path) {
+Calibration readRig(const std::filesystem::path& path, std::vector<std::string>* notes) {
   if (!std::filesystem::is_regular_file(path)) {
     throw StartupError(
         ExitCode::kUnavailable,
@@ -37,13 +43,19 @@ Calibration readRig(const std::filesystem::path& path) {
   const SensorFile file(path);
   Calibration rig;
   for (const std::string name : {"cam0", "cam1"}) {
-    if (file.has(name)) rig.cameras.push_back(readCamera(file.section(name), name));
+    if (!file.has(name)) continue;
+    const SensorFile section = file.section(name);
+    const auto in_chain =
+        rig.cameras.empty() ? std::nullopt : placeInChain(section, rig.cameras.back());
+    rig.cameras.push_back(readCamera(section, name, in_chain));
+    addNotes(section, notes);
   }
   if (rig.cameras.empty() || rig.cameras[0].name != "cam0") file.wrong("cam0", "is missing");
   if (file.has("imu0")) {
     const SensorFile imu = file.section("imu0");
     rig.imu = readImuCalibration(imu);
     for (auto& camera : rig.cameras) camera.T_BC = imu.T_BS().inverse() * camera.T_BC;
+    addNotes(imu, notes);
   }
   return rig;
 }
@@ -68,7 +80,9 @@ void applyRig(const Calibration& rig, const std::string& file, Calibration& cali
       stop(fmt::format("{} is for images of {}x{}, the drive's are {}x{}; calibrate at that size",
                        camera.name, given->width, given->height, camera.width, camera.height));
     }
+    const double rate_hz = given->rate_hz > 0.0 ? given->rate_hz : camera.rate_hz;
     camera = *given;
+    camera.rate_hz = rate_hz;
   }
   if (rig.imu) calibration.imu = rig.imu;
 }

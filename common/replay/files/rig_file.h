@@ -1,17 +1,19 @@
 // The rig file: cameras and IMU of a vehicle, as `perdure calibrate` writes them and as capture,
 // pipeline and calibrate read them. Sections cam0, cam1 and imu0 with the keys of EuRoC's
-// sensor.yaml; T_BS is the sensor in the body, and the body is the IMU.
+// sensor.yaml; T_BS is the sensor in the body, and the body is the IMU. Kalibr's camchain is one,
+// too.
 #pragma once
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/types/sensors.h"
 
 namespace perdure::replay {
 
-/// Throws StartupError with the key and the mend.
-Calibration readRig(const std::filesystem::path& file);
+/// Throws StartupError with the key and the mend. `notes` gets a sentence for each unknown key.
+Calibration readRig(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);
 
 /// All digits; `comment` may have several lines.
 std::string rigText(const Calibration& rig, const std::string& comment);

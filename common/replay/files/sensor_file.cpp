@@ -17,6 +17,7 @@ const char* nameOf(DistortionModel model) {
     case DistortionModel::kNone:
       return "none";
     case DistortionModel::kRadialTangential:
+    case DistortionModel::kRational:
       return "radial-tangential";
     case DistortionModel::kEquidistant:
       return "equidistant";
@@ -48,15 +49,46 @@ SensorFile SensorFile::section(const std::string& key) const {
   return {name_ + ": " + key, node};
 }
 
+YAML::Node SensorFile::value(const std::string& key) const {
+  asked_.insert(key);
+  return root_[key];
+}
+
+std::optional<std::vector<double>> SensorFile::list(const char* key) const {
+  YAML::Node node = value(key);
+  if (!node) return std::nullopt;
+  if (node.IsMap()) {
+    if (!node["data"]) wrong(key, "holds no `data`");
+    node.reset(node["data"]);
+  }
+  std::vector<double> values;
+  const auto take = [&](const YAML::Node& item) {
+    const auto number = item.IsScalar() ? parseNumber(item.Scalar()) : std::nullopt;
+    if (!number) wrong(key, "holds something that is no number");
+    values.push_back(*number);
+  };
+  if (!node.IsSequence()) wrong(key, "holds no `data` or list of numbers");
+  for (const auto& item : node) {
+    if (!item.IsSequence()) {
+      take(item);
+      continue;
+    }
+    for (const auto& number : item) take(number);
+  }
+  return values;
+}
+
 std::vector<double> SensorFile::numbers(const char* key, std::size_t count) const {
-  return numbersOf(root_[key], key, count);
+  auto values = list(key);
+  if (values && values->size() == count) return *std::move(values);
+  wrong(key, "is missing or has not " + std::to_string(count) + " numbers");
 }
 
 double SensorFile::number(const char* key, double low) const {
-  const YAML::Node node = root_[key];
-  const auto value = node && node.IsScalar() ? parseNumber(node.Scalar()) : std::nullopt;
-  if (!value || *value < low) wrong(key, "is missing or no number that makes sense");
-  return *value;
+  const YAML::Node node = value(key);
+  const auto number = node && node.IsScalar() ? parseNumber(node.Scalar()) : std::nullopt;
+  if (!number || *number < low) wrong(key, "is missing or no number that makes sense");
+  return *number;
 }
 
 double SensorFile::number(const char* key, double low, double otherwise) const {
@@ -64,20 +96,19 @@ double SensorFile::number(const char* key, double low, double otherwise) const {
 }
 
 std::string SensorFile::text(const char* key) const {
-  const YAML::Node node = root_[key];
+  const YAML::Node node = value(key);
   return node && node.IsScalar() ? node.Scalar() : std::string();
 }
 
-RigidTransform SensorFile::T_BS() const {
-  if (!has("T_BS")) return {};
-  if (!root_["T_BS"].IsMap()) wrong("T_BS", "holds no `data` of 16 numbers");
+std::optional<RigidTransform> SensorFile::transform(const char* key) const {
+  if (!has(key)) return std::nullopt;
   using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-  const auto v = numbersOf(root_["T_BS"]["data"], "T_BS.data", 16);
+  const auto v = numbers(key, 16);
   const Eigen::Matrix4d m = Eigen::Map<const RowMajor>(v.data());
   const Eigen::Matrix3d R = m.topLeftCorner<3, 3>();
   const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(error <= 1e-2) || R.determinant() < 0.0) {
-    wrong("T_BS", "is not a rotation and a translation");
+    wrong(key, "is not a rotation and a translation");
   }
   return RigidTransform(R, Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
@@ -87,69 +118,47 @@ void SensorFile::wrong(const std::string& key, const std::string& what) const {
                      name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
 }
 
-std::vector<double> SensorFile::numbersOf(const YAML::Node& node, const std::string& key,
-                                          std::size_t count) const {
-  std::vector<double> values;
-  if (node && node.IsSequence()) {
-    for (const auto& item : node) {
-      const auto value = item.IsScalar() ? parseNumber(item.Scalar()) : std::nullopt;
-      if (value) values.push_back(*value);
-    }
+std::vector<std::string> SensorFile::unknownKeys() const {
+  // Of EuRoC, Kalibr and ROS; nothing here needs them.
+  static const std::set<std::string> kOfNoUse{"sensor_type",
+                                              "comment",
+                                              "rostopic",
+                                              "cam_overlaps",
+                                              "T_cn_cnm1",
+                                              "camera_name",
+                                              "camera_id",
+                                              "projection_matrix",
+                                              "gyroscope_misalignment",
+                                              "T_i_b",
+                                              "model",
+                                              "T_BS",
+                                              "rectification_matrix",
+                                              "time_offset",
+                                              "camera_model",
+                                              "line-delay",
+                                              "line_delay_nanoseconds",
+                                              "cam0",
+                                              "cam1",
+                                              "imu0"};
+  std::vector<std::string> sentences;
+  for (const auto& entry : root_) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
+    if (key.empty() || asked_.contains(key) || kOfNoUse.contains(key)) continue;
+    sentences.push_back(name_ + ": the key `" + key + "` is not known and has no effect");
   }
-  if (values.size() == count) return values;
-  wrong(key, "is missing or has not " + std::to_string(count) + " numbers");
-}
-
-CameraCalibration readCamera(const SensorFile& file, const std::string& name) {
-  CameraCalibration camera;
-  camera.name = name;
-  const auto size = file.numbers("resolution", 2);
-  const auto f = file.numbers("intrinsics", 4);
-  if (size[0] < 1 || size[1] < 1 || size[0] > 65535 || size[1] > 65535) {
-    file.wrong("resolution", "is no size of an image");
-  }
-  if (f[0] <= 0 || f[1] <= 0) file.wrong("intrinsics", "have a focal length that is not > 0");
-  camera.width = static_cast<std::uint32_t>(size[0]);
-  camera.height = static_cast<std::uint32_t>(size[1]);
-  camera.fx = f[0], camera.fy = f[1], camera.cx = f[2], camera.cy = f[3];
-  camera.rate_hz = file.number("rate_hz", 1e-3);
-  const std::string model = toLower(file.text("distortion_model"));
-  if (model == "radial-tangential" || model == "radtan") {
-    camera.distortion = DistortionModel::kRadialTangential;
-  } else if (model == "equidistant") {
-    camera.distortion = DistortionModel::kEquidistant;
-  } else if (!model.empty() && model != "none") {
-    file.wrong("distortion_model",
-               "is `" + model + "`; radial-tangential, equidistant and none are known");
-  }
-  if (camera.distortion != DistortionModel::kNone) {
-    camera.distortion_coefficients = file.numbers("distortion_coefficients", 4);
-  }
-  camera.T_BC = file.T_BS();
-  camera.time_offset_s = file.number("time_offset_s", -1.0, 0.0);
-  camera.readout_s = file.number("readout_s", 0.0, 0.0);
-  return camera;
-}
-
-ImuCalibration readImuCalibration(const SensorFile& file) {
-  ImuCalibration imu;
-  imu.gyro_noise = file.number("gyroscope_noise_density", 0.0);
-  imu.gyro_bias_walk = file.number("gyroscope_random_walk", 0.0);
-  imu.accel_noise = file.number("accelerometer_noise_density", 0.0);
-  imu.accel_bias_walk = file.number("accelerometer_random_walk", 0.0);
-  imu.rate_hz = file.number("rate_hz", 1e-3);
-  return imu;
+  return sentences;
 }
 
 std::string cameraKeys(const CameraCalibration& camera) {
-  std::string text = fmt::format(
-      "rate_hz: {}\nresolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: [{}, {}, {}, {}]\n"
+  std::string text = camera.rate_hz > 0.0 ? fmt::format("rate_hz: {}\n", camera.rate_hz) : "";
+  text += fmt::format(
+      "resolution: [{}, {}]\ncamera_model: pinhole\nintrinsics: [{}, {}, {}, {}]\n"
       "distortion_model: {}\n",
-      camera.rate_hz, camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+      camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
       nameOf(camera.distortion));
   if (camera.distortion != DistortionModel::kNone) {
-    const auto& d = camera.distortion_coefficients;
-    text += fmt::format("distortion_coefficients: [{}, {}, {}, {}]\n", d[0], d[1], d[2], d[3]);
+    text += fmt::format("distortion_coefficients: [{}]\n",
+                        fmt::join(camera.distortion_coefficients, ", "));
   }
   return text + fmt::format(
                     "time_offset_s: {}  # t_imu = t_image + this\n"

@@ -98,8 +98,10 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
     return fail("not_mcap",
                 path.string() + " is no MCAP file; recordings come from perdure record");
   }
-  reader.finished_ = reader.readSummary();
-  if (!reader.finished_) reader.scan();
+  const Summary summary = reader.readSummary();
+  reader.finished_ = summary == Summary::kHolds;
+  if (!reader.finished_) reader.finished_ = reader.scan() && summary == Summary::kTooLittle;
+  if (reader.finished_) reader.whole_ = reader.size_;
   return reader;
 }
 
@@ -109,6 +111,7 @@ Reader::Reader(Reader&& other) noexcept
       size_(other.size_),
       whole_(other.whole_),
       damaged_(other.damaged_),
+      problem_(std::move(other.problem_)),
       finished_(other.finished_),
       catalogue_(std::move(other.catalogue_)),
       chunks_(std::move(other.chunks_)),
@@ -139,86 +142,104 @@ std::vector<std::uint8_t> Reader::read(std::uint64_t at, std::uint64_t length) c
   return bytes;
 }
 
-bool Reader::readSummary() {
+/// What may be left out (all of it, statistics, indexes) is no fault.
+Reader::Summary Reader::readSummary() {
   constexpr std::uint64_t kEnd = kRecordHead + kFooterContent + kMagic.size();
-  if (size_ < kMagic.size() + kEnd) return false;
+  if (size_ < kMagic.size() + kEnd) return Summary::kTooLittle;
   const std::uint64_t footer_at = size_ - kEnd;
   const auto end = read(footer_at, kEnd);
   Bytes rest(end);
   const auto footer = takeRecord(rest);
   if (!footer || footer->op != Op::kFooter || !std::equal(rest.begin(), rest.end(), kMagic.begin()))
-    return false;
+    return Summary::kTooLittle;
   Take take(footer->content);
   std::uint64_t summary_at = 0, offsets_at = 0;
   std::uint32_t checksum = 0;
-  if (!take.number(summary_at) || !take.number(offsets_at) || !take.number(checksum)) return false;
-  if (summary_at < kMagic.size() || summary_at > footer_at) return false;
-  if (footer_at - summary_at > kMostContent) return false;
+  const bool whole = take.number(summary_at) && take.number(offsets_at) && take.number(checksum);
+  if (whole && summary_at == 0) return Summary::kTooLittle;
+  if (!whole || summary_at < kMagic.size() || summary_at > footer_at) return Summary::kWrong;
+  if (footer_at - summary_at > kMostContent) return Summary::kWrong;
   const std::uint64_t covered = size_ - summary_at - kMagic.size() - sizeof checksum;
   const auto summary = read(summary_at, covered);
-  if (summary.size() != covered || (checksum != 0 && crc(summary) != checksum)) return false;
-  whole_ = size_;
-  return takeSummary(Bytes(summary).first(footer_at - summary_at)) && plausible();
+  if (summary.size() != covered || (checksum != 0 && crc(summary) != checksum))
+    return Summary::kWrong;
+  return takeSummary(Bytes(summary).first(footer_at - summary_at));
 }
 
-bool Reader::takeSummary(Bytes records) {
+Reader::Summary Reader::takeSummary(Bytes records) {
   bool counted = false;
   while (!records.empty()) {
     const auto record = takeRecord(records);
-    if (!record) return false;
+    if (!record) return Summary::kWrong;
     if (record->op == Op::kSchema) {
       const auto schema = schemaFrom(record->content);
-      if (!schema) return false;
+      if (!schema) return Summary::kWrong;
       catalogue_.schemas.emplace(schema->id, *schema);
     } else if (record->op == Op::kChannel) {
       const auto channel = channelFrom(record->content);
-      if (!channel) return false;
+      if (!channel) return Summary::kWrong;
       catalogue_.channels.emplace(channel->id, *channel);
     } else if (record->op == Op::kChunkIndex) {
       const auto chunk = chunkIndexFrom(record->content);
-      if (!chunk) return false;
+      if (!chunk) return Summary::kWrong;
       chunks_.push_back(*chunk);
     } else if (record->op == Op::kStatistics) {
       const auto statistics = statisticsFrom(record->content);
-      if (!statistics) return false;
+      if (!statistics) return Summary::kWrong;
       statistics_ = *statistics;
       counted = true;
     }
   }
-  return counted;
+  if (!plausible()) return Summary::kWrong;
+  return counted && describesAll() ? Summary::kHolds : Summary::kTooLittle;
 }
 
-/// Whether chunks lie in the file, and all messages in chunks.
+/// Whether chunks lie in the file.
 bool Reader::plausible() const {
-  for (const ChunkIndex& chunk : chunks_) {
-    if (chunk.offset < kMagic.size() || chunk.offset > size_ || chunk.length < kRecordHead ||
-        chunk.length > size_ - chunk.offset) {
-      return false;
-    }
-  }
-  return !chunks_.empty() || statistics_.messages == 0;
+  return std::all_of(chunks_.begin(), chunks_.end(), [this](const ChunkIndex& chunk) {
+    return chunk.offset >= kMagic.size() && chunk.offset <= size_ && chunk.length >= kRecordHead &&
+           chunk.length <= size_ - chunk.offset;
+  });
 }
 
-void Reader::scan() {
+/// Whether all messages, and what they refer to, can be found by the summary alone.
+bool Reader::describesAll() const {
+  if (statistics_.messages == 0) return true;
+  return !chunks_.empty() && chunks_.size() == statistics_.chunks &&
+         catalogue_.channels.size() == statistics_.channels &&
+         catalogue_.schemas.size() == statistics_.schemas;
+}
+
+/// Whether it came to the footer with the magic behind it, the file's end.
+bool Reader::scan() {
   catalogue_ = {};
   chunks_.clear();
   statistics_ = {};
   std::uint64_t at = whole_ = std::min<std::uint64_t>(size_, kMagic.size());
+  bool in_data = true;
   while (at + kRecordHead <= size_) {
     const auto head = read(at, kRecordHead);
     Take take(head);
     std::uint8_t op = 0;
     std::uint64_t length = 0;
-    if (!take.number(op) || !take.number(length) || op == 0) return;
-    if (length > size_ - at - kRecordHead) return;  // cut off
-    if (!scanRecord(static_cast<Op>(op), at, length)) return;
-    at += kRecordHead + length;
+    if (!take.number(op) || !take.number(length) || op == 0) return false;
+    if (length > size_ - at - kRecordHead) return false;  // cut off
+    const std::uint64_t end = at + kRecordHead + length;
+    if (static_cast<Op>(op) == Op::kFooter) return endsAt(end);
+    if (static_cast<Op>(op) == Op::kDataEnd) in_data = false;
+    if (in_data && !scanRecord(static_cast<Op>(op), at, length)) return false;
+    at = end;
   }
+  return false;
 }
 
-/// False at the end of the data, and where nothing behind can be believed.
+bool Reader::endsAt(std::uint64_t end) const {
+  const auto magic = read(end, kMagic.size() + 1);
+  return std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end());
+}
+
+/// False where nothing behind can be believed.
 bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
-  if (op == Op::kDataEnd || op == Op::kFooter) return false;
   if (op == Op::kChunk) return scanChunk(at, length);
   if (op == Op::kHeader && chunks_.empty()) whole_ = at + kRecordHead + length;
   if (op != Op::kSchema && op != Op::kChannel && op != Op::kMessage && op != Op::kMessageIndex) {
@@ -252,6 +273,7 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
   const auto records = unpack(place);
   if (!records) {
     ++damaged_;
+    problem_ = records.error();
     return true;
   }
   constexpr std::uint64_t kHead = 256;
@@ -269,7 +291,10 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
         ++statistics_.by_channel[message.channel];
       },
       catalogue_);
-  if (!whole) ++damaged_;
+  if (!whole) {
+    ++damaged_;
+    problem_ = {"chunk_damaged", path_.string() + ": a chunk ends within a record"};
+  }
   for (const auto& [channel, entries] : last_index_) statistics_.messages += entries.size();
   statistics_.start_ns =
       chunks_.empty() ? place.start_ns : std::min(statistics_.start_ns, place.start_ns);
@@ -313,10 +338,10 @@ Result<Records> Reader::unpack(const ChunkIndex& chunk) const {
   const auto record = takeRecord(rest);
   const auto head =
       record && record->op == Op::kChunk ? chunkHeadFrom(record->content) : std::nullopt;
-  if (!head || head->place.packed != record->content.size() - head->records_at) {
+  if (!head || head->place.packed > record->content.size() - head->records_at) {
     return fail("chunk_damaged", path_.string() + ": no chunk at " + std::to_string(chunk.offset));
   }
-  auto records = unpacked(*head, record->content.subspan(head->records_at));
+  auto records = unpacked(*head, record->content.subspan(head->records_at, head->place.packed));
   if (!records) return fail(records.error().code, path_.string() + ": " + records.error().detail);
   return std::make_shared<const std::vector<std::uint8_t>>(*std::move(records));
 }

@@ -1,6 +1,7 @@
 // A recording's file as it is read: by its summary, or, where that is missing or wrong (a recorder
-// that was killed), by going through it chunk by chunk. Any bytes are taken; nothing is believed
-// that was not checked.
+// that was killed, or a writer that leaves out what it may), by going through it record by record.
+// Records of kinds that are not known are passed over, and so are bytes behind a record's last
+// field. Any bytes are taken; nothing is believed that was not checked.
 #pragma once
 
 #include <filesystem>
@@ -25,15 +26,19 @@ class Reader {
   ~Reader();
 
   const std::filesystem::path& path() const { return path_; }
-  /// Whether it has a summary that holds. Otherwise all that is whole was found by looking.
+  /// Whether the file goes to its end: a footer and the magic, and no summary that is wrong.
+  /// Otherwise all that is whole was found by looking.
   bool finished() const { return finished_; }
   const Catalogue& catalogue() const { return catalogue_; }
   const std::vector<ChunkIndex>& chunks() const { return chunks_; }
   const Statistics& statistics() const { return statistics_; }
   std::uint64_t size() const { return size_; }
-  /// Of an unfinished file: bytes behind the last whole chunk, and chunks that are damaged.
+  /// Of an unfinished file: bytes behind the last whole chunk.
   std::uint64_t cutBytes() const { return size_ - whole_; }
+  /// Chunks that could not be read, where the file was gone through, and why the last one could
+  /// not.
   std::uint64_t damagedChunks() const { return damaged_; }
+  const Reason& problem() const { return problem_; }
 
   /// The chunk's records. Reasons: "chunk_damaged", "chunk_lz4", "chunk_too_large", "file".
   Result<Records> unpack(const ChunkIndex& chunk) const;
@@ -47,10 +52,13 @@ class Reader {
  private:
   Reader(std::filesystem::path path, int file, std::uint64_t size)
       : path_(std::move(path)), file_(file), size_(size) {}
-  bool readSummary();
-  bool takeSummary(Bytes records);
+  enum class Summary { kHolds, kTooLittle, kWrong };
+  Summary readSummary();
+  Summary takeSummary(Bytes records);
   bool plausible() const;
-  void scan();
+  bool describesAll() const;
+  bool scan();
+  bool endsAt(std::uint64_t end) const;
   bool scanRecord(Op op, std::uint64_t at, std::uint64_t length);
   bool scanChunk(std::uint64_t at, std::uint64_t length);
   void scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content);
@@ -60,6 +68,7 @@ class Reader {
   std::filesystem::path path_;
   int file_ = -1;
   std::uint64_t size_ = 0, whole_ = 0, damaged_ = 0;
+  Reason problem_;
   bool finished_ = false;
   Catalogue catalogue_;
   std::vector<ChunkIndex> chunks_;

@@ -73,6 +73,7 @@ void RecordedMessages::openFile(const fs::path& path) {
                              " was not finished: " + std::to_string(reader->cutBytes()) +
                              " bytes at its end are lost; `perdure record repair` makes it whole"});
   }
+  if (reader->damagedChunks() > 0) count(reader->problem());
   const auto& catalogue = reader->catalogue();
   for (const auto& [id, n] : reader->statistics().by_channel) {
     const auto channel = catalogue.channels.find(id);

@@ -50,11 +50,11 @@ void describe(A& a, D& d, W& w) {
   a.number("fy", d.fy, w.fy, kPositive);
   a.number("cx", d.cx, w.cx, kPixel);
   a.number("cy", d.cy, w.cy, kPixel);
-  a.choice("distortion", d.distortion, w.distortion, DistortionModel::kEquidistant);
+  a.choice("distortion", d.distortion, w.distortion, DistortionModel::kRational);
   a.numbers("distortion_coefficients", d.distortion_coefficients, w.coefficients, kMatrixEntry,
             kCoefficients);
   a.ensure("distortion_coefficients", "size_mismatch", [&] {
-    const std::size_t needed = d.distortion == DistortionModel::kNone ? 0 : 4;
+    const std::size_t needed = coefficientsOf(d.distortion);
     return d.distortion_coefficients.size() == needed || d.distortion_coefficients.empty();
   });
   a.pose("T_BC", d.T_BC, w.T_BC);

@@ -23,6 +23,8 @@ CameraCalibration calibrationWith(DistortionModel model) {
     c.distortion_coefficients = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
   } else if (model == DistortionModel::kEquidistant) {
     c.distortion_coefficients = {-0.0143, 0.0048, -0.0031, 0.0007};
+  } else if (model == DistortionModel::kRational) {
+    c.distortion_coefficients = {0.45, 0.09, 0.0007, -0.0004, 0.002, 0.72, 0.16, 0.008};
   }
   return c;
 }
@@ -66,7 +68,33 @@ TEST_P(CameraModelOfEachKind, PointsBehindDoNotProject) {
 INSTANTIATE_TEST_SUITE_P(Models, CameraModelOfEachKind,
                          ::testing::Values(DistortionModel::kNone,
                                            DistortionModel::kRadialTangential,
-                                           DistortionModel::kEquidistant));
+                                           DistortionModel::kEquidistant,
+                                           DistortionModel::kRational));
+
+TEST(CameraModel, WithoutItsLastFourCoefficientsTheRationalModelIsBrowns) {
+  const CameraModel brown(calibrationWith(DistortionModel::kRadialTangential));
+  CameraCalibration calibration = brown.calibration();
+  calibration.distortion = DistortionModel::kRational;
+  calibration.distortion_coefficients.resize(8, 0.0);
+  const CameraModel rational(calibration);
+  for (double x = -0.7; x < 0.7; x += 0.1) {
+    const Eigen::Vector2d n(x, 0.4 - x);
+    EXPECT_LT((brown.distort(n) - rational.distort(n)).norm(), 1e-12);
+  }
+}
+
+TEST(CameraModel, TheRationalModelIsTheQuotientOfItsDefinition) {
+  const CameraModel camera(calibrationWith(DistortionModel::kRational));
+  const auto radial = [](double r2) {
+    return (1 + r2 * (0.45 + r2 * (0.09 + r2 * 0.002))) /
+           (1 + r2 * (0.72 + r2 * (0.16 + r2 * 0.008)));
+  };
+  const double x = 0.4, y = -0.3, r2 = 0.25, p1 = 0.0007, p2 = -0.0004;
+  const Eigen::Vector2d expected(
+      458.654 * (x * radial(r2) + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + 367.215,
+      457.296 * (y * radial(r2) + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + 248.375);
+  EXPECT_LT((camera.distort({x, y}) - expected).norm(), 1e-10);
+}
 
 TEST(CameraModel, DistortionThatFoldsBackDoesNotProjectFarPointsIntoTheImage) {
   CameraCalibration calibration = calibrationWith(DistortionModel::kRadialTangential);

@@ -82,11 +82,12 @@ TEST(Euroc, ASimulatedVehiclesSpeedComesWithItsSigma) {
   while (auto message = dataset->next()) {
     if (auto* sample = std::get_if<SpeedSample>(&*message)) speed.push_back(*sample);
   }
-  ASSERT_EQ(speed.size(), 2U);
-  EXPECT_EQ(speed[1].speed, 8.6);
-  EXPECT_EQ(speed[1].sigma, 0.03);
-  EXPECT_EQ(toNanoseconds(speed[1].time), 1'020'000'000);
-  EXPECT_EQ(dataset->reasons().of("speed_malformed"), 2U);
+  ASSERT_EQ(speed.size(), 3U);
+  EXPECT_EQ(speed[2].speed, 8.6);
+  EXPECT_EQ(speed[2].sigma, 0.03);
+  EXPECT_EQ(toNanoseconds(speed[2].time), 1'020'000'000);
+  EXPECT_EQ(dataset->reasons().of("speed_malformed"), 1U);
+  EXPECT_EQ(dataset->reasons().of("speed_unsorted"), 1U);
   fs::remove(root / "mav0/speed0/sensor.yaml");
   EXPECT_THAT(errorOfEuroc(root), HasSubstr("speed0/sensor.yaml"));
 }
@@ -195,7 +196,7 @@ TEST(Euroc, BrokenLinesAreCountedAndLeftOut) {
   EXPECT_EQ(dataset->reasons().of("imu_not_increasing"), 1U);
   EXPECT_EQ(dataset->reasons().of("imu_malformed"), 2U);
   EXPECT_EQ(dataset->reasons().of("frame_malformed"), 1U);
-  EXPECT_EQ(dataset->frameCount(), 5U);
+  EXPECT_EQ(dataset->frameCount(), 6U) << "a line that cannot be read keeps its number";
 }
 
 }  // namespace

@@ -106,6 +106,31 @@ TEST(KittiRaw, OxtsComesAsInertialSamplesAndSpeedOfTheBody) {
   EXPECT_EQ(speed[3].time, imu[3].time);
 }
 
+/// The line of a file becomes empty.
+void emptyLine(const fs::path& file, std::size_t number) {
+  std::string text = readText(file);
+  std::size_t begin = 0;
+  for (; number > 1; --number) begin = text.find('\n', begin) + 1;
+  text.erase(begin, text.find('\n', begin) - begin);
+  writeText(file, text);
+}
+
+TEST(KittiRaw, AnEmptyStampCostsItsRecordAndNotTheOnesBehind) {
+  const auto drive = tinyKittiRaw("empty_line");
+  const auto whole = Dataset::open({.path = drive});
+  const auto third = *whole->frameTime(2), fourth = *whole->frameTime(3);
+  emptyLine(drive / "image_02/timestamps.txt", 2);
+  emptyLine(drive / "oxts/timestamps.txt", 2);
+  const auto dataset = Dataset::open({.path = drive});
+  EXPECT_FALSE(dataset->frameTime(1));
+  EXPECT_EQ(dataset->frameTime(2), third);
+  EXPECT_EQ(dataset->frameTime(3), fourth);
+  EXPECT_EQ(dataset->reasons().of("imu_malformed"), 1U);
+  ASSERT_EQ(dataset->recording().speed.size(), 3U);
+  EXPECT_EQ(dataset->recording().speed[1].speed, 5.0) << "the third record's own";
+  EXPECT_EQ(dataset->recording().speed[1].time, whole->recording().speed[2].time);
+}
+
 TEST(KittiRaw, AStampOfNoTimeOfDayIsNone) {
   for (const char* stamp :
        {"24:04:32.1", "13:60:32.1", "13:04:61.1", "-1:04:32.1", "13:04:32.-1", "2147483647:0:0"}) {

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "common/base/errors.h"
@@ -95,6 +96,19 @@ void writeImage(const fs::path& file, int width, int height, int channels) {
   cv::Mat image(height, width, channels == 3 ? CV_8UC3 : CV_8UC1);
   for (int r = 0; r < height; ++r) {
     for (int c = 0; c < width * channels; ++c) image.ptr(r)[c] = static_cast<uchar>(7 * r + 3 * c);
+  }
+  cv::imwrite(file.string(), image);
+}
+
+void writeGrey(const fs::path& file, int width, int height, int value) {
+  cv::imwrite(file.string(), cv::Mat(height, width, CV_8UC1, cv::Scalar(value)));
+}
+
+void writeDeepImage(const fs::path& file, int width, int height, int bits) {
+  cv::Mat image(height, width, CV_16UC1);
+  const int most = (1 << bits) - 1, last = width * height - 1;
+  for (int i = 0; i <= last; ++i) {
+    image.at<std::uint16_t>(i / width, i % width) = static_cast<std::uint16_t>(most * i / last);
   }
   cv::imwrite(file.string(), image);
 }

@@ -13,6 +13,9 @@ void writeText(const std::filesystem::path& file, const std::string& text);
 std::string readText(const std::filesystem::path& file);
 /// A grey ramp; .png or .jpg, one or three channels.
 void writeImage(const std::filesystem::path& file, int width, int height, int channels);
+void writeGrey(const std::filesystem::path& file, int width, int height, int value);
+/// A ramp from 0 to the brightest value of so many bits, in a PNG of 16.
+void writeDeepImage(const std::filesystem::path& file, int width, int height, int bits);
 void truncate(const std::filesystem::path& file, double share);
 
 /// EuRoC: five 32×24 frames at 20 Hz from 1 s, IMU at 200 Hz from 0.95 s to 1.25 s, truth.

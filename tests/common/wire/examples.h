@@ -82,7 +82,10 @@ class Examples {
                         uniform(),
                         uniform(),
                         uniform(1, 60)};
-    for (int i = 0; i < 4; ++i) c.distortion_coefficients.push_back(uniform(-1, 1));
+    if (coin()) c.distortion = DistortionModel::kRational;
+    while (c.distortion_coefficients.size() < coefficientsOf(c.distortion)) {
+      c.distortion_coefficients.push_back(uniform(-1, 1));
+    }
     return c;
   }
   void fill(Calibration& m) {

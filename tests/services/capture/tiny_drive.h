@@ -29,7 +29,8 @@ struct TinyDrive {
   void writeCamera(const std::filesystem::path& folder) const {
     std::filesystem::create_directories(folder / "data");
     std::ofstream(folder / "sensor.yaml")
-        << "rate_hz: 20\nresolution: [16, 12]\nintrinsics: [10.0, 10.0, 8.0, 6.0]\n";
+        << "rate_hz: 20\nresolution: [16, 12]\nintrinsics: [10.0, 10.0, 8.0, 6.0]\n"
+           "T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n";
     std::ofstream csv(folder / "data.csv");
     csv << "#timestamp [ns],filename\n";
     for (int i = 0; i < frames; ++i) {

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "common/base/checked_file.h"
 #include "common/base/ids.h"
 
 namespace perdure::tools {
@@ -159,6 +161,12 @@ cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& are
     if (isFree(place)) return place;
   }
   return wanted;
+}
+
+void writePicture(const cv::Mat& picture, const std::filesystem::path& file) {
+  std::vector<uchar> bytes;
+  if (!cv::imencode(".png", picture, bytes)) throwUnwritten(file, "the picture cannot be packed");
+  writeChecked(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace perdure::tools

@@ -2,6 +2,7 @@
 // inside the picture and beside one another.
 #pragma once
 
+#include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
@@ -51,5 +52,8 @@ void drawText(cv::Mat& image, const std::string& text, const cv::Point& at, cons
 /// than the area begins at its upper left corner.
 cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& area,
                   const std::vector<cv::Rect>& taken);
+
+/// As PNG. Throws StartupError(kInputOutput) where the file cannot be written whole.
+void writePicture(const cv::Mat& picture, const std::filesystem::path& file);
 
 }  // namespace perdure::tools

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 
 #include "tools/outputs/pictures/chart.h"
+#include "tools/outputs/pictures/drawing.h"
 
 namespace perdure::tools {
 namespace {
@@ -242,7 +242,9 @@ cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions) {
 bool writeEvolution(const DriveLog& log, const PictureTruth* truth,
                     const std::filesystem::path& file) {
   const auto evolutions = chooseEvolutions(log, truth, 5);
-  return !evolutions.empty() && cv::imwrite(file.string(), drawEvolutions(evolutions));
+  if (evolutions.empty()) return false;
+  writePicture(drawEvolutions(evolutions), file);
+  return true;
 }
 
 }  // namespace perdure::tools

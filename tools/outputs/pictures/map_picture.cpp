@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "common/math/so3.h"
 #include "tools/outputs/pictures/chart.h"
+#include "tools/outputs/pictures/drawing.h"
 #include "tools/outputs/pictures/map_legend.h"
 
 namespace perdure::tools {
@@ -235,7 +235,8 @@ cv::Mat drawMap(const MapContent& content, const MapView& view) {
 
 bool writeMap(const MapContent& content, const std::filesystem::path& file) {
   if (content.path.empty() && content.objects.empty()) return false;
-  return cv::imwrite(file.string(), drawMap(content, viewOf(content)));
+  writePicture(drawMap(content, viewOf(content)), file);
+  return true;
 }
 
 }  // namespace perdure::tools

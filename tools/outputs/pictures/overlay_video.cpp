@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/vision/image.h"
 
@@ -40,6 +41,7 @@ double rateOf(const DriveLog& log, const CameraCalibration& camera) {
 }
 
 std::string writeFrames(const DriveLog& log, replay::Dataset& dataset, OverlayWriter& writer,
+                        const std::filesystem::path& file,
                         const std::function<void(std::size_t, std::size_t)>& progress) {
   std::size_t done = 0;
   Reason last{"image_missing", "the folder has no images"};
@@ -51,6 +53,8 @@ std::string writeFrames(const DriveLog& log, replay::Dataset& dataset, OverlayWr
     if (!added && added.error().code.starts_with("video_")) break;
     progress(++done, log.frames().size());
   }
+  if (const auto finished = writer.finish(); !finished) last = finished.error();
+  if (last.code == "video_not_written") throwUnwritten(file, last.detail);
   if (writer.frames() > 0) {
     return fmt::format("overlay.mp4: {} frames, {}", writer.frames(), writer.codec());
   }
@@ -68,8 +72,9 @@ std::string writeOverlay(const DriveLog& log, const replay::DatasetOptions& data
     const auto dataset = replay::Dataset::open(data);
     const CameraCalibration& camera = dataset->calibration().cameras.front();
     OverlayWriter writer(file, camera, rateOf(log, camera), {.reach_m = usualReach(log)});
-    return writeFrames(log, *dataset, writer, progress);
+    return writeFrames(log, *dataset, writer, file, progress);
   } catch (const StartupError& error) {
+    if (error.code() == ExitCode::kInputOutput) throw;
     return fmt::format("overlay.mp4 is not written: {}", error.what());
   }
 }

@@ -24,6 +24,8 @@ class OverlayWriter {
   /// Frames by time. Opens the file at the first. Reasons: image_missing, image_malformed (viewOf),
   /// image_size (not that of the calibration), those of VideoFile (nothing is written then).
   Result<void> add(const Frame& frame, const FrameGlance& glance);
+  /// Ends the film. Reason video_not_written.
+  Result<void> finish() { return video_ ? video_->finish() : Result<void>(); }
   std::size_t frames() const { return video_ ? video_->frames() : 0; }
   /// "H.264", "MPEG-4"; empty before the first frame.
   std::string codec() const { return video_ ? video_->codec() : ""; }

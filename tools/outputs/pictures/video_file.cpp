@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "common/base/check.h"
 
@@ -64,11 +65,16 @@ struct VideoFile::Film {
   std::size_t frames = 0;
   bool begun = false;
 
-  ~Film() {
-    if (!begun) return;
+  ~Film() { (void)end(); }
+
+  /// Writes what is left, once; false where not all of the file could be written.
+  bool end() {
+    if (!std::exchange(begun, false)) return true;
     avcodec_send_frame(codec.get(), nullptr);
-    drain();
-    av_write_trailer(file.get());
+    const bool drained = drain();
+    const bool ended = av_write_trailer(file.get()) >= 0;
+    avio_flush(file->pb);
+    return drained && ended && file->pb->error >= 0;
   }
 
   /// Moves what the codec has finished into the file.
@@ -150,6 +156,10 @@ Result<VideoFile> VideoFile::open(const std::filesystem::path& file, const cv::S
   return VideoFile(std::move(film));
 }
 
+Result<void> VideoFile::finish() {
+  return film_->end() ? Result<void>() : fail("video_not_written", "the disk is full");
+}
+
 Result<void> VideoFile::write(const cv::Mat& picture) {
   Film& film = *film_;
   check(picture.type() == CV_8UC3 && picture.cols == film.codec->width &&
@@ -161,7 +171,7 @@ Result<void> VideoFile::write(const cv::Mat& picture) {
   film.fill(planes);
   film.frame->pts = static_cast<std::int64_t>(film.frames);
   if (avcodec_send_frame(film.codec.get(), film.frame.get()) < 0 || !film.drain()) {
-    return fail("video_not_written", "is the disk full?");
+    return fail("video_not_written", "the disk is full");
   }
   ++film.frames;
   return {};

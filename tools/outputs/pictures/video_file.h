@@ -24,6 +24,8 @@ class VideoFile {
 
   /// CV_8UC3 (blue, green, red) of the film's size. Reason video_not_written: the disk is full.
   Result<void> write(const cv::Mat& picture);
+  /// Ends the film; the same reason.
+  Result<void> finish();
   std::size_t frames() const;
   const std::string& codec() const;  ///< "H.264", "MPEG-4"
 

@@ -45,6 +45,14 @@ TEST(PoseFile, TumPosesAreInterpolatedBetweenCloseNeighboursOnly) {
   EXPECT_TRUE(poses.at(0, at(9.0005))) << "within a millisecond it is the same time";
 }
 
+TEST(PoseFile, AnEmptyLineAmongKittisIsNamedSinceItWouldShiftTheOthers) {
+  const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  EXPECT_THAT(errorOfPoses(pose + "\n" + pose), HasSubstr("poses.txt:2: the line is empty"));
+  EXPECT_EQ(readPoses("# a comment\n\n" + pose + pose + "\n\n").poses().size(), 2U);
+  const std::string tum = " 0 0 0 0 0 0 1\n";
+  EXPECT_EQ(readPoses("1" + tum + "\n2" + tum).poses().size(), 2U) << "lines with a time may";
+}
+
 TEST(PoseFile, KittiLinesOfTwelveAndSixteenNumbersAreByFrame) {
   for (const char* last_row : {"", " 0 0 0 1"}) {
     const std::string rows = std::string("1 0 0 0 0 1 0 0 0 0 1 0") + last_row +

@@ -1,0 +1,75 @@
+#include "common/base/checked_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+
+#include "common/base/errors.h"
+
+namespace perdure {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path placeOf(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) return file;
+  fs::path part = file;
+  part += ".part";
+  return part;
+}
+
+}  // namespace
+
+CheckedFile::CheckedFile(fs::path file) : file_(std::move(file)), written_(placeOf(file_)) {
+  errno = 0;
+  stream_.open(written_, std::ios::binary | std::ios::trunc);
+  if (stream_) return;
+  if (errno == ENOSPC) throwUnwritten(file_);
+  throw StartupError(ExitCode::kUnavailable, file_.string() + " cannot be written (" +
+                                                 std::strerror(errno) +
+                                                 "); give --out a folder that you may write");
+}
+
+CheckedFile::~CheckedFile() {
+  if (!stream_.is_open() || written_ == file_) return;
+  stream_.close();
+  std::error_code ignored;
+  fs::remove(written_, ignored);
+}
+
+void CheckedFile::close() {
+  flushChecked(stream_, file_);
+  errno = 0;
+  stream_.close();
+  std::error_code error;
+  if (stream_ && written_ != file_) fs::rename(written_, file_, error);
+  if (stream_ && !error) return;
+  const std::string why = error ? error.message() : "";
+  std::error_code ignored;
+  if (written_ != file_) fs::remove(written_, ignored);
+  throwUnwritten(file_, why);
+}
+
+void writeChecked(const fs::path& file, std::string_view content) {
+  CheckedFile checked(file);
+  checked.stream().write(content.data(), static_cast<std::streamsize>(content.size()));
+  checked.close();
+}
+
+void flushChecked(std::ostream& stream, const fs::path& file) {
+  const bool failed_before = !stream;
+  errno = 0;
+  stream.flush();
+  if (!stream) throwUnwritten(file, failed_before ? "not all of it could be written" : "");
+}
+
+void throwUnwritten(const fs::path& file, std::string_view why) {
+  std::string reason(why);
+  if (reason.empty()) reason = errno != 0 ? std::strerror(errno) : "not all of it could be written";
+  throw StartupError(ExitCode::kInputOutput,
+                     file.string() + ": " + reason +
+                         "; free space, or write to another disk: the results are not whole");
+}
+
+}  // namespace perdure

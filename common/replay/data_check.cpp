@@ -1,0 +1,256 @@
+#include "common/replay/data_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "common/base/errors.h"
+#include "common/vision/decode.h"
+#include "common/vision/image.h"
+#include "common/vision/jpeg.h"
+
+namespace perdure::replay {
+namespace {
+
+using Grade = DataFinding::Grade;
+
+/// Which of what is known as (low, high) a median falls into.
+struct Unit {
+  double low, high;
+  const char *code, *text;
+};
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void addForceUnit(double force, DataFindings& findings) {
+  // Gravity is 9.8 m/s²; what moves reads somewhat more or less.
+  constexpr std::array kUnits{
+      Unit{0.85, 1.25, "accel_in_g", "the unit is g; multiply the columns by 9.80665"},
+      Unit{850, 1250, "accel_in_mg", "the unit is mg; multiply the columns by 0.00980665"},
+      Unit{8300, 12300, "accel_in_mm", "the unit is mm/s²; divide the columns by 1000"}};
+  for (const Unit& unit : kUnits) {
+    if (force < unit.low || force > unit.high) continue;
+    findings.push_back({Grade::kFatal, unit.code,
+                        fmt::format("the accelerometer measures {:.3g} m/s² (median) where gravity "
+                                    "alone is 9.8: {}",
+                                    force, unit.text)});
+    return;
+  }
+  if (force < 4.0) {
+    findings.push_back(
+        {Grade::kFatal, "accel_without_gravity",
+         fmt::format(
+             "the accelerometer measures {:.3g} m/s² (median) where gravity alone is 9.8: it "
+             "seems to be taken away already; write the specific force that the sensor gives, "
+             "in m/s²",
+             force)});
+  } else if (force < 8.0 || force > 13.0) {
+    findings.push_back({force > 40.0 ? Grade::kFatal : Grade::kWarning, "accel_scale",
+                        fmt::format("the accelerometer measures {:.3g} m/s² (median) where gravity "
+                                    "alone is 9.8: see its unit and scale",
+                                    force)});
+  }
+}
+
+/// "12.3 s … 18.2 s", as nanoseconds where they are needed to see the unit.
+std::string rangeText(TimePoint first, TimePoint last) {
+  return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
+}
+
+/// What one range of stamps may be in place of the other.
+std::string guessOfClock(TimePoint images, TimePoint imu) {
+  const double ratio = static_cast<double>(toNanoseconds(images)) /
+                       std::max(1.0, static_cast<double>(toNanoseconds(imu)));
+  constexpr std::array<std::pair<double, const char*>, 3> kUnits{
+      {{1e3, "microseconds"}, {1e6, "milliseconds"}, {1e9, "seconds"}}};
+  for (const auto& [factor, unit] : kUnits) {
+    if (std::abs(ratio / factor - 1.0) < 0.05) {
+      return fmt::format("the IMU's stamps look like {}: multiply them by {:.0f}", unit, factor);
+    }
+    if (std::abs(ratio * factor - 1.0) < 0.05) {
+      return fmt::format("the images' stamps look like {}: multiply them by {:.0f}", unit, factor);
+    }
+  }
+  return fmt::format(
+      "they are {:.9g} s apart: they come from two clocks; add the difference of the clocks to one "
+      "of them",
+      std::abs(toSeconds(images) - toSeconds(imu)));
+}
+
+void checkClocks(const Recording& recording, DataFindings& findings) {
+  if (recording.imu.empty() || recording.frames.empty()) return;
+  const TimePoint first = recording.frames.front().time, last = recording.frames.back().time;
+  const TimePoint from = recording.imu.front().time, to = recording.imu.back().time;
+  if (from > last || to < first) {
+    findings.push_back(
+        {Grade::kFatal, "clocks_apart",
+         fmt::format("camera and IMU stamps do not overlap: images {}, inertial "
+                     "samples {}; {}",
+                     rangeText(first, last), rangeText(from, to), guessOfClock(first, from))});
+    return;
+  }
+  const auto covered =
+      std::count_if(recording.frames.begin(), recording.frames.end(),
+                    [&](const auto& frame) { return frame.time >= from && frame.time <= to; });
+  const auto all = static_cast<std::ptrdiff_t>(recording.frames.size());
+  if (2 * covered >= all) return;
+  findings.push_back(
+      {Grade::kWarning, "imu_covers_part",
+       fmt::format("only {} of {} images lie within the time of the inertial samples: "
+                   "images {}, samples {}",
+                   covered, all, rangeText(first, last), rangeText(from, to))});
+}
+
+void checkRate(const Recording& recording, DataFindings& findings) {
+  const auto& imu = recording.imu;
+  if (!recording.calibration.imu || imu.size() < 10) return;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < imu.size(); ++i)
+    intervals.push_back(toSeconds(imu[i].time - imu[i - 1].time));
+  const double rate = 1.0 / std::max(1e-9, medianOf(intervals));
+  const double said = recording.calibration.imu->rate_hz;
+  if (said <= 0.0 || (rate < 1.5 * said && rate > said / 1.5)) return;
+  findings.push_back(
+      {Grade::kWarning, "imu_rate",
+       fmt::format("inertial samples come at {:.4g} Hz, the calibration says {:.4g}: "
+                   "see the unit of their stamps, or set rate_hz",
+                   rate, said)});
+}
+
+bool isFlat(const cv::Mat& image) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(image, mean, deviation);
+  return deviation[0] < 1.5;
+}
+
+/// The first, the middle and the last of a camera.
+std::vector<const Recording::FrameFile*> someOf(const Recording& recording, std::size_t camera) {
+  std::vector<const Recording::FrameFile*> all, some;
+  for (const auto& frame : recording.frames) {
+    if (frame.camera == camera && (frame.load || !frame.path.empty())) all.push_back(&frame);
+  }
+  if (all.empty()) return {};
+  for (const std::size_t i : {std::size_t{0}, all.size() / 2, all.size() - 1}) {
+    if (some.empty() || some.back() != all[i]) some.push_back(all[i]);
+  }
+  return some;
+}
+
+void checkImages(const Recording& recording, std::size_t camera, DataFindings& findings) {
+  const CameraCalibration& calibration = recording.calibration.cameras[camera];
+  const auto some = someOf(recording, camera);
+  std::size_t other_size = 0, flat = 0, unreadable = 0;
+  std::string size, why;
+  for (const auto* file : some) {
+    const auto image = monoImageOf(*file);
+    if (!image) {
+      ++unreadable;
+      why = image.error().detail;
+      continue;
+    }
+    const auto width = static_cast<std::uint32_t>(image->cols),
+               height = static_cast<std::uint32_t>(image->rows);
+    if (width != calibration.width || height != calibration.height) {
+      ++other_size;
+      size = fmt::format("{}x{}", width, height);
+    }
+    flat += isFlat(*image) ? 1 : 0;
+  }
+  if (some.empty()) return;
+  if (unreadable == some.size()) {
+    findings.push_back(
+        {Grade::kWarning, "image_unreadable",
+         fmt::format("no image of {} that was tried can be read: {}", calibration.name, why)});
+  } else if (other_size > 0 && other_size + unreadable == some.size()) {
+    findings.push_back(
+        {Grade::kFatal, "image_size",
+         fmt::format(
+             "the images of {} are {}, its calibration is for {}x{}: set `resolution` (width, "
+             "height) where it was only written wrongly, or calibrate at the images' size",
+             calibration.name, size, calibration.width, calibration.height)});
+  } else if (flat == some.size()) {
+    findings.push_back(
+        {Grade::kWarning, "image_flat",
+         fmt::format("the images of {} are of one grey: see exposure, lens cap and bit "
+                     "depth",
+                     calibration.name)});
+  }
+}
+
+}  // namespace
+
+DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
+  DataFindings findings;
+  if (samples.size() < 20) return findings;
+  std::vector<double> forces, turns;
+  for (const ImuSample& sample : samples) {
+    forces.push_back(sample.accel.norm());
+    turns.push_back(sample.gyro.norm());
+  }
+  const double force = medianOf(std::move(forces)), turn = medianOf(std::move(turns));
+  if (turn > 8.0 && turn < 13.0 && force < 4.0) {
+    findings.push_back(
+        {Grade::kFatal, "imu_columns_exchanged",
+         fmt::format(
+             "what should be rates of turn measures {:.3g} (median), as gravity does, and what "
+             "should be accelerations {:.3g}: the columns are exchanged; write w_x, w_y, w_z, "
+             "then a_x, a_y, a_z",
+             turn, force)});
+    return findings;
+  }
+  addForceUnit(force, findings);
+  if (turn > 6.0) {
+    findings.push_back(
+        {Grade::kWarning, "gyro_scale",
+         fmt::format("rates of turn are {:.3g} rad/s (median), more than a turn a "
+                     "second: in degrees per second? Then multiply them by 0.0174533",
+                     turn)});
+  }
+  return findings;
+}
+
+DataFindings checkData(const Recording& recording, const DataUse& use) {
+  DataFindings findings;
+  if (use.imu && !recording.imu.empty()) {
+    checkClocks(recording, findings);
+    checkRate(recording, findings);
+    const DataFindings units = checkImuUnits(recording.imu);
+    findings.insert(findings.end(), units.begin(), units.end());
+  }
+  if (!use.images) return findings;
+  for (std::size_t camera = 0; camera < recording.calibration.cameras.size(); ++camera) {
+    checkImages(recording, camera, findings);
+  }
+  return findings;
+}
+
+Result<cv::Mat> monoImageOf(const Recording::FrameFile& file) {
+  if (!file.load) {
+    return vision::decodeImageFile(file.path, ImageEncoding::kMono8, vision::usedBits(file.path));
+  }
+  const auto loaded = file.load();
+  if (!loaded) return tl::unexpected(loaded.error());
+  const auto frame = vision::decompressed(*loaded);
+  if (!frame) return tl::unexpected(frame.error());
+  auto image = vision::monoOf(*frame);
+  return image ? Result<cv::Mat>(image->clone()) : image;
+}
+
+void refuseFatal(const DataFindings& findings, const std::string& where) {
+  std::string text;
+  for (const DataFinding& finding : findings) {
+    if (finding.grade != Grade::kFatal) continue;
+    text += (text.empty() ? "" : "\n") + where + ": " + finding.text;
+  }
+  if (!text.empty()) throw StartupError(ExitCode::kData, text);
+}
+
+}  // namespace perdure::replay

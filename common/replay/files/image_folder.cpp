@@ -1,0 +1,52 @@
+#include "common/replay/files/image_folder.h"
+
+#include <algorithm>
+#include <array>
+
+#include "common/replay/files/text_file.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isImage(const fs::path& file) {
+  constexpr std::array kEndings{".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".webp"};
+  const std::string ending = toLower(file.extension().string());
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
+}  // namespace
+
+ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder_, ignored)) {
+    const fs::path& file = entry.path();
+    if (!isImage(file)) continue;
+    // Of two with one stem the first by name is taken.
+    std::string& name = by_stem_[file.stem().string()];
+    const std::string other = file.filename().string();
+    if (name.empty() || other < name) name = other;
+  }
+}
+
+std::optional<fs::path> ImageFolder::find(std::string_view name, TimePoint stamp) {
+  std::error_code ignored;
+  const fs::path written(name);
+  if (!name.empty() && fs::is_regular_file(folder_ / written, ignored)) return folder_ / written;
+  const std::string last = written.filename().string();
+  for (const std::string& stem :
+       {last, written.stem().string(), std::to_string(toNanoseconds(stamp))}) {
+    const auto found = stem.empty() ? by_stem_.end() : by_stem_.find(stem);
+    if (found == by_stem_.end()) continue;
+    ++found_otherwise_;
+    return folder_ / found->second;
+  }
+  return std::nullopt;
+}
+
+std::string ImageFolder::first() const {
+  return by_stem_.empty() ? std::string() : by_stem_.begin()->second;
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,153 @@
+// Cameras and inertial units out of the keys that EuRoC, Kalibr and ROS have for them.
+#include <algorithm>
+
+#include "common/replay/files/sensor_file.h"
+#include "common/replay/files/text_file.h"
+
+namespace perdure::replay {
+namespace {
+
+bool isOneOf(const std::string& name, std::initializer_list<const char*> names) {
+  return std::any_of(names.begin(), names.end(), [&](const char* one) { return name == one; });
+}
+
+void readSize(const SensorFile& file, CameraCalibration& camera) {
+  std::vector<double> size;
+  if (!file.has("resolution") && file.has("image_width")) {
+    size = {file.number("image_width", 1), file.number("image_height", 1)};
+  } else {
+    size = file.numbers("resolution", 2);
+  }
+  if (size[0] < 1 || size[1] < 1 || size[0] > 65535 || size[1] > 65535) {
+    file.wrong("resolution", "is no size of an image");
+  }
+  camera.width = static_cast<std::uint32_t>(size[0]);
+  camera.height = static_cast<std::uint32_t>(size[1]);
+}
+
+void readFocalLengths(const SensorFile& file, CameraCalibration& camera) {
+  std::vector<double> f;
+  if (!file.has("intrinsics") && file.has("camera_matrix")) {
+    const auto K = file.numbers("camera_matrix", 9);
+    f = {K[0], K[4], K[2], K[5]};
+  } else {
+    f = file.numbers("intrinsics", 4);
+  }
+  if (f[0] <= 0 || f[1] <= 0) file.wrong("intrinsics", "have a focal length that is not > 0");
+  camera.fx = f[0], camera.fy = f[1], camera.cx = f[2], camera.cy = f[3];
+}
+
+/// "pinhole-radtan", as Kalibr's command line has it, is pinhole and radtan.
+std::string distortionName(const SensorFile& file) {
+  const std::string lens = toLower(file.text("camera_model"));
+  const auto dash = lens.find('-');
+  if (!isOneOf(lens.substr(0, dash), {"", "pinhole", "perspective", "kannala_brandt"})) {
+    file.wrong("camera_model", "is `" + lens +
+                                   "`; pinhole lenses are read, with radtan or equidistant "
+                                   "distortion: calibrate as pinhole-radtan or pinhole-equi");
+  }
+  const std::string model = toLower(file.text("distortion_model"));
+  if (model.empty() && lens == "kannala_brandt") return "equidistant";
+  return model.empty() && dash != lens.npos ? lens.substr(dash + 1) : model;
+}
+
+std::vector<double> coefficientsOf(const SensorFile& file) {
+  for (const char* key : {"distortion_coefficients", "distortion_coeffs"}) {
+    if (const auto values = file.list(key)) return *values;
+  }
+  return {};
+}
+
+/// Brown's model has four coefficients, five with k3, or eight (rational).
+void setRadial(const SensorFile& file, std::vector<double> values, CameraCalibration& camera) {
+  while (values.size() > 8 && values.back() == 0.0)
+    values.pop_back();  // thin prism, tilt: not used
+  if (values.size() != 4 && values.size() != 5 && values.size() != 8) {
+    file.wrong("distortion_coefficients", "is missing or has not 4, 5 or 8 numbers");
+  }
+  while (values.size() > 4 && values.back() == 0.0) values.pop_back();
+  camera.distortion = DistortionModel::kRadialTangential;
+  if (values.size() > 4) {
+    camera.distortion = DistortionModel::kRational;
+    values.resize(8, 0.0);
+  }
+  camera.distortion_coefficients = std::move(values);
+}
+
+void readLens(const SensorFile& file, CameraCalibration& camera) {
+  const std::string model = distortionName(file);
+  std::vector<double> values = coefficientsOf(file);
+  if (isOneOf(model, {"radial-tangential", "radtan", "plumb_bob", "brown", "rational_polynomial",
+                      "rational"})) {
+    return setRadial(file, std::move(values), camera);
+  }
+  if (isOneOf(model, {"equidistant", "equi", "fisheye", "kannala_brandt"})) {
+    if (values.size() != 4)
+      file.wrong("distortion_coefficients", "is missing or has not 4 numbers");
+    camera.distortion = DistortionModel::kEquidistant;
+    camera.distortion_coefficients = std::move(values);
+    return;
+  }
+  if (!isOneOf(model, {"", "none"})) {
+    file.wrong("distortion_model",
+               "is `" + model +
+                   "`; radial-tangential (radtan, plumb_bob), equidistant (equi) and "
+                   "none are known");
+  }
+  const bool any = std::any_of(values.begin(), values.end(), [](double d) { return d != 0.0; });
+  if (any) {
+    file.wrong("distortion_model",
+               model.empty() ? "is missing, but there are coefficients: write radial-tangential or "
+                               "equidistant"
+                             : "is none, but there are coefficients: write radial-tangential or "
+                               "equidistant");
+  }
+}
+
+RigidTransform placeOf(const SensorFile& file, const std::optional<RigidTransform>& given) {
+  if (const auto T_BS = file.transform("T_BS")) return *T_BS;
+  if (const auto T_BC = file.transform("T_imu_cam")) return *T_BC;
+  if (const auto T_CB = file.transform("T_cam_imu")) return T_CB->inverse();
+  if (given) return *given;
+  file.wrong(
+      "T_BS",
+      "is missing, and so are T_cam_imu and T_imu_cam: where is the camera on the IMU? Write "
+      "T_BS (camera in the IMU's frame, 4x4, row by row), or let perdure calibrate find it");
+}
+
+}  // namespace
+
+CameraCalibration readCamera(const SensorFile& file, const std::string& name,
+                             const std::optional<RigidTransform>& T_BC_given) {
+  CameraCalibration camera;
+  camera.name = name;
+  readSize(file, camera);
+  readFocalLengths(file, camera);
+  readLens(file, camera);
+  camera.T_BC = placeOf(file, T_BC_given);
+  camera.rate_hz = file.number("rate_hz", 1e-3, 0.0);
+  camera.time_offset_s = file.has("time_offset_s") ? file.number("time_offset_s", -1.0)
+                                                   : file.number("timeshift_cam_imu", -1.0, 0.0);
+  camera.readout_s = file.number("readout_s", 0.0, 0.0);
+  return camera;
+}
+
+std::optional<RigidTransform> placeInChain(const SensorFile& file,
+                                           const CameraCalibration& before) {
+  const auto T_C_before = file.transform("T_cn_cnm1");
+  if (!T_C_before) return std::nullopt;
+  return before.T_BC * T_C_before->inverse();
+}
+
+ImuCalibration readImuCalibration(const SensorFile& file) {
+  ImuCalibration imu;
+  imu.gyro_noise = file.number("gyroscope_noise_density", 0.0);
+  imu.gyro_bias_walk = file.number("gyroscope_random_walk", 0.0);
+  imu.accel_noise = file.number("accelerometer_noise_density", 0.0);
+  imu.accel_bias_walk = file.number("accelerometer_random_walk", 0.0);
+  const bool of_kalibr = !file.has("rate_hz") && file.has("update_rate");
+  imu.rate_hz = file.number(of_kalibr ? "update_rate" : "rate_hz", 1e-3);
+  return imu;
+}
+
+}  // namespace perdure::replay

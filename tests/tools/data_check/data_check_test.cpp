@@ -1,0 +1,172 @@
+#include "tools/data_check/data_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/base/errors.h"
+#include "common/math/so3.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tests/tools/data_check/turning_drive.h"
+#include "tools/data_check/motion_check.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::DataFinding;
+using replay::Dataset;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using tests::makeTurningDrive;
+using tests::TurningDrive;
+
+std::vector<std::string> codesOf(const replay::DataFindings& findings) {
+  std::vector<std::string> codes;
+  for (const auto& finding : findings) codes.push_back(finding.code);
+  return codes;
+}
+replay::DataFindings findingsIn(const fs::path& root) {
+  return checkDrive(Dataset::open({.path = root})->recording(), {});
+}
+replay::DataFindings findingsOf(const std::string& name, const TurningDrive& drive) {
+  return findingsIn(makeTurningDrive(name, drive));
+}
+
+TEST(DataCheck, ASoundDriveHasNoFinding) {
+  EXPECT_THAT(codesOf(findingsOf("sound", {})), ElementsAre());
+  TurningDrive still;
+  still.turning = 0.0;
+  EXPECT_THAT(codesOf(findingsOf("still", still)), ElementsAre());
+  TurningDrive biased;
+  biased.gyro_bias = {0.1, -0.2, 0.1};  // of a cheap unit
+  EXPECT_THAT(codesOf(findingsOf("biased", biased)), ElementsAre());
+}
+
+TEST(DataCheck, ImagesTurnAsTheGyroscopeSays) {
+  const auto root = makeTurningDrive("turns");
+  const auto recording = Dataset::open({.path = root})->recording();
+  const auto turns = turnsOfImages(recording);
+  ASSERT_GE(turns.size(), 30U);
+  double worst = 0.0, largest = 0.0;
+  for (const Turn& turn : turns) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = 1; i < recording.imu.size(); ++i) {
+      if (recording.imu[i].time <= turn.from || recording.imu[i].time > turn.to) continue;
+      sum += 0.0025 * (recording.imu[i].gyro + recording.imu[i - 1].gyro);
+    }
+    sum -= 0.05 * TurningDrive().gyro_bias;
+    const Eigen::Vector3d expected = tests::trueCameraPlace().R().transpose() * sum;
+    worst = std::max(worst, (turn.of_images - expected).norm());
+    largest = std::max(largest, expected.norm());
+  }
+  EXPECT_GT(largest, 0.03);
+  EXPECT_LT(worst, 0.003);
+}
+
+TEST(DataCheck, DegreesPerSecondAreSeenByTheImages) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { sample.gyro *= 180.0 / M_PI; };
+  const auto findings = findingsOf("degrees", drive);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings.back().code, "gyro_in_degrees");
+  EXPECT_EQ(findings.back().grade, DataFinding::Grade::kFatal);
+  EXPECT_THAT(findings.back().text, HasSubstr("57 times what the images show"));
+  drive.change = [](ImuSample& sample) { sample.gyro *= M_PI / 180.0; };
+  EXPECT_THAT(codesOf(findingsOf("converted_twice", drive)), ElementsAre("gyro_too_small"));
+}
+
+TEST(DataCheck, ATransformTheWrongWayRoundIsNamed) {
+  TurningDrive drive;
+  drive.written_T_BC = tests::trueCameraPlace().inverse();
+  const auto findings = findingsOf("inverted", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("T_BS_inverted"));
+  EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
+}
+
+TEST(DataCheck, AnIdentityInPlaceOfTheTransformIsDoubtful) {
+  TurningDrive drive;
+  drive.written_T_BC = RigidTransform();
+  const auto findings = findingsOf("identity", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("T_BS_turned"));
+  EXPECT_THAT(findings[0].text, HasSubstr("120°"));
+}
+
+TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
+  TurningDrive drive;
+  drive.seconds = 3.0;
+  drive.images_late = std::chrono::milliseconds(250);
+  const auto findings = findingsOf("late", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("time_offset"));
+  EXPECT_THAT(findings[0].text, HasSubstr("time_offset_s to -0.25"));
+}
+
+TEST(DataCheck, UnitsOfTheAccelerometerAreToldByGravity) {
+  const auto codesAt = [](double factor) {
+    std::vector<ImuSample> samples(50);
+    for (auto& sample : samples) sample.accel = factor * Eigen::Vector3d(0.3, -0.2, 9.8);
+    return codesOf(replay::checkImuUnits(samples));
+  };
+  EXPECT_THAT(codesAt(1.0), ElementsAre());
+  EXPECT_THAT(codesAt(1.0 / 9.80665), ElementsAre("accel_in_g"));
+  EXPECT_THAT(codesAt(1000.0 / 9.80665), ElementsAre("accel_in_mg"));
+  EXPECT_THAT(codesAt(1000.0), ElementsAre("accel_in_mm"));
+  EXPECT_THAT(codesAt(0.01), ElementsAre("accel_without_gravity"));
+  EXPECT_THAT(codesAt(1.5), ElementsAre("accel_scale"));
+}
+
+TEST(DataCheck, ExchangedColumnsAreToldByGravity) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { std::swap(sample.gyro, sample.accel); };
+  const auto findings = findingsOf("exchanged", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("imu_columns_exchanged"));
+  EXPECT_THAT(replay::startupErrorOf([&] { replay::refuseFatal(findings, "DRIVE"); }),
+              HasSubstr("DRIVE: what should be rates of turn"));
+}
+
+/// The IMU's stamps of a drive, changed.
+replay::DataFindings findingsWithStamps(const std::string& name,
+                                        const std::function<std::int64_t(std::int64_t)>& change) {
+  const auto root = makeTurningDrive(name);
+  auto recording = Dataset::open({.path = root})->recording();
+  for (auto& sample : recording.imu) {
+    sample.time = fromNanoseconds(change(toNanoseconds(sample.time)));
+  }
+  return replay::checkData(recording, {});
+}
+
+TEST(DataCheck, ClocksThatDoNotOverlapAreShownWithTheirUnit) {
+  auto findings = findingsWithStamps("epoch", [](auto ns) { return ns - 900'000'000'000'000'000; });
+  ASSERT_THAT(codesOf(findings), ElementsAre("clocks_apart"));
+  EXPECT_THAT(findings[0].text, HasSubstr("900000000 s apart"));
+  findings = findingsWithStamps("micro", [](auto ns) { return ns / 1000; });
+  EXPECT_EQ(findings[0].code, "clocks_apart");
+  EXPECT_THAT(findings[0].text, HasSubstr("look like microseconds: multiply them by 1000"));
+}
+
+TEST(DataCheck, ImagesOfAnotherSizeThanTheCalibrationAreNamedWithBoth) {
+  const auto root = replay::tinyEuroc("other_size");
+  for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
+    replay::writeImage(entry.path(), 24, 32, 1);
+  }
+  const auto findings = findingsIn(root);
+  ASSERT_THAT(codesOf(findings), ElementsAre("image_size"));
+  EXPECT_THAT(findings[0].text, HasSubstr("cam0 are 24x32, its calibration is for 32x24"));
+  EXPECT_TRUE(checkDrive(Dataset::open({.path = root})->recording(), {.images = false}).empty());
+}
+
+TEST(DataCheck, OneImageOfAnotherSizeIsNoReasonToStop) {
+  const auto root = replay::tinyEuroc("one_other_size");
+  replay::writeImage(root / "mav0/cam0/data/1000000000.png", 24, 32, 1);
+  EXPECT_THAT(codesOf(findingsIn(root)), ElementsAre());
+}
+
+TEST(DataCheck, ImagesOfOneGreyAreDoubtful) {
+  const auto root = replay::tinyEuroc("one_grey");
+  for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
+    replay::writeGrey(entry.path(), 32, 24, 40);
+  }
+  EXPECT_THAT(codesOf(findingsIn(root)), ElementsAre("image_flat"));
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,142 @@
+// A run in which nothing comes out says why: before it begins, or at its end.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "common/base/errors.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tests/tools/data_check/turning_drive.h"
+#include "tools/pipeline/pipeline.h"
+#include "tools/pipeline/report.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::readText;
+using replay::writeText;
+using testing::AllOf;
+using testing::HasSubstr;
+using tests::makeTurningDrive;
+using tests::TurningDrive;
+
+PipelineOptions optionsFor(const fs::path& root) {
+  PipelineOptions options;
+  options.data = root.string();
+  options.odometry = "vio";
+  options.detections = "none";
+  options.out = (root / "out").string();
+  return options;
+}
+/// Sentence and status of a run; "" and 0 where it ends well.
+std::pair<std::string, int> endOf(const PipelineOptions& options) {
+  try {
+    Pipeline pipeline(options);
+    pipeline.run([](const PipelineCounts&) {});
+    pipeline.finish();
+    pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
+    pipeline.refuseNothing();
+  } catch (const StartupError& error) {
+    return {error.what(), static_cast<int>(error.code())};
+  }
+  return {};
+}
+std::pair<std::string, int> endOf(const std::string& name, const TurningDrive& drive) {
+  return endOf(optionsFor(makeTurningDrive(name, drive)));
+}
+
+TEST(PipelineRefusal, UnitsAreToldBeforeTheRun) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { sample.accel /= 9.80665; };
+  EXPECT_THAT(endOf("run_in_g", drive), testing::Pair(HasSubstr("the unit is g"), 65));
+  drive.change = [](ImuSample& sample) { sample.gyro *= 180.0 / M_PI; };
+  EXPECT_THAT(endOf("run_in_degrees", drive), testing::Pair(HasSubstr("degrees"), 65));
+  drive = {};
+  drive.written_T_BC = tests::trueCameraPlace().inverse();
+  EXPECT_THAT(endOf("run_inverted", drive), testing::Pair(HasSubstr("wrong way round"), 65));
+}
+
+TEST(PipelineRefusal, WithoutTheImuItsUnitsDoNotMatter) {
+  TurningDrive drive;
+  drive.seconds = 1.0;
+  drive.change = [](ImuSample& sample) { sample.accel /= 9.80665; };
+  const auto root = makeTurningDrive("poses_for_g", drive);
+  auto options = optionsFor(root);
+  options.odometry = (root / "poses.tum").string();
+  writeText(options.odometry, "1000000000.0 0 0 0 0 0 0 1\n1000000001.0 1 0 0 0 0 0 1\n");
+  options.assignments = {};
+  EXPECT_THAT(endOf(options).second, 0) << "poses at most .5 s apart, but the ends are exact";
+}
+
+TEST(PipelineRefusal, WhereNoImageCanBeReadTheLastOneIsNamed) {
+  const auto root = makeTurningDrive("unreadable");
+  for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
+    replay::truncate(entry.path(), 0.5);
+  }
+  EXPECT_THAT(endOf(optionsFor(root)),
+              testing::Pair(AllOf(HasSubstr("none of 41 frames could be used"),
+                                  HasSubstr("image_truncated 41 times"), HasSubstr(".png")),
+                            65));
+}
+
+TEST(PipelineRefusal, PosesOfAnotherEpochAreShownBesideTheFrames) {
+  const auto root = makeTurningDrive("poses_elsewhen");
+  auto options = optionsFor(root);
+  options.odometry = (root / "poses.tum").string();
+  writeText(options.odometry, "5.0 0 0 0 0 0 0 1\n6.0 1 0 0 0 0 0 1\n");
+  EXPECT_THAT(endOf(options), testing::Pair(AllOf(HasSubstr("no frame has a pose"),
+                                                  HasSubstr("5000000000 … 6000000000")),
+                                            65));
+}
+
+TEST(PipelineRefusal, NoPoseOfVioSaysItsReasons) {
+  TurningDrive drive;
+  drive.seconds = 0.2;
+  EXPECT_THAT(endOf("too_short", drive), testing::Pair(HasSubstr("no pose came of 5 frames"), 65));
+}
+
+TEST(PipelineRefusal, DetectionsOfOtherFramesAreRefusedBeforeTheRun) {
+  const auto root = makeTurningDrive("other_frames");
+  auto options = optionsFor(root);
+  options.detections = (root / "boxes.csv").string();
+  writeText(options.detections, "frame,class,x1,y1,x2,y2,score\n900,car,1,2,30,40,0.9\n");
+  EXPECT_THAT(endOf(options), testing::Pair(AllOf(HasSubstr("none of its 1 rows"),
+                                                  HasSubstr("(0 … 40)"), HasSubstr("900 … 900")),
+                                            65));
+}
+
+TEST(PipelineRefusal, AnEmptyMapWithDetectionsIsNoSuccess) {
+  const auto root = makeTurningDrive("empty_map");
+  auto options = optionsFor(root);
+  options.odometry = (root / "poses.tum").string();
+  std::string poses;
+  for (int i = 0; i <= 20; ++i) {
+    poses +=
+        "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " 0 0 0 0 0 0 1\n";
+  }
+  writeText(options.odometry, poses);
+  options.detections = (root / "boxes.csv").string();
+  writeText(options.detections, "frame,class,x1,y1,x2,y2,score\n3,car,1,2,30,40,0.2\n");
+  EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("the map is empty"), 65));
+  EXPECT_TRUE(fs::exists(root / "out/trajectory.tum")) << "what there is is written";
+}
+
+TEST(PipelineRefusal, WhatWasMendedIsInTheReport) {
+  const auto root = makeTurningDrive("mended");
+  for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
+    fs::rename(entry.path(), fs::path(entry.path()).replace_extension(".PNG"));
+  }
+  auto options = optionsFor(root);
+  options.odometry = (root / "poses.tum").string();
+  writeText(options.odometry, "1000000000.0 0 0 0 0 0 0 1\n1000000000.4 1 0 0 0 0 0 1\n");
+  EXPECT_EQ(endOf(options).second, 0);
+  options.out = (root / "with_images").string();
+  options.odometry = "vio";
+  (void)endOf(options);
+  const auto report = nlohmann::json::parse(readText(root / "with_images/report.json"));
+  EXPECT_THAT(report["data_check"]["notes"].dump(), HasSubstr("41 of 41 images"));
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,41 @@
+#include "tools/data_check/data_check.h"
+
+#include <cstdio>
+
+#include "tools/data_check/motion_check.h"
+
+namespace perdure::tools {
+
+using Grade = replay::DataFinding::Grade;
+
+replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use) {
+  replay::DataFindings findings = replay::checkData(recording, use);
+  if (!use.images || !use.imu || recording.calibration.cameras.empty()) return findings;
+  for (const auto& finding : findings) {
+    if (finding.grade == Grade::kFatal) return findings;  // what is said of turns would follow
+  }
+  const auto turns =
+      judgeTurns(turnsOfImages(recording), recording.imu, recording.calibration.cameras.front());
+  findings.insert(findings.end(), turns.begin(), turns.end());
+  return findings;
+}
+
+nlohmann::ordered_json toJson(const replay::DataFindings& findings) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& finding : findings) {
+    list.push_back({{"grade", finding.grade == Grade::kFatal ? "fatal" : "warning"},
+                    {"code", finding.code},
+                    {"text", finding.text}});
+  }
+  return list;
+}
+
+void printDoubts(const replay::Recording& recording, const replay::DataFindings& findings) {
+  for (const std::string& note : recording.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  for (const auto& finding : findings) {
+    const char* word = finding.grade == Grade::kFatal ? "error" : "warning";
+    std::fprintf(stderr, "%s: %s\n", word, finding.text.c_str());
+  }
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,31 @@
+// Whether images turn as the gyroscope says: its unit, the camera's rotation on the IMU (T_BS given
+// the wrong way round) and the time between the two. Rotations between images are those that
+// explain the flow of their corners best (robust least squares; what the camera's own way adds is
+// an outlier or the same in all pairs); both sides are compared without their means, so that a bias
+// is none.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/replay/data_check.h"
+
+namespace perdure::tools {
+
+/// Between two images.
+struct Turn {
+  TimePoint from, to;
+  Eigen::Vector3d of_images = Eigen::Vector3d::Zero();  ///< rad, in C
+};
+
+/// Of up to `most` pairs of images of cam0 that follow each other, where the gyroscope's rate
+/// changes most. Pairs with fewer than 15 corners that can be followed are left out.
+std::vector<Turn> turnsOfImages(const replay::Recording& recording, std::size_t most = 36);
+
+/// Codes: gyro_in_degrees, gyro_too_small, T_BS_inverted, T_BS_turned, time_offset. Nothing where
+/// images or gyroscope turn too little to tell.
+replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
+                                const std::vector<ImuSample>& samples,
+                                const CameraCalibration& camera);
+
+}  // namespace perdure::tools

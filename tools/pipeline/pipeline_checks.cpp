@@ -1,0 +1,126 @@
+// What is known of the data before a run, and what must be said when nothing came out of it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "common/base/checked_file.h"
+#include "common/base/errors.h"
+#include "tools/data_check/data_check.h"
+#include "tools/pipeline/pipeline.h"
+
+namespace perdure::tools {
+namespace {
+
+/// "image_missing 120 times, image_size 3 times".
+std::string listOf(const ReasonCounts& reasons) {
+  std::string list;
+  for (const auto& [code, n] : reasons.all()) {
+    list += fmt::format("{}{} {} times", list.empty() ? "" : ", ", code, n);
+  }
+  return list;
+}
+
+/// What a person can do about vio's reason for not starting.
+std::string mendOfStart(const ReasonCounts& reasons) {
+  std::string most;
+  std::uint64_t times = 0;
+  for (const auto& [code, n] : reasons.all()) {
+    if (n > times) most = code, times = n;
+  }
+  if (most.empty()) return "there were too few frames or inertial samples before they ended";
+  if (most == "start_force_not_gravity") {
+    return "the accelerations are not those of gravity and motion: see their unit (m/s²)";
+  }
+  return "`perdure doctor --data` says more, and the README of vio what the reasons mean";
+}
+
+/// Reasons of the store for which what it was given is not in its file.
+const std::set<std::string> kUnwritable{"disk_full", "io_error", "read_only", "cannot_open",
+                                        "database_error"};
+
+[[noreturn]] void refuse(const std::string& what) { throw StartupError(ExitCode::kData, what); }
+
+std::string spanText(TimePoint first, TimePoint last) {
+  return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
+}
+
+}  // namespace
+
+void Pipeline::checkData() {
+  if (recorded_) return;
+  const auto data = dataOptions();
+  findings_ =
+      checkDrive(dataset_->recording(), {.images = data.decode, .imu = options_.odometry == "vio"});
+  replay::refuseFatal(findings_, options_.data);
+}
+
+/// Rows of other frames would be left out in silence.
+void Pipeline::checkDetectionFile() const {
+  const auto& frames = dataset_->recording().frames;
+  if (!detection_file_ || frames.empty() || detection_file_->rows() == 0) return;
+  const auto [first, last] = std::minmax_element(
+      frames.begin(), frames.end(), [](const auto& a, const auto& b) { return a.index < b.index; });
+  if (detection_file_->firstFrame() <= last->index && detection_file_->lastFrame() >= first->index)
+    return;
+  refuse(
+      fmt::format("{}: none of its {} rows is of a frame of this drive ({} … {}), they are of {} … "
+                  "{}; its first column must count the drive's frames from 0",
+                  options_.detections, detection_file_->rows(), first->index, last->index,
+                  detection_file_->firstFrame(), detection_file_->lastFrame()));
+}
+
+void Pipeline::refuseUnwritten() const {
+  for (const auto& [service, reasons] : reasons()) {
+    for (const auto& [code, n] : reasons.all()) {
+      const bool store = service == "map_store" && kUnwritable.contains(code);
+      const bool run = service == "pipeline" && code.starts_with("run_") &&
+                       (code.ends_with("disk_full") || code.ends_with("_file"));
+      if (!store && !run) continue;
+      throwUnwritten(outputs_->folder() / (store ? "map.sqlite" : "run.mcap"),
+                     code.ends_with("disk_full") ? "no space left on device" : code);
+    }
+  }
+}
+
+void Pipeline::refuseNothing() const {
+  const auto& recording = dataset_->recording();
+  const std::string counted = listOf(dataset_->reasons());
+  if (counts_.frames == 0) {
+    if (recorded_)
+      refuse(options_.data + " holds no odometry that can be read; record it, or run vio");
+    refuse(fmt::format("{}: none of {} frames could be used ({}){}", options_.data,
+                       recording.frame_count, counted.empty() ? "there are none" : counted,
+                       dataset_->lastProblem().empty() ? std::string()
+                                                       : "; the last: " + dataset_->lastProblem()));
+  }
+  if (counts_.odometry == 0 && pose_file_ && !recording.frames.empty() &&
+      pose_file_->format() == replay::PoseFormat::kTum) {
+    const auto& poses = pose_file_->poses();
+    const TimePoint first = recording.frames.front().time, last = recording.frames.back().time;
+    refuse(
+        fmt::format("no frame has a pose: frames are of {}, poses of {}; give poses of this drive, "
+                    "on the clock of its images",
+                    spanText(first, last), spanText(poses.front().time, poses.back().time)));
+  }
+  if (counts_.odometry == 0) {
+    const ReasonCounts reasons = vio_ ? vio_->reasons() : ReasonCounts();
+    refuse(fmt::format("no pose came of {} frames ({}{}{}): {}", counts_.frames, counted,
+                       counted.empty() ? "" : "; ", listOf(reasons), mendOfStart(reasons)));
+  }
+  if (options_.detections == "none" || counts_.objects == 0) return;
+  if (!outputs_->history().lastBeliefs().empty()) return;
+  if (counts_.detections == 0) {
+    refuse(
+        fmt::format("nothing was detected in {} frames, so the map is empty: does the network (or "
+                    "file) know what is in the images?",
+                    counts_.frames));
+  }
+  refuse(fmt::format(
+      "{} detections in {} frames made no object, so the map is empty: do they belong to "
+      "these frames, are they of known classes, and does the camera move past what they "
+      "show?",
+      counts_.detections, counts_.frames));
+}
+
+}  // namespace perdure::tools
