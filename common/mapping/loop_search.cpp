@@ -26,6 +26,14 @@ LevelGaussian anywhereOn(const MapIndex& map) {
   return prior;
 }
 
+AnchorId homeOf(const PlaceMatch& match, const std::map<ObjectId, AnchorId>& homes) {
+  std::map<AnchorId, std::size_t> counts;
+  for (const auto& [known, seen] : match.pairs) ++counts[homes.at(known)];
+  return std::max_element(counts.begin(), counts.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
 }  // namespace
 
 bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
@@ -133,7 +141,9 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
   }
   for (const ObjectId id : ids) {
     const ObjectRecord& record = body.state.records().at(id);
-    around.objects.push_back(inM(body.state, *sightingOfBefore(record, body, loop.visit_m)));
+    const Sighting& known = *sightingOfBefore(record, body, loop.visit_m);
+    around.objects.push_back(inM(body.state, known));
+    around.homes[id] = known.anchor;
   }
   return around;
 }
@@ -150,7 +160,8 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   const MapIndex index(std::move(around.objects), std::move(around.driven), parameters_.place);
   auto match = bestMatch(std::move(seen), index, prior, parameters_.place);
   if (!match || !isBelieved(*match, sigma_m)) return std::nullopt;
-  return Found{std::move(*match), prior, sigma_m};
+  const AnchorId home = homeOf(*match, around.homes);
+  return Found{std::move(*match), home, prior, sigma_m};
 }
 
 /// Where the body is known well, what is asked is only which object is which.
@@ -171,36 +182,41 @@ void LoopSearch::indexOthers(const Whereabouts& body) {
     if (!record.confirmed) continue;
     const Sighting* known = &record.sighting;
     if (components.at(known->anchor) == own && record.earlier) known = &*record.earlier;
-    if (components.at(known->anchor) == own) continue;
-    objects[components.at(known->anchor)].push_back(inM(body.state, *known));
+    const AnchorId component = components.at(known->anchor);
+    if (component == own) continue;
+    objects[component].push_back(inM(body.state, *known));
+    others_[component].homes[id] = known->anchor;
   }
   for (const auto& [anchor, component] : components) {
     if (component != own) driven[component].push_back(body.state.graph().pose(anchor).p.head<2>());
   }
   for (auto& [component, of_it] : objects) {
-    indices_[component] = std::make_unique<MapIndex>(
+    others_[component].index = std::make_unique<MapIndex>(
         std::move(of_it), std::move(driven.at(component)), parameters_.place);
   }
 }
 
 std::optional<LoopSearch::Found> LoopSearch::elsewhere(const Whereabouts& body) {
+  if (body.state.graph().components() < 2) return std::nullopt;
   const auto seen = seenOfLate(body);
   if (seen.size() < parameters_.loop.least_elsewhere) return std::nullopt;
-  if (indices_.empty()) indexOthers(body);
-  std::optional<PlaceMatch> best;
-  for (const auto& [component, index] : indices_) {
-    auto match = bestMatch(seen, *index, anywhereOn(*index), parameters_.place);
+  if (others_.empty()) indexOthers(body);
+  constexpr double kNowhere = std::numeric_limits<double>::infinity();
+  std::optional<Found> best;
+  for (const auto& [component, other] : others_) {
+    auto match = bestMatch(seen, *other.index, anywhereOn(*other.index), parameters_.place);
     if (!match) continue;
     // Another component is another way to lay it.
-    if (best) match->next = std::max(match->next, best->score);
-    if (!best || match->score > best->score) {
-      best = std::move(match);
-    } else {
-      best->next = std::max(best->next, match->score);
+    if (best) {
+      match->next = std::max(match->next, best->match.score);
+      best->match.next = std::max(best->match.next, match->score);
     }
+    if (best && match->score <= best->match.score) continue;
+    const AnchorId home = homeOf(*match, other.homes);
+    best = Found{std::move(*match), home, std::nullopt, kNowhere};
   }
-  if (!best || !isBelieved(*best, std::numeric_limits<double>::infinity())) return std::nullopt;
-  return Found{std::move(*best), std::nullopt, std::numeric_limits<double>::infinity()};
+  if (!best || !isBelieved(best->match, kNowhere)) return std::nullopt;
+  return best;
 }
 
 }  // namespace perdure::mapping

@@ -46,6 +46,7 @@ class LoopSearch {
 
   struct Found {
     PlaceMatch match;                    ///< T_MB in the M of the component that it is found in
+    AnchorId home = 0;                   ///< to which most of the known objects belong
     std::optional<LevelGaussian> prior;  ///< by odometry and graph; nothing: it was nowhere known
     double sigma_m = 0.0;                ///< deviation of the prior in the plane
   };
@@ -55,13 +56,14 @@ class LoopSearch {
   /// In the components of the graph that the body's session does not hang together with.
   std::optional<Found> elsewhere(const Whereabouts& body);
   /// The graph or the objects of other components have changed.
-  void forget() { indices_.clear(); }
+  void forget() { others_.clear(); }
 
  private:
   std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body) const;
   std::vector<PlacedObject> seenOfLate(const Whereabouts& body) const;
   struct Around {
     std::vector<PlacedObject> objects;
+    std::map<ObjectId, AnchorId> homes;
     std::vector<Eigen::Vector2d> driven;
     std::optional<LevelGaussian> nearest;  ///< T_ba of its nearest place
   };
@@ -70,7 +72,11 @@ class LoopSearch {
   void indexOthers(const Whereabouts& body);
 
   Parameters parameters_;
-  std::map<AnchorId, std::unique_ptr<MapIndex>> indices_;  ///< of other components
+  struct Other {
+    std::unique_ptr<MapIndex> index;
+    std::map<ObjectId, AnchorId> homes;
+  };
+  std::map<AnchorId, Other> others_;  ///< components, by their first anchors
 };
 
 }  // namespace perdure::mapping

@@ -85,6 +85,11 @@ void MapState::put(ObjectId id, ObjectRecord record) {
   const auto at = records_.find(id);
   if (at != records_.end()) unindex(id, at->second);
   index(id, record);
+  if (record.confirmed) {
+    unconfirmed_.erase(id);
+  } else {
+    unconfirmed_.insert(id);
+  }
   records_.insert_or_assign(id, std::move(record));
 }
 
@@ -93,6 +98,7 @@ void MapState::erase(ObjectId id) {
   if (at == records_.end()) return;
   if (at->second.confirmed) erased_.insert(id);
   touched_.erase(id);
+  unconfirmed_.erase(id);
   unindex(id, at->second);
   records_.erase(at);
 }

@@ -36,6 +36,7 @@ class MapState {
   const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
   void put(ObjectId id, ObjectRecord record);
   void erase(ObjectId id);
+  const std::set<ObjectId>& unconfirmed() const { return unconfirmed_; }
   /// Objects that were seen from an anchor, on the newest visit or on the one before.
   const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
@@ -57,6 +58,7 @@ class MapState {
   std::map<AnchorId, Anchor> anchors_;
   std::map<ObjectId, ObjectRecord> records_;
   std::map<AnchorId, std::set<ObjectId>> seen_from_;
+  std::set<ObjectId> unconfirmed_;
   std::map<std::string, std::uint32_t> class_numbers_;
   std::map<AnchorId, Kept> saved_anchors_;
   std::map<EdgeId, double> saved_edges_;  ///< weights of loops

@@ -54,6 +54,8 @@ void Mapper::replay(const WorldId& session) {
   }
   if (way.empty()) return;
   session_ = session;
+  drift_scale_ = DriftScale(parameters_.drift_scale);
+  odometry_variance_ = 1.0;
   active_.reset();
   tentative_.reset();
   tracked_ties_.begin();
@@ -148,8 +150,8 @@ void Mapper::onObjects(const Objects& objects) {
 /// Of earlier visits.
 void Mapper::forgetUnconfirmed() {
   std::vector<ObjectId> old;
-  for (const auto& [id, record] : state_.records()) {
-    if (!record.confirmed && isOld(record)) old.push_back(id);
+  for (const ObjectId id : state_.unconfirmed()) {
+    if (isOld(state_.records().at(id))) old.push_back(id);
   }
   for (const ObjectId id : old) state_.erase(id);
 }
@@ -248,7 +250,7 @@ void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
 bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
   constexpr double kSame_m = 3.0, kSame_rad = 0.1;
   const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
-  const AnchorId component = componentsOf(state_.graph()).at(homeOf(found.match));
+  const AnchorId component = componentsOf(state_.graph()).at(found.home);
   const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m()};
   if (tentative_ && tentative_->component == component) {
     const double apart_m = now.way_m - tentative_->way_m;
@@ -262,22 +264,10 @@ bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
   return false;
 }
 
-AnchorId Mapper::homeOf(const PlaceMatch& match) {
-  const Whereabouts here = body();
-  std::map<AnchorId, std::size_t> homes;
-  for (const auto& [known, seen] : match.pairs) {
-    const ObjectRecord& record = state_.records().at(known);
-    ++homes[sightingOfBefore(record, here, parameters_.loop.visit_m)->anchor];
-  }
-  return std::max_element(homes.begin(), homes.end(),
-                          [](const auto& x, const auto& y) { return x.second < y.second; })
-      ->first;
-}
-
 void Mapper::close(const LoopSearch::Found& found) {
   const PlaceMatch& match = found.match;
   if (found.prior) learnDrift(match, *found.prior);
-  const AnchorId a = homeOf(match), b = builder_.last()->id;
+  const AnchorId a = found.home, b = builder_.last()->id;
   const Edge edge = edgeFrom(a, b, match.T_MB, EdgeKind::kLoop);
   const LevelPose before = state_.graph().pose(b);
   const bool rests_on_the_same =

@@ -122,8 +122,6 @@ class Mapper {
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
   bool isAgreedOn(const LoopSearch::Found& found);
   void close(const LoopSearch::Found& found);
-  /// The anchor of before that most of the matched objects belong to.
-  AnchorId homeOf(const PlaceMatch& match);
   void learnDrift(const PlaceMatch& match, const LevelGaussian& prior);
   Edge edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const;
   void bringTogether(const Edge& edge);

@@ -72,6 +72,8 @@ class PoseGraph {
   bool isNew(EdgeId id) const;
   /// Of an edge between anchors of the graph, where they are now.
   double chi2(const Edge& edge) const;
+  /// How many there were when anchors were last held fast: at the last optimise().
+  std::size_t components() const { return held_fast_.size(); }
   bool isHeldFast(AnchorId id) const { return held_fast_.contains(id); }
 
  private:
