@@ -21,7 +21,7 @@ constexpr double kReach_m = MapIndex::kReach_m;
 // m⁻²; chance density where the map has no objects: one in a disc of 100 m radius
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
-constexpr std::size_t kMostSeen = 48, kMostVotes = 500'000, kCandidates = 128;
+constexpr std::size_t kMostSeen = 48, kMostVotes = 250'000, kCandidates = 128;
 constexpr std::size_t kMostCells = 4096;  // of which candidates are chosen, one of each place
 // beyond this, a way is another one
 constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
