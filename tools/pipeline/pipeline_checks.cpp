@@ -108,8 +108,10 @@ void Pipeline::refuseNothing() const {
     refuse(fmt::format("no pose came of {} frames ({}{}{}): {}", counts_.frames, counted,
                        counted.empty() ? "" : "; ", listOf(reasons), mendOfStart(reasons)));
   }
-  if (options_.detections == "none" || counts_.objects == 0) return;
-  if (!outputs_->history().lastBeliefs().empty()) return;
+  if (options_.detections == "none") return;
+  // What came and went was there; nothing to find is no fault of the data then.
+  const ObjectHistory& history = outputs_->history();
+  if (!history.lastBeliefs().empty() || !history.inst().empty()) return;
   if (counts_.detections == 0) {
     refuse(
         fmt::format("nothing was detected in {} frames, so the map is empty: does the network (or "
