@@ -9,8 +9,9 @@ void describe(Config& c, config::Fields& fields) {
   fields.text("http.address", c.web.address,
               {"where it listens; all interfaces: 0.0.0.0", "",
                "elsewhere than on loopback set http.token"});
-  fields.integer("http.port", c.web.port, config::between(0, 65535),
-                 {"the one port: page, /healthz, /metrics, WebSocket; 0: any that is free", "", ""});
+  fields.integer(
+      "http.port", c.web.port, config::between(0, 65535),
+      {"the one port: page, /healthz, /metrics, WebSocket; 0: any that is free", "", ""});
   fields.text("http.token", c.web.token,
               {"who has it may look: ?token=… behind the address; empty: whoever is on this host"});
   fields.texts("http.allowed_hosts", c.web.allowed_hosts,
@@ -38,11 +39,12 @@ void describe(Config& c, config::Fields& fields) {
 
 void verify(const Config& config) {
   if (config.web.token.empty() && !web::isLoopback(config.web.address)) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "http.address " + config.web.address +
-                           " can be reached from elsewhere, and http.token is empty: set a token, "
-                           "or listen on 127.0.0.1 and forward the port (ssh -L 8765:localhost:8765 "
-                           "VEHICLE)");
+    throw StartupError(
+        ExitCode::kConfiguration,
+        "http.address " + config.web.address +
+            " can be reached from elsewhere, and http.token is empty: set a token, "
+            "or listen on 127.0.0.1 and forward the port (ssh -L 8765:localhost:8765 "
+            "VEHICLE)");
   }
 }
 

@@ -1,11 +1,14 @@
 // perdure-gateway: what is on the bus, for browsers, Foxglove and Prometheus.
 #include <chrono>
-#include <map>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <vector>
 
 #include "common/bus/topics.h"
 #include "common/service/service.h"
+#include "common/wire/cdr.h"
 #include "services/gateway/node.h"
 #include "services/gateway/web/server.h"
 
@@ -28,8 +31,13 @@ class OnDemand {
   void follow(const gateway::Channels& wanted) {
     bool now = false;
     for (const std::uint32_t channel : channels_) now = now || wanted.contains(channel);
-    if (now != open_) now ? open() : close();
+    if (now == open_) return;
     open_ = now;
+    if (now) {
+      open();
+    } else {
+      close();
+    }
   }
 
  protected:
@@ -73,6 +81,34 @@ class ReaderOnDemand : public OnDemand {
   std::unique_ptr<bus::Reader<T>> reader_;
   ReasonCounts before_;
 };
+
+/// The same of a topic's bytes as they come.
+class BytesOnDemand : public OnDemand {
+ public:
+  using Handler = std::function<void(const bus::CdrMessage&)>;
+  BytesOnDemand(service::Context& context, std::string topic, gateway::Channels channels,
+                Handler handler)
+      : OnDemand(context, std::move(channels)),
+        topic_(std::move(topic)),
+        handler_(std::move(handler)) {}
+
+ private:
+  void open() override {
+    reader_ = std::make_unique<bus::CdrReader>(context_.participant(), topic_);
+    context_.loop().on(*reader_, handler_);
+  }
+  void close() override {
+    context_.loop().off(*reader_);
+    reader_.reset();
+  }
+
+  const std::string topic_;
+  const Handler handler_;
+  std::unique_ptr<bus::CdrReader> reader_;
+};
+
+/// Topics of @final types, which readers of CDR decode by their IDL.
+constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
 
 /// What the server's thread tells the loop's.
 struct Mail {
@@ -132,11 +168,30 @@ std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
   return readers;
 }
 
+void listenToRaw(service::Context& context, web::Server& server,
+                 std::vector<std::unique_ptr<OnDemand>>& readers) {
+  std::uint32_t id = gateway::kRaw;
+  for (const char* topic : kRawTopics) {
+    readers.push_back(std::make_unique<BytesOnDemand>(
+        context, topic, gateway::Channels{id}, [&server, id](const bus::CdrMessage& m) {
+          server.publish({id, fromNanoseconds(m.written_ns),
+                          std::make_shared<const std::string>(m.bytes.begin(), m.bytes.end())});
+        }));
+    ++id;
+  }
+}
+
 web::Content contentFor(const service::Context& context, const gateway::Config& config) {
   const auto folder = config.page_folder.empty() ? web::usualPageFolder()
                                                  : std::filesystem::path(config.page_folder);
-  return {"perdure", toHex(context.instance()), gateway::channelTable(config.cameras),
-          gateway::serviceTable(), web::Files(folder)};
+  auto channels = gateway::channelTable(config.cameras);
+  std::uint32_t id = gateway::kRaw;
+  for (const char* topic : kRawTopics) {
+    const std::string type = bus::findTopic(topic)->typeName();
+    channels.push_back(gateway::rawChannel(id++, topic, type, wire::idlOf(type)));
+  }
+  return {"perdure", toHex(context.instance()), std::move(channels), gateway::serviceTable(),
+          web::Files(folder)};
 }
 
 std::string addressOf(const gateway::Config& config, std::uint16_t port) {
@@ -163,14 +218,14 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                             context.loop().wake();
                           }});
   auto& questions = context.writer(topics::kMapQuery);
-  gateway::Node node(
-      config, vehicle, context.instance(),
-      {.message = [&](const gateway::Encoded& message) { server.publish(message); },
-       .time = [&](const TimePoint& time) { server.tellTime(time); },
-       .answer = [&](const gateway::Answer& answer) { server.answer(answer); },
-       .query = [&](const MapQuery& query) { (void)questions.write(query); }});
+  gateway::Node node(config, vehicle, context.instance(),
+                     {.message = [&](const gateway::Encoded& message) { server.publish(message); },
+                      .time = [&](const TimePoint& time) { server.tellTime(time); },
+                      .answer = [&](const gateway::Answer& answer) { server.answer(answer); },
+                      .query = [&](const MapQuery& query) { (void)questions.write(query); }});
   listenAlways(context, node);
-  const auto readers = listenOnDemand(context, node, config);
+  auto readers = listenOnDemand(context, node, config);
+  listenToRaw(context, server, readers);
   context.loop().onWake([&] {
     std::optional<gateway::Channels> wanted;
     std::vector<gateway::Call> calls;
@@ -188,15 +243,16 @@ void serve(service::Context& context, const gateway::Config& config, const std::
   context.every(std::chrono::milliseconds(100), [&] { node.tick(monotonicNs()); });
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&](ReasonCounts& counts) {
-    for (const auto& [reason, n] : server.stats().reasons.all()) counts.add(reason, n);
+    const web::Stats stats = server.stats();
+    for (const auto& [reason, n] : stats.reasons.all()) counts.add(reason, n);
   });
   context.onHealth([&] {
     const web::Stats stats = server.stats();
     const std::int64_t now = monotonicNs();
     context.health().setDropped(stats.dropped);
-    server.setTexts(node.vitalSigns().healthz(now),
-                    node.vitalSigns().metrics(now, figuresOf(stats, node.objects()),
-                                              stats.reasons.all()));
+    server.setTexts(
+        node.vitalSigns().healthz(now),
+        node.vitalSigns().metrics(now, figuresOf(stats, node.objects()), stats.reasons.all()));
   });
   context.watch([&] { return server.goesOn(); });
   context.log().info("{} at {}", has_page ? "the page is" : "no page was built; Foxglove connects",

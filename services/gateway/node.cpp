@@ -59,7 +59,8 @@ void Node::sendNow(std::uint32_t channel) {
   const bool placed = odometry_ || objects_;
   switch (channel) {
     case kTransforms:
-      if (placed) send(kTransforms, frameTransforms(time_, pose(), calibration_ ? &*calibration_ : nullptr));
+      if (placed)
+        send(kTransforms, frameTransforms(time_, pose(), calibration_ ? &*calibration_ : nullptr));
       return;
     case kPose:
       if (placed) send(kPose, poseInFrame(time_, pose()));
@@ -193,9 +194,9 @@ void Node::onEvent(const Event& event) {
 }
 
 void Node::sendEvent(const Event& event, bool as_log) {
-  outputs_.message({as_log ? kLog : kEvents, event.stamp.time,
-                    std::make_shared<const std::string>(as_log ? eventLog(event)
-                                                               : eventJson(event))});
+  outputs_.message(
+      {as_log ? kLog : kEvents, event.stamp.time,
+       std::make_shared<const std::string>(as_log ? eventLog(event) : eventJson(event))});
 }
 
 /// A prediction holds until the object is seen again, or is no more.

@@ -44,7 +44,9 @@ class Node {
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
   void onEvent(const Event& event);
-  void onHealth(const Health& health, std::int64_t now_ns) { vital_signs_.onHealth(health, now_ns); }
+  void onHealth(const Health& health, std::int64_t now_ns) {
+    vital_signs_.onHealth(health, now_ns);
+  }
   void onMapTile(const MapTile& tile);
   void onMapTileGone(const MapTile& key);
   void onMapReply(const MapReply& reply);

@@ -39,8 +39,8 @@ std::optional<Eigen::Vector3d> placeOf(const Json& request, const char* name) {
 std::optional<MapQuery> queryOf(const Json& request) {
   MapQuery query;
   constexpr double kMost = 1000;
-  query.limit = static_cast<std::uint32_t>(
-      std::clamp(numberOf(request, "limit").value_or(200), 1.0, kMost));
+  query.limit =
+      static_cast<std::uint32_t>(std::clamp(numberOf(request, "limit").value_or(200), 1.0, kMost));
   const auto near = placeOf(request, "near"), low = placeOf(request, "low"),
              high = placeOf(request, "high");
   const auto radius = numberOf(request, "radius");
@@ -106,8 +106,9 @@ void Node::askForMap(const Call& call, std::int64_t now_ns) {
   const Json request = Json::parse(call.payload, nullptr, false);
   const auto query = request.is_object() ? queryOf(request) : std::nullopt;
   if (!query) {
-    return fail(call, "ask as {\"id\": 12}, {\"class\": \"car\"}, {\"near\": [x, y, z], "
-                      "\"radius\": 20}, {\"low\": [x, y, z], \"high\": [x, y, z]}, or {}");
+    return fail(call,
+                "ask as {\"id\": 12}, {\"class\": \"car\"}, {\"near\": [x, y, z], "
+                "\"radius\": 20}, {\"low\": [x, y, z], \"high\": [x, y, z]}, or {}");
   }
   ask(call, *query, now_ns);
 }

@@ -34,7 +34,8 @@ class Silent : public web::Viewer {
   bool cut_ = false;
 };
 
-/// The first byte says whether it is text: all but 'b' do. What is taken goes through a hub with one client.
+/// The first byte says whether it is text: all but 'b' do. What is taken goes through a hub with
+/// one client.
 bool takeSaid(View bytes) {
   if (bytes.empty()) return false;
   const bool text = bytes[0] != 'b';
@@ -43,7 +44,8 @@ bool takeSaid(View bytes) {
   const auto message = text ? protocol::parseText(chars) : protocol::parseBinary(said);
   if (!message) require(!message.error().code.empty(), "a refusal has a reason");
   Channels wanted;
-  web::Hub hub("perdure", "s", 8, {.wanted = [&](const Channels& c) { wanted = c; }, .call = [](Call) {}});
+  web::Hub hub("perdure", "s", 8,
+               {.wanted = [&](const Channels& c) { wanted = c; }, .call = [](Call) {}});
   hub.offer(channelTable({"cam0"}), serviceTable());
   Silent viewer;
   hub.join(viewer);
@@ -83,9 +85,9 @@ bool takeQuestion(View bytes) {
 
 std::vector<Bytes> questionSeeds() {
   std::vector<Bytes> seeds;
-  for (const char* text : {"0{\"id\":12}", "1{\"class\":\"car\",\"limit\":3}", "1{}",
-                           "1{\"near\":[1,2,3],\"radius\":20}",
-                           "1{\"low\":[0,0,0],\"high\":[1,1.5,2e3]}"}) {
+  for (const char* text :
+       {"0{\"id\":12}", "1{\"class\":\"car\",\"limit\":3}", "1{}",
+        "1{\"near\":[1,2,3],\"radius\":20}", "1{\"low\":[0,0,0],\"high\":[1,1.5,2e3]}"}) {
     seeds.push_back(bytesOf(text));
   }
   return seeds;

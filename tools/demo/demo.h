@@ -21,7 +21,8 @@ class Demo {
   ~Demo();
 
   /// Until the drive ends and everything is drained, --seconds are over, or interrupted; then ends
-  /// the services in order (but with --keep) and writes the outputs. Throws StartupError where a service cannot run.
+  /// the services in order (but with --keep) and writes the outputs. Throws StartupError where a
+  /// service cannot run.
   void run();
   /// After the end of a drive with --keep: all goes on until it is interrupted, and is then ended.
   void keep();

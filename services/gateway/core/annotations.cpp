@@ -67,8 +67,8 @@ void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
 }
 
 /// Draws an object's cuboid; its label where it is in the image.
-std::optional<Label> putObject(JsonWriter& json, const Objects& objects,
-                               const ObjectBelief& object, const CameraModel& camera) {
+std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const ObjectBelief& object,
+                               const CameraModel& camera) {
   const RigidTransform T_CW = (objects.T_WB * camera.T_BC()).inverse();
   auto corners = cornersOf(cuboidOf(object, objects.up_W));
   for (Eigen::Vector3d& corner : corners) corner = T_CW * corner;
@@ -76,8 +76,8 @@ std::optional<Label> putObject(JsonWriter& json, const Objects& objects,
   for (const auto& [a, b] : kEdges) {
     addStrokes(camera, corners[a], corners[b], isHidden(object), strokes);
   }
-  addStrokes(camera, (corners[0] + corners[3]) / 2, (corners[1] + corners[3]) / 2,
-             isHidden(object), strokes);
+  addStrokes(camera, (corners[0] + corners[3]) / 2, (corners[1] + corners[3]) / 2, isHidden(object),
+             strokes);
   if (strokes.empty()) return std::nullopt;
   const Colour colour = classColour(object.best().name);
   putLines(json, objects.stamp.time, kLineList, strokes,
@@ -93,8 +93,8 @@ std::optional<Label> putObject(JsonWriter& json, const Objects& objects,
 /// Of being there rather than clutter, by its likeliest class, with even odds before.
 double likelihood(const Detection& detection) {
   if (detection.activations.size() < 2) return 0.0;
-  const float best = *std::max_element(detection.activations.begin() + 1,
-                                       detection.activations.end());
+  const float best =
+      *std::max_element(detection.activations.begin() + 1, detection.activations.end());
   return 1.0 / (1.0 + std::exp(static_cast<double>(detection.activations[0] - best)));
 }
 

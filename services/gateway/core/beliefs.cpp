@@ -19,8 +19,7 @@ constexpr std::size_t kMostHistories = 4000;
 /// Centre, yaw, size and how well they are known, in the keys of the schema.
 void putState(JsonWriter& json, const Vector7d& mean, const Matrix7d& P) {
   const Eigen::Vector3d size = mean.tail<3>().array().exp();
-  const Eigen::Vector3d size_sigma =
-      size.array() * P.diagonal().tail<3>().array().max(0.0).sqrt();
+  const Eigen::Vector3d size_sigma = size.array() * P.diagonal().tail<3>().array().max(0.0).sqrt();
   json.key("c");
   putNumbers(json, {mean.data(), 3}, 3);
   json.key("yaw").number(mean[3], 4).key("size");
@@ -216,7 +215,8 @@ std::string detectionsJson(const Detections& detections, const ModelInfo* model)
     putNumbers(json, box, 1);
     const auto& a = one.activations;
     if (a.size() > 1) {
-      const auto best = static_cast<std::size_t>(std::max_element(a.begin() + 1, a.end()) - a.begin());
+      const auto best =
+          static_cast<std::size_t>(std::max_element(a.begin() + 1, a.end()) - a.begin());
       const bool named = model != nullptr && best - 1 < model->classes.size();
       json.key("class").text(named ? model->classes[best - 1] : fmt::format("class {}", best));
       json.key("nats").number(a[best] - a[0], 3);
@@ -247,8 +247,7 @@ void History::add(const Objects& objects) {
   for (const ObjectBelief& object : objects.objects) {
     auto& samples = samples_[object.id];
     if (!samples.empty() && std::abs(now - samples.back().time_s) < kSampleEvery) continue;
-    samples.push_back(
-        {now, object.existence, object.best().probability, object.visible_fraction});
+    samples.push_back({now, object.existence, object.best().probability, object.visible_fraction});
     if (samples.size() > kMostSamples) samples.pop_front();
   }
   // Ids grow: the smallest is the oldest.

@@ -30,8 +30,7 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras) {
       json(kTransforms, "/tf", "foxglove.FrameTransforms", frameTransforms(), Delivery::kLatched),
       json(kScene, "/scene", "foxglove.SceneUpdate", sceneUpdate(), Delivery::kLatched),
       json(kPose, "/pose", "foxglove.PoseInFrame", poseInFrame(), Delivery::kLatched),
-      json(kTrajectory, "/trajectory", "foxglove.PosesInFrame", posesInFrame(),
-           Delivery::kLatched),
+      json(kTrajectory, "/trajectory", "foxglove.PosesInFrame", posesInFrame(), Delivery::kLatched),
       json(kLandmarks, "/landmarks", "foxglove.PointCloud", pointCloud()),
       json(kLog, "/log", "foxglove.Log", log(), Delivery::kEach),
       json(kHealth, "/health", "perdure.Health", health(), Delivery::kLatched),
@@ -44,10 +43,20 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras) {
   return table;
 }
 
+ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
+                       std::string idl) {
+  return {id, "/raw/" + topic, "cdr", type, "omgidl", std::move(idl), Delivery::kNewest};
+}
+
 std::vector<ServiceInfo> serviceTable() {
   using namespace schemas;
   return {{kObjectService, "/object", "perdure.Object", objectRequest(), object()},
           {kMapQueryService, "/map/query", "perdure.MapQuery", mapRequest(), mapReply()}};
+}
+
+ServiceInfo nextEventService() {
+  return {kNextEventService, "/playback/next_event", "perdure.NextEvent", R"({"type":"object"})",
+          schemas::event()};
 }
 
 }  // namespace perdure::gateway

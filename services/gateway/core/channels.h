@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ enum Channel : std::uint32_t {
   kDetections,
   kMap,
   kModel,
+  kRaw = 50,  ///< and on: topics of the bus as they are
   kCamera = 100,
 };
 enum CameraPart : std::uint32_t { kImage = 0, kCalibration, kAnnotations, kPerCamera = 10 };
@@ -49,6 +51,10 @@ struct ChannelInfo {
 };
 
 std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
+/// A topic of the bus as it is, CDR with its IDL: "/raw/imu". For @final types alone, which go as
+/// XCDR1: the readers of others do not know XCDR2's delimiters.
+ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
+                       std::string idl);
 
 /// One message of a channel, encoded once for all who look.
 struct Encoded {
@@ -58,12 +64,14 @@ struct Encoded {
 };
 
 /// What clients may ask for (the protocol's services), with JSON both ways.
-enum Service : std::uint32_t { kObjectService = 1, kMapQueryService };
+enum Service : std::uint32_t { kObjectService = 1, kMapQueryService, kNextEventService };
 struct ServiceInfo {
   std::uint32_t id = 0;
   std::string name, type, request_schema, response_schema;
 };
 std::vector<ServiceInfo> serviceTable();
+/// To go on to the next event; of recordings alone.
+ServiceInfo nextEventService();
 
 /// A question of a client to one of them; answered by `client` and `call`.
 struct Call {
@@ -79,5 +87,25 @@ struct Answer {
 };
 
 using Channels = std::set<std::uint32_t>;
+
+/// What a client wants of a recording that is played (capability playbackControl).
+struct PlaybackRequest {
+  bool play = true;
+  double speed = 1.0;
+  std::optional<TimePoint> seek;
+  std::string id;  ///< goes back with the answer
+};
+struct PlaybackState {
+  enum class Status : std::uint8_t { kPlaying = 0, kPaused = 1, kBuffering = 2, kEnded = 3 };
+  Status status = Status::kPlaying;
+  TimePoint time;
+  double speed = 1.0;
+  bool did_seek = false;
+  std::string id;  ///< of the request that this answers; empty: none
+};
+/// What a recording covers.
+struct TimeRange {
+  TimePoint first, last;
+};
 
 }  // namespace perdure::gateway

@@ -19,9 +19,18 @@ Cuboid cuboidOf(const ObjectBelief& object, const Eigen::Vector3d& up_W);
 /// In W; bit 0: front, bit 1: left, bit 2: top.
 std::array<Eigen::Vector3d, 8> cornersOf(const Cuboid& cuboid);
 /// Pairs of corners; the thirteenth marks the front: across its lower half.
-inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1}, {2, 3}, {4, 5}, {6, 7},
-                                                            {0, 2}, {1, 3}, {4, 6}, {5, 7},
-                                                            {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
+inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
+                                                            {2, 3},
+                                                            {4, 5},
+                                                            {6, 7},
+                                                            {0, 2},
+                                                            {1, 3},
+                                                            {4, 6},
+                                                            {5, 7},
+                                                            {0, 4},
+                                                            {1, 5},
+                                                            {2, 6},
+                                                            {3, 7}}};
 
 /// Something on the map hides it now.
 inline bool isHidden(const ObjectBelief& object) {

@@ -43,8 +43,8 @@ void putStrokes(JsonWriter& json, const Eigen::Vector3d& a, const Eigen::Vector3
     putVector(json, b);
     return;
   }
-  const int strokes = std::clamp(static_cast<int>(std::round(length / (kDash + kGap))), 2,
-                                 kMostDashes);
+  const int strokes =
+      std::clamp(static_cast<int>(std::round(length / (kDash + kGap))), 2, kMostDashes);
   // As many gaps as fit between the strokes, which begin and end at the corners.
   const double unit = 1.0 / (strokes * (kDash + kGap) - kGap);
   for (int i = 0; i < strokes; ++i) {
@@ -63,7 +63,8 @@ void putEdges(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid
   json.key("points").begin('[');
   for (const auto& [a, b] : kEdges) putStrokes(json, corners[a], corners[b], isHidden(object));
   // Which way it faces: from the middle of its floor to the middle of its front's lower edge.
-  const Eigen::Vector3d floor = (corners[0] + corners[3]) / 2, front = (corners[1] + corners[3]) / 2;
+  const Eigen::Vector3d floor = (corners[0] + corners[3]) / 2,
+                        front = (corners[1] + corners[3]) / 2;
   putStrokes(json, floor, front, isHidden(object));
   json.end(']').key("color");
   putColour(json, classColour(object.best().name).withAlpha(opacityOf(object)));

@@ -118,27 +118,26 @@ Json entity() {
 
 /// Of one object, as `objects` and the map have it in common.
 Json glance() {
-  return object(
-      {{"id", natural()},
-       {"class", text()},
-       {"p", said(number(), "probability of the class")},
-       {"r", said(number(), "probability that it exists")},
-       {"c", said(listOf(number()), "centre in frame_id, m")},
-       {"yaw", said(number(), "about the vertical, rad")},
-       {"size", said(listOf(number()), "length, width, height, m")},
-       {"cov", said(listOf(number()), "of the centre, m^2: xx xy xz yy yz zz")},
-       {"yaw_sigma", number()},
-       {"size_sigma", said(listOf(number()), "standard deviation, m")},
-       {"visibility", said(text(), "visible, partial, occluded, out_of_view, behind")},
-       {"fraction", said(number(), "of it that is visible")},
-       {"blocked_by", said(natural(), "id of what hides it; 0: nothing that has one")},
-       {"confirmed", boolean()},
-       {"moving", said(number(), "probability that it moves")},
-       {"velocity", said(listOf(number()), "m/s")},
-       {"hits", natural()},
-       {"first_s", said(number(), "first seen, s of the sensor clock")},
-       {"last_s", said(number(), "last seen, s of the sensor clock")},
-       {"recalled", said(boolean(), "came back from the map and not seen since")}});
+  return object({{"id", natural()},
+                 {"class", text()},
+                 {"p", said(number(), "probability of the class")},
+                 {"r", said(number(), "probability that it exists")},
+                 {"c", said(listOf(number()), "centre in frame_id, m")},
+                 {"yaw", said(number(), "about the vertical, rad")},
+                 {"size", said(listOf(number()), "length, width, height, m")},
+                 {"cov", said(listOf(number()), "of the centre, m^2: xx xy xz yy yz zz")},
+                 {"yaw_sigma", number()},
+                 {"size_sigma", said(listOf(number()), "standard deviation, m")},
+                 {"visibility", said(text(), "visible, partial, occluded, out_of_view, behind")},
+                 {"fraction", said(number(), "of it that is visible")},
+                 {"blocked_by", said(natural(), "id of what hides it; 0: nothing that has one")},
+                 {"confirmed", boolean()},
+                 {"moving", said(number(), "probability that it moves")},
+                 {"velocity", said(listOf(number()), "m/s")},
+                 {"hits", natural()},
+                 {"first_s", said(number(), "first seen, s of the sensor clock")},
+                 {"last_s", said(number(), "last seen, s of the sensor clock")},
+                 {"recalled", said(boolean(), "came back from the map and not seen since")}});
 }
 
 }  // namespace
@@ -254,15 +253,16 @@ std::string object() {
                               {"p", number()},
                               {"mean", said(listOf(number()), "x y z yaw log l, log w, log h")},
                               {"covariance", said(listOf(listOf(number())), "7 x 7")}});
-  return object({{"found", boolean()},
-                 {"object", glance()},
-                 {"classes", listOf(belief)},
-                 {"existence", said(Json{{"type", "object"}}, "evidence by kind, nats and counts")},
-                 {"ledger", said(Json{{"type", "object"}}, "of each class: evidence by kind, nats")},
-                 {"ousted", said(Json{{"type", "object"}}, "the class that was given up last")},
-                 {"returns", said(Json{{"type", "object"}}, "when it should be seen again, s")},
-                 {"history", said(listOf(listOf(number())), "time s, r, p, visible fraction")}},
-                "perdure.Object")
+  return object(
+             {{"found", boolean()},
+              {"object", glance()},
+              {"classes", listOf(belief)},
+              {"existence", said(Json{{"type", "object"}}, "evidence by kind, nats and counts")},
+              {"ledger", said(Json{{"type", "object"}}, "of each class: evidence by kind, nats")},
+              {"ousted", said(Json{{"type", "object"}}, "the class that was given up last")},
+              {"returns", said(Json{{"type", "object"}}, "when it should be seen again, s")},
+              {"history", said(listOf(listOf(number())), "time s, r, p, visible fraction")}},
+             "perdure.Object")
       .dump();
 }
 

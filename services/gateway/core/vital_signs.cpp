@@ -66,7 +66,10 @@ std::string VitalSigns::json(std::int64_t now_ns, const Silence& last) const {
     json.key("age_s").number(secondsSince(service.heard_ns, now_ns), 2);
     json.key("frames_in").integer(h.frames_in).key("frames_out").integer(h.frames_out);
     json.key("dropped").integer(h.dropped).key("rate_hz").number(h.rate_hz, 2);
-    json.key("cpu").number(service.cpu, 3).key("rss_mb").number(1e-6 * static_cast<double>(h.rss_bytes), 1);
+    json.key("cpu")
+        .number(service.cpu, 3)
+        .key("rss_mb")
+        .number(1e-6 * static_cast<double>(h.rss_bytes), 1);
     json.key("reasons").begin('{');
     for (const auto& [reason, n] : h.reasons) json.textKey(reason).integer(n);
     json.end('}').end('}');
@@ -104,7 +107,8 @@ std::string VitalSigns::metrics(std::int64_t now_ns, const std::vector<Figure>& 
                         const std::function<double(const Service&)>& value) {
     head(name, help, type);
     for (const auto& [process, service] : services_) {
-      text += fmt::format("perdure_{}{{process=\"{}\"}} {}\n", name, label(process), value(service));
+      text +=
+          fmt::format("perdure_{}{{process=\"{}\"}} {}\n", name, label(process), value(service));
     }
   };
   each("service_up", "1 where the service was heard in the last seconds", "gauge",

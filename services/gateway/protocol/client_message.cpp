@@ -1,5 +1,6 @@
 #include "services/gateway/protocol/client_message.h"
 
+#include <bit>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -77,12 +78,16 @@ Result<ClientMessage> fetchAsset(const Json& message) {
 class Take {
  public:
   explicit Take(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
-  std::optional<std::uint32_t> natural() {
-    if (rest_.size() < 4) return std::nullopt;
-    std::uint32_t value = 0;
-    for (unsigned i = 0; i < 4; ++i) value |= static_cast<std::uint32_t>(rest_[i]) << (8 * i);
-    rest_ = rest_.subspan(4);
+  std::optional<std::uint64_t> little(unsigned bytes) {
+    if (rest_.size() < bytes) return std::nullopt;
+    std::uint64_t value = 0;
+    for (unsigned i = 0; i < bytes; ++i) value |= static_cast<std::uint64_t>(rest_[i]) << (8 * i);
+    rest_ = rest_.subspan(bytes);
     return value;
+  }
+  std::optional<std::uint32_t> natural() {
+    const auto value = little(4);
+    return value ? std::optional(static_cast<std::uint32_t>(*value)) : std::nullopt;
   }
   std::optional<std::string> text(std::size_t length) {
     if (rest_.size() < length) return std::nullopt;
@@ -100,10 +105,28 @@ Result<ClientMessage> serviceCall(Take take) {
   const auto service = take.natural(), call = take.natural(), length = take.natural();
   const auto encoding = length ? take.text(*length) : std::nullopt;
   if (!service || !call || !encoding) {
-    return fail("binary_short", "a service request is u32 service, u32 call, u32 length of the "
-                                "encoding's name, the name, and the payload");
+    return fail("binary_short",
+                "a service request is u32 service, u32 call, u32 length of the "
+                "encoding's name, the name, and the payload");
   }
   return ServiceCall{*service, *call, *encoding, take.rest()};
+}
+
+Result<ClientMessage> playbackRequest(Take take) {
+  constexpr double kSlowest = 0.01, kFastest = 100.0;
+  const auto command = take.little(1), speed = take.little(4), had_seek = take.little(1),
+             seek = take.little(8);
+  const auto length = take.natural();
+  const auto id = length ? take.text(*length) : std::nullopt;
+  if (!id) return fail("binary_short", "a playback request ends before its id does");
+  const double factor = std::bit_cast<float>(static_cast<std::uint32_t>(*speed));
+  constexpr std::uint64_t kLast = std::numeric_limits<std::int64_t>::max();
+  if (*command > 1 || !(factor >= kSlowest && factor <= kFastest) || *seek > kLast) {
+    return fail("playback_malformed", "play (0) or pause (1), at .01 to 100 times the speed");
+  }
+  PlaybackRequest request{*command == 0, factor, std::nullopt, id->substr(0, 128)};
+  if (*had_seek != 0) request.seek = fromNanoseconds(static_cast<std::int64_t>(*seek));
+  return request;
 }
 
 }  // namespace
@@ -121,9 +144,8 @@ Result<ClientMessage> parseText(std::string_view text) {
   for (const char* refused : {"advertise", "unadvertise", "setParameters"}) {
     if (op == refused) return NotOffered{op};
   }
-  for (const char* ignored :
-       {"subscribeParameterUpdates", "unsubscribeParameterUpdates", "subscribeConnectionGraph",
-        "unsubscribeConnectionGraph"}) {
+  for (const char* ignored : {"subscribeParameterUpdates", "unsubscribeParameterUpdates",
+                              "subscribeConnectionGraph", "unsubscribeConnectionGraph"}) {
     if (op == ignored) return Ignored{};
   }
   return fail("op_unknown", "there is no op \"" + op.substr(0, 64) + "\"");
@@ -138,7 +160,7 @@ Result<ClientMessage> parseBinary(std::span<const std::uint8_t> bytes) {
     case kServiceRequest:
       return serviceCall(Take(bytes.subspan(1)));
     case kPlaybackControl:
-      return NotOffered{"playbackControlRequest"};
+      return playbackRequest(Take(bytes.subspan(1)));
     default:
       return fail("binary_unknown", "there is no opcode " + std::to_string(bytes[0]));
   }

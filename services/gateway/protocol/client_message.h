@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "services/gateway/core/channels.h"
 
 namespace perdure::gateway::protocol {
 
@@ -44,11 +45,11 @@ struct NotOffered {
 };
 
 using ClientMessage = std::variant<Subscribe, Unsubscribe, GetParameters, FetchAsset, ServiceCall,
-                                   Ignored, NotOffered>;
+                                   PlaybackRequest, Ignored, NotOffered>;
 
 /// Reasons: json_malformed, op_missing, op_unknown, member_malformed, too_many_subscriptions.
 Result<ClientMessage> parseText(std::string_view text);
-/// Reasons: binary_empty, binary_unknown, binary_short.
+/// Reasons: binary_empty, binary_unknown, binary_short, playback_malformed.
 Result<ClientMessage> parseBinary(std::span<const std::uint8_t> bytes);
 
 }  // namespace perdure::gateway::protocol

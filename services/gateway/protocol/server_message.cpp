@@ -1,13 +1,21 @@
 #include "services/gateway/protocol/server_message.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "services/gateway/core/json_writer.h"
+#include "services/gateway/core/pieces.h"
 
 namespace perdure::gateway::protocol {
 namespace {
 
-enum Opcode : std::uint8_t { kMessage = 1, kTime = 2, kServiceResponse = 3, kAsset = 4 };
+enum Opcode : std::uint8_t {
+  kMessage = 1,
+  kTime = 2,
+  kServiceResponse = 3,
+  kAsset = 4,
+  kPlayback = 5
+};
 
 template <class Out>
 void putLittle(Out& out, std::uint64_t value, unsigned bytes) {
@@ -49,10 +57,20 @@ std::string_view chooseSubprotocol(std::string_view offered) {
   return {};
 }
 
-std::string serverInfo(const std::string& name, const std::string& session) {
+std::string serverInfo(const std::string& name, const std::string& session,
+                       const std::optional<TimeRange>& range) {
   JsonWriter json;
   json.begin('{').key("op").text("serverInfo").key("name").text(name);
-  json.key("capabilities").begin('[').text("time").text("services").end(']');
+  json.key("capabilities").begin('[').text("time").text("services");
+  if (range)
+    json.text("playbackControl").text("rangedPlayback");  // as newer and older SDKs call it
+  json.end(']');
+  if (range) {
+    json.key("dataStartTime");
+    putTime(json, range->first);
+    json.key("dataEndTime");
+    putTime(json, range->last);
+  }
   json.key("supportedEncodings").begin('[').text("json").end(']');
   json.key("metadata").begin('{').end('}').key("sessionId").text(session);
   return json.end('}').take();
@@ -102,6 +120,16 @@ std::string time(TimePoint time) {
   std::string bytes(1, static_cast<char>(kTime));
   putLittle(bytes, nanoseconds(time), 8);
   return bytes;
+}
+
+std::string playbackState(const PlaybackState& state) {
+  std::string bytes(1, static_cast<char>(kPlayback));
+  bytes += static_cast<char>(state.status);
+  putLittle(bytes, nanoseconds(state.time), 8);
+  putLittle(bytes, std::bit_cast<std::uint32_t>(static_cast<float>(state.speed)), 4);
+  bytes += state.did_seek ? '\x01' : '\0';
+  putLittle(bytes, state.id.size(), 4);
+  return bytes + state.id;
 }
 
 std::string serviceResponse(std::uint32_t service, std::uint32_t call, std::string_view json) {

@@ -20,7 +20,9 @@ std::string_view chooseSubprotocol(std::string_view offered);
 
 enum class StatusLevel { kInfo = 0, kWarning = 1, kError = 2 };
 
-std::string serverInfo(const std::string& name, const std::string& session);
+/// `range`: of a recording that clients control; nothing where it is live.
+std::string serverInfo(const std::string& name, const std::string& session,
+                       const std::optional<TimeRange>& range = std::nullopt);
 std::string advertise(const std::vector<ChannelInfo>& channels);
 std::string advertiseServices(const std::vector<ServiceInfo>& services);
 std::string status(StatusLevel level, std::string_view message);
@@ -28,6 +30,7 @@ std::string noParameters(const std::string& id);
 std::string serviceFailure(std::uint32_t service, std::uint32_t call, std::string_view message);
 
 std::string time(TimePoint time);
+std::string playbackState(const PlaybackState& state);
 std::string serviceResponse(std::uint32_t service, std::uint32_t call, std::string_view json);
 std::string assetMissing(std::uint32_t request, std::string_view message);
 

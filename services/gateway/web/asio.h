@@ -1,8 +1,6 @@
 // Boost.Asio and Beast, as this service uses them.
 #pragma once
 
-#include <utility>  // before Asio: Boost 1.74 with GCC 12 misses std::exchange
-
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -10,6 +8,7 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
+#include <utility>  // before Asio: Boost 1.74 with GCC 12 misses std::exchange
 
 namespace perdure::gateway::web {
 

@@ -76,8 +76,8 @@ void Client::read() {
 void Client::onRead(beast::error_code error) {
   if (error) return noteEnd(error);
   const auto data = said_.cdata();
-  shared_->hub.hear(*this, {static_cast<const char*>(data.data()), data.size()},
-                    socket_.got_text(), std::chrono::steady_clock::now());
+  shared_->hub.hear(*this, {static_cast<const char*>(data.data()), data.size()}, socket_.got_text(),
+                    std::chrono::steady_clock::now());
   said_.consume(said_.size());
   if (!cut_) read();
 }
@@ -117,10 +117,10 @@ void Client::write() {
   const std::array<asio::const_buffer, 2> buffers{
       asio::buffer(sending_.head.data(), sending_.has_head ? sending_.head.size() : 0),
       asio::buffer(*sending_.payload)};
-  socket_.async_write(buffers, [self = shared_from_this()](beast::error_code error,
-                                                           std::size_t bytes) {
-    self->onWritten(error, bytes);
-  });
+  socket_.async_write(buffers,
+                      [self = shared_from_this()](beast::error_code error, std::size_t bytes) {
+                        self->onWritten(error, bytes);
+                      });
 }
 
 void Client::onWritten(beast::error_code error, std::size_t bytes) {
@@ -137,9 +137,8 @@ void Client::onWritten(beast::error_code error, std::size_t bytes) {
 void Client::cut(const std::string&) {
   if (cut_) return;
   cut_ = true;
-  asio::post(socket_.get_executor(), [self = shared_from_this()] {
-    self->noteEnd(asio::error::operation_aborted);
-  });
+  asio::post(socket_.get_executor(),
+             [self = shared_from_this()] { self->noteEnd(asio::error::operation_aborted); });
 }
 
 }  // namespace

@@ -10,10 +10,10 @@
 namespace perdure::gateway::web {
 
 struct File {
-  std::string type;     ///< of HTTP: "text/html; charset=utf-8"
+  std::string type;  ///< of HTTP: "text/html; charset=utf-8"
   std::string content;
-  std::string packed;   ///< the same by gzip, where FILE.gz lies beside it; else empty
-  std::string tag;      ///< ETag, in quotes
+  std::string packed;  ///< the same by gzip, where FILE.gz lies beside it; else empty
+  std::string tag;     ///< ETag, in quotes
 };
 
 class Files {

@@ -1,5 +1,5 @@
-// Who may talk to the gateway: its Host and Origin, against pages that were not meant (any page in a
-// browser may open ws://127.0.0.1, and a name that leads there), and the token.
+// Who may talk to the gateway: its Host and Origin, against pages that were not meant (any page in
+// a browser may open ws://127.0.0.1, and a name that leads there), and the token.
 #pragma once
 
 #include <string>

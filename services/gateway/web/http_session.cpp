@@ -32,10 +32,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     parser_->header_limit(kLongestHeader);
     parser_->body_limit(0);
     stream_.expires_after(kPatience);
-    http::async_read(stream_, buffer_, *parser_,
-                     [self = shared_from_this()](beast::error_code error, std::size_t) {
-                       self->onRead(error);
-                     });
+    http::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
   }
   void end() override {
     beast::error_code ignored;
@@ -67,8 +66,8 @@ void HttpSession::onRead(beast::error_code error) {
     shared_->hub.reasons().add(error == beast::error::timeout ? "http_too_slow" : "http_too_large");
     return;
   }
-  if (error == http::error::end_of_stream || error.category() == asio::error::get_system_category() ||
-      error == asio::error::eof) {
+  if (error == http::error::end_of_stream ||
+      error.category() == asio::error::get_system_category() || error == asio::error::eof) {
     return;
   }
   if (error) {
@@ -91,9 +90,10 @@ void HttpSession::upgrade() {
   const auto& options = shared_->options;
   const auto origin = shared_->guard.checkOrigin(view(request[http::field::origin]),
                                                  view(request[http::field::host]));
-  const auto token = shared_->guard.checkToken(view(request.target()),
-                                               view(request[http::field::authorization]));
-  const auto protocol = protocol::chooseSubprotocol(view(request[http::field::sec_websocket_protocol]));
+  const auto token =
+      shared_->guard.checkToken(view(request.target()), view(request[http::field::authorization]));
+  const auto protocol =
+      protocol::chooseSubprotocol(view(request[http::field::sec_websocket_protocol]));
   if (!origin) return refuse(http::status::forbidden, origin.error());
   if (!token) return refuse(http::status::unauthorized, token.error());
   if (protocol.empty()) {
@@ -148,12 +148,13 @@ void HttpSession::answerFile(std::string_view path) {
     return say(http::status::not_found, "text/plain; charset=utf-8", "There is no such file.\n");
   }
   const Request& request = parser_->get();
-  const bool packs = !file->packed.empty() &&
-                     view(request[http::field::accept_encoding]).find("gzip") != std::string_view::npos;
+  const bool packs =
+      !file->packed.empty() &&
+      view(request[http::field::accept_encoding]).find("gzip") != std::string_view::npos;
   const bool known = view(request[http::field::if_none_match]) == file->tag;
   const std::string& content = packs ? file->packed : file->content;
-  auto response = std::make_shared<FileBody>(
-      known ? http::status::not_modified : http::status::ok, request.version());
+  auto response = std::make_shared<FileBody>(known ? http::status::not_modified : http::status::ok,
+                                             request.version());
   putCommonFields(*response);
   response->set(http::field::content_type, file->type);
   response->set(http::field::etag, file->tag);
@@ -182,8 +183,9 @@ void HttpSession::say(http::status status, const char* type, std::string text) {
 
 template <class Response>
 void HttpSession::send(std::shared_ptr<Response> response, std::shared_ptr<const void> keeper) {
-  const bool goes_on = parser_->get().keep_alive() && ++served_ < kMostRequests &&
-                       http::to_status_class(response->result()) != http::status_class::client_error;
+  const bool goes_on =
+      parser_->get().keep_alive() && ++served_ < kMostRequests &&
+      http::to_status_class(response->result()) != http::status_class::client_error;
   response->keep_alive(goes_on);
   stream_.expires_after(kPatience);
   // The serializer must outlive the write; HEAD and 304 tell a length without a body.

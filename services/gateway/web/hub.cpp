@@ -6,7 +6,7 @@
 namespace perdure::gateway::web {
 namespace {
 
-constexpr int kMostASecond = 200;  // messages of one client
+constexpr int kMostASecond = 200;        // messages of one client
 constexpr std::size_t kMostOfOne = 512;  // subscriptions
 
 template <class... F>
@@ -22,7 +22,9 @@ Hub::Hub(std::string name, std::string session, std::size_t most_events, Told to
       most_events_(most_events),
       told_(std::move(told)) {}
 
-void Hub::offer(std::vector<ChannelInfo> channels, std::vector<ServiceInfo> services) {
+void Hub::offer(std::vector<ChannelInfo> channels, std::vector<ServiceInfo> services,
+                std::optional<TimeRange> range) {
+  range_ = range;
   for (ChannelInfo& info : channels) channels_[info.id].info = std::move(info);
   services_ = std::move(services);
 }
@@ -32,9 +34,10 @@ void Hub::join(Viewer& viewer) {
   viewers_[viewer.id_] = &viewer;
   std::vector<ChannelInfo> channels;
   for (const auto& [id, kept] : channels_) channels.push_back(kept.info);
-  say(viewer, protocol::serverInfo(name_, session_));
+  say(viewer, protocol::serverInfo(name_, session_, range_));
   say(viewer, protocol::advertise(channels));
   say(viewer, protocol::advertiseServices(services_));
+  if (!playback_.empty()) say(viewer, playback_, false);
 }
 
 void Hub::leave(Viewer& viewer) {
@@ -94,11 +97,19 @@ void Hub::handle(Viewer& viewer, const protocol::ClientMessage& message) {
                    say(viewer, assetMissing(m.request, "this gateway has no assets"), false);
                  },
                  [&](const ServiceCall& m) { callService(viewer, m); },
+                 [&](const PlaybackRequest& m) {
+                   if (told_.playback) {
+                     told_.playback(m);
+                   } else {
+                     complain(viewer, "this is live: there is nothing to play back");
+                   }
+                 },
                  [](const Ignored&) {},
                  [&](const NotOffered& m) {
                    reasons_.add("client_said_not_offered");
-                   complain(viewer, m.what + ": this gateway only shows; its serverInfo has what "
-                                             "it is capable of");
+                   complain(viewer, m.what +
+                                        ": this gateway only shows; its serverInfo has what "
+                                        "it is capable of");
                  }},
       message);
 }
@@ -208,6 +219,14 @@ void Hub::publish(const Encoded& message) {
     }
     if (any) viewer->flush();
   }
+}
+
+void Hub::tellPlayback(const PlaybackState& state) {
+  for (const auto& [id, viewer] : viewers_) say(*viewer, protocol::playbackState(state), false);
+  PlaybackState later = state;
+  later.id.clear();
+  later.did_seek = false;
+  playback_ = protocol::playbackState(later);
 }
 
 void Hub::tellTime(TimePoint time) {

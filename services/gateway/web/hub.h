@@ -47,6 +47,7 @@ class Hub {
   struct Told {
     std::function<void(const Channels&)> wanted;  ///< channels that somebody looks at; on change
     std::function<void(Call)> call;
+    std::function<void(PlaybackRequest)> playback = {};  ///< empty: it is live
   };
   Hub(std::string name, std::string session, std::size_t most_events, Told told);
 
@@ -57,10 +58,12 @@ class Hub {
             std::chrono::steady_clock::time_point now);
 
   /// The channels must not be empty; once.
-  void offer(std::vector<ChannelInfo> channels, std::vector<ServiceInfo> services);
+  void offer(std::vector<ChannelInfo> channels, std::vector<ServiceInfo> services,
+             std::optional<TimeRange> range = std::nullopt);
   void publish(const Encoded& message);
   void tellTime(TimePoint time);
   void answer(const Answer& answer);
+  void tellPlayback(const PlaybackState& state);
 
   std::size_t clients() const { return viewers_.size(); }
   std::uint64_t published() const { return published_; }
@@ -90,6 +93,8 @@ class Hub {
   const Told told_;
   std::map<std::uint32_t, Kept> channels_;
   std::vector<ServiceInfo> services_;
+  std::optional<TimeRange> range_;
+  std::string playback_;  ///< the newest state, for who comes late
   std::map<std::uint64_t, Viewer*> viewers_;
   std::uint64_t next_id_ = 1, published_ = 0, dropped_by_gone_ = 0;
   Channels wanted_;

@@ -18,8 +18,8 @@ tcp::endpoint endpointOf(const Options& options) {
   const std::string name = options.address == "localhost" ? "127.0.0.1" : options.address;
   const auto address = asio::ip::make_address(name, error);
   if (error) {
-    throw StartupError(ExitCode::kConfiguration, "http.address " + options.address +
-                                                     " is no address; give one as 127.0.0.1");
+    throw StartupError(ExitCode::kConfiguration,
+                       "http.address " + options.address + " is no address; give one as 127.0.0.1");
   }
   return {address, static_cast<unsigned short>(options.port)};
 }
@@ -29,14 +29,22 @@ tcp::endpoint endpointOf(const Options& options) {
 class Server::Impl {
  public:
   Impl(const Options& options, Content content, Hub::Told told)
-      : shared_(std::make_shared<Shared>(Shared{
-            options, Guard(options), std::move(content.files),
-            Hub(content.name, content.session, static_cast<std::size_t>(options.most_events),
-                std::move(told)),
-            {}, {}, {}, 0, 0, 0, {}})),
+      : shared_(std::make_shared<Shared>(
+            Shared{options,
+                   Guard(options),
+                   std::move(content.files),
+                   Hub(content.name, content.session, static_cast<std::size_t>(options.most_events),
+                       std::move(told)),
+                   {},
+                   {},
+                   {},
+                   0,
+                   0,
+                   0,
+                   {}})),
         acceptor_(io_),
         beat_(io_) {
-    shared_->hub.offer(std::move(content.channels), std::move(content.services));
+    shared_->hub.offer(std::move(content.channels), std::move(content.services), content.range);
     shared_->healthz = R"({"status":"starting"})";
     shared_->texts_at = Clock::now();
     listen();
@@ -123,9 +131,9 @@ class Server::Impl {
     last_beat_ = Clock::now().time_since_epoch().count();
     {
       const std::lock_guard lock(mutex_);
-      stats_ = {shared_->hub.clients(),  shared_->connections.size(), shared_->bytes_sent,
-                shared_->messages_sent,  shared_->hub.published(),    shared_->hub.dropped(),
-                shared_->requests,       shared_->hub.reasons()};
+      stats_ = {shared_->hub.clients(), shared_->connections.size(), shared_->bytes_sent,
+                shared_->messages_sent, shared_->hub.published(),    shared_->hub.dropped(),
+                shared_->requests,      shared_->hub.reasons()};
     }
     beat_.expires_after(std::chrono::seconds(1));
     beat_.async_wait([this](beast::error_code error) {
@@ -162,6 +170,10 @@ void Server::tellTime(TimePoint time) {
 
 void Server::answer(Answer answer) {
   (void)impl_->post([answer = std::move(answer)](Shared& shared) { shared.hub.answer(answer); });
+}
+
+void Server::tellPlayback(PlaybackState state) {
+  (void)impl_->post([state = std::move(state)](Shared& shared) { shared.hub.tellPlayback(state); });
 }
 
 void Server::setTexts(std::string healthz, std::string metrics) {

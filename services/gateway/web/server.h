@@ -21,6 +21,7 @@ struct Content {
   std::vector<ChannelInfo> channels;
   std::vector<ServiceInfo> services;
   Files files;
+  std::optional<TimeRange> range = std::nullopt;  ///< of a recording that clients control
 };
 
 struct Stats {
@@ -31,7 +32,8 @@ struct Stats {
 
 class Server {
  public:
-  /// `told` is called in the server's thread. Throws StartupError (69) where the port cannot be had.
+  /// `told` is called in the server's thread. Throws StartupError (69) where the port cannot be
+  /// had.
   Server(const Options& options, Content content, Hub::Told told);
   /// Ends all connections.
   ~Server();
@@ -42,6 +44,7 @@ class Server {
   void publish(Encoded message);
   void tellTime(TimePoint time);
   void answer(Answer answer);
+  void tellPlayback(PlaybackState state);
   /// What /healthz and /metrics answer from now on.
   void setTexts(std::string healthz, std::string metrics);
   Stats stats() const;

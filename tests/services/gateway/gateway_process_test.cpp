@@ -24,7 +24,8 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 
 std::string subscribe(std::uint32_t id, std::uint32_t channel) {
-  return json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}}.dump();
+  return json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}}
+      .dump();
 }
 
 class Gateway : public ::testing::Test {
@@ -62,7 +63,8 @@ class Gateway : public ::testing::Test {
   }
   void publish(std::uint64_t sequence, std::size_t objects = 3) {
     std::vector<ObjectBelief> beliefs;
-    for (ObjectId id = 1; id <= objects; ++id) beliefs.push_back(objectAt(id, {5.0 * static_cast<double>(id), 0, 0}));
+    for (ObjectId id = 1; id <= objects; ++id)
+      beliefs.push_back(objectAt(id, {5.0 * static_cast<double>(id), 0, 0}));
     ASSERT_TRUE(objects_.write(frameOf(sequence, beliefs)).has_value());
   }
   /// A count of /metrics; 0 where there is none.
@@ -104,8 +106,9 @@ TEST_F(Gateway, ServesPageHealthAndMetrics) {
   EXPECT_EQ(get(port_, "/", "If-None-Match: " + tag[1].str() + "\r\n").status, 304);
   EXPECT_EQ(get(port_, "/../../etc/passwd").status, 404);
   EXPECT_EQ(get(port_, "/nothing").status, 404);
-  ASSERT_TRUE(eventually(5s, [&] { return get(port_, "/healthz").text.find("\"gateway\":\"ok\"") != std::string::npos; }))
-      << get(port_, "/healthz").text;
+  ASSERT_TRUE(eventually(5s, [&] {
+    return get(port_, "/healthz").text.find("\"gateway\":\"ok\"") != std::string::npos;
+  })) << get(port_, "/healthz").text;
   publish(1);
   EXPECT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_objects") == 3; }));
   EXPECT_THAT(get(port_, "/metrics").text, HasSubstr("perdure_service_up{process=\"gateway\"} 1"));
@@ -130,15 +133,17 @@ TEST_F(Gateway, RefusesForeignHostsPagesAndProtocols) {
   RawClient post(port_);
   post.send("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
   EXPECT_THAT(post.readHead(), HasSubstr(" 405 "));
-  EXPECT_TRUE(eventually(5s, [&] { return refused("origin_refused") == 2 && refused("host_refused") == 2; }))
-      << get(port_, "/metrics").text;
+  EXPECT_TRUE(eventually(5s, [&] {
+    return refused("origin_refused") == 2 && refused("host_refused") == 2;
+  })) << get(port_, "/metrics").text;
   serves();
 }
 
 TEST_F(Gateway, WantsTheTokenThatIsSet) {
   start({"http.token=s3cret"});
   EXPECT_THAT(RawClient(port_).upgrade(), HasSubstr(" 401 "));
-  EXPECT_THAT(RawClient(port_).upgrade("", "foxglove.sdk.v1", "vehicle.example", "/?token=s3cret"), HasSubstr(" 101 "));
+  EXPECT_THAT(RawClient(port_).upgrade("", "foxglove.sdk.v1", "vehicle.example", "/?token=s3cret"),
+              HasSubstr(" 101 "));
   EXPECT_EQ(get(port_, "/metrics").status, 401);
   EXPECT_EQ(get(port_, "/metrics?token=s3cret").status, 200);
 }
@@ -172,7 +177,10 @@ TEST_F(Gateway, LosesNothingOfOneClientThroughAnotherThatDoesNotRead) {
   // Each some 150 kB: more than all buffers between the two.
   for (std::uint64_t i = 1; i <= kFrames; ++i) {
     publish(i, 60);
-    ASSERT_THAT(good->readMessage(1), HasSubstr("\"sec\":" + std::to_string((2'000'000'000 + 100'000'000 * i) / 1'000'000'000))) << i;
+    ASSERT_THAT(
+        good->readMessage(1),
+        HasSubstr("\"sec\":" + std::to_string((2'000'000'000 + 100'000'000 * i) / 1'000'000'000)))
+        << i;
   }
   EXPECT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_lost_total") > 10; }));
   EXPECT_EQ(metric("perdure_gateway_encoded_total"), static_cast<double>(kFrames));
@@ -196,7 +204,8 @@ TEST_F(Gateway, GoesOnThroughFramesThatLieOrMakeNoSense) {
   latin->sendFrame("\xff\xfe");
   EXPECT_TRUE(latin->closed(10));
   const auto confused = greeted();
-  for (const char* text : {"", "{", "[]", "{\"op\":\"subscribe\",\"subscriptions\":[[]]}"}) confused->sendFrame(text);
+  for (const char* text : {"", "{", "[]", "{\"op\":\"subscribe\",\"subscriptions\":[[]]}"})
+    confused->sendFrame(text);
   confused->sendFrame(std::string("\x02\x01\0\0\0", 5), 2);
   confused->sendFrame("", 2);
   for (int i = 0; i < 6; ++i) {
@@ -205,10 +214,12 @@ TEST_F(Gateway, GoesOnThroughFramesThatLieOrMakeNoSense) {
     EXPECT_EQ(status["op"], "status") << status;
   }
   confused->sendFrame(subscribe(9, channels_["/objects"]));
-  ASSERT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_clients") == 1; })) << get(port_, "/metrics").text;
+  ASSERT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_clients") == 1; }))
+      << get(port_, "/metrics").text;
   publish(++sequence_);
   EXPECT_THAT(confused->readMessage(9), HasSubstr("\"objects\""));
-  EXPECT_TRUE(eventually(5s, [&] { return refused("client_cut_message_too_large") == 2; })) << get(port_, "/metrics").text;
+  EXPECT_TRUE(eventually(5s, [&] { return refused("client_cut_message_too_large") == 2; }))
+      << get(port_, "/metrics").text;
   serves();
 }
 
@@ -251,7 +262,8 @@ TEST_F(Gateway, EndsRequestsThatTrickleInAndLongHeaders) {
   lengthy.send("GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(20'000, 'x') + "\r\n\r\n");
   EXPECT_TRUE(lengthy.closed(10));
   EXPECT_TRUE(loris.closed(20));
-  EXPECT_TRUE(eventually(5s, [&] { return refused("http_too_slow") >= 1 && refused("http_too_large") == 1; }));
+  EXPECT_TRUE(eventually(
+      5s, [&] { return refused("http_too_slow") >= 1 && refused("http_too_large") == 1; }));
   serves();
 }
 
@@ -266,7 +278,8 @@ TEST_F(Gateway, EndsAtOnceWithClientsThatDoNotRead) {
 
 TEST_F(Gateway, SaysWhereItsPortIsTaken) {
   start();
-  Child second({(programs() / "perdure-gateway").string(), "--port", std::to_string(port_)}, folder_.file("second"));
+  Child second({(programs() / "perdure-gateway").string(), "--port", std::to_string(port_)},
+               folder_.file("second"));
   EXPECT_EQ(second.wait(20s), 69);
   EXPECT_THAT(second.log(), HasSubstr("set http.port to another one"));
 }

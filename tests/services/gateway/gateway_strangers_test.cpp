@@ -31,6 +31,8 @@ class Drive {
         objects_(participant, bus::topics::kObjects),
         events_(participant, bus::topics::kEvents),
         tiles_(participant, bus::topics::kMap),
+        imu_(participant, bus::topics::kImu),
+        speed_(participant, bus::topics::kSpeed),
         frames_(participant, bus::topics::frame("cam0")) {
     Calibration calibration = forwardCamera();
     calibration.source = 42;
@@ -59,7 +61,9 @@ class Drive {
  private:
   void step(std::uint64_t i) {
     std::vector<ObjectBelief> cars;
-    for (ObjectId id = 1; id <= 3; ++id) cars.push_back(objectAt(id, {4.0 + 6.0 * static_cast<double>(id), id % 2 == 0 ? 3.0 : -3.0, 0}));
+    for (ObjectId id = 1; id <= 3; ++id)
+      cars.push_back(
+          objectAt(id, {4.0 + 6.0 * static_cast<double>(id), id % 2 == 0 ? 3.0 : -3.0, 0}));
     cars[2].visibility = Visibility::kOccluded;
     cars[2].blocked_by = 1;
     const Objects objects = frameOf(i, cars);
@@ -70,6 +74,8 @@ class Drive {
     odometry.T_WB.p.x() = 0.01 * static_cast<double>(i);
     odometry.covariance.setIdentity();
     (void)odometry_.write(odometry);
+    (void)imu_.write(ImuSample{42, i, objects.stamp.time, {0, 0, 0.1}, {0, 0, 9.8}});
+    (void)speed_.write(SpeedSample{42, i, objects.stamp.time, 1.0, 0.1});
     Landmarks landmarks;
     landmarks.stamp = objects.stamp;
     landmarks.world = objects.world;
@@ -81,7 +87,7 @@ class Drive {
     detections.stamp = objects.stamp;
     detections.camera = "cam0";
     detections.model_hash = 9;
-    detections.detections = {{.box = {100, 100, 200, 200}, .activations = {0.F, 2.F}}};
+    detections.detections = {test::detectionOf({100, 100, 200, 200}, {0.F, 2.F})};
     (void)detections_.write(detections);
     Frame frame;
     frame.stamp = objects.stamp;
@@ -110,6 +116,8 @@ class Drive {
   bus::Writer<Objects> objects_;
   bus::Writer<Event> events_;
   bus::Writer<MapTile> tiles_;
+  bus::Writer<ImuSample> imu_;
+  bus::Writer<SpeedSample> speed_;
   bus::Writer<Frame> frames_;
   std::atomic<bool> over_{false};
   std::thread thread_;
@@ -119,11 +127,14 @@ class Strangers : public ::testing::Test {
  protected:
   void SetUp() override {
     const char* modules = std::getenv("PERDURE_STRANGERS");
-    if (modules == nullptr || !std::filesystem::exists(std::filesystem::path(modules) / "ws") || !findProgram("node")) {
+    if (modules == nullptr || !std::filesystem::exists(std::filesystem::path(modules) / "ws") ||
+        !findProgram("node")) {
       GTEST_SKIP() << "npm is not here, or got nothing: clients of other people are not tried";
     }
     modules_ = modules;
-    gateway_ = std::make_unique<Child>(std::vector<std::string>{(programs() / "perdure-gateway").string(), "--port", "0"}, folder_.file("log"));
+    gateway_ = std::make_unique<Child>(
+        std::vector<std::string>{(programs() / "perdure-gateway").string(), "--port", "0"},
+        folder_.file("log"));
     const std::regex pattern("http://[^:]*:([0-9]+)/");
     std::smatch found;
     ASSERT_TRUE(eventually(20s, [&] {
@@ -134,7 +145,9 @@ class Strangers : public ::testing::Test {
     })) << gateway_->log();
   }
   json answer(const std::string& script, std::vector<std::string> more) {
-    std::vector<std::string> command{"node", (sources() / "tests/services/gateway/strangers" / script).string(), modules_, port_};
+    std::vector<std::string> command{
+        "node", (sources() / "tests/services/gateway/strangers" / script).string(), modules_,
+        port_};
     command.insert(command.end(), more.begin(), more.end());
     Child node(command, folder_.file(script));
     status_ = node.wait(150s);
@@ -155,7 +168,7 @@ TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
     const json said = answer("foxglove.mjs", {protocol});
     ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("foxglove.mjs"));
     EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
-    EXPECT_EQ(said["channels"], 15);
+    EXPECT_EQ(said["channels"], 19);
     EXPECT_EQ(status_, 0);
   }
 }

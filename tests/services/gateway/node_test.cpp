@@ -27,7 +27,8 @@ class GatewayNode : public ::testing::Test {
   }
   Frame grey(std::uint64_t sequence) const {
     Frame frame;
-    frame.stamp = {42, sequence, fromNanoseconds(kSecond + 50'000'000 * static_cast<std::int64_t>(sequence)), 0};
+    frame.stamp = {42, sequence,
+                   fromNanoseconds(kSecond + 50'000'000 * static_cast<std::int64_t>(sequence)), 0};
     frame.camera = "cam0";
     frame.width = 16, frame.height = 8;
     frame.data = std::make_shared<const std::vector<std::uint8_t>>(16 * 8, std::uint8_t{90});
@@ -38,7 +39,9 @@ class GatewayNode : public ::testing::Test {
   std::vector<Answer> answers_;
   std::vector<MapQuery> queries_;
   Config config_;
-  Node node_{config_, "ego", 5,
+  Node node_{config_,
+             "ego",
+             5,
              {.message = [this](const Encoded& m) { said_.push_back(m); },
               .time = [](const TimePoint&) {},
               .answer = [this](const Answer& a) { answers_.push_back(a); },
@@ -97,7 +100,7 @@ TEST_F(GatewayNode, DrawsTheDetectionsOfTheSameFrame) {
   Detections detections;
   detections.camera = "cam0";
   detections.stamp = frameOf(1, {}).stamp;
-  detections.detections = {{.box = {1, 2, 3, 4}, .activations = {0.F, 3.F}}};
+  detections.detections = {test::detectionOf({1, 2, 3, 4}, {0.F, 3.F})};
   node_.onDetections(detections);
   node_.onObjects(frameOf(1, {}), kSecond);
   node_.onObjects(frameOf(2, {}), kSecond);
@@ -162,9 +165,10 @@ TEST_F(GatewayNode, PassesTheMapsAnswerToWhoAsked) {
 }
 
 TEST_F(GatewayNode, RefusesQuestionsThatMakeNoSense) {
-  for (const char* text : {"", "[]", "{\"id\":-1}", "{\"id\":\"1\"}", "{\"near\":[1,2]}", "{\"near\":[1,2,3]}",
-                           "{\"near\":[1,2,3],\"radius\":-1}", "{\"low\":[1,1,1],\"high\":[0,2,2]}",
-                           "{\"class\":7}", "{\"low\":[1,1,\"x\"],\"high\":[2,2,2]}"}) {
+  for (const char* text :
+       {"", "[]", "{\"id\":-1}", "{\"id\":\"1\"}", "{\"near\":[1,2]}", "{\"near\":[1,2,3]}",
+        "{\"near\":[1,2,3],\"radius\":-1}", "{\"low\":[1,1,1],\"high\":[0,2,2]}", "{\"class\":7}",
+        "{\"low\":[1,1,\"x\"],\"high\":[2,2,2]}"}) {
     node_.onCall({7, kMapQueryService, 1, text}, kSecond);
     ASSERT_FALSE(answers_.empty()) << text;
     EXPECT_FALSE(answers_.back().ok) << text;

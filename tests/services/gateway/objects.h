@@ -56,6 +56,13 @@ inline Event eventOf(EventKind kind, ObjectId id) {
   return event;
 }
 
+inline Detection detectionOf(const Box& box, std::vector<float> activations) {
+  Detection detection;
+  detection.box = box;
+  detection.activations = std::move(activations);
+  return detection;
+}
+
 /// Looks along the body's x axis from its origin.
 inline Calibration forwardCamera() {
   CameraCalibration camera;

@@ -1,5 +1,5 @@
-// A mesh as binary glTF 2.0 for the page: one primitive in a box of 1 × 1 × 1 about the origin, with
-// COLOR_0 instead of materials.
+// A mesh as binary glTF 2.0 for the page: one primitive in a box of 1 × 1 × 1 about the origin,
+// with COLOR_0 instead of materials.
 #pragma once
 
 #include <string>

@@ -2,7 +2,7 @@
 // by itself, and says in words why there is nothing.
 
 const PROTOCOLS = ['foxglove.sdk.v1', 'foxglove.websocket.v1'];
-const MESSAGE = 1, TIME = 2, SERVICE_RESPONSE = 3, SERVICE_REQUEST = 2;
+const MESSAGE = 1, TIME = 2, SERVICE_RESPONSE = 3, PLAYBACK = 5, SERVICE_REQUEST = 2, PLAYBACK_CONTROL = 3;
 const text = new TextDecoder();
 
 export class Connection {
@@ -112,12 +112,32 @@ export class Connection {
     const opcode = view.getUint8(0);
     if (opcode === MESSAGE) this.receiveMessage(view, data);
     if (opcode === TIME) this.time = view.getBigUint64(1, true);
+    if (opcode === PLAYBACK) this.receivePlayback(view);
     if (opcode === SERVICE_RESPONSE) {
       const call = this.take(view.getUint32(5, true));
       const begin = 13 + view.getUint32(9, true);
       call?.resolve(JSON.parse(text.decode(new Uint8Array(data, begin))));
     }
     return undefined;
+  }
+
+  receivePlayback(view) {
+    const status = ['playing', 'paused', 'buffering', 'ended'][view.getUint8(1)];
+    this.playback = { status, time: 1e-9 * Number(view.getBigUint64(2, true)), speed: view.getFloat32(10, true) };
+    if (view.getUint8(14)) this.onSeek?.();
+  }
+
+  /** Of a recording: play or pause, how fast, and where (s) if it is to be somewhere else. */
+  control(play, speed, seek) {
+    const id = new TextEncoder().encode(`p${this.nextId++}`), bytes = new Uint8Array(19 + id.length), view = new DataView(bytes.buffer);
+    view.setUint8(0, PLAYBACK_CONTROL);
+    view.setUint8(1, play ? 0 : 1);
+    view.setFloat32(2, speed, true);
+    view.setUint8(6, seek === undefined ? 0 : 1);
+    view.setBigUint64(7, BigInt(Math.round(1e9 * (seek ?? 0))), true);
+    view.setUint32(15, id.length, true);
+    bytes.set(id, 19);
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(bytes);
   }
 
   receiveMessage(view, data) {
@@ -129,7 +149,11 @@ export class Connection {
   }
 
   receiveText(message) {
-    if (message.op === 'serverInfo') this.session = message.sessionId;
+    if (message.op === 'serverInfo') {
+      this.session = message.sessionId;
+      this.range = message.dataStartTime && { first: seconds(message.dataStartTime), last: seconds(message.dataEndTime) };
+      this.playback = undefined;
+    }
     if (message.op === 'advertise') {
       for (const channel of message.channels) this.channels.set(channel.id, channel);
       this.subscribe(message.channels);
@@ -157,7 +181,8 @@ export function readImage(view) {
     return view.getUint32(at - 4, true);
   };
   const time = natural() + 1e-9 * natural();
-  at += natural(); // frame_id
+  const name = natural(); // length of frame_id
+  at += name;
   const length = natural();
   return { time, bytes: new Uint8Array(view.buffer, view.byteOffset + at, length) };
 }

@@ -99,7 +99,11 @@ export class EventLog {
       const link = e.target.closest('[data-object]');
       if (link) onLink(Number(link.dataset.object));
     });
-    list.innerHTML = '<li class="empty">No events yet.</li>';
+    this.clear();
+  }
+
+  clear() {
+    this.list.innerHTML = '<li class="empty">No events yet.</li>';
   }
 
   add(event) {

@@ -4,6 +4,7 @@ import { Connection } from './connection.js';
 import { EventLog, ObjectList, renderServices } from './lists.js';
 import { Model, troubleOf } from './model.js';
 import { ObjectPanel } from './object_panel.js';
+import { PlaybackBar } from './playback.js';
 import { escaped } from './words.js';
 import { World } from './world.js';
 
@@ -33,6 +34,9 @@ const camera = new CameraView($('camera'), $('image'), $('image-caption'));
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
 const log = new EventLog($('events'), model, choose);
 const panel = new ObjectPanel($('object'), model, connection, choose);
+
+const playback = new PlaybackBar($('playback'), connection, model);
+connection.onSeek = () => { model.jumped(); log.clear(); };
 
 function choose(id, { reveal = true } = {}) {
   model.chosen = id;
@@ -153,6 +157,10 @@ document.addEventListener('keydown', (e) => {
   } else if (e.key === '/') {
     openTab('objects');
     $('search').focus();
+  } else if (e.key === ' ' && connection.range && e.target.tagName !== 'BUTTON') {
+    playback.toggle();
+  } else if (e.key.toLowerCase() === 'n' && connection.range) {
+    playback.nextEvent();
   } else if (e.key === '?') {
     $('help').showModal();
   } else if (toggles[e.key.toLowerCase()]) {
@@ -173,8 +181,9 @@ function figures(now) {
 
 function showState() {
   const now = performance.now();
-  const [state, sentence] = troubleOf(model, status, now);
-  const words = { live: 'live', degraded: 'degraded', stale: 'nothing comes', lost: 'no connection', connecting: 'connecting' };
+  const [state, sentence] = troubleOf(model, { ...status, playback: connection.playback }, now);
+  playback.render();
+  const words = { live: 'live', degraded: 'degraded', stale: 'nothing comes', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };
   $('state').dataset.state = state;
   $('state').textContent = words[state];
   document.body.dataset.state = state;

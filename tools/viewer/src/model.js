@@ -42,6 +42,12 @@ export class Model {
     if (samples.length > 1500) samples.shift();
   }
 
+  /** To another place of a recording: what was remembered on the way there is of another time. */
+  jumped() {
+    this.history.clear();
+    this.events = [];
+  }
+
   takeEvent(event) {
     this.events.push(event);
     if (this.events.length > 500) this.events.shift();
@@ -74,6 +80,7 @@ export function troubleOf(model, connection, now) {
   if (connection.state !== 'open') return ['connecting', ''];
   const services = (model.health?.services ?? []).filter((s) => s.process !== 'gateway');
   const silent = model.silentFor(now);
+  if (connection.playback) return ['played', ''];
   if (!model.health) return ['connecting', ''];
   const heard = services.filter((s) => s.age_s < 2.5);
   const capture = heard.find((s) => s.process === 'capture');

@@ -47,9 +47,14 @@ export class World {
   }
 
   addGround() {
-    this.grid = new THREE.GridHelper(400, 80, '#2c3b4a', '#1b2631');
-    this.grid.rotation.x = Math.PI / 2;
-    this.grid.material.depthWrite = false;
+    // In short pieces: a line that passes behind the camera is drawn wrongly by some.
+    const half = 150, step = 5, points = [];
+    for (let a = -half; a <= half; a += step) {
+      for (let b = -half; b < half; b += step) points.push(a, b, 0, a, b + step, 0, b, a, 0, b + step, a, 0);
+    }
+    const lines = new THREE.BufferGeometry();
+    lines.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
+    this.grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: '#24313e', depthWrite: false }));
     this.scene.add(this.grid);
     this.ground = null;
   }

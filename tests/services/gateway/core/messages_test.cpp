@@ -84,7 +84,8 @@ TEST(Scene, PutsTheCuboidAndTheEllipsoidWhereTheBeliefIs) {
   EXPECT_NEAR(cube["pose"]["orientation"]["z"], std::sin(0.25), 1e-5);
   EXPECT_NEAR(cube["size"]["x"], 4.0, 1e-3);
   std::multiset<double> diameters;
-  for (const char* axis : {"x", "y", "z"}) diameters.insert(entity["spheres"][0]["size"][axis].get<double>());
+  for (const char* axis : {"x", "y", "z"})
+    diameters.insert(entity["spheres"][0]["size"][axis].get<double>());
   EXPECT_THAT(std::vector<double>(diameters.begin(), diameters.end()),
               ::testing::Pointwise(::testing::DoubleNear(1e-3), {0.4, 0.8, 1.2}));
 }
@@ -107,8 +108,10 @@ TEST(Beliefs, TellEverythingAboutOneObject) {
 
 TEST(Beliefs, AreReadableWhateverANameOnTheWireIs) {
   ObjectBelief object = objectAt(1, {0, 0, 0}, "ca\"r\\\n\xff");
-  EXPECT_FALSE(json::parse(objectInFull(object, std::nullopt, nullptr), nullptr, false).is_discarded());
-  EXPECT_FALSE(json::parse(objectsAtAGlance(frameOf(1, {object}), -1), nullptr, false).is_discarded());
+  EXPECT_FALSE(
+      json::parse(objectInFull(object, std::nullopt, nullptr), nullptr, false).is_discarded());
+  EXPECT_FALSE(
+      json::parse(objectsAtAGlance(frameOf(1, {object}), -1), nullptr, false).is_discarded());
 }
 
 TEST(Beliefs, SayEachEventInASentence) {
@@ -170,9 +173,9 @@ TEST(Annotations, LeaveOutWhatIsBehindAndDrawBoxesAsBrightAsTheyAreLikely) {
   behind.visibility = Visibility::kBehind;
   Detections detections;
   detections.detections.resize(3);
-  detections.detections[0] = {.box = {1, 2, 3, 4}, .activations = {0.F, 2.F}};
-  detections.detections[1] = {.box = {1, 2, 3, 4}, .activations = {0.F, -9.F}};
-  detections.detections[2] = {.box = {1, 2, 3, 4}, .activations = {}};
+  detections.detections[0] = test::detectionOf({1, 2, 3, 4}, {0.F, 2.F});
+  detections.detections[1] = test::detectionOf({1, 2, 3, 4}, {0.F, -9.F});
+  detections.detections[2] = test::detectionOf({1, 2, 3, 4}, {});
   const json message = json::parse(imageAnnotations(frameOf(1, {behind}), camera, &detections));
   ASSERT_EQ(message["points"].size(), 1u);
   EXPECT_NEAR(message["points"][0]["outline_color"]["a"], 1 / (1 + std::exp(-2.0)), 1e-3);
@@ -182,7 +185,8 @@ TEST(Annotations, LeaveOutWhatIsBehindAndDrawBoxesAsBrightAsTheyAreLikely) {
 TEST(World, ThinsALongWayAndKeepsItsShape) {
   Trajectory way;
   for (int i = 0; i < 100000; ++i) {
-    way.add(fromNanoseconds(i), {1, 1}, RigidTransform(Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}));
+    way.add(fromNanoseconds(i), {1, 1},
+            RigidTransform(Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}));
   }
   const json poses = json::parse(way.posesInFrame())["poses"];
   EXPECT_LE(poses.size(), 4001u);
@@ -196,12 +200,11 @@ TEST(World, ThinsALongWayAndKeepsItsShape) {
 TEST(World, PutsAnImageIntoCdrAsItsIdlSays) {
   const std::vector<std::uint8_t> jpeg{9, 8, 7};
   const std::string cdr = compressedImage({1, 2, fromNanoseconds(3'000'000'005), 0}, "cam0", jpeg);
-  const std::string expected{
-      0, 1, 0, 0,                                                          // XCDR1, little-endian
-      3, 0, 0, 0, 5, 0, 0, 0,                                              // time
-      13, 0, 0, 0, 'c', 'a', 'm', '0', '_', 'o', 'p', 't', 'i', 'c', 'a', 'l', 0, 0, 0, 0,
-      3, 0, 0, 0, 9, 8, 7, 0,                                              // data
-      5, 0, 0, 0, 'j', 'p', 'e', 'g', 0};
+  const std::string expected{0,   1, 0, 0,                    // XCDR1, little-endian
+                             3,   0, 0, 0, 5,   0,   0,   0,  // time
+                             13,  0, 0, 0, 'c', 'a', 'm', '0', '_', 'o', 'p', 't', 'i', 'c', 'a',
+                             'l', 0, 0, 0, 0,   3,   0,   0,   0,   9,   8,   7,   0,  // data
+                             5,   0, 0, 0, 'j', 'p', 'e', 'g', 0};
   EXPECT_EQ(cdr, expected);
 }
 
@@ -223,10 +226,12 @@ TEST(VitalSigns, TellSilenceProcessorTimeAndReasons) {
   EXPECT_LT(health["silent_s"]["odometry"], 0);
   EXPECT_THAT(signs.healthz(11 * kSecond), HasSubstr("\"status\":\"ok\""));
   EXPECT_THAT(signs.healthz(20 * kSecond), HasSubstr("\"vio\":\"silent\""));
-  const std::string metrics = signs.metrics(11 * kSecond, {{"clients", "now", false, 2}}, {{"x", 1}});
+  const std::string metrics =
+      signs.metrics(11 * kSecond, {{"clients", "now", false, 2}}, {{"x", 1}});
   EXPECT_THAT(metrics, HasSubstr("perdure_service_up{process=\"vio\"} 1\n"));
   EXPECT_THAT(metrics, HasSubstr("perdure_reasons_total{process=\"vio\",reason=\"imu_gap\"} 3\n"));
-  EXPECT_THAT(metrics, HasSubstr("# TYPE perdure_gateway_clients gauge\nperdure_gateway_clients 2\n"));
+  EXPECT_THAT(metrics,
+              HasSubstr("# TYPE perdure_gateway_clients gauge\nperdure_gateway_clients 2\n"));
 }
 
 }  // namespace

@@ -27,9 +27,13 @@ TEST(ClientMessage, IsReadAsTheProtocolSays) {
   EXPECT_EQ(list[1].channel, 5u);
   EXPECT_EQ(std::get<Unsubscribe>(*parseText(R"({"op":"unsubscribe","subscriptionIds":[7]})")).ids,
             std::vector<std::uint32_t>{7});
-  EXPECT_EQ(std::get<NotOffered>(*parseText(R"({"op":"advertise","channels":[]})")).what, "advertise");
+  EXPECT_EQ(std::get<NotOffered>(*parseText(R"({"op":"advertise","channels":[]})")).what,
+            "advertise");
   EXPECT_TRUE(std::holds_alternative<Ignored>(*parseText(R"({"op":"subscribeConnectionGraph"})")));
-  EXPECT_EQ(std::get<GetParameters>(*parseText(R"({"op":"getParameters","parameterNames":[],"id":"q"})")).id, "q");
+  EXPECT_EQ(
+      std::get<GetParameters>(*parseText(R"({"op":"getParameters","parameterNames":[],"id":"q"})"))
+          .id,
+      "q");
 }
 
 TEST(ClientMessage, IsRefusedWithAReasonWhereItIsNot) {
@@ -40,20 +44,23 @@ TEST(ClientMessage, IsRefusedWithAReasonWhereItIsNot) {
   EXPECT_EQ(reasonOf(R"({"op":"dance"})"), "op_unknown");
   EXPECT_EQ(reasonOf(R"({"op":"subscribe"})"), "member_malformed");
   EXPECT_EQ(reasonOf(R"({"op":"subscribe","subscriptions":{}})"), "member_malformed");
-  for (const char* id : {"-1", "1.5", "4294967296", "\"1\"", "null", "1e3", "18446744073709551616"}) {
+  for (const char* id :
+       {"-1", "1.5", "4294967296", "\"1\"", "null", "1e3", "18446744073709551616"}) {
     EXPECT_EQ(reasonOf(std::string(R"({"op":"subscribe","subscriptions":[{"id":)") + id +
                        R"(,"channelId":1}]})"),
               "member_malformed")
         << id;
   }
   EXPECT_EQ(reasonOf(R"({"op":"subscribe","subscriptions":[3]})"), "member_malformed");
-  json many = {{"op", "unsubscribe"}, {"subscriptionIds", std::vector<int>(kMostSubscriptions + 1, 1)}};
+  json many = {{"op", "unsubscribe"},
+               {"subscriptionIds", std::vector<int>(kMostSubscriptions + 1, 1)}};
   EXPECT_EQ(reasonOf(many.dump()), "too_many_subscriptions");
   EXPECT_EQ(reasonOf(std::string(200000, '[')), "json_malformed");
 }
 
 TEST(ClientMessage, CallsAServiceInBinary) {
-  std::vector<std::uint8_t> bytes{2, 1, 0, 0, 0, 9, 0, 0, 0, 4, 0, 0, 0, 'j', 's', 'o', 'n', '{', '}'};
+  std::vector<std::uint8_t> bytes{2, 1, 0, 0,   0,   9,   0,   0,   0,  4,
+                                  0, 0, 0, 'j', 's', 'o', 'n', '{', '}'};
   const auto call = parseBinary(bytes);
   ASSERT_TRUE(call);
   EXPECT_EQ(std::get<ServiceCall>(*call).call, 9u);
@@ -68,6 +75,44 @@ TEST(ClientMessage, CallsAServiceInBinary) {
   EXPECT_EQ(parseBinary({}).error().code, "binary_empty");
   const std::vector<std::uint8_t> unknown{200};
   EXPECT_EQ(parseBinary(unknown).error().code, "binary_unknown");
+}
+
+TEST(ClientMessage, ControlsAPlaybackWithinReason) {
+  std::vector<std::uint8_t> bytes{3, 0, 0, 0, 0xc0, 0x3f, 1, 5, 0,   0,  0,
+                                  0, 0, 0, 0, 2,    0,    0, 0, 'i', 'd'};
+  const auto request = parseBinary(bytes);
+  ASSERT_TRUE(request);
+  const auto& playback = std::get<PlaybackRequest>(*request);
+  EXPECT_TRUE(playback.play);
+  EXPECT_DOUBLE_EQ(playback.speed, 1.5);
+  EXPECT_EQ(playback.seek, fromNanoseconds(5));
+  EXPECT_EQ(playback.id, "id");
+  for (std::size_t length = 1; length < bytes.size(); ++length) {
+    EXPECT_EQ(parseBinary(std::span(bytes).first(length)).error().code, "binary_short") << length;
+  }
+  auto wrong = bytes;
+  wrong[1] = 2;
+  EXPECT_EQ(parseBinary(wrong).error().code, "playback_malformed");
+  wrong = bytes;
+  wrong[4] = 0xc0, wrong[5] = 0x7f;  // not a number
+  EXPECT_EQ(parseBinary(wrong).error().code, "playback_malformed");
+  wrong = bytes;
+  wrong[14] = 0xff;  // beyond every time
+  EXPECT_EQ(parseBinary(wrong).error().code, "playback_malformed");
+}
+
+TEST(ServerMessage, TellsOfAPlayback) {
+  EXPECT_EQ(playbackState({.status = PlaybackState::Status::kPaused,
+                           .time = fromNanoseconds(5),
+                           .speed = 1.5,
+                           .did_seek = true,
+                           .id = "id"}),
+            std::string("\x05\x01\x05\0\0\0\0\0\0\0\0\0\xc0\x3f\x01\x02\0\0\0id", 21));
+  const json info = json::parse(
+      serverInfo("x", "s", TimeRange{fromNanoseconds(2'000'000'001), fromNanoseconds(3)}));
+  EXPECT_EQ(info["dataStartTime"]["nsec"], 1);
+  EXPECT_THAT(info["capabilities"], ::testing::Contains("playbackControl"));
+  EXPECT_FALSE(json::parse(serverInfo("x", "s")).contains("dataStartTime"));
 }
 
 TEST(ServerMessage, ChoosesTheNewestSubprotocolThatIsOffered) {

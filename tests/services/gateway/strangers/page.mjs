@@ -15,6 +15,7 @@ const browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ??
 const page = await browser.newPage();
 page.on('pageerror', (e) => problems.push(`error: ${e.message}`));
 page.on('console', (m) => { if (m.type() === 'error') problems.push(`console: ${m.text()}`); });
+page.setDefaultNavigationTimeout(120000);
 await page.setViewport({ width: 1280, height: 800 });
 
 await page.goto(`http://127.0.0.1:${port}/`, { waitUntil: 'domcontentloaded' });
@@ -95,7 +96,8 @@ await page.keyboard.press('c');
 
 // A phone.
 await page.setViewport({ width: 390, height: 780, isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
-await pause(1200);
+await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });
+await pause(1500);
 const wide = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth + 1);
 check(!wide, 'nothing sticks out at the side of a phone');
 await page.screenshot({ path: join(out, 'phone.png') });

@@ -37,7 +37,8 @@ Encoded message(std::uint32_t channel, const std::string& payload) {
 }
 
 std::string subscribe(std::uint32_t id, std::uint32_t channel) {
-  return json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}}.dump();
+  return json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}}
+      .dump();
 }
 
 class HubTest : public ::testing::Test {
@@ -57,7 +58,9 @@ class HubTest : public ::testing::Test {
   Clock::time_point now_{};
   std::vector<Channels> wanted_;
   std::vector<Call> calls_;
-  Hub hub_{"perdure", "s", 4,
+  Hub hub_{"perdure",
+           "s",
+           4,
            {.wanted = [this](const Channels& c) { wanted_.push_back(c); },
             .call = [this](Call c) { calls_.push_back(std::move(c)); }}};
 };
@@ -113,7 +116,8 @@ TEST_F(HubTest, GivesWhoComesLateWhatIsLatchedAndTheLastEvents) {
   say(first, subscribe(2, 3));
   say(first, subscribe(3, 1));
   for (int i = 0; i < 9; ++i) {
-    for (const std::uint32_t channel : {1U, 2U, 3U}) hub_.publish(message(channel, std::to_string(i)));
+    for (const std::uint32_t channel : {1U, 2U, 3U})
+      hub_.publish(message(channel, std::to_string(i)));
   }
   say(late, subscribe(1, 2));
   say(late, subscribe(2, 3));
@@ -135,8 +139,9 @@ TEST_F(HubTest, ForgetsWhatNobodyLooksAtAnyMore) {
 TEST_F(HubTest, AnswersNonsenseWithAStatusAndGoesOn) {
   TestViewer viewer(4);
   join(viewer);
-  for (const char* text : {"{", R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})",
-                           R"({"op":"unsubscribe","subscriptionIds":[5]})", R"({"op":"advertise"})"}) {
+  for (const char* text :
+       {"{", R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})",
+        R"({"op":"unsubscribe","subscriptionIds":[5]})", R"({"op":"advertise"})"}) {
     say(viewer, text);
     const auto said = viewer.read();
     ASSERT_EQ(said.size(), 1u) << text;
@@ -193,14 +198,21 @@ TEST_F(HubTest, PassesCallsOnAndAnswersWhoStillIsThere) {
   EXPECT_EQ(json::parse(other.read().at(0))["op"], "serviceCallFailure");
 }
 
+Options with(const std::string& token, std::vector<std::string> hosts = {}) {
+  Options options;
+  options.token = token;
+  options.allowed_hosts = std::move(hosts);
+  return options;
+}
+
 TEST(Guard, TakesLoopbackNamesAloneWhereThereIsNoToken) {
-  const Guard guard(Options{.allowed_hosts = {"robot.local"}});
-  for (const char* host : {"127.0.0.1:8765", "localhost:9000", "LOCALHOST", "[::1]:8765", "127.1.2.3",
-                           "robot.local:8765"}) {
+  const Guard guard(with("", {"robot.local"}));
+  for (const char* host : {"127.0.0.1:8765", "localhost:9000", "LOCALHOST", "[::1]:8765",
+                           "127.1.2.3", "robot.local:8765"}) {
     EXPECT_TRUE(guard.checkHost(host)) << host;
   }
-  for (const char* host : {"", "evil.example", "127.0.0.1.evil.example", "127.0.0.1evil", "localhost.evil",
-                           "10.0.0.1", "[::2]", "[", "127.0.0.256", "127.0.0"}) {
+  for (const char* host : {"", "evil.example", "127.0.0.1.evil.example", "127.0.0.1evil",
+                           "localhost.evil", "10.0.0.1", "[::2]", "[", "127.0.0.256", "127.0.0"}) {
     EXPECT_FALSE(guard.checkHost(host)) << host;
   }
 }
@@ -210,19 +222,20 @@ TEST(Guard, TakesItsOwnPageAndThoseThatAreListed) {
   EXPECT_TRUE(guard.checkOrigin("", "127.0.0.1:8765"));
   EXPECT_TRUE(guard.checkOrigin("http://127.0.0.1:8765", "127.0.0.1:8765"));
   EXPECT_TRUE(guard.checkOrigin("https://app.foxglove.dev", "127.0.0.1:8765"));
-  for (const char* origin : {"https://evil.example", "null", "http://127.0.0.1:1", "file://127.0.0.1:8765",
-                             "https://app.foxglove.dev.evil.example", "http://"}) {
+  for (const char* origin :
+       {"https://evil.example", "null", "http://127.0.0.1:1", "file://127.0.0.1:8765",
+        "https://app.foxglove.dev.evil.example", "http://"}) {
     EXPECT_FALSE(guard.checkOrigin(origin, "127.0.0.1:8765")) << origin;
   }
   EXPECT_FALSE(guard.checkOrigin("http://", ""));
 }
 
 TEST(Guard, WantsTheTokenWhereOneIsSet) {
-  const Guard guard(Options{.token = "s3cret"});
+  const Guard guard(with("s3cret"));
   EXPECT_TRUE(guard.checkToken("/?a=b&token=s3cret", ""));
   EXPECT_TRUE(guard.checkToken("/", "Bearer s3cret"));
-  for (const char* target : {"/", "/?token=", "/?token=s3cre", "/?token=s3crets", "/?token=s3cretS3cret",
-                             "/?xtoken=s3cret", "/token=s3cret"}) {
+  for (const char* target : {"/", "/?token=", "/?token=s3cre", "/?token=s3crets",
+                             "/?token=s3cretS3cret", "/?xtoken=s3cret", "/token=s3cret"}) {
     EXPECT_FALSE(guard.checkToken(target, "")) << target;
   }
   EXPECT_TRUE(guard.checkHost("vehicle.example"));
@@ -230,7 +243,8 @@ TEST(Guard, WantsTheTokenWhereOneIsSet) {
 }
 
 TEST(Files, AreThoseOfTheFolderAndNoOthers) {
-  const auto folder = std::filesystem::temp_directory_path() / ("perdure-files-" + std::to_string(getpid()));
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("perdure-files-" + std::to_string(getpid()));
   std::filesystem::create_directories(folder / "vendor");
   std::ofstream(folder / "index.html") << "page";
   std::ofstream(folder / "vendor" / "a.js") << "code";
