@@ -219,14 +219,16 @@ void Node::onMapTileGone(const MapTile& key) {
   map_changed_ = true;
 }
 
-void Node::sendMap() {
+std::size_t Node::sendMap() {
   std::vector<MapObject> objects;
   for (const auto& [key, tile] : tiles_) {
     for (const MapObject& object : tile.objects) {
       if (!objects_ || object.world == objects_->world) objects.push_back(object);
     }
   }
+  const std::size_t all = objects.size();
   send(kMap, mapNearBody(std::move(objects), pose().p, time_));
+  return std::min(all, kMostOfMap);
 }
 
 bool Node::hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const {
@@ -239,9 +241,10 @@ void Node::tick(std::int64_t now_ns) {
     send(kHealth, vital_signs_.json(now_ns, last_));
   }
   if (wants(kMap) && map_changed_ && now_ns >= next_map_ns_) {
-    next_map_ns_ = now_ns + kSecond;
     map_changed_ = false;
-    sendMap();
+    // A large map more seldom: about as many bytes a second whatever it holds.
+    constexpr std::size_t kASecond = 200;
+    next_map_ns_ = now_ns + kSecond * static_cast<std::int64_t>(1 + sendMap() / kASecond);
   }
   constexpr std::int64_t kResend = kSecond / 2;
   for (auto it = pending_.begin(); it != pending_.end();) {

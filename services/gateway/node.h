@@ -79,7 +79,7 @@ class Node {
   void sendObjects();
   void sendAnnotations(std::size_t camera);
   void sendEvent(const Event& event, bool as_log);
-  void sendMap();
+  std::size_t sendMap();  ///< how many objects it told
   void noteReturns(const Event& event);
   void newest(TimePoint time);
   RigidTransform pose() const;

@@ -11,7 +11,6 @@
 namespace perdure::gateway {
 namespace {
 
-constexpr std::size_t kMostOfMap = 2000;
 constexpr double kSampleEvery = 0.5;       // s
 constexpr std::size_t kMostSamples = 600;  // five minutes
 constexpr std::size_t kMostHistories = 4000;

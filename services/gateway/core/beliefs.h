@@ -42,6 +42,9 @@ class History {
 std::string objectInFull(const ObjectBelief& object, const std::optional<Event>& returns,
                          const std::deque<History::Sample>* history);
 
+/// So many objects of the map are told.
+inline constexpr std::size_t kMostOfMap = 2000;
+
 /// "perdure.Map": those nearest to the body of all that are on it.
 std::string mapNearBody(std::vector<MapObject> objects, const Eigen::Vector3d& p_WB,
                         TimePoint time);

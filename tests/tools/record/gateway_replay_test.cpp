@@ -32,16 +32,16 @@ class Replayed : public ::testing::Test {
     replay::RecordingWriter writer(folder_.file("run.mcap"));
     for (std::uint64_t i = 0; i < 200; ++i) {
       const std::uint64_t log = 5000 * kSecond + i * kSecond / 10;
-      ASSERT_ok(writer.add("objects",
+      mustBe(writer.add("objects",
                            frameOf(i, {objectAt(1, {0.1 * static_cast<double>(i), 0, 0})}), log));
-      if (i == 70) ASSERT_ok(writer.add("events", eventOf(EventKind::kOccluded, 1), log));
-      if (i == 120) ASSERT_ok(writer.add("events", eventOf(EventKind::kReappeared, 1), log));
-      if (i % 10 == 9) ASSERT_ok(writer.cut());
+      if (i == 70) mustBe(writer.add("events", eventOf(EventKind::kOccluded, 1), log));
+      if (i == 120) mustBe(writer.add("events", eventOf(EventKind::kReappeared, 1), log));
+      if (i % 10 == 9) mustBe(writer.cut());
     }
-    ASSERT_ok(writer.finish());
+    mustBe(writer.finish());
   }
   template <class R>
-  static void ASSERT_ok(const R& result) {
+  static void mustBe(const R& result) {
     if (!result) throw std::runtime_error(result.error().detail);
   }
 
@@ -170,7 +170,9 @@ TEST_F(Replayed, AnswersAboutAnObjectAndSaysThatThereIsNoStore) {
 TEST(Replay, RefusesARecordingWithNothingToShow) {
   const test::Folder folder;
   replay::RecordingWriter writer(folder.file("run.mcap"));
-  ASSERT_TRUE(writer.add("speed", SpeedSample{.source = 1}, 1));
+  SpeedSample speed;
+  speed.source = 1;
+  ASSERT_TRUE(writer.add("speed", speed, 1));
   ASSERT_TRUE(writer.finish());
   replay::RecordedMessages recording(folder.file("run.mcap"));
   EXPECT_THROW(GatewayReplay(recording, {}, {}), StartupError);
