@@ -61,17 +61,21 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
 void HttpSession::onRead(beast::error_code error) {
-  if (error == http::error::header_limit || error == beast::error::timeout ||
-      error == http::error::body_limit || error == http::error::buffer_overflow) {
-    shared_->hub.reasons().add(error == beast::error::timeout ? "http_too_slow" : "http_too_large");
+  if (error == beast::error::timeout) {
+    // A connection that only waits, as browsers hold some, is ended without a word.
+    if (parser_->got_some()) shared_->hub.reasons().add("http_too_slow");
     return;
   }
-  if (error == http::error::end_of_stream ||
-      error.category() == asio::error::get_system_category() || error == asio::error::eof) {
+  if (error == http::error::header_limit || error == http::error::body_limit ||
+      error == http::error::buffer_overflow) {
+    shared_->hub.reasons().add("http_too_large");
     return;
   }
   if (error) {
-    shared_->hub.reasons().add("http_malformed");
+    // Who only hangs up says nothing wrong.
+    const bool hung_up = error == http::error::end_of_stream || error == asio::error::eof ||
+                         error.category() == asio::error::get_system_category();
+    if (!hung_up) shared_->hub.reasons().add("http_malformed");
     return;
   }
   ++shared_->requests;
