@@ -14,7 +14,7 @@ const Ajv = require('ajv').default ?? require('ajv');
 const WebSocket = require('ws');
 
 const ajv = new Ajv({ strict: false, allErrors: false });
-const problems = [], got = new Map(), channels = new Map(), byId = new Map();
+const problems = [], got = new Map(), channels = new Map(), byId = new Map(), readers = new Map(), validators = new Map();
 const socket = new WebSocket(`ws://127.0.0.1:${port}/`, [subprotocol]);
 const client = new FoxgloveClient({ ws: socket });
 const fail = (what) => { problems.push(what); };
@@ -25,7 +25,10 @@ function compare(channel, value) {
   if (channel.schemaName.startsWith('foxglove') && !known) fail(`${channel.topic}: Foxglove has no ${channel.schemaName}`);
   for (const schema of [known, channel.schemaEncoding === 'jsonschema' ? JSON.parse(channel.schema) : undefined]) {
     if (!schema) continue;
-    if (!ajv.validate(schema, value)) fail(`${channel.topic}: ${ajv.errorsText()}`);
+    const key = `${channel.id}/${schema === known}`;
+    if (!validators.has(key)) validators.set(key, ajv.compile({ ...schema, $id: undefined }));
+    const validate = validators.get(key);
+    if (!validate(value)) fail(`${channel.topic}: ${ajv.errorsText(validate.errors)}`);
     for (const name of Object.keys(schema.properties)) {
       if (known === schema && !(name in value) && name !== 'metadata') fail(`${channel.topic}: ${name} is missing`);
     }
@@ -43,7 +46,8 @@ function expectRaw(channel, value) {
 function decode(channel, data) {
   const bytes = new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
   if (channel.encoding === 'json') return JSON.parse(new TextDecoder().decode(bytes));
-  const reader = new MessageReader(channel.schemaName, parseIDL(channel.schema));
+  if (!readers.has(channel.id)) readers.set(channel.id, new MessageReader(channel.schemaName, parseIDL(channel.schema)));
+  const reader = readers.get(channel.id);
   const value = reader.readMessage(bytes);
   if (!channel.schemaName.startsWith('foxglove')) return expectRaw(channel, value);
   return { ...value, data: Buffer.from(value.data).toString('base64'), timestamp: { sec: value.timestamp.sec, nsec: value.timestamp.nsec } };
