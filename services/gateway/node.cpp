@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kMostEvents = 256;
+constexpr std::chrono::seconds kLongBack{2};  // a recording begins again, or another drive does
 
 }  // namespace
 
@@ -36,7 +37,7 @@ void Node::send(std::uint32_t channel, std::string payload) {
 }
 
 void Node::newest(TimePoint time) {
-  if (time <= time_ && time_ - time < std::chrono::seconds(2)) return;
+  if (time <= time_ && time_ - time < kLongBack) return;
   time_ = time;  // a little late is late; much earlier is another drive
   outputs_.time(time);
 }
@@ -149,7 +150,8 @@ void Node::onModel(const ModelInfo& model) {
 
 void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   last_.objects_ns = now_ns;
-  if (objects_ && objects_->world != objects.world) {
+  const bool again = objects_ && objects.stamp.time + kLongBack < objects_->stamp.time;
+  if (again || (objects_ && objects_->world != objects.world)) {
     history_.clear();
     returns_.clear();
   }

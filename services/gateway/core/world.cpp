@@ -12,6 +12,7 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::size_t kMostPoses = 4000;
+constexpr std::chrono::seconds kBack{2};
 
 void putTransform(JsonWriter& json, TimePoint time, const std::string& parent,
                   const std::string& child, const RigidTransform& T) {
@@ -147,7 +148,8 @@ std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
 }
 
 void Trajectory::add(TimePoint time, const WorldId& world, const RigidTransform& T_WB) {
-  if (world != world_) {
+  const bool again = time + kBack < time_;  // a recording that begins again
+  if (world != world_ || again) {
     world_ = world;
     poses_.clear();
     step_m_ = 0.25;

@@ -61,7 +61,8 @@ export class CameraView {
 
   drawAnnotations(message) {
     const { pen, canvas } = this;
-    const scale = Math.max(1, canvas.width / 640);
+    // Lines and letters as large on the screen, however small the image is shown.
+    const scale = Math.max(1, (0.85 * canvas.width) / Math.max(1, canvas.clientWidth));
     for (const p of message.points) {
       pen.strokeStyle = css(p.outline_color);
       pen.lineWidth = p.thickness * scale * (p.type === 4 ? 0.9 : 1);

@@ -19,7 +19,8 @@ export class Model {
     const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
     const world = `${frame.world}/${frame.epoch}`;
     if (this.world !== undefined && this.world !== world) this.history.clear();
-    const another = this.frame && time < this.time - 2;
+    const another = this.frame && time < this.time - 2; // a recording begins again
+    if (another) this.history.clear();
     if (another || this.firstTime === null) this.firstTime = time;
     this.world = world;
     this.time = time;

@@ -193,6 +193,10 @@ TEST(World, ThinsALongWayAndKeepsItsShape) {
   EXPECT_GE(poses.size(), 1500u);
   EXPECT_EQ(poses.front()["position"]["x"], 0);
   EXPECT_NEAR(poses.back()["position"]["x"], 9999.9, 1e-3);
+  way.add(fromNanoseconds(90000), {1, 1}, {});  // a little late
+  EXPECT_GT(json::parse(way.posesInFrame())["poses"].size(), 2u);
+  way.add(fromNanoseconds(-3'000'000'000), {1, 1}, {});  // it begins again
+  EXPECT_EQ(json::parse(way.posesInFrame())["poses"].size(), 2u);
   way.add(fromNanoseconds(1), {2, 1}, {});
   EXPECT_EQ(json::parse(way.posesInFrame())["poses"].size(), 2u);
 }
