@@ -1,4 +1,4 @@
-# What is installed, in the four components that deploy/packages makes packages of. The folders are
+# What is installed, in the five components that deploy/packages makes packages of. The folders are
 # those of GNUInstallDirs; PERDURE_SYSTEM_LIBDIR is where systemd and udev look, relative to the
 # prefix or absolute (Debian 12: /lib).
 include_guard()
@@ -49,13 +49,22 @@ install(CODE "
   file(CREATE_LINK ${etc} \"\${folder}/config\" SYMBOLIC)" COMPONENT services)
 install(DIRECTORY config/models/ DESTINATION ${share}/models COMPONENT services)
 install(DIRECTORY deploy/systemd/ DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system
-  COMPONENT services FILES_MATCHING PATTERN "*.service" PATTERN "*.target" PATTERN "*.conf")
+  COMPONENT services FILES_MATCHING PATTERN "*.service" PATTERN "*.target" PATTERN "*.conf"
+  PATTERN "perdure-gateway.service" EXCLUDE)
 install(FILES deploy/packages/host/60-perdure.rules
   DESTINATION ${PERDURE_SYSTEM_LIBDIR}/udev/rules.d COMPONENT services)
 foreach(kind sysctl sysusers tmpfiles)
   install(FILES deploy/packages/host/${kind}.conf DESTINATION lib/${kind}.d RENAME perdure.conf
     COMPONENT services)
 endforeach()
+
+# What shows it, with the page where npm built one.
+install(TARGETS perdure-gateway COMPONENT gateway)
+install(FILES deploy/systemd/perdure-gateway.service
+  DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system COMPONENT gateway)
+install(FILES config/gateway.yaml DESTINATION ${etc} COMPONENT gateway)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/share/perdure/viewer DESTINATION ${share} COMPONENT gateway
+  OPTIONAL)
 
 # The command, with what model import runs.
 install(TARGETS perdure COMPONENT tools)

@@ -9,7 +9,7 @@ namespace {
 constexpr double kCameraHz = 10.0;
 constexpr double kImuHz = 100.0;
 constexpr std::string_view kFramePrefix = "frame/";
-constexpr Roles kWatchers = Role::kRecord | Role::kOperator;  // they read everything
+constexpr Roles kWatchers = Role::kRecord | Role::kOperator | Role::kGateway;  // they read all
 
 template <class T>
 TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded, Roles writers,
@@ -66,10 +66,10 @@ Table makeTable() {
       row(kMap, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
       row(kMapHeader, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
       row(kMapFrame, latched(1), 0, kRecorded, kMapStore, kSubscriber),
-      row(kMapQuery, reliable(16), 0, kRecorded, kSemanticFilter | kOperator | kSubscriber,
-          kMapStore),
+      row(kMapQuery, reliable(16), 0, kRecorded,
+          kSemanticFilter | kOperator | kSubscriber | kGateway, kMapStore),
       row(kMapReply, reliable(16), 0, kRecorded, kMapStore, kSubscriber),
-      row(kHealth, latched(1, 1.0), 1.0, kRecorded, kServices | kRecord, kSubscriber),
+      row(kHealth, latched(1, 1.0), 1.0, kRecorded, kServices | kRecord | kGateway, kSubscriber),
   };
 }
 

@@ -18,7 +18,11 @@ void WaitLoop::attach(const Endpoint& reader, std::function<bool()> drain) {
   Entity condition(dds_create_readcondition(reader.handle(), DDS_ANY_STATE));
   check(condition.handle() > 0, "DDS gives a read condition");
   dds_waitset_attach(waitset_.handle(), condition.handle(), 0);
-  sources_.push_back({std::move(condition), std::move(drain)});
+  sources_.push_back({&reader, std::move(condition), std::move(drain)});
+}
+
+void WaitLoop::off(const Endpoint& reader) {
+  std::erase_if(sources_, [&](const Source& source) { return source.reader == &reader; });
 }
 
 void WaitLoop::every(std::chrono::nanoseconds period, std::function<void()> tick) {

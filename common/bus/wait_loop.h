@@ -29,6 +29,9 @@ class WaitLoop {
   void on(CdrReader& reader, CdrReader::Handler handler) {
     attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
+  /// Not any more; the reader may end then. Not from a handler of messages or ticks: those are being
+  /// gone through.
+  void off(const Endpoint& reader);
   /// First after one period; a late tick is not made up for.
   void every(std::chrono::nanoseconds period, std::function<void()> tick);
   /// Runs in the loop's thread soon after wake(); several wake-ups may become one call.
@@ -48,6 +51,7 @@ class WaitLoop {
  private:
   using Clock = std::chrono::steady_clock;
   struct Source {
+    const Endpoint* reader;
     Entity condition;
     std::function<bool()> drain;
   };

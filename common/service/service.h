@@ -30,6 +30,7 @@ class Context {
 
   InstanceId instance() const { return instance_; }
   bus::Participant& participant() { return participant_; }
+  const std::string& vehicle() const { return domain_.options().vehicle; }
   bus::WaitLoop& loop() { return loop_; }
   HealthMeter& health() { return health_; }
   spdlog::logger& log() { return *log_; }

@@ -27,6 +27,7 @@ const std::vector<Layers> kLayers{
      {"belief", "measurement", "visibility", "association", "update", "smoothing", "tracks",
       "memory", ""}},
     {"services/vio/core/", {"state", "propagation", "tracks", "update", "", "start"}},
+    {"services/gateway/", {"core", "protocol", "web", ""}},
     {"services/inference/core/", {"", "network", "decode", "takeover"}},
     {"tools/bus_tools/", {"", "status", "doctor"}},
     {"tools/calibrate/", {"estimate", ""}},

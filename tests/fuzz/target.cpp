@@ -7,7 +7,8 @@ namespace perdure::fuzz {
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = [] {
     std::vector<Target> list;
-    for (const auto& group : {textTargets(), folderTargets(), settingTargets(), binaryTargets()}) {
+    for (const auto& group : {textTargets(), folderTargets(), settingTargets(), binaryTargets(),
+                              gatewayTargets()}) {
       list.insert(list.end(), group.begin(), group.end());
     }
     return list;

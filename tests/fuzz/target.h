@@ -37,6 +37,7 @@ std::vector<Target> textTargets();
 std::vector<Target> folderTargets();
 std::vector<Target> settingTargets();
 std::vector<Target> binaryTargets();
+std::vector<Target> gatewayTargets();
 
 inline Bytes bytesOf(std::string_view text) { return {text.begin(), text.end()}; }
 inline std::string textOf(View bytes) { return {bytes.begin(), bytes.end()}; }

@@ -99,9 +99,11 @@ void runDemo(DemoOptions options) {
   std::atomic<bool> interrupted = false;
   const service::SignalThread signals(blocked, [&] { interrupted = true; });
   complete(options, interrupted);
-  Demo(options, interrupted).run();
+  Demo demo(options, interrupted);
+  demo.run();
   summarise(fs::absolute(options.out));
   if (interrupted) throw CLI::RuntimeError(130);
+  if (options.keep) demo.keep();
 }
 
 }  // namespace
@@ -123,6 +125,8 @@ void addDemoCommand(CLI::App& app) {
                    "seconds of the drive in one second, or max: as fast as the services answer")
       ->capture_default_str();
   demo->add_option("--out", options->out, "folder for what comes out")->capture_default_str();
+  demo->add_flag("--keep", options->keep,
+                 "leave everything running at the end of the drive, until Ctrl-C");
   demo->add_flag("--headless", options->headless, "open no window (this version has none to open)");
   demo->add_option("--shared-memory-mb", options->shared_memory_mb,
                    "images up to this size go through shared memory, where iox-roudi runs")

@@ -101,6 +101,7 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   openData();
   folders_ = prepareFolders(options_);
   services_ = planServices(options_, folders_);
+  addGateway();
   checkConfigurations();
   leaseDomain();
   outputs_ = std::make_unique<OutputWriter>(
@@ -119,6 +120,15 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
       "demo: {} frames, services on DDS domain {}; listen with: "
       "PERDURE_DOMAIN={} {}/perdure topics\n",
       frames_, domain_->options().domain, domain_->options().domain, options_.programs);
+  if (!address_.empty()) std::cerr << "demo: look at " << address_ << std::endl;
+}
+
+void Demo::addGateway() {
+  const std::uint16_t port = freePort();
+  auto gateway = planGateway(options_, folders_, port);
+  if (!gateway) return;
+  services_.push_back(*std::move(gateway));
+  address_ = fmt::format("http://127.0.0.1:{}/", port);
 }
 
 Demo::~Demo() {
@@ -171,8 +181,21 @@ void Demo::run() {
   }
   showProgress(true);
   if (interrupted_) std::cerr << "demo: ends early\n";
-  endInOrder();
+  if (!options_.keep || interrupted_) endInOrder();
   write();
+}
+
+void Demo::keep() {
+  std::cerr << fmt::format("demo: everything goes on{}; Ctrl-C ends it\n",
+                           address_.empty() ? "" : " at " + address_);
+  while (!interrupted_) {
+    loop_->runOnce(50ms);
+    const std::int64_t now = monotonicNs();
+    if (now - checked_ns_ < kSecond / 2) continue;
+    checked_ns_ = now;
+    checkServices();
+  }
+  endInOrder();
 }
 
 void Demo::watch() {
@@ -230,6 +253,7 @@ void Demo::showProgress(bool last) {
 
 void Demo::endInOrder() {
   for (const char* service : kServices) endOne(service);
+  if (!address_.empty()) endOne(kGateway);
 }
 
 void Demo::endOne(const std::string& service) {

@@ -21,8 +21,11 @@ class Demo {
   ~Demo();
 
   /// Until the drive ends and everything is drained, --seconds are over, or interrupted; then ends
-  /// the services in order and writes the outputs. Throws StartupError where a service cannot run.
+  /// the services in order (but with --keep) and writes the outputs. Throws StartupError where a
+  /// service cannot run.
   void run();
+  /// After the end of a drive with --keep: all goes on until it is interrupted, and is then ended.
+  void keep();
 
  private:
   void openData();
@@ -31,6 +34,7 @@ class Demo {
   bool over();
   void checkServices();
   void showProgress(bool last);
+  void addGateway();
   void endInOrder();
   void endOne(const std::string& service);
   void write();
@@ -44,7 +48,7 @@ class Demo {
   std::vector<ServicePlan> services_;
   std::optional<TruthFiles> truth_;
   std::size_t frames_ = 0;
-  std::string configurations_, socket_;
+  std::string configurations_, socket_, address_;
   std::unique_ptr<OutputWriter> outputs_;
   std::unique_ptr<bus::Domain> domain_;
   std::unique_ptr<bus::Participant> participant_;

@@ -1,6 +1,9 @@
 #include "tools/demo/plan.h"
 
 #include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <charconv>
 #include <fstream>
@@ -69,6 +72,21 @@ std::vector<std::string> settingsOf(const std::string& service, const DemoOption
   return settings;
 }
 
+ServicePlan planOf(const std::string& name, const DemoOptions& options, const DemoFolders& folders,
+                   std::vector<std::string> settings) {
+  const fs::path program = fs::absolute(options.programs) / programName(name);
+  ServicePlan plan{name, {program.string()}, (folders.run / (name + ".log")).string()};
+  const fs::path config = fs::absolute(options.root) / "config" / (name + ".yaml");
+  if (fs::exists(config)) plan.command.insert(plan.command.end(), {"--config", config.string()});
+  if (options.shared_memory_mb > 0) {
+    settings.push_back(fmt::format("bus.shared_memory_mb={}", options.shared_memory_mb));
+  }
+  for (const std::string& setting : settings) {
+    plan.command.insert(plan.command.end(), {"--set", setting});
+  }
+  return plan;
+}
+
 /// As supervisord reads a command: in double quotes, with % doubled.
 std::string quoted(const std::string& word) {
   std::string text = "\"";
@@ -119,7 +137,6 @@ std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions&
 
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders) {
   std::vector<ServicePlan> plans;
-  const fs::path root = fs::absolute(options.root);
   for (const std::string name : kServices) {
     const fs::path program = fs::absolute(options.programs) / programName(name);
     if (!fs::exists(program)) {
@@ -128,19 +145,34 @@ std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFold
                                      "--build --preset release",
                                      program.string()));
     }
-    ServicePlan plan{name, {program.string()}, (folders.run / (name + ".log")).string()};
-    const fs::path config = root / "config" / (name + ".yaml");
-    if (fs::exists(config)) plan.command.insert(plan.command.end(), {"--config", config.string()});
-    auto settings = settingsOf(name, options, folders);
-    if (options.shared_memory_mb > 0) {
-      settings.push_back(fmt::format("bus.shared_memory_mb={}", options.shared_memory_mb));
-    }
-    for (const std::string& setting : settings) {
-      plan.command.insert(plan.command.end(), {"--set", setting});
-    }
-    plans.push_back(std::move(plan));
+    plans.push_back(planOf(name, options, folders, settingsOf(name, options, folders)));
   }
   return plans;
+}
+
+std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFolders& folders,
+                                       std::uint16_t port) {
+  if (!fs::exists(fs::absolute(options.programs) / programName(kGateway))) return std::nullopt;
+  return planOf(kGateway, options, folders, {fmt::format("http.port={}", port)});
+}
+
+std::uint16_t freePort() {
+  constexpr std::uint16_t kUsual = 8765;
+  for (const std::uint16_t wanted : {kUsual, std::uint16_t{0}}) {
+    const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const int yes = 1;
+    setsockopt(file, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(wanted);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    auto* const any = reinterpret_cast<sockaddr*>(&address);
+    const bool free = bind(file, any, size) == 0 && getsockname(file, any, &size) == 0;
+    close(file);
+    if (free) return ntohs(address.sin_port);
+  }
+  return kUsual;
 }
 
 std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,

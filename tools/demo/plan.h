@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,11 +23,14 @@ struct DemoOptions {
   double seconds = 0.0;      ///< of the drive; 0: all of it
   int shared_memory_mb = 0;  ///< of images; 0: none
   bool headless = false;
+  bool keep = false;  ///< all goes on after the end of the drive, until it is interrupted
 };
 
 /// The services in the order in which they are ended: from the source to the store.
 inline constexpr const char* kServices[] = {"capture", "inference", "vio", "semantic_filter",
                                             "map_store"};
+/// What only shows them; left out where its program is not installed.
+inline constexpr const char kGateway[] = "gateway";
 
 struct ServicePlan {
   std::string name;                  ///< "semantic_filter"
@@ -48,6 +52,12 @@ std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions&
 
 /// In the order of kServices. Throws StartupError where a program is missing or --rate is wrong.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
+
+/// perdure-gateway on this port of loopback; nothing where it is not there.
+std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFolders& folders,
+                                       std::uint16_t port);
+/// 8765 where nobody listens there, else any free one.
+std::uint16_t freePort();
 
 /// The configuration of supervisord: a service that ends by a fault is started again at once.
 std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,

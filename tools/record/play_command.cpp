@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <memory>
 
 #include "common/service/signals.h"
 #include "tools/bus_tools/common.h"
 #include "tools/record/command.h"
 #include "tools/record/files.h"
+#include "tools/record/gateway_replay.h"
 #include "tools/record/player.h"
 
 namespace perdure::tools {
@@ -16,7 +18,31 @@ struct Options {
   bus::Options bus;
   std::string path;
   PlayOptions play;
+  bool gateway = false, paused = false;
+  std::int64_t port = 8765;
 };
+
+/// Nothing goes onto the bus: whoever looks has the controls.
+void runGateway(const Options& options) {
+  const service::BlockedSignals blocked;
+  replay::RecordedMessages recording(options.path);
+  gateway::Config config;
+  config.web.port = options.port;
+  config.cameras.clear();
+  for (const auto& [topic, counted] : recording.topics()) {
+    if (topic.starts_with("frame/")) config.cameras.push_back(topic.substr(6));
+  }
+  gateway::PlaybackRequest start;
+  start.play = !options.paused;
+  start.speed = options.play.rate;
+  GatewayReplay replay(recording, config, start);
+  const service::SignalThread signals(blocked, [&] { replay.stop(); });
+  const auto range = replay.range();
+  fmt::print("{:.1f} s of {} at http://127.0.0.1:{}/\n", toSeconds(range.last - range.first),
+             options.path, replay.port());
+  std::fflush(stdout);
+  replay.run();
+}
 
 void runPlay(const Options& options) {
   const service::BlockedSignals blocked;
@@ -60,7 +86,14 @@ void addPlayCommand(CLI::App& app) {
   command->add_flag("--loop", play.loop, "again and again, with the same stamps");
   command->add_flag("--force", play.force, "also onto topics that others write now");
   addBusOptions(*command, options->bus);
-  command->callback([options] { runPlay(*options); });
+  command->add_flag("--gateway", options->gateway,
+                    "to a browser or Foxglove instead of the bus; they play, pause and seek");
+  command->add_flag("--paused", options->paused, "with --gateway: begin with a pause")
+      ->needs("--gateway");
+  command->add_option("--port", options->port, "with --gateway; 0: any that is free")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  command->callback([options] { options->gateway ? runGateway(*options) : runPlay(*options); });
 }
 
 }  // namespace perdure::tools

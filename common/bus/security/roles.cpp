@@ -5,7 +5,7 @@
 namespace perdure::bus {
 
 std::span<const RoleName> roleNames() {
-  static constexpr std::array<RoleName, 9> kNames{{{Role::kCapture, "capture"},
+  static constexpr std::array<RoleName, 10> kNames{{{Role::kCapture, "capture"},
                                                    {Role::kVio, "vio"},
                                                    {Role::kInference, "inference"},
                                                    {Role::kSemanticFilter, "semantic_filter"},
@@ -13,7 +13,8 @@ std::span<const RoleName> roleNames() {
                                                    {Role::kRecord, "record"},
                                                    {Role::kOperator, "operator"},
                                                    {Role::kPlayer, "player"},
-                                                   {Role::kSubscriber, "subscriber"}}};
+                                                   {Role::kSubscriber, "subscriber"},
+                                                   {Role::kGateway, "gateway"}}};
   return kNames;
 }
 

@@ -9,7 +9,7 @@
 
 namespace perdure::bus {
 
-/// The five services, what records and plays, and people.
+/// The services, what records and plays, and people.
 enum class Role : std::uint32_t {
   kCapture = 1u << 0,
   kVio = 1u << 1,
@@ -20,6 +20,7 @@ enum class Role : std::uint32_t {
   kOperator = 1u << 6,    ///< the other commands: read everything, write queries
   kPlayer = 1u << 7,      ///< `perdure play`: writes everything; made on demand only
   kSubscriber = 1u << 8,  ///< programs of other people: results, and queries of the map
+  kGateway = 1u << 9,     ///< shows what is on the bus: reads everything, writes queries
 };
 
 /// A set of roles.

@@ -55,6 +55,16 @@ TEST_F(DemoPlan, PacesCaptureByTheClockOrLetsItFollow) {
   }
 }
 
+TEST_F(DemoPlan, ShowsItWhereTheGatewayIsInstalled) {
+  const auto folders = prepareFolders(options_);
+  EXPECT_FALSE(planGateway(options_, folders, 8765).has_value());
+  std::ofstream(folder_ / "perdure-gateway") << "";
+  const auto gateway = planGateway(options_, folders, 8765);
+  ASSERT_TRUE(gateway.has_value());
+  EXPECT_THAT(gateway->command, Contains("http.port=8765"));
+  EXPECT_GT(freePort(), 0);
+}
+
 TEST_F(DemoPlan, ShapesAreOfThePriorsThatTheFiltersConfigurationNames) {
   fs::create_directories(folder_ / "config");
   std::ofstream(folder_ / "config" / "semantic_filter.yaml") << "class_priors: mine.yaml\n";

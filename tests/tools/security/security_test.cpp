@@ -152,6 +152,8 @@ TEST(Permissions, AreTheLeastThatEachRoleNeeds) {
               ElementsAre("frame/*", "imu", "speed", "calibration", "health"));
   EXPECT_THAT(permissionsOf(Role::kOperator).writes, ElementsAre("map/query"));
   EXPECT_THAT(permissionsOf(Role::kRecord).writes, ElementsAre("health"));
+  EXPECT_THAT(permissionsOf(Role::kGateway).writes, ElementsAre("map/query", "health"));
+  EXPECT_THAT(permissionsOf(Role::kGateway).reads, Contains("frame/*"));
   EXPECT_THAT(permissionsOf(Role::kPlayer).reads, IsEmpty());
 }
 

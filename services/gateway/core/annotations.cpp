@@ -1,0 +1,131 @@
+#include "services/gateway/core/annotations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "services/gateway/core/cuboid.h"
+#include "services/gateway/core/pieces.h"
+
+namespace perdure::gateway {
+namespace {
+
+using Point = Eigen::Vector2d;
+constexpr int kSamples = 8;  // of an edge, which distortion bends
+enum PointsType { kLineLoop = 2, kLineList = 4 };
+
+/// Pairs of ends of the strokes that can be seen of the line from a to b (in C). Of a dashed line
+/// every other sample.
+void addStrokes(const CameraModel& camera, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                bool dashed, std::vector<Point>& strokes) {
+  const int samples = dashed ? 2 * kSamples + 1 : kSamples;
+  std::optional<Point> before;
+  for (int i = 0; i <= samples; ++i) {
+    const auto now = camera.project(a + (b - a) * (static_cast<double>(i) / samples));
+    if (before && now && (!dashed || i % 2 == 1)) {
+      strokes.push_back(*before);
+      strokes.push_back(*now);
+    }
+    before = now;
+  }
+}
+
+void putPoint(JsonWriter& json, const Point& p) {
+  json.begin('{').key("x").number(p.x(), 1).key("y").number(p.y(), 1).end('}');
+}
+
+void putLines(JsonWriter& json, TimePoint time, PointsType type, const std::vector<Point>& points,
+              const Colour& colour, double thickness) {
+  json.begin('{').key("timestamp");
+  putTime(json, time);
+  json.key("type").integer(static_cast<int>(type)).key("points").begin('[');
+  for (const Point& point : points) putPoint(json, point);
+  json.end(']').key("outline_color");
+  putColour(json, colour);
+  json.key("outline_colors").begin('[').end(']').key("fill_color");
+  putColour(json, {0, 0, 0, 0});
+  json.key("thickness").number(thickness).end('}');
+}
+
+struct Label {
+  Point at;
+  std::string text;
+  Colour colour;
+};
+
+void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
+  json.begin('{').key("timestamp");
+  putTime(json, time);
+  json.key("position");
+  putPoint(json, label.at);
+  json.key("text").text(label.text).key("font_size").number(11).key("text_color");
+  putColour(json, {1, 1, 1, 1});
+  json.key("background_color");
+  putColour(json, label.colour);
+  json.end('}');
+}
+
+/// Draws an object's cuboid; its label where it is in the image.
+std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const ObjectBelief& object,
+                               const CameraModel& camera) {
+  const RigidTransform T_CW = (objects.T_WB * camera.T_BC()).inverse();
+  auto corners = cornersOf(cuboidOf(object, objects.up_W));
+  for (Eigen::Vector3d& corner : corners) corner = T_CW * corner;
+  std::vector<Point> strokes;
+  for (const auto& [a, b] : kEdges) {
+    addStrokes(camera, corners[a], corners[b], isHidden(object), strokes);
+  }
+  addStrokes(camera, (corners[0] + corners[3]) / 2, (corners[1] + corners[3]) / 2, isHidden(object),
+             strokes);
+  if (strokes.empty()) return std::nullopt;
+  const Colour colour = classColour(object.best().name);
+  putLines(json, objects.stamp.time, kLineList, strokes,
+           colour.withAlpha(isHidden(object) ? 0.8 : std::max(0.3, object.existence)), 2);
+  Point corner = strokes.front();
+  for (const Point& p : strokes) corner = corner.cwiseMin(p);
+  if (corner.x() > camera.width() || corner.y() > camera.height()) return std::nullopt;
+  corner = corner.cwiseMax(Point(2, 14));
+  const std::string hidden = isHidden(object) ? " hidden" : "";
+  return Label{corner, nameOf(object) + hidden, colour.withAlpha(isHidden(object) ? 0.45 : 0.75)};
+}
+
+/// Of being there rather than clutter, by its likeliest class, with even odds before.
+double likelihood(const Detection& detection) {
+  if (detection.activations.size() < 2) return 0.0;
+  const float best =
+      *std::max_element(detection.activations.begin() + 1, detection.activations.end());
+  return 1.0 / (1.0 + std::exp(static_cast<double>(detection.activations[0] - best)));
+}
+
+void putDetection(JsonWriter& json, TimePoint time, const Detection& detection) {
+  const double bright = likelihood(detection);
+  constexpr double kDarkest = 0.05;
+  if (bright < kDarkest || detection.primed) return;
+  const Box& b = detection.box;
+  putLines(json, time, kLineLoop, {{b.x1, b.y1}, {b.x2, b.y1}, {b.x2, b.y2}, {b.x1, b.y2}},
+           {1, 1, 1, bright}, 1);
+}
+
+}  // namespace
+
+std::string imageAnnotations(const Objects& objects, const CameraModel& camera,
+                             const Detections* detections) {
+  JsonWriter json(1024 + 3072 * objects.objects.size());
+  json.begin('{').key("timestamp");
+  putTime(json, objects.stamp.time);
+  json.key("circles").begin('[').end(']').key("points").begin('[');
+  if (detections != nullptr) {
+    for (const Detection& one : detections->detections) putDetection(json, objects.stamp.time, one);
+  }
+  std::vector<Label> labels;
+  for (const ObjectBelief& object : objects.objects) {
+    if (!object.confirmed || !(isInSight(object) || isHidden(object))) continue;
+    if (auto label = putObject(json, objects, object, camera)) labels.push_back(*label);
+  }
+  json.end(']').key("texts").begin('[');
+  for (const Label& label : labels) putLabel(json, objects.stamp.time, label);
+  return json.end(']').end('}').take();
+}
+
+}  // namespace perdure::gateway

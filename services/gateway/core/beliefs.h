@@ -1,0 +1,52 @@
+// Perdure's own JSON: all objects at a glance for each frame, and everything about one of them.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/types/map.h"
+#include "common/types/objects.h"
+
+namespace perdure::gateway {
+
+/// "perdure.Objects". latency_ms below 0: not known.
+std::string objectsAtAGlance(const Objects& objects, double latency_ms);
+/// "perdure.Event", and the same in words as "foxglove.Log".
+std::string eventJson(const Event& event);
+std::string eventLog(const Event& event);
+/// "perdure.Detections"; without the model the classes have no names.
+std::string detectionsJson(const Detections& detections, const ModelInfo* model);
+std::string modelJson(const ModelInfo& model);
+
+/// "perdure.MapReply" of what the store answered.
+std::string mapReplyJson(const MapReply& reply);
+
+/// How an object's existence, class and visibility were, twice a second, for some minutes.
+class History {
+ public:
+  void add(const Objects& objects);
+  struct Sample {
+    double time_s = 0, existence = 0, probability = 0, fraction = 0;
+  };
+  const std::deque<Sample>* of(ObjectId id) const;
+  void clear() { samples_.clear(); }
+
+ private:
+  std::map<ObjectId, std::deque<Sample>> samples_;
+};
+
+/// "perdure.Object": its belief, why, when it should be seen again, and its history.
+std::string objectInFull(const ObjectBelief& object, const std::optional<Event>& returns,
+                         const std::deque<History::Sample>* history);
+
+/// So many objects of the map are told.
+inline constexpr std::size_t kMostOfMap = 2000;
+
+/// "perdure.Map": those nearest to the body of all that are on it.
+std::string mapNearBody(std::vector<MapObject> objects, const Eigen::Vector3d& p_WB,
+                        TimePoint time);
+
+}  // namespace perdure::gateway

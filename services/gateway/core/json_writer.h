@@ -1,0 +1,94 @@
+// JSON as text, appended piece by piece: what goes out twenty times a second builds no tree first.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace perdure::gateway {
+
+/// Puts the commas. Objects and arrays must be closed by the caller, keys come before values.
+class JsonWriter {
+ public:
+  explicit JsonWriter(std::size_t expected = 1024) { out_.reserve(expected); }
+
+  JsonWriter& begin(char bracket) {
+    comma();
+    out_ += bracket;
+    return *this;
+  }
+  JsonWriter& end(char bracket) {
+    out_ += bracket;
+    return *this;
+  }
+  JsonWriter& key(std::string_view name) {
+    comma();
+    out_ += '"';
+    out_ += name;
+    out_ += "\":";
+    return *this;
+  }
+  /// With so many decimals; what is not finite becomes 0, since JSON has no word for it.
+  JsonWriter& number(double value, int decimals = 4) {
+    comma();
+    char buffer[64];
+    constexpr double kLargest = 1e15;
+    if (!std::isfinite(value)) value = 0.0;
+    const auto format =
+        std::abs(value) < kLargest ? std::chars_format::fixed : std::chars_format::scientific;
+    const auto done = std::to_chars(buffer, buffer + sizeof buffer, value, format, decimals);
+    const char* last = done.ptr;
+    if (format == std::chars_format::fixed && decimals > 0) {
+      while (last[-1] == '0') --last;
+      if (last[-1] == '.') --last;
+    }
+    out_.append(buffer, static_cast<std::size_t>(last - buffer));
+    return *this;
+  }
+  JsonWriter& integer(std::integral auto value) {
+    comma();
+    out_ += std::to_string(value);
+    return *this;
+  }
+  JsonWriter& boolean(bool value) {
+    comma();
+    out_ += value ? "true" : "false";
+    return *this;
+  }
+  JsonWriter& null() {
+    comma();
+    out_ += "null";
+    return *this;
+  }
+  /// Escaped; bytes that are no UTF-8 become '?'.
+  JsonWriter& text(std::string_view value);
+  /// A key that is not ours, hence to be escaped.
+  JsonWriter& textKey(std::string_view name) {
+    text(name);
+    out_ += ':';
+    return *this;
+  }
+  /// Text that is JSON already.
+  JsonWriter& raw(std::string_view json) {
+    comma();
+    out_ += json;
+    return *this;
+  }
+
+  const std::string& str() const { return out_; }
+  std::string take() { return std::move(out_); }
+
+ private:
+  void comma() {
+    if (out_.empty()) return;
+    const char last = out_.back();
+    if (last != '{' && last != '[' && last != ':') out_ += ',';
+  }
+  std::string out_;
+};
+
+}  // namespace perdure::gateway

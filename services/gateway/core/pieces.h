@@ -1,0 +1,38 @@
+// The small pieces of which Foxglove's JSON messages are made.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+
+#include "common/base/time.h"
+#include "common/math/rigid_transform.h"
+#include "services/gateway/core/json_writer.h"
+
+namespace perdure::gateway {
+
+/// The frames of REP-105 and REP-103; the camera's is <name>_optical. The odometry's W is `odom`.
+inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link";
+std::string opticalFrame(const std::string& camera);
+
+/// Linear, 0 … 1.
+struct Colour {
+  double r = 0, g = 0, b = 0, a = 1;
+  Colour withAlpha(double alpha) const { return {r, g, b, alpha}; }
+};
+/// The colour of a class in all pictures: known classes have their own.
+Colour classColour(const std::string& class_name);
+
+/// {"sec", "nsec"}; before 1970 is 0.
+void putTime(JsonWriter& json, TimePoint time);
+void putVector(JsonWriter& json, const Eigen::Vector3d& v);
+void putQuaternion(JsonWriter& json, const Eigen::Quaterniond& q);
+void putPose(JsonWriter& json, const RigidTransform& T);
+void putColour(JsonWriter& json, const Colour& colour);
+/// [1, 2, 3]
+void putNumbers(JsonWriter& json, std::span<const double> values, int decimals = 4);
+
+/// About the vertical `up`, as the objects' yaw is.
+Eigen::Quaterniond rotationOfYaw(double yaw);
+
+}  // namespace perdure::gateway

@@ -1,0 +1,182 @@
+#include "services/gateway/core/scene.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "services/gateway/core/cuboid.h"
+#include "services/gateway/core/pieces.h"
+
+namespace perdure::gateway {
+namespace {
+
+constexpr int kTold = 100;
+constexpr double kDash = 0.25, kGap = 0.2;  // m
+constexpr int kMostDashes = 40;             // of an edge
+constexpr double kEllipsoidSigmas = 2.0;
+enum DeletionType { kMatching = 0, kAll = 1 };
+enum LineType { kSegments = 2 };
+
+double opacityOf(const ObjectBelief& object) {
+  return isInSight(object) ? 0.9 : isHidden(object) ? 0.8 : 0.35;
+}
+
+void putCube(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid) {
+  json.key("cubes").begin('[');
+  if (isInSight(object)) {
+    json.begin('{').key("pose");
+    putPose(json, cuboid.T_WO);
+    json.key("size");
+    putVector(json, cuboid.size);
+    json.key("color");
+    putColour(json, classColour(object.best().name).withAlpha(0.35 * object.existence));
+    json.end('}');
+  }
+  json.end(']');
+}
+
+/// Ends of short strokes from a to b; of the whole line where it is not dashed.
+void putStrokes(JsonWriter& json, const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool dashed) {
+  const double length = (b - a).norm();
+  if (!dashed || length < 2 * kDash) {
+    putVector(json, a);
+    putVector(json, b);
+    return;
+  }
+  const int strokes =
+      std::clamp(static_cast<int>(std::round(length / (kDash + kGap))), 2, kMostDashes);
+  // As many gaps as fit between the strokes, which begin and end at the corners.
+  const double unit = 1.0 / (strokes * (kDash + kGap) - kGap);
+  for (int i = 0; i < strokes; ++i) {
+    const double from = i * (kDash + kGap) * unit;
+    putVector(json, a + from * (b - a));
+    putVector(json, a + (from + kDash * unit) * (b - a));
+  }
+}
+
+void putEdges(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid) {
+  const auto corners = cornersOf(cuboid);
+  json.key("lines").begin('[').begin('{').key("type").integer(static_cast<int>(kSegments));
+  json.key("pose");
+  putPose(json, {});
+  json.key("thickness").number(isInSight(object) ? 2 : 1.5).key("scale_invariant").boolean(true);
+  json.key("points").begin('[');
+  for (const auto& [a, b] : kEdges) putStrokes(json, corners[a], corners[b], isHidden(object));
+  // Which way it faces: from the middle of its floor to the middle of its front's lower edge.
+  const Eigen::Vector3d floor = (corners[0] + corners[3]) / 2,
+                        front = (corners[1] + corners[3]) / 2;
+  putStrokes(json, floor, front, isHidden(object));
+  json.end(']').key("color");
+  putColour(json, classColour(object.best().name).withAlpha(opacityOf(object)));
+  json.key("colors").begin('[').end(']').key("indices").begin('[').end(']');
+  json.end('}').end(']');
+}
+
+void putEllipsoid(JsonWriter& json, const ObjectBelief& object) {
+  const Eigen::Matrix3d P = object.best().covariance.topLeftCorner<3, 3>();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(P);
+  Eigen::Matrix3d axes = eigen.eigenvectors();
+  if (axes.determinant() < 0) axes.col(0) *= -1;
+  const Eigen::Vector3d radii = kEllipsoidSigmas * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  json.key("spheres").begin('[').begin('{').key("pose");
+  putPose(json, RigidTransform(axes, Eigen::Vector3d(object.best().mean.head<3>())));
+  json.key("size");
+  putVector(json, 2 * radii);
+  json.key("color");
+  putColour(json, {1, 1, 1, 0.25});
+  json.end('}').end(']');
+}
+
+void putLabel(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid) {
+  constexpr double kAbove = 0.3;  // m
+  const Eigen::Vector3d up = cuboid.T_WO.q * Eigen::Vector3d::UnitZ();
+  json.key("texts").begin('[').begin('{').key("pose");
+  putPose(json, {Eigen::Quaterniond::Identity(),
+                 Eigen::Vector3d(cuboid.T_WO.p + up * (cuboid.size.z() / 2 + kAbove))});
+  json.key("billboard").boolean(true).key("font_size").number(12);
+  json.key("scale_invariant").boolean(true).key("color");
+  putColour(json, {1, 1, 1, opacityOf(object)});
+  json.key("text").text(nameOf(object) + (isHidden(object) ? " (hidden)" : ""));
+  json.end('}').end(']');
+}
+
+void putPair(JsonWriter& json, const char* name, const std::string& value) {
+  json.begin('{').key("key").text(name).key("value").text(value).end('}');
+}
+
+std::string percent(double probability) {
+  return std::to_string(static_cast<int>(std::lround(100 * probability))) + " %";
+}
+
+void putMetadata(JsonWriter& json, const ObjectBelief& object) {
+  json.key("metadata").begin('[');
+  putPair(json, "exists", percent(object.existence));
+  for (const ClassBelief& belief : object.classes) {
+    putPair(json, belief.name.c_str(), percent(belief.probability));
+  }
+  putPair(json, "visibility", perdure::nameOf(object.visibility));
+  if (object.blocked_by != 0) putPair(json, "hidden by", std::to_string(object.blocked_by));
+  json.end(']');
+}
+
+void putEntity(JsonWriter& json, const Objects& objects, const ObjectBelief& object) {
+  const Cuboid cuboid = cuboidOf(object, objects.up_W);
+  json.begin('{').key("timestamp");
+  putTime(json, objects.stamp.time);
+  json.key("frame_id").text(kOdomFrame).key("id").text(std::to_string(object.id));
+  json.key("lifetime").raw(R"({"sec":0,"nsec":0})").key("frame_locked").boolean(true);
+  putMetadata(json, object);
+  putCube(json, object, cuboid);
+  putEdges(json, object, cuboid);
+  putEllipsoid(json, object);
+  putLabel(json, object, cuboid);
+  for (const char* none : {"arrows", "cylinders", "triangles", "models"}) {
+    json.key(none).begin('[').end(']');
+  }
+  json.end('}');
+}
+
+void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id) {
+  json.begin('{').key("timestamp");
+  putTime(json, time);
+  json.key("type").integer(static_cast<int>(type)).key("id").text(id).end('}');
+}
+
+}  // namespace
+
+std::string Scene::update(const Objects& objects) {
+  if (world_ != objects.world) {
+    world_ = objects.world;
+    shown_.clear();
+    gone_.clear();
+    clear_ = kTold;
+  }
+  JsonWriter json(4096 + 3072 * objects.objects.size());
+  std::set<ObjectId> now;
+  for (const ObjectBelief& object : objects.objects) {
+    if (object.confirmed) now.insert(object.id);
+  }
+  for (const ObjectId id : shown_) {
+    if (!now.contains(id)) gone_.push_back({id, 0});
+  }
+  std::erase_if(gone_, [&](const Gone& one) { return one.told >= kTold || now.contains(one.id); });
+  json.begin('{').key("deletions").begin('[');
+  if (clear_ > 0) {
+    --clear_;
+    putDeletion(json, objects.stamp.time, kAll, "");
+  }
+  for (Gone& one : gone_) {
+    ++one.told;
+    putDeletion(json, objects.stamp.time, kMatching, std::to_string(one.id));
+  }
+  json.end(']').key("entities").begin('[');
+  for (const ObjectBelief& object : objects.objects) {
+    if (object.confirmed) putEntity(json, objects, object);
+  }
+  json.end(']').end('}');
+  shown_ = std::move(now);
+  return json.take();
+}
+
+}  // namespace perdure::gateway

@@ -1,0 +1,32 @@
+// JSON schemas of what the gateway sends: Foxglove's well-known ones, by their public field lists,
+// and Perdure's own. As text.
+#pragma once
+
+#include <string>
+
+namespace perdure::gateway::schemas {
+
+std::string frameTransforms();
+std::string sceneUpdate();
+std::string poseInFrame();
+std::string posesInFrame();
+std::string pointCloud();
+std::string log();
+std::string cameraCalibration();
+std::string imageAnnotations();
+
+std::string objects();
+std::string object();
+std::string event();
+std::string health();
+std::string detections();
+std::string map();
+std::string model();
+std::string objectRequest();
+std::string mapRequest();
+std::string mapReply();
+
+/// Of foxglove::CompressedImage, which goes as CDR: its bytes need no base64.
+std::string compressedImageIdl();
+
+}  // namespace perdure::gateway::schemas

@@ -1,0 +1,146 @@
+#include "services/gateway/core/vital_signs.h"
+
+#include <fmt/format.h>
+
+#include <functional>
+
+#include "services/gateway/core/json_writer.h"
+
+namespace perdure::gateway {
+namespace {
+
+constexpr double kSilent = 2.5;  // s; health comes each second
+
+const char* wordOf(HealthState state) {
+  switch (state) {
+    case HealthState::kStarting:
+      return "starting";
+    case HealthState::kOk:
+      return "ok";
+    case HealthState::kDegraded:
+      return "degraded";
+    case HealthState::kFailed:
+      return "failed";
+  }
+  return "unknown";
+}
+
+double secondsSince(std::int64_t then_ns, std::int64_t now_ns) {
+  return then_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(now_ns - then_ns);
+}
+
+/// The value of a label, escaped as Prometheus wants it.
+std::string label(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '\\' || c == '"') escaped += '\\';
+    if (c == '\n') {
+      escaped += "\\n";
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+void VitalSigns::onHealth(const Health& health, std::int64_t now_ns) {
+  constexpr std::size_t kMostServices = 64;
+  if (!services_.contains(health.process) && services_.size() >= kMostServices) return;
+  Service& service = services_[health.process];
+  const double span = secondsSince(service.heard_ns, now_ns);
+  const bool same = service.health.instance == health.instance && span > 0.2;
+  service.cpu = same ? (health.cpu_s - service.health.cpu_s) / span : -1.0;
+  service.health = health;
+  service.heard_ns = now_ns;
+}
+
+std::string VitalSigns::json(std::int64_t now_ns, const Silence& last) const {
+  JsonWriter json(4096);
+  json.begin('{').key("vehicle").text(vehicle_).key("services").begin('[');
+  for (const auto& [name, service] : services_) {
+    const Health& h = service.health;
+    json.begin('{').key("process").text(name).key("state").text(wordOf(h.state));
+    json.key("message").text(h.message);
+    json.key("age_s").number(secondsSince(service.heard_ns, now_ns), 2);
+    json.key("frames_in").integer(h.frames_in).key("frames_out").integer(h.frames_out);
+    json.key("dropped").integer(h.dropped).key("rate_hz").number(h.rate_hz, 2);
+    json.key("cpu")
+        .number(service.cpu, 3)
+        .key("rss_mb")
+        .number(1e-6 * static_cast<double>(h.rss_bytes), 1);
+    json.key("reasons").begin('{');
+    for (const auto& [reason, n] : h.reasons) json.textKey(reason).integer(n);
+    json.end('}').end('}');
+  }
+  json.end(']').key("silent_s").begin('{');
+  json.key("objects").number(secondsSince(last.objects_ns, now_ns), 2);
+  json.key("odometry").number(secondsSince(last.odometry_ns, now_ns), 2);
+  return json.end('}').end('}').take();
+}
+
+std::string VitalSigns::healthz(std::int64_t now_ns) const {
+  const char* status = "ok";
+  std::size_t heard = 0;
+  JsonWriter services;
+  services.begin('{');
+  for (const auto& [name, service] : services_) {
+    const bool silent = secondsSince(service.heard_ns, now_ns) > kSilent;
+    if (name != "gateway" && !silent) ++heard;
+    if (silent || service.health.state != HealthState::kOk) status = "degraded";
+    services.textKey(name).text(silent ? "silent" : wordOf(service.health.state));
+  }
+  services.end('}');
+  JsonWriter json;
+  json.begin('{').key("status").text(heard == 0 ? "silent" : status);
+  return json.key("services").raw(services.str()).end('}').take() + "\n";
+}
+
+std::string VitalSigns::metrics(std::int64_t now_ns, const std::vector<Figure>& own,
+                                const std::map<std::string, std::uint64_t>& own_reasons) const {
+  std::string text;
+  const auto head = [&](const std::string& name, const std::string& help, const char* type) {
+    text += fmt::format("# HELP perdure_{0} {1}\n# TYPE perdure_{0} {2}\n", name, help, type);
+  };
+  const auto each = [&](const std::string& name, const std::string& help, const char* type,
+                        const std::function<double(const Service&)>& value) {
+    head(name, help, type);
+    for (const auto& [process, service] : services_) {
+      text +=
+          fmt::format("perdure_{}{{process=\"{}\"}} {}\n", name, label(process), value(service));
+    }
+  };
+  each("service_up", "1 where the service was heard in the last seconds", "gauge",
+       [&](const Service& s) { return secondsSince(s.heard_ns, now_ns) <= kSilent ? 1 : 0; });
+  each("service_state", "0 starting, 1 ok, 2 degraded, 3 failed", "gauge",
+       [](const Service& s) { return static_cast<double>(s.health.state); });
+  each("frames_in_total", "frames that the service took", "counter",
+       [](const Service& s) { return static_cast<double>(s.health.frames_in); });
+  each("frames_out_total", "results that it gave", "counter",
+       [](const Service& s) { return static_cast<double>(s.health.frames_out); });
+  each("dropped_total", "frames that it left out", "counter",
+       [](const Service& s) { return static_cast<double>(s.health.dropped); });
+  each("cpu_seconds_total", "processor time of all threads", "counter",
+       [](const Service& s) { return s.health.cpu_s; });
+  each("resident_bytes", "memory", "gauge",
+       [](const Service& s) { return static_cast<double>(s.health.rss_bytes); });
+  head("reasons_total", "what was counted, by reason", "counter");
+  for (const auto& [process, service] : services_) {
+    for (const auto& [reason, n] : service.health.reasons) {
+      text += fmt::format("perdure_reasons_total{{process=\"{}\",reason=\"{}\"}} {}\n",
+                          label(process), label(reason), n);
+    }
+  }
+  for (const Figure& figure : own) {
+    head("gateway_" + figure.name, figure.help, figure.counts ? "counter" : "gauge");
+    text += fmt::format("perdure_gateway_{} {}\n", figure.name, figure.value);
+  }
+  head("gateway_refused_total", "connections and messages that were refused or cut", "counter");
+  for (const auto& [reason, n] : own_reasons) {
+    text += fmt::format("perdure_gateway_refused_total{{reason=\"{}\"}} {}\n", label(reason), n);
+  }
+  return text;
+}
+
+}  // namespace perdure::gateway

@@ -1,0 +1,49 @@
+// How the services are, for the page ("perdure.Health"), for /healthz and for Prometheus.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/types/health.h"
+
+namespace perdure::gateway {
+
+/// A figure of the gateway's own, for /metrics.
+struct Figure {
+  std::string name, help;
+  bool counts = false;  ///< a counter; else a gauge
+  double value = 0;
+};
+
+/// Times are of CLOCK_MONOTONIC in ns; 0: never.
+struct Silence {
+  std::int64_t objects_ns = 0, odometry_ns = 0;
+};
+
+class VitalSigns {
+ public:
+  explicit VitalSigns(std::string vehicle) : vehicle_(std::move(vehicle)) {}
+
+  void onHealth(const Health& health, std::int64_t now_ns);
+
+  /// "perdure.Health"
+  std::string json(std::int64_t now_ns, const Silence& last) const;
+  /// {"status": "ok" or "degraded" or "silent", …}
+  std::string healthz(std::int64_t now_ns) const;
+  /// Prometheus' text format, 0.0.4.
+  std::string metrics(std::int64_t now_ns, const std::vector<Figure>& own,
+                      const std::map<std::string, std::uint64_t>& own_reasons) const;
+
+ private:
+  struct Service {
+    Health health;
+    std::int64_t heard_ns = 0;
+    double cpu = -1.0;  ///< of one core, between the last two; below 0: not known
+  };
+  const std::string vehicle_;
+  std::map<std::string, Service> services_;
+};
+
+}  // namespace perdure::gateway

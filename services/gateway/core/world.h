@@ -1,0 +1,41 @@
+// Where things are, for Foxglove: frames, the body's pose and way, landmarks, the camera.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/types/odometry.h"
+#include "common/types/sensors.h"
+
+namespace perdure::gateway {
+
+/// map → odom → base_link → <camera>_optical. `map` and `odom` are one until the bus tells the two
+/// apart.
+std::string frameTransforms(TimePoint time, const RigidTransform& T_WB,
+                            const Calibration* calibration);
+std::string poseInFrame(TimePoint time, const RigidTransform& T_WB);
+/// x, y, z, sigma as 32-bit floats.
+std::string landmarksAsPoints(const Landmarks& landmarks);
+std::string cameraCalibration(const CameraCalibration& camera, TimePoint time);
+
+/// foxglove::CompressedImage as CDR (XCDR1, little-endian). `jpeg` are the bytes.
+std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
+                            std::span<const std::uint8_t> jpeg);
+
+/// The way of the body, thinned: a point at least every so often as it matters to the eye, and
+/// never more than some thousands.
+class Trajectory {
+ public:
+  void add(TimePoint time, const WorldId& world, const RigidTransform& T_WB);
+  std::string posesInFrame() const;
+  std::size_t size() const { return poses_.size(); }
+
+ private:
+  WorldId world_;
+  TimePoint time_;
+  double step_m_ = 0.25;
+  std::vector<RigidTransform> poses_;
+  RigidTransform newest_;
+};
+
+}  // namespace perdure::gateway

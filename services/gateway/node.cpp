@@ -1,0 +1,267 @@
+#include "services/gateway/node.h"
+
+#include <algorithm>
+
+#include "common/vision/jpeg.h"
+#include "services/gateway/core/annotations.h"
+
+namespace perdure::gateway {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::size_t kMostEvents = 256;
+constexpr std::chrono::seconds kLongBack{2};  // a recording begins again, or another drive does
+
+}  // namespace
+
+Node::Node(const Config& config, const std::string& vehicle, InstanceId instance, Outputs outputs)
+    : config_(config),
+      instance_(instance),
+      outputs_(std::move(outputs)),
+      vital_signs_(vehicle),
+      cameras_(config.cameras.size()),
+      image_pace_(config.cameras.size(), Pace{config.image_rate_hz}),
+      scene_pace_{config.scene_rate_hz},
+      pose_pace_{config.scene_rate_hz} {}
+
+bool Node::Pace::due(TimePoint time) {
+  // A little early counts: stamps jitter around the rate.
+  const auto least = durationFromSeconds(0.9 / rate_hz);
+  if (last && time >= *last && time - *last < least) return false;
+  last = time;
+  return true;
+}
+
+void Node::send(std::uint32_t channel, std::string payload) {
+  outputs_.message({channel, time_, std::make_shared<const std::string>(std::move(payload))});
+}
+
+void Node::newest(TimePoint time) {
+  if (time <= time_ && time_ - time < kLongBack) return;
+  time_ = time;  // a little late is late; much earlier is another drive
+  outputs_.time(time);
+}
+
+RigidTransform Node::pose() const {
+  if (odometry_) return odometry_->T_WB;
+  return objects_ ? objects_->T_WB : RigidTransform();
+}
+
+void Node::setWanted(const Channels& wanted) {
+  const Channels before = std::exchange(wanted_, wanted);
+  if (!wants(kMap)) tiles_.clear();  // their reader is closed
+  for (const std::uint32_t channel : wanted) {
+    if (!before.contains(channel)) sendNow(channel);
+  }
+}
+
+/// As it is now, to the first who looks.
+void Node::sendNow(std::uint32_t channel) {
+  const bool placed = odometry_ || objects_;
+  switch (channel) {
+    case kTransforms:
+      if (placed)
+        send(kTransforms, frameTransforms(time_, pose(), calibration_ ? &*calibration_ : nullptr));
+      return;
+    case kPose:
+      if (placed) send(kPose, poseInFrame(time_, pose()));
+      return;
+    case kTrajectory:
+      if (trajectory_.size() > 0) send(kTrajectory, trajectory_.posesInFrame());
+      return;
+    case kScene:
+      if (objects_) send(kScene, scene_.update(*objects_));
+      return;
+    case kObjects:
+      if (objects_) send(kObjects, objectsAtAGlance(*objects_, latency_ms_));
+      return;
+    case kEvents:
+    case kLog:
+      for (const Event& event : events_) sendEvent(event, channel == kLog);
+      return;
+    case kHealth:
+      next_health_ns_ = 0;
+      return;
+    case kModel:
+      if (model_) send(kModel, modelJson(*model_));
+      return;
+    default:
+      break;
+  }
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
+    if (channel != cameraChannel(i, kCalibration) || !calibration_) continue;
+    const CameraCalibration* camera = calibration_->camera(config_.cameras[i]);
+    if (camera != nullptr) send(channel, cameraCalibration(*camera, time_));
+  }
+}
+
+void Node::onCalibration(const Calibration& calibration) {
+  calibration_ = calibration;
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
+    const CameraCalibration* camera = calibration.camera(config_.cameras[i]);
+    cameras_[i].reset();
+    if (camera == nullptr) continue;
+    cameras_[i].emplace(*camera);
+    const std::uint32_t channel = cameraChannel(i, kCalibration);
+    if (wants(channel)) send(channel, cameraCalibration(*camera, time_));
+  }
+}
+
+void Node::onFrame(std::size_t camera, const Frame& frame) {
+  const std::uint32_t channel = cameraChannel(camera, kImage);
+  if (!wants(channel) || !image_pace_[camera].due(frame.stamp.time)) return;
+  const auto jpeg = vision::compressed(frame, static_cast<int>(config_.image_quality));
+  if (!jpeg) return reasons_.add("image_" + jpeg.error().code);
+  outputs_.message({channel, frame.stamp.time,
+                    std::make_shared<const std::string>(
+                        compressedImage(frame.stamp, config_.cameras[camera], *jpeg->data))});
+}
+
+void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
+  last_.odometry_ns = now_ns;
+  if (odometry.state == OdometryState::kInitialising) return;
+  odometry_ = odometry;
+  newest(odometry.stamp.time);
+  trajectory_.add(odometry.stamp.time, odometry.world, odometry.T_WB);
+  if (!pose_pace_.due(odometry.stamp.time)) return;
+  for (const std::uint32_t channel : {kTransforms, kPose}) {
+    if (wants(channel)) sendNow(channel);
+  }
+  if (wants(kTrajectory) && trajectory_pace_.due(odometry.stamp.time)) sendNow(kTrajectory);
+}
+
+void Node::onLandmarks(const Landmarks& landmarks) {
+  if (wants(kLandmarks)) send(kLandmarks, landmarksAsPoints(landmarks));
+}
+
+void Node::onDetections(const Detections& detections) {
+  constexpr std::size_t kMostCameras = 16;
+  if (!detections_.contains(detections.camera) && detections_.size() >= kMostCameras) return;
+  detections_[detections.camera] = detections;
+  if (wants(kDetections)) {
+    send(kDetections, detectionsJson(detections, model_ ? &*model_ : nullptr));
+  }
+}
+
+void Node::onModel(const ModelInfo& model) {
+  model_ = model;
+  if (wants(kModel)) sendNow(kModel);
+}
+
+void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
+  last_.objects_ns = now_ns;
+  const bool again = objects_ && objects.stamp.time + kLongBack < objects_->stamp.time;
+  if (again || (objects_ && objects_->world != objects.world)) {
+    history_.clear();
+    returns_.clear();
+  }
+  objects_ = objects;
+  const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
+  constexpr double kLongest = 1e4;  // ms; beyond it is another host's clock, or a recording
+  latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
+  newest(objects.stamp.time);
+  history_.add(objects);
+  if (!odometry_) trajectory_.add(objects.stamp.time, objects.world, objects.T_WB);
+  if (scene_pace_.due(objects.stamp.time)) sendObjects();
+}
+
+void Node::sendObjects() {
+  for (const std::uint32_t channel : {kObjects, kScene}) {
+    if (wants(channel)) sendNow(channel);
+  }
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i);
+  if (odometry_) return;  // it tells where the body is
+  for (const std::uint32_t channel : {kTransforms, kPose}) {
+    if (wants(channel)) sendNow(channel);
+  }
+  if (wants(kTrajectory) && trajectory_pace_.due(objects_->stamp.time)) sendNow(kTrajectory);
+}
+
+void Node::sendAnnotations(std::size_t camera) {
+  const std::uint32_t channel = cameraChannel(camera, kAnnotations);
+  if (!wants(channel) || !cameras_[camera]) return;
+  const auto found = detections_.find(config_.cameras[camera]);
+  const bool same = found != detections_.end() && found->second.stamp.sameFrame(objects_->stamp);
+  outputs_.message({channel, objects_->stamp.time,
+                    std::make_shared<const std::string>(imageAnnotations(
+                        *objects_, *cameras_[camera], same ? &found->second : nullptr))});
+}
+
+void Node::onEvent(const Event& event) {
+  events_.push_back(event);
+  if (events_.size() > kMostEvents) events_.pop_front();
+  noteReturns(event);
+  if (wants(kEvents)) sendEvent(event, false);
+  if (wants(kLog)) sendEvent(event, true);
+}
+
+void Node::sendEvent(const Event& event, bool as_log) {
+  outputs_.message(
+      {as_log ? kLog : kEvents, event.stamp.time,
+       std::make_shared<const std::string>(as_log ? eventLog(event) : eventJson(event))});
+}
+
+/// A prediction holds until the object is seen again, or is no more.
+void Node::noteReturns(const Event& event) {
+  if (event.kind == EventKind::kPredictedReturn) {
+    returns_[event.object_id] = event;
+  } else if (event.kind == EventKind::kReappeared || event.kind == EventKind::kGone ||
+             event.kind == EventKind::kMerged || event.kind == EventKind::kArchived) {
+    returns_.erase(event.object_id);
+  }
+}
+
+void Node::onMapTile(const MapTile& tile) {
+  tiles_[{tile.x, tile.y, tile.part}] = tile;
+  map_changed_ = true;
+}
+
+void Node::onMapTileGone(const MapTile& key) {
+  tiles_.erase({key.x, key.y, key.part});
+  map_changed_ = true;
+}
+
+std::size_t Node::sendMap() {
+  std::vector<MapObject> objects;
+  for (const auto& [key, tile] : tiles_) {
+    for (const MapObject& object : tile.objects) {
+      if (!objects_ || object.world == objects_->world) objects.push_back(object);
+    }
+  }
+  const std::size_t all = objects.size();
+  send(kMap, mapNearBody(std::move(objects), pose().p, time_));
+  return std::min(all, kMostOfMap);
+}
+
+bool Node::hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const {
+  return now_ns - std::max(last_.objects_ns, last_.odometry_ns) > longest_ns;
+}
+
+void Node::tick(std::int64_t now_ns) {
+  if (wants(kHealth) && now_ns >= next_health_ns_) {
+    next_health_ns_ = now_ns + kSecond;
+    send(kHealth, vital_signs_.json(now_ns, last_));
+  }
+  if (wants(kMap) && map_changed_ && now_ns >= next_map_ns_) {
+    map_changed_ = false;
+    // A large map more seldom: about as many bytes a second whatever it holds.
+    constexpr std::size_t kASecond = 200;
+    next_map_ns_ = now_ns + kSecond * static_cast<std::int64_t>(1 + sendMap() / kASecond);
+  }
+  constexpr std::int64_t kResend = kSecond / 2;
+  for (auto it = pending_.begin(); it != pending_.end();) {
+    Pending& one = it->second;
+    if (now_ns >= one.until_ns) {
+      fail(one.call, "map_store does not answer; does it run, on this bus?");
+      it = pending_.erase(it);
+      continue;
+    }
+    if (now_ns >= one.next_ns) {
+      one.next_ns = now_ns + kResend;
+      outputs_.query(one.query);
+    }
+    ++it;
+  }
+}
+
+}  // namespace perdure::gateway

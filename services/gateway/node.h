@@ -1,0 +1,121 @@
+// The gateway without bus and sockets: messages in, channels' messages out. What nobody looks at is
+// not made; what is made is made once.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/base/sink.h"
+#include "common/camera/camera_model.h"
+#include "common/types/map.h"
+#include "common/types/odometry.h"
+#include "services/gateway/config.h"
+#include "services/gateway/core/beliefs.h"
+#include "services/gateway/core/channels.h"
+#include "services/gateway/core/scene.h"
+#include "services/gateway/core/vital_signs.h"
+#include "services/gateway/core/world.h"
+
+namespace perdure::gateway {
+
+struct Outputs {
+  Sink<Encoded> message;
+  Sink<TimePoint> time;  ///< of the newest message
+  Sink<Answer> answer;
+  Sink<MapQuery> query;
+};
+
+/// Times `now_ns` are of CLOCK_MONOTONIC.
+class Node {
+ public:
+  Node(const Config& config, const std::string& vehicle, InstanceId instance, Outputs outputs);
+
+  /// The channels that somebody looks at. What is new among them is told as it is now.
+  void setWanted(const Channels& wanted);
+
+  void onCalibration(const Calibration& calibration);
+  void onFrame(std::size_t camera, const Frame& frame);
+  void onOdometry(const Odometry& odometry, std::int64_t now_ns);
+  void onLandmarks(const Landmarks& landmarks);
+  void onDetections(const Detections& detections);
+  void onModel(const ModelInfo& model);
+  void onObjects(const Objects& objects, std::int64_t now_ns);
+  void onEvent(const Event& event);
+  void onHealth(const Health& health, std::int64_t now_ns) {
+    vital_signs_.onHealth(health, now_ns);
+  }
+  void onMapTile(const MapTile& tile);
+  void onMapTileGone(const MapTile& key);
+  void onMapReply(const MapReply& reply);
+  void onCall(const Call& call, std::int64_t now_ns);
+  /// About ten times a second.
+  void tick(std::int64_t now_ns);
+
+  const VitalSigns& vitalSigns() const { return vital_signs_; }
+  std::size_t objects() const { return objects_ ? objects_->objects.size() : 0; }
+  /// The last of objects and odometry is older than that, or there was none.
+  bool hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const;
+  const ReasonCounts& reasons() const { return reasons_; }
+
+ private:
+  struct Pending {
+    Call call;
+    MapQuery query;
+    std::int64_t until_ns = 0, next_ns = 0;
+  };
+  /// Lets something through at most so often, by the sensor clock.
+  struct Pace {
+    double rate_hz = 0;
+    std::optional<TimePoint> last = {};
+    bool due(TimePoint time);
+  };
+
+  bool wants(std::uint32_t channel) const { return wanted_.contains(channel); }
+  void send(std::uint32_t channel, std::string payload);
+  void sendNow(std::uint32_t channel);
+  void sendObjects();
+  void sendAnnotations(std::size_t camera);
+  void sendEvent(const Event& event, bool as_log);
+  std::size_t sendMap();  ///< how many objects it told
+  void noteReturns(const Event& event);
+  void newest(TimePoint time);
+  RigidTransform pose() const;
+  void ask(const Call& call, MapQuery query, std::int64_t now_ns);
+  void askForObject(const Call& call, std::int64_t now_ns);
+  void askForMap(const Call& call, std::int64_t now_ns);
+  void fail(const Call& call, const std::string& sentence);
+
+  const Config config_;
+  const InstanceId instance_;
+  const Outputs outputs_;
+  Channels wanted_;
+  VitalSigns vital_signs_;
+  Silence last_;
+  TimePoint time_;
+
+  std::optional<Calibration> calibration_;
+  std::vector<std::optional<CameraModel>> cameras_;
+  std::optional<Odometry> odometry_;
+  std::optional<Objects> objects_;
+  std::optional<ModelInfo> model_;
+  std::map<std::string, Detections> detections_;  ///< newest, by camera
+  std::deque<Event> events_;
+  std::map<ObjectId, Event> returns_;
+  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, MapTile> tiles_;
+  double latency_ms_ = -1.0;
+  bool map_changed_ = false;
+  Scene scene_;
+  Trajectory trajectory_;
+  History history_;
+  std::vector<Pace> image_pace_;
+  Pace scene_pace_, pose_pace_, trajectory_pace_{2.0};
+  std::int64_t next_health_ns_ = 0, next_map_ns_ = 0;
+  std::map<std::uint64_t, Pending> pending_;
+  std::uint64_t next_request_ = 1;
+  ReasonCounts reasons_;
+};
+
+}  // namespace perdure::gateway

@@ -1,0 +1,144 @@
+// What clients ask: everything about one object, and what is on the map.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "services/gateway/node.h"
+
+namespace perdure::gateway {
+namespace {
+
+using Json = nlohmann::json;
+constexpr std::int64_t kPatience = 3'000'000'000;
+constexpr std::size_t kMostPending = 64;
+
+std::optional<double> numberOf(const Json& object, const char* name) {
+  const auto found = object.find(name);
+  if (found == object.end() || !found->is_number()) return std::nullopt;
+  const double value = found->get<double>();
+  return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+std::optional<ObjectId> idOf(const Json& request) {
+  const auto found = request.find("id");
+  if (found == request.end() || !found->is_number_unsigned()) return std::nullopt;
+  return found->get<ObjectId>();
+}
+
+std::optional<Eigen::Vector3d> placeOf(const Json& request, const char* name) {
+  const auto found = request.find(name);
+  if (found == request.end() || !found->is_array() || found->size() != 3) return std::nullopt;
+  Eigen::Vector3d place;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(*found)[i].is_number()) return std::nullopt;
+    place[static_cast<Eigen::Index>(i)] = (*found)[i].get<double>();
+  }
+  return place.allFinite() ? std::optional(place) : std::nullopt;
+}
+
+/// Nothing where it asks for nothing that there is.
+std::optional<MapQuery> queryOf(const Json& request) {
+  MapQuery query;
+  constexpr double kMost = 1000;
+  query.limit =
+      static_cast<std::uint32_t>(std::clamp(numberOf(request, "limit").value_or(200), 1.0, kMost));
+  const auto near = placeOf(request, "near"), low = placeOf(request, "low"),
+             high = placeOf(request, "high");
+  const auto radius = numberOf(request, "radius");
+  const auto name = request.find("class");
+  if (const auto id = idOf(request)) {
+    query.kind = MapQueryKind::kById;
+    query.object_id = *id;
+  } else if (name != request.end() && name->is_string()) {
+    query.kind = MapQueryKind::kByClass;
+    query.class_name = name->get<std::string>().substr(0, 64);
+  } else if (near && radius && *radius > 0) {
+    query.kind = MapQueryKind::kByRadius;
+    query.low = *near;
+    query.radius = *radius;
+  } else if (low && high && (low->array() <= high->array()).all()) {
+    query.kind = MapQueryKind::kByBox;
+    query.low = *low;
+    query.high = *high;
+  } else if (request.empty() || (request.size() == 1 && request.contains("limit"))) {
+    query.kind = MapQueryKind::kAll;
+  } else {
+    return std::nullopt;
+  }
+  return query;
+}
+
+}  // namespace
+
+void Node::fail(const Call& call, const std::string& sentence) {
+  outputs_.answer({call.client, call.service, call.call, false, sentence});
+}
+
+void Node::onCall(const Call& call, std::int64_t now_ns) {
+  if (call.service == kObjectService) {
+    askForObject(call, now_ns);
+  } else {
+    askForMap(call, now_ns);
+  }
+}
+
+void Node::askForObject(const Call& call, std::int64_t now_ns) {
+  const Json request = Json::parse(call.payload, nullptr, false);
+  const auto id = request.is_object() ? idOf(request) : std::nullopt;
+  if (!id) return fail(call, "ask as {\"id\": 12}");
+  if (objects_) {
+    for (const ObjectBelief& object : objects_->objects) {
+      if (object.id != *id) continue;
+      const auto returns = returns_.find(*id);
+      const auto found =
+          returns == returns_.end() ? std::optional<Event>() : std::optional(returns->second);
+      outputs_.answer({call.client, call.service, call.call, true,
+                       objectInFull(object, found, history_.of(*id))});
+      return;
+    }
+  }
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = *id;
+  ask(call, query, now_ns);
+}
+
+void Node::askForMap(const Call& call, std::int64_t now_ns) {
+  const Json request = Json::parse(call.payload, nullptr, false);
+  const auto query = request.is_object() ? queryOf(request) : std::nullopt;
+  if (!query) {
+    return fail(call,
+                "ask as {\"id\": 12}, {\"class\": \"car\"}, {\"near\": [x, y, z], "
+                "\"radius\": 20}, {\"low\": [x, y, z], \"high\": [x, y, z]}, or {}");
+  }
+  ask(call, *query, now_ns);
+}
+
+void Node::ask(const Call& call, MapQuery query, std::int64_t now_ns) {
+  if (pending_.size() >= kMostPending) {
+    reasons_.add("too_many_questions");
+    return fail(call, "too many questions wait for map_store");
+  }
+  query.client = instance_;
+  query.request = next_request_++;
+  pending_[query.request] = {call, query, now_ns + kPatience, now_ns};
+  tick(now_ns);
+}
+
+void Node::onMapReply(const MapReply& reply) {
+  const auto found = reply.client == instance_ ? pending_.find(reply.request) : pending_.end();
+  if (found == pending_.end()) return;
+  const Call call = found->second.call;
+  pending_.erase(found);
+  if (!reply.ok) return fail(call, reply.error);
+  if (call.service == kMapQueryService) {
+    outputs_.answer({call.client, call.service, call.call, true, mapReplyJson(reply)});
+  } else if (reply.beliefs.empty() || reply.beliefs.front().classes.empty()) {
+    outputs_.answer({call.client, call.service, call.call, true, R"({"found":false})"});
+  } else {
+    const ObjectBelief& object = reply.beliefs.front();
+    outputs_.answer({call.client, call.service, call.call, true,
+                     objectInFull(object, std::nullopt, history_.of(object.id))});
+  }
+}
+
+}  // namespace perdure::gateway

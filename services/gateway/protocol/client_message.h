@@ -1,0 +1,55 @@
+// What a client of the Foxglove WebSocket protocol may say (subprotocols foxglove.sdk.v1 and
+// foxglove.websocket.v1), parsed and bounded: whatever bytes come, there is a value or a reason.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "services/gateway/core/channels.h"
+
+namespace perdure::gateway::protocol {
+
+/// At most so many in one message.
+inline constexpr std::size_t kMostSubscriptions = 256;
+
+struct Subscription {
+  std::uint32_t id = 0, channel = 0;
+};
+struct Subscribe {
+  std::vector<Subscription> subscriptions;
+};
+struct Unsubscribe {
+  std::vector<std::uint32_t> ids;
+};
+struct GetParameters {
+  std::string id;  ///< empty: none
+};
+struct FetchAsset {
+  std::uint32_t request = 0;
+  std::string uri;
+};
+struct ServiceCall {
+  std::uint32_t service = 0, call = 0;
+  std::string encoding, payload;
+};
+/// Sound, and of no consequence here: connection graph, updates of parameters.
+struct Ignored {};
+/// Sound, and refused: this gateway only shows ("advertise", "setParameters", messages).
+struct NotOffered {
+  std::string what;
+};
+
+using ClientMessage = std::variant<Subscribe, Unsubscribe, GetParameters, FetchAsset, ServiceCall,
+                                   PlaybackRequest, Ignored, NotOffered>;
+
+/// Reasons: json_malformed, op_missing, op_unknown, member_malformed, too_many_subscriptions.
+Result<ClientMessage> parseText(std::string_view text);
+/// Reasons: binary_empty, binary_unknown, binary_short, playback_malformed.
+Result<ClientMessage> parseBinary(std::span<const std::uint8_t> bytes);
+
+}  // namespace perdure::gateway::protocol

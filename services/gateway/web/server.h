@@ -1,0 +1,59 @@
+// The one port: HTTP for the page, /healthz and /metrics, and the Foxglove WebSocket protocol. One
+// thread serves all clients; everything here may be called from any thread.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "services/gateway/core/channels.h"
+#include "services/gateway/web/files.h"
+#include "services/gateway/web/hub.h"
+#include "services/gateway/web/options.h"
+
+namespace perdure::gateway::web {
+
+struct Content {
+  std::string name, session;  ///< of serverInfo
+  std::vector<ChannelInfo> channels;
+  std::vector<ServiceInfo> services;
+  Files files;
+  std::optional<TimeRange> range = std::nullopt;  ///< of a recording that clients control
+};
+
+struct Stats {
+  std::size_t clients = 0, connections = 0;
+  std::uint64_t bytes_sent = 0, messages_sent = 0, published = 0, dropped = 0, requests = 0;
+  ReasonCounts reasons;  ///< of what was refused or cut
+};
+
+class Server {
+ public:
+  /// `told` is called in the server's thread. Throws StartupError (69) where the port cannot be
+  /// had.
+  Server(const Options& options, Content content, Hub::Told told);
+  /// Ends all connections.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  std::uint16_t port() const;
+  void publish(Encoded message);
+  void tellTime(TimePoint time);
+  void answer(Answer answer);
+  void tellPlayback(PlaybackState state);
+  /// What /healthz and /metrics answer from now on.
+  void setTexts(std::string healthz, std::string metrics);
+  Stats stats() const;
+  /// False where its thread has not turned for some seconds.
+  bool goesOn() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace perdure::gateway::web

@@ -1,0 +1,242 @@
+// What goes out, read again: scene, beliefs, annotations, poses, health.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "services/gateway/core/annotations.h"
+#include "services/gateway/core/beliefs.h"
+#include "services/gateway/core/scene.h"
+#include "services/gateway/core/vital_signs.h"
+#include "services/gateway/core/world.h"
+#include "tests/services/gateway/objects.h"
+
+namespace perdure::gateway {
+namespace {
+
+using nlohmann::json;
+using test::frameOf;
+using test::objectAt;
+using ::testing::HasSubstr;
+
+std::set<std::string> idsIn(const json& list) {
+  std::set<std::string> ids;
+  for (const auto& one : list) ids.insert(one["id"]);
+  return ids;
+}
+
+TEST(Scene, HasTheWholeSceneInEachMessageAndTellsForAWhileWhatHasGone) {
+  Scene scene;
+  (void)scene.update(frameOf(1, {objectAt(1, {10, 0, 0}), objectAt(2, {20, 0, 0})}));
+  for (int i = 0; i < 100; ++i) {
+    const json update = json::parse(scene.update(frameOf(2, {objectAt(1, {10, 0, 0})})));
+    ASSERT_EQ(idsIn(update["entities"]), std::set<std::string>{"1"});
+    ASSERT_TRUE(idsIn(update["deletions"]).contains("2")) << i;
+  }
+  const json later = json::parse(scene.update(frameOf(3, {objectAt(1, {10, 0, 0})})));
+  EXPECT_FALSE(idsIn(later["deletions"]).contains("2"));
+}
+
+TEST(Scene, TellsNoDeletionOfWhatHasComeBack) {
+  Scene scene;
+  (void)scene.update(frameOf(1, {objectAt(1, {10, 0, 0})}));
+  (void)scene.update(frameOf(2, {}));
+  const json back = json::parse(scene.update(frameOf(3, {objectAt(1, {10, 0, 0})})));
+  EXPECT_FALSE(idsIn(back["deletions"]).contains("1"));
+}
+
+TEST(Scene, BeginsAnewInANewFrameOfReference) {
+  constexpr int kAll = 1;
+  Scene scene;
+  for (int i = 0; i < 150; ++i) (void)scene.update(frameOf(1, {objectAt(1, {10, 0, 0})}));
+  EXPECT_TRUE(json::parse(scene.update(frameOf(1, {})))["deletions"][0]["type"] != kAll);
+  Objects other = frameOf(2, {objectAt(5, {1, 0, 0})});
+  other.world.epoch = 2;
+  const json update = json::parse(scene.update(other));
+  EXPECT_EQ(update["deletions"][0]["type"], kAll);
+  EXPECT_EQ(update["deletions"].size(), 1u);
+}
+
+TEST(Scene, DrawsWhatIsHiddenAsStrokesWithoutABody) {
+  ObjectBelief hidden = objectAt(3, {10, 0, 0});
+  hidden.visibility = Visibility::kOccluded;
+  hidden.blocked_by = 9;
+  Scene scene;
+  const json seen = json::parse(scene.update(frameOf(1, {objectAt(3, {10, 0, 0})})))["entities"][0];
+  const json strokes = json::parse(scene.update(frameOf(2, {hidden})))["entities"][0];
+  EXPECT_EQ(seen["cubes"].size(), 1u);
+  EXPECT_TRUE(strokes["cubes"].empty());
+  EXPECT_EQ(seen["lines"][0]["points"].size(), 2u * 13);
+  EXPECT_GT(strokes["lines"][0]["points"].size(), 4u * 13);
+  EXPECT_EQ(strokes["lines"][0]["points"].size() % 2, 0u);
+  EXPECT_EQ(strokes["texts"][0]["text"], "car 3 (hidden)");
+}
+
+TEST(Scene, PutsTheCuboidAndTheEllipsoidWhereTheBeliefIs) {
+  ObjectBelief object = objectAt(3, {10, -2, 1});
+  object.classes[0].covariance.topLeftCorner<3, 3>() =
+      Eigen::Vector3d(0.01, 0.04, 0.09).asDiagonal();
+  Scene scene;
+  const json entity = json::parse(scene.update(frameOf(1, {object})))["entities"][0];
+  const json cube = entity["cubes"][0];
+  EXPECT_NEAR(cube["pose"]["position"]["y"], -2, 1e-9);
+  EXPECT_NEAR(cube["pose"]["orientation"]["z"], std::sin(0.25), 1e-5);
+  EXPECT_NEAR(cube["size"]["x"], 4.0, 1e-3);
+  std::multiset<double> diameters;
+  for (const char* axis : {"x", "y", "z"})
+    diameters.insert(entity["spheres"][0]["size"][axis].get<double>());
+  EXPECT_THAT(std::vector<double>(diameters.begin(), diameters.end()),
+              ::testing::Pointwise(::testing::DoubleNear(1e-3), {0.4, 0.8, 1.2}));
+}
+
+TEST(Beliefs, TellEverythingAboutOneObject) {
+  const ObjectBelief object = objectAt(12, {1, 2, 3});
+  Event returns = test::eventOf(EventKind::kPredictedReturn, 12);
+  returns.returns_in_s = {2.5, 1.5, 4.0};
+  const std::deque<History::Sample> history{{1.0, 0.5, 0.6, 1.0}, {2.0, 0.9, 0.7, 0.0}};
+  const json full = json::parse(objectInFull(object, returns, &history));
+  EXPECT_EQ(full["object"]["id"], 12);
+  EXPECT_EQ(full["classes"][1]["class"], "other");
+  EXPECT_EQ(full["classes"][0]["covariance"].size(), 7u);
+  EXPECT_DOUBLE_EQ(full["existence"]["hit"]["nats"], 5.0);
+  EXPECT_EQ(full["existence"]["hit"]["count"], 7);
+  EXPECT_DOUBLE_EQ(full["ledger"]["car"]["activation"], 0.15);
+  EXPECT_DOUBLE_EQ(full["returns"]["in_s"][2], 4.0);
+  EXPECT_EQ(full["history"][1], (json{2.0, 0.9, 0.7, 0.0}));
+}
+
+TEST(Beliefs, AreReadableWhateverANameOnTheWireIs) {
+  ObjectBelief object = objectAt(1, {0, 0, 0}, "ca\"r\\\n\xff");
+  EXPECT_FALSE(
+      json::parse(objectInFull(object, std::nullopt, nullptr), nullptr, false).is_discarded());
+  EXPECT_FALSE(
+      json::parse(objectsAtAGlance(frameOf(1, {object}), -1), nullptr, false).is_discarded());
+}
+
+TEST(Beliefs, SayEachEventInASentence) {
+  for (int kind = 0; kind <= static_cast<int>(EventKind::kRestored); ++kind) {
+    const Event event = test::eventOf(static_cast<EventKind>(kind), 7);
+    const json said = json::parse(eventJson(event)), log = json::parse(eventLog(event));
+    EXPECT_GT(said["words"].get<std::string>().size(), 8u);
+    EXPECT_EQ(log["message"], said["words"]);
+    EXPECT_EQ(log["name"], said["event"]);
+  }
+}
+
+TEST(Beliefs, ShowTheNearestOfALargeMap) {
+  std::vector<MapObject> objects(3000);
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    objects[i].id = i + 1;
+    objects[i].class_name = "car";
+    objects[i].mean[0] = static_cast<double>(objects.size() - i);
+  }
+  const json map = json::parse(mapNearBody(objects, {0, 0, 0}, {}));
+  EXPECT_EQ(map["all"], 3000);
+  ASSERT_EQ(map["objects"].size(), 2000u);
+  EXPECT_EQ(map["objects"][0]["id"], 3000);
+}
+
+TEST(History, KeepsTwoSamplesASecondAndForgetsTheOldest) {
+  History history;
+  for (std::uint64_t i = 0; i < 8000; ++i) history.add(frameOf(i, {objectAt(1, {0, 0, 0})}));
+  ASSERT_NE(history.of(1), nullptr);
+  EXPECT_EQ(history.of(1)->size(), 600u);
+  EXPECT_NEAR(history.of(1)->back().time_s - history.of(1)->at(598).time_s, 0.5, 1e-6);
+  EXPECT_EQ(history.of(2), nullptr);
+}
+
+TEST(Annotations, AreTheProjectedCuboid) {
+  const Calibration calibration = test::forwardCamera();
+  const CameraModel camera(calibration.cameras[0]);
+  ObjectBelief object = objectAt(4, {10, 0, 0});
+  object.classes[0].mean[3] = 0;
+  const json message = json::parse(imageAnnotations(frameOf(1, {object}), camera, nullptr));
+  ASSERT_EQ(message["points"].size(), 1u);
+  double left = 1e9, right = -1e9, top = 1e9;
+  for (const auto& p : message["points"][0]["points"]) {
+    left = std::min(left, p["x"].get<double>());
+    right = std::max(right, p["x"].get<double>());
+    top = std::min(top, p["y"].get<double>());
+  }
+  // Its rear face is 8 m away, 1.8 m wide and 1.5 m high.
+  EXPECT_NEAR(left, 320 - 400 * 0.9 / 8, 0.1);
+  EXPECT_NEAR(right, 320 + 400 * 0.9 / 8, 0.1);
+  EXPECT_NEAR(top, 240 - 400 * 0.75 / 8, 0.1);
+  EXPECT_EQ(message["texts"][0]["text"], "car 4");
+}
+
+TEST(Annotations, LeaveOutWhatIsBehindAndDrawBoxesAsBrightAsTheyAreLikely) {
+  const Calibration calibration = test::forwardCamera();
+  const CameraModel camera(calibration.cameras[0]);
+  ObjectBelief behind = objectAt(4, {-10, 0, 0});
+  behind.visibility = Visibility::kBehind;
+  Detections detections;
+  detections.detections.resize(3);
+  detections.detections[0] = test::detectionOf({1, 2, 3, 4}, {0.F, 2.F});
+  detections.detections[1] = test::detectionOf({1, 2, 3, 4}, {0.F, -9.F});
+  detections.detections[2] = test::detectionOf({1, 2, 3, 4}, {});
+  const json message = json::parse(imageAnnotations(frameOf(1, {behind}), camera, &detections));
+  ASSERT_EQ(message["points"].size(), 1u);
+  EXPECT_NEAR(message["points"][0]["outline_color"]["a"], 1 / (1 + std::exp(-2.0)), 1e-3);
+  EXPECT_TRUE(message["texts"].empty());
+}
+
+TEST(World, ThinsALongWayAndKeepsItsShape) {
+  Trajectory way;
+  for (int i = 0; i < 100000; ++i) {
+    way.add(fromNanoseconds(i), {1, 1},
+            RigidTransform(Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}));
+  }
+  const json poses = json::parse(way.posesInFrame())["poses"];
+  EXPECT_LE(poses.size(), 4001u);
+  EXPECT_GE(poses.size(), 1500u);
+  EXPECT_EQ(poses.front()["position"]["x"], 0);
+  EXPECT_NEAR(poses.back()["position"]["x"], 9999.9, 1e-3);
+  way.add(fromNanoseconds(90000), {1, 1}, {});  // a little late
+  EXPECT_GT(json::parse(way.posesInFrame())["poses"].size(), 2u);
+  way.add(fromNanoseconds(-3'000'000'000), {1, 1}, {});  // it begins again
+  EXPECT_EQ(json::parse(way.posesInFrame())["poses"].size(), 2u);
+  way.add(fromNanoseconds(1), {2, 1}, {});
+  EXPECT_EQ(json::parse(way.posesInFrame())["poses"].size(), 2u);
+}
+
+TEST(World, PutsAnImageIntoCdrAsItsIdlSays) {
+  const std::vector<std::uint8_t> jpeg{9, 8, 7};
+  const std::string cdr = compressedImage({1, 2, fromNanoseconds(3'000'000'005), 0}, "cam0", jpeg);
+  const std::string expected{0,   1, 0, 0,                    // XCDR1, little-endian
+                             3,   0, 0, 0, 5,   0,   0,   0,  // time
+                             13,  0, 0, 0, 'c', 'a', 'm', '0', '_', 'o', 'p', 't', 'i', 'c', 'a',
+                             'l', 0, 0, 0, 0,   3,   0,   0,   0,   9,   8,   7,   0,  // data
+                             5,   0, 0, 0, 'j', 'p', 'e', 'g', 0};
+  EXPECT_EQ(cdr, expected);
+}
+
+TEST(VitalSigns, TellSilenceProcessorTimeAndReasons) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  VitalSigns signs("ego");
+  Health vio;
+  vio.process = "vio";
+  vio.state = HealthState::kOk;
+  vio.cpu_s = 1.0;
+  vio.reasons = {{"imu_gap", 3}};
+  EXPECT_THAT(signs.healthz(kSecond), HasSubstr("\"silent\""));
+  signs.onHealth(vio, 10 * kSecond);
+  vio.cpu_s = 1.25;
+  signs.onHealth(vio, 11 * kSecond);
+  const json health = json::parse(signs.json(11 * kSecond, {.objects_ns = 9 * kSecond}));
+  EXPECT_NEAR(health["services"][0]["cpu"], 0.25, 1e-6);
+  EXPECT_NEAR(health["silent_s"]["objects"], 2.0, 1e-6);
+  EXPECT_LT(health["silent_s"]["odometry"], 0);
+  EXPECT_THAT(signs.healthz(11 * kSecond), HasSubstr("\"status\":\"ok\""));
+  EXPECT_THAT(signs.healthz(20 * kSecond), HasSubstr("\"vio\":\"silent\""));
+  const std::string metrics =
+      signs.metrics(11 * kSecond, {{"clients", "now", false, 2}}, {{"x", 1}});
+  EXPECT_THAT(metrics, HasSubstr("perdure_service_up{process=\"vio\"} 1\n"));
+  EXPECT_THAT(metrics, HasSubstr("perdure_reasons_total{process=\"vio\",reason=\"imu_gap\"} 3\n"));
+  EXPECT_THAT(metrics,
+              HasSubstr("# TYPE perdure_gateway_clients gauge\nperdure_gateway_clients 2\n"));
+}
+
+}  // namespace
+}  // namespace perdure::gateway

@@ -1,0 +1,288 @@
+// perdure-gateway as a process: what it serves, whom it refuses, and what hostile clients can do to
+// it and to others.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+
+#include "common/bus/topics.h"
+#include "common/bus/wait_loop.h"
+#include "tests/process/support.h"
+#include "tests/services/gateway/objects.h"
+#include "tests/services/gateway/raw_client.h"
+
+namespace perdure::gateway::test {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace perdure::test;
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+std::string subscribe(std::uint32_t id, std::uint32_t channel) {
+  return json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}}
+      .dump();
+}
+
+class Gateway : public ::testing::Test {
+ protected:
+  void start(std::vector<std::string> settings = {}) {
+    std::vector<std::string> command{(programs() / "perdure-gateway").string(), "--port", "0"};
+    for (const std::string& setting : settings) command.insert(command.end(), {"--set", setting});
+    child_ = std::make_unique<Child>(command, folder_.file("log"));
+    const std::regex pattern("http://[^:]*:([0-9]+)/");
+    std::smatch found;
+    ASSERT_TRUE(eventually(20s, [&] {
+      const std::string log = child_->log();
+      if (!std::regex_search(log, found, pattern)) return false;
+      port_ = static_cast<std::uint16_t>(std::stoi(found[1]));
+      return true;
+    })) << child_->log();
+    ASSERT_TRUE(eventually(20s, [&] { return objects_.matched() > 0; })) << child_->log();
+  }
+
+  /// A client that is greeted, with the ids of the channels by topic.
+  std::unique_ptr<RawClient> greeted() {
+    auto client = std::make_unique<RawClient>(port_);
+    EXPECT_THAT(client->upgrade(), HasSubstr("101")) << child_->log();
+    for (int i = 0; i < 3; ++i) {
+      const json message = json::parse(client->readFrame().payload, nullptr, false);
+      if (!message.is_object() || message["op"] != "advertise") continue;
+      for (const auto& channel : message["channels"]) channels_[channel["topic"]] = channel["id"];
+    }
+    return client;
+  }
+  std::unique_ptr<RawClient> lookingAt(const std::string& topic) {
+    auto client = greeted();
+    client->sendFrame(subscribe(1, channels_[topic]));
+    return client;
+  }
+  void publish(std::uint64_t sequence, std::size_t objects = 3) {
+    std::vector<ObjectBelief> beliefs;
+    for (ObjectId id = 1; id <= objects; ++id)
+      beliefs.push_back(objectAt(id, {5.0 * static_cast<double>(id), 0, 0}));
+    ASSERT_TRUE(objects_.write(frameOf(sequence, beliefs)).has_value());
+  }
+  /// A count of /metrics; 0 where there is none.
+  double metric(const std::string& name) const {
+    const std::string text = get(port_, "/metrics").text;
+    const auto at = text.find("\n" + name + " ");
+    return at == std::string::npos ? 0 : std::stod(text.substr(at + name.size() + 2));
+  }
+  double refused(const std::string& reason) const {
+    return metric("perdure_gateway_refused_total{reason=\"" + reason + "\"}");
+  }
+  /// It serves others as if nothing had been.
+  void serves() {
+    const auto client = lookingAt("/objects");
+    publish(++sequence_);
+    EXPECT_THAT(client->readMessage(1), HasSubstr("\"objects\":[{\"id\":1")) << child_->log();
+  }
+
+  bus::Domain domain_{ownNetwork()};
+  bus::Participant participant_{domain_, "test"};
+  bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
+  Folder folder_;
+  std::unique_ptr<Child> child_;
+  std::uint16_t port_ = 0;
+  std::map<std::string, std::uint32_t> channels_;
+  std::uint64_t sequence_ = 1;
+};
+
+TEST_F(Gateway, ServesPageHealthAndMetrics) {
+  std::filesystem::create_directories(folder_.file("page"));
+  std::ofstream(folder_.file("page/index.html")) << "<title>the page</title>";
+  start({"page.folder=" + folder_.file("page")});
+  const HttpAnswer page = get(port_, "/");
+  EXPECT_EQ(page.status, 200);
+  EXPECT_THAT(page.text, HasSubstr("<title>the page</title>"));
+  EXPECT_THAT(page.text, HasSubstr("Content-Security-Policy: default-src 'self'"));
+  std::smatch tag;
+  ASSERT_TRUE(std::regex_search(page.text, tag, std::regex("ETag: (\"[^\"]*\")")));
+  EXPECT_EQ(get(port_, "/", "If-None-Match: " + tag[1].str() + "\r\n").status, 304);
+  EXPECT_EQ(get(port_, "/../../etc/passwd").status, 404);
+  EXPECT_EQ(get(port_, "/nothing").status, 404);
+  ASSERT_TRUE(eventually(5s, [&] {
+    return get(port_, "/healthz").text.find("\"gateway\":\"ok\"") != std::string::npos;
+  })) << get(port_, "/healthz").text;
+  publish(1);
+  EXPECT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_objects") == 3; }));
+  EXPECT_THAT(get(port_, "/metrics").text, HasSubstr("perdure_service_up{process=\"gateway\"} 1"));
+}
+
+TEST_F(Gateway, SaysInOneSentenceWhereThereIsNoPage) {
+  start({"page.folder=" + folder_.file("absent")});
+  EXPECT_THAT(get(port_, "/").text, HasSubstr("The page was not built"));
+}
+
+TEST_F(Gateway, RefusesForeignHostsPagesAndProtocols) {
+  start();
+  EXPECT_EQ(get(port_, "/", "", "evil.example").status, 421);
+  EXPECT_EQ(get(port_, "/healthz", "", "").status, 421);
+  EXPECT_THAT(RawClient(port_).upgrade("Origin: https://evil.example\r\n"), HasSubstr(" 403 "));
+  EXPECT_THAT(RawClient(port_).upgrade("Origin: null\r\n"), HasSubstr(" 403 "));
+  EXPECT_THAT(RawClient(port_).upgrade("", "chat"), HasSubstr(" 400 "));
+  EXPECT_THAT(RawClient(port_).upgrade("", ""), HasSubstr(" 400 "));
+  EXPECT_THAT(RawClient(port_).upgrade("", "foxglove.websocket.v1, foxglove.sdk.v1"),
+              HasSubstr("Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"));
+  EXPECT_THAT(RawClient(port_).upgrade("Origin: https://app.foxglove.dev\r\n"), HasSubstr(" 101 "));
+  RawClient post(port_);
+  post.send("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+  EXPECT_THAT(post.readHead(), HasSubstr(" 405 "));
+  EXPECT_TRUE(eventually(5s, [&] {
+    return refused("origin_refused") == 2 && refused("host_refused") == 2;
+  })) << get(port_, "/metrics").text;
+  serves();
+}
+
+TEST_F(Gateway, WantsTheTokenThatIsSet) {
+  start({"http.token=s3cret"});
+  EXPECT_THAT(RawClient(port_).upgrade(), HasSubstr(" 401 "));
+  EXPECT_THAT(RawClient(port_).upgrade("", "foxglove.sdk.v1", "vehicle.example", "/?token=s3cret"),
+              HasSubstr(" 101 "));
+  EXPECT_EQ(get(port_, "/metrics").status, 401);
+  EXPECT_EQ(get(port_, "/metrics?token=s3cret").status, 200);
+}
+
+TEST_F(Gateway, HasTheImagesSentToItOnlyWhileSomebodyLooks) {
+  start();
+  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  const auto client = greeted();
+  EXPECT_EQ(frames.matched(), 0u);
+  client->sendFrame(subscribe(4, channels_["/camera/cam0/image"]));
+  ASSERT_TRUE(eventually(10s, [&] { return frames.matched() == 1; }));
+  Frame frame;
+  frame.stamp = {42, 1, fromNanoseconds(5), 0};
+  frame.camera = "cam0";
+  frame.width = 64, frame.height = 48;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(64 * 48, std::uint8_t{90});
+  ASSERT_TRUE(frames.write(frame).has_value());
+  EXPECT_THAT(client->readMessage(4), HasSubstr("\xff\xd8\xff"));
+  client->sendFrame(R"({"op":"unsubscribe","subscriptionIds":[4]})");
+  EXPECT_TRUE(eventually(10s, [&] { return frames.matched() == 0; }));
+  client->sendFrame(subscribe(5, channels_["/camera/cam0/image"]));
+  EXPECT_TRUE(eventually(10s, [&] { return frames.matched() == 1; }));
+}
+
+TEST_F(Gateway, LosesNothingOfOneClientThroughAnotherThatDoesNotRead) {
+  start();
+  const auto stopped = lookingAt("/scene");
+  stopped->readSlowly();
+  const auto good = lookingAt("/scene");
+  constexpr std::uint64_t kFrames = 150;
+  // Each some 150 kB: more than all buffers between the two.
+  for (std::uint64_t i = 1; i <= kFrames; ++i) {
+    publish(i, 60);
+    ASSERT_THAT(
+        good->readMessage(1),
+        HasSubstr("\"sec\":" + std::to_string((2'000'000'000 + 100'000'000 * i) / 1'000'000'000)))
+        << i;
+  }
+  EXPECT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_lost_total") > 10; }));
+  EXPECT_EQ(metric("perdure_gateway_encoded_total"), static_cast<double>(kFrames));
+}
+
+TEST_F(Gateway, GoesOnThroughFramesThatLieOrMakeNoSense) {
+  start();
+  const auto giant = greeted();
+  giant->send(std::string("\x82\xff\x7f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0", 14));  // 8 exabytes
+  EXPECT_TRUE(giant->closed(10));
+  const auto large = greeted();
+  large->sendFrame(std::string(100'000, ' '));
+  EXPECT_TRUE(large->closed(10));
+  const auto bare = greeted();
+  bare->send(std::string("\x81\x02{}", 4));  // without a mask
+  EXPECT_TRUE(bare->closed(10));
+  const auto reserved = greeted();
+  reserved->sendFrame("x", 5);
+  EXPECT_TRUE(reserved->closed(10));
+  const auto latin = greeted();
+  latin->sendFrame("\xff\xfe");
+  EXPECT_TRUE(latin->closed(10));
+  const auto confused = greeted();
+  for (const char* text : {"", "{", "[]", "{\"op\":\"subscribe\",\"subscriptions\":[[]]}"})
+    confused->sendFrame(text);
+  confused->sendFrame(std::string("\x02\x01\0\0\0", 5), 2);
+  confused->sendFrame("", 2);
+  for (int i = 0; i < 6; ++i) {
+    const json status = json::parse(confused->readFrame().payload, nullptr, false);
+    ASSERT_TRUE(status.is_object()) << i;
+    EXPECT_EQ(status["op"], "status") << status;
+  }
+  confused->sendFrame(subscribe(9, channels_["/objects"]));
+  ASSERT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_clients") == 1; }))
+      << get(port_, "/metrics").text;
+  publish(++sequence_);
+  EXPECT_THAT(confused->readMessage(9), HasSubstr("\"objects\""));
+  EXPECT_TRUE(eventually(5s, [&] { return refused("client_cut_message_too_large") == 2; }))
+      << get(port_, "/metrics").text;
+  serves();
+}
+
+TEST_F(Gateway, LetsSoManyClientsInAndNoMore) {
+  start({"limits.clients=8", "limits.connections=40"});
+  std::vector<std::unique_ptr<RawClient>> clients;
+  int in = 0, told = 0;
+  for (int i = 0; i < 100; ++i) {
+    clients.push_back(std::make_unique<RawClient>(port_));
+    const std::string head = clients.back()->upgrade();
+    in += head.find(" 101 ") != std::string::npos;
+    told += head.find(" 503 ") != std::string::npos;
+  }
+  EXPECT_EQ(in, 8);
+  EXPECT_GT(told, 20);
+  EXPECT_EQ(child_->wait(0ms), -1);
+  clients.clear();
+  ASSERT_TRUE(eventually(10s, [&] { return metric("perdure_gateway_clients") == 0; }));
+  serves();
+}
+
+TEST_F(Gateway, LivesThroughAStormOfConnections) {
+  start({"limits.connections=16"});
+  const auto looks = lookingAt("/objects");
+  for (int i = 0; i < 1000; ++i) {
+    RawClient client(port_);
+    if (i % 3 == 0) client.send("GET / HT");
+    if (i % 3 == 1) client.send(std::string(1000, '\0'));
+  }
+  publish(++sequence_);
+  EXPECT_THAT(looks->readMessage(1), HasSubstr("\"objects\""));
+  EXPECT_TRUE(eventually(15s, [&] { return get(port_, "/healthz").status == 200; }));
+}
+
+TEST_F(Gateway, EndsRequestsThatTrickleInAndLongHeaders) {
+  start();
+  RawClient loris(port_);
+  loris.send("GET / HTTP/1.1\r\nHost: localhost\r\nX-");
+  RawClient lengthy(port_);
+  lengthy.send("GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(20'000, 'x') + "\r\n\r\n");
+  EXPECT_TRUE(lengthy.closed(10));
+  EXPECT_TRUE(loris.closed(20));
+  EXPECT_TRUE(eventually(
+      5s, [&] { return refused("http_too_slow") >= 1 && refused("http_too_large") == 1; }));
+  serves();
+}
+
+TEST_F(Gateway, EndsAtOnceWithClientsThatDoNotRead) {
+  start();
+  const auto client = lookingAt("/scene");
+  client->readSlowly();
+  for (std::uint64_t i = 1; i < 30; ++i) publish(i, 60);
+  child_->signal(SIGTERM);
+  EXPECT_EQ(child_->wait(5s), 0) << child_->log();
+}
+
+TEST_F(Gateway, SaysWhereItsPortIsTaken) {
+  start();
+  Child second({(programs() / "perdure-gateway").string(), "--port", std::to_string(port_)},
+               folder_.file("second"));
+  EXPECT_EQ(second.wait(20s), 69);
+  EXPECT_THAT(second.log(), HasSubstr("set http.port to another one"));
+}
+
+}  // namespace
+}  // namespace perdure::gateway::test

@@ -1,0 +1,192 @@
+// Programs of other people against perdure-gateway: Foxglove's client, and a browser with the page.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <thread>
+
+#include "common/bus/topics.h"
+#include "tests/process/support.h"
+#include "tests/services/gateway/objects.h"
+
+namespace perdure::gateway::test {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace perdure::test;
+using nlohmann::json;
+using ::testing::IsEmpty;
+
+/// A drive of every topic that is shown, at 10 Hz: three cars, of which the vehicle passes one.
+class Drive {
+ public:
+  explicit Drive(const bus::Participant& participant)
+      : calibration_(participant, bus::topics::kCalibration),
+        odometry_(participant, bus::topics::kOdometry),
+        landmarks_(participant, bus::topics::kLandmarks),
+        detections_(participant, bus::topics::kDetections),
+        model_(participant, bus::topics::kModel),
+        objects_(participant, bus::topics::kObjects),
+        events_(participant, bus::topics::kEvents),
+        tiles_(participant, bus::topics::kMap),
+        imu_(participant, bus::topics::kImu),
+        speed_(participant, bus::topics::kSpeed),
+        frames_(participant, bus::topics::frame("cam0")) {
+    Calibration calibration = forwardCamera();
+    calibration.source = 42;
+    (void)calibration_.write(calibration);
+    ModelInfo model;
+    model.hash = 9;
+    model.name = "net";
+    model.classes = {"car"};
+    (void)model_.write(model);
+    (void)events_.write(eventOf(EventKind::kBorn, 1));
+    (void)events_.write(eventOf(EventKind::kConfirmed, 1));
+    thread_ = std::thread([this] {
+      for (std::uint64_t i = 1; !over_; ++i) {
+        step(i);
+        std::this_thread::sleep_for(100ms);
+      }
+    });
+  }
+  ~Drive() {
+    over_ = true;
+    thread_.join();
+  }
+  Drive(const Drive&) = delete;
+  Drive& operator=(const Drive&) = delete;
+
+ private:
+  void step(std::uint64_t i) {
+    std::vector<ObjectBelief> cars;
+    for (ObjectId id = 1; id <= 3; ++id)
+      cars.push_back(
+          objectAt(id, {4.0 + 6.0 * static_cast<double>(id), id % 2 == 0 ? 3.0 : -3.0, 0}));
+    cars[2].visibility = Visibility::kOccluded;
+    cars[2].blocked_by = 1;
+    const Objects objects = frameOf(i, cars);
+    Odometry odometry;
+    odometry.stamp = objects.stamp;
+    odometry.world = objects.world;
+    odometry.state = OdometryState::kTracking;
+    odometry.T_WB.p.x() = 0.01 * static_cast<double>(i);
+    odometry.covariance.setIdentity();
+    (void)odometry_.write(odometry);
+    (void)imu_.write(ImuSample{42, i, objects.stamp.time, {0, 0, 0.1}, {0, 0, 9.8}});
+    (void)speed_.write(SpeedSample{42, i, objects.stamp.time, 1.0, 0.1});
+    Landmarks landmarks;
+    landmarks.stamp = objects.stamp;
+    landmarks.world = objects.world;
+    landmarks.camera = "cam0";
+    landmarks.landmarks.resize(5);
+    for (Landmark& one : landmarks.landmarks) one.p_W.x() = 5, one.covariance.setIdentity();
+    (void)landmarks_.write(landmarks);
+    Detections detections;
+    detections.stamp = objects.stamp;
+    detections.camera = "cam0";
+    detections.model_hash = 9;
+    detections.detections = {test::detectionOf({100, 100, 200, 200}, {0.F, 2.F})};
+    (void)detections_.write(detections);
+    Frame frame;
+    frame.stamp = objects.stamp;
+    frame.camera = "cam0";
+    frame.width = 640, frame.height = 480;
+    frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{70});
+    (void)frames_.write(frame);
+    (void)objects_.write(objects);
+    if (i % 10 != 1) return;
+    MapTile tile;
+    tile.revision = i;
+    tile.objects.resize(1);
+    tile.objects[0].id = 77;
+    tile.objects[0].class_name = "bicycle";
+    tile.objects[0].class_probability = tile.objects[0].existence = 0.9;
+    tile.objects[0].mean[0] = 12;
+    tile.objects[0].world = objects.world;
+    (void)tiles_.write(tile);
+  }
+
+  bus::Writer<Calibration> calibration_;
+  bus::Writer<Odometry> odometry_;
+  bus::Writer<Landmarks> landmarks_;
+  bus::Writer<Detections> detections_;
+  bus::Writer<ModelInfo> model_;
+  bus::Writer<Objects> objects_;
+  bus::Writer<Event> events_;
+  bus::Writer<MapTile> tiles_;
+  bus::Writer<ImuSample> imu_;
+  bus::Writer<SpeedSample> speed_;
+  bus::Writer<Frame> frames_;
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+class Strangers : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const char* modules = std::getenv("PERDURE_STRANGERS");
+    if (modules == nullptr || !std::filesystem::exists(std::filesystem::path(modules) / "ws") ||
+        !findProgram("node")) {
+      GTEST_SKIP() << "npm is not here, or got nothing: clients of other people are not tried";
+    }
+    modules_ = modules;
+    gateway_ = std::make_unique<Child>(
+        std::vector<std::string>{(programs() / "perdure-gateway").string(), "--port", "0"},
+        folder_.file("log"));
+    const std::regex pattern("http://[^:]*:([0-9]+)/");
+    std::smatch found;
+    ASSERT_TRUE(eventually(20s, [&] {
+      const std::string log = gateway_->log();
+      if (!std::regex_search(log, found, pattern)) return false;
+      port_ = found[1];
+      return true;
+    })) << gateway_->log();
+  }
+  json answer(const std::string& script, std::vector<std::string> more) {
+    std::vector<std::string> command{
+        "node", (sources() / "tests/services/gateway/strangers" / script).string(), modules_,
+        port_};
+    command.insert(command.end(), more.begin(), more.end());
+    Child node(command, folder_.file(script));
+    status_ = node.wait(150s);
+    return json::parse(node.log(), nullptr, false);
+  }
+
+  bus::Domain domain_{ownNetwork()};
+  bus::Participant participant_{domain_, "test"};
+  Folder folder_;
+  std::unique_ptr<Child> gateway_;
+  std::string modules_, port_;
+  int status_ = -1;
+};
+
+TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
+  const Drive drive(participant_);
+  for (const char* protocol : {"foxglove.sdk.v1", "foxglove.websocket.v1"}) {
+    const json said = answer("foxglove.mjs", {protocol});
+    ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("foxglove.mjs"));
+    EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
+    EXPECT_EQ(said["channels"], 19);
+    EXPECT_EQ(status_, 0);
+  }
+}
+
+TEST_F(Strangers, ABrowserShowsThePage) {
+  if (!findProgram("chromium")) GTEST_SKIP() << "chromium is not here: the page is not looked at";
+  if (!std::filesystem::exists(programs().parent_path() / "share/perdure/viewer/index.html")) {
+    GTEST_SKIP() << "the page was not built, for want of npm";
+  }
+  const Drive drive(participant_);
+  const json said = answer("page.mjs", {folder_.file("pictures")});
+  ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("page.mjs"));
+  EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
+  EXPECT_EQ(said["page"]["things"], 3);
+  EXPECT_EQ(said["page"]["hidden"], 1);
+  EXPECT_GT(said["page"]["images"], 0);
+  EXPECT_EQ(status_, 0);
+}
+
+}  // namespace
+}  // namespace perdure::gateway::test

@@ -1,0 +1,218 @@
+#include "services/gateway/node.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/services/gateway/objects.h"
+
+namespace perdure::gateway {
+namespace {
+
+using nlohmann::json;
+using test::frameOf;
+using test::objectAt;
+using ::testing::HasSubstr;
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+class GatewayNode : public ::testing::Test {
+ protected:
+  std::vector<json> on(std::uint32_t channel) const {
+    std::vector<json> found;
+    for (const Encoded& one : said_) {
+      if (one.channel == channel) found.push_back(json::parse(*one.payload));
+    }
+    return found;
+  }
+  Frame grey(std::uint64_t sequence) const {
+    Frame frame;
+    frame.stamp = {42, sequence,
+                   fromNanoseconds(kSecond + 50'000'000 * static_cast<std::int64_t>(sequence)), 0};
+    frame.camera = "cam0";
+    frame.width = 16, frame.height = 8;
+    frame.data = std::make_shared<const std::vector<std::uint8_t>>(16 * 8, std::uint8_t{90});
+    return frame;
+  }
+
+  std::vector<Encoded> said_;
+  std::vector<Answer> answers_;
+  std::vector<MapQuery> queries_;
+  Config config_;
+  Node node_{config_,
+             "ego",
+             5,
+             {.message = [this](const Encoded& m) { said_.push_back(m); },
+              .time = [](const TimePoint&) {},
+              .answer = [this](const Answer& a) { answers_.push_back(a); },
+              .query = [this](const MapQuery& q) { queries_.push_back(q); }}};
+};
+
+TEST_F(GatewayNode, MakesNothingWhileNobodyLooks) {
+  node_.onCalibration(test::forwardCamera());
+  node_.onObjects(frameOf(1, {objectAt(1, {10, 0, 0})}), kSecond);
+  node_.onFrame(0, grey(1));
+  node_.onEvent(test::eventOf(EventKind::kBorn, 1));
+  node_.tick(2 * kSecond);
+  EXPECT_TRUE(said_.empty());
+}
+
+TEST_F(GatewayNode, TellsWhoComesWhatIsKnownAlready) {
+  node_.onCalibration(test::forwardCamera());
+  node_.onObjects(frameOf(1, {objectAt(1, {10, 0, 0})}), kSecond);
+  node_.onEvent(test::eventOf(EventKind::kBorn, 1));
+  node_.onEvent(test::eventOf(EventKind::kConfirmed, 1));
+  node_.setWanted({kObjects, kScene, kEvents, kTransforms, kTrajectory, kHealth,
+                   cameraChannel(0, kCalibration)});
+  node_.tick(2 * kSecond);
+  EXPECT_EQ(on(kObjects).at(0)["objects"][0]["id"], 1);
+  EXPECT_EQ(on(kScene).at(0)["entities"].size(), 1u);
+  ASSERT_EQ(on(kEvents).size(), 2u);
+  EXPECT_EQ(on(kEvents)[1]["event"], "confirmed");
+  EXPECT_EQ(on(kTransforms).at(0)["transforms"].size(), 3u);
+  EXPECT_EQ(on(kHealth).at(0)["vehicle"], "ego");
+  EXPECT_EQ(on(cameraChannel(0, kCalibration)).at(0)["K"][0], 400);
+}
+
+TEST_F(GatewayNode, ShowsImagesAtTheRateThatIsSetAndAsJpeg) {
+  node_.setWanted({cameraChannel(0, kImage)});
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(0, grey(i));  // at 20 Hz
+  EXPECT_EQ(said_.size(), 10u);
+  EXPECT_THAT(*said_[0].payload, HasSubstr("\xff\xd8\xff"));
+  Frame broken = grey(40);
+  broken.width = 17;
+  node_.onFrame(0, broken);
+  EXPECT_EQ(said_.size(), 10u);
+  EXPECT_EQ(node_.reasons().of("image_image_malformed"), 1u);
+}
+
+TEST_F(GatewayNode, GoesOnWhenARecordingBeginsAgain) {
+  node_.setWanted({kObjects});
+  node_.onObjects(frameOf(900, {}), kSecond);
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onObjects(frameOf(2, {}), kSecond);
+  EXPECT_EQ(on(kObjects).size(), 3u);
+}
+
+TEST_F(GatewayNode, DrawsTheDetectionsOfTheSameFrame) {
+  node_.onCalibration(test::forwardCamera());
+  node_.setWanted({cameraChannel(0, kAnnotations)});
+  Detections detections;
+  detections.camera = "cam0";
+  detections.stamp = frameOf(1, {}).stamp;
+  detections.detections = {test::detectionOf({1, 2, 3, 4}, {0.F, 3.F})};
+  node_.onDetections(detections);
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onObjects(frameOf(2, {}), kSecond);
+  const auto drawn = on(cameraChannel(0, kAnnotations));
+  ASSERT_EQ(drawn.size(), 2u);
+  EXPECT_EQ(drawn[0]["points"].size(), 1u);
+  EXPECT_EQ(drawn[1]["points"].size(), 0u);
+}
+
+TEST_F(GatewayNode, AnswersAboutAnObjectOfTheWorkingSetAtOnce) {
+  node_.onObjects(frameOf(1, {objectAt(12, {10, 0, 0})}), kSecond);
+  Event returns = test::eventOf(EventKind::kPredictedReturn, 12);
+  returns.returns_in_s = {3, 2, 5};
+  node_.onEvent(returns);
+  node_.onCall({7, kObjectService, 1, R"({"id":12})"}, kSecond);
+  ASSERT_EQ(answers_.size(), 1u);
+  EXPECT_EQ(answers_[0].client, 7u);
+  EXPECT_EQ(json::parse(answers_[0].payload)["returns"]["in_s"][0], 3);
+  node_.onEvent(test::eventOf(EventKind::kReappeared, 12));
+  node_.onCall({7, kObjectService, 2, R"({"id":12})"}, kSecond);
+  EXPECT_FALSE(json::parse(answers_[1].payload).contains("returns"));
+  EXPECT_TRUE(queries_.empty());
+}
+
+TEST_F(GatewayNode, AsksTheMapForOthersAgainAndAgainAndThenGivesUp) {
+  node_.onCall({7, kObjectService, 1, R"({"id":99})"}, kSecond);
+  ASSERT_EQ(queries_.size(), 1u);
+  EXPECT_EQ(queries_[0].object_id, 99u);
+  EXPECT_EQ(queries_[0].client, 5u);
+  node_.tick(kSecond + kSecond / 10);
+  EXPECT_EQ(queries_.size(), 1u);
+  node_.tick(kSecond + 6 * kSecond / 10);
+  ASSERT_EQ(queries_.size(), 2u);
+  EXPECT_EQ(queries_[1].request, queries_[0].request);
+  node_.tick(5 * kSecond);
+  ASSERT_EQ(answers_.size(), 1u);
+  EXPECT_FALSE(answers_[0].ok);
+  EXPECT_THAT(answers_[0].payload, HasSubstr("map_store does not answer"));
+}
+
+TEST_F(GatewayNode, PassesTheMapsAnswerToWhoAsked) {
+  node_.onCall({7, kMapQueryService, 1, R"({"class":"car"})"}, kSecond);
+  node_.onCall({8, kObjectService, 2, R"({"id":4})"}, kSecond);
+  ASSERT_EQ(queries_.size(), 2u);
+  EXPECT_EQ(queries_[0].kind, MapQueryKind::kByClass);
+  MapReply reply;
+  reply.client = 5;
+  reply.request = queries_[1].request;
+  reply.beliefs = {objectAt(4, {1, 2, 3})};
+  node_.onMapReply(reply);
+  reply.request = queries_[0].request;
+  reply.objects.resize(1);
+  reply.objects[0].id = 31;
+  node_.onMapReply(reply);
+  node_.onMapReply(reply);  // once
+  reply.client = 6;
+  node_.onMapReply(reply);  // another's
+  ASSERT_EQ(answers_.size(), 2u);
+  EXPECT_EQ(answers_[0].client, 8u);
+  EXPECT_EQ(json::parse(answers_[0].payload)["object"]["id"], 4);
+  EXPECT_EQ(json::parse(answers_[1].payload)["objects"][0]["id"], 31);
+}
+
+TEST_F(GatewayNode, RefusesQuestionsThatMakeNoSense) {
+  for (const char* text :
+       {"", "[]", "{\"id\":-1}", "{\"id\":\"1\"}", "{\"near\":[1,2]}", "{\"near\":[1,2,3]}",
+        "{\"near\":[1,2,3],\"radius\":-1}", "{\"low\":[1,1,1],\"high\":[0,2,2]}", "{\"class\":7}",
+        "{\"low\":[1,1,\"x\"],\"high\":[2,2,2]}"}) {
+    node_.onCall({7, kMapQueryService, 1, text}, kSecond);
+    ASSERT_FALSE(answers_.empty()) << text;
+    EXPECT_FALSE(answers_.back().ok) << text;
+    answers_.clear();
+  }
+  node_.onCall({7, kObjectService, 1, "{}"}, kSecond);
+  EXPECT_FALSE(answers_.at(0).ok);
+  EXPECT_TRUE(queries_.empty());
+}
+
+TEST_F(GatewayNode, LetsOnlySoManyQuestionsWait) {
+  for (int i = 0; i < 70; ++i) node_.onCall({7, kMapQueryService, 1, "{}"}, kSecond);
+  EXPECT_EQ(answers_.size(), 6u);
+  EXPECT_EQ(node_.reasons().of("too_many_questions"), 6u);
+}
+
+TEST_F(GatewayNode, ShowsTheTilesOfTheMapInItsFrameOfReference) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.setWanted({kMap});
+  MapTile tile;
+  tile.objects.resize(2);
+  tile.objects[0].id = 1;
+  tile.objects[0].world = {77, 1};
+  tile.objects[1].id = 2;
+  tile.objects[1].world = {78, 1};
+  node_.onMapTile(tile);
+  node_.tick(2 * kSecond);
+  ASSERT_EQ(on(kMap).size(), 1u);
+  EXPECT_EQ(on(kMap)[0]["objects"].size(), 1u);
+  node_.tick(4 * kSecond);
+  EXPECT_EQ(on(kMap).size(), 1u);
+  node_.onMapTileGone(tile);
+  node_.tick(6 * kSecond);
+  EXPECT_EQ(on(kMap).at(1)["all"], 0);
+}
+
+TEST(GatewayConfig, RefusesAnOpenPortWithoutAToken) {
+  Config config;
+  verify(config);
+  config.web.address = "0.0.0.0";
+  EXPECT_ANY_THROW(verify(config));
+  config.web.token = "s3cret";
+  verify(config);
+}
+
+}  // namespace
+}  // namespace perdure::gateway

@@ -1,0 +1,110 @@
+// The page in a real browser: what it draws, what a click and keys do, how it looks on a phone.
+// usage: node page.mjs NODE_MODULES PORT OUT [WAIT_S]   — OUT: folder for pictures
+import { createRequire } from 'node:module';
+import { mkdirSync } from 'node:fs';
+import { join } from 'node:path';
+
+const [modules, port, out, wait = '1'] = process.argv.slice(2);
+const puppeteer = createRequire(join(modules, 'x.js'))('puppeteer-core');
+mkdirSync(out, { recursive: true });
+const problems = [], figures = {};
+const check = (holds, what) => { if (!holds) problems.push(what); };
+
+const browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', headless: true, protocolTimeout: 120000,
+  args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-dev-shm-usage'] });
+const page = await browser.newPage();
+page.on('pageerror', (e) => problems.push(`error: ${e.message}`));
+page.on('console', (m) => { if (m.type() === 'error') problems.push(`console: ${m.text()}`); });
+page.setDefaultNavigationTimeout(120000);
+await page.setViewport({ width: 1280, height: 800 });
+
+await page.goto(`http://127.0.0.1:${port}/`, { waitUntil: 'domcontentloaded' });
+await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 60000 });
+figures.first_object_ms = await page.evaluate(() => Math.round(performance.now()));
+const pause = (ms) => new Promise((r) => setTimeout(r, ms));
+await pause(1000 * Number(wait));
+
+const state = () => page.evaluate(() => {
+  const { model, world, camera } = window.perdure;
+  return { state: document.body.dataset.state, objects: model.objects.size, things: world.things.size, drawn: world.drawn,
+    rows: document.querySelectorAll('#list tr').length, names: document.querySelectorAll('#labels span').length,
+    hidden: [...world.things.values()].filter((t) => t.object.visibility === 'occluded').length,
+    images: camera.drawn, events: document.querySelectorAll('#events li[data-kind]').length,
+    services: document.querySelectorAll('#services article').length, trouble: document.getElementById('trouble').textContent };
+});
+figures.page = await state();
+check(figures.page.things === figures.page.objects && figures.page.things > 0, 'each object is in the map');
+check(figures.page.rows > 0, 'the list has rows');
+check(figures.page.names > 0, 'names are over the objects');
+check(figures.page.events > 0, 'there are events');
+check(figures.page.services > 0, 'there are services');
+await page.screenshot({ path: join(out, 'live.png') });
+
+// A pixel that is not the background: the map is drawn, not only there.
+const lit = await page.evaluate(() => {
+  const { world } = window.perdure;
+  world.orbit.apply();
+  world.renderer.render(world.scene, world.camera);
+  const gl = world.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+  const pixels = new Uint8Array(4 * w * h);
+  gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  let n = 0;
+  for (let i = 0; i < pixels.length; i += 4) if (pixels[i] + pixels[i + 1] + pixels[i + 2] > 150) ++n;
+  return n / (w * h);
+});
+figures.lit = lit;
+check(lit > 0.003, `the map is lit (${lit})`);
+
+// A click in the list, and everything about the object.
+await page.evaluate(() => { window.clicked = performance.now(); document.querySelector('#list tr').click(); });
+await page.waitForFunction(() => document.querySelector('#object .pmf') && document.querySelector('#object .ledger'), { timeout: 20000, polling: 10 });
+figures.click_ms = await page.evaluate(() => Math.round(window.perdure_panel_latency ?? performance.now() - window.clicked));
+const text = await page.$eval('#object', (e) => e.innerText);
+for (const words of ['exists', 'WHAT IT IS', 'WHY IT IS BELIEVED TO EXIST', 'showed it', 'WHERE IT IS']) check(text.includes(words), `the panel says "${words}"`);
+await pause(700);
+await page.screenshot({ path: join(out, 'object.png') });
+
+// Keys.
+await page.keyboard.press('Escape');
+await page.keyboard.press('/');
+await page.keyboard.type('zzzz');
+await pause(400);
+check(await page.$eval('#list', (e) => e.rows.length) === 0, 'nothing is called zzzz');
+await page.keyboard.press('Escape');
+await page.keyboard.press('Escape');
+await page.keyboard.press('ArrowDown');
+await pause(300);
+check(await page.evaluate(() => window.perdure.model.chosen > 0), 'the arrow chooses an object');
+await page.keyboard.press('Escape');
+await page.keyboard.press('3');
+await pause(200);
+check(await page.$eval('[data-panel=events]', (e) => !e.hidden), '3 opens the events');
+await page.screenshot({ path: join(out, 'events.png') });
+await page.keyboard.press('4');
+await pause(1200);
+await page.screenshot({ path: join(out, 'services.png') });
+await page.keyboard.press('t');
+await pause(400);
+await page.keyboard.press('1');
+await pause(400);
+await page.screenshot({ path: join(out, 'top.png') });
+await page.keyboard.press('t');
+await page.keyboard.press('c');
+await pause(300);
+check(await page.$eval('#camera', (e) => e.hidden), 'C closes the camera');
+await page.keyboard.press('c');
+
+// A phone.
+await page.setViewport({ width: 390, height: 780, isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
+await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });
+await pause(1500);
+const wide = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth + 1);
+check(!wide, 'nothing sticks out at the side of a phone');
+await page.screenshot({ path: join(out, 'phone.png') });
+await page.evaluate(() => document.querySelector('#list tr')?.click());
+await pause(900);
+await page.screenshot({ path: join(out, 'phone_object.png') });
+
+console.log(JSON.stringify({ problems, ...figures }));
+await browser.close();
+process.exit(problems.length > 0 ? 1 : 0);

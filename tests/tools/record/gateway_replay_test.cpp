@@ -1,0 +1,182 @@
+// A recording in front of a client: it has the controls, and sees what was known at each place.
+#include "tools/record/gateway_replay.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "common/base/errors.h"
+#include "common/replay/recordings/recording_writer.h"
+#include "tests/process/support.h"
+#include "tests/services/gateway/objects.h"
+#include "tests/services/gateway/raw_client.h"
+
+namespace perdure::tools {
+namespace {
+
+using gateway::test::eventOf;
+using gateway::test::frameOf;
+using gateway::test::objectAt;
+using gateway::test::RawClient;
+using nlohmann::json;
+using ::testing::HasSubstr;
+constexpr std::uint64_t kSecond = 1'000'000'000;
+
+class Replayed : public ::testing::Test {
+ protected:
+  /// Twenty seconds at 10 Hz, recorded at a time of its own; events at 7 and 12 s.
+  Replayed() {
+    replay::RecordingWriter writer(folder_.file("run.mcap"));
+    for (std::uint64_t i = 0; i < 200; ++i) {
+      const std::uint64_t log = 5000 * kSecond + i * kSecond / 10;
+      mustBe(writer.add("objects",
+                           frameOf(i, {objectAt(1, {0.1 * static_cast<double>(i), 0, 0})}), log));
+      if (i == 70) mustBe(writer.add("events", eventOf(EventKind::kOccluded, 1), log));
+      if (i == 120) mustBe(writer.add("events", eventOf(EventKind::kReappeared, 1), log));
+      if (i % 10 == 9) mustBe(writer.cut());
+    }
+    mustBe(writer.finish());
+  }
+  template <class R>
+  static void mustBe(const R& result) {
+    if (!result) throw std::runtime_error(result.error().detail);
+  }
+
+  void startPaused() {
+    gateway::PlaybackRequest how;
+    how.play = false;
+    recording_ = std::make_unique<replay::RecordedMessages>(folder_.file("run.mcap"));
+    gateway::Config config;
+    config.web.port = 0;
+    replay_ = std::make_unique<GatewayReplay>(*recording_, config, how);
+    thread_ = std::thread([this] { replay_->run(); });
+    client_ = std::make_unique<RawClient>(replay_->port());
+    ASSERT_THAT(client_->upgrade(), HasSubstr("101"));
+    info_ = json::parse(client_->readFrame().payload);
+    client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":8}]})");
+  }
+  ~Replayed() override {
+    if (!replay_) return;
+    replay_->stop();
+    thread_.join();
+  }
+
+  /// The sequence of the next objects that come.
+  std::uint64_t shown() {
+    return json::parse(client_->readMessage(1), nullptr, false).value("sequence", 9999);
+  }
+  void control(bool play, float speed, std::optional<std::uint64_t> seek_ns = {}) {
+    std::string bytes(19, '\0');
+    bytes[0] = 3;
+    bytes[1] = play ? 0 : 1;
+    std::memcpy(&bytes[2], &speed, 4);
+    bytes[6] = seek_ns ? 1 : 0;
+    const std::uint64_t seek = seek_ns.value_or(0);
+    std::memcpy(&bytes[7], &seek, 8);
+    client_->sendFrame(bytes, 2);
+  }
+  /// The next state that is told: {status, time in s of the sensors}.
+  std::pair<int, double> state() {
+    while (true) {
+      const auto frame = client_->readFrame();
+      if (frame.opcode == 0xff) return {-1, 0};
+      if (frame.opcode != 2 || frame.payload[0] != 5) continue;
+      std::uint64_t time = 0;
+      std::memcpy(&time, &frame.payload[2], 8);
+      return {frame.payload[1], 1e-9 * static_cast<double>(time)};
+    }
+  }
+
+  test::Folder folder_;
+  std::unique_ptr<replay::RecordedMessages> recording_;
+  std::unique_ptr<GatewayReplay> replay_;
+  std::thread thread_;
+  std::unique_ptr<RawClient> client_;
+  json info_;
+};
+
+TEST_F(Replayed, SaysWhatItCoversInTheSensorsTime) {
+  startPaused();
+  EXPECT_THAT(info_["capabilities"], ::testing::Contains("playbackControl"));
+  EXPECT_EQ(info_["dataStartTime"], (json{{"sec", 2}, {"nsec", 0}}));
+  EXPECT_EQ(info_["dataEndTime"], (json{{"sec", 21}, {"nsec", 900'000'000}}));
+}
+
+TEST_F(Replayed, ShowsThePlaceThatIsSoughtWhilePaused) {
+  startPaused();
+  control(false, 1, 12 * kSecond);
+  std::uint64_t sequence = 0;
+  for (int i = 0; i < 5 && sequence != 100; ++i) sequence = shown();
+  EXPECT_EQ(sequence, 100u);
+  control(false, 1, 3 * kSecond);
+  for (int i = 0; i < 5 && sequence != 10; ++i) sequence = shown();
+  EXPECT_EQ(sequence, 10u);
+}
+
+TEST_F(Replayed, PlaysOnFromThereAndSaysWhenItHasEnded) {
+  startPaused();
+  control(true, 100, 20 * kSecond);
+  std::pair<int, double> now;
+  for (int i = 0; i < 5 && now.first != 3; ++i) now = state();
+  EXPECT_EQ(now.first, 3);
+  EXPECT_NEAR(now.second, 21.9, 0.05);
+  control(true, 100);  // again from the beginning
+  EXPECT_NEAR(state().second, 2.0, 0.2);
+}
+
+TEST_F(Replayed, GoesOnToTheNextEvent) {
+  startPaused();
+  const std::string call("\x02\x03\0\0\0\x09\0\0\0\x04\0\0\0json{}", 19);
+  std::vector<double> places;
+  for (int i = 0; i < 2; ++i) {
+    client_->sendFrame(call, 2);
+    std::pair<int, double> now;
+    do now = state();
+    while (now.first >= 0 && !places.empty() && now.second <= places.back());
+    places.push_back(now.second);
+  }
+  EXPECT_THAT(places, ::testing::Pointwise(::testing::DoubleNear(0.11), {9.0, 14.0}));
+  client_->sendFrame(call, 2);
+  while (true) {
+    const auto frame = client_->readFrame();
+    ASSERT_NE(frame.opcode, 0xff);
+    if (frame.payload.find("there is no later event") != std::string::npos) break;
+  }
+}
+
+TEST_F(Replayed, AnswersAboutAnObjectAndSaysThatThereIsNoStore) {
+  startPaused();
+  (void)shown();
+  std::string call("\x02\x01\0\0\0\x09\0\0\0\x04\0\0\0json{\"id\":1}", 25);
+  client_->sendFrame(call, 2);
+  std::string answer;
+  while (answer.find("\"found\":true") == std::string::npos) {
+    const auto frame = client_->readFrame();
+    ASSERT_NE(frame.opcode, 0xff);
+    answer = frame.payload;
+  }
+  call[1] = 2;
+  client_->sendFrame(call, 2);
+  while (answer.find("has no map store") == std::string::npos) {
+    const auto frame = client_->readFrame();
+    ASSERT_NE(frame.opcode, 0xff);
+    answer = frame.payload;
+  }
+}
+
+TEST(Replay, RefusesARecordingWithNothingToShow) {
+  const test::Folder folder;
+  replay::RecordingWriter writer(folder.file("run.mcap"));
+  SpeedSample speed;
+  speed.source = 1;
+  ASSERT_TRUE(writer.add("speed", speed, 1));
+  ASSERT_TRUE(writer.finish());
+  replay::RecordedMessages recording(folder.file("run.mcap"));
+  EXPECT_THROW(GatewayReplay(recording, {}, {}), StartupError);
+}
+
+}  // namespace
+}  // namespace perdure::tools

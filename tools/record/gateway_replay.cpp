@@ -1,0 +1,295 @@
+#include "tools/record/gateway_replay.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/errors.h"
+#include "services/gateway/core/beliefs.h"
+
+namespace perdure::tools {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr double kBack = 3.0;  // s of the recording that are read before a place that is sought
+
+bool isShown(const std::string& topic) {
+  return topic == "calibration" || topic == "odometry" || topic == "landmarks" ||
+         topic == "detections" || topic == "model" || topic == "objects" || topic == "events" ||
+         topic == "health" || topic.starts_with("frame/");
+}
+
+std::optional<TimePoint> sensorTimeOf(const replay::RecordedMessage& message) {
+  if (message.topic == "odometry") {
+    const auto odometry = replay::valueOf<Odometry>(message);
+    if (odometry) return odometry->stamp.time;
+  } else if (message.topic == "objects") {
+    const auto objects = replay::valueOf<Objects>(message);
+    if (objects) return objects->stamp.time;
+  }
+  return std::nullopt;
+}
+
+bool isTimed(const std::string& topic) { return topic == "odometry" || topic == "objects"; }
+
+}  // namespace
+
+GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
+                             const gateway::PlaybackRequest& start)
+    : recording_(recording), config_(config), playing_(start.play), speed_(start.speed) {
+  measure();
+  const auto folder = config.page_folder.empty() ? gateway::web::usualPageFolder()
+                                                 : std::filesystem::path(config.page_folder);
+  auto services = gateway::serviceTable();
+  services.push_back(gateway::nextEventService());
+  const auto post = [this](auto change) {
+    const std::lock_guard lock(mutex_);
+    change(mail_);
+    something_.notify_one();
+  };
+  node_ = freshNode();
+  server_ = std::make_unique<gateway::web::Server>(
+      config.web,
+      gateway::web::Content{"perdure play", toHex(makeInstanceId()),
+                            gateway::channelTable(config.cameras), std::move(services),
+                            gateway::web::Files(folder), range()},
+      gateway::web::Hub::Told{
+          .wanted = [post](const gateway::Channels& w) { post([&](Mail& m) { m.wanted = w; }); },
+          .call =
+              [post](gateway::Call c) { post([&](Mail& m) { m.calls.push_back(std::move(c)); }); },
+          .playback =
+              [post](gateway::PlaybackRequest r) {
+                post([&](Mail& m) { m.requests.push_back(std::move(r)); });
+              }});
+  seek(start.seek ? logTime(*start.seek) : begin_ns_);
+}
+
+GatewayReplay::~GatewayReplay() = default;
+
+/// Times of the sensors and of the recorder run alike between the first message with both and the
+/// last one.
+void GatewayReplay::measure() {
+  begin_ns_ = recording_.startNs();
+  end_ns_ = recording_.endNs();
+  recording_.rewind(isTimed);
+  while (const auto message = recording_.next()) {
+    const auto time = sensorTimeOf(*message);
+    if (!time) continue;
+    first_ = last_ = {message->log_ns, *time};
+    break;
+  }
+  constexpr std::uint64_t kTail = 5'000'000'000;
+  recording_.rewind(isTimed, end_ns_ > kTail ? end_ns_ - kTail : 0);
+  while (const auto message = recording_.next()) {
+    const auto time = sensorTimeOf(*message);
+    if (time && *time > last_.time) last_ = {message->log_ns, *time};
+  }
+  if (first_.log_ns == 0) {
+    throw StartupError(ExitCode::kUsage,
+                       "the recording has neither odometry nor objects, so there is nothing to "
+                       "show; `perdure record info` tells what it has");
+  }
+  begin_ns_ = first_.log_ns;
+  end_ns_ = last_.log_ns;
+}
+
+TimePoint GatewayReplay::sensorTime(std::uint64_t log_ns) const {
+  const double span = static_cast<double>(last_.log_ns - first_.log_ns);
+  const double slope =
+      span > 0 ? static_cast<double>((last_.time - first_.time).count()) / span : 1;
+  const double since = static_cast<double>(static_cast<std::int64_t>(log_ns - first_.log_ns));
+  return first_.time + Duration(static_cast<std::int64_t>(slope * since));
+}
+
+std::uint64_t GatewayReplay::logTime(TimePoint time) const {
+  const auto all = static_cast<double>((last_.time - first_.time).count());
+  const auto since = static_cast<double>((time - first_.time).count());
+  const double share = all > 0 ? std::clamp(since / all, 0.0, 1.0) : 0.0;
+  return first_.log_ns +
+         static_cast<std::uint64_t>(share * static_cast<double>(last_.log_ns - first_.log_ns));
+}
+
+std::int64_t GatewayReplay::nowNs() const { return static_cast<std::int64_t>(at_ns_); }
+
+std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
+  const auto no_store = [this](const MapQuery& query) {
+    MapReply reply;
+    reply.client = query.client;
+    reply.request = query.request;
+    reply.ok = false;
+    reply.error = "a recording has no map store; perdure map --db FILE asks a map";
+    refusals_.push_back(reply);  // the node is in the middle of asking
+  };
+  return std::make_unique<gateway::Node>(
+      config_, "recording", 1,
+      gateway::Outputs{.message = [this](const gateway::Encoded& m) { server_->publish(m); },
+                       .time = [this](const TimePoint& t) { server_->tellTime(t); },
+                       .answer = [this](const gateway::Answer& a) { server_->answer(a); },
+                       .query = no_store});
+}
+
+/// What was known before that place is known again: the last seconds are gone through.
+void GatewayReplay::seek(std::uint64_t log_ns) {
+  node_ = freshNode();
+  if (calibration_) node_->onCalibration(*calibration_);
+  if (model_) node_->onModel(*model_);
+  const auto back = static_cast<std::uint64_t>(1e9 * kBack);
+  recording_.rewind(isShown, log_ns > back ? log_ns - back : 0);
+  next_ = recording_.next();
+  while (next_ && next_->log_ns < log_ns) (void)pull();
+  node_->setWanted(wanted_);
+  at_ns_ = log_ns;
+  ended_ = false;
+  setClock();
+  if (!playing_) showFrame();
+}
+
+/// On to the next objects, so that what is paused is seen.
+void GatewayReplay::showFrame() {
+  fed_objects_ = false;
+  while (next_ && !fed_objects_) (void)pull();
+}
+
+void GatewayReplay::seekToNextEvent(const gateway::Call& call) {
+  replay::RecordedMessages& r = recording_;
+  r.rewind([](const std::string& topic) { return topic == "events"; }, at_ns_);
+  std::optional<Event> found;
+  std::uint64_t place = 0;
+  while (const auto message = r.next()) {
+    if (message->log_ns <= at_ns_ + 50'000'000) continue;
+    if (const auto event = replay::valueOf<Event>(*message)) {
+      found = *event;
+      place = message->log_ns;
+      break;
+    }
+  }
+  if (!found) {
+    seek(at_ns_);
+    server_->answer({call.client, call.service, call.call, false, "there is no later event"});
+    return;
+  }
+  seek(place);
+  server_->answer({call.client, call.service, call.call, true, gateway::eventJson(*found)});
+  tellState(true, "");
+}
+
+/// Hands over one message; false at the end.
+bool GatewayReplay::pull() {
+  if (!next_) return false;
+  at_ns_ = std::max(at_ns_, next_->log_ns);
+  feed(*next_);
+  next_ = recording_.next();
+  return true;
+}
+
+void GatewayReplay::feed(const replay::RecordedMessage& message) {
+  const auto give = [&]<class T>(auto take) {
+    if (const auto value = replay::valueOf<T>(message)) take(*value);
+  };
+  const std::string& topic = message.topic;
+  if (topic == "objects") {
+    give.operator()<Objects>([&](const Objects& m) { node_->onObjects(m, nowNs()); });
+    fed_objects_ = true;
+  } else if (topic == "odometry") {
+    give.operator()<Odometry>([&](const Odometry& m) { node_->onOdometry(m, nowNs()); });
+  } else if (topic == "landmarks" && wanted_.contains(gateway::kLandmarks)) {
+    give.operator()<Landmarks>([&](const Landmarks& m) { node_->onLandmarks(m); });
+  } else if (topic == "detections") {
+    give.operator()<Detections>([&](const Detections& m) { node_->onDetections(m); });
+  } else if (topic == "events") {
+    give.operator()<Event>([&](const Event& m) { node_->onEvent(m); });
+  } else if (topic == "health") {
+    give.operator()<Health>([&](const Health& m) { node_->onHealth(m, nowNs()); });
+  } else if (topic == "calibration") {
+    give.operator()<Calibration>(
+        [&](const Calibration& m) { calibration_ = m, node_->onCalibration(m); });
+  } else if (topic == "model") {
+    give.operator()<ModelInfo>([&](const ModelInfo& m) { model_ = m, node_->onModel(m); });
+  }
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
+    if (topic != "frame/" + config_.cameras[i]) continue;
+    if (!wanted_.contains(gateway::cameraChannel(i, gateway::kImage))) continue;
+    give.operator()<Frame>([&](const Frame& m) { node_->onFrame(i, m); });
+  }
+}
+
+void GatewayReplay::setClock() {
+  clock_log_ns_ = at_ns_;
+  clock_began_ = Clock::now();
+}
+
+void GatewayReplay::tellState(bool did_seek, const std::string& id) {
+  using Status = gateway::PlaybackState::Status;
+  const Status status = ended_ ? Status::kEnded : playing_ ? Status::kPlaying : Status::kPaused;
+  server_->tellPlayback({status, sensorTime(at_ns_), speed_, did_seek, id});
+}
+
+void GatewayReplay::obey(const gateway::PlaybackRequest& request) {
+  playing_ = request.play;
+  speed_ = request.speed;
+  if (request.seek) {
+    seek(logTime(*request.seek));
+  } else if (ended_ && request.play) {
+    seek(begin_ns_);
+  }
+  setClock();
+  tellState(request.seek.has_value(), request.id);
+}
+
+GatewayReplay::Mail GatewayReplay::waitUntil(Clock::time_point due) {
+  std::unique_lock lock(mutex_);
+  something_.wait_until(lock, due, [&] { return !mail_.empty(); });
+  return std::exchange(mail_, {});
+}
+
+void GatewayReplay::handle(Mail mail) {
+  stopped_ = stopped_ || mail.stop;
+  if (mail.wanted) {
+    wanted_ = *mail.wanted;
+    node_->setWanted(wanted_);
+  }
+  for (const gateway::PlaybackRequest& request : mail.requests) obey(request);
+  for (const gateway::Call& call : mail.calls) {
+    if (call.service == gateway::kNextEventService) {
+      seekToNextEvent(call);
+    } else {
+      node_->onCall(call, nowNs());
+    }
+  }
+  for (const MapReply& refusal : std::exchange(refusals_, {})) node_->onMapReply(refusal);
+}
+
+void GatewayReplay::run() {
+  constexpr auto kTick = 100ms;
+  Clock::time_point next_tick = Clock::now();
+  tellState(false, "");
+  while (!stopped_) {
+    Clock::time_point due = next_tick;
+    if (playing_ && next_) {
+      const double later =
+          static_cast<double>(next_->log_ns - std::min(next_->log_ns, clock_log_ns_));
+      const auto play =
+          clock_began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(later / speed_));
+      if (play <= Clock::now()) {
+        (void)pull();
+        handle(waitUntil(Clock::time_point{}));
+        if (!next_) ended_ = true, playing_ = false, tellState(false, "");
+        continue;
+      }
+      due = std::min(due, play);
+    }
+    handle(waitUntil(due));
+    if (Clock::now() < next_tick) continue;
+    next_tick = Clock::now() + kTick;
+    node_->tick(nowNs());
+    server_->setTexts(node_->vitalSigns().healthz(nowNs()),
+                      node_->vitalSigns().metrics(nowNs(), {}, {}));
+  }
+}
+
+void GatewayReplay::stop() {
+  const std::lock_guard lock(mutex_);
+  mail_.stop = true;
+  something_.notify_one();
+}
+
+}  // namespace perdure::tools

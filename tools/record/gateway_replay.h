@@ -1,0 +1,88 @@
+// A recording to look at without a bus: the gateway's page and Foxglove with play, pause, seek,
+// speed and the next event, all from the client.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/replay/recordings/recorded_messages.h"
+#include "services/gateway/node.h"
+#include "services/gateway/web/server.h"
+
+namespace perdure::tools {
+
+class GatewayReplay {
+ public:
+  /// Finds out what the recording covers. Throws StartupError: it holds nothing to be shown, or the
+  /// port cannot be had.
+  GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
+                const gateway::PlaybackRequest& start);
+  ~GatewayReplay();
+
+  std::uint16_t port() const { return server_->port(); }
+  gateway::TimeRange range() const { return {sensorTime(first_.log_ns), sensorTime(last_.log_ns)}; }
+  /// Until stop().
+  void run();
+  void stop();  ///< from any thread
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// A message that has both times: the recorder's, and the sensors'.
+  struct Instant {
+    std::uint64_t log_ns = 0;
+    TimePoint time;
+  };
+  struct Mail {
+    std::optional<gateway::Channels> wanted;
+    std::deque<gateway::Call> calls;
+    std::deque<gateway::PlaybackRequest> requests;
+    bool stop = false;
+    bool empty() const { return !wanted && calls.empty() && requests.empty() && !stop; }
+  };
+
+  void measure();
+  TimePoint sensorTime(std::uint64_t log_ns) const;
+  std::uint64_t logTime(TimePoint time) const;
+  std::unique_ptr<gateway::Node> freshNode();
+  void seek(std::uint64_t log_ns);
+  void seekToNextEvent(const gateway::Call& call);
+  void showFrame();
+  bool pull();
+  void feed(const replay::RecordedMessage& message);
+  void obey(const gateway::PlaybackRequest& request);
+  Mail waitUntil(Clock::time_point due);
+  void handle(Mail mail);
+  void setClock();
+  void tellState(bool did_seek, const std::string& id);
+  std::int64_t nowNs() const;
+
+  replay::RecordedMessages& recording_;
+  const gateway::Config config_;
+  Instant first_, last_;
+  std::uint64_t begin_ns_ = 0, end_ns_ = 0;
+  std::unique_ptr<gateway::Node> node_;
+  gateway::Channels wanted_;
+  std::optional<Calibration> calibration_;
+  std::optional<ModelInfo> model_;
+  std::optional<replay::RecordedMessage> next_;
+  std::uint64_t at_ns_ = 0;  ///< log time that is shown
+  bool playing_ = true, stopped_ = false, ended_ = false;
+  double speed_ = 1.0;
+  std::uint64_t clock_log_ns_ = 0;
+  Clock::time_point clock_began_;
+  bool fed_objects_ = false;
+  std::vector<MapReply> refusals_;
+
+  std::mutex mutex_;
+  std::condition_variable something_;
+  Mail mail_;
+  std::unique_ptr<gateway::web::Server> server_;  // its thread uses what is above
+};
+
+}  // namespace perdure::tools

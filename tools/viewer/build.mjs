@@ -1,0 +1,24 @@
+// Copies the page into a folder: the modules of src as they are, and three.js of node_modules beside
+// them, each with a FILE.gz for browsers that take it.
+// usage: node build.mjs OUT NODE_MODULES
+import { cpSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
+import { dirname, extname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { gzipSync } from 'node:zlib';
+
+const [out, modules] = process.argv.slice(2);
+const here = dirname(fileURLToPath(import.meta.url));
+const three = join(modules, 'three');
+mkdirSync(join(out, 'vendor'), { recursive: true });
+cpSync(join(here, 'src'), out, { recursive: true });
+for (const file of ['three.module.js', 'three.core.js']) cpSync(join(three, 'build', file), join(out, 'vendor', file));
+cpSync(join(three, 'LICENSE'), join(out, 'vendor', 'three.LICENSE.txt'));
+
+function pack(folder) {
+  for (const name of readdirSync(folder)) {
+    const path = join(folder, name);
+    if (statSync(path).isDirectory()) pack(path);
+    else if (['.js', '.css', '.html', '.svg', '.glb'].includes(extname(name))) writeFileSync(`${path}.gz`, gzipSync(readFileSync(path), { level: 9 }));
+  }
+}
+pack(out);

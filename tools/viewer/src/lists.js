@@ -1,0 +1,136 @@
+// The list of objects with its search, the log of events, and the state of services.
+import { colourOf, escaped, looksLike, percent, visibilityWords } from './words.js';
+
+const MOST_ROWS = 400;
+
+export class ObjectList {
+  constructor(body, note, search, model, onChoose) {
+    Object.assign(this, { body, note, search, model, onChoose });
+    this.rows = new Map();
+    body.addEventListener('click', (e) => {
+      const row = e.target.closest('tr');
+      if (row) onChoose(Number(row.dataset.id));
+    });
+  }
+
+  distance(o) {
+    const b = this.model.frame?.body ?? [0, 0, 0];
+    return Math.hypot(o.c[0] - b[0], o.c[1] - b[1]);
+  }
+
+  /** Every word has to be in what is said of an object. */
+  matches(o, words, onlyMap) {
+    const text = `${o.class} ${o.id} ${onlyMap ? 'remembered map' : visibilityWords(o)} ${o.confirmed ? 'confirmed' : 'unconfirmed'} ${(o.moving ?? 0) >= 0.5 ? 'moving' : ''}`.toLowerCase();
+    return words.every((w) => text.includes(w));
+  }
+
+  found() {
+    const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const asked = words.some((w) => 'unconfirmed'.startsWith(w) && w.length > 3);
+    const here = [...this.model.objects.values()].filter((o) => (o.confirmed || asked || o.id === this.model.chosen) && this.matches(o, words, false));
+    const left = [...this.model.remembered.values()].filter((o) => !this.model.objects.has(o.id) && this.matches(o, words, true));
+    const rank = { seen: 0, hidden: 1, away: 2 };
+    here.sort((a, b) => rank[looksLike(a)] - rank[looksLike(b)] || this.distance(a) - this.distance(b));
+    left.sort((a, b) => this.distance(a) - this.distance(b));
+    return [here, left];
+  }
+
+  render() {
+    const [here, left] = this.found();
+    const all = [...here, ...left], shown = all.slice(0, MOST_ROWS);
+    this.order = shown.map((o) => o.id);
+    const seen = here.filter((o) => looksLike(o) === 'seen').length, hidden = here.filter((o) => looksLike(o) === 'hidden').length;
+    this.note.textContent = all.length === 0
+      ? (this.search.value ? 'Nothing here matches; the whole map can be asked.' : 'No objects yet.')
+      : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only`;
+    const wanted = new Set(this.order);
+    for (const [id, row] of this.rows) {
+      if (wanted.has(id)) continue;
+      row.remove();
+      this.rows.delete(id);
+    }
+    let at = this.body.firstElementChild;
+    for (const o of shown) {
+      const row = this.row(o);
+      if (row === at) at = at.nextElementSibling;
+      else this.body.insertBefore(row, at);
+    }
+  }
+
+  row(o) {
+    let row = this.rows.get(o.id);
+    if (!row) {
+      row = document.createElement('tr');
+      row.dataset.id = o.id;
+      row.innerHTML = '<td class="what"><i></i><span></span></td><td class="dim"></td><td><span class="bar" title="exists"><b></b></span></td><td class="n"></td>';
+      this.rows.set(o.id, row);
+    }
+    const only = !this.model.objects.has(o.id), look = only ? 'away' : looksLike(o);
+    const [what, where, bar, far] = row.children;
+    const put = (node, text) => { if (node.textContent !== text) node.textContent = text; };
+    put(what.lastElementChild, `${o.class} ${o.id}`);
+    put(where, only ? 'on the map' : look === 'seen' && o.visibility === 'partial' ? 'partly' : { seen: 'in sight', hidden: 'hidden', away: 'out of view' }[look]);
+    put(far, `${this.distance(o).toFixed(1)} m`);
+    bar.firstElementChild.firstElementChild.style.width = `${Math.round(100 * o.r)}%`;
+    bar.firstElementChild.title = `exists: ${percent(o.r)}`;
+    row.style.setProperty('--c', colourOf(o.class));
+    if (row.className !== look) row.className = look;
+    row.setAttribute('aria-selected', String(o.id === this.model.chosen));
+    return row;
+  }
+
+  /** The id `step` rows on. */
+  next(step) {
+    if (!this.order?.length) return 0;
+    const at = this.order.indexOf(this.model.chosen);
+    return this.order[at < 0 ? (step > 0 ? 0 : this.order.length - 1) : Math.min(this.order.length - 1, Math.max(0, at + step))];
+  }
+
+  reveal() {
+    this.rows.get(this.model.chosen)?.scrollIntoView({ block: 'nearest' });
+  }
+}
+
+export class EventLog {
+  constructor(list, model, onLink) {
+    this.list = list;
+    this.model = model;
+    list.addEventListener('click', (e) => {
+      const link = e.target.closest('[data-object]');
+      if (link) onLink(Number(link.dataset.object));
+    });
+    this.clear();
+  }
+
+  clear() {
+    this.list.innerHTML = '<li class="empty">No events yet.</li>';
+  }
+
+  add(event) {
+    if (this.model.events.length === 1) this.list.innerHTML = '';
+    const time = event.timestamp.sec + 1e-9 * event.timestamp.nsec - (this.model.firstTime ?? event.timestamp.sec);
+    const line = document.createElement('li');
+    line.dataset.kind = event.event;
+    let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
+    for (const id of new Set([event.object_id, event.other_id])) {
+      if (id) words = words.replace(new RegExp(`\\b${id}\\b`), `<a data-object="${id}">${id}</a>`);
+    }
+    line.innerHTML = `<time>${time < 0 ? 'before' : `${time.toFixed(1)} s`}</time><span>${words}</span>`;
+    this.list.prepend(line);
+    while (this.list.childElementCount > 500) this.list.lastElementChild.remove();
+  }
+}
+
+export function renderServices(element, health) {
+  const open = new Set([...element.querySelectorAll('details[open]')].map((d) => d.dataset.process));
+  const articles = health.services.map((s) => {
+    const silent = s.age_s > 2.5;
+    const reasons = Object.entries(s.reasons).map(([name, n]) => `<span>${escaped(name)}</span><span>${n}</span>`).join('');
+    const cpu = s.cpu >= 0 ? `${(100 * s.cpu).toFixed(0)} % CPU, ` : '';
+    return `<article data-state="${silent ? 'silent' : s.state}"><h3>${escaped(s.process)} <span class="dim">${silent ? `silent for ${Math.round(s.age_s)} s` : s.state}</span></h3>
+      ${s.message ? `<p>${escaped(s.message)}</p>` : ''}
+      <p class="figures">${s.rate_hz.toFixed(1)} Hz, in ${s.frames_in}, out ${s.frames_out}, dropped ${s.dropped}; ${cpu}${s.rss_mb.toFixed(0)} MB</p>
+      ${reasons ? `<details data-process="${escaped(s.process)}"${open.has(s.process) ? ' open' : ''}><summary>counted</summary><div class="reasons">${reasons}</div></details>` : ''}</article>`;
+  });
+  element.innerHTML = articles.join('') || '<p class="empty">No service is heard.</p>';
+}

@@ -1,0 +1,219 @@
+// Puts the page together: what comes goes to the model, and from there to map, lists and panels.
+import { CameraView } from './camera.js';
+import { Connection } from './connection.js';
+import { EventLog, ObjectList, renderServices } from './lists.js';
+import { Model, troubleOf } from './model.js';
+import { ObjectPanel } from './object_panel.js';
+import { PlaybackBar } from './playback.js';
+import { escaped } from './words.js';
+import { World } from './world.js';
+
+const $ = (id) => document.getElementById(id);
+const model = new Model();
+const status = { state: 'connecting', sentence: '' };
+
+function addressOfGateway() {
+  const address = new URL(location.href);
+  address.protocol = address.protocol === 'https:' ? 'wss:' : 'ws:';
+  address.hash = '';
+  return address.href;
+}
+
+const connection = new Connection(addressOfGateway(), (state, sentence) => {
+  status.state = state;
+  status.sentence = sentence;
+});
+
+let world = null;
+try {
+  world = new World($('canvas'), $('labels'), choose);
+} catch (error) {
+  $('labels').innerHTML = `<p class="empty">This browser draws no WebGL, hence no map: ${escaped(error.message)}</p>`;
+}
+const camera = new CameraView($('camera'), $('image'), $('image-caption'));
+const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
+const log = new EventLog($('events'), model, choose);
+const panel = new ObjectPanel($('object'), model, connection, choose);
+
+const playback = new PlaybackBar($('playback'), connection, model);
+connection.onSeek = () => { model.jumped(); log.clear(); };
+
+function choose(id, { reveal = true } = {}) {
+  model.chosen = id;
+  world?.choose(id);
+  panel.show(id);
+  list.render();
+  if (id !== 0) {
+    if (reveal) list.reveal();
+    if (document.activeElement !== $('search')) openTab('object');
+    panel.ask();
+  }
+}
+
+function openTab(name) {
+  for (const tab of document.querySelectorAll('[role=tab]')) tab.setAttribute('aria-selected', String(tab.dataset.tab === name));
+  for (const part of document.querySelectorAll('[data-panel]')) part.hidden = part.dataset.panel !== name;
+  if (name === 'object') panel.ask();
+}
+
+// What comes.
+let cameraTopic = '';
+function lookThroughCamera() {
+  const first = [...connection.channels.values()].find((c) => c.schemaName === 'foxglove::CompressedImage');
+  if (!first || cameraTopic || !showsCamera) return;
+  cameraTopic = first.topic;
+  connection.on(cameraTopic, (view) => camera.takeImage(view).catch((e) => console.warn(`image: ${e.message}`)));
+  connection.on(cameraTopic.replace(/image$/, 'annotations'), (m) => camera.takeAnnotations(m));
+}
+let showsCamera = true;
+
+connection.on('/objects', (message) => {
+  model.takeObjects(message, performance.now());
+  world?.setObjects(model);
+});
+connection.on('/trajectory', (message) => world?.setWay(message.poses));
+connection.on('/landmarks', (message) => world?.setPoints(message));
+connection.on('/map', (message) => {
+  model.takeMap(message);
+  world?.syncRemembered(model);
+});
+connection.on('/events', (event) => {
+  model.takeEvent(event);
+  log.add(event);
+});
+connection.on('/health', (health) => {
+  model.health = health;
+  $('vehicle').textContent = health.vehicle;
+  renderServices($('services'), health);
+});
+
+// What is asked.
+$('search').addEventListener('input', () => list.render());
+$('ask-map').addEventListener('click', askMap);
+async function askMap() {
+  const word = $('search').value.trim();
+  const request = /^\d+$/.test(word) ? { id: Number(word) } : word ? { class: word.toLowerCase() } : {};
+  $('list-note').textContent = 'The map is asked …';
+  try {
+    const reply = await connection.call('/map/query', request);
+    for (const o of reply.objects) model.remembered.set(o.id, o);
+    world?.syncRemembered(model);
+    list.render();
+    const many = reply.truncated ? ', and there are more' : '';
+    $('list-note').textContent = reply.objects.length === 0 ? `The map has nothing that is "${word}".` : `The map has ${reply.objects.length}${many}.`;
+  } catch (error) {
+    $('list-note').textContent = `The map does not answer: ${error.message}`;
+  }
+  noteHeldUntil = performance.now() + 4000;
+}
+let noteHeldUntil = 0;
+
+// Keys and buttons.
+const toggles = {
+  f: () => { world?.setFollow(!world.follow); return world?.follow; },
+  t: () => { world?.fromAbove(); return undefined; },
+  e: () => world?.toggle('ellipsoids'),
+  l: () => world?.toggle('points'),
+  m: () => world?.toggle('map'),
+  c: () => {
+    showsCamera = !showsCamera;
+    $('camera').hidden = !showsCamera;
+    if (showsCamera) lookThroughCamera();
+    else if (cameraTopic) {
+      connection.off(cameraTopic); // nobody looks: nothing is sent
+      connection.off(cameraTopic.replace(/image$/, 'annotations'));
+      cameraTopic = '';
+    }
+    return showsCamera;
+  },
+};
+function toggle(key) {
+  const on = toggles[key]();
+  if (on !== undefined) document.querySelector(`[data-key=${key}]`).setAttribute('aria-pressed', String(on));
+}
+if (world) world.onFollow = (on) => document.querySelector('[data-key=f]').setAttribute('aria-pressed', String(on));
+$('tools').addEventListener('click', (e) => { if (e.target.dataset.key) toggle(e.target.dataset.key); });
+document.querySelector('nav').addEventListener('click', (e) => { if (e.target.dataset.tab) openTab(e.target.dataset.tab); });
+$('state').addEventListener('click', () => openTab('services'));
+$('help-button').addEventListener('click', () => $('help').showModal());
+
+document.addEventListener('keydown', (e) => {
+  if (e.ctrlKey || e.metaKey || e.altKey || $('help').open) return;
+  const typing = e.target === $('search');
+  const step = { ArrowDown: 1, ArrowUp: -1 }[e.key];
+  if (step) {
+    const id = list.next(step);
+    if (id) choose(id);
+  } else if (e.key === 'Enter' && model.chosen) {
+    world?.lookAt(model.chosen);
+    if (typing) openTab('object');
+  } else if (e.key === 'Enter' && typing) {
+    const id = list.next(1);
+    if (id) choose(id); else askMap();
+  } else if (e.key === 'Escape') {
+    if (typing && $('search').value) { $('search').value = ''; list.render(); } else { $('search').blur(); choose(0); openTab('objects'); }
+  } else if (typing) {
+    return;
+  } else if (e.key === '/') {
+    openTab('objects');
+    $('search').focus();
+  } else if (e.key === ' ' && connection.range && e.target.tagName !== 'BUTTON') {
+    playback.toggle();
+  } else if (e.key.toLowerCase() === 'n' && connection.range) {
+    playback.nextEvent();
+  } else if (e.key === '?') {
+    $('help').showModal();
+  } else if (toggles[e.key.toLowerCase()]) {
+    toggle(e.key.toLowerCase());
+  } else if ('1234'.includes(e.key)) {
+    openTab(['objects', 'object', 'events', 'services'][e.key - 1]);
+  } else return;
+  e.preventDefault();
+});
+
+// What is shown, as often as eyes want it.
+function figures(now) {
+  const frame = model.frame, items = [];
+  if (frame) items.push(['time', `${Math.max(0, model.time - model.firstTime).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
+  if (frame) items.push(['rate', `${model.rate(now).toFixed(0)} Hz`, ''], ['latency', frame.latency_ms >= 0 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
+  return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
+}
+
+function showState() {
+  const now = performance.now();
+  const [state, sentence] = troubleOf(model, { ...status, playback: connection.playback }, now);
+  playback.render();
+  const words = { live: 'live', degraded: 'degraded', stale: 'nothing comes', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };
+  $('state').dataset.state = state;
+  $('state').textContent = words[state];
+  document.body.dataset.state = state;
+  $('trouble').hidden = !sentence;
+  $('trouble').classList.toggle('bad', state === 'lost');
+  if ($('trouble').textContent !== sentence) $('trouble').textContent = sentence;
+  $('figures').innerHTML = figures(now);
+  if (!cameraTopic) lookThroughCamera();
+  if (camera.figure.classList.contains('has-image') && state === 'lost') camera.caption.textContent = 'the last image';
+  if (!camera.figure.classList.contains('has-image')) camera.caption.textContent = 'no image yet: is the camera in image.cameras?';
+}
+
+function refresh() {
+  if (now4(4)) {
+    if (!document.querySelector('[data-panel=objects]').hidden && performance.now() > noteHeldUntil) list.render();
+    if (!document.querySelector('[data-panel=object]').hidden && model.chosen) panel.render();
+    showState();
+  }
+  world?.draw();
+  requestAnimationFrame(refresh);
+}
+let last4 = 0;
+/** True so many times a second. */
+function now4(rate) {
+  const now = performance.now();
+  if (now - last4 < 1000 / rate) return false;
+  last4 = now;
+  return true;
+}
+
+// For tests: what is there and what was drawn.
+window.perdure = { model, world, camera, connection, choose, opened: performance.now() };
+refresh();

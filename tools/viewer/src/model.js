@@ -1,0 +1,105 @@
+// What the page knows: the newest of everything, and how the objects were since it was opened.
+
+export class Model {
+  constructor() {
+    this.objects = new Map(); // id → object, of the working set
+    this.remembered = new Map(); // id → object, on the map
+    this.history = new Map(); // id → [[time, r], …]
+    this.events = [];
+    this.chosen = 0;
+    this.frame = null; // the newest perdure.Objects without its objects
+    this.health = null;
+    this.heardAt = 0; // performance.now() of the newest objects
+    this.firstTime = null;
+    this.intervals = [];
+  }
+
+  takeObjects(message, now) {
+    const { objects, ...frame } = message;
+    const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
+    const world = `${frame.world}/${frame.epoch}`;
+    if (this.world !== undefined && this.world !== world) this.history.clear();
+    const another = this.frame && time < this.time - 2; // a recording begins again
+    if (another) this.history.clear();
+    if (another || this.firstTime === null) this.firstTime = time;
+    this.world = world;
+    this.time = time;
+    this.frame = frame;
+    this.objects = new Map(objects.map((o) => [o.id, o]));
+    if (this.heardAt > 0) {
+      this.intervals.push(now - this.heardAt);
+      if (this.intervals.length > 30) this.intervals.shift();
+    }
+    this.heardAt = now;
+    for (const o of objects) this.remember(o, time);
+  }
+
+  remember(o, time) {
+    let samples = this.history.get(o.id);
+    if (!samples) this.history.set(o.id, (samples = []));
+    const last = samples.at(-1);
+    if (last && time - last[0] < 0.2 && time >= last[0]) return;
+    samples.push([time, o.r, o.p, o.fraction]);
+    if (samples.length > 1500) samples.shift();
+  }
+
+  /** To another place of a recording: what was remembered on the way there is of another time. */
+  jumped() {
+    this.history.clear();
+    this.events = [];
+  }
+
+  takeEvent(event) {
+    this.events.push(event);
+    if (this.events.length > 500) this.events.shift();
+  }
+
+  takeMap(message) {
+    this.remembered = new Map(message.objects.map((o) => [o.id, o]));
+    this.onMap = message.all;
+  }
+
+  find(id) {
+    return this.objects.get(id) ?? this.remembered.get(id);
+  }
+
+  /** Messages of objects a second. */
+  rate(now) {
+    if (this.intervals.length < 2 || now - this.heardAt > 2000) return 0;
+    const sorted = [...this.intervals].sort((a, b) => a - b);
+    return 1000 / Math.max(1, sorted.reduce((a, b) => a + b, 0) / sorted.length);
+  }
+
+  silentFor(now) {
+    return this.heardAt > 0 ? (now - this.heardAt) / 1000 : Infinity;
+  }
+}
+
+/** What is wrong, in a sentence with the mend; "" where all is well. Beside it how bad it is. */
+export function troubleOf(model, connection, now) {
+  if (connection.state === 'lost') return ['lost', connection.sentence];
+  if (connection.state !== 'open') return ['connecting', ''];
+  const services = (model.health?.services ?? []).filter((s) => s.process !== 'gateway');
+  const silent = model.silentFor(now);
+  if (connection.playback) return ['played', ''];
+  if (!model.health) return ['connecting', ''];
+  const heard = services.filter((s) => s.age_s < 2.5);
+  const capture = heard.find((s) => s.process === 'capture');
+  if (heard.length === 0 && silent > 2) {
+    return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
+  }
+  if (silent > 2) {
+    if (capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
+    const bad = services.filter((s) => s.age_s >= 2.5).map((s) => `${s.process} has been silent for ${Math.round(s.age_s)} s`);
+    const said = heard.filter((s) => s.state !== 'ok' && s.message).map((s) => `${s.process}: ${s.message}`);
+    const why = [...bad, ...said].slice(0, 3).join('; ');
+    const since = silent === Infinity ? 'No objects have come' : `No objects for ${Math.round(silent)} s`;
+    const playing = heard.length === 0 ? ' Recordings that are played end so.' : '';
+    return ['stale', `${since}${why ? ` (${why})` : ''}.${playing || (why ? '' : ' Is semantic_filter running, and does odometry come?')}`];
+  }
+  const gone = services.filter((s) => s.age_s >= 2.5);
+  if (gone.length > 0) return ['degraded', `${gone.map((s) => s.process).join(', ')}: silent for ${Math.round(Math.max(...gone.map((s) => s.age_s)))} s; it is stopped, hangs, or is gone.`];
+  const degraded = heard.filter((s) => s.state !== 'ok' && s.message);
+  if (degraded.length > 0) return ['degraded', degraded.map((s) => `${s.process} is ${s.state}: ${s.message}`).join('; ')];
+  return ['live', ''];
+}

@@ -1,0 +1,186 @@
+// Everything about one object, asked of the gateway twice a second while it is looked at.
+import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
+
+const EVERY_MS = 500;
+
+export class ObjectPanel {
+  constructor(element, model, connection, onLink) {
+    this.element = element;
+    this.model = model;
+    this.connection = connection;
+    this.id = 0;
+    element.addEventListener('click', (e) => {
+      const link = e.target.closest('[data-object]');
+      if (link) onLink(Number(link.dataset.object));
+    });
+    setInterval(() => this.ask(), EVERY_MS);
+    this.clear();
+  }
+
+  clear() {
+    this.id = 0;
+    this.element.innerHTML = '<p class="empty">Click on an object in the map or in the list.</p>';
+  }
+
+  show(id) {
+    this.id = id;
+    this.full = null;
+    this.note = '';
+    this.shown = performance.now();
+    if (id === 0) return this.clear();
+    this.render(); // at once, from what is known
+    this.ask();
+  }
+
+  async ask() {
+    if (this.id === 0 || this.asking || this.element.closest('section').hidden) return;
+    const id = this.id;
+    this.asking = true;
+    try {
+      const full = await this.connection.call('/object', { id });
+      if (id !== this.id) return;
+      this.note = full.found === false ? 'It is neither in the working set nor on the map any more.' : '';
+      if (full.found !== false) this.full = full;
+      this.latency ??= performance.now() - this.shown;
+      this.render();
+    } catch (error) {
+      if (id === this.id) this.note = error.message;
+    } finally {
+      this.asking = false;
+      if (id !== this.id) this.ask();
+    }
+  }
+
+  render() {
+    const o = this.model.objects.get(this.id) ?? this.full?.object ?? this.model.find(this.id);
+    if (!o) {
+      this.element.innerHTML = `<p class="empty">${escaped(this.note || 'It is asked for …')}</p>`;
+      return;
+    }
+    // A text that is being selected stays.
+    if (String(getSelection()).length > 0 && this.element.contains(getSelection().anchorNode)) return;
+    const top = this.element.scrollTop;
+    this.element.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o);
+    this.element.scrollTop = top;
+    this.element.dataset.object = String(this.id);
+  }
+
+  heading(o) {
+    const look = isHidden(o) ? 'hidden' : isInSight(o) ? 'seen' : '';
+    const tags = [`<span class="tag ${look}">${escaped(this.model.objects.has(o.id) ? visibilityWords(o) : 'on the map only')}</span>`];
+    if (!o.confirmed) tags.push('<span class="tag">not confirmed yet</span>');
+    if ((o.moving ?? 0) >= 0.5) tags.push('<span class="tag">moves</span>');
+    if (o.recalled) tags.push('<span class="tag">recalled from the map</span>');
+    const note = this.note ? `<p class="dim">${escaped(this.note)}</p>` : '';
+    return `<h2 style="--c:${colourOf(o.class)}"><i></i>${escaped(o.class)} ${o.id}</h2>${tags.join('')}${note}
+      <div class="big"><div><strong>${percent(o.r)}</strong><span>exists</span></div>
+      <div><strong>${percent(o.p)}</strong><span>is a ${escaped(o.class)}</span></div>
+      <div><strong>${this.distance(o)}</strong><span>away</span></div></div>`;
+  }
+
+  distance(o) {
+    const b = this.model.frame?.body;
+    return b ? `${Math.hypot(o.c[0] - b[0], o.c[1] - b[1], o.c[2] - b[2]).toFixed(1)} m` : '–';
+  }
+
+  whereWords(o) {
+    const words = [];
+    if (isHidden(o)) {
+      const by = this.model.find(o.blocked_by);
+      words.push(o.blocked_by ? `It is hidden by <a data-object="${o.blocked_by}">${escaped(by?.class ?? 'object')} ${o.blocked_by}</a>.` : 'Something that is not on the map hides it.');
+    }
+    const returns = this.full?.returns;
+    if (returns && !isInSight(o)) {
+      const now = this.model.time ?? returns.said_s;
+      const left = returns.in_s.map((s) => Math.max(0, s - (now - returns.said_s)));
+      words.push(`It should be seen again in <b>${left[0].toFixed(1)} s</b> (${left[1].toFixed(1)} to ${left[2].toFixed(1)} s).`);
+    } else if (!isInSight(o)) {
+      words.push('When it will be seen again is not known: it is not on the way.');
+    }
+    if (o.last_s !== undefined && this.model.time !== undefined && !isInSight(o)) words.push(`Last seen ${Math.max(0, this.model.time - o.last_s).toFixed(1)} s ago.`);
+    return words.map((w) => `<p>${w}</p>`).join('');
+  }
+
+  existenceChart(o) {
+    const own = this.model.history.get(o.id) ?? [];
+    const samples = (this.full?.history?.length ?? 0) > 1 && (own.length === 0 || this.full.history[0][0] < own[0][0]) ? this.full.history : own;
+    if (samples.length < 2) return '';
+    const t0 = samples[0][0], t1 = samples.at(-1)[0], span = Math.max(0.1, t1 - t0);
+    const x = (t) => (100 * (t - t0)) / span, y = (p) => 37 - 34 * p;
+    const path = (k) => samples.map((s, i) => `${i ? 'L' : 'M'}${x(s[0]).toFixed(2)} ${y(s[k]).toFixed(2)}`).join('');
+    // Darker where it could not be seen.
+    const gaps = [];
+    for (let i = 1; i < samples.length; ++i) {
+      if ((samples[i][3] ?? 1) > 0.05) continue;
+      gaps.push(`<rect x="${x(samples[i - 1][0]).toFixed(2)}" y="0" width="${(x(samples[i][0]) - x(samples[i - 1][0])).toFixed(2)}" height="40" fill="#ffd98a" opacity=".13"/>`);
+    }
+    return `<h3>Existence and class over the last ${span.toFixed(0)} s</h3>
+      <svg viewBox="0 0 100 40" preserveAspectRatio="none" role="img" aria-label="Existence over time">${gaps.join('')}
+      <path d="M0 3H100M0 20H100M0 37H100" stroke="#26313d" stroke-width=".4"/>
+      <path d="${path(2)}" fill="none" stroke="#8b9aa8" stroke-width="1.2" vector-effect="non-scaling-stroke"/>
+      <path d="${path(1)}" fill="none" stroke="${colourOf(o.class)}" stroke-width="2" vector-effect="non-scaling-stroke"/></svg>
+      <p class="dim">coloured: exists; grey: ${escaped(o.class)}; shaded: it could not be seen</p>`;
+  }
+
+  classes() {
+    const classes = this.full?.classes;
+    if (!classes) return '';
+    const rows = classes.map((c) => `<span>${escaped(c.class)}</span><span class="bar"><b style="--c:${colourOf(c.class)};width:${(100 * c.p).toFixed(1)}%"></b></span><span class="n">${percent(c.p)}</span>`);
+    return `<h3>What it is</h3><div class="pmf">${rows.join('')}</div>`;
+  }
+
+  static swing(nats, most) {
+    const half = Math.min(50, (50 * Math.abs(nats)) / Math.max(0.5, most));
+    return `<span class="swing"><b class="${nats < 0 ? 'less' : ''}" style="${nats < 0 ? 'right:50%' : 'left:50%'};width:${half.toFixed(1)}%"></b></span>`;
+  }
+
+  ledger() {
+    const rows = Object.entries(this.full?.existence ?? {});
+    if (rows.length === 0) return '';
+    const most = Math.max(...rows.map(([, e]) => Math.abs(e.nats)));
+    const sum = rows.reduce((s, [, e]) => s + e.nats, 0);
+    const signed = (n) => (Math.abs(n) < 0.005 ? '0' : `${n > 0 ? '+' : '−'}${Math.abs(n).toFixed(2)}`);
+    const lines = rows.map(([kind, e]) => `<tr><td>${ObjectPanel.swing(e.nats, most)}</td><td class="n">${signed(e.nats)}</td><td>${escaped(existenceWords(kind, e.count))}</td></tr>`);
+    return `<h3>Why it is believed to exist (nats)</h3><table class="ledger">${lines.join('')}
+      <tr><td></td><td class="n"><b>${signed(sum)}</b></td><td><b>log-odds: ${percent(1 / (1 + Math.exp(-sum)))}</b></td></tr></table>`;
+  }
+
+  /** Why the likeliest class is before the next one. */
+  margins() {
+    const [first, second] = this.full?.classes ?? [];
+    const ledger = this.full?.ledger ?? {}, ousted = this.full?.ousted;
+    let nats, title;
+    if (second && ledger[first.class] && ledger[second.class]) {
+      const kinds = new Set([...Object.keys(ledger[first.class]), ...Object.keys(ledger[second.class])]);
+      nats = [...kinds].map((k) => [k, (ledger[first.class][k] ?? 0) - (ledger[second.class][k] ?? 0)]);
+      title = `Why it is a ${first.class} rather than ${second.class}`;
+    } else if (ousted) {
+      nats = Object.entries(ousted.nats);
+      title = `Why ${ousted.class} was given up for ${ousted.by}`;
+    } else return '';
+    nats = nats.filter(([, n]) => Math.abs(n) >= 0.005);
+    if (nats.length === 0) return '';
+    const most = Math.max(...nats.map(([, n]) => Math.abs(n)));
+    const lines = nats.map(([kind, n]) => `<tr><td>${ObjectPanel.swing(n, most)}</td><td class="n">${n > 0 ? '+' : '−'}${Math.abs(n).toFixed(2)}</td><td>${escaped(classWords(kind))}</td></tr>`);
+    return `<h3>${escaped(title)} (nats)</h3><table class="ledger">${lines.join('')}</table>`;
+  }
+
+  place(o) {
+    const sigma = [0, 3, 5].map((i) => Math.sqrt(Math.max(0, o.cov[i])));
+    const pm = (value, s, unit, digits = 2) => `${value.toFixed(digits)} <span class="dim">± ${s === undefined ? '?' : s.toFixed(digits)}</span> ${unit}`;
+    const rows = [
+      ['x', pm(o.c[0], sigma[0], 'm')], ['y', pm(o.c[1], sigma[1], 'm')], ['z', pm(o.c[2], sigma[2], 'm')],
+      ['heading', pm((180 * o.yaw) / Math.PI, (180 * (o.yaw_sigma ?? 0)) / Math.PI, '°', 1)],
+      ['length', pm(o.size[0], o.size_sigma?.[0], 'm')], ['width', pm(o.size[1], o.size_sigma?.[1], 'm')], ['height', pm(o.size[2], o.size_sigma?.[2], 'm')],
+      ['seen', `${o.hits ?? '?'} times, first ${this.ago(o.first_s)}, last ${this.ago(o.last_s)}`],
+    ];
+    if ((o.moving ?? 0) > 0.01) rows.push(['moves', `${percent(o.moving)}, ${Math.hypot(...o.velocity).toFixed(1)} m/s`]);
+    return `<h3>Where it is, and how large (± 1 σ)</h3><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
+  }
+
+  ago(s) {
+    if (s === undefined || this.model.time === undefined) return '?';
+    const d = this.model.time - s;
+    return d < 0.15 ? 'now' : d < 90 ? `${d.toFixed(1)} s ago` : `${(d / 60).toFixed(1)} min ago`;
+  }
+}

@@ -1,0 +1,72 @@
+// What things are called and how they are coloured.
+
+const COLOURS = {
+  car: '#388ee0', van: '#14b4b8', truck: '#3c6eb4', bus: '#6e6edc', person: '#f58c32', bicycle: '#50b45a',
+  cyclist: '#50b45a', motorcycle: '#af7341', chair: '#966ee1', 'dining table': '#b98755', monitor: '#1eaa82',
+  couch: '#e15f55', toy: '#e1b428', other: '#969696',
+};
+const FURTHER = ['#96aa3c', '#5a96aa', '#cd7369', '#7882be', '#bea064', '#64aa82'];
+
+export function colourOf(name) {
+  if (COLOURS[name]) return COLOURS[name];
+  let hash = 7;
+  for (const c of name) hash = (hash * 31 + c.codePointAt(0)) >>> 0;
+  return FURTHER[hash % FURTHER.length];
+}
+
+export const isHidden = (o) => o.visibility === 'occluded';
+export const isInSight = (o) => o.visibility === 'visible' || o.visibility === 'partial';
+/** A class for the style sheet. */
+export const looksLike = (o) => (isHidden(o) ? 'hidden' : isInSight(o) ? 'seen' : 'away');
+
+export const percent = (p) => (p > 0.9995 ? '100 %' : p >= 0.0995 ? `${(100 * p).toFixed(1)} %` : p >= 0.001 ? `${(100 * p).toFixed(2)} %` : p > 0 ? '< 0.1 %' : '0 %');
+const looks = (n) => (n === 1 ? '1 look' : `${n} looks`);
+const times = (n) => (n === 1 ? 'once' : `${n} times`);
+
+/** Each kind of evidence for existence as a sentence. */
+export function existenceWords(kind, n) {
+  const words = {
+    prior: 'before its first box: few boxes are new things',
+    hit: `${looks(n)} showed it`,
+    repeated: `${looks(n)} more showed it from where it had been looked at: worth little`,
+    miss: `${looks(n)} at its place did not show it`,
+    unmapped_occluder: 'of these is excused: something off the map may have hidden it',
+    hidden: `${looks(n)} not used: something hid it`,
+    away: `${looks(n)} not used: it was out of view`,
+    time: 'time passed: things leave',
+    misshapen: `given up ${times(n)}: explanations that lost the size of their class`,
+    lost: `given up ${times(n)}: that it drove off unseen`,
+    shared: "its first box may have been another object's",
+    merge: `merged ${times(n)} with an object that was the same thing`,
+    restore: `back from a restart ${times(n)}: believed before this ledger`,
+    recall: `back from the map ${times(n)}: believed before this ledger`,
+  };
+  return words[kind] ?? kind;
+}
+
+export function classWords(kind) {
+  const words = {
+    prior: 'how frequent the two are',
+    activation: 'what the network said of its boxes',
+    geometry: 'how well size and place explain the boxes',
+    miss: 'looks that did not show it',
+    motion: 'whether it moves',
+    pruning: 'explanations that were given up',
+    merge: 'objects that were the same thing',
+    restore: 'believed before this ledger',
+    context: 'what stands near it',
+  };
+  return words[kind] ?? kind;
+}
+
+export function visibilityWords(o) {
+  if (o.visibility === 'visible') return 'in full sight';
+  if (o.visibility === 'partial') return `partly in sight (${Math.round(100 * (o.fraction ?? 0))} %)`;
+  if (o.visibility === 'occluded') return 'hidden';
+  if (o.visibility === 'out_of_view') return 'out of view';
+  if (o.visibility === 'behind') return 'behind the camera';
+  return o.visibility ?? 'not known';
+}
+
+/** A text node's worth of HTML. */
+export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);

@@ -1,0 +1,319 @@
+// The map in three dimensions: ground, way, vehicle, points and things, with names over them.
+import * as THREE from './vendor/three.module.js';
+import { Orbit } from './orbit.js';
+import { Thing } from './things.js';
+import { colourOf, looksLike } from './words.js';
+
+const MOST_LABELS = 40;
+
+export class World {
+  constructor(canvas, labels, onPick) {
+    this.canvas = canvas;
+    this.labels = labels;
+    this.onPick = onPick;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });
+    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color('#0c1117');
+    this.scene.fog = new THREE.Fog('#0c1117', 60, 190);
+    this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 2000);
+    this.camera.up.set(0, 0, 1);
+    this.things = new Map();
+    this.remembered = new Map();
+    this.names = new Map(); // id → element
+    this.shows = { ellipsoids: true, points: true, map: true };
+    this.follow = true;
+    this.chosen = 0;
+    this.dirty = true;
+    this.drawn = 0;
+    this.light();
+    this.addGround();
+    this.addVehicle();
+    this.addLines();
+    this.orbit = new Orbit(this.camera, canvas, (shifted) => {
+      this.dirty = true;
+      if (shifted) this.setFollow(false);
+    });
+    canvas.addEventListener('click', (e) => this.pick(e));
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.resize();
+  }
+
+  light() {
+    this.scene.add(new THREE.HemisphereLight('#dfeaff', '#39424c', 1.7));
+    const sun = new THREE.DirectionalLight('#fff4e0', 1.9);
+    sun.position.set(-30, 20, 60);
+    this.scene.add(sun);
+  }
+
+  addGround() {
+    // In short pieces: a line that passes behind the camera is drawn wrongly by some.
+    const half = 150, step = 5, points = [];
+    for (let a = -half; a <= half; a += step) {
+      for (let b = -half; b < half; b += step) points.push(a, b, 0, a, b + step, 0, b, a, 0, b + step, a, 0);
+    }
+    const lines = new THREE.BufferGeometry();
+    lines.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
+    this.grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: '#24313e', depthWrite: false }));
+    this.scene.add(this.grid);
+    this.ground = null;
+  }
+
+  addVehicle() {
+    this.vehicle = new THREE.Group();
+    const shape = new THREE.Shape([new THREE.Vector2(1.3, 0), new THREE.Vector2(-0.9, 0.8), new THREE.Vector2(-0.45, 0), new THREE.Vector2(-0.9, -0.8)]);
+    const arrow = new THREE.Mesh(new THREE.ExtrudeGeometry(shape, { depth: 0.25, bevelEnabled: false }), new THREE.MeshStandardMaterial({ color: '#ffffff', emissive: '#5aa9ff', emissiveIntensity: 0.5 }));
+    arrow.position.z = -0.1;
+    this.vehicle.add(arrow);
+    const sight = new THREE.Shape([new THREE.Vector2(0, 0), new THREE.Vector2(26, 15), new THREE.Vector2(29, 0), new THREE.Vector2(26, -15)]);
+    this.sight = new THREE.Mesh(new THREE.ShapeGeometry(sight), new THREE.MeshBasicMaterial({ color: '#4aa3ff', transparent: true, opacity: 0.06, depthWrite: false, side: THREE.DoubleSide }));
+    this.vehicle.add(this.sight);
+    this.vehicle.visible = false;
+    this.scene.add(this.vehicle);
+  }
+
+  addLines() {
+    this.way = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: '#4aa3ff' }));
+    this.way.frustumCulled = false;
+    this.points = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 2.5, sizeAttenuation: false, vertexColors: true }));
+    this.points.frustumCulled = false;
+    this.blocker = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineDashedMaterial({ color: '#ffd98a', dashSize: 0.4, gapSize: 0.3, depthTest: false }));
+    this.blocker.frustumCulled = false;
+    this.scene.add(this.way, this.points, this.blocker);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  setFollow(on) {
+    this.follow = on;
+    this.onFollow?.(on);
+    this.dirty = true;
+  }
+
+  toggle(what) {
+    this.shows[what] = !this.shows[what];
+    this.applyShows();
+    return this.shows[what];
+  }
+
+  applyShows() {
+    this.points.visible = this.shows.points;
+    for (const thing of this.things.values()) thing.ellipsoid.visible = this.shows.ellipsoids;
+    for (const thing of this.remembered.values()) thing.group.visible = this.shows.map;
+    this.dirty = true;
+  }
+
+  fromAbove() {
+    this.orbit.polar = this.orbit.polar < 0.1 ? 1.02 : 0.02;
+    if (this.orbit.polar < 0.1) this.orbit.distance = Math.max(this.orbit.distance, 60);
+    this.dirty = true;
+  }
+
+  setObjects(model) {
+    const up = new THREE.Vector3().fromArray(model.frame.up);
+    if (this.shownWorld !== model.world) {
+      this.shownWorld = model.world;
+      this.way.geometry.setFromPoints([]);
+      this.heading = null;
+    }
+    this.sync(this.things, model.objects, false, up);
+    this.syncRemembered(model);
+    this.setBody(model.frame.body);
+    this.setGround(model.objects);
+    this.showBlocker();
+    this.dirty = true;
+  }
+
+  syncRemembered(model) {
+    const only = new Map([...model.remembered].filter(([id]) => !model.objects.has(id)));
+    this.sync(this.remembered, only, true, new THREE.Vector3(0, 0, 1));
+  }
+
+  sync(things, objects, remembered, up) {
+    for (const [id, thing] of things) {
+      if (objects.has(id)) continue;
+      this.scene.remove(thing.group, thing.ellipsoid);
+      thing.dispose();
+      things.delete(id);
+    }
+    for (const [id, object] of objects) {
+      let thing = things.get(id);
+      if (!thing) {
+        things.set(id, (thing = new Thing(object, remembered)));
+        thing.group.userData.id = id;
+        this.scene.add(thing.group);
+        if (!remembered) this.scene.add(thing.ellipsoid);
+        thing.ellipsoid.visible = this.shows.ellipsoids;
+        if (remembered) thing.group.visible = this.shows.map;
+        thing.choose(id === this.chosen);
+      } else if (!remembered || thing.object.last_s !== object.last_s) {
+        thing.update(object, up);
+      }
+    }
+  }
+
+  setBody([x, y, z, qx, qy, qz, qw]) {
+    this.vehicle.visible = true;
+    this.vehicle.position.set(x, y, z);
+    this.vehicle.quaternion.set(qx, qy, qz, qw);
+    const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(this.vehicle.quaternion);
+    const heading = Math.atan2(ahead.y, ahead.x);
+    if (this.follow) {
+      // Some way ahead of it, and turned with it.
+      const turned = this.heading === null || this.heading === undefined ? 0 : Math.atan2(Math.sin(heading - this.heading), Math.cos(heading - this.heading));
+      if (this.heading === null || this.heading === undefined) this.orbit.azimuth = heading + Math.PI;
+      else this.orbit.azimuth += turned;
+      this.orbit.target.set(x + 7 * Math.cos(heading), y + 7 * Math.sin(heading), z);
+    }
+    this.heading = heading;
+    this.sight.position.z = 0;
+  }
+
+  /** Where most things stand. */
+  setGround(objects) {
+    const feet = [...objects.values()].filter((o) => o.confirmed).map((o) => o.c[2] - o.size[2] / 2).sort((a, b) => a - b);
+    const z = feet.length > 0 ? feet[feet.length >> 1] : this.vehicle.position.z - 1.2;
+    this.ground = this.ground === null || Math.abs(z - this.ground) > 3 ? z : this.ground + 0.05 * (z - this.ground);
+    const step = 5;
+    this.grid.position.set(step * Math.round(this.vehicle.position.x / step), step * Math.round(this.vehicle.position.y / step), this.ground);
+  }
+
+  setWay(poses) {
+    this.way.geometry.dispose();
+    this.way.geometry = new THREE.BufferGeometry().setFromPoints(poses.map((p) => new THREE.Vector3(p.position.x, p.position.y, p.position.z)));
+    this.dirty = true;
+  }
+
+  setPoints(cloud) {
+    const bytes = Uint8Array.from(atob(cloud.data), (c) => c.charCodeAt(0));
+    const values = new Float32Array(bytes.buffer), n = values.length / 4;
+    const positions = new Float32Array(3 * n), colours = new Float32Array(3 * n), colour = new THREE.Color();
+    for (let i = 0; i < n; ++i) {
+      positions.set(values.subarray(4 * i, 4 * i + 3), 3 * i);
+      // The better it is known, the brighter it is.
+      const known = 1 / (1 + 2 * values[4 * i + 3]);
+      colour.setHSL(0.42, 0.55, 0.18 + 0.5 * known).toArray(colours, 3 * i);
+    }
+    this.points.geometry.dispose();
+    this.points.geometry = new THREE.BufferGeometry();
+    this.points.geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+    this.points.geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3));
+    this.dirty = true;
+  }
+
+  thing(id) {
+    return this.things.get(id) ?? this.remembered.get(id);
+  }
+
+  choose(id) {
+    this.thing(this.chosen)?.choose(false);
+    this.chosen = id;
+    this.thing(id)?.choose(true);
+    this.showBlocker();
+    this.dirty = true;
+  }
+
+  /** A line from what is chosen to what hides it. */
+  showBlocker() {
+    const thing = this.things.get(this.chosen), by = thing && this.things.get(thing.object.blocked_by);
+    this.blocker.visible = Boolean(by);
+    if (!by) return;
+    this.blocker.geometry.dispose();
+    this.blocker.geometry = new THREE.BufferGeometry().setFromPoints([thing.group.position, by.group.position]);
+    this.blocker.computeLineDistances();
+  }
+
+  lookAt(id) {
+    const thing = this.thing(id);
+    if (!thing) return;
+    this.setFollow(false);
+    this.orbit.target.copy(thing.group.position);
+    this.orbit.distance = Math.min(this.orbit.distance, 5 * Math.max(...thing.object.size) + 6);
+    this.dirty = true;
+  }
+
+  /** By the boxes, hidden ones too: a finger is not exact. */
+  pick(e) {
+    if (this.orbit.travelled > 6) return;
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(((e.clientX - box.left) / box.width) * 2 - 1, 1 - ((e.clientY - box.top) / box.height) * 2);
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(at, this.camera);
+    let best = { distance: Infinity, id: 0 };
+    for (const things of [this.things, this.shows.map ? this.remembered : new Map()]) {
+      for (const [id, thing] of things) {
+        const inverse = thing.group.matrixWorld.clone().invert();
+        const local = ray.ray.clone().applyMatrix4(inverse);
+        const half = new THREE.Vector3().fromArray(thing.object.size).multiplyScalar(0.5);
+        const hit = local.intersectBox(new THREE.Box3(half.clone().negate(), half), new THREE.Vector3());
+        if (!hit) continue;
+        const distance = hit.applyMatrix4(thing.group.matrixWorld).distanceTo(ray.ray.origin);
+        if (distance < best.distance) best = { distance, id };
+      }
+    }
+    this.onPick(best.id);
+  }
+
+  /** Draws where something has changed; to be called each animation frame. */
+  draw() {
+    if (!this.dirty) return;
+    this.dirty = false;
+    this.orbit.apply();
+    this.renderer.render(this.scene, this.camera);
+    this.drawNames();
+    ++this.drawn;
+  }
+
+  drawNames() {
+    const { clientWidth: width, clientHeight: height } = this.canvas, at = new THREE.Vector3();
+    const candidates = [];
+    for (const [id, thing] of this.things) {
+      const o = thing.object;
+      if (!o.confirmed && id !== this.chosen) continue;
+      at.copy(thing.group.position);
+      at.z += o.size[2] / 2 + 0.25;
+      const distance = at.distanceTo(this.camera.position);
+      at.project(this.camera);
+      if (at.z > 1 || Math.abs(at.x) > 1.05 || Math.abs(at.y) > 1.05) continue;
+      const near = id === this.chosen ? -1 : distance + (looksLike(o) === 'away' ? 40 : 0);
+      if (near > 130) continue;
+      candidates.push({ id, o, near, x: (at.x + 1) * width / 2, y: (1 - at.y) * height / 2 });
+    }
+    candidates.sort((a, b) => a.near - b.near);
+    const placed = [], shown = new Set();
+    for (const one of candidates) {
+      if (placed.length >= MOST_LABELS) break;
+      const w = 7 * (one.o.class.length + String(one.id).length + 1) + 14;
+      const box = { l: one.x - w / 2, r: one.x + w / 2, t: one.y - 20, b: one.y };
+      if (placed.some((p) => p.l < box.r && p.r > box.l && p.t < box.b && p.b > box.t)) continue;
+      placed.push(box);
+      shown.add(one.id);
+      this.placeName(one, box);
+    }
+    for (const [id, element] of this.names) {
+      if (shown.has(id)) continue;
+      element.remove();
+      this.names.delete(id);
+    }
+  }
+
+  placeName({ id, o }, box) {
+    let element = this.names.get(id);
+    if (!element) {
+      this.names.set(id, (element = document.createElement('span')));
+      this.labels.append(element);
+    }
+    const words = `${o.class} ${id}`, look = `${looksLike(o)}${id === this.chosen ? ' chosen' : ''}`;
+    if (element.textContent !== words) element.textContent = words;
+    if (element.className !== look) element.className = look;
+    element.style.setProperty('--c', colourOf(o.class));
+    element.style.transform = `translate(${box.l.toFixed(1)}px, ${box.t.toFixed(1)}px)`;
+  }
+}
