@@ -66,7 +66,7 @@ TEST(Detect, SaysWhenItsFileCannotBeWritten) {
   auto options = tinyOptions("detect_unwritable");
   options.out = options.data / "none" / "detections.csv";
   const std::string message = replay::startupErrorOf([&] { detect(options, {}); });
-  EXPECT_THAT(message, HasSubstr("cannot be written; give --out"));
+  EXPECT_THAT(message, HasSubstr("cannot be written (No such file or directory); give --out"));
 }
 
 }  // namespace
