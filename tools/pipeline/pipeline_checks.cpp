@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <map>
 #include <set>
 
 #include "common/base/checked_file.h"
@@ -11,6 +13,14 @@
 
 namespace perdure::tools {
 namespace {
+
+/// By more than a metre, from where it was first.
+bool hasMoved(const std::map<std::uint64_t, replay::StampedPose>& poses) {
+  constexpr double kMoved_m = 1.0;
+  return std::any_of(poses.begin(), poses.end(), [&](const auto& pose) {
+    return (pose.second.T_WB.p - poses.begin()->second.T_WB.p).norm() > kMoved_m;
+  });
+}
 
 /// "image_missing 120 times, image_size 3 times".
 std::string listOf(const ReasonCounts& reasons) {
@@ -117,6 +127,11 @@ void Pipeline::refuseNothing() const {
         fmt::format("nothing was detected in {} frames, so the map is empty: does the network (or "
                     "file) know what is in the images?",
                     counts_.frames));
+  }
+  if (!hasMoved(outputs_->poses())) {
+    std::fprintf(stderr,
+                 "The camera never moved, so that no distance is known: the map is empty\n");
+    return;
   }
   refuse(fmt::format(
       "{} detections in {} frames made no object, so the map is empty: do they belong to "

@@ -154,6 +154,12 @@ std::string sentenceOf(const Event& e) {
       return "the network was changed";
     case EventKind::kRestored:
       return "the working set was restored";
+    case EventKind::kLoopClosed:
+      return "the map closed a loop: " + e.detail;
+    case EventKind::kLoopWithdrawn:
+      return "the map took a loop back: " + e.detail;
+    case EventKind::kRelocalised:
+      return "this session is found on the map of before: " + e.detail;
   }
   return perdure::nameOf(e.kind);
 }

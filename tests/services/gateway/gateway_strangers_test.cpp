@@ -7,6 +7,7 @@
 #include <regex>
 #include <thread>
 
+#include "common/bus/endpoint.h"
 #include "common/bus/topics.h"
 #include "tests/process/support.h"
 #include "tests/services/gateway/objects.h"
