@@ -45,7 +45,8 @@ class MapState {
   /// As it was saved last.
   struct Kept {
     LevelPose T_MA;
-    double variance = 0.0;  ///< of the increment's x
+    double scale2 = 1.0;
+    bool held_fast = false;
   };
   SavedAnchor savedAnchor(AnchorId id) const;
   bool isSaved(AnchorId id) const;

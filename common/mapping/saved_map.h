@@ -14,6 +14,7 @@
 #include "common/mapping/frames/anchor.h"
 #include "common/mapping/graph/pose_graph.h"
 #include "common/mapping/places/placed_object.h"
+#include "common/types/odometry.h"
 
 namespace perdure::mapping {
 
