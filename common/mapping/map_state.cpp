@@ -20,7 +20,7 @@ MapState::MapState(const GraphParameters& parameters, SavedMap saved)
     const Anchor& anchor = saved_anchor.anchor;
     add(anchor);
     graph_.setPose(id, saved_anchor.T_MA);
-    saved_anchors_[id] = {saved_anchor.T_MA, anchor.from_previous.covariance(0, 0)};
+    saved_anchors_[id] = {saved_anchor.T_MA, anchor.scale2, saved_anchor.held_fast};
   }
   graph_.holdFirstAnchors();
   for (const auto& [id, record] : records_) index(id, record);
@@ -54,6 +54,7 @@ void MapState::scaleOdometry(double factor, const WorldId& session) {
   for (auto& [id, anchor] : anchors_) {
     if (anchor.session != session) continue;
     anchor.from_previous.covariance *= factor;
+    anchor.scale2 *= factor;
     of_session.insert(id);
   }
   graph_.scaleOdometry(factor, of_session);
@@ -81,7 +82,6 @@ const std::set<ObjectId>& MapState::seenFrom(AnchorId id) const {
 
 void MapState::put(ObjectId id, ObjectRecord record) {
   touched_.insert(id);
-  erased_.erase(id);
   const auto at = records_.find(id);
   if (at != records_.end()) unindex(id, at->second);
   index(id, record);
@@ -112,7 +112,8 @@ bool MapState::isSaved(AnchorId id) const {
   if (at == saved_anchors_.end()) return false;
   const LevelPose& now = graph_.pose(id);
   return at->second.T_MA.p == now.p && at->second.T_MA.yaw == now.yaw &&
-         at->second.variance == anchors_.at(id).from_previous.covariance(0, 0);
+         at->second.scale2 == anchors_.at(id).scale2 &&
+         at->second.held_fast == graph_.isHeldFast(id);
 }
 
 Unsaved MapState::unsaved() const {
@@ -136,13 +137,16 @@ Unsaved MapState::unsaved() const {
     const ObjectRecord& record = records_.at(id);
     if (record.confirmed) result.changed.records[id] = record;
   }
-  result.records_gone = erased_;
+  // One that was begun again under its id is gone until it is confirmed.
+  for (const ObjectId id : erased_) {
+    if (!result.changed.records.contains(id)) result.records_gone.insert(id);
+  }
   return result;
 }
 
 void MapState::markSaved() {
   for (const auto& [id, anchor] : anchors_) {
-    saved_anchors_[id] = {graph_.pose(id), anchor.from_previous.covariance(0, 0)};
+    saved_anchors_[id] = {graph_.pose(id), anchor.scale2, graph_.isHeldFast(id)};
   }
   saved_edges_.clear();
   for (const auto& [id, edge] : graph_.edges()) {

@@ -47,7 +47,8 @@ class MapState {
   /// As it was saved last.
   struct Kept {
     LevelPose T_MA;
-    double variance = 0.0;  ///< of the increment's x
+    double scale2 = 1.0;
+    bool held_fast = false;
   };
   void index(ObjectId id, const ObjectRecord& record);
   void unindex(ObjectId id, const ObjectRecord& record);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "common/mapping/frames/level_errors.h"
@@ -31,14 +32,21 @@ void Mapper::begin(const Odometry& odometry) {
   session_ = odometry.world;
   builder_ = AnchorBuilder(parameters_.anchor);
   if (const auto last = state_.newestOf(odometry.world)) builder_.resume(*last);
-  drift_scale_ = DriftScale(parameters_.drift_scale);
-  odometry_variance_ = 1.0;
-  searched_at_m_ = searched_elsewhere_at_m_ = learned_at_m_ = builder_.way_m();
+  learnAnew(odometry.world);
+  searched_at_m_ = searched_elsewhere_at_m_ = builder_.way_m();
   active_.reset();
   tentative_.reset();
   marginals_.reset();
   loop_search_.forget();
   tracked_ties_.begin();
+}
+
+/// How far a session's odometry errs is learned anew; what was learned of it stays until then.
+void Mapper::learnAnew(const WorldId& session) {
+  drift_scale_ = DriftScale(parameters_.drift_scale);
+  const auto last = state_.newestOf(session);
+  odometry_variance_ = last ? last->scale2 : 1.0;
+  learned_at_m_ = last ? -std::numeric_limits<double>::infinity() : 0.0;
 }
 
 void Mapper::stand(const Anchor& anchor) {
@@ -54,17 +62,18 @@ void Mapper::replay(const WorldId& session) {
   }
   if (way.empty()) return;
   session_ = session;
-  drift_scale_ = DriftScale(parameters_.drift_scale);
-  odometry_variance_ = 1.0;
   active_.reset();
   tentative_.reset();
+  learnAnew(session);
   tracked_ties_.begin();
   searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
+  learned_at_m_ = std::numeric_limits<double>::infinity();  // it was learned when it was driven
   loop_search_.forget();
   for (const AnchorId id : way) {
     stand(state_.anchors().at(id));
     search();
   }
+  searched_at_m_ = learned_at_m_ = builder_.way_m();
 }
 
 void Mapper::onOdometry(const Odometry& odometry) {
@@ -73,6 +82,7 @@ void Mapper::onOdometry(const Odometry& odometry) {
   auto anchor = builder_.add(odometry, state_.nextAnchor());
   if (!anchor) return;
   anchor->from_previous.covariance *= odometry_variance_;
+  anchor->scale2 = odometry_variance_;
   state_.add(*anchor);
   marginals_.reset();
 }
@@ -83,7 +93,7 @@ Whereabouts Mapper::body() {
 }
 
 bool Mapper::isOld(const ObjectRecord& record) const {
-  return record.session != *session_ ||
+  return !session_ || record.session != *session_ ||
          std::abs(builder_.way_m() - record.way_m) > parameters_.loop.visit_m;
 }
 
@@ -184,6 +194,7 @@ void Mapper::onMerged(ObjectId survivor, ObjectId absorbed) {
   if (merged.earlier) merged.earlier->in_anchor.id = survivor;
   state_.put(survivor, std::move(merged));
   state_.erase(absorbed);
+  loop_search_.forget();
 }
 
 void Mapper::onGone(ObjectId id) {
@@ -374,8 +385,8 @@ std::optional<Mapper::Frame> Mapper::frame() {
   frame.map = state_.anchors().at(first).session;
   frame.T_MW = T_MW();
   const auto T_bM = marginals().to(first);
-  const LevelPose T_Mb = state_.graph().pose(builder_.last()->id);
-  if (T_bM) frame.covariance = turnedBy(T_Mb.R(), mapping::inverse(*T_bM).covariance);
+  const Eigen::Matrix3d R_M = state_.graph().pose(first).R();
+  if (T_bM) frame.covariance = turnedBy(R_M, mapping::inverse(*T_bM).covariance);
   std::set<WorldId> sessions;
   for (const auto& [anchor, component] : components) {
     if (component == first) sessions.insert(state_.anchors().at(anchor).session);

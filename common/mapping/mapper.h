@@ -114,6 +114,7 @@ class Mapper {
   PlacedObject placedOf(const ObjectBelief& belief, const Matrix6d& pose_error);
   bool isOld(const ObjectRecord& record) const;
   void forgetUnconfirmed();
+  void learnAnew(const WorldId& session);
   void stand(const Anchor& anchor);
   bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   void tie();

@@ -92,7 +92,7 @@ void Node::tellLoops(const mapping::MapChange& change) {
 
 /// Where it changes: after a loop, in a new session, and now and then as the way goes on.
 void Node::tellFrame() {
-  if (!newest_) return;
+  if (!newest_ || !mapper_.follows(newest_->world)) return;
   const ToldFrame now{newest_->world, mapper_.revision(), mapper_.anchors().size()};
   if (told_frame_ == now) return;
   const auto whole = mapper_.frame();

@@ -19,6 +19,7 @@ struct Anchor {
   RigidTransform T_WA;          ///< z against gravity; never changes
   LevelGaussian from_previous;  ///< T_previous,A by odometry
   double way_m = 0.0;           ///< driven in the session so far
+  double scale2 = 1.0;          ///< by which loops have multiplied the increment's covariance
 };
 
 }  // namespace perdure::mapping

@@ -130,7 +130,8 @@ bool isSound(const Anchor& anchor) {
   constexpr double kRounding = 1e-6;
   return anchor.id != 0 && anchor.previous < anchor.id && anchor.T_WA.finite() &&
          std::abs(anchor.T_WA.q.norm() - 1.0) < kRounding &&
-         isSoundGaussian(anchor.from_previous) && std::isfinite(anchor.way_m);
+         isSoundGaussian(anchor.from_previous) && std::isfinite(anchor.way_m) &&
+         std::isfinite(anchor.scale2) && anchor.scale2 > 0.0;
 }
 
 bool isSound(const Edge& edge) {
@@ -153,6 +154,7 @@ Bytes encodeAnchor(const Anchor& anchor) {
   out.put(anchor.T_WA.p);
   put(out, anchor.from_previous);
   out.put(anchor.way_m);
+  out.put(anchor.scale2);
   return out.take();
 }
 
@@ -166,6 +168,7 @@ Result<Anchor> decodeAnchor(std::span<const std::uint8_t> bytes) {
     in.takeInto(anchor.T_WA.p);
     take(in, anchor.from_previous);
     anchor.way_m = in.takeReal();
+    anchor.scale2 = in.takeReal();
   });
 }
 

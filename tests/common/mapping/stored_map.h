@@ -1,0 +1,90 @@
+// The store of a mapper, in memory: what it is told has changed, and what two maps have in common.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "common/mapping/saved_map.h"
+
+namespace perdure::mapping::test {
+
+/// As the store does it.
+inline void apply(const Unsaved& unsaved, SavedMap& map) {
+  map.classes = unsaved.changed.classes;
+  for (const auto& [id, anchor] : unsaved.changed.anchors) map.anchors[id] = anchor;
+  for (const auto& [id, edge] : unsaved.changed.edges) map.edges[id] = edge;
+  for (const auto& [id, record] : unsaved.changed.records) map.records[id] = record;
+  for (const EdgeId id : unsaved.edges_gone) {
+    map.edges.erase(id);
+    EXPECT_FALSE(unsaved.changed.edges.contains(id)) << "edge " << id << " is both";
+  }
+  for (const ObjectId id : unsaved.records_gone) {
+    map.records.erase(id);
+    EXPECT_FALSE(unsaved.changed.records.contains(id)) << "object " << id << " is both";
+  }
+}
+
+inline bool isEmpty(const Unsaved& unsaved) {
+  return unsaved.changed.anchors.empty() && unsaved.changed.edges.empty() &&
+         unsaved.changed.records.empty() && unsaved.edges_gone.empty() &&
+         unsaved.records_gone.empty();
+}
+
+template <class Map>
+std::vector<typename Map::key_type> keysOf(const Map& map) {
+  std::vector<typename Map::key_type> keys;
+  for (const auto& [key, value] : map) keys.push_back(key);
+  return keys;
+}
+
+inline void expectSame(const LevelGaussian& a, const LevelGaussian& b, const std::string& what) {
+  EXPECT_EQ(a.mean.p, b.mean.p) << what;
+  EXPECT_EQ(a.mean.yaw, b.mean.yaw) << what;
+  EXPECT_EQ(a.covariance, b.covariance) << what;
+}
+
+inline void expectSame(const Sighting& a, const Sighting& b, const std::string& what) {
+  EXPECT_EQ(a.anchor, b.anchor) << what;
+  EXPECT_EQ(a.in_anchor.id, b.in_anchor.id) << what;
+  EXPECT_EQ(a.in_anchor.p, b.in_anchor.p) << what;
+  EXPECT_EQ(a.in_anchor.yaw, b.in_anchor.yaw) << what;
+  EXPECT_EQ(a.in_anchor.covariance, b.in_anchor.covariance) << what;
+}
+
+/// To the last bit.
+inline void expectSame(const SavedMap& a, const SavedMap& b) {
+  EXPECT_EQ(a.classes, b.classes);
+  ASSERT_EQ(keysOf(a.anchors), keysOf(b.anchors));
+  ASSERT_EQ(keysOf(a.edges), keysOf(b.edges));
+  ASSERT_EQ(keysOf(a.records), keysOf(b.records));
+  for (const auto& [id, x] : a.anchors) {
+    const SavedAnchor& y = b.anchors.at(id);
+    const std::string what = "anchor " + std::to_string(id);
+    EXPECT_EQ(x.T_MA.p, y.T_MA.p) << what;
+    EXPECT_EQ(x.T_MA.yaw, y.T_MA.yaw) << what;
+    expectSame(x.anchor.from_previous, y.anchor.from_previous, what);
+    EXPECT_EQ(x.held_fast, y.held_fast) << what;
+    EXPECT_EQ(x.anchor.scale2, y.anchor.scale2) << what;
+    EXPECT_EQ(x.anchor.T_WA.p, y.anchor.T_WA.p) << what;
+  }
+  for (const auto& [id, x] : a.edges) {
+    const SavedEdge& y = b.edges.at(id);
+    const std::string what = "edge " + std::to_string(id);
+    EXPECT_EQ(x.weight, y.weight) << what;
+    EXPECT_EQ(x.edge.kind, y.edge.kind) << what;
+    expectSame(x.edge.T_ab, y.edge.T_ab, what);
+  }
+  for (const auto& [id, x] : a.records) {
+    const ObjectRecord& y = b.records.at(id);
+    const std::string what = "object " + std::to_string(id);
+    EXPECT_EQ(x.session, y.session) << what;
+    EXPECT_EQ(x.way_m, y.way_m) << what;
+    EXPECT_EQ(x.last_seen, y.last_seen) << what;
+    expectSame(x.sighting, y.sighting, what);
+    ASSERT_EQ(x.earlier.has_value(), y.earlier.has_value()) << what;
+    if (x.earlier) expectSame(*x.earlier, *y.earlier, what);
+  }
+}
+
+}  // namespace perdure::mapping::test
