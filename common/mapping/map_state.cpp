@@ -20,7 +20,7 @@ MapState::MapState(const GraphParameters& parameters, SavedMap saved)
     const Anchor& anchor = saved_anchor.anchor;
     add(anchor);
     graph_.setPose(id, saved_anchor.T_MA);
-    saved_anchors_[id] = {saved_anchor.T_MA, anchor.scale2, saved_anchor.held_fast};
+    saved_anchors_[id] = {saved_anchor.T_MA, anchor.scale2};
   }
   graph_.holdFirstAnchors();
   for (const auto& [id, record] : records_) index(id, record);
@@ -112,8 +112,7 @@ bool MapState::isSaved(AnchorId id) const {
   if (at == saved_anchors_.end()) return false;
   const LevelPose& now = graph_.pose(id);
   return at->second.T_MA.p == now.p && at->second.T_MA.yaw == now.yaw &&
-         at->second.scale2 == anchors_.at(id).scale2 &&
-         at->second.held_fast == graph_.isHeldFast(id);
+         at->second.scale2 == anchors_.at(id).scale2;
 }
 
 Unsaved MapState::unsaved() const {
@@ -146,7 +145,7 @@ Unsaved MapState::unsaved() const {
 
 void MapState::markSaved() {
   for (const auto& [id, anchor] : anchors_) {
-    saved_anchors_[id] = {graph_.pose(id), anchor.scale2, graph_.isHeldFast(id)};
+    saved_anchors_[id] = {graph_.pose(id), anchor.scale2};
   }
   saved_edges_.clear();
   for (const auto& [id, edge] : graph_.edges()) {

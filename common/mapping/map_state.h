@@ -48,7 +48,6 @@ class MapState {
   struct Kept {
     LevelPose T_MA;
     double scale2 = 1.0;
-    bool held_fast = false;
   };
   void index(ObjectId id, const ObjectRecord& record);
   void unindex(ObjectId id, const ObjectRecord& record);

@@ -113,7 +113,8 @@ TEST(PipelineRefusal, AnEmptyMapWithDetectionsIsNoSuccess) {
   std::string poses;
   for (int i = 0; i <= 20; ++i) {
     poses +=
-        "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " 0 0 0 0 0 0 1\n";
+        "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " " +
+        std::to_string(0.2 * i) + " 0 0 0 0 0 1\n";
   }
   writeText(options.odometry, poses);
   options.detections = (root / "boxes.csv").string();

@@ -113,11 +113,13 @@ TEST(StoredMap, OfAnOlderVersionIsTakenOverInTheCopyAlone) {
   fs::copy_file(fs::path(options.out) / "map.sqlite", older);
   {
     const auto connection = opened(older);
-    ASSERT_TRUE(connection
-                    .execute("PRAGMA journal_mode=DELETE; DROP TABLE sightings; DROP TABLE edges;"
-                             "DROP TABLE anchor_poses; DROP TABLE anchors; DROP TABLE graph_classes;"
-                             "PRAGMA user_version=2")
-                    .has_value());
+    ASSERT_TRUE(
+        connection
+            .execute("PRAGMA journal_mode=DELETE; DROP VIEW objects_in_map; DROP TABLE sightings; "
+                     "DROP TABLE edges;"
+                     "DROP TABLE anchor_poses; DROP TABLE anchors; DROP TABLE graph_classes;"
+                     "PRAGMA user_version=2")
+            .has_value());
   }
   const auto bytes = readText(older);
   options.map = older.string();
@@ -164,7 +166,8 @@ class StreetAgain : public ::testing::Test {
   static std::set<ObjectId> idsOf(const fs::path& run) {
     std::set<ObjectId> ids;
     const auto connection = map_store::openStoreForReading((run / "map.sqlite").string());
-    for (const auto& placed : map_store::MapReader(&connection).beliefs().value()) {
+    const auto beliefs = map_store::MapReader(&connection).beliefs();
+    for (const auto& placed : beliefs.value()) {
       ids.insert(placed.belief.id);
     }
     return ids;
