@@ -14,7 +14,7 @@ namespace perdure {
 /// One object as the map shows it.
 struct MapObject {
   ObjectId id = 0;
-  WorldId world;
+  WorldId world;  ///< M, or where a question named a W that W
   std::string class_name;
   double existence = 0.0, class_probability = 0.0;
   Vector7d mean = Vector7d::Zero();
@@ -79,7 +79,7 @@ struct MapQuery {
   Eigen::Vector3d low = Eigen::Vector3d::Zero();   ///< box corner, or centre of the sphere
   Eigen::Vector3d high = Eigen::Vector3d::Zero();  ///< box corner
   double radius = 0.0;
-  WorldId world;  ///< kRestore, kRecall: the frame of reference that is meant
+  WorldId world;  ///< the W that is meant; 0: M
   std::uint32_t limit = 1000;
 };
 

@@ -51,6 +51,8 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       database_(storeOptions(config)),
       mapper_(config.mapping),
       replies_(static_cast<std::size_t>(config.cached_replies)),
+      view_(database_.reader(), config.tile_size_m,
+            [this](ObjectId id) { return mapper_.recordOf(id); }),
       notice_(database_.notice()) {
   if (!notice_.empty()) reasons_.add("map_set_aside");
   auto working = database_.reader().working();
@@ -68,6 +70,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
   }
   if (next_id_ > 1) next_id_ += kIdReserve;
   if (config_.graph) loadGraph();
+  (void)loadView();
 }
 
 bool Node::acceptable(const ObjectBelief& belief) {
@@ -173,33 +176,7 @@ void Node::commit() {
   ++commits_;
   header_stale_ = header_stale_ || written->revision != revision_;
   revision_ = written->revision;
-  stale_squares_.insert(written->squares.begin(), written->squares.end());
-}
-
-void Node::publish() {
-  if (!published_once_) {
-    const auto squares = database_.reader().squares();
-    if (!squares) return blame(squares.error());
-    for (const auto& [square, count] : *squares) stale_squares_.insert(square);
-    published_once_ = true;
-  }
-  while (!stale_squares_.empty()) {
-    const Square square = *stale_squares_.begin();
-    stale_squares_.erase(stale_squares_.begin());
-    publishSquare(square);
-  }
-  header_stale_ = false;
-  if (graph_) tellFrame();
-  outputs_.header({instance_, revision_, config_.tile_size_m, tiles_.tiles(), tiles_.objects()});
-}
-
-void Node::publishSquare(const Square& square) {
-  auto found = database_.reader().inSquare(square);
-  if (!found) return blame(found.error());
-  if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
-  const auto changes = tiles_.replace(square, std::move(found->objects), instance_, revision_);
-  for (const auto& tile : changes.tiles) outputs_.tile(tile);
-  for (const auto& key : changes.emptied) outputs_.emptied(key);
+  followView(written->objects);
 }
 
 void Node::onQuery(const MapQuery& query) {
@@ -222,8 +199,7 @@ MapReply Node::answer(const MapQuery& query) {
   reply.instance = instance_;
   reply.error = faultOf(query);
   if (reply.error.empty()) {
-    const auto limit = std::min(query.limit, static_cast<std::uint32_t>(config_.query_limit));
-    auto found = database_.reader().find(query, newest_ ? newest_->world : WorldId{}, limit);
+    auto found = find(query);
     if (found) {
       if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
       reply.truncated = found->truncated;

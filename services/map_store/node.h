@@ -16,6 +16,7 @@
 #include "common/types/objects.h"
 #include "services/map_store/config.h"
 #include "services/map_store/core/map_database.h"
+#include "services/map_store/core/map_places.h"
 #include "services/map_store/core/reply_cache.h"
 #include "services/map_store/core/tile_book.h"
 
@@ -38,6 +39,8 @@ class Node {
  public:
   /// Opens the map. Throws StartupError.
   Node(const Config& config, InstanceId instance, Outputs outputs);
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
 
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
@@ -70,9 +73,14 @@ class Node {
   void leaveBehind(const Objects& next);
   bool acceptable(const ObjectBelief& belief);
   void commit();
-  void publish();
-  void publishSquare(const Square& square);
   MapReply answer(const MapQuery& query);
+  // In node_view.cpp.
+  bool loadView();
+  void followView(const std::vector<ObjectId>& changed);
+  void publish();
+  bool publishSquare(const Square& square, const std::vector<ObjectId>& ids);
+  Result<Found> find(const MapQuery& query);
+
   void restore(const MapQuery& query);
   void recall(const MapQuery& query);
   const Objects* workingSetFor(const MapQuery& query) const;
@@ -86,8 +94,11 @@ class Node {
   bool graph_ = false;  ///< it is on, and what is stored of it was read
   ReplyCache replies_;
   TileBook tiles_;
-  std::set<Square> stale_squares_;
-  std::optional<Objects> newest_;    ///< as received, or as loaded
+  MapInM view_;                      ///< as of the last commit
+  std::uint64_t view_revision_ = 0;  ///< of the graph
+  std::size_t view_anchors_ = 0;
+  std::map<Square, std::vector<ObjectId>> stale_squares_;  ///< to be published
+  std::optional<Objects> newest_;                          ///< as received, or as loaded
   std::optional<Objects> previous_;  ///< the last one of the filter before this one
   std::map<ObjectId, PlacedBelief> left_;
   std::map<ObjectId, Removal> removed_;

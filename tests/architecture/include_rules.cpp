@@ -32,7 +32,7 @@ const std::vector<Layers> kLayers{
     {"tools/bus_tools/", {"", "status", "doctor"}},
     {"tools/calibrate/", {"estimate", ""}},
     {"tools/evaluate/", {"", "memory"}},
-    {"tools/outputs/", {"pictures", ""}},
+    {"tools/outputs/", {"frames", "pictures", ""}},
     {"tools/simulate/", {"shapes", "render", ""}}};
 
 std::string part(const std::string& path, std::size_t index) {

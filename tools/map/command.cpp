@@ -6,6 +6,7 @@
 #include <iostream>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "common/base/checked_file.h"
@@ -24,7 +25,7 @@ struct Request {
   std::string db;
   double patience_s = 5.0;
   bool json = false, geojson = false;
-  std::string out;
+  std::string out, frame = "M";
   std::vector<double> radius, box, anchor;
   std::vector<std::string> maps;
   MapQuery query;
@@ -45,8 +46,18 @@ MapReply askOverDds(const Request& request) {
           bus.domain, bus.interface, bus.vehicle, request.patience_s));
 }
 
+MapReply askFile(const Request& request) {
+  return askMapFile(request.db, request.query,
+                    request.frame == "W" ? MapFrameChoice::kW : MapFrameChoice::kM);
+}
+
 MapReply ask(const Request& request) {
-  MapReply reply = request.db.empty() ? askOverDds(request) : askMapFile(request.db, request.query);
+  if (request.db.empty() && request.frame == "W") {
+    throw StartupError(ExitCode::kUsage,
+                       "--frame W reads what is stored: give the map's file with --db; a running "
+                       "map_store answers in M");
+  }
+  MapReply reply = request.db.empty() ? askOverDds(request) : askFile(request);
   if (!reply.ok) throw StartupError(ExitCode::kUsage, reply.error);
   if (reply.truncated) {
     std::cerr
@@ -91,7 +102,15 @@ void why(const Request& request) {
                        "version, or read its file with --db");
   }
   const ObjectBelief& belief = reply.beliefs.front();
-  std::cout << (request.json ? toJson(belief.why).dump(1) + "\n" : toWhy(belief));
+  std::optional<Standing> standing;  // a running map_store does not tell it
+  if (!request.db.empty()) standing = askStanding(request.db, belief.id);
+  if (request.json) {
+    auto json = toJson(belief.why);
+    if (standing) json["map"] = toJson(*standing);
+    std::cout << json.dump(1) << "\n";
+    return;
+  }
+  std::cout << toWhy(belief) << (standing ? "\n" + toText(*standing) : "");
 }
 
 void chooseKind(Request& request) {
@@ -134,6 +153,12 @@ void exportMap(const Request& request) {
 void addSource(CLI::App& command, Request& request) {
   command.add_option("--db", request.db, "read this file instead of asking the running map_store")
       ->type_name("FILE");
+  command
+      .add_option(
+          "--frame", request.frame,
+          "M: as the graph lays what --db holds; W: as stored, each object in the odometry's "
+          "frame of its own session")
+      ->check(CLI::IsMember({"M", "W"}));
   addBusOptions(command, request.bus);
   command.add_option("--wait", request.patience_s, "seconds until giving up")
       ->check(CLI::PositiveNumber);
@@ -184,7 +209,7 @@ void addMapCommand(CLI::App& app) {
   exporting->add_flag("--geojson", request->geojson, "GeoJSON (RFC 7946)");
   exporting
       ->add_option("--anchor", request->anchor,
-                   "LATITUDE LONGITUDE HEIGHT YAW: where W's origin lies, degrees and metres; "
+                   "LATITUDE LONGITUDE HEIGHT YAW: where M's origin lies, degrees and metres; "
                    "yaw of its x axis from east")
       ->expected(4);
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");

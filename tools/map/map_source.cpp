@@ -6,6 +6,7 @@
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
+#include "services/map_store/core/map_places.h"
 
 namespace perdure::tools {
 namespace {
@@ -17,6 +18,28 @@ using namespace std::chrono_literals;
   throw StartupError(ExitCode::kUnavailable,
                      path + " cannot be read: " + reason.detail +
                          "; map_store sets a damaged file aside at its next start");
+}
+
+/// What it reads belongs together, though a service goes on writing: objects and graph.
+map_store::Connection openAtOneState(const std::string& path) {
+  auto connection = map_store::openStoreForReading(path);
+  if (const auto begun = connection.execute("BEGIN"); !begun) cannotRead(path, begun.error());
+  return connection;
+}
+
+Result<map_store::Found> findInM(const map_store::MapReader& reader, const MapQuery& query,
+                                 const WorldId& newest) {
+  const auto graph = reader.graph();
+  if (!graph) return tl::unexpected<Reason>(graph.error());
+  const auto& records = graph->map.records;
+  constexpr double kTile_m = 32.0;  // no tiles are taken
+  map_store::MapInM map(reader, kTile_m, [&records](ObjectId id) {
+    const auto at = records.find(id);
+    return at == records.end() ? nullptr : &at->second;
+  });
+  const auto done = map.load(mapping::MapFrames(mapping::MapState({}, graph->map)));
+  if (!done) return tl::unexpected<Reason>(done.error());
+  return map.find(query, newest, query.limit);
 }
 
 }  // namespace
@@ -51,18 +74,36 @@ Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query
   return *reply;
 }
 
-MapReply askMapFile(const std::string& path, const MapQuery& query) {
-  const auto connection = map_store::openStoreForReading(path);
+MapReply askMapFile(const std::string& path, const MapQuery& query, MapFrameChoice frame) {
+  const auto connection = openAtOneState(path);
   const map_store::MapReader reader(&connection);
   const auto working = reader.working();
   const WorldId newest = working && *working ? (*working)->world : WorldId{};
-  auto found = reader.find(query, newest, query.limit);
+  const bool as_stored = frame == MapFrameChoice::kW || query.world.world != 0;
+  auto found = as_stored ? reader.find(query, newest, query.limit) : findInM(reader, query, newest);
   if (!found) cannotRead(path, found.error());
   MapReply reply;
   reply.truncated = found->truncated;
   reply.objects = std::move(found->objects);
   reply.beliefs = std::move(found->beliefs);
   return reply;
+}
+
+Standing askStanding(const std::string& path, ObjectId id) {
+  const auto connection = openAtOneState(path);
+  const map_store::MapReader reader(&connection);
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = id;
+  auto found = reader.find(query, {}, 1);
+  const auto graph = reader.graph();
+  auto absorbed = reader.mergedInto(id);
+  if (!found) cannotRead(path, found.error());
+  if (!graph) cannotRead(path, graph.error());
+  if (!absorbed) cannotRead(path, absorbed.error());
+  if (found->beliefs.empty()) cannotRead(path, {"no_object", "it no longer has the object"});
+  return standingOf(found->beliefs.front(), found->objects.front().world, graph->map,
+                    std::move(*absorbed));
 }
 
 std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path) {

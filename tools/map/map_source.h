@@ -8,6 +8,7 @@
 #include "common/bus/domain.h"
 #include "common/types/map.h"
 #include "services/map_store/core/map_database.h"
+#include "tools/map/standing.h"
 
 namespace perdure::tools {
 
@@ -17,9 +18,16 @@ namespace perdure::tools {
 Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
                              double patience_s);
 
+/// How what a map's file holds is laid: in M, in which it is one, or in the W in which it is
+/// stored.
+enum class MapFrameChoice { kM, kW };
+
 /// Reads a map's file, also beside the running service. Places are looked for in query.world, or
-/// where it names none in the newest frame of reference.
-MapReply askMapFile(const std::string& path, const MapQuery& query);
+/// where it names none in the newest session's M, or its W.
+MapReply askMapFile(const std::string& path, const MapQuery& query,
+                    MapFrameChoice frame = MapFrameChoice::kM);
+/// Of an object that the file has. Throws StartupError.
+Standing askStanding(const std::string& path, ObjectId id);
 /// All objects of a map's file in full. Throws StartupError.
 std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path);
 

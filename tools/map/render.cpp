@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tools/outputs/geodesy.h"
+#include "tools/outputs/frames/geodesy.h"
 
 namespace perdure::tools {
 namespace {
@@ -30,9 +30,9 @@ std::string toTable(const std::vector<MapObject>& objects) {
   for (const MapObject& o : objects) {
     const Eigen::Vector3d size = sizeOf(o);
     text += fmt::format(
-        "{:>6}  {:<14} {:>6.3f} {:>6.3f}  {:>9.2f} {:>9.2f} {:>8.2f}  {:>5.2f} {:>5.2f} {:>5.2f}  {:>5}  {}\n",
+        "{:>6}  {:<14} {:>6.3f} {:>6.3f}  {:>9.2f} {:>9.2f} {:>8.2f}  {:>5.2f} {:>5.2f} {:>5.2f}  {:>5}  {}{}\n",
         o.id, o.class_name, o.existence, o.class_probability, o.mean[0], o.mean[1], o.mean[2],
-        size[0], size[1], size[2], o.hits, nameOf(o.memory));
+        size[0], size[1], size[2], o.hits, nameOf(o.memory), o.provisional ? ", provisional" : "");
   }
   return text;
 }
@@ -46,14 +46,15 @@ std::string toText(const MapObject& o) {
       "  position     {:.3f} {:.3f} {:.3f} m, sigma {} {} {}\n"
       "  yaw          {:.3f} rad, sigma {}\n"
       "  size         {:.3f} {:.3f} {:.3f} m, sigma {} {} {}\n"
-      "  frame        world {}, epoch {}\n"
+      "  frame        world {}, epoch {}{}\n"
       "  first seen   {:.3f} s\n"
       "  last seen    {:.3f} s, {} times\n"
       "  now          {}, {} memory\n",
       o.id, o.class_name, o.class_probability, o.existence, o.mean[0], o.mean[1], o.mean[2],
       deviation(o, 0), deviation(o, 1), deviation(o, 2), o.mean[3], deviation(o, 3), size[0],
       size[1], size[2], deviation(o, 4, size[0]), deviation(o, 5, size[1]),
-      deviation(o, 6, size[2]), o.world.world, o.world.epoch, toSeconds(o.first_seen),
+      deviation(o, 6, size[2]), o.world.world, o.world.epoch,
+      o.provisional ? "; provisional: not found on the map of before" : "", toSeconds(o.first_seen),
       toSeconds(o.last_seen), o.hits, perdure::nameOf(o.visibility), nameOf(o.memory));
 }
 
@@ -76,6 +77,7 @@ Json toJson(const MapObject& o) {
           {"covariance", covariance},
           {"world", o.world.world},
           {"epoch", o.world.epoch},
+          {"provisional", o.provisional},
           {"first_seen_ns", toNanoseconds(o.first_seen)},
           {"last_seen_ns", toNanoseconds(o.last_seen)},
           {"hits", o.hits},

@@ -8,8 +8,9 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/mapping/frames/laid_belief.h"
 #include "common/math/so3.h"
-#include "tools/outputs/geodesy.h"
+#include "tools/outputs/frames/geodesy.h"
 #include "tools/outputs/ledger_json.h"
 #include "tools/outputs/pictures/evolution_picture.h"
 #include "tools/outputs/pictures/map_picture.h"
@@ -162,12 +163,16 @@ void OutputWriter::onLandmarks(const Landmarks& message) {
   constexpr double kVagueVariance = 1.0;  // m²
   for (const Landmark& one : message.landmarks) {
     if (!one.p_W.allFinite() || !(one.covariance.trace() < kVagueVariance)) continue;
-    landmarks_[{message.instance, one.id}] = one.p_W.cast<float>();
+    landmarks_[{message.instance, one.id}] = {message.stamp.time, one.p_W.cast<float>()};
   }
 }
 
 void OutputWriter::onEvent(const Event& event) {
   history_.add(event);
+  if (event.kind == EventKind::kLoopClosed || event.kind == EventKind::kLoopWithdrawn ||
+      event.kind == EventKind::kRelocalised) {
+    loop_marks_.push_back({event.stamp.sequence, event.kind});
+  }
   events_ << toJson(event).dump() << "\n";
 }
 
@@ -181,27 +186,52 @@ void OutputWriter::finish() {
   writeTable("objects_inst.csv", history_.inst());
   writeTable("objects_final.csv", history_.finalRows());
   writeTrajectory();
+  writeMapTrajectory();
   writeObjects();
   writeGeoJson();
   writePictures();
 }
 
-void OutputWriter::writePictures() const {
+std::vector<ObjectBelief> OutputWriter::beliefsInMap() const {
+  std::vector<ObjectBelief> beliefs = history_.lastBeliefs();
+  if (in_map_.along.empty()) return beliefs;
+  for (ObjectBelief& belief : beliefs) {
+    const auto found = in_map_.objects.find(belief.id);
+    const RigidTransform T_MW =
+        found == in_map_.objects.end() ? in_map_.T_MW(belief.last_seen) : found->second;
+    belief = mapping::turned(T_MW, std::move(belief));
+  }
+  return beliefs;
+}
+
+MapContent OutputWriter::mapContent() const {
   MapContent content;
-  for (const auto& [frame, pose] : poses_) content.path.push_back(pose.T_WB.p);
-  for (const ObjectBelief& belief : history_.lastBeliefs()) {
+  content.in_M = !in_map_.along.empty();
+  for (const auto& [frame, pose] : poses_) content.path.push_back(in_map_.T_MB(pose).p);
+  for (const ObjectBelief& belief : beliefsInMap()) {
     content.objects.push_back(glanceAt(belief));
     if (belief.memory == Memory::kLongTerm)
       content.objects.back().visibility = Visibility::kOutOfView;
   }
-  for (const auto& [id, p_W] : landmarks_) content.landmarks.push_back(p_W);
-  content.truth = truth_;
-  if (!poses_.empty()) content.end = poses_.rbegin()->second.time;
-  if (const auto T_WB = poseAtAnchor()) {
-    content.yaw_of_north = yawOf(T_WB->R()) + 0.5 * std::numbers::pi - anchor_->yaw;
+  for (const auto& [id, point] : landmarks_) {
+    const Eigen::Vector3d p_M = in_map_.T_MW(point.time) * point.p_W.cast<double>();
+    content.landmarks.push_back(p_M.cast<float>());
   }
-  writeMap(content, folder_ / "map.png");
-  writeEvolution(log_, truth_ ? &*truth_ : nullptr, folder_ / "evolution.png");
+  content.anchors = in_map_.anchors_M;
+  content.loops = in_map_.loops;
+  if (truth_) content.truth = turned(in_map_.T_MW_begin(), *truth_);
+  if (!poses_.empty()) content.end = poses_.rbegin()->second.time;
+  if (const auto T_MB = poseAtAnchor()) {
+    content.yaw_of_north = yawOf(T_MB->R()) + 0.5 * std::numbers::pi - anchor_->yaw;
+  }
+  return content;
+}
+
+void OutputWriter::writePictures() const {
+  const PictureTruth* truth = truth_ ? &*truth_ : nullptr;
+  writeMap(mapContent(), folder_ / "map.png");
+  writeEvolution(log_, truth, bodyErrors(poses_, in_map_, loop_marks_, truth),
+                 folder_ / "evolution.png");
 }
 
 void OutputWriter::writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const {
@@ -223,26 +253,11 @@ void OutputWriter::writeTrajectory() const {
   file.close();
 }
 
-void OutputWriter::writeMapTrajectory(
-    const std::vector<std::pair<TimePoint, RigidTransform>>& along) const {
-  if (along.empty()) return;
-  CheckedFile checked(folder_ / "trajectory_map.tum");
-  std::ostream& file = checked.stream();
-  std::size_t next = 0;
-  for (const auto& [frame, pose] : poses_) {
-    while (next < along.size() && along[next].first <= pose.time) ++next;
-    RigidTransform T_MW = along[next == 0 ? 0 : next - 1].second;
-    if (next > 0 && next < along.size()) {
-      // Both corrections as they act on the pose itself: they may turn about a far origin.
-      const auto& [t0, from] = along[next - 1];
-      const auto& [t1, to] = along[next];
-      const double s = toSeconds(pose.time - t0) / toSeconds(t1 - t0);
-      file << tumLine(pose.time, interpolate(from * pose.T_WB, to * pose.T_WB, s));
-    } else {
-      file << tumLine(pose.time, T_MW * pose.T_WB);
-    }
-  }
-  checked.close();
+void OutputWriter::writeMapTrajectory() const {
+  if (in_map_.along.empty()) return;
+  CheckedFile file(folder_ / "trajectory_map.tum");
+  for (const auto& [frame, pose] : poses_) file.stream() << tumLine(pose.time, in_map_.T_MB(pose));
+  file.close();
 }
 
 void OutputWriter::writeObjects() const {
@@ -251,31 +266,32 @@ void OutputWriter::writeObjects() const {
   writeJson("objects.json", {{"objects", objects}});
 }
 
-/// W meets the Earth at the pose nearest to the anchor's time; further away it would be a guess.
+/// T_MB, in M as the map is: it meets the Earth at the pose nearest to the anchor's time; further
+/// away it would be a guess.
 std::optional<RigidTransform> OutputWriter::poseAtAnchor() const {
   if (!anchor_) return std::nullopt;
   constexpr Duration kNear = std::chrono::seconds(1);
-  std::optional<RigidTransform> T_WB;
+  std::optional<RigidTransform> T_MB;
   auto nearest = kNear + Duration(1);
   for (const auto& [frame, pose] : poses_) {
     const auto apart = std::chrono::abs(pose.time - anchor_->time);
     if (apart >= nearest) continue;
     nearest = apart;
-    T_WB = pose.T_WB;
+    T_MB = in_map_.T_MB(pose);
   }
-  return T_WB;
+  return T_MB;
 }
 
 void OutputWriter::writeGeoJson() const {
-  const auto T_WB = poseAtAnchor();
-  const GeoReference reference(anchor_.value_or(kDefaultAnchor), T_WB.value_or(RigidTransform{}));
+  const auto T_MB = poseAtAnchor();
+  const GeoReference reference(anchor_.value_or(kDefaultAnchor), T_MB.value_or(RigidTransform{}));
   Json features = Json::array();
-  for (const ObjectBelief& belief : history_.lastBeliefs()) {
+  for (const ObjectBelief& belief : beliefsInMap()) {
     features.push_back(featureOf(belief, reference));
   }
   writeJson(
       "map.geojson",
-      {{"type", "FeatureCollection"}, {"georeferenced", T_WB.has_value()}, {"features", features}});
+      {{"type", "FeatureCollection"}, {"georeferenced", T_MB.has_value()}, {"features", features}});
 }
 
 }  // namespace perdure::tools

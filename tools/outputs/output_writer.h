@@ -14,8 +14,11 @@
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
+#include "tools/outputs/frames/drive_in_map.h"
 #include "tools/outputs/object_history.h"
 #include "tools/outputs/pictures/drive_log.h"
+#include "tools/outputs/pictures/loop_chart.h"
+#include "tools/outputs/pictures/map_picture.h"
 #include "tools/outputs/pictures/picture_truth.h"
 
 namespace perdure::tools {
@@ -36,15 +39,15 @@ class OutputWriter {
   void onDetections(const Detections& detections) { log_.add(detections); }
   /// Points whose standard deviation is above a metre are not drawn.
   void onLandmarks(const Landmarks& landmarks);
-  /// For the pictures; before finish().
+  /// For the pictures, in W; before finish().
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
+  /// With it map.png and map.geojson are in M, and there is a trajectory_map.tum: the way as the
+  /// map's graph has it in the end. Before finish().
+  void setInMap(DriveInMap in_map) { in_map_ = std::move(in_map); }
 
   /// Writes everything but events.jsonl and odometry.csv, which are written as their messages come.
   /// Throws StartupError(kInputOutput) with the file that could not be written whole.
   void finish();
-  /// trajectory_map.tum: the way as the map's graph has it in the end. `along`: T_MW at times, in
-  /// order; between them it is interpolated.
-  void writeMapTrajectory(const std::vector<std::pair<TimePoint, RigidTransform>>& along) const;
   /// Any further file: timing.json, report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
 
@@ -59,9 +62,13 @@ class OutputWriter {
   void open(std::ofstream& stream, const char* name) const;
   void writeTable(const std::string& name, const std::vector<ObjectRow>& rows) const;
   void writeTrajectory() const;
+  void writeMapTrajectory() const;
   void writeObjects() const;
   void writeGeoJson() const;
   void writePictures() const;
+  MapContent mapContent() const;
+  /// In M where the run has one, else as they are, in W.
+  std::vector<ObjectBelief> beliefsInMap() const;
   std::optional<RigidTransform> poseAtAnchor() const;
 
   std::filesystem::path folder_;
@@ -69,8 +76,14 @@ class OutputWriter {
   ObjectHistory history_;
   DriveLog log_;
   std::map<std::uint64_t, replay::StampedPose> poses_;
-  std::map<std::pair<InstanceId, std::uint64_t>, Eigen::Vector3f> landmarks_;
+  struct SparsePoint {
+    TimePoint time;
+    Eigen::Vector3f p_W = Eigen::Vector3f::Zero();
+  };
+  std::map<std::pair<InstanceId, std::uint64_t>, SparsePoint> landmarks_;
   std::optional<PictureTruth> truth_;
+  DriveInMap in_map_;
+  std::vector<BodyErrors::Mark> loop_marks_;
   std::optional<GeoAnchor> anchor_;
   std::ofstream events_, odometry_;
 };

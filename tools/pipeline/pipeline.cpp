@@ -109,6 +109,7 @@ void Pipeline::openFilter() {
         keep("events", event, event.stamp.time);
         outputs_->onEvent(event);
       });
+  if (configs_.map_store.graph) in_map_.emplace(session_);
   if (!options_.map.empty()) map_->giveIds(instanceOf(kFilter), session_);
 }
 
@@ -341,6 +342,7 @@ void Pipeline::deliver() {
       waits_for_detections_.erase(waits_for_detections_.begin());
     timer_.timeTowardsNext("semantic_filter", [&] { deliverDetections(frame); });
     remember();
+    if (in_map_) in_map_->follow(odometry, map_->mapper());
     landmarks_.erase(landmarks_.begin(), landmarks_.upper_bound(frame));
   }
   while (!waiting_.empty() && waits_for_detections_.contains(waiting_.begin()->first)) {
@@ -362,12 +364,10 @@ void Pipeline::deliverDetections(std::uint64_t frame) {
 void Pipeline::finish() {
   if (auto truth = pictureTruth(*dataset_, dataOptions(), outputs_->poses()))
     outputs_->setTruth(*std::move(truth));
-  outputs_->finish();
-  if (configs_.map_store.graph) {
-    std::vector<std::pair<TimePoint, RigidTransform>> along;
-    for (const auto& [time, T_MW] : map_->mapper().along(session_)) along.emplace_back(time, T_MW);
-    outputs_->writeMapTrajectory(along);
+  if (in_map_) {
+    outputs_->setInMap(in_map_->finish(map_->mapper(), outputs_->history().lastBeliefs()));
   }
+  outputs_->finish();
   if (run_) {
     if (const auto kept = run_->finish(); !kept) reasons_.add("run_" + kept.error().code);
   }

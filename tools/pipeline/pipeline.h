@@ -20,6 +20,7 @@
 #include "services/vio/node.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
+#include "tools/pipeline/map_follower.h"
 #include "tools/pipeline/map_memory.h"
 #include "tools/pipeline/settings.h"
 
@@ -117,6 +118,7 @@ class Pipeline {
   std::unique_ptr<vio::Node> vio_;
   std::unique_ptr<semantic_filter::Node> filter_;
   std::unique_ptr<MapMemory> map_;
+  std::optional<MapFollower> in_map_;  ///< where the map has a graph
   bool uses_vio_ = false;
   bool recorded_ = false;    // odometry and detections come from the recording
   bus::Once odometry_once_;  // of the recording, as the service has it

@@ -5,21 +5,39 @@
 
 namespace perdure::mapping {
 
+namespace {
+
+/// Of an object's state: d(state in A) by the state in B.
+Matrix7d stateTurn(const RigidTransform& T_AB) {
+  Matrix7d G = Matrix7d::Identity();
+  G.topLeftCorner<3, 3>() = T_AB.R();
+  return G;
+}
+
+void turn(const RigidTransform& T_AB, const Matrix7d& G, Vector7d& mean, Matrix7d& covariance) {
+  mean.head<3>() = (T_AB * Eigen::Vector3d(mean.head<3>())).eval();
+  mean[3] = wrapAngle(mean[3] + yawOf(T_AB.R()));
+  covariance = (G * covariance * G.transpose()).eval();
+  makeSymmetric(covariance);
+}
+
+}  // namespace
+
 ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief) {
   const Eigen::Matrix3d R = T_AB.R();
-  const double yaw = yawOf(R);
-  Matrix7d G = Matrix7d::Identity();
-  G.topLeftCorner<3, 3>() = R;
+  const Matrix7d G = stateTurn(T_AB);
   for (ClassBelief& c : belief.classes) {
-    c.mean.head<3>() = (T_AB * Eigen::Vector3d(c.mean.head<3>())).eval();
-    c.mean[3] = wrapAngle(c.mean[3] + yaw);
-    c.covariance = (G * c.covariance * G.transpose()).eval();
-    makeSymmetric(c.covariance);
+    turn(T_AB, G, c.mean, c.covariance);
     c.cross_pose = (G * c.cross_pose).eval();
     c.cross_pose.rightCols<3>() = (c.cross_pose.rightCols<3>() * R.transpose()).eval();
   }
   belief.velocity = R * belief.velocity;
   return belief;
+}
+
+MapObject turned(const RigidTransform& T_AB, MapObject object) {
+  turn(T_AB, stateTurn(T_AB), object.mean, object.covariance);
+  return object;
 }
 
 ObjectBelief relativeToBody(ObjectBelief belief, const Matrix6d& P_pose) {

@@ -1,6 +1,7 @@
 // Beliefs of objects in another level frame.
 #pragma once
 
+#include "common/types/map.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 
@@ -8,6 +9,8 @@ namespace perdure::mapping {
 
 /// Transforms a belief from frame B into frame A; both are level.
 ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief);
+/// The same of what the map shows of it. `world` stays as it is.
+MapObject turned(const RigidTransform& T_AB, MapObject object);
 
 /// Takes out of the covariances what the error of the pose explains, whose covariance was P_pose
 /// when the object was last detected: what is left is known relative to the body. cross_pose is

@@ -38,7 +38,7 @@ std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); 
 }  // namespace
 
 struct MapDatabase::Change {
-  std::set<Square> squares;
+  std::set<ObjectId> objects;    ///< whose rows have changed
   std::map<ObjectId, Row> rows;  ///< to be remembered once committed
   std::set<ObjectId> shut_out;   ///< removed later than this frame
 };
@@ -156,8 +156,7 @@ Result<void> MapDatabase::put(const PlacedBelief& placed, TimePoint now, Change&
   const Row after{digestOf(bytes, placed.world), square, std::nullopt};
   change.rows[id] = after;
   if (after.digest == before->digest) return {};
-  if (before->square) change.squares.insert(*before->square);
-  change.squares.insert(*square);
+  change.objects.insert(id);
   return insert(placed, *square, bytes);
 }
 
@@ -192,7 +191,7 @@ Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
   if (!row->square || row->gone) return {};
-  change.squares.insert(*row->square);
+  change.objects.insert(id);
   return runOnce(connection_, "UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1",
                  asStored(id), static_cast<std::int64_t>(Visibility::kOutOfView),
                  static_cast<std::int64_t>(Memory::kLongTerm));
@@ -202,7 +201,7 @@ Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& ch
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
   if (!row->square || row->gone) return {};  // never confirmed, or gone before
-  change.squares.insert(*row->square);
+  change.objects.insert(id);
   change.rows.erase(id);
   const auto done = runOnce(
       connection_,
@@ -297,8 +296,8 @@ Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
 Result<Written> MapDatabase::nextRevision(const Change& change) {
   const auto revision = reader().revision();
   if (!revision) return tl::unexpected<Reason>(revision.error());
-  Written written{{change.squares.begin(), change.squares.end()}, *revision};
-  if (change.squares.empty()) return written;
+  Written written{{change.objects.begin(), change.objects.end()}, *revision};
+  if (change.objects.empty()) return written;
   ++written.revision;
   const auto done =
       runOnce(connection_, "REPLACE INTO meta VALUES('revision', ?1)", asStored(written.revision));

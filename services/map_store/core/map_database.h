@@ -48,7 +48,7 @@ struct Batch {
 };
 
 struct Written {
-  std::vector<Square> squares;  ///< whose contents changed, each once
+  std::vector<ObjectId> objects;  ///< that changed, came or went, each once
   std::uint64_t revision = 0;
   std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; left as they are stored
 };
@@ -58,6 +58,14 @@ struct Found {
   std::vector<ObjectBelief> beliefs;  ///< of kById and longTermNear: the objects in full
   bool truncated = false;
   std::uint64_t malformed = 0;  ///< rows whose belief could not be read; left out
+};
+
+/// Where an object on the map was stored.
+struct StoredPlace {
+  ObjectId id = 0;
+  WorldId world;  ///< W
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+  TimePoint last_seen;
 };
 
 /// Where the centre of a belief lies on the map; nothing where it is not finite or too far away.
@@ -77,8 +85,14 @@ class MapReader {
   /// What is nearer than radius and not in the working set as committed: nearest first, in full.
   Result<Found> longTermNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                              std::uint32_t limit) const;
-  Result<Found> inSquare(const Square& square) const;
-  Result<std::map<Square, std::uint32_t>> squares() const;  ///< with counts of objects
+  /// Of the objects with these ids, in their order, those that are on the map; at most `limit`.
+  Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
+  /// Of all objects on the map, by id.
+  Result<std::vector<StoredPlace>> places() const;
+  /// Nothing: the object is not on the map.
+  Result<std::optional<StoredPlace>> placeOf(ObjectId id) const;
+  /// What was merged into an object, by id.
+  Result<std::vector<ObjectId>> mergedInto(ObjectId id) const;
   /// The working set as it was at the last commit; nothing on an empty map.
   Result<std::optional<Objects>> working() const;
   /// The pose graph as it was at the last commit; an empty one on a map without.

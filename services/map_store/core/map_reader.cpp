@@ -21,6 +21,16 @@ Result<PlacedBelief> beliefFrom(const Statement& row) {
   return PlacedBelief{{row.id(0), static_cast<std::uint32_t>(row.integer(1))}, std::move(*belief)};
 }
 
+constexpr char kPlace[] =
+    "SELECT id, world, epoch, x, y, z, last_seen_ns FROM objects WHERE gone = 0 ";
+
+StoredPlace placeFrom(const Statement& row) {
+  return {row.id(0),
+          {row.id(1), static_cast<std::uint32_t>(row.integer(2))},
+          {row.real(3), row.real(4), row.real(5)},
+          fromNanoseconds(row.integer(6))};
+}
+
 /// Reads rows up to `limit`, and one more to know whether there are more.
 Result<Found> collect(Statement& statement, std::size_t limit, bool in_full = false) {
   Found found;
@@ -178,27 +188,55 @@ Result<Found> MapReader::longTermNear(const Eigen::Vector3d& centre, double radi
   return collect(*statement, limit, true);
 }
 
-Result<Found> MapReader::inSquare(const Square& square) const {
-  auto statement = connection_->prepare(
-      std::string(kColumns) +
-      "FROM objects o WHERE o.tile_x = ?1 AND o.tile_y = ?2 AND o.gone = 0 ORDER BY o.id");
+Result<Found> MapReader::byIds(const std::vector<ObjectId>& ids, std::size_t limit) const {
+  auto statement =
+      connection_->prepare(std::string(kColumns) + "FROM objects o WHERE o.id = ?1 AND o.gone = 0");
   if (!statement) return tl::unexpected<Reason>(statement.error());
-  statement->bind(1, std::int64_t{square.x}).bind(2, std::int64_t{square.y});
-  return collect(*statement, SIZE_MAX);
+  Found found;
+  for (const ObjectId id : ids) {
+    statement->bindId(1, id);
+    auto one = collect(*statement, 1);
+    if (!one) return one;
+    found.truncated = found.objects.size() == limit && !one->objects.empty();
+    if (found.truncated) return found;
+    found.malformed += one->malformed;
+    for (MapObject& object : one->objects) found.objects.push_back(std::move(object));
+    statement->reset();
+  }
+  return found;
 }
 
-Result<std::map<Square, std::uint32_t>> MapReader::squares() const {
-  auto rows = connection_->prepare(
-      "SELECT tile_x, tile_y, count(*) FROM objects WHERE gone = 0 GROUP BY tile_x, tile_y");
+Result<std::vector<StoredPlace>> MapReader::places() const {
+  auto rows = connection_->prepare(std::string(kPlace) + "ORDER BY id");
   if (!rows) return tl::unexpected<Reason>(rows.error());
-  std::map<Square, std::uint32_t> squares;
+  std::vector<StoredPlace> places;
   for (;;) {
     const auto row = rows->step();
     if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return squares;
-    const Square square{static_cast<std::int32_t>(rows->integer(0)),
-                        static_cast<std::int32_t>(rows->integer(1))};
-    squares[square] = static_cast<std::uint32_t>(rows->integer(2));
+    if (!*row) return places;
+    places.push_back(placeFrom(*rows));
+  }
+}
+
+Result<std::optional<StoredPlace>> MapReader::placeOf(ObjectId id) const {
+  auto rows = connection_->prepare(std::string(kPlace) + "AND id = ?1");
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  rows->bindId(1, id);
+  const auto row = rows->step();
+  if (!row) return tl::unexpected<Reason>(row.error());
+  return *row ? std::optional(placeFrom(*rows)) : std::nullopt;
+}
+
+Result<std::vector<ObjectId>> MapReader::mergedInto(ObjectId id) const {
+  auto rows = connection_->prepare("SELECT id FROM objects WHERE merged_into = ?1 ORDER BY id");
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  rows->bindId(1, id);
+  std::vector<ObjectId> ids;
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return ids;
+    ids.push_back(rows->id(0));
   }
 }
 

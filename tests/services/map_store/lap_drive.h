@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -65,7 +66,13 @@ class LapDrive : public ::testing::Test {
   void start() {
     node_ = std::make_unique<Node>(
         config_, 5,
-        Outputs{[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
+        Outputs{[this](const MapTile& t) {
+                  tiles_[{t.x, t.y, t.part}] = t;
+                },
+                [this](const MapTile& t) {
+                  tiles_.erase({t.x, t.y, t.part});
+                },
+                [](const MapHeader&) {},
                 [this](const MapReply& r) { replies_.push_back(r); },
                 [this](const Recalled& r) { recalled_.push_back(r); },
                 [this](const MapFrame& f) { frames_.push_back(f); },
@@ -93,7 +100,7 @@ class LapDrive : public ::testing::Test {
 
   void step() {
     way_m_ += 1.0;
-    T_WB_ = T_WB_ * (onLap(way_m_ - 1.0).inverse() * onLap(way_m_)) * planar(0.0, 0.0, kDrift);
+    T_WB_ = T_WB_ * (onLap(way_m_ - 1.0).inverse() * onLap(way_m_)) * planar(0.0, 0.0, drift_);
     Odometry odometry;
     odometry.stamp = stamp(++sequence_);
     odometry.world = world_;
@@ -156,11 +163,22 @@ class LapDrive : public ::testing::Test {
     query.request = ++request_;
     query.kind = MapQueryKind::kById;
     query.object_id = id;
+    query.world = world_;  // as stored, each in its own W
     query.limit = 1;
     node_->onQuery(query);
     EXPECT_EQ(replies_.back().beliefs.size(), 1u) << id;
     return replies_.back().beliefs.empty() ? ObjectBelief{} : replies_.back().beliefs.front();
   }
+
+  MapReply answerTo(MapQuery query) {
+    query.client = 3;
+    query.request = ++request_;
+    query.limit = 1000;
+    node_->onQuery(query);
+    return replies_.back();
+  }
+  Eigen::Vector3d truthOf(ObjectId id) const { return things_[thing_of_.at(id)].p; }
+  static Eigen::Vector3d placeOf(const MapObject& object) { return object.mean.head<3>(); }
 
   void ask(const Eigen::Vector3d& centre, double radius_m) {
     recalled_.clear();
@@ -190,6 +208,7 @@ class LapDrive : public ::testing::Test {
   TemporaryFolder folder_;
   Config config_;
   std::unique_ptr<Node> node_;
+  std::map<std::array<std::int32_t, 3>, MapTile> tiles_;  ///< as a late joiner sees them
   std::vector<MapReply> replies_;
   std::vector<Recalled> recalled_;
   std::vector<Thing> things_ = things();
@@ -200,7 +219,7 @@ class LapDrive : public ::testing::Test {
   std::vector<Event> events_;
   WorldId world_ = kHere;
   RigidTransform T_WB_;
-  double way_m_ = 0.0;
+  double way_m_ = 0.0, drift_ = kDrift;
   std::uint64_t sequence_ = 0, request_ = 0;
   ObjectId next_id_ = 1;
 };

@@ -190,18 +190,46 @@ TEST_F(MapQueries, ForgetObjectsThatAreGoneAndRefuseTheirLateBeliefs) {
   EXPECT_THAT(idsOf(ask(query)), ElementsAre(5u));
 }
 
-TEST_F(MapQueries, StayTheSameWhenTheTileSizeChanges) {
-  const std::string path = folder_.file("map.sqlite");
-  const MapDatabase coarse({path, 1000.0});
-  EXPECT_EQ(coarse.reader().squares().value().size(), 4u);
-  const MapDatabase fine({path, 10.0});
-  std::size_t objects = 0;
-  const auto squares = fine.reader().squares();
-  for (const auto& [square, count] : *squares) {
-    EXPECT_EQ(fine.reader().inSquare(square).value().objects.size(), count);
-    objects += count;
+TEST_F(MapQueries, TellWhereEachObjectWasStoredAndWhatIsNoLongerThere) {
+  Objects later = workingSet(3, {});
+  const TimePoint gone_at = fromNanoseconds(250'000'000);
+  ASSERT_TRUE(
+      database_
+          .write({&later,
+                  {},
+                  {{5, {EventKind::kMerged, gone_at, 9}}, {7, {EventKind::kMerged, gone_at, 9}}}})
+          .has_value());
+  const auto places = database_.reader().places().value();
+  ASSERT_EQ(places.size(), 398u);
+  for (const StoredPlace& place : places) {
+    const ObjectBelief& belief = all_.objects[place.id - 1];
+    EXPECT_EQ(place.p_W, Eigen::Vector3d(belief.best().mean.head<3>()));
+    EXPECT_EQ(place.last_seen, belief.last_seen);
+    EXPECT_EQ(place.world, kWorld);
   }
-  EXPECT_EQ(objects, 400u);
+  EXPECT_FALSE(database_.reader().placeOf(5).value());
+  EXPECT_EQ(database_.reader().placeOf(6).value()->id, 6u);
+  EXPECT_THAT(database_.reader().mergedInto(9).value(), ElementsAre(5u, 7u));
+  EXPECT_THAT(database_.reader().mergedInto(10).value(), IsEmpty());
+}
+
+TEST_F(MapQueries, GiveObjectsByTheirIdsInTheOrderAskedFor) {
+  const auto found = database_.reader().byIds({9, 3, 1000, 200}, 5).value();
+  EXPECT_THAT(idsOf(found), ElementsAre(9u, 3u, 200u));
+  EXPECT_FALSE(found.truncated);
+  EXPECT_THAT(idsOf(database_.reader().byIds({9, 3, 200}, 2).value()), ElementsAre(9u, 3u));
+  EXPECT_TRUE(database_.reader().byIds({9, 3, 200}, 2).value().truncated);
+  EXPECT_FALSE(database_.reader().byIds({9, 3, 1000}, 2).value().truncated);
+}
+
+TEST_F(MapQueries, AWriteSaysWhichObjectsItChanged) {
+  Objects next = all_;
+  next.stamp.sequence = 2;
+  next.objects[3].hits = 99;
+  next.objects.erase(next.objects.begin() + 10);
+  const auto written = database_.write({&next, {}, {}}).value();
+  EXPECT_THAT(written.objects, ElementsAre(4u, 11u));
+  EXPECT_THAT(database_.write({&next, {}, {}}).value().objects, IsEmpty());
 }
 
 }  // namespace

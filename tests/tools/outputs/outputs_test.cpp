@@ -7,7 +7,7 @@
 
 #include "common/base/errors.h"
 #include "tests/support/camera.h"
-#include "tools/outputs/geodesy.h"
+#include "tools/outputs/frames/geodesy.h"
 #include "tools/outputs/object_history.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
@@ -269,6 +269,34 @@ TEST(OutputWriter, TheMapIsGeoreferencedAtThePoseNearestToTheAnchor) {
     if (!in_time) continue;
     EXPECT_NEAR(map["features"][0]["geometry"]["coordinates"][0].get<double>(), 0.0, 1e-9);
   }
+}
+
+TEST(OutputWriter, WithAMapTheMapsFilesAreInMAndTheTablesStayInW) {
+  const auto folder = emptyFolder("perdure_outputs_in_map");
+  OutputWriter writer(folder, "0000");
+  for (int frame = 0; frame < 3; ++frame) {
+    Odometry odometry;
+    odometry.state = OdometryState::kTracking;
+    odometry.stamp.sequence = static_cast<std::uint64_t>(frame);
+    odometry.stamp.time = fromNanoseconds(100'000'000 * frame);
+    odometry.T_WB.p.x() = 4.0 * frame;
+    writer.onOdometry(odometry);
+  }
+  writer.onObjects(messageAt(1, {carAt(1, 4), carAt(2, 8)}));
+  const auto shift = [](double y) {
+    return RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, y, 0));
+  };
+  DriveInMap in_map;
+  in_map.along = {{fromNanoseconds(0), shift(0.0)}, {fromNanoseconds(200'000'000), shift(6.0)}};
+  in_map.objects[2] = shift(5.0);
+  writer.setInMap(in_map);
+  writer.finish();
+  const auto map = nlohmann::json::parse(textOf(folder / "map.geojson"));
+  EXPECT_EQ(map["features"][0]["properties"]["local_m"][1], 2.0) << "seen at the first anchor";
+  EXPECT_EQ(map["features"][1]["properties"]["local_m"][1], 7.0);
+  EXPECT_THAT(textOf(folder / "trajectory_map.tum"), HasSubstr("0.100000000 4.000000000 3.0000"));
+  EXPECT_THAT(textOf(folder / "trajectory.tum"), HasSubstr("0.100000000 4.000000000 0.0000"));
+  EXPECT_THAT(textOf(folder / "objects_inst.csv"), HasSubstr(",8.0000,2.0000,"));
 }
 
 TEST(OutputWriter, SaysTheMendWhereTheFolderCannotBeMade) {

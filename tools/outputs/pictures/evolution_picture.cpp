@@ -15,6 +15,7 @@ namespace {
 constexpr double kSameThing = 3.0;  // metres between an object and its truth
 constexpr int kWidth = 1500, kRow = 190, kTop = 66, kBottom = 56;
 constexpr int kLeft = 84, kBetween = 90, kRight = 24;
+constexpr int kBodyRow = 300;
 const Colour kHiddenShade(150, 150, 235), kOutShade(190, 190, 190);
 
 struct Seen {
@@ -159,9 +160,9 @@ double topOf(const Evolution& evolution) {
   return std::max(0.1, 1.15 * *at);
 }
 
-void drawRow(cv::Mat& picture, int row, const Evolution& evolution, const Chart::Range& frames,
+void drawRow(cv::Mat& picture, int top, const Evolution& evolution, const Chart::Range& frames,
              bool last) {
-  const int y = kTop + row * kRow + 26, height = kRow - 44;
+  const int y = top + 26, height = kRow - 44;
   const int width = (kWidth - kLeft - kBetween - kRight) / 2;
   const Colour colour = classColour(evolution.class_name);
   Chart left(picture, {kLeft, y, width, height}, frames, {0.0, topOf(evolution)});
@@ -181,11 +182,11 @@ void drawRow(cv::Mat& picture, int row, const Evolution& evolution, const Chart:
   drawText(picture, "existence", {kWidth - kRight - 68, y - 7}, kInk, {0.42});
 }
 
-void drawLegend(cv::Mat& picture, bool with_truth) {
+void drawLegend(cv::Mat& picture, int top, bool with_truth) {
   int x = kLeft;
   const auto entry = [&](const std::string& text, const auto& sign) {
-    sign(cv::Point(x, 26));
-    drawText(picture, text, {x + 40, 31}, kInk, {0.5});
+    sign(cv::Point(x, top + 26));
+    drawText(picture, text, {x + 40, top + 31}, kInk, {0.5});
     x += 40 + sizeOf(text, {0.5}).width + 34;
   };
   const auto line = [&](const Stroke& stroke) {
@@ -219,9 +220,10 @@ std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth*
   return result;
 }
 
-cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions) {
+cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions, const BodyErrors& body) {
   const int rows = static_cast<int>(evolutions.size());
-  cv::Mat picture(kTop + rows * kRow + kBottom, kWidth, CV_8UC3, kPaper);
+  const int above = body.points.empty() ? 0 : kBodyRow;
+  cv::Mat picture(above + kTop + rows * kRow + kBottom, kWidth, CV_8UC3, kPaper);
   Chart::Range frames{1e18, -1e18};
   bool with_truth = false;
   for (const Evolution& one : evolutions) {
@@ -231,19 +233,28 @@ cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions) {
       with_truth = with_truth || point.error.has_value();
     }
   }
-  drawLegend(picture, with_truth);
+  for (const BodyErrors::Point& point : body.points) {
+    frames.low = std::min(frames.low, static_cast<double>(point.frame));
+    frames.high = std::max(frames.high, static_cast<double>(point.frame));
+  }
+  if (above > 0) {
+    const cv::Rect area(kLeft, 48, kWidth - kLeft - kRight, above - 90);
+    drawBodyErrors(picture, area, body, frames);
+  }
+  drawLegend(picture, above, with_truth);
   for (int row = 0; row < rows; ++row) {
-    drawRow(picture, row, evolutions[static_cast<std::size_t>(row)], frames, row + 1 == rows);
+    drawRow(picture, above + kTop + row * kRow, evolutions[static_cast<std::size_t>(row)], frames,
+            row + 1 == rows);
   }
   drawText(picture, "frame", {kWidth / 2 - 20, picture.rows - 16}, kInk, {0.5});
   return picture;
 }
 
-bool writeEvolution(const DriveLog& log, const PictureTruth* truth,
+bool writeEvolution(const DriveLog& log, const PictureTruth* truth, const BodyErrors& body,
                     const std::filesystem::path& file) {
   const auto evolutions = chooseEvolutions(log, truth, 5);
-  if (evolutions.empty()) return false;
-  writePicture(drawEvolutions(evolutions), file);
+  if (evolutions.empty() && body.points.empty()) return false;
+  writePicture(drawEvolutions(evolutions, body), file);
   return true;
 }
 

@@ -1,11 +1,13 @@
 // evolution.png: how sure the system was of a few objects, frame by frame: the error of the
-// position where truth is known, its standard deviation, and the existence.
+// position where truth is known, its standard deviation, and the existence. Above them, where the
+// map closed loops, how far off the body was.
 #pragma once
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
 
 #include "tools/outputs/pictures/drive_log.h"
+#include "tools/outputs/pictures/loop_chart.h"
 #include "tools/outputs/pictures/picture_truth.h"
 
 namespace perdure::tools {
@@ -32,9 +34,10 @@ struct Evolution {
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 
-cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions);
+/// `body` is a row of its own above the objects, where it has points.
+cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions, const BodyErrors& body = {});
 /// False: there is nothing to draw, or the file cannot be written.
-bool writeEvolution(const DriveLog& log, const PictureTruth* truth,
+bool writeEvolution(const DriveLog& log, const PictureTruth* truth, const BodyErrors& body,
                     const std::filesystem::path& file);
 
 }  // namespace perdure::tools

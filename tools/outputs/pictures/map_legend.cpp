@@ -21,6 +21,11 @@ std::map<std::string, int> countsOf(const MapContent& content) {
   return counts;
 }
 
+std::ptrdiff_t loopsOf(const MapContent& content, bool believed) {
+  return std::count_if(content.loops.begin(), content.loops.end(),
+                       [&](const LoopLine& loop) { return loop.believed == believed; });
+}
+
 /// Draws entries below one another; sizes in units of view.text.
 class Legend {
  public:
@@ -63,6 +68,14 @@ class Legend {
                     colour, cv::FILLED);
     }
   }
+  void rings(const std::string& text) {
+    const cv::Rect2d at = entry(text);
+    for (const double x : {0.15, 0.5, 0.85}) {
+      const cv::Point centre(at.tl() + cv::Point2d(x * at.width, 0.5 * at.height));
+      cv::circle(picture_, centre, thick(3), kInk, cv::FILLED, cv::LINE_AA);
+      cv::circle(picture_, centre, thick(2), kPaper, cv::FILLED, cv::LINE_AA);
+    }
+  }
   cv::Point2d corner() const { return {x_, y_}; }
   TextStyle style() const { return {0.48 * unit_, thick(1)}; }
   int thick(double width) const {
@@ -75,8 +88,8 @@ class Legend {
   double unit_, x_, y_;
 };
 
-/// The axes of W, and north where it is known.
-void drawCompass(cv::Mat& picture, Legend& legend, const std::optional<double>& yaw_of_north) {
+/// The axes, and north where it is known.
+void drawCompass(cv::Mat& picture, Legend& legend, const MapContent& content) {
   const double unit = legend.unit();
   const cv::Point2d from = legend.corner() + cv::Point2d(56 * unit, 78 * unit);
   const auto arrow = [&](double yaw, const Colour& colour, const std::string& text) {
@@ -90,16 +103,23 @@ void drawCompass(cv::Mat& picture, Legend& legend, const std::optional<double>& 
   };
   arrow(0.0, kInk, "x");
   arrow(std::numbers::pi / 2, kInk, "y");
-  if (yaw_of_north) arrow(*yaw_of_north, classColour("couch"), "N");
+  if (content.yaw_of_north) arrow(*content.yaw_of_north, classColour("couch"), "N");
   legend.skip(4.4);
-  legend.entry("W, metres; yaw 0 is x");
+  legend.entry(content.in_M ? "M, metres; yaw 0 is x" : "W, metres; yaw 0 is x");
 }
 
 int linesOf(const MapContent& content) {
-  return 15 + static_cast<int>(countsOf(content).size()) + (content.truth ? 1 : 0);
+  return 15 + static_cast<int>(countsOf(content).size()) + (content.truth ? 1 : 0) +
+         (content.anchors.empty() ? 0 : 3);
 }
 
 }  // namespace
+
+Stroke loopStroke(bool believed, double text) {
+  const int thickness = std::max(1, static_cast<int>(std::lround(text)));
+  if (believed) return {Colour(40, 150, 235), thickness};
+  return {Colour(60, 70, 205), thickness, true, 5.0 * text, 4.0 * text};
+}
 
 double fillOf(Visibility visibility) {
   switch (visibility) {
@@ -153,7 +173,13 @@ void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& v
   legend.ellipse("2 sigma of the centre", grey);
   legend.line("the way (disc: start)", {kInk, 2});
   if (!content.landmarks.empty()) legend.dots("sparse points", kDots);
-  drawCompass(picture, legend, content.yaw_of_north);
+  if (!content.anchors.empty()) legend.rings("anchors");
+  for (const bool believed : {true, false}) {
+    const auto loops = loopsOf(content, believed);
+    const char* text = believed ? "loops: {}" : "loops, not believed: {}";
+    if (loops > 0) legend.line(fmt::format(fmt::runtime(text), loops), loopStroke(believed, 1.0));
+  }
+  drawCompass(picture, legend, content);
 }
 
 }  // namespace perdure::tools

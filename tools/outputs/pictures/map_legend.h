@@ -7,6 +7,8 @@
 namespace perdure::tools {
 
 inline const Colour kDots(170, 165, 160);
+/// A loop of the map's graph.
+Stroke loopStroke(bool believed, double text);
 /// How much of its colour an object's outline is filled with, by what is seen of it at the end.
 double fillOf(Visibility visibility);
 /// Map, axes and legend together.

@@ -136,8 +136,29 @@ void drawEnds(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Ve
              kInk, 1.0);
 }
 
+void drawAnchors(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vector3d>& all) {
+  for (const Eigen::Vector3d& p : all) {
+    cv::circle(picture, cv::Point(view.at(flat(p))), thick(view, 3), kInk, cv::FILLED, cv::LINE_AA);
+    cv::circle(picture, cv::Point(view.at(flat(p))), thick(view, 2), kPaper, cv::FILLED,
+               cv::LINE_AA);
+  }
+}
+
+/// What is not believed is drawn over what is, so that it is seen.
+void drawLoops(cv::Mat& picture, const MapView& view, const std::vector<LoopLine>& loops) {
+  for (const bool believed : {true, false}) {
+    for (const LoopLine& loop : loops) {
+      if (loop.believed != believed) continue;
+      drawLine(picture, {view.at(flat(loop.a_M)), view.at(flat(loop.b_M))},
+               loopStroke(believed, view.text));
+    }
+  }
+}
+
 void drawTruth(cv::Mat& picture, const MapView& view, const PictureTruth& truth, TimePoint end) {
-  drawWay(picture, view, truth.path, {mixed(kTruthColour, kPaper, 0.45), thick(view, 1)});
+  std::vector<Eigen::Vector3d> path;
+  for (const auto& [frame, p] : truth.path) path.push_back(p);
+  drawWay(picture, view, path, {mixed(kTruthColour, kPaper, 0.45), thick(view, 1)});
   const Stroke stroke{kTruthColour, thick(view, 1)};
   for (const TruthTrack& track : truth.objects) {
     if (track.moves) {
@@ -223,9 +244,11 @@ cv::Mat drawMap(const MapContent& content, const MapView& view) {
   cv::Mat map = picture.clone();  // what is drawn beyond the map's border is not taken over
   drawLandmarks(map, view, content.landmarks);
   drawWay(map, view, content.path, {kInk, thick(view, 2)});
+  drawAnchors(map, view, content.anchors);
   drawEnds(map, view, content.path);
   for (const ObjectGlance& object : content.objects) drawObject(map, view, object);
   if (content.truth) drawTruth(map, view, *content.truth, content.end);
+  drawLoops(map, view, content.loops);
   drawIds(map, view, content.objects);
   map(view.area).copyTo(picture(view.area));
   drawScaleBar(picture, view);

@@ -8,21 +8,26 @@
 #include <optional>
 #include <vector>
 
+#include "tools/outputs/frames/drive_in_map.h"
 #include "tools/outputs/pictures/drive_log.h"
 #include "tools/outputs/pictures/picture_truth.h"
 
 namespace perdure::tools {
 
+/// All of it in one frame, M or W.
 struct MapContent {
-  std::vector<Eigen::Vector3d> path;  ///< of the body, in W
+  bool in_M = false;                  ///< else in W
+  std::vector<Eigen::Vector3d> path;  ///< of the body
   std::vector<ObjectGlance> objects;  ///< as they are at the end
   std::vector<Eigen::Vector3f> landmarks;
+  std::vector<Eigen::Vector3d> anchors;
+  std::vector<LoopLine> loops;
   std::optional<PictureTruth> truth;
   TimePoint end;                       ///< for the truth of what is moved or taken away
-  std::optional<double> yaw_of_north;  ///< in W, radians from x
+  std::optional<double> yaw_of_north;  ///< radians from x
 };
 
-/// W to the picture's pixels: x to the right, y up, the same scale both ways.
+/// Metres to the picture's pixels: x to the right, y up, the same scale both ways.
 struct MapView {
   Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Ones();  ///< metres
   double scale = 1.0;  ///< pixels a metre
@@ -31,8 +36,8 @@ struct MapView {
   double bar_m = 1.0;  ///< length of the scale bar
   cv::Point bar;       ///< its left end
 
-  cv::Point2d at(const Eigen::Vector2d& p_W) const {
-    return {area.x + scale * (p_W.x() - low.x()), area.y + scale * (high.y() - p_W.y())};
+  cv::Point2d at(const Eigen::Vector2d& p) const {
+    return {area.x + scale * (p.x() - low.x()), area.y + scale * (high.y() - p.y())};
   }
 };
 

@@ -20,6 +20,18 @@ std::optional<TruthTrack::Key> TruthTrack::at(TimePoint time) const {
              wrapAngle(before.yaw + s * wrapAngle(after->yaw - before.yaw))};
 }
 
+PictureTruth turned(const RigidTransform& T_AB, PictureTruth truth) {
+  const double turn = yawOf(T_AB.R());
+  for (auto& [frame, p] : truth.path) p = T_AB * p;
+  for (TruthTrack& track : truth.objects) {
+    for (TruthTrack::Key& key : track.keys) {
+      key.centre_W = T_AB * key.centre_W;
+      key.yaw = wrapAngle(key.yaw + turn);
+    }
+  }
+  return truth;
+}
+
 const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,
                                TimePoint time, double within) {
   const TruthTrack* nearest = nullptr;

@@ -1,13 +1,16 @@
-// What really stood where, as the pictures draw it: in W, in the order of time.
+// What really stood where, as the pictures draw it: in W, or where it says so in M, in the order of
+// time.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/time.h"
+#include "common/math/rigid_transform.h"
 
 namespace perdure::tools {
 
@@ -30,9 +33,12 @@ struct TruthTrack {
 };
 
 struct PictureTruth {
-  std::vector<Eigen::Vector3d> path;  ///< of the body; may be empty
+  std::map<std::uint64_t, Eigen::Vector3d> path;  ///< of the body by frame; may be empty
   std::vector<TruthTrack> objects;
 };
+
+/// From frame B to frame A; both are level.
+PictureTruth turned(const RigidTransform& T_AB, PictureTruth truth);
 
 /// The track of `truth` that is nearest to `p_W` at a time, nearer than `within` metres.
 const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,

@@ -64,7 +64,7 @@ PictureTruth truthOfSimulation(const sim::Truth& truth, const replay::PoseFile& 
     const auto T_TB = body.at(frame, pose.time);
     if (!T_TB) continue;
     if (!T_WT) T_WT = level(pose.T_WB * T_TB->inverse());
-    picture.path.push_back(*T_WT * T_TB->p);
+    picture.path[frame] = *T_WT * T_TB->p;
   }
   if (!T_WT) return {};
   for (const auto& object : truth.objects) picture.objects.push_back(inWorld(object, *T_WT));

@@ -42,6 +42,20 @@ ObjectBelief car(std::uint32_t seed) {
 
 const RigidTransform kTurn(rotationAboutZ(1.1), Eigen::Vector3d(40.0, -9.0, 1.3));
 
+TEST(LaidBelief, WhatTheMapShowsOfItIsTurnedAsItsBestBeliefIs) {
+  const ObjectBelief belief = car(2);
+  MapObject object;
+  object.world = {3, 1};
+  object.mean = belief.best().mean;
+  object.covariance = belief.best().covariance;
+  const MapObject there = turned(kTurn, object);
+  const ClassBelief best = turned(kTurn, belief).best();
+  EXPECT_EQ(there.mean, best.mean);
+  EXPECT_EQ(there.covariance, best.covariance);
+  EXPECT_EQ(there.world, object.world);
+  EXPECT_GT((there.covariance - object.covariance).norm(), 1e-3) << "covariances turn, too";
+}
+
 TEST(LaidBelief, IsTurnedAndTurnedBack) {
   const ObjectBelief before = car(1);
   const ObjectBelief there = turned(kTurn, before);

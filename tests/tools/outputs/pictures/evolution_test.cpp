@@ -158,7 +158,18 @@ TEST(Truth, OfASimulationIsLaidToTheFirstPoseByYawAndPosition) {
   EXPECT_LT((key.centre_W - T_WT * Eigen::Vector3d(10, 4, 0.7)).norm(), 1e-9);
   EXPECT_NEAR(key.yaw, 0.2 + turn, 1e-9);
   ASSERT_THAT(picture.path, SizeIs(4));
-  EXPECT_LT((picture.path[3] - poses[4].T_WB.p).norm(), 1e-9);
+  EXPECT_LT((picture.path.at(4) - poses[4].T_WB.p).norm(), 1e-9);
+}
+
+TEST(Truth, IsTurnedWithItsYaws) {
+  PictureTruth truth;
+  truth.objects = {standing(1, {2, 0, 0})};
+  truth.path[3] = {1, 0, 0};
+  const RigidTransform T_MW(rotationAboutZ(0.5 * std::numbers::pi), Eigen::Vector3d(10, 0, 0));
+  const PictureTruth there = turned(T_MW, truth);
+  EXPECT_LT((there.objects[0].keys[0].centre_W - Eigen::Vector3d(10, 2, 0)).norm(), 1e-12);
+  EXPECT_NEAR(there.objects[0].keys[0].yaw, 0.5 * std::numbers::pi, 1e-12);
+  EXPECT_LT((there.path.at(3) - Eigen::Vector3d(10, 1, 0)).norm(), 1e-12);
 }
 
 TEST(Truth, OfLabelsStandsInTheWorldWhereverTheBodyIs) {

@@ -162,6 +162,22 @@ TEST(MapPicture, LandmarksAreDotsAndThoseOutsideAreLeftOut) {
   EXPECT_TRUE(hasColour(picture, view.at({10, 3}), kDots, 0, 2.0));
 }
 
+TEST(MapPicture, AnchorsAreRingsAndLoopsLinesBrokenWhereTheyAreNotBelieved) {
+  MapContent content = street();
+  content.anchors = {{10, 0, 1}, {50, 0, 1}};
+  content.loops = {{{5, 3, 0}, {15, 3, 0}, true}, {{25, 3, 0}, {35, 3, 0}, false}};
+  const MapView view = viewOf(content);
+  const cv::Mat picture = drawMap(content, view);
+  EXPECT_TRUE(hasColour(picture, view.at({10, 0}), kPaper, 0, 12.0));
+  EXPECT_TRUE(hasColour(picture, view.at({20, 0}), kInk, 1, 30.0)) << "the way between them";
+  const Colour believed = loopStroke(true, 1.0).colour, doubted = loopStroke(false, 1.0).colour;
+  EXPECT_EQ(coverage(picture, view.at({5.5, 3}), view.at({14.5, 3}), believed), 1.0);
+  const double dashes = coverage(picture, view.at({25.5, 3}), view.at({34.5, 3}), doubted);
+  EXPECT_GT(dashes, 0.4);
+  EXPECT_LT(dashes, 0.95);
+  EXPECT_GT(pictureSize(content, view).height, pictureSize(street(), view).height - 1);
+}
+
 TEST(MapPicture, NothingIsWrittenWhereThereIsNothing) {
   const std::string file = ::testing::TempDir() + "/perdure_empty_map.png";
   std::filesystem::remove(file);

@@ -1,4 +1,4 @@
-#include "tools/outputs/geodesy.h"
+#include "tools/outputs/frames/geodesy.h"
 
 #include <cmath>
 #include <numbers>
