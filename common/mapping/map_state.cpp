@@ -6,7 +6,7 @@
 namespace perdure::mapping {
 
 MapState::MapState(const GraphParameters& parameters, SavedMap saved)
-    : graph_(parameters), records_(std::move(saved.records)) {
+    : graph_(parameters), records_(std::move(saved.records)), merges_(std::move(saved.merges)) {
   for (std::size_t k = 0; k < saved.classes.size(); ++k) {
     class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
   }
@@ -103,6 +103,18 @@ void MapState::erase(ObjectId id) {
   records_.erase(at);
 }
 
+void MapState::putMerge(ObjectId absorbed, HungMerge merge) {
+  merges_.insert_or_assign(absorbed, std::move(merge));
+  merges_touched_.insert(absorbed);
+  merges_erased_.erase(absorbed);
+}
+
+void MapState::eraseMerge(ObjectId absorbed) {
+  if (merges_.erase(absorbed) == 0) return;
+  merges_touched_.erase(absorbed);
+  merges_erased_.insert(absorbed);
+}
+
 SavedAnchor MapState::savedAnchor(AnchorId id) const {
   return {anchors_.at(id), graph_.pose(id), graph_.isHeldFast(id)};
 }
@@ -140,10 +152,14 @@ Unsaved MapState::unsaved() const {
   for (const ObjectId id : erased_) {
     if (!result.changed.records.contains(id)) result.records_gone.insert(id);
   }
+  for (const ObjectId id : merges_touched_) result.changed.merges[id] = merges_.at(id);
+  result.merges_gone = merges_erased_;
   return result;
 }
 
 void MapState::markSaved() {
+  merges_touched_.clear();
+  merges_erased_.clear();
   for (const auto& [id, anchor] : anchors_) {
     saved_anchors_[id] = {graph_.pose(id), anchor.scale2};
   }

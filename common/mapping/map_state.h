@@ -40,6 +40,11 @@ class MapState {
   /// Objects that were seen from an anchor, on the newest visit or on the one before.
   const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
+  /// Merges that hang on loops, by the absorbed object.
+  const std::map<ObjectId, HungMerge>& merges() const { return merges_; }
+  void putMerge(ObjectId absorbed, HungMerge merge);
+  void eraseMerge(ObjectId absorbed);
+
   Unsaved unsaved() const;
   void markSaved();
 
@@ -63,6 +68,8 @@ class MapState {
   std::map<AnchorId, Kept> saved_anchors_;
   std::map<EdgeId, double> saved_edges_;  ///< weights of loops
   std::set<ObjectId> touched_, erased_;
+  std::map<ObjectId, HungMerge> merges_;
+  std::set<ObjectId> merges_touched_, merges_erased_;
 };
 
 }  // namespace perdure::mapping

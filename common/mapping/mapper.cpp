@@ -11,25 +11,19 @@
 #include "common/math/so3.h"
 
 namespace perdure::mapping {
-namespace {
-
-std::set<std::pair<ObjectId, ObjectId>> pairsOf(const PlaceMatch& match) {
-  return {match.pairs.begin(), match.pairs.end()};
-}
-
-}  // namespace
-
 Mapper::Mapper(const Parameters& parameters, SavedMap saved)
     : parameters_(parameters),
       state_(parameters.graph, std::move(saved)),
       builder_(parameters.anchor),
       loop_search_(parameters),
       tracked_ties_(parameters),
+      loop_book_(parameters.loop),
       drift_scale_(parameters.drift_scale) {}
 
 /// Of a session that is known already it goes on from its newest anchor.
 void Mapper::begin(const Odometry& odometry) {
   session_ = odometry.world;
+  for (const EdgeId id : loop_book_.begin()) state_.removeLoop(id);
   builder_ = AnchorBuilder(parameters_.anchor);
   if (const auto last = state_.newestOf(odometry.world)) builder_.resume(*last);
   learnAnew(odometry.world);
@@ -177,6 +171,7 @@ void Mapper::onMerged(ObjectId survivor, ObjectId absorbed) {
   if (from == state_.records().end()) return;
   ObjectRecord merged = from->second;
   const auto into = state_.records().find(survivor);
+  keepForUndo(survivor, absorbed);
   if (into != state_.records().end()) {
     const ObjectRecord& record = into->second;
     const bool confirmed = merged.confirmed || record.confirmed;
@@ -207,118 +202,6 @@ const Marginals& Mapper::marginals() {
     marginals_ = std::make_unique<Marginals>(state_.graph(), builder_.last()->id);
   }
   return *marginals_;
-}
-
-/// By objects seen again under their old ids.
-void Mapper::tie() {
-  const auto tie = tracked_ties_.find(body());
-  if (!tie) return;
-  tracked_ties_.use(*tie, builder_.way_m());
-  const Edge edge = edgeFrom(tie->home, builder_.last()->id, tie->T_Mb, EdgeKind::kTracking);
-  const double chi2 = state_.graph().chi2(edge);
-  state_.addLoop(edge);
-  marginals_.reset();
-  constexpr double kAgrees = 4.0;  // the next solve takes it along
-  if (chi2 > kAgrees) graphMoved();
-}
-
-void Mapper::graphMoved() {
-  state_.optimise();
-  marginals_.reset();
-  loop_search_.forget();
-  ++revision_;
-}
-
-/// By way of its own map first; then, more rarely, in the parts of the map that it does not hang
-/// together with.
-void Mapper::search() {
-  const Whereabouts here = body();
-  auto found = loop_search_.nearby(here);
-  const bool due = builder_.way_m() - searched_elsewhere_at_m_ >= parameters_.loop.elsewhere_each_m;
-  if (!found && due) {
-    searched_elsewhere_at_m_ = builder_.way_m();
-    found = loop_search_.elsewhere(here);
-    if (found && !isAgreedOn(*found)) return;
-  }
-  if (!found) return;
-  if (active_ && active_->pairs == pairsOf(found->match)) return;  // nothing new
-  close(*found);
-}
-
-void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
-  if (builder_.way_m() - learned_at_m_ < parameters_.loop.view_m) return;
-  learned_at_m_ = builder_.way_m();
-  Eigen::Matrix4d measured = match.T_MB.covariance;
-  addFloor(measured, parameters_.loop.floor_m, parameters_.loop.floor_rad);
-  drift_scale_.add(difference(match.T_MB.mean, prior.mean), measured,
-                   prior.covariance / odometry_variance_);
-  const double variance = drift_scale_.variance();
-  state_.scaleOdometry(variance / odometry_variance_, *session_);
-  odometry_variance_ = variance;
-}
-
-/// In streets that are alike one search may find the wrong one. The next one sees more objects.
-bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
-  constexpr double kSame_m = 3.0, kSame_rad = 0.1;
-  const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
-  const AnchorId component = componentsOf(state_.graph()).at(found.home);
-  const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m()};
-  if (tentative_ && tentative_->component == component) {
-    const double apart_m = now.way_m - tentative_->way_m;
-    const LevelError d = difference(tentative_->T_MN * T_Nb, found.match.T_MB.mean);
-    const bool same = d.head<2>().norm() < kSame_m && std::abs(d[3]) < kSame_rad;
-    const LoopParameters& loop = parameters_.loop;
-    if (same && apart_m < loop.agree_after_m) return false;
-    if (same && apart_m < loop.agree_within_m) return true;
-  }
-  tentative_ = now;
-  return false;
-}
-
-void Mapper::close(const LoopSearch::Found& found) {
-  const PlaceMatch& match = found.match;
-  if (found.prior) learnDrift(match, *found.prior);
-  const AnchorId a = found.home, b = builder_.last()->id;
-  const Edge edge = edgeFrom(a, b, match.T_MB, EdgeKind::kLoop);
-  const LevelPose before = state_.graph().pose(b);
-  const bool rests_on_the_same =
-      active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
-                             [&](const auto& pair) { return active_->pairs.contains(pair); });
-  if (rests_on_the_same) state_.removeLoop(active_->id);
-  if (!found.prior) bringTogether(edge);
-  const EdgeId id = state_.addLoop(edge);
-  active_ = {id, pairsOf(match)};
-  graphMoved();
-  const double moved_m = (state_.graph().pose(b).p - before.p).norm();
-  change_.loops.push_back({id, a, b, match, !found.prior, moved_m});
-  for (const auto& [known, seen] : match.pairs) {
-    if (known != seen) change_.merges.push_back({id, known, seen});
-  }
-}
-
-/// Moves the younger of two components to where the edge says that it lies in the older one's M.
-void Mapper::bringTogether(const Edge& edge) {
-  const auto components = componentsOf(state_.graph());
-  const bool b_is_younger = components.at(edge.b) > components.at(edge.a);
-  const AnchorId younger = components.at(b_is_younger ? edge.b : edge.a);
-  const LevelPose& T_Ma = state_.graph().pose(edge.a);
-  const LevelPose& T_Nb = state_.graph().pose(edge.b);
-  const LevelPose T_MN = T_Ma * edge.T_ab.mean * T_Nb.inverse();
-  std::set<AnchorId> moving;
-  for (const auto& [anchor, component] : components) {
-    if (component == younger) moving.insert(anchor);
-  }
-  state_.move(moving, b_is_younger ? T_MN : T_MN.inverse());
-}
-
-/// The measured T_Mb as an edge. What M says of a is not a part of its error.
-Edge Mapper::edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const {
-  Edge edge{a, b, {}, kind};
-  const LevelPose T_Ma = state_.graph().pose(a);
-  edge.T_ab.mean = T_Ma.inverse() * T_Mb.mean;
-  edge.T_ab.covariance = turnedBy(T_Ma.R().transpose(), T_Mb.covariance);
-  addFloor(edge.T_ab.covariance, parameters_.loop.floor_m, parameters_.loop.floor_rad);
-  return edge;
 }
 
 std::vector<Recallable> Mapper::near(const Eigen::Vector3d& centre_W, double radius_m) {

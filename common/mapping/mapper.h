@@ -17,6 +17,7 @@
 #include "common/mapping/frames/anchor_builder.h"
 #include "common/mapping/graph/drift_scale.h"
 #include "common/mapping/graph/marginals.h"
+#include "common/mapping/loop_book.h"
 #include "common/mapping/loop_search.h"
 #include "common/mapping/map_state.h"
 #include "common/mapping/parameters.h"
@@ -26,19 +27,20 @@
 
 namespace perdure::mapping {
 
-/// A loop that was closed.
-struct LoopClosure {
+/// A loop that was told, and that later ones contradict.
+struct LoopWithdrawal {
   EdgeId id = 0;
-  AnchorId a = 0, b = 0;  ///< b: where the body was
-  PlaceMatch match;
-  bool joins = false;         ///< a session that belonged to nothing, with the map
-  double correction_m = 0.0;  ///< how far the body's place in M moved
+  AnchorId a = 0, b = 0;
 };
 
 /// What has changed since it was asked for last.
 struct MapChange {
   std::vector<LoopClosure> loops;
   std::vector<MergeOrder> merges;
+  std::vector<LoopWithdrawal> withdrawn;
+  std::vector<MergeOrder> splits;  ///< merges of these to be undone
+
+  bool empty() const { return loops.empty() && withdrawn.empty(); }
 };
 
 /// An object of the map that lies near the body.
@@ -81,6 +83,9 @@ class Mapper {
   /// Its record, if it belongs to one.
   const ObjectRecord* recordOf(ObjectId id) const;
 
+  /// Merges that hang on loops, by the absorbed object.
+  const std::map<ObjectId, HungMerge>& merges() const { return state_.merges(); }
+
   /// What is to be saved, and that it has been.
   Unsaved unsaved() const { return state_.unsaved(); }
   void markSaved() { state_.markSaved(); }
@@ -116,10 +121,18 @@ class Mapper {
   void forgetUnconfirmed();
   void learnAnew(const WorldId& session);
   void stand(const Anchor& anchor);
+  void keepForUndo(ObjectId survivor, ObjectId absorbed);
   bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   void tie();
   void search();
   void graphMoved();
+  void settle();
+  void orderMerges(const LoopClosure& loop);
+  void withdraw(EdgeId loop);
+  void undo(ObjectId absorbed, const HungMerge& merge);
+  bool hasMerges(EdgeId loop) const;
+  void forgetMergesOf(EdgeId loop);
+  void rehang(EdgeId old, EdgeId now);
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
   bool isAgreedOn(const LoopSearch::Found& found);
   void close(const LoopSearch::Found& found);
@@ -133,6 +146,7 @@ class Mapper {
   AnchorBuilder builder_;
   LoopSearch loop_search_;
   TrackedTies tracked_ties_;
+  LoopBook loop_book_;
   DriftScale drift_scale_;
   double odometry_variance_ = 1.0;  ///< by which the session's odometry edges are multiplied
   std::optional<WorldId> session_;

@@ -46,18 +46,28 @@ struct SavedEdge {
   double weight = 1.0;  ///< of the last optimisation, (0, 1]
 };
 
+/// A merge that hangs on a loop, with what its undoing needs. Kept until the loop is old and sound.
+struct HungMerge {
+  EdgeId loop = 0;
+  ObjectId survivor = 0;
+  bool done = false;  ///< else ordered: the records are as of the order
+  ObjectRecord survivor_before, absorbed_before;
+};
+
 /// All of it, or what has changed and replaces what is stored under the same ids.
 struct SavedMap {
   std::vector<std::string> classes;  ///< names by the numbers in ClassShare; always all of them
   std::map<AnchorId, SavedAnchor> anchors;
   std::map<EdgeId, SavedEdge> edges;
   std::map<ObjectId, ObjectRecord> records;
+  std::map<ObjectId, HungMerge> merges = {};  ///< by the absorbed object
 };
 
 struct Unsaved {
   SavedMap changed;
   std::set<EdgeId> edges_gone;
   std::set<ObjectId> records_gone;
+  std::set<ObjectId> merges_gone = {};
 };
 
 }  // namespace perdure::mapping

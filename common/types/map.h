@@ -112,6 +112,9 @@ struct Recalled {
   /// The map's graph takes the drift of the odometry out, so that the filter does not.
   bool graph = false;
   std::vector<MergeOrder> merges;  ///< to be done once `objects` are in the working set
+  /// Merges to be undone before anything else: their loop was withdrawn. What was seen of the
+  /// survivor since is of the absorbed one.
+  std::vector<MergeOrder> splits;
 };
 
 }  // namespace perdure

@@ -95,6 +95,7 @@ void Node::onObjects(const Objects& objects) {
     }
   }
   std::erase_if(next.objects, [this](const ObjectBelief& b) { return !acceptable(b); });
+  renameSplit(next);
   leaveBehind(next);
   if (newest_ && !same_filter) previous_ = std::move(newest_);
   // The filter whose ids these are knows the next one; another one may not have been restored yet.
@@ -160,7 +161,8 @@ void Node::commit() {
   }
   const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
   const auto written =
-      database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr});
+      database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr,
+                       unwritten_splits_});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
@@ -173,6 +175,7 @@ void Node::commit() {
   kept_ = newest_->stamp.time;
   left_.clear();
   removed_.clear();
+  unwritten_splits_.clear();
   ++commits_;
   header_stale_ = header_stale_ || written->revision != revision_;
   revision_ = written->revision;

@@ -65,9 +65,13 @@ class Node {
   void followGraph();
   void tellLoops(const mapping::MapChange& change);
   void tellFrame();
-  /// Sends what the graph has laid near a place, with the merges of new loops.
+  void tellWithdrawals(const mapping::MapChange& change);
+  void split(const std::vector<MergeOrder>& splits);
+  void renameSplit(Objects& objects);
+  void resendOrders();
+  /// Sends what the graph has laid near a place, with what else has changed.
   void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
-                  const std::vector<MergeOrder>& merges, bool lay_again);
+                  const mapping::MapChange& change, bool lay_again);
   std::optional<ObjectBelief> laidNow(const mapping::Recallable& there);
 
   void leaveBehind(const Objects& next);
@@ -103,6 +107,10 @@ class Node {
   std::map<ObjectId, PlacedBelief> left_;
   std::map<ObjectId, Removal> removed_;
   std::set<ObjectId> laid_;  ///< by the graph, and not seen since
+  std::vector<MergeOrder> unwritten_splits_;
+  std::map<ObjectId, ObjectId> splits_;  ///< that the filter has not obeyed: survivors by absorbed
+  std::optional<TimePoint> orders_sent_;
+  bool adopts_merges_ = true;  ///< the filter may have merged while nobody heard it
   struct ToldFrame {
     WorldId world;
     std::uint64_t revision = 0;

@@ -65,10 +65,94 @@ void Node::onOdometry(const Odometry& odometry) {
 void Node::followGraph() {
   mapper_.onObjects(*newest_);
   const auto change = mapper_.takeChange();
-  if (change.loops.empty()) return;
-  commit();  // what is laid is read from the file
+  if (change.empty()) return resendOrders();
+  split(change.splits);
+  commit();  // what is laid is read from the file; and orders are known before they are obeyed
   tellLoops(change);
-  recallLaid(newest_->T_WB.p, kAroundALoop_m, change.merges, true);
+  tellWithdrawals(change);
+  recallLaid(newest_->T_WB.p, kAroundALoop_m, change, true);
+  orders_sent_ = newest_->stamp.time;
+}
+
+/// What the survivor is now was seen of the absorbed one.
+void Node::split(const std::vector<MergeOrder>& splits) {
+  for (const MergeOrder& order : splits) {
+    removed_.erase(order.absorbed);
+    laid_.erase(order.survivor);
+    splits_[order.absorbed] = order.survivor;
+    unwritten_splits_.insert(unwritten_splits_.begin(), order);
+    auto left = left_.extract(order.survivor);
+    if (left.empty()) continue;
+    left.key() = left.mapped().belief.id = order.absorbed;
+    left_.insert(std::move(left));
+  }
+  renameSplit(*newest_);
+}
+
+/// Until the filter has obeyed, what it has under a survivor's id is of the absorbed object.
+void Node::renameSplit(Objects& next) {
+  if (splits_.empty()) return;
+  const auto find = [&](ObjectId id) {
+    return std::find_if(next.objects.begin(), next.objects.end(),
+                        [&](const ObjectBelief& b) { return b.id == id; });
+  };
+  std::erase_if(splits_, [&](const auto& split) {
+    const auto survivor = find(split.second);
+    const bool obeyed = find(split.first) != next.objects.end() ||
+                        survivor == next.objects.end() || survivor->recalled;
+    if (!obeyed) survivor->id = split.first;
+    return obeyed;
+  });
+  std::sort(next.objects.begin(), next.objects.end(),
+            [](const ObjectBelief& a, const ObjectBelief& b) { return a.id < b.id; });
+}
+
+/// Merges that were ordered and not done: a message may be lost, and either side may have begun
+/// anew since.
+void Node::resendOrders() {
+  constexpr Duration kEach = std::chrono::seconds(1);
+  if (orders_sent_ && newest_->stamp.time - *orders_sent_ < kEach &&
+      newest_->stamp.time >= *orders_sent_) {
+    return;
+  }
+  orders_sent_ = newest_->stamp.time;
+  std::map<ObjectId, bool> recalled;
+  for (const ObjectBelief& belief : newest_->objects) recalled[belief.id] = belief.recalled;
+  mapping::MapChange again;
+  for (const auto& [absorbed, merge] : std::map(mapper_.merges())) {
+    if (merge.done) continue;
+    const auto survivor = recalled.find(merge.survivor);
+    if (recalled.contains(absorbed)) {
+      again.merges.push_back({merge.loop, merge.survivor, absorbed});
+    } else if (adopts_merges_ && survivor != recalled.end() && !survivor->second) {
+      mapper_.onMerged(merge.survivor, absorbed);
+      removed_[absorbed] = {EventKind::kMerged, newest_->stamp.time, merge.survivor};
+      dirty_ = true;
+    }
+  }
+  adopts_merges_ = false;
+  if (!again.merges.empty()) recallLaid(newest_->T_WB.p, kAroundALoop_m, again, false);
+}
+
+void Node::tellWithdrawals(const mapping::MapChange& change) {
+  for (const mapping::LoopWithdrawal& loop : change.withdrawn) {
+    std::string split;
+    for (const MergeOrder& order : change.splits) {
+      if (order.loop != loop.id) continue;
+      split += fmt::format("{}{} from {}", split.empty() ? "" : ", ", order.absorbed,
+                           order.survivor);
+    }
+    Event event;
+    event.stamp = newest_->stamp;
+    event.instance = instance_;
+    event.world = newest_->world;
+    event.kind = EventKind::kLoopWithdrawn;
+    event.detail = fmt::format(
+        "loop {} is contradicted by later ones; objects that are two again: {}; anchors {} and {}",
+        loop.id, split.empty() ? "none" : split, loop.a, loop.b);
+    outputs_.event(event);
+    reasons_.add("loops_withdrawn");
+  }
 }
 
 void Node::tellLoops(const mapping::MapChange& change) {
@@ -129,14 +213,15 @@ std::optional<ObjectBelief> Node::laidNow(const mapping::Recallable& there) {
 }
 
 void Node::recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
-                      const std::vector<MergeOrder>& merges, bool lay_again) {
+                      const mapping::MapChange& change, bool lay_again) {
   Recalled recalled;
   recalled.instance = instance_;
   recalled.world = newest_->world;
   recalled.client = newest_->instance;
   recalled.next_id = next_id_;
   recalled.laid = recalled.graph = true;
-  recalled.merges = merges;
+  recalled.merges = change.merges;
+  recalled.splits = change.splits;
   std::set<ObjectId> working;
   for (const auto& belief : newest_->objects) working.insert(belief.id);
   for (const mapping::Recallable& there : mapper_.near(centre_W, radius_m)) {
@@ -147,7 +232,7 @@ void Node::recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
     laid_.insert(there.id);
     recalled.objects.push_back(std::move(*belief));
   }
-  if (recalled.objects.empty() && merges.empty()) return;
+  if (recalled.objects.empty() && change.merges.empty() && change.splits.empty()) return;
   outputs_.recalled(recalled);
 }
 

@@ -77,6 +77,13 @@ void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Even
   known.class_name = o.best().name;
 }
 
+void EventTracker::renamed(ObjectId from, ObjectId to) {
+  auto node = known_.extract(from);
+  if (node.empty()) return;
+  node.key() = to;
+  known_.insert(std::move(node));
+}
+
 std::vector<Event> EventTracker::update(const Objects& objects,
                                         const std::vector<MergeRecord>& merges) {
   Event blank;

@@ -14,6 +14,8 @@ namespace perdure::semantic_filter {
 
 class EventTracker {
  public:
+  /// An object goes on under another id.
+  void renamed(ObjectId from, ObjectId to);
   /// Returns the events since the last call, ordered by object id. `merges`: those since then.
   std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
   /// An object was recalled with this id. The next update makes its event. `how`: detail of the

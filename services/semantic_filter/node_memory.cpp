@@ -150,6 +150,11 @@ void Node::insertRecalled(const Recalled& recalled) {
 void Node::insertLaid(const Recalled& recalled) {
   if (history_.empty()) return;
   const FrameInput& input = history_.newest().input;
+  for (const MergeOrder& split : recalled.splits) {
+    if (history_.split(split.survivor, split.absorbed)) {
+      events_.renamed(split.survivor, split.absorbed);
+    }
+  }
   for (const ObjectBelief& belief : soundOf(recalled.objects)) {
     if (belief.moving > 0.5) {
       reasons_.add("recalled_moving");

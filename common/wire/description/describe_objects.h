@@ -120,6 +120,7 @@ void describe(A& a, D& d, W& w) {
   a.value("laid", d.laid, w.laid);
   a.value("graph", d.graph, w.graph);
   a.list("merges", d.merges, w.merges, kObjects);
+  a.list("splits", d.splits, w.splits, kObjects);
 }
 
 template <class A, Is<Event> D, class W>

@@ -9,6 +9,7 @@ namespace {
 
 using mapping::Anchor;
 using mapping::Edge;
+using mapping::HungMerge;
 using mapping::LevelGaussian;
 using mapping::LevelPose;
 using mapping::ObjectRecord;
@@ -89,6 +90,25 @@ void take(ByteReader& in, Sighting& sighting) {
   }
 }
 
+void put(ByteWriter& out, const ObjectRecord& record) {
+  put(out, record.session);
+  out.put(record.way_m);
+  out.put(record.last_seen);
+  out.put(record.pose_error);
+  put(out, record.sighting);
+  out.put(record.earlier.has_value());
+  if (record.earlier) put(out, *record.earlier);
+}
+
+void take(ByteReader& in, ObjectRecord& record) {
+  take(in, record.session);
+  record.way_m = in.takeReal();
+  record.last_seen = in.takeTime();
+  in.takeInto(record.pose_error);
+  take(in, record.sighting);
+  if (in.takeFlag()) take(in, record.earlier.emplace());
+}
+
 bool isSoundGaussian(const LevelGaussian& gaussian) {
   return isSound(gaussian.mean) && gaussian.covariance.allFinite();
 }
@@ -143,6 +163,11 @@ bool isSound(const ObjectRecord& record) {
          isSoundSighting(record.sighting) && (!record.earlier || isSoundSighting(*record.earlier));
 }
 
+bool isSound(const HungMerge& merge) {
+  return merge.loop != 0 && merge.survivor != 0 && isSound(merge.survivor_before) &&
+         isSound(merge.absorbed_before);
+}
+
 Bytes encodeAnchor(const Anchor& anchor) {
   ByteWriter out;
   out.put(kGraphFormat);
@@ -194,25 +219,39 @@ Result<Edge> decodeEdge(std::span<const std::uint8_t> bytes) {
 Bytes encodeRecord(const ObjectRecord& record) {
   ByteWriter out;
   out.put(kGraphFormat);
-  put(out, record.session);
-  out.put(record.way_m);
-  out.put(record.last_seen);
-  out.put(record.pose_error);
-  put(out, record.sighting);
-  out.put(record.earlier.has_value());
-  if (record.earlier) put(out, *record.earlier);
+  put(out, record);
   return out.take();
 }
 
 Result<ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes) {
   return decode<ObjectRecord>("sighting", bytes, [](ByteReader& in, ObjectRecord& record) {
-    take(in, record.session);
-    record.way_m = in.takeReal();
-    record.last_seen = in.takeTime();
-    in.takeInto(record.pose_error);
-    take(in, record.sighting);
-    if (in.takeFlag()) take(in, record.earlier.emplace());
+    take(in, record);
     record.confirmed = true;
+  });
+}
+
+Bytes encodeMerge(const HungMerge& merge) {
+  ByteWriter out;
+  out.put(kGraphFormat);
+  out.put(merge.loop);
+  out.put(merge.survivor);
+  out.put(merge.done);
+  for (const ObjectRecord* record : {&merge.survivor_before, &merge.absorbed_before}) {
+    put(out, *record);
+    out.put(record->confirmed);
+  }
+  return out.take();
+}
+
+Result<HungMerge> decodeMerge(std::span<const std::uint8_t> bytes) {
+  return decode<HungMerge>("merge", bytes, [](ByteReader& in, HungMerge& merge) {
+    merge.loop = in.take<std::uint64_t>();
+    merge.survivor = in.take<std::uint64_t>();
+    merge.done = in.takeFlag();
+    for (ObjectRecord* record : {&merge.survivor_before, &merge.absorbed_before}) {
+      take(in, *record);
+      record->confirmed = in.takeFlag();
+    }
   });
 }
 

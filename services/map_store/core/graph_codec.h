@@ -20,6 +20,7 @@ bool isSound(const mapping::LevelPose& pose);
 bool isSound(const mapping::Anchor& anchor);
 bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
+bool isSound(const mapping::HungMerge& merge);
 
 // The decoders refuse ("graph_malformed") what is cut short, too long, of another version or not
 // sound.
@@ -33,5 +34,8 @@ Result<mapping::Edge> decodeEdge(std::span<const std::uint8_t> bytes);
 /// Of confirmed objects: `confirmed` is not kept and comes back true.
 Bytes encodeRecord(const mapping::ObjectRecord& record);
 Result<mapping::ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes);
+
+Bytes encodeMerge(const mapping::HungMerge& merge);
+Result<mapping::HungMerge> decodeMerge(std::span<const std::uint8_t> bytes);
 
 }  // namespace perdure::map_store

@@ -88,6 +88,20 @@ Result<void> readRecords(const Connection& connection, SavedGraph& graph) {
                   });
 }
 
+Result<void> readMerges(const Connection& connection, SavedGraph& graph) {
+  const auto there = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'merges'");
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (*there == 0) return {};
+  auto& merges = graph.map.merges;
+  return takeRows(connection, "SELECT absorbed, undo FROM merges ORDER BY absorbed",
+                  graph.malformed, [&](const Statement& row) {
+                    auto merge = decodeMerge(row.blob(1));
+                    if (!merge || row.id(0) == 0) return false;
+                    merges.emplace_hint(merges.end(), row.id(0), *std::move(merge));
+                    return true;
+                  });
+}
+
 /// A predecessor comes before, so that what hangs on one that was left out is left out too.
 void leaveOutBrokenChains(SavedGraph& graph) {
   auto& anchors = graph.map.anchors;
@@ -116,6 +130,11 @@ void leaveOutDangling(SavedGraph& graph) {
   });
   graph.malformed += std::erase_if(
       map.records, [&](const auto& each) { return !isKnown(each.second.sighting, map); });
+  graph.malformed += std::erase_if(map.merges, [&](const auto& each) {
+    const mapping::HungMerge& merge = each.second;
+    return !map.edges.contains(merge.loop) || !isKnown(merge.survivor_before.sighting, map) ||
+           !isKnown(merge.absorbed_before.sighting, map);
+  });
   for (auto& [id, record] : map.records) {
     if (!record.earlier || isKnown(*record.earlier, map)) continue;
     record.earlier.reset();
@@ -164,6 +183,7 @@ Result<void> readAll(const Connection& connection, SavedGraph& graph) {
   if (done) done = readAnchors(connection, graph);
   if (done) done = readEdges(connection, graph);
   if (done) done = readRecords(connection, graph);
+  if (done) done = readMerges(connection, graph);
   return done;
 }
 

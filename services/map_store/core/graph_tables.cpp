@@ -10,6 +10,7 @@ namespace perdure::map_store {
 // Blobs are what core/graph_codec.h says, and the columns beside them repeat what they hold, to be
 // asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
 // weight. These have no type: REAL would lose the sign of zero.
+// A merge that hangs on a loop keeps the survivor's belief as it was: world, epoch, belief.
 const char* const kGraphSchema = R"sql(
 CREATE TABLE graph_classes(number INTEGER PRIMARY KEY, name TEXT NOT NULL);
 CREATE TABLE anchors(
@@ -36,6 +37,12 @@ CREATE VIEW objects_in_map AS
     WHERE o.gone = 0);
 )sql";
 
+const char* const kMergesSchema = R"sql(
+CREATE TABLE IF NOT EXISTS merges(
+  absorbed INTEGER PRIMARY KEY, survivor INTEGER NOT NULL, loop INTEGER NOT NULL,
+  done INTEGER NOT NULL, undo BLOB NOT NULL, world INTEGER, epoch INTEGER, belief BLOB);
+)sql";
+
 namespace {
 
 constexpr char kPutAnchor[] =
@@ -46,6 +53,10 @@ constexpr char kPutPose[] = "REPLACE INTO anchor_poses VALUES(?1, ?2, ?3, ?4, ?5
 constexpr char kPutEdge[] = "REPLACE INTO edges VALUES(?1, ?2, ?3, ?4, ?5, ?6)";
 constexpr char kPutSighting[] =
     "REPLACE INTO sightings VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
+constexpr char kPutMerge[] =
+    "INSERT INTO merges SELECT ?1, ?2, ?3, ?4, ?5, o.world, o.epoch, o.belief "
+    "FROM (SELECT 1) LEFT JOIN objects o ON o.id = ?2 WHERE true "
+    "ON CONFLICT(absorbed) DO UPDATE SET survivor = ?2, loop = ?3, done = ?4, undo = ?5";
 constexpr char kPutClass[] =
     "INSERT INTO graph_classes VALUES(?1, ?2) ON CONFLICT(number) DO UPDATE SET name = ?2 "
     "WHERE name <> ?2";
@@ -67,6 +78,7 @@ Result<void> runForEach(const Connection& connection, std::string_view sql, cons
 
 using AnchorRow = std::pair<const mapping::AnchorId, mapping::SavedAnchor>;
 using EdgeRow = std::pair<const mapping::EdgeId, mapping::SavedEdge>;
+using MergeRow = std::pair<const ObjectId, mapping::HungMerge>;
 using SightingRow = std::pair<const ObjectId, mapping::ObjectRecord>;
 
 void bindAnchor(Statement& to, const AnchorRow& row) {
@@ -101,6 +113,13 @@ void bindSighting(Statement& to, const SightingRow& row) {
   to.bind(10, std::span<const std::uint8_t>(encodeRecord(record)));
 }
 
+void bindMerge(Statement& to, const MergeRow& row) {
+  const mapping::HungMerge& merge = row.second;
+  to.bindId(1, row.first).bindId(2, merge.survivor).bindId(3, merge.loop);
+  to.bind(4, std::int64_t{merge.done});
+  to.bind(5, std::span<const std::uint8_t>(encodeMerge(merge)));
+}
+
 /// Elements of `all` that may be written; how many may not is added to `refused`.
 template <class All, class MayBeWritten>
 std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
@@ -124,18 +143,18 @@ Result<void> putClasses(const Connection& connection, const std::vector<std::str
 }
 
 Result<void> deleteFrom(const Connection& connection, const std::string& table,
-                        const std::set<std::uint64_t>& ids) {
-  return runForEach(connection, "DELETE FROM " + table + " WHERE id = ?1", ids,
+                        const std::set<std::uint64_t>& ids, const std::string& key = "id") {
+  return runForEach(connection, "DELETE FROM " + table + " WHERE " + key + " = ?1", ids,
                     [](Statement& to, std::uint64_t id) { to.bindId(1, id); });
 }
 
 /// Rows of a table whose id is not among those of `known`.
 template <class Known>
 Result<void> deleteOthers(const Connection& connection, const std::string& table,
-                          const Known& known) {
+                          const Known& known, const std::string& key = "id") {
   std::set<std::uint64_t> others;
   {
-    auto rows = connection.prepare("SELECT id FROM " + table);
+    auto rows = connection.prepare("SELECT " + key + " FROM " + table);
     if (!rows) return tl::unexpected<Reason>(rows.error());
     for (;;) {
       const auto row = rows->step();
@@ -144,7 +163,7 @@ Result<void> deleteOthers(const Connection& connection, const std::string& table
       if (!known.contains(rows->id(0))) others.insert(rows->id(0));
     }
   }
-  return deleteFrom(connection, table, others);
+  return deleteFrom(connection, table, others, key);
 }
 
 }  // namespace
@@ -163,6 +182,8 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
     unconfirmed += r.confirmed ? 0 : 1;
     return r.confirmed && isSound(r);
   });
+  const auto merges = soundOnes(changed.merges, refused,
+                                [](const mapping::HungMerge& merge) { return isSound(merge); });
   auto done = putClasses(connection, changed.classes);
   if (done) done = deleteFrom(connection, "edges", unsaved.edges_gone);
   if (done) done = deleteFrom(connection, "sightings", unsaved.records_gone);
@@ -170,6 +191,8 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
   if (done) done = runForEach(connection, kPutPose, anchors, bindPose);
   if (done) done = runForEach(connection, kPutEdge, edges, bindEdge);
   if (done) done = runForEach(connection, kPutSighting, records, bindSighting);
+  if (done) done = deleteFrom(connection, "merges", unsaved.merges_gone, "absorbed");
+  if (done) done = runForEach(connection, kPutMerge, merges, bindMerge);
   if (!done) return tl::unexpected<Reason>(done.error());
   return refused - unconfirmed;
 }
@@ -187,6 +210,7 @@ Result<void> sweepGraph(const Connection& connection) {
   if (done) done = deleteOthers(connection, "anchor_poses", map.anchors);
   if (done) done = deleteOthers(connection, "edges", map.edges);
   if (done) done = deleteOthers(connection, "sightings", map.records);
+  if (done) done = deleteOthers(connection, "merges", map.merges, "absorbed");
   if (!done) return done;
   const auto written = writeGraph(connection, shortened);
   if (!written) return tl::unexpected<Reason>(written.error());

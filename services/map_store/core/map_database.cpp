@@ -197,6 +197,49 @@ Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
                  static_cast<std::int64_t>(Memory::kLongTerm));
 }
 
+/// The absorbed one as it went: history, and on the map again.
+Result<void> MapDatabase::bringBack(ObjectId absorbed, ObjectId survivor, Change& change) {
+  change.objects.insert(absorbed);
+  auto done = runOnce(connection_,
+                      "UPDATE objects SET gone = 0, gone_ns = NULL, merged_into = NULL "
+                      "WHERE id = ?1 AND merged_into = ?2",
+                      asStored(absorbed), asStored(survivor));
+  if (!done) return done;
+  return runOnce(connection_,
+                 "REPLACE INTO positions SELECT id, x, x, y, y, z, z FROM objects "
+                 "WHERE id = ?1 AND gone = 0",
+                 asStored(absorbed));
+}
+
+Result<void> MapDatabase::undoMerge(const MergeOrder& split, Change& change) {
+  auto rows = connection_.prepare(
+      "SELECT m.world, m.epoch, m.belief, o.world, o.epoch, o.belief FROM merges m "
+      "LEFT JOIN objects o ON o.id = m.survivor AND o.gone = 0 WHERE m.absorbed = ?1");
+  if (!rows) return failed(rows.error());
+  const auto there = rows->bindId(1, split.absorbed).step();
+  if (!there) return failed(there.error());
+  if (!*there) return {};
+  const auto placedAt = [&](int column) -> std::optional<PlacedBelief> {
+    auto belief = decodeBelief(rows->blob(column + 2));
+    if (!belief) return std::nullopt;
+    return PlacedBelief{{rows->id(column), static_cast<std::uint32_t>(rows->integer(column + 1))},
+                        *std::move(belief)};
+  };
+  const std::optional<PlacedBelief> before = placedAt(0);
+  std::optional<PlacedBelief> now = placedAt(3);
+  auto done = bringBack(split.absorbed, split.survivor, change);
+  committed_.erase(split.survivor);
+  committed_.erase(split.absorbed);
+  if (!before || !now || now->belief.last_seen == before->belief.last_seen) return done;
+  now->belief.id = split.absorbed;
+  for (const PlacedBelief* placed : {static_cast<const PlacedBelief*>(&*now), &*before}) {
+    const auto square = squareOf(placed->belief.best().mean.head<3>(), tile_size_m_);
+    if (done && square) done = insert(*placed, *square, encodeBelief(placed->belief));
+    change.objects.insert(placed->belief.id);
+  }
+  return done ? markLeft(split.survivor, change) : done;
+}
+
 Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& change) {
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
@@ -274,7 +317,11 @@ Result<std::uint64_t> MapDatabase::putGraph(const mapping::Unsaved& graph) {
 }
 
 Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
-  auto done = putObjects(batch, change);
+  Result<void> done;
+  for (const MergeOrder& split : batch.splits) {
+    if (done) done = undoMerge(split, change);
+  }
+  if (done) done = putObjects(batch, change);
   std::set<ObjectId> alive, away;
   for (const auto& belief : batch.working->objects) alive.insert(belief.id);
   for (const auto& [id, row] : committed_) away.insert(id);

@@ -45,6 +45,9 @@ struct Batch {
   /// Of the working set: laid by the graph and not seen since. What is stored of them stays.
   std::set<ObjectId> laid = {};
   const mapping::Unsaved* graph = nullptr;  ///< what of it has changed; null: nothing
+  /// Merges to be undone, the newest first: the survivor is as it was before, and what it is now
+  /// is the absorbed one.
+  std::vector<MergeOrder> splits = {};
 };
 
 struct Written {
@@ -139,6 +142,8 @@ class MapDatabase {
   Result<void> put(const PlacedBelief& placed, TimePoint now, Change& change);
   Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes);
   Result<void> putObjects(const Batch& batch, Change& change);
+  Result<void> undoMerge(const MergeOrder& split, Change& change);
+  Result<void> bringBack(ObjectId absorbed, ObjectId survivor, Change& change);
   Result<void> addDoubtful(std::set<ObjectId>& ids) const;
   Result<void> markLeft(ObjectId id, Change& change);
   Result<void> remove(ObjectId id, const Removal& removal, Change& change);

@@ -126,6 +126,28 @@ void History::join(ObjectId id, ObjectId absorbed, const FrameInput& input) {
   for (HistoryFrame& f : frames_) (void)filter_.join(f.before, id, absorbed, f.input);
 }
 
+bool History::split(ObjectId id, ObjectId absorbed) {
+  const auto rename = [&](std::vector<Track>& tracks) {
+    const auto find = [&](ObjectId wanted) {
+      return std::find_if(tracks.begin(), tracks.end(),
+                          [&](const Track& o) { return o.id == wanted; });
+    };
+    const auto joined = find(id);
+    if (joined == tracks.end()) return false;
+    const bool is_seen = !joined->life.recalled && find(absorbed) == tracks.end();
+    if (!is_seen) {  // before the join, or laid and not seen since
+      tracks.erase(joined);
+      return false;
+    }
+    joined->id = absorbed;
+    std::sort(tracks.begin(), tracks.end(),
+              [](const Track& a, const Track& b) { return a.id < b.id; });
+    return true;
+  };
+  for (HistoryFrame& f : frames_) (void)rename(f.before.tracks);
+  return rename(belief_.tracks);
+}
+
 std::optional<ComingFrame> History::comingAfter(const HistoryFrame& frame) const {
   for (std::size_t i = 1; i < frames_.size(); ++i) {
     if (&frames_[i] != &frame) continue;

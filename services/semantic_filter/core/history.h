@@ -57,6 +57,9 @@ class History {
   void erase(const std::set<ObjectId>& ids);
   /// Two tracks are one object, in all of these beliefs.
   void join(ObjectId id, ObjectId absorbed, const FrameInput& input);
+  /// Undoes a join: what was seen of `id` since is of the absorbed object. What `id` was laid with
+  /// says little beside that. Returns whether it was seen since.
+  bool split(ObjectId id, ObjectId absorbed);
 
   std::deque<HistoryFrame>& frames() { return frames_; }
   const std::deque<HistoryFrame>& frames() const { return frames_; }

@@ -15,6 +15,11 @@ inline void apply(const Unsaved& unsaved, SavedMap& map) {
   for (const auto& [id, anchor] : unsaved.changed.anchors) map.anchors[id] = anchor;
   for (const auto& [id, edge] : unsaved.changed.edges) map.edges[id] = edge;
   for (const auto& [id, record] : unsaved.changed.records) map.records[id] = record;
+  for (const auto& [id, merge] : unsaved.changed.merges) map.merges[id] = merge;
+  for (const ObjectId id : unsaved.merges_gone) {
+    map.merges.erase(id);
+    EXPECT_FALSE(unsaved.changed.merges.contains(id)) << "the merge of " << id << " is both";
+  }
   for (const EdgeId id : unsaved.edges_gone) {
     map.edges.erase(id);
     EXPECT_FALSE(unsaved.changed.edges.contains(id)) << "edge " << id << " is both";
@@ -28,7 +33,8 @@ inline void apply(const Unsaved& unsaved, SavedMap& map) {
 inline bool isEmpty(const Unsaved& unsaved) {
   return unsaved.changed.anchors.empty() && unsaved.changed.edges.empty() &&
          unsaved.changed.records.empty() && unsaved.edges_gone.empty() &&
-         unsaved.records_gone.empty();
+         unsaved.records_gone.empty() && unsaved.changed.merges.empty() &&
+         unsaved.merges_gone.empty();
 }
 
 template <class Map>
@@ -58,6 +64,7 @@ inline void expectSame(const SavedMap& a, const SavedMap& b) {
   ASSERT_EQ(keysOf(a.anchors), keysOf(b.anchors));
   ASSERT_EQ(keysOf(a.edges), keysOf(b.edges));
   ASSERT_EQ(keysOf(a.records), keysOf(b.records));
+  ASSERT_EQ(keysOf(a.merges), keysOf(b.merges));
   for (const auto& [id, x] : a.anchors) {
     const SavedAnchor& y = b.anchors.at(id);
     const std::string what = "anchor " + std::to_string(id);

@@ -131,6 +131,11 @@ class Drive {
     apply(mapper_->unsaved(), map);
     return map;
   }
+  /// The same, on another map.
+  void restartOn(SavedMap map) {
+    begun_with_ = std::move(map);
+    mapper_ = std::make_unique<Mapper>(parametersOf(settings_), begun_with_);
+  }
   /// The filter calls two objects by each other's ids from now on.
   void confuse(ObjectId a, ObjectId b) {
     told_as_[a] = b;
@@ -144,6 +149,8 @@ class Drive {
   const Settings& settings() const { return settings_; }
   const std::shared_ptr<Archive>& archive() const { return archive_; }
   const std::vector<LoopClosure>& loops() const { return loops_; }
+  const std::vector<LoopWithdrawal>& withdrawn() const { return withdrawn_; }
+  const std::vector<MergeOrder>& splits() const { return splits_; }
   /// How far the body was off in M before the message that closed the first loop, and after.
   double offBefore() const { return off_before_; }
   double offAfter() const { return off_after_; }
@@ -198,6 +205,8 @@ class Drive {
       off_after_ = off();
     }
     loops_.insert(loops_.end(), change.loops.begin(), change.loops.end());
+    withdrawn_.insert(withdrawn_.end(), change.withdrawn.begin(), change.withdrawn.end());
+    splits_.insert(splits_.end(), change.splits.begin(), change.splits.end());
     for (const MergeOrder& merge : change.merges) join(merge);
   }
 
@@ -329,6 +338,8 @@ class Drive {
   double way_m_ = 0.0, off_before_ = 0.0, off_after_ = 0.0;
   std::uint64_t sequence_ = 0;
   std::vector<LoopClosure> loops_;
+  std::vector<LoopWithdrawal> withdrawn_;
+  std::vector<MergeOrder> splits_;
   std::size_t right_ = 0, wrong_ = 0, recalled_ = 0, renamed_ = 0;
 };
 

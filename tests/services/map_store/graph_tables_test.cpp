@@ -307,5 +307,90 @@ TEST_F(GraphTables, StayAsTheyWereWhereTheDiskIsFull) {
   EXPECT_EQ(read().map.edges.size(), map.edges.size() - 1);
 }
 
+class UndoneMerge : public GraphTables {
+ protected:
+  static constexpr ObjectId kOld = 3, kNew = 9;
+
+  UndoneMerge() : graph_{RandomGraph(5).map({40, 60, 20, 1, 0}), {}, {}} {
+    commit({carAt(kOld, {1, 2, 0}), carAt(kNew, {8, 2, 0})}, {}, {});
+    const mapping::EdgeId loop = graph_.changed.edges.rbegin()->first;
+    order_ = {loop, kOld, kNew};
+    graph_.changed.merges[kNew] = {loop, kOld, false, graph_.changed.records.at(kOld),
+                                   graph_.changed.records.at(kNew)};
+    commit({carAt(kOld, {1, 2, 0}), carAt(kNew, {8, 2, 0})}, {}, {});
+  }
+  void commit(std::vector<ObjectBelief> beliefs, std::map<ObjectId, Removal> removed,
+              std::vector<MergeOrder> splits) {
+    const Objects objects = workingSet(++commits_, std::move(beliefs));
+    Batch batch{&objects, {}, std::move(removed)};
+    batch.graph = &graph_;
+    batch.splits = std::move(splits);
+    MapDatabase database({path()});
+    const auto written = database.write(batch);
+    ASSERT_TRUE(written.has_value()) << written.error().detail;
+  }
+  /// The survivor is seen where the absorbed one was.
+  ObjectBelief joined() const {
+    ObjectBelief belief = carAt(kOld, {8.1, 2, 0});
+    belief.last_seen += std::chrono::seconds(5);
+    return belief;
+  }
+  void merge() {
+    commit({joined()}, {{kNew, {EventKind::kMerged, fromNanoseconds(900'000'000), kOld}}}, {});
+    ASSERT_EQ(placeOf(kNew), std::nullopt);
+    ASSERT_NEAR(placeOf(kOld)->x(), 8.1, 1e-12);
+  }
+  void withdraw() {
+    graph_.changed.merges.clear();
+    graph_.merges_gone = {kNew};
+  }
+  std::optional<Eigen::Vector3d> placeOf(ObjectId id) {
+    const auto connection = openStoreForReading(path());
+    const auto place = MapReader(&connection).placeOf(id);
+    return place && *place ? std::optional((*place)->p_W) : std::nullopt;
+  }
+
+  Unsaved graph_;
+  MergeOrder order_;
+  std::uint64_t commits_ = 10;
+};
+
+TEST_F(UndoneMerge, GivesTheSurvivorBackAsItWasAndTheAbsorbedOneWhatWasSeenSince) {
+  merge();
+  withdraw();
+  ObjectBelief renamed = joined();
+  renamed.id = kNew;
+  commit({renamed}, {}, {order_});
+  EXPECT_EQ(*placeOf(kOld), Eigen::Vector3d(1, 2, 0));
+  EXPECT_EQ(*placeOf(kNew), Eigen::Vector3d(8.1, 2, 0));
+  EXPECT_EQ(ask("SELECT count(*) FROM positions WHERE id IN (3, 9)"), 2);
+  EXPECT_EQ(ask("SELECT count(*) FROM merges"), 0);
+  EXPECT_EQ(ask("SELECT memory FROM objects WHERE id = 3"),
+            static_cast<std::int64_t>(Memory::kLongTerm));
+}
+
+TEST_F(UndoneMerge, WorksWhereTheObjectHasLeftTheWorkingSet) {
+  merge();
+  commit({}, {}, {});
+  withdraw();
+  commit({}, {}, {order_});
+  EXPECT_EQ(*placeOf(kOld), Eigen::Vector3d(1, 2, 0));
+  EXPECT_EQ(*placeOf(kNew), Eigen::Vector3d(8.1, 2, 0)) << "what was seen since is of it";
+}
+
+TEST_F(UndoneMerge, ChangesNothingWhereTheOrderWasNeverObeyed) {
+  withdraw();
+  commit({carAt(kOld, {1, 2, 0}), carAt(kNew, {8, 2, 0})}, {}, {order_});
+  EXPECT_EQ(*placeOf(kOld), Eigen::Vector3d(1, 2, 0));
+  EXPECT_EQ(*placeOf(kNew), Eigen::Vector3d(8, 2, 0));
+}
+
+TEST_F(UndoneMerge, MapsOfTheFirstSchemaThreeAreGivenTheTable) {
+  change("DROP TABLE merges");
+  EXPECT_EQ(read().malformed, 0u) << "a reader does without";
+  merge();
+  EXPECT_EQ(ask("SELECT count(*) FROM merges"), 1);
+}
+
 }  // namespace
 }  // namespace perdure::map_store

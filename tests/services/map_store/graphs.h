@@ -10,7 +10,7 @@
 namespace perdure::map_store::test {
 
 struct GraphSize {
-  std::size_t anchors = 40, edges = 60, records = 100, sessions = 2;
+  std::size_t anchors = 40, edges = 60, records = 100, sessions = 2, merges = 5;
 };
 
 class RandomGraph {
@@ -36,6 +36,7 @@ class RandomGraph {
       map.edges[next++] = edge(a, b, mapping::EdgeKind::kLoop);
     }
     for (ObjectId id = 1; id <= size.records; ++id) map.records[id] = record(id, map);
+    for (ObjectId id = 1; id <= size.merges; ++id) map.merges[1000 + id] = merge(id, 1000 + id, map);
     return map;
   }
 
@@ -72,6 +73,13 @@ class RandomGraph {
     if (random_() % 3 == 0) record.earlier = sighting(id, map);
     record.confirmed = true;
     return record;
+  }
+
+  mapping::HungMerge merge(ObjectId survivor, ObjectId absorbed, const mapping::SavedMap& map) {
+    mapping::HungMerge merge{map.edges.rbegin()->first, survivor, random_() % 2 == 0,
+                             record(survivor, map), record(absorbed, map)};
+    merge.absorbed_before.confirmed = random_() % 2 == 0;
+    return merge;
   }
 
  private:
@@ -136,6 +144,10 @@ inline std::string bitsOf(const mapping::SavedMap& map) {
     out.put(id);
     out.put(record.confirmed);
     add(encodeRecord(record));
+  }
+  for (const auto& [absorbed, merge] : map.merges) {
+    out.put(absorbed);
+    add(encodeMerge(merge));
   }
   add(out.take());
   return bits;

@@ -51,6 +51,55 @@ TEST_F(LaidRecall, ALoopLaysTheFirstLapBesideTheBodyAndJoinsWhatIsOne) {
   }
 }
 
+TEST_F(LaidRecall, MergesAreOrderedAgainUntilTheyAreDone) {
+  start();
+  const Recalled laid = driveToTheLoop();
+  ASSERT_FALSE(laid.merges.empty());
+  recalled_.clear();
+  const auto second = [&] {
+    sequence_ += 11;
+    publish();
+  };
+  second();
+  ASSERT_EQ(recalled_.size(), 1u);
+  EXPECT_EQ(recalled_[0].merges.size(), laid.merges.size());
+  const MergeOrder done = laid.merges.front();
+  Event event;
+  event.kind = EventKind::kMerged;
+  event.object_id = done.survivor;
+  event.other_id = done.absorbed;
+  event.stamp = stamp(sequence_);
+  node_->onEvent(event);
+  working_.erase(done.absorbed);
+  second();
+  ASSERT_GE(recalled_.size(), 1u);
+  for (const MergeOrder& merge : recalled_.back().merges) {
+    EXPECT_NE(merge.absorbed, done.absorbed);
+  }
+}
+
+TEST_F(LaidRecall, AMergeThatWasDoneWhileNobodyHeardItIsKnownAfterARestart) {
+  start();
+  const Recalled laid = driveToTheLoop();
+  ASSERT_FALSE(laid.merges.empty());
+  const MergeOrder order = laid.merges.front();
+  node_.reset();  // killed: the order was given
+  start();
+  ObjectBelief merged = working_.at(order.absorbed);
+  working_.erase(order.absorbed);
+  merged.id = order.survivor;
+  working_[order.survivor] = merged;
+  ++sequence_;
+  publish();
+  node_->flush();
+  EXPECT_FALSE(node_->mapper().holds(order.absorbed));
+  EXPECT_TRUE(node_->mapper().merges().at(order.absorbed).done);
+  MapQuery query;
+  query.kind = MapQueryKind::kById;
+  query.object_id = order.absorbed;
+  EXPECT_TRUE(answerTo(query).objects.empty()) << "it is not on the map beside the survivor";
+}
+
 TEST_F(LaidRecall, WhereItLaidAnUnseenObjectIsNotWrittenOverWhatWasSeen) {
   start();
   const Recalled laid = driveToTheLoop();

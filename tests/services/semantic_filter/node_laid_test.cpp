@@ -99,6 +99,31 @@ TEST(NodeLaid, ALaidObjectIsAsUncertainAsTheBodyAndSharesItsError) {
   EXPECT_GT(pair.objects.back().next_id, 1000u - 1u);
 }
 
+TEST(NodeLaid, AJoinThatIsUndoneGoesOnUnderTheYoungerIdAndTheOlderOneIsLaidWhereItIs) {
+  Pair pair;
+  pair.driveTo(14);
+  const ObjectBelief seen = seenCar(pair);
+  const Eigen::Vector3d beside = seen.best().mean.head<3>() + Eigen::Vector3d(0.3, -0.2, 0.0);
+  pair.filter.onRecalled(laid({laidCar(kLaid, beside)}, {{1, kLaid, seen.id}}));
+  ASSERT_EQ(trackOf(pair, seen.id), nullptr);
+  pair.driveTo(16);
+  const std::size_t born = pair.count(EventKind::kBorn);
+  Recalled undone = laid({laidCar(kLaid, kBehind)});
+  undone.splits = {{1, kLaid, seen.id}};
+  pair.filter.onRecalled(undone);
+  const Track* track = trackOf(pair, seen.id);
+  ASSERT_NE(track, nullptr);
+  EXPECT_LT((track->best().x.head<3>() - seen.best().mean.head<3>()).norm(), 0.5);
+  EXPECT_FALSE(track->life.recalled);
+  ASSERT_NE(trackOf(pair, kLaid), nullptr);
+  EXPECT_LT((trackOf(pair, kLaid)->best().x.head<3>() - kBehind).norm(), 1e-9);
+  pair.driveTo(18);
+  EXPECT_NE(trackOf(pair, seen.id), nullptr) << "also after late detections";
+  EXPECT_EQ(pair.count(EventKind::kBorn), born) << "it is no new object";
+  pair.filter.onRecalled(undone);
+  EXPECT_NE(trackOf(pair, seen.id), nullptr) << "an order that comes twice changes nothing";
+}
+
 TEST(NodeLaid, WhatIsOneWithIsJoinedUnderTheOlderId) {
   Pair pair;
   pair.driveTo(14);

@@ -1,0 +1,235 @@
+// Loops: searched, closed, told, withdrawn.
+#include <algorithm>
+#include <cmath>
+
+#include "common/mapping/frames/level_errors.h"
+#include "common/mapping/graph/components.h"
+#include "common/mapping/mapper.h"
+#include "common/math/so3.h"
+
+namespace perdure::mapping {
+namespace {
+
+std::set<std::pair<ObjectId, ObjectId>> pairsOf(const PlaceMatch& match) {
+  return {match.pairs.begin(), match.pairs.end()};
+}
+
+}  // namespace
+
+/// By objects seen again under their old ids.
+void Mapper::tie() {
+  const auto tie = tracked_ties_.find(body());
+  if (!tie) return;
+  tracked_ties_.use(*tie, builder_.way_m());
+  const Edge edge = edgeFrom(tie->home, builder_.last()->id, tie->T_Mb, EdgeKind::kTracking);
+  const double chi2 = state_.graph().chi2(edge);
+  const EdgeId id = state_.addLoop(edge);
+  for (const auto& [absorbed, merge] : state_.merges()) {
+    const bool of_it = std::find(tie->objects.begin(), tie->objects.end(), merge.survivor) !=
+                       tie->objects.end();
+    if (of_it) loop_book_.hang(id, merge.loop);
+  }
+  marginals_.reset();
+  constexpr double kAgrees = 4.0;  // the next solve takes it along
+  if (chi2 > kAgrees) graphMoved();
+}
+
+void Mapper::graphMoved() {
+  state_.optimise();
+  settle();
+  marginals_.reset();
+  loop_search_.forget();
+  ++revision_;
+}
+
+/// Tells what the graph believes now, and takes back what it no longer does.
+void Mapper::settle() {
+  const LoopBook::Verdict verdict = loop_book_.judge(state_.graph(), builder_.way_m());
+  for (const EdgeId id : verdict.sound) forgetMergesOf(id);
+  for (const EdgeId id : verdict.given_up) {
+    if (hasMerges(id)) {
+      withdraw(id);
+    } else {
+      state_.removeLoop(id);
+      loop_book_.remove(id);
+    }
+  }
+  for (const EdgeId id : verdict.withdrawn) withdraw(id);
+  if (!change_.withdrawn.empty()) state_.optimise();
+  for (const LoopClosure& loop : verdict.told) {
+    change_.loops.push_back(loop);
+    orderMerges(loop);
+  }
+}
+
+void Mapper::orderMerges(const LoopClosure& loop) {
+  for (const auto& [known, seen] : loop.match.pairs) {
+    const auto survivor = state_.records().find(known), absorbed = state_.records().find(seen);
+    const bool both = survivor != state_.records().end() && absorbed != state_.records().end();
+    if (known == seen || !both) continue;  // one may be gone since the loop was found
+    change_.merges.push_back({loop.id, known, seen});
+    state_.putMerge(seen, {loop.id, known, false, survivor->second, absorbed->second});
+  }
+}
+
+bool Mapper::hasMerges(EdgeId loop) const {
+  return std::any_of(state_.merges().begin(), state_.merges().end(),
+                     [&](const auto& each) { return each.second.loop == loop; });
+}
+
+void Mapper::forgetMergesOf(EdgeId loop) {
+  std::vector<ObjectId> of_it;
+  for (const auto& [absorbed, merge] : state_.merges()) {
+    if (merge.loop == loop) of_it.push_back(absorbed);
+  }
+  for (const ObjectId id : of_it) state_.eraseMerge(id);
+}
+
+void Mapper::withdraw(EdgeId loop) {
+  const Edge& edge = state_.graph().edges().at(loop);
+  change_.withdrawn.push_back({loop, edge.a, edge.b});
+  const auto merges = state_.merges();
+  for (const auto& [absorbed, merge] : merges) {
+    if (merge.loop != loop) continue;
+    undo(absorbed, merge);
+    change_.splits.push_back({loop, merge.survivor, absorbed});
+  }
+  forgetMergesOf(loop);
+  for (const EdgeId tie : loop_book_.tiesOf(loop)) state_.removeLoop(tie);
+  state_.removeLoop(loop);
+  loop_book_.remove(loop);
+  if (active_ && active_->id == loop) active_.reset();
+}
+
+/// What was seen of the survivor since is of the absorbed one.
+void Mapper::undo(ObjectId absorbed, const HungMerge& merge) {
+  const auto at = state_.records().find(merge.survivor);
+  if (!merge.done || at == state_.records().end()) return;
+  ObjectRecord now = merge.absorbed_before;
+  if (isNewer(at->second, now)) {
+    now.session = at->second.session;
+    now.way_m = at->second.way_m;
+    now.last_seen = at->second.last_seen;
+    now.pose_error = at->second.pose_error;
+    now.sighting = at->second.sighting;
+    now.sighting.in_anchor.id = absorbed;
+  }
+  state_.put(absorbed, std::move(now));
+  state_.put(merge.survivor, merge.survivor_before);
+}
+
+/// By way of its own map first; then, more rarely, in the parts of the map that it does not hang
+/// together with.
+void Mapper::search() {
+  const Whereabouts here = body();
+  auto found = loop_search_.nearby(here);
+  const bool due = builder_.way_m() - searched_elsewhere_at_m_ >= parameters_.loop.elsewhere_each_m;
+  if (!found && due) {
+    searched_elsewhere_at_m_ = builder_.way_m();
+    found = loop_search_.elsewhere(here);
+    if (found && !isAgreedOn(*found)) return;
+  }
+  if (!found) return;
+  if (active_ && active_->pairs == pairsOf(found->match)) return;  // nothing new
+  close(*found);
+}
+
+void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
+  if (builder_.way_m() - learned_at_m_ < parameters_.loop.view_m) return;
+  learned_at_m_ = builder_.way_m();
+  Eigen::Matrix4d measured = match.T_MB.covariance;
+  addFloor(measured, parameters_.loop.floor_m, parameters_.loop.floor_rad);
+  drift_scale_.add(difference(match.T_MB.mean, prior.mean), measured,
+                   prior.covariance / odometry_variance_);
+  const double variance = drift_scale_.variance();
+  state_.scaleOdometry(variance / odometry_variance_, *session_);
+  odometry_variance_ = variance;
+}
+
+/// In streets that are alike one search may find the wrong one. The next one sees more objects.
+bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
+  constexpr double kSame_m = 3.0, kSame_rad = 0.1;
+  const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
+  const AnchorId component = componentsOf(state_.graph()).at(found.home);
+  const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m()};
+  if (tentative_ && tentative_->component == component) {
+    const double apart_m = now.way_m - tentative_->way_m;
+    const LevelError d = difference(tentative_->T_MN * T_Nb, found.match.T_MB.mean);
+    const bool same = d.head<2>().norm() < kSame_m && std::abs(d[3]) < kSame_rad;
+    const LoopParameters& loop = parameters_.loop;
+    if (same && apart_m < loop.agree_after_m) return false;
+    if (same && apart_m < loop.agree_within_m) return true;
+  }
+  tentative_ = now;
+  return false;
+}
+
+void Mapper::close(const LoopSearch::Found& found) {
+  const PlaceMatch& match = found.match;
+  if (found.prior) learnDrift(match, *found.prior);
+  const AnchorId a = found.home, b = builder_.last()->id;
+  const Edge edge = edgeFrom(a, b, match.T_MB, EdgeKind::kLoop);
+  const LevelPose before = state_.graph().pose(b);
+  const bool rests_on_the_same =
+      active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
+                             [&](const auto& pair) { return active_->pairs.contains(pair); });
+  const std::optional<EdgeId> old = rests_on_the_same ? std::optional(active_->id) : std::nullopt;
+  if (old) {
+    state_.removeLoop(*old);
+    loop_book_.remove(*old);
+  }
+  if (!found.prior) bringTogether(edge);
+  const EdgeId id = state_.addLoop(edge);
+  if (old) rehang(*old, id);
+  active_ = {id, pairsOf(match)};
+  loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
+  graphMoved();
+}
+
+/// One loop takes another's place.
+void Mapper::rehang(EdgeId old, EdgeId now) {
+  for (auto [absorbed, merge] : std::map<ObjectId, HungMerge>(state_.merges())) {
+    if (merge.loop != old) continue;
+    merge.loop = now;
+    state_.putMerge(absorbed, std::move(merge));
+  }
+}
+
+/// Moves the younger of two components to where the edge says that it lies in the older one's M.
+void Mapper::bringTogether(const Edge& edge) {
+  const auto components = componentsOf(state_.graph());
+  const bool b_is_younger = components.at(edge.b) > components.at(edge.a);
+  const AnchorId younger = components.at(b_is_younger ? edge.b : edge.a);
+  const LevelPose& T_Ma = state_.graph().pose(edge.a);
+  const LevelPose& T_Nb = state_.graph().pose(edge.b);
+  const LevelPose T_MN = T_Ma * edge.T_ab.mean * T_Nb.inverse();
+  std::set<AnchorId> moving;
+  for (const auto& [anchor, component] : components) {
+    if (component == younger) moving.insert(anchor);
+  }
+  state_.move(moving, b_is_younger ? T_MN : T_MN.inverse());
+}
+
+/// The measured T_Mb as an edge. What M says of a is not a part of its error.
+Edge Mapper::edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const {
+  Edge edge{a, b, {}, kind};
+  const LevelPose T_Ma = state_.graph().pose(a);
+  edge.T_ab.mean = T_Ma.inverse() * T_Mb.mean;
+  edge.T_ab.covariance = turnedBy(T_Ma.R().transpose(), T_Mb.covariance);
+  addFloor(edge.T_ab.covariance, parameters_.loop.floor_m, parameters_.loop.floor_rad);
+  return edge;
+}
+
+/// Of a merge that a loop ordered: both as they are before.
+void Mapper::keepForUndo(ObjectId survivor, ObjectId absorbed) {
+  const auto ordered = state_.merges().find(absorbed);
+  if (ordered == state_.merges().end() || ordered->second.survivor != survivor) return;
+  HungMerge merge = ordered->second;
+  merge.done = true;
+  merge.absorbed_before = state_.records().at(absorbed);
+  const auto into = state_.records().find(survivor);
+  if (into != state_.records().end()) merge.survivor_before = into->second;
+  state_.putMerge(absorbed, std::move(merge));
+}
+
+}  // namespace perdure::mapping
