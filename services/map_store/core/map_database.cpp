@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
+#include "services/map_store/core/outbox.h"
 
 namespace perdure::map_store {
 namespace {
@@ -51,6 +52,7 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
       tile_size_m_(options.tile_size_m) {
   auto ready = keepTileSize();
   if (ready) ready = rememberWorking();
+  if (ready) ready = options.outbox ? openOutbox(connection_) : dropOutbox(connection_);
   if (!ready) {
     throw StartupError(ExitCode::kUnavailable,
                        "The map " + options.path + " cannot be read (" + ready.error().detail +
@@ -253,7 +255,9 @@ Result<Written> MapDatabase::write(const Batch& batch) {
     if (!unsound) return tl::unexpected<Reason>(unsound.error());
     written->unsound = *unsound;
   }
-  const auto done = transaction->commit();
+  auto done = Result<void>();
+  if (batch.acknowledged > 0) done = acknowledge(connection_, batch.acknowledged);
+  if (done) done = transaction->commit();
   if (!done) return tl::unexpected<Reason>(done.error());
   remember(*batch.working, change);
   graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;

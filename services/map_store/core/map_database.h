@@ -45,6 +45,7 @@ struct Batch {
   /// Of the working set: laid by the graph and not seen since. What is stored of them stays.
   std::set<ObjectId> laid = {};
   const mapping::Unsaved* graph = nullptr;  ///< what of it has changed; null: nothing
+  std::int64_t acknowledged = 0;            ///< entries of the outbox that a server has
 };
 
 struct Written {
