@@ -124,7 +124,8 @@ class MapDatabase {
   Result<void> rememberWorking();
   Result<Row> rowOf(ObjectId id) const;
   Result<void> put(const PlacedBelief& placed, TimePoint now, Change& change);
-  Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes);
+  Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes,
+                      Change& change);
   Result<void> putObjects(const Batch& batch, Change& change);
   Result<void> addDoubtful(std::set<ObjectId>& ids) const;
   Result<void> markLeft(ObjectId id, Change& change);
