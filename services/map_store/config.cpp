@@ -13,6 +13,16 @@ void describe(Config& c, config::Fields& fields) {
                  {"the file grows no further than this; 0: as large as the disk", "MiB", ""});
   fields.boolean("store.check_at_start", c.check_at_start,
                  {"read the whole file at the start and set it aside where it is damaged"});
+  fields.text(
+      "store.url", c.fleet.url,
+      {"a PostgreSQL server to which the map is sent as well, as postgresql://…; empty: none", "",
+       "give postgresql://USER@HOST:PORT/DATABASE?passfile=FILE"});
+  fields.text("store.vehicle", c.fleet.vehicle,
+              {"the name of this vehicle's map there; empty: the host's name", "", ""});
+  fields.numbers("store.earth_anchor", c.fleet.earth_anchor, {},
+                 {"where the map's frame of reference lies on Earth, for the server's geometry: "
+                  "latitude, longitude, height, yaw of its x axis from east; []: not known",
+                  "°, m", "give four numbers, or []"});
   fields.number("tiles.size", c.tile_size_m, config::between(1.0, 10000.0),
                 {"width of the squares in which the map is published", "m", ""});
   fields.number("tiles.period", c.tile_period_s, config::between(0.05, 60.0),

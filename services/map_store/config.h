@@ -6,6 +6,7 @@
 
 #include "common/config/fields.h"
 #include "common/mapping/parameters.h"
+#include "services/map_store/fleet/parameters.h"
 
 namespace perdure::map_store {
 
@@ -14,6 +15,7 @@ struct Config {
   double commit_period_s = 0.5;
   std::int64_t max_size_mb = 0;
   bool check_at_start = true;
+  fleet::Parameters fleet;  ///< a server that the map is sent to
   double tile_size_m = 32.0;
   double tile_period_s = 1.0;
   std::int64_t query_limit = 1000;

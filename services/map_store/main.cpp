@@ -1,14 +1,61 @@
 // perdure-map-store: the durable map of objects on the bus.
 #include <chrono>
+#include <optional>
+#include <string>
 
 #include "common/bus/topics.h"
 #include "common/service/service.h"
+#include "services/map_store/fleet/replicator.h"
+#include "services/map_store/fleet/server_url.h"
 #include "services/map_store/node.h"
 
 namespace {
 
 using namespace perdure;
 namespace topics = bus::topics;
+
+/// The fleet's server: it gets each commit, and the log and Health say how that goes. Does nothing
+/// where `store.url` names none.
+class FleetServer {
+ public:
+  explicit FleetServer(const map_store::Config& config) {
+    if (!config.fleet.url.empty()) replicator_.emplace(config.fleet, config.store_path);
+  }
+  void onCommit(map_store::Node& node) {
+    if (!replicator_) return;
+    replicator_->wake();
+    node.onAcknowledged(replicator_->progress().sent);
+  }
+  void count(ReasonCounts& counts) const {
+    if (!replicator_) return;
+    const auto progress = replicator_->progress();
+    for (const auto& [code, count] : progress.reasons.all()) counts.add(code, count);
+  }
+  /// The trouble, or nothing. Each kind is logged once, and its end.
+  std::string tell(spdlog::logger& log) {
+    if (!replicator_) return {};
+    const auto progress = replicator_->progress();
+    if (notice_ != progress.notice && !progress.notice.empty()) log.warn(progress.notice);
+    if (failing_ != progress.failing && !progress.failing.empty()) log.warn(progress.trouble);
+    if (!failing_.empty() && progress.failing.empty()) {
+      log.info("The fleet's server takes the map again.");
+    }
+    notice_ = progress.notice;
+    failing_ = progress.failing;
+    return progress.trouble;
+  }
+  /// The last commit, where the server takes it at once; the rest goes after the next start.
+  void finish() {
+    if (!replicator_) return;
+    constexpr std::chrono::milliseconds kLastWords{300};
+    replicator_->wake();
+    (void)replicator_->finish(kLastWords);
+  }
+
+ private:
+  std::optional<map_store::fleet::Replicator> replicator_;
+  std::string notice_, failing_;
+};
 
 void serve(service::Context& context, const map_store::Config& config) {
   auto& tiles = context.writer(topics::kMap);
@@ -27,18 +74,23 @@ void serve(service::Context& context, const map_store::Config& config) {
     node.onObjects(objects);
   });
   context.on(topics::kMapQuery, [&](const MapQuery& query) { node.onQuery(query); });
+  FleetServer server(config);
   context.every(std::chrono::milliseconds(50), [&, commits = std::uint64_t{0}]() mutable {
     node.tick(std::chrono::steady_clock::now().time_since_epoch());
+    if (commits < node.commits()) server.onCommit(node);
     for (; commits < node.commits(); ++commits) context.health().frameOut();
   });
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
+  context.countReasons([&](ReasonCounts& counts) { server.count(counts); });
   context.onHealth([&] {
-    const std::string trouble = node.trouble();
+    const std::string unsent = server.tell(context.log());
+    const std::string trouble = node.trouble().empty() ? unsent : node.trouble();
     context.health().state(trouble.empty() ? HealthState::kOk : HealthState::kDegraded, trouble);
   });
   if (!node.trouble().empty()) context.log().warn(node.trouble());
   context.run();
   node.flush();
+  server.finish();
 }
 
 }  // namespace
@@ -50,5 +102,6 @@ int main(int argc, char** argv) {
       {.process = "map_store",
        .summary = "Keeps the map of objects: durable, published in tiles, open to questions",
        .describe = [&](config::Fields& fields) { map_store::describe(config, fields); },
-       .body = [&](service::Context& context) { serve(context, config); }});
+       .body = [&](service::Context& context) { serve(context, config); },
+       .verify = [&] { map_store::fleet::check(config.fleet); }});
 }

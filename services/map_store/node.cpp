@@ -8,7 +8,7 @@ namespace perdure::map_store {
 namespace {
 
 StoreOptions storeOptions(const Config& c) {
-  return {c.store_path, c.tile_size_m, c.max_size_mb, c.check_at_start};
+  return {c.store_path, c.tile_size_m, c.max_size_mb, c.check_at_start, !c.fleet.url.empty()};
 }
 
 /// Nothing, or why the query cannot be answered.
@@ -160,9 +160,9 @@ void Node::commit() {
     return;
   }
   const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
-  const auto written =
-      database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr,
-                       unwritten_splits_});
+  const auto written = database_.write({&*newest_, left_, removed_, laid_,
+                                        graph_ ? &graph : nullptr, unwritten_splits_,
+                                        acknowledged_});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
@@ -171,6 +171,7 @@ void Node::commit() {
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);
   failure_.clear();
   dirty_ = false;
+  acknowledged_ = 0;
   kept_of_ = newest_->instance;
   kept_ = newest_->stamp.time;
   left_.clear();

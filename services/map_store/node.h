@@ -2,6 +2,7 @@
 // and gives a filter that starts anew its working set back (the paper's "semantic map").
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -49,6 +50,8 @@ class Node {
   /// Commits and publishes what is due. `now`: a monotonic time since any origin; call it ten
   /// times a second or more often.
   void tick(Duration now);
+  /// A server has what the outbox holds up to this entry: the next commit takes it away.
+  void onAcknowledged(std::int64_t number) { acknowledged_ = std::max(acknowledged_, number); }
   /// Commits what is left. Call it before the end.
   void flush();
 
@@ -122,6 +125,7 @@ class Node {
   InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk
   TimePoint kept_;          ///< of its newest frame there
   std::uint64_t revision_ = 0;
+  std::int64_t acknowledged_ = 0;  ///< of the outbox, not yet taken away
   bool dirty_ = false, published_once_ = false, header_stale_ = false;
   std::optional<Duration> committed_at_, published_at_;
   ReasonCounts reasons_;

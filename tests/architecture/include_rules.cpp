@@ -29,6 +29,7 @@ const std::vector<Layers> kLayers{
     {"services/vio/core/", {"state", "propagation", "tracks", "update", "", "start"}},
     {"services/gateway/", {"core", "protocol", "web", ""}},
     {"services/inference/core/", {"", "network", "decode", "takeover"}},
+    {"services/map_store/", {"core", "fleet", ""}},
     {"tools/bus_tools/", {"", "status", "doctor"}},
     {"tools/calibrate/", {"estimate", ""}},
     {"tools/evaluate/", {"", "memory"}},

@@ -1,15 +1,18 @@
-// usage: graph_file_bench [RECORDS ANCHORS EDGES]
+// usage: graph_file_bench [RECORDS ANCHORS EDGES [outbox]]
 // What the pose graph costs in the map's file (100,000 sightings, 5,000 anchors, 6,000 edges):
 // writing all of it once, reading it as at a start, and the commits of a drive: the poses of all
 // anchors after a loop, the same with all covariances of the odometry, sixty sightings, and nothing
-// of the graph. Medians of five runs: wall time (most of a commit is the sync), processor time, and
-// what went to the write-ahead log.
+// of the graph, sixty objects. With "outbox" the file's triggers gather what a fleet's server is to
+// get, and the server has all of it before each commit. Medians of five runs: wall time (most of a
+// commit is the sync), processor time, and what went to the write-ahead log.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <string_view>
 
 #include "services/map_store/core/map_database.h"
+#include "services/map_store/core/outbox.h"
 #include "tests/services/map_store/beliefs.h"
 #include "tests/services/map_store/graphs.h"
 
@@ -45,16 +48,19 @@ double median(std::vector<double> values) {
 
 class Bench {
  public:
-  explicit Bench(mapping::SavedMap map) : map_(std::move(map)) {}
+  Bench(mapping::SavedMap map, bool outbox)
+      : map_(std::move(map)), database_({.path = path(), .outbox = outbox}), outbox_(outbox) {}
 
   /// Commits, each alone in the log.
-  void commit(const char* what, const mapping::Unsaved* graph, int runs = kRuns) {
+  void commit(const char* what, const mapping::Unsaved* graph, int runs = kRuns, int cars = 0) {
     std::vector<double> logs;
     report(what, runs, [&](std::vector<Times>& times) {
       checkpoint();
-      const Objects objects = test::workingSet(++sequence_, {});
+      ++sequence_;
+      const Objects objects = test::workingSet(sequence_, carsAt(sequence_, cars));
       Batch batch{&objects, {}, {}};
       batch.graph = graph;
+      batch.acknowledged = outbox_ ? lastEntry() : 0;
       times.push_back(timesOf([&] { must(database_.write(batch).has_value()); }));
       logs.push_back(logKb());
     });
@@ -82,7 +88,19 @@ class Bench {
     while (runs-- > 0) run(times);
     std::vector<double> wall, cpu;
     for (const Times& each : times) wall.push_back(each.wall), cpu.push_back(each.cpu);
-    std::printf("%-26s %9.1f ms, CPU %8.1f ms", what, median(wall), median(cpu));
+    std::printf("%-26s %9.2f ms, CPU %8.2f ms", what, median(wall), median(cpu));
+  }
+  /// All of them have moved since the last frame.
+  static std::vector<ObjectBelief> carsAt(std::uint64_t sequence, int cars) {
+    std::vector<ObjectBelief> all;
+    for (int i = 1; i <= cars; ++i) {
+      const double x = 2.0 * i + 0.01 * static_cast<double>(sequence);
+      all.push_back(test::carAt(static_cast<ObjectId>(i), {x, 0, 0}));
+    }
+    return all;
+  }
+  std::int64_t lastEntry() const {
+    return outboxMark(Connection::open(path(), Connection::Mode::kReadOnly).value()).value().last;
   }
   std::string path() const { return folder_.file("map.sqlite"); }
   /// Everything into the file, so that the next commit is alone in the log.
@@ -98,7 +116,8 @@ class Bench {
 
   test::TemporaryFolder folder_;
   mapping::SavedMap map_;
-  MapDatabase database_{{path()}};
+  MapDatabase database_;
+  bool outbox_;
   std::uint64_t sequence_ = 0;
 };
 
@@ -109,7 +128,7 @@ int main(int argc, char** argv) {
     return static_cast<std::size_t>(argc > i ? std::max(1L, std::atol(argv[i])) : otherwise);
   };
   const test::GraphSize size{number(2, 5000), number(3, 6000), number(1, 100'000), 1};
-  Bench bench(test::RandomGraph(1).map(size));
+  Bench bench(test::RandomGraph(1).map(size), argc > 4 && std::string_view(argv[4]) == "outbox");
   mapping::Unsaved all{bench.map(), {}, {}}, poses, loop, drive;
   poses.changed.classes = loop.changed.classes = drive.changed.classes = bench.map().classes;
   poses.changed.anchors = loop.changed.anchors = bench.map().anchors;
@@ -124,5 +143,7 @@ int main(int argc, char** argv) {
   bench.commit("the same and all edges", &loop);
   bench.commit("sixty sightings", &drive);
   bench.commit("nothing of the graph", nullptr);
+  bench.commit("sixty objects", nullptr, 4 * kRuns, 60);
+  bench.commit("sixty of each", &drive, 4 * kRuns, 60);
   return 0;
 }

@@ -11,6 +11,7 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "services/map_store/fleet/map_transfer.h"
 #include "tools/bus_tools/common.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
@@ -150,6 +151,66 @@ void exportMap(const Request& request) {
   writeChecked(request.out, json.dump(1) + "\n");
 }
 
+void listServerMaps(const std::string& url) {
+  const auto maps = map_store::fleet::listMaps(url);
+  fmt::print("{:<24} {:>8} {:>8} {:>9}  {:<20}  {}\n", "name", "objects", "anchors", "revision",
+             "changed", "");
+  for (const auto& map : maps) {
+    fmt::print("{:<24} {:>8} {:>8} {:>9}  {:<20}  {}\n", map.vehicle, map.objects, map.anchors,
+               map.revision, map.changed, map.whole ? "" : "(being sent)");
+  }
+}
+
+struct ServerRequest {
+  std::string url, name, file;
+  std::vector<double> earth_anchor;
+  bool all = false, unfinished = false;
+};
+
+void pullMaps(const ServerRequest& request) {
+  if (request.all != request.name.empty()) {
+    throw StartupError(ExitCode::kUsage, "Give the NAME of one map, or --all.");
+  }
+  if (!request.all) {
+    map_store::fleet::pullMap(request.url, request.name, request.file, request.unfinished);
+    return;
+  }
+  const auto files = map_store::fleet::pullVehicles(request.url, request.file, request.unfinished);
+  for (const std::string& file : files) fmt::print("{}\n", file);
+}
+
+void addServerCommands(CLI::App& map) {
+  auto request = std::make_shared<ServerRequest>();
+  CLI::App* maps = map.add_subcommand("maps", "The maps that a fleet's server has");
+  maps->callback([request] { listServerMaps(request->url); });
+
+  CLI::App* pull = map.add_subcommand("pull", "A map of a fleet's server as a file");
+  pull->add_option("NAME", request->name, "the vehicle's name, or that of a pushed map");
+  pull->add_flag("--all", request->all, "the newest map of each vehicle, as NAME.sqlite");
+  pull->add_option("--out", request->file, "the new file; with --all its folder")
+      ->type_name("FILE")
+      ->required();
+  pull->add_flag("--unfinished", request->unfinished, "also while it is being sent");
+  pull->callback([request] { pullMaps(*request); });
+
+  CLI::App* push = map.add_subcommand("push", "A file as a map of a fleet's server");
+  push->add_option("FILE", request->file, "the map's file, which is only read")->required();
+  push->add_option("--name", request->name, "the map's name there")->required();
+  push->add_option("--earth-anchor", request->earth_anchor,
+                   "latitude, longitude [°], height [m] of M's origin, yaw of its x axis from east "
+                   "[°]; else its geometry is in metres alone")
+      ->expected(4);
+  push->callback([request] {
+    map_store::fleet::pushMap(request->file, request->url, request->name, request->earth_anchor);
+  });
+  for (CLI::App* command : {maps, pull, push}) {
+    command
+        ->add_option("--url", request->url,
+                     "postgresql://USER@HOST:PORT/DATABASE?passfile=FILE, without a password")
+        ->required();
+  }
+}
+
 void addSource(CLI::App& command, Request& request) {
   command.add_option("--db", request.db, "read this file instead of asking the running map_store")
       ->type_name("FILE");
@@ -215,6 +276,7 @@ void addMapCommand(CLI::App& app) {
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
 
+  addServerCommands(*map);
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);
 }

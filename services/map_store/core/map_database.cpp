@@ -1,6 +1,7 @@
 #include "services/map_store/core/map_database.h"
 
 #include <cmath>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -8,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
+#include "services/map_store/core/outbox.h"
 
 namespace perdure::map_store {
 namespace {
@@ -24,13 +26,27 @@ std::uint64_t digestOf(std::span<const std::uint8_t> bytes, const WorldId& world
 
 Result<void> failed(const Reason& reason) { return tl::unexpected<Reason>(reason); }
 
+Result<void> run(Statement& statement, const auto&... parameters) {
+  int index = 0;
+  (statement.bind(++index, parameters), ...);
+  return statement.run();
+}
+
 Result<void> runOnce(const Connection& connection, std::string_view sql,
                      const auto&... parameters) {
   auto statement = connection.prepare(sql);
-  if (!statement) return failed(statement.error());
-  int index = 0;
-  (statement->bind(++index, parameters), ...);
-  return statement->run();
+  return statement ? run(*statement, parameters...) : failed(statement.error());
+}
+
+/// A statement for many rows of one commit: prepared with the first, which takes longer than a row.
+Result<void> runAgain(const Connection& connection, std::optional<Statement>& statement,
+                      std::string_view sql, const auto&... parameters) {
+  if (!statement) {
+    auto prepared = connection.prepare(sql);
+    if (!prepared) return failed(prepared.error());
+    statement.emplace(std::move(*prepared));
+  }
+  return run(*statement, parameters...);
 }
 
 std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); }
@@ -41,6 +57,7 @@ struct MapDatabase::Change {
   std::set<ObjectId> objects;    ///< whose rows have changed
   std::map<ObjectId, Row> rows;  ///< to be remembered once committed
   std::set<ObjectId> shut_out;   ///< removed later than this frame
+  std::optional<Statement> put_object, put_place;
 };
 
 MapDatabase::MapDatabase(const StoreOptions& options) : MapDatabase(openStore(options), options) {}
@@ -51,6 +68,7 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
       tile_size_m_(options.tile_size_m) {
   auto ready = keepTileSize();
   if (ready) ready = rememberWorking();
+  if (ready) ready = options.outbox ? openOutbox(connection_) : dropOutbox(connection_);
   if (!ready) {
     throw StartupError(ExitCode::kUnavailable,
                        "The map " + options.path + " cannot be read (" + ready.error().detail +
@@ -126,19 +144,20 @@ Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
 }
 
 Result<void> MapDatabase::insert(const PlacedBelief& placed, const Square& square,
-                                 const Bytes& bytes) {
+                                 const Bytes& bytes, Change& change) {
   const MapObject o = mapObjectOf(placed.belief, placed.world);
   const Vector7d& m = o.mean;
-  const auto done =
-      runOnce(connection_, kPutObject, asStored(o.id), asStored(o.world.world),
-              std::int64_t{o.world.epoch}, std::string_view(o.class_name), o.class_probability,
-              o.existence, m[0], m[1], m[2], m[3], std::exp(m[4]), std::exp(m[5]), std::exp(m[6]),
-              toNanoseconds(o.first_seen), toNanoseconds(o.last_seen), std::int64_t{o.hits},
-              static_cast<std::int64_t>(o.visibility), static_cast<std::int64_t>(o.memory),
-              std::int64_t{square.x}, std::int64_t{square.y}, std::span<const std::uint8_t>(bytes));
+  const auto done = runAgain(
+      connection_, change.put_object, kPutObject, asStored(o.id), asStored(o.world.world),
+      std::int64_t{o.world.epoch}, std::string_view(o.class_name), o.class_probability, o.existence,
+      m[0], m[1], m[2], m[3], std::exp(m[4]), std::exp(m[5]), std::exp(m[6]),
+      toNanoseconds(o.first_seen), toNanoseconds(o.last_seen), std::int64_t{o.hits},
+      static_cast<std::int64_t>(o.visibility), static_cast<std::int64_t>(o.memory),
+      std::int64_t{square.x}, std::int64_t{square.y}, std::span<const std::uint8_t>(bytes));
   if (!done) return done;
-  return runOnce(connection_, "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
-                 asStored(o.id), m[0], m[0], m[1], m[1], m[2], m[2]);
+  return runAgain(connection_, change.put_place,
+                  "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)", asStored(o.id), m[0],
+                  m[0], m[1], m[1], m[2], m[2]);
 }
 
 Result<void> MapDatabase::put(const PlacedBelief& placed, TimePoint now, Change& change) {
@@ -157,7 +176,7 @@ Result<void> MapDatabase::put(const PlacedBelief& placed, TimePoint now, Change&
   change.rows[id] = after;
   if (after.digest == before->digest) return {};
   change.objects.insert(id);
-  return insert(placed, *square, bytes);
+  return insert(placed, *square, bytes, change);
 }
 
 Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
@@ -234,7 +253,7 @@ Result<void> MapDatabase::undoMerge(const MergeOrder& split, Change& change) {
   now->belief.id = split.absorbed;
   for (const PlacedBelief* placed : {static_cast<const PlacedBelief*>(&*now), &*before}) {
     const auto square = squareOf(placed->belief.best().mean.head<3>(), tile_size_m_);
-    if (done && square) done = insert(*placed, *square, encodeBelief(placed->belief));
+    if (done && square) done = insert(*placed, *square, encodeBelief(placed->belief), change);
     change.objects.insert(placed->belief.id);
   }
   return done ? markLeft(split.survivor, change) : done;
@@ -295,7 +314,9 @@ Result<Written> MapDatabase::write(const Batch& batch) {
     if (!unsound) return tl::unexpected<Reason>(unsound.error());
     written->unsound = *unsound;
   }
-  const auto done = transaction->commit();
+  auto done = Result<void>();
+  if (batch.acknowledged > 0) done = acknowledge(connection_, batch.acknowledged);
+  if (done) done = transaction->commit();
   if (!done) return tl::unexpected<Reason>(done.error());
   remember(*batch.working, change);
   graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;

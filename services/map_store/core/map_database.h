@@ -48,6 +48,7 @@ struct Batch {
   /// Merges to be undone, the newest first: the survivor is as it was before, and what it is now
   /// is the absorbed one.
   std::vector<MergeOrder> splits = {};
+  std::int64_t acknowledged = 0;            ///< entries of the outbox that a server has
 };
 
 struct Written {
@@ -140,7 +141,8 @@ class MapDatabase {
   Result<void> rememberWorking();
   Result<Row> rowOf(ObjectId id) const;
   Result<void> put(const PlacedBelief& placed, TimePoint now, Change& change);
-  Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes);
+  Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes,
+                      Change& change);
   Result<void> putObjects(const Batch& batch, Change& change);
   Result<void> undoMerge(const MergeOrder& split, Change& change);
   Result<void> bringBack(ObjectId absorbed, ObjectId survivor, Change& change);

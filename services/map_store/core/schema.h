@@ -19,6 +19,7 @@ struct StoreOptions {
   double tile_size_m = 32.0;
   std::int64_t max_size_mb = 0;  ///< 0: as large as the disk
   bool check_at_start = true;
+  bool outbox = false;  ///< changes are gathered for a server (core/outbox.h)
 };
 
 struct OpenedStore {

@@ -1,0 +1,130 @@
+#include "services/map_store/core/outbox.h"
+
+#include <array>
+#include <string_view>
+
+namespace perdure::map_store {
+namespace {
+
+struct Followed {
+  OutboxTable number;
+  const char* name;
+  const char* key;
+};
+constexpr std::array kFollowed = {Followed{OutboxTable::kClasses, "graph_classes", "number"},
+                                  Followed{OutboxTable::kAnchors, "anchors", "id"},
+                                  Followed{OutboxTable::kPoses, "anchor_poses", "id"},
+                                  Followed{OutboxTable::kEdges, "edges", "id"},
+                                  Followed{OutboxTable::kObjects, "objects", "id"},
+                                  Followed{OutboxTable::kSightings, "sightings", "id"}};
+
+/// A row has one entry, with the number of its last change.
+std::string enter(OutboxTable table, const std::string& id) {
+  const std::string number = std::to_string(static_cast<std::int64_t>(table));
+  return "BEGIN DELETE FROM outbox WHERE tbl = " + number + " AND id = " + id +
+         "; INSERT INTO outbox(tbl, id) VALUES(" + number + ", " + id + "); END;";
+}
+
+/// REPLACE fires no trigger for what it deletes, and one for what it inserts.
+std::string triggersOf(const Followed& table) {
+  const std::string name = table.name, key = table.key;
+  std::string sql;
+  for (const std::string_view event : {"INSERT", "UPDATE", "DELETE"}) {
+    const std::string row = event == "DELETE" ? "OLD." : "NEW.";
+    sql += "CREATE TRIGGER outbox_" + name + "_" + std::string(event) + " AFTER " +
+           std::string(event) + " ON " + name + " " + enter(table.number, row + key);
+  }
+  return sql;
+}
+
+std::string schema() {
+  std::string sql =
+      "CREATE TABLE outbox(number INTEGER PRIMARY KEY AUTOINCREMENT, tbl INTEGER NOT NULL, "
+      "id INTEGER NOT NULL, UNIQUE(tbl, id));";
+  for (const Followed& table : kFollowed) sql += triggersOf(table);
+  for (const std::string_view event : {"INSERT", "UPDATE"}) {
+    sql += "CREATE TRIGGER outbox_meta_" + std::string(event) + " AFTER " + std::string(event) +
+           " ON meta WHEN NEW.key IN ('working', 'revision', 'tile_size_m') " +
+           enter(OutboxTable::kWorking, "0");
+  }
+  return sql +
+         "INSERT OR IGNORE INTO meta VALUES('file', lower(hex(randomblob(16))));"
+         "REPLACE INTO meta VALUES('outbox', lower(hex(randomblob(16))));"
+         "REPLACE INTO meta VALUES('outbox_acknowledged', 0);";
+}
+
+Result<bool> isThere(const Connection& connection) {
+  const auto tables =
+      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'outbox'");
+  if (!tables) return tl::unexpected<Reason>(tables.error());
+  return *tables > 0;
+}
+
+Result<std::string> text(const Connection& connection, std::string_view sql) {
+  auto statement = connection.prepare(sql);
+  if (!statement) return tl::unexpected<Reason>(statement.error());
+  const auto row = statement->step();
+  if (!row) return tl::unexpected<Reason>(row.error());
+  return *row ? statement->text(0) : std::string();
+}
+
+}  // namespace
+
+Result<void> openOutbox(const Connection& connection) {
+  auto transaction = Transaction::begin(connection);
+  if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  const auto there = isThere(connection);
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (*there) return {};
+  const auto made = connection.execute(schema());
+  return made ? transaction->commit() : made;
+}
+
+Result<void> dropOutbox(const Connection& connection) {
+  const auto there = isThere(connection);
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (!*there) return {};
+  auto transaction = Transaction::begin(connection);
+  if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  std::string sql =
+      "DROP TABLE outbox; DROP TRIGGER outbox_meta_INSERT;"
+      "DROP TRIGGER outbox_meta_UPDATE;";
+  for (const Followed& table : kFollowed) {
+    for (const char* event : {"INSERT", "UPDATE", "DELETE"}) {
+      sql += std::string("DROP TRIGGER outbox_") + table.name + "_" + event + ";";
+    }
+  }
+  const auto dropped = connection.execute(sql);
+  return dropped ? transaction->commit() : dropped;
+}
+
+Result<void> acknowledge(const Connection& connection, std::int64_t number) {
+  for (const char* sql :
+       {"DELETE FROM outbox WHERE number <= ?1",
+        "UPDATE meta SET value = ?1 WHERE key = 'outbox_acknowledged' AND value < ?1"}) {
+    auto statement = connection.prepare(sql);
+    if (!statement) return tl::unexpected<Reason>(statement.error());
+    const auto done = statement->bind(1, number).run();
+    if (!done) return done;
+  }
+  return {};
+}
+
+Result<OutboxMark> outboxMark(const Connection& connection) {
+  const auto there = isThere(connection);
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (!*there) return fail("no_outbox", "the map's file has no outbox");
+  const auto file = text(connection, "SELECT value FROM meta WHERE key = 'file'");
+  const auto outbox = text(connection, "SELECT value FROM meta WHERE key = 'outbox'");
+  const auto acknowledged =
+      connection.integer("SELECT value FROM meta WHERE key = 'outbox_acknowledged'");
+  const auto last =
+      connection.integer("SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'outbox'");
+  if (!file) return tl::unexpected<Reason>(file.error());
+  if (!outbox) return tl::unexpected<Reason>(outbox.error());
+  if (!acknowledged) return tl::unexpected<Reason>(acknowledged.error());
+  if (!last) return tl::unexpected<Reason>(last.error());
+  return OutboxMark{*file, *outbox, *acknowledged, *last};
+}
+
+}  // namespace perdure::map_store

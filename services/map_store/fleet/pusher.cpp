@@ -1,0 +1,279 @@
+#include "services/map_store/fleet/pusher.h"
+
+#include <limits>
+#include <utility>
+
+#include "services/map_store/core/belief_codec.h"
+#include "services/map_store/fleet/tables.h"
+
+namespace perdure::map_store::fleet {
+namespace {
+
+constexpr std::int64_t kSmallest = std::numeric_limits<std::int64_t>::min();
+constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+
+constexpr std::int64_t kRowsOfAPortion = 2000;
+constexpr char kAttach[] =
+    "SELECT number, sent, next_table, next_id FROM "
+    "perdure.attach($1::text, $2::text, $3::text, $4::bigint, $5::bigint, $6::float8, $7::float8, "
+    "$8::float8, $9::float8)";
+constexpr char kAdvance[] =
+    "SELECT perdure.advance($1::bigint, $2::text, $3::bigint, $4::bigint, $5::bigint, $6::bigint, "
+    "$7::bigint, $8::bigint, $9::bigint)";
+constexpr char kSetWorking[] =
+    "UPDATE perdure.maps SET revision = $2::bigint, tile_size_m = $3::text, working = $4::bytea, "
+    "world = $5::bigint, epoch = $6::bigint WHERE number = $1::bigint";
+
+std::string nameOf(const std::string& what, OutboxTable table) {
+  return what + std::to_string(static_cast<std::int64_t>(table));
+}
+
+OutboxTable tableAt(std::int64_t number) { return static_cast<OutboxTable>(number); }
+
+Result<void> prepareStatements(Link& link) {
+  auto done = link.prepare("advance", kAdvance);
+  for (std::int64_t number = 0; done && number + 1 < kOutboxTables; ++number) {
+    const Table& table = tableOf(tableAt(number));
+    done = link.prepare(nameOf("put", tableAt(number)), upsertOf(table));
+    if (!done) break;
+    done = link.prepare(nameOf("delete", tableAt(number)),
+                        "DELETE FROM perdure." + table.name + " WHERE map = $1 AND " +
+                            table.columns.front().name + " = $2");
+  }
+  if (done) done = link.prepare("set_working", kSetWorking);
+  if (done) done = link.prepare("clear_working", "DELETE FROM perdure.working WHERE map = $1");
+  if (done) done = link.prepare("put_working", upsertOf(workingTable()));
+  return done;
+}
+
+/// A reading transaction: one state of the file.
+class Snapshot {
+ public:
+  static Result<Snapshot> begin(const Connection& connection) {
+    const auto begun = connection.execute("BEGIN");
+    if (!begun) return tl::unexpected<Reason>(begun.error());
+    return Snapshot(&connection);
+  }
+  ~Snapshot() {
+    if (connection_ != nullptr) (void)connection_->execute("ROLLBACK");
+  }
+  Snapshot(Snapshot&& other) noexcept : connection_(std::exchange(other.connection_, nullptr)) {}
+  Snapshot& operator=(Snapshot&&) = delete;
+
+ private:
+  explicit Snapshot(const Connection* connection) : connection_(connection) {}
+  const Connection* connection_;
+};
+
+}  // namespace
+
+struct Pusher::Draft {
+  std::int64_t most = 0;
+  std::uint64_t rows = 0;
+  Place next;
+  bool whole = false;
+};
+
+Pusher::Pusher(std::string file, std::string vehicle, std::vector<double> earth_anchor)
+    : file_(std::move(file)),
+      vehicle_(std::move(vehicle)),
+      earth_anchor_(std::move(earth_anchor)) {}
+
+Result<void> Pusher::openFile(bool with_outbox) {
+  connection_.reset();
+  auto connection = Connection::open(file_, Connection::Mode::kReadOnly);
+  if (!connection) return tl::unexpected<Reason>(connection.error());
+  (void)connection->execute("PRAGMA busy_timeout=1000");
+  const auto mark = with_outbox ? outboxMark(*connection) : Result<OutboxMark>(OutboxMark());
+  if (!mark) return tl::unexpected<Reason>(mark.error());
+  mark_ = *mark;
+  has_outbox_ = with_outbox;
+  connection_ = std::move(*connection);
+  return {};
+}
+
+Result<void> Pusher::attach(Link& link) {
+  const auto opened = openFile(true);
+  return opened ? introduce(link) : opened;
+}
+
+/// The server's row of this map; where it is new, or of another outbox, it is empty after this.
+Result<void> Pusher::introduce(Link& link) {
+  Values values;
+  values.put(std::string_view(vehicle_)).put(std::string_view(mark_.file));
+  values.put(std::string_view(mark_.outbox)).put(mark_.acknowledged).put(mark_.last);
+  for (std::size_t i = 0; i < 4; ++i) {
+    earth_anchor_.size() == 4 ? values.put(earth_anchor_[i]) : values.null();
+  }
+  const auto row = link.ask(kAttach, values);
+  if (!row) return tl::unexpected<Reason>(row.error());
+  map_ = row->integer(0, 0);
+  at_ = {row->integer(0, 1), row->integer(0, 2), row->integer(0, 3)};
+  const auto known = link.ask("SELECT 1 FROM pg_prepared_statements WHERE name = 'advance'");
+  if (!known) return tl::unexpected<Reason>(known.error());
+  return known->rows() > 0 ? Result<void>() : prepareStatements(link);
+}
+
+Result<void> Pusher::replaceAll(Link& link, const std::string& file) {
+  auto done = openFile(false);
+  if (!done) return done;
+  const auto unique = link.ask("SELECT gen_random_uuid()::text");
+  if (!unique) return tl::unexpected<Reason>(unique.error());
+  mark_ = {file, unique->text(0, 0), 0, 0};
+  done = link.run("BEGIN");
+  if (done) done = introduce(link);
+  if (!done) return done;
+  const auto snapshot = Snapshot::begin(*connection_);
+  if (!snapshot) return tl::unexpected<Reason>(snapshot.error());
+  while (at_.next_table < kOutboxTables) {
+    const auto portion = pushPortion(link, kRowsOfAPortion, false);
+    if (!portion) return tl::unexpected<Reason>(portion.error());
+  }
+  return link.run("COMMIT");
+}
+
+Result<bool> Pusher::hasMore() const {
+  if (at_.next_table < kOutboxTables) return true;
+  const auto newest = connection_->integer("SELECT coalesce(max(number), 0) FROM outbox");
+  if (!newest) return tl::unexpected<Reason>(newest.error());
+  return *newest > at_.sent;
+}
+
+Result<Portion> Pusher::push(Link& link, std::int64_t most_rows) {
+  const auto snapshot = Snapshot::begin(*connection_);
+  if (!snapshot) return tl::unexpected<Reason>(snapshot.error());
+  return pushPortion(link, most_rows, true);
+}
+
+Result<Portion> Pusher::pushPortion(Link& link, std::int64_t most_rows, bool as_transaction) {
+  Draft draft{most_rows, 0, at_, false};
+  link.beginBatch(as_transaction);
+  const auto read =
+      at_.next_table < kOutboxTables ? readWhole(link, draft) : readChanges(link, draft);
+  // Where the file could not be read to the end the server refuses, and takes nothing of it.
+  queueAdvance(link, draft, read.has_value() ? mark_.outbox : "");
+  const auto done = link.endBatch();
+  if (!read) return tl::unexpected<Reason>(read.error());
+  if (!done) return tl::unexpected<Reason>(done.error());
+  at_ = draft.next;
+  return Portion{draft.rows, at_.sent, draft.whole};
+}
+
+Result<void> Pusher::readChanges(Link& link, Draft& draft) const {
+  auto entries = connection_->prepare(
+      "SELECT number, tbl, id FROM outbox WHERE number > ?1 ORDER BY number LIMIT ?2");
+  if (!entries) return tl::unexpected<Reason>(entries.error());
+  entries->bind(1, at_.sent).bind(2, draft.most + 1);
+  for (;;) {
+    const auto row = entries->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    draft.whole = !*row;
+    if (!*row || draft.rows == static_cast<std::uint64_t>(draft.most)) return {};
+    const auto queued = queueRow(link, tableAt(entries->integer(1)), entries->integer(2));
+    if (!queued) return queued;
+    draft.next.sent = entries->integer(0);
+    ++draft.rows;
+  }
+}
+
+Result<void> Pusher::queueRow(Link& link, OutboxTable table, std::int64_t id) const {
+  if (table == OutboxTable::kWorking) return queueWorking(link);
+  const Table& t = tableOf(table);
+  auto row = connection_->prepare(selectionOf(t) + " WHERE " + t.columns.front().name + " = ?1");
+  if (!row) return tl::unexpected<Reason>(row.error());
+  const auto there = row->bind(1, id).step();
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (*there) {
+    link.queue(nameOf("put", table), valuesOf(t, map_, *row));
+  } else {
+    link.queue(nameOf("delete", table), Values().put(map_).put(id));
+  }
+  return {};
+}
+
+Result<void> Pusher::queueWorking(Link& link) const {
+  auto meta = connection_->prepare(
+      "SELECT (SELECT value FROM meta WHERE key = 'revision'), "
+      "(SELECT value FROM meta WHERE key = 'tile_size_m'), "
+      "(SELECT value FROM meta WHERE key = 'working')");
+  if (!meta) return tl::unexpected<Reason>(meta.error());
+  const auto there = meta->step();
+  if (!there) return tl::unexpected<Reason>(there.error());
+  Values values;
+  values.put(map_).put(meta->integer(0)).put(std::string_view(meta->text(1)));
+  const auto header =
+      meta->isNull(2) ? Result<Objects>(fail("belief_malformed")) : decodeHeader(meta->blob(2));
+  meta->isNull(2) ? values.null() : values.put(meta->blob(2));
+  if (header) {
+    values.put(static_cast<std::int64_t>(header->world.world));
+    values.put(static_cast<std::int64_t>(header->world.epoch));
+  } else {
+    values.null().null();
+  }
+  link.queue("set_working", values);
+  link.queue("clear_working", Values().put(map_));
+  auto rows = connection_->prepare(selectionOf(workingTable()));
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return {};
+    link.queue("put_working", valuesOf(workingTable(), map_, *rows));
+  }
+}
+
+/// Row by row through the tables. Entries of the outbox that came since it began follow then.
+Result<void> Pusher::readWhole(Link& link, Draft& draft) const {
+  while (draft.next.next_table + 1 < kOutboxTables &&
+         draft.rows < static_cast<std::uint64_t>(draft.most)) {
+    const auto queued = queueRows(link, tableAt(draft.next.next_table), draft);
+    if (!queued) return queued;
+  }
+  if (draft.next.next_table + 1 < kOutboxTables) return {};
+  const auto queued = queueWorking(link);
+  if (!queued) return queued;
+  draft.next.next_table = kOutboxTables;
+  draft.whole = !has_outbox_;
+  if (!has_outbox_) return {};
+  const auto newest = connection_->integer("SELECT coalesce(max(number), 0) FROM outbox");
+  if (!newest) return tl::unexpected<Reason>(newest.error());
+  draft.whole = *newest <= draft.next.sent;
+  return {};
+}
+
+Result<void> Pusher::queueRows(Link& link, OutboxTable table, Draft& draft) const {
+  const Table& t = tableOf(table);
+  const std::string& key = t.columns.front().name;
+  auto rows = connection_->prepare(selectionOf(t) + " WHERE " + key + " >= ?1 ORDER BY " + key +
+                                   " LIMIT ?2");
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  const auto most = draft.most - static_cast<std::int64_t>(draft.rows);
+  rows->bind(1, draft.next.next_id).bind(2, most);
+  for (std::int64_t count = 0;; ++count) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (*row) {
+      link.queue(nameOf("put", table), valuesOf(t, map_, *rows));
+      ++draft.rows;
+      const std::int64_t id = rows->integer(0);
+      draft.next.next_id = id == kLargest ? id : id + 1;
+      if (id != kLargest) continue;
+    } else if (count == most) {
+      return {};
+    }
+    ++draft.next.next_table;
+    draft.next.next_id = kSmallest;
+    return {};
+  }
+}
+
+void Pusher::queueAdvance(Link& link, const Draft& draft, const std::string& outbox) const {
+  Values values;
+  values.put(map_).put(std::string_view(outbox));
+  for (const Place& place : {at_, draft.next}) {
+    values.put(place.sent).put(place.next_table).put(place.next_id);
+  }
+  link.queue("advance", values.put(static_cast<std::int64_t>(draft.whole)));
+}
+
+}  // namespace perdure::map_store::fleet
