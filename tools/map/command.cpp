@@ -11,6 +11,7 @@
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "tools/bus_tools/common.h"
+#include "tools/map/fuse.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -189,6 +190,8 @@ void addMapCommand(CLI::App& app) {
       ->expected(4);
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
+
+  addFuseCommand(*map);
 
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);
