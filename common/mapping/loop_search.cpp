@@ -36,6 +36,10 @@ AnchorId homeOf(const PlaceMatch& match, const std::map<ObjectId, AnchorId>& hom
 
 }  // namespace
 
+bool Whereabouts::asks(AnchorId anchor) const {
+  return !others_only || state.anchors().at(anchor).session != here().session;
+}
+
 bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
   return record.session != here().session || std::abs(way.way_m() - record.way_m) > visit_m;
 }
@@ -89,7 +93,8 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   bool fresh = false;
   for (const ObjectId id : body.objectsOfVisit(parameters_.loop.visit_m)) {
     const ObjectRecord& record = body.state.records().at(id);
-    if (record.earlier && body.relative.to(record.earlier->anchor)) continue;
+    const Sighting* before = record.earlier ? &*record.earlier : nullptr;
+    if (before && body.asks(before->anchor) && body.relative.to(before->anchor)) continue;
     const auto T_bA = body.relative.to(record.sighting.anchor);
     if (!T_bA) continue;
     seen.push_back(laid(*T_bA, record.sighting.in_anchor));
@@ -108,7 +113,7 @@ std::vector<std::pair<double, AnchorId>> LoopSearch::anchorsOfBefore(
   const auto of_late = body.anchorsOfVisit(parameters_.loop.visit_m);
   std::vector<std::pair<double, AnchorId>> anchors;
   for (const auto& [id, pose] : graph.poses()) {
-    if (id >= of_late.front() && id <= of_late.back()) continue;
+    if ((id >= of_late.front() && id <= of_late.back()) || !body.asks(id)) continue;
     anchors.emplace_back((pose.p - here).head<2>().norm(), id);
   }
   const double far_m =

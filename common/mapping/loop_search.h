@@ -21,8 +21,11 @@ struct Whereabouts {
   const AnchorBuilder& way;
   const Marginals& relative;  ///< to the body's newest anchor
   double deviation_m = 0.0;   ///< in the plane, from the first anchor of its component
+  bool others_only = false;   ///< asked is what other sessions have seen
 
   const Anchor& here() const { return *way.last(); }
+  /// Whether what was seen from the anchor is asked.
+  bool asks(AnchorId anchor) const;
   /// Of another session, or not detected within `visit_m` of way.
   bool isOld(const ObjectRecord& record, double visit_m) const;
   /// Anchors of the session within so much way, in order.

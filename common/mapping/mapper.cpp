@@ -56,6 +56,7 @@ void Mapper::replay(const WorldId& session) {
   }
   if (way.empty()) return;
   session_ = session;
+  for (const EdgeId id : loop_book_.begin()) state_.removeLoop(id);
   active_.reset();
   tentative_.reset();
   learnAnew(session);
@@ -63,10 +64,16 @@ void Mapper::replay(const WorldId& session) {
   searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
   learned_at_m_ = std::numeric_limits<double>::infinity();  // it was learned when it was driven
   loop_search_.forget();
+  replays_ = true;
   for (const AnchorId id : way) {
     stand(state_.anchors().at(id));
+    const std::size_t told = change_.merges.size();
     search();
+    for (std::size_t k = told; k < change_.merges.size(); ++k) {
+      onMerged(change_.merges[k].survivor, change_.merges[k].absorbed);
+    }
   }
+  replays_ = false;
   searched_at_m_ = learned_at_m_ = builder_.way_m();
 }
 
@@ -83,7 +90,8 @@ void Mapper::onOdometry(const Odometry& odometry) {
 
 Whereabouts Mapper::body() {
   const auto to_first = marginals().to(marginals().first());
-  return {state_, builder_, marginals(), to_first ? planeSigma(to_first->covariance) : 0.0};
+  const double deviation_m = to_first ? planeSigma(to_first->covariance) : 0.0;
+  return {state_, builder_, marginals(), deviation_m, replays_};
 }
 
 bool Mapper::isOld(const ObjectRecord& record) const {

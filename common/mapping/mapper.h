@@ -65,9 +65,9 @@ class Mapper {
   void onObjects(const Objects& objects);
   void onMerged(ObjectId survivor, ObjectId absorbed);
   void onGone(ObjectId id);
-  /// Drives along a saved session again and looks for its places on the rest of the map, with what
-  /// was seen a little later, too. For maps that are brought together. Afterwards the mapper stands
-  /// at its end.
+  /// Drives along a saved session again and looks for its places among what other sessions have
+  /// seen, with what was seen a little later, too. For maps that are brought together. Merges are
+  /// carried out as they are found; the change tells them. Afterwards the mapper stands at its end.
   void replay(const WorldId& session);
   MapChange takeChange() { return std::exchange(change_, {}); }
 
@@ -165,6 +165,7 @@ class Mapper {
     double way_m = 0.0;
   };
   std::optional<Tentative> tentative_;
+  bool replays_ = false;
   double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };

@@ -13,6 +13,7 @@
 #include "common/base/errors.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "tools/bus_tools/common.h"
+#include "tools/map/fuse.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -277,6 +278,8 @@ void addMapCommand(CLI::App& app) {
   exporting->callback([request] { exportMap(*request); });
 
   addServerCommands(*map);
+  addFuseCommand(*map);
+
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);
 }

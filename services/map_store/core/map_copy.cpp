@@ -1,21 +1,16 @@
 #include "services/map_store/core/map_copy.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <filesystem>
 #include <system_error>
 
 #include "common/base/errors.h"
+#include "services/map_store/core/draft_file.h"
 #include "services/map_store/core/schema.h"
 
 namespace perdure::map_store {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// What SQLite may leave beside a file.
-constexpr const char* kBeside[] = {"-wal", "-shm", "-journal"};
 
 [[noreturn]] void cannotRead(const std::string& from, const Reason& reason) {
   const std::string why = " (" + reason.code + ": " + reason.detail + ")";
@@ -86,26 +81,8 @@ void refuseWhatIsThere(const std::string& to) {
   for (const char* suffix : kBeside) refuse(to + suffix);
 }
 
-/// A file that is removed at the end, with what lies beside it, unless it was renamed.
-class Draft {
- public:
-  explicit Draft(std::string path) : path_(std::move(path)) { remove(); }
-  ~Draft() { remove(); }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  void remove() const {
-    std::error_code ignored;
-    fs::remove(path_, ignored);
-    for (const char* suffix : kBeside) fs::remove(path_ + suffix, ignored);
-  }
-  std::string path_;
-};
-
 /// The draft is closed, so that all of it is in its one file.
-void writeDraft(const std::string& from, const std::string& to, const Draft& draft) {
+void writeDraft(const std::string& from, const std::string& to, const DraftFile& draft) {
   const Connection source = openSource(from);
   const auto target = Connection::open(draft.path(), Connection::Mode::kReadWriteCreate);
   if (!target) cannotWrite(to, target.error());
@@ -120,14 +97,6 @@ void writeDraft(const std::string& from, const std::string& to, const Draft& dra
   if (!sound) cannotWrite(to, sound.error());
 }
 
-bool sync(const fs::path& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  const bool synced = fsync(file) == 0;
-  close(file);
-  return synced;
-}
-
 }  // namespace
 
 void copyMap(const std::string& from, const std::string& to) {
@@ -137,7 +106,7 @@ void copyMap(const std::string& from, const std::string& to) {
   (void)openSource(from);
   fs::create_directories(folder, error);
   if (error) cannotWrite(to, {"cannot_open", folder.string() + ": " + error.message()});
-  const Draft draft(to + ".part");
+  const DraftFile draft(to);
   writeDraft(from, to, draft);
   if (!sync(draft.path())) cannotWrite(to, {"io_error", "it cannot be synced"});
   fs::rename(draft.path(), to, error);

@@ -1,0 +1,149 @@
+#include "common/mapping/fusion/map_fusion.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "common/mapping/fusion/object_fusion.h"
+#include "common/mapping/fusion/overlaps.h"
+#include "common/mapping/fusion/sightings.h"
+#include "common/mapping/fusion/united_map.h"
+#include "common/mapping/graph/components.h"
+#include "common/mapping/mapper.h"
+
+namespace perdure::mapping {
+namespace {
+
+void apply(SavedMap& map, Unsaved&& unsaved) {
+  map.classes = std::move(unsaved.changed.classes);
+  for (auto& [id, saved] : unsaved.changed.anchors) map.anchors[id] = std::move(saved);
+  for (auto& [id, saved] : unsaved.changed.edges) map.edges[id] = saved;
+  for (auto& [id, record] : unsaved.changed.records) map.records[id] = std::move(record);
+  for (const EdgeId id : unsaved.edges_gone) map.edges.erase(id);
+  for (const ObjectId id : unsaved.records_gone) map.records.erase(id);
+}
+
+/// Drives along sessions again until that finds no more loops.
+class Replays {
+ public:
+  Replays(const SavedMap& map, const Parameters& parameters) : mapper_(parameters, map) {}
+
+  void run(const std::vector<WorldId>& sessions) {
+    // What one of them joins the next time may be what lies before the place where it was joined.
+    constexpr int kMostPasses = 3;
+    for (int pass = 0; pass < kMostPasses; ++pass) {
+      const std::size_t before = loops_;
+      for (const WorldId& session : sessions) replay(session);
+      if (loops_ == before) return;
+    }
+  }
+
+  /// Merges what stands in one place.
+  void settle(const MapContents& map) {
+    SavedMap aligned = map.graph;
+    apply(aligned, mapper_.unsaved());
+    for (const MergeOrder& order : overlapping(map, aligned, mapper_.graph())) {
+      mapper_.onMerged(order.survivor, order.absorbed);
+      merges_.push_back(order);
+    }
+  }
+
+  Mapper& mapper() { return mapper_; }
+  const std::vector<MergeOrder>& merges() const { return merges_; }
+  std::size_t loops() const { return loops_; }
+
+ private:
+  void replay(const WorldId& session) {
+    mapper_.replay(session);
+    const MapChange change = mapper_.takeChange();
+    loops_ += change.loops.size();
+    merges_.insert(merges_.end(), change.merges.begin(), change.merges.end());
+    for (const MergeOrder& undone : change.splits) {
+      std::erase_if(merges_, [&](const MergeOrder& order) {
+        return order.survivor == undone.survivor && order.absorbed == undone.absorbed;
+      });
+    }
+  }
+
+  Mapper mapper_;
+  std::vector<MergeOrder> merges_;
+  std::size_t loops_ = 0;
+};
+
+/// What is new, and after it what had found nothing before.
+std::vector<WorldId> toBeReplayed(const MapContents& map, const Addition& addition) {
+  std::vector<WorldId> sessions = addition.sessions;
+  sessions.insert(sessions.end(), addition.grown.begin(), addition.grown.end());
+  if (sessions.empty()) return sessions;
+  const auto parts = partsOf(map);
+  for (std::size_t k = 1; k < parts.size(); ++k) {
+    for (const WorldId& session : parts[k]) {
+      const bool there = std::find(sessions.begin(), sessions.end(), session) != sessions.end();
+      if (!there) sessions.push_back(session);
+    }
+  }
+  return sessions;
+}
+
+std::size_t loopsOf(const SavedMap& map) {
+  return static_cast<std::size_t>(
+      std::count_if(map.edges.begin(), map.edges.end(), [](const auto& each) {
+        return each.second.edge.kind == EdgeKind::kLoop && each.second.weight >= kBelieved;
+      }));
+}
+
+void align(MapContents& map, const std::vector<WorldId>& sessions, const Parameters& parameters,
+           FusionReport& report) {
+  const std::size_t before = loopsOf(map.graph);
+  Replays replays(map.graph, parameters);
+  replays.run(sessions);
+  replays.settle(map);
+  const std::map<ObjectId, ObjectRecord> records = map.graph.records;
+  apply(map.graph, replays.mapper().unsaved());
+  report.merges = mergeObjects(map, records, replays.merges(), replays.mapper().graph());
+  const std::size_t after = loopsOf(map.graph);
+  report.loops = after > before ? after - before : 0;
+}
+
+}  // namespace
+
+FusionReport fuseInto(MapContents& map, const MapContents& other, const Parameters& parameters) {
+  const Addition addition = unite(map, other);
+  FusionReport report;
+  report.added = addition.sessions;
+  report.grown = addition.grown;
+  report.parted = addition.parted;
+  report.known = addition.known;
+  report.renewed = addition.renewed.size();
+  for (const ObjectId id : addition.objects) report.objects += map.objects.at(id).ended ? 0 : 1;
+  report.changes = renew(map, addition);
+  const auto sessions = toBeReplayed(map, addition);
+  if (!sessions.empty()) align(map, sessions, parameters, report);
+  const auto gone = endWhatIsGone(map);
+  report.changes.insert(report.changes.end(), gone.begin(), gone.end());
+  map.changes.insert(map.changes.end(), report.changes.begin(), report.changes.end());
+  return report;
+}
+
+std::vector<std::vector<WorldId>> partsOf(const MapContents& map) {
+  const MapState state(GraphParameters(), map.graph);
+  std::map<AnchorId, std::size_t> anchors;
+  std::map<AnchorId, std::vector<WorldId>> sessions;
+  const auto components = componentsOf(state.graph());
+  for (const auto& [anchor, component] : components) ++anchors[component];
+  for (const Session& session : sessionsOf(map.graph)) {
+    sessions[components.at(session.anchors.front())].push_back(session.world);
+  }
+  std::vector<std::pair<std::size_t, AnchorId>> order;
+  for (const auto& [component, count] : anchors) order.emplace_back(count, component);
+  std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+    return a.first > b.first || (a.first == b.first && a.second < b.second);
+  });
+  std::vector<std::vector<WorldId>> parts;
+  for (const auto& [count, component] : order) {
+    if (!sessions[component].empty()) parts.push_back(sessions[component]);
+  }
+  return parts;
+}
+
+}  // namespace perdure::mapping

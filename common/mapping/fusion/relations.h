@@ -1,0 +1,32 @@
+// Relations between anchors of one graph.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "common/mapping/graph/marginals.h"
+
+namespace perdure::mapping {
+
+/// With one factorisation for each anchor that others are asked from: ask for its own in a row.
+class Relations {
+ public:
+  explicit Relations(const PoseGraph& graph) : graph_(graph) {}
+
+  /// Nothing where the graph does not connect them.
+  std::optional<LevelGaussian> between(AnchorId from, AnchorId to) {
+    if (from == to) return LevelGaussian();
+    if (from != from_) {
+      marginals_ = std::make_unique<Marginals>(graph_, from);
+      from_ = from;
+    }
+    return marginals_->to(to);
+  }
+
+ private:
+  const PoseGraph& graph_;
+  AnchorId from_ = 0;
+  std::unique_ptr<Marginals> marginals_;
+};
+
+}  // namespace perdure::mapping

@@ -1,0 +1,62 @@
+// Their sessions, anchors and edges beside those of a map, and what became of their numbers.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "common/mapping/fusion/map_contents.h"
+#include "common/mapping/fusion/united_map.h"
+
+namespace perdure::mapping {
+
+class UnitedSessions {
+ public:
+  /// Changes the graph of `map`. References are kept.
+  UnitedSessions(MapContents& map, const MapContents& other, Addition& addition);
+
+  /// Their world in the united map; one that is free where it was not met yet.
+  const WorldId& worldOf(const WorldId& world);
+  /// Their record in the united map's ids; nothing where there is none, or of a way that was left
+  /// out.
+  std::optional<ObjectRecord> recordOf(ObjectId theirs, ObjectId id) const;
+  /// Whether a sighting of the record, in ids of the united map, is of a session that both maps
+  /// know.
+  bool wasSeenInBoth(const ObjectRecord& record) const;
+  bool isNew(AnchorId id) const { return new_ids_.contains(id); }
+
+ private:
+  WorldId freeWorld(const WorldId& world) const;
+  WorldId otherWorld(const WorldId& world) const;
+  void matchWorlds();
+  void matchAnchors();
+  void matchAnchors(const Session& session, const Session& same);
+  void makeRoom();
+  void moveUp();
+  void renumber(const std::map<AnchorId, AnchorId>& moved);
+  void addAnchors();
+  AnchorId reference(AnchorId id, const std::map<AnchorId, AnchorId>& known,
+                     const std::map<AnchorId, AnchorId>& components) const;
+  void addAnchor(AnchorId theirs, AnchorId id, AnchorId reference, AnchorId component);
+  void addEdges();
+  void addClasses();
+  bool take(Sighting& sighting, ObjectId id) const;
+
+  MapContents& map_;
+  const MapContents& other_;
+  Addition& addition_;
+  const std::vector<Session> sessions_, other_sessions_;
+  std::set<WorldId> worlds_;         ///< of the map
+  std::set<std::uint64_t> numbers_;  ///< of these
+  std::map<WorldId, const Session*> known_;
+  std::map<WorldId, WorldId> world_of_;  ///< theirs to ours; so are the next ones
+  std::map<std::uint64_t, std::uint64_t> number_of_;
+  std::map<WorldId, std::vector<AnchorId>> new_anchors_;
+  std::map<WorldId, AnchorId> first_new_;  ///< by our world
+  std::map<AnchorId, AnchorId> anchor_of_, frames_, first_of_;
+  std::set<AnchorId> new_ids_;
+  std::vector<std::uint32_t> class_of_;
+};
+
+}  // namespace perdure::mapping

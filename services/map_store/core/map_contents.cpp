@@ -1,0 +1,287 @@
+#include "services/map_store/core/map_contents.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "common/base/errors.h"
+#include "services/map_store/core/draft_file.h"
+#include "services/map_store/core/map_database.h"
+
+namespace perdure::map_store {
+namespace {
+
+namespace fs = std::filesystem;
+using mapping::Change;
+using mapping::MapContents;
+using mapping::Origin;
+using mapping::StoredObject;
+
+// Whose object each one was: `map_first`, `map_second` are digests of the first session's first
+// anchor and first two. What one drive saw and another one did not find any more; kind 0: gone, 1:
+// moved; the place is in M of `map_world`.
+constexpr char kFusionSchema[] = R"sql(
+CREATE TABLE provenance(
+  map_first INTEGER NOT NULL, map_second INTEGER NOT NULL, old_id INTEGER NOT NULL,
+  id INTEGER NOT NULL, first_seen_ns INTEGER NOT NULL, last_seen_ns INTEGER NOT NULL);
+CREATE INDEX provenance_by_id ON provenance(id);
+CREATE TABLE changes(
+  id INTEGER NOT NULL, kind INTEGER NOT NULL, class TEXT NOT NULL,
+  map_world INTEGER NOT NULL, map_epoch INTEGER NOT NULL, x REAL NOT NULL, y REAL NOT NULL,
+  z REAL NOT NULL, last_seen_ns INTEGER NOT NULL, since_ns INTEGER NOT NULL,
+  by_world INTEGER NOT NULL, by_epoch INTEGER NOT NULL);
+)sql";
+
+template <class Take>
+Result<void> forRows(const Connection& connection, std::string_view sql, Take take) {
+  auto rows = connection.prepare(sql);
+  if (!rows) return tl::unexpected<Reason>(rows.error());
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return {};
+    take(*rows);
+  }
+}
+
+bool hasTable(const Connection& connection, const std::string& name) {
+  const auto count =
+      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
+  return count && *count > 0;
+}
+
+WorldId worldAt(const Statement& row, int column) {
+  return {row.id(column), static_cast<std::uint32_t>(row.integer(column + 1))};
+}
+
+void takeObject(const Statement& row, WholeMap& map) {
+  auto belief = decodeBelief(row.blob(3));
+  if (!belief || belief->id == 0) {
+    ++map.malformed;
+    return;
+  }
+  StoredObject object{worldAt(row, 0), *std::move(belief), std::nullopt};
+  object.belief.visibility = Visibility::kOutOfView;
+  object.belief.visible_fraction = 0.0;
+  object.belief.memory = Memory::kLongTerm;
+  if (row.integer(2) != 0) {
+    object.ended = mapping::Ending{static_cast<EventKind>(row.integer(2) - 1),
+                                   fromNanoseconds(row.integer(4)), row.id(5)};
+  }
+  const ObjectId id = object.belief.id;
+  map.contents.objects.insert_or_assign(id, std::move(object));
+}
+
+Result<void> readObjects(const Connection& connection, WholeMap& map) {
+  return forRows(connection,
+                 "SELECT world, epoch, gone, belief, gone_ns, "
+                 "coalesce(merged_into, 0) FROM objects ORDER BY id",
+                 [&](const Statement& row) { takeObject(row, map); });
+}
+
+Result<void> readProvenance(const Connection& connection, MapContents& map) {
+  if (!hasTable(connection, "provenance")) return {};
+  return forRows(connection,
+                 "SELECT map_first, map_second, old_id, id, first_seen_ns, last_seen_ns FROM "
+                 "provenance ORDER BY rowid",
+                 [&](const Statement& row) {
+                   map.origins.push_back({{row.id(0), row.id(1)},
+                                          row.id(2),
+                                          row.id(3),
+                                          fromNanoseconds(row.integer(4)),
+                                          fromNanoseconds(row.integer(5))});
+                 });
+}
+
+Result<void> readChanges(const Connection& connection, MapContents& map) {
+  if (!hasTable(connection, "changes")) return {};
+  return forRows(connection,
+                 "SELECT map_world, map_epoch, by_world, by_epoch, id, kind, class, x, y, z, "
+                 "last_seen_ns, since_ns FROM changes ORDER BY rowid",
+                 [&](const Statement& row) {
+                   Change change;
+                   change.map = worldAt(row, 0);
+                   change.by = worldAt(row, 2);
+                   change.id = row.id(4);
+                   change.kind = row.integer(5) == 1 ? Change::Kind::kMoved : Change::Kind::kGone;
+                   change.class_name = row.text(6);
+                   change.p_M = {row.real(7), row.real(8), row.real(9)};
+                   change.last_seen = fromNanoseconds(row.integer(10));
+                   change.since = fromNanoseconds(row.integer(11));
+                   map.changes.push_back(std::move(change));
+                 });
+}
+
+Result<void> readMeta(const Connection& connection, WholeMap& map) {
+  return forRows(connection, "SELECT key, value FROM meta", [&](const Statement& row) {
+    if (row.text(0) == "revision") map.revision = row.id(1);
+    if (row.text(0) == "tile_size_m" && row.real(1) > 0.0) map.tile_size_m = row.real(1);
+  });
+}
+
+Result<void> readWhole(const Connection& connection, WholeMap& map) {
+  const auto version = connection.integer("PRAGMA user_version");
+  if (!version) return tl::unexpected<Reason>(version.error());
+  map.schema = *version;
+  auto graph = readGraph(connection);
+  if (!graph) return tl::unexpected<Reason>(graph.error());
+  map.malformed += graph->malformed;
+  map.contents.graph = std::move(graph->map);
+  map.contents.graph.merges.clear();  // what is united is not undone
+  auto done = readObjects(connection, map);
+  if (done) done = readProvenance(connection, map.contents);
+  if (done) done = readChanges(connection, map.contents);
+  if (done) done = readMeta(connection, map);
+  // What the mapper has seen and the map has no row of, or a row of history.
+  std::erase_if(map.contents.graph.records, [&](const auto& each) {
+    const auto object = map.contents.objects.find(each.first);
+    return object == map.contents.objects.end() || object->second.ended.has_value();
+  });
+  return done;
+}
+
+// Writing.
+
+Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Unsaved& graph) {
+  Batch batch;
+  batch.working = &working;
+  batch.graph = &graph;
+  for (const auto& [id, object] : map.contents.objects) {
+    batch.left[id] = {object.world, object.belief};
+    if (object.ended) {
+      batch.removed[id] = {object.ended->kind, object.ended->time, object.ended->merged_into};
+    }
+  }
+  return batch;
+}
+
+/// Nothing is in sight; a service that begins with the map gives ids above its own.
+Objects emptyWorkingSet(const WholeMap& map) {
+  Objects working;
+  const auto& anchors = map.contents.graph.anchors;
+  if (!anchors.empty()) {
+    const mapping::Anchor& first = anchors.begin()->second.anchor;
+    working.world = first.session;
+    working.stamp = first.stamp;
+    working.T_WB = first.T_WA;
+  }
+  working.next_id = map.contents.largestId() + 1;
+  return working;
+}
+
+Result<void> writeProvenance(const Connection& connection, const MapContents& map) {
+  auto insert = connection.prepare("INSERT INTO provenance VALUES(?1, ?2, ?3, ?4, ?5, ?6)");
+  if (!insert) return tl::unexpected<Reason>(insert.error());
+  for (const Origin& origin : map.origins) {
+    insert->bindId(1, origin.map.first).bindId(2, origin.map.second).bindId(3, origin.id);
+    insert->bindId(4, origin.now).bind(5, toNanoseconds(origin.first_seen));
+    const auto done = insert->bind(6, toNanoseconds(origin.last_seen)).run();
+    if (!done) return done;
+  }
+  return {};
+}
+
+Result<void> writeChanges(const Connection& connection, const MapContents& map) {
+  auto insert = connection.prepare(
+      "INSERT INTO changes VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)");
+  if (!insert) return tl::unexpected<Reason>(insert.error());
+  for (const Change& change : map.changes) {
+    insert->bindId(1, change.id).bind(2, static_cast<std::int64_t>(change.kind));
+    insert->bind(3, std::string_view(change.class_name)).bindId(4, change.map.world);
+    insert->bind(5, std::int64_t{change.map.epoch}).bind(6, change.p_M.x());
+    insert->bind(7, change.p_M.y()).bind(8, change.p_M.z());
+    insert->bind(9, toNanoseconds(change.last_seen)).bind(10, toNanoseconds(change.since));
+    insert->bindId(11, change.by.world);
+    const auto done = insert->bind(12, std::int64_t{change.by.epoch}).run();
+    if (!done) return done;
+  }
+  return {};
+}
+
+/// Beside what MapDatabase writes; then all of it is in one file.
+Result<void> completeFile(const WholeMap& map, const std::string& path) {
+  auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
+  if (!connection) return tl::unexpected<Reason>(connection.error());
+  auto transaction = Transaction::begin(*connection);
+  if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  auto done =
+      connection->execute(std::string(kFusionSchema) + "REPLACE INTO meta VALUES('revision', " +
+                          std::to_string(static_cast<std::int64_t>(map.revision)) + ");");
+  if (done) done = writeProvenance(*connection, map.contents);
+  if (done) done = writeChanges(*connection, map.contents);
+  if (done) done = transaction->commit();
+  if (done) done = connection->execute("PRAGMA journal_mode=DELETE");
+  return done;
+}
+
+[[noreturn]] void cannotWriteWhole(const std::string& path, const Reason& reason) {
+  const bool full = reason.code == "disk_full";
+  throw StartupError(ExitCode::kUnavailable,
+                     "The map " + path + " cannot be written (" + reason.code + ": " +
+                         reason.detail + "); " +
+                         (full ? "free space there, or name a file on another disk."
+                               : "name a file in a folder that this user may write."));
+}
+
+void writeWholeDraft(const WholeMap& map, const std::string& path, const std::string& draft,
+                     std::int64_t max_size_mb) {
+  const Objects working = emptyWorkingSet(map);
+  mapping::Unsaved graph;
+  graph.changed = map.contents.graph;
+  {
+    MapDatabase database({draft, map.tile_size_m, max_size_mb, false});
+    const auto written = database.write(wholeBatch(map, working, graph));
+    if (!written) cannotWriteWhole(path, written.error());
+  }
+  const auto done = completeFile(map, draft);
+  if (!done) cannotWriteWhole(path, done.error());
+}
+
+}  // namespace
+
+Result<WholeMap> readWholeMap(const Connection& connection) {
+  auto done = connection.execute("SAVEPOINT whole_map");
+  if (!done) return tl::unexpected<Reason>(done.error());
+  WholeMap map;
+  done = readWhole(connection, map);
+  const auto released = connection.execute("RELEASE whole_map");
+  if (!done) return tl::unexpected<Reason>(done.error());
+  if (!released) return tl::unexpected<Reason>(released.error());
+  return map;
+}
+
+void checkNewFile(const std::string& path, bool replace) {
+  std::error_code error;
+  if (fs::exists(fs::symlink_status(path)) && !replace) {
+    throw StartupError(ExitCode::kConfiguration,
+                       path +
+                           " is there already; name another file, or give --force to replace "
+                           "it.");
+  }
+  if (fs::is_directory(path, error)) {
+    throw StartupError(ExitCode::kConfiguration, path + " is a folder; name a file in it.");
+  }
+  const fs::path folder = fs::absolute(path).parent_path();
+  fs::create_directories(folder, error);
+  if (!error && access(folder.c_str(), W_OK) != 0) error = {errno, std::generic_category()};
+  if (error) cannotWriteWhole(path, {"cannot_open", folder.string() + ": " + error.message()});
+}
+
+void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
+                   std::int64_t max_size_mb) {
+  checkNewFile(path, replace);
+  const DraftFile draft(path);
+  writeWholeDraft(map, path, draft.path(), max_size_mb);
+  if (!sync(draft.path())) cannotWriteWhole(path, {"io_error", "it cannot be synced"});
+  // The log of the map that is replaced would be taken for this one's.
+  std::error_code error;
+  for (const char* suffix : kBeside) fs::remove(path + suffix, error);
+  fs::rename(draft.path(), path, error);
+  if (error) cannotWriteWhole(path, {"io_error", error.message()});
+  (void)sync(fs::absolute(path).parent_path());  // not every file system can
+}
+
+}  // namespace perdure::map_store

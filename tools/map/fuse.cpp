@@ -1,0 +1,328 @@
+#include "tools/map/fuse.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "common/base/errors.h"
+#include "services/map_store/config.h"
+#include "services/map_store/core/map_contents.h"
+#include "services/map_store/core/schema.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using map_store::WholeMap;
+
+struct GivenMap {
+  std::string path;
+  WholeMap map;
+};
+
+[[noreturn]] void refuse(ExitCode code, const std::string& why) { throw StartupError(code, why); }
+
+void refuseForeign(const std::string& path, const map_store::Identity& identity) {
+  if (identity.application != map_store::kApplicationId) {
+    refuse(ExitCode::kConfiguration,
+           path + " is not a map of Perdure's; give files that map_store writes (its store.path).");
+  }
+  if (identity.version > map_store::kSchemaVersion) {
+    refuse(ExitCode::kConfiguration,
+           fmt::format("The map {} has schema {}, this program knows up to {}; use the newer "
+                       "Perdure, or leave the map out.",
+                       path, identity.version, map_store::kSchemaVersion));
+  }
+}
+
+[[noreturn]] void cannotReadMap(const std::string& path, const Reason& reason) {
+  if (reason.code == "not_a_database") {
+    refuse(ExitCode::kConfiguration,
+           path +
+               " is not a map of Perdure's, or its beginning is damaged; give files that "
+               "map_store writes (its store.path).");
+  }
+  refuse(ExitCode::kUnavailable,
+         fmt::format("The map {} cannot be read ({}: {}); this user must be able to read it and to "
+                     "write to its folder. What can be read of a damaged one: sqlite3 {} .recover",
+                     path, reason.code, reason.detail, path));
+}
+
+WholeMap readMap(const std::string& path) {
+  if (!fs::is_regular_file(path)) {
+    refuse(ExitCode::kUnavailable,
+           "There is no map " + path + "; give files that map_store writes (its store.path).");
+  }
+  const auto connection = map_store::Connection::open(path, map_store::Connection::Mode::kReadOnly);
+  if (!connection) cannotReadMap(path, connection.error());
+  (void)connection->execute("PRAGMA busy_timeout=1000");
+  const auto identity = map_store::identityOf(*connection);
+  if (!identity) cannotReadMap(path, identity.error());
+  refuseForeign(path, *identity);
+  auto map = map_store::readWholeMap(*connection);
+  if (!map) cannotReadMap(path, map.error());
+  return std::move(*map);
+}
+
+void refuseToReplaceInputs(const FuseRequest& request) {
+  for (const std::string& file : request.files) {
+    std::error_code ignored;
+    if (!fs::equivalent(file, request.out, ignored)) continue;
+    refuse(ExitCode::kUsage, request.out + " is one of the maps to be fused; give another --out.");
+  }
+}
+
+std::vector<GivenMap> readAll(const FuseRequest& request, FuseOutcome& outcome) {
+  std::vector<GivenMap> maps;
+  for (const std::string& path : request.files) {
+    WholeMap map = readMap(path);
+    outcome.malformed += map.malformed;
+    if (map.contents.graph.anchors.empty()) {
+      outcome.left_out.push_back(path);
+    } else {
+      maps.push_back({path, std::move(map)});
+    }
+  }
+  std::stable_sort(maps.begin(), maps.end(), [](const GivenMap& a, const GivenMap& b) {
+    return mapping::comesFirst(a.map.contents, b.map.contents);
+  });
+  return maps;
+}
+
+FusedFile begunBy(const GivenMap& given) {
+  FusedFile file{given.path, 0, given.map.contents.present(), {}};
+  for (const auto& session : mapping::sessionsOf(given.map.contents.graph)) {
+    file.report.added.push_back(session.world);
+  }
+  file.sessions = file.report.added.size();
+  file.report.objects = file.objects;
+  return file;
+}
+
+FusedFile bring(WholeMap& fused, const GivenMap& given, const mapping::Parameters& parameters) {
+  FusedFile file = begunBy(given);
+  file.report = mapping::fuseInto(fused.contents, given.map.contents, parameters);
+  fused.revision = std::max(fused.revision, given.map.revision);
+  return file;
+}
+
+/// Objects that have no place in the graph belong to no part.
+void countParts(const mapping::MapContents& map, FuseOutcome& outcome) {
+  outcome.parts = mapping::partsOf(map);
+  outcome.objects_of_part.assign(outcome.parts.size(), 0);
+  std::map<WorldId, std::size_t> part_of;
+  for (std::size_t k = 0; k < outcome.parts.size(); ++k) {
+    for (const WorldId& world : outcome.parts[k]) part_of[world] = k;
+  }
+  for (const auto& [id, record] : map.graph.records) {
+    const WorldId& world = map.graph.anchors.at(record.sighting.anchor).anchor.session;
+    const auto object = map.objects.find(id);
+    if (object == map.objects.end() || object->second.ended) continue;
+    ++outcome.objects_of_part[part_of.at(world)];
+  }
+  outcome.objects = map.present();
+}
+
+std::string nameOf(const WorldId& world) { return fmt::format("{}/{}", world.world, world.epoch); }
+
+std::string namesOf(const std::vector<WorldId>& worlds) {
+  std::string names;
+  for (const WorldId& world : worlds) names += (names.empty() ? "" : ", ") + nameOf(world);
+  return names;
+}
+
+const char* nameOf(mapping::Change::Kind kind) {
+  return kind == mapping::Change::Kind::kMoved ? "moved" : "gone";
+}
+
+std::string lineOf(const FusedFile& file) {
+  const mapping::FusionReport& report = file.report;
+  std::string line = fmt::format("{}: {} sessions ({} new, {} longer, {} known), {} objects",
+                                 file.path, file.sessions, report.added.size(), report.grown.size(),
+                                 report.known, file.objects);
+  if (report.renewed > 0) line += fmt::format(", {} seen again since", report.renewed);
+  if (!report.parted.empty()) {
+    line += fmt::format(
+        "; session {} went on in another way in an older map, the rest of it here "
+        "is left out",
+        namesOf(report.parted));
+  }
+  return line + "\n";
+}
+
+std::string partLines(const FuseOutcome& outcome) {
+  std::string text;
+  for (std::size_t k = 1; k < outcome.parts.size(); ++k) {
+    text += fmt::format("session {} joins nothing yet: its {} objects are a part of their own\n",
+                        namesOf(outcome.parts[k]), outcome.objects_of_part[k]);
+  }
+  return text;
+}
+
+std::string changeTable(const std::vector<mapping::Change>& changes) {
+  if (changes.empty()) return {};
+  std::string text =
+      fmt::format("{:>6}  {:<14} {:>9} {:>9} {:>8}  {:>14}  {:<5} {:>14}  {}\n", "id", "class", "x",
+                  "y", "z", "last seen s", "", "since s", "by session");
+  for (const auto& change : changes) {
+    text +=
+        fmt::format("{:>6}  {:<14} {:>9.2f} {:>9.2f} {:>8.2f}  {:>14.3f}  {:<5} {:>14.3f}  {}\n",
+                    change.id, change.class_name, change.p_M.x(), change.p_M.y(), change.p_M.z(),
+                    toSeconds(change.last_seen), nameOf(change.kind), toSeconds(change.since),
+                    nameOf(change.by));
+  }
+  return text;
+}
+
+Json toJson(const std::vector<WorldId>& worlds) {
+  Json list = Json::array();
+  for (const WorldId& world : worlds) {
+    list.push_back(Json{{"world", world.world}, {"epoch", world.epoch}});
+  }
+  return list;
+}
+
+Json toJson(const FusedFile& file) {
+  const mapping::FusionReport& r = file.report;
+  return {{"file", file.path},         {"sessions", file.sessions},
+          {"objects", file.objects},   {"new_sessions", toJson(r.added)},
+          {"longer", toJson(r.grown)}, {"parted", toJson(r.parted)},
+          {"known", r.known},          {"new_objects", r.objects},
+          {"seen_again", r.renewed},   {"loops", r.loops},
+          {"merges", r.merges}};
+}
+
+Json toJson(const mapping::Change& change) {
+  return {{"id", change.id},
+          {"class", change.class_name},
+          {"kind", nameOf(change.kind)},
+          {"map", toJson(std::vector{change.map}).front()},
+          {"position", {change.p_M.x(), change.p_M.y(), change.p_M.z()}},
+          {"last_seen_ns", toNanoseconds(change.last_seen)},
+          {"since_ns", toNanoseconds(change.since)},
+          {"by", toJson(std::vector{change.by}).front()}};
+}
+
+/// What was written is whole; the status says that not all was taken.
+void complainOfLeftOut(const FuseOutcome& outcome) {
+  if (outcome.left_out.empty()) return;
+  std::string names;
+  for (const std::string& path : outcome.left_out) names += (names.empty() ? "" : ", ") + path;
+  refuse(ExitCode::kFailure,
+         names +
+             ": without a graph (of an older Perdure, or with graph.enabled off) the objects "
+             "cannot be aligned and stay out; drive there again with this version.");
+}
+
+void fuse(const FuseRequest& request, bool json) {
+  const FuseOutcome outcome = fuseFiles(request);
+  std::cout << (json ? toJsonText(outcome) : toText(outcome));
+  std::cout.flush();
+  complainOfLeftOut(outcome);
+}
+
+}  // namespace
+
+std::size_t FuseOutcome::objectsBefore() const {
+  std::size_t sum = 0;
+  for (const FusedFile& file : files) sum += file.report.objects;
+  return sum;
+}
+
+std::size_t FuseOutcome::loops() const {
+  std::size_t sum = 0;
+  for (const FusedFile& file : files) sum += file.report.loops;
+  return sum;
+}
+
+std::size_t FuseOutcome::merges() const {
+  std::size_t sum = 0;
+  for (const FusedFile& file : files) sum += file.report.merges;
+  return sum;
+}
+
+std::vector<mapping::Change> FuseOutcome::changes() const {
+  std::vector<mapping::Change> all;
+  for (const FusedFile& file : files) {
+    all.insert(all.end(), file.report.changes.begin(), file.report.changes.end());
+  }
+  return all;
+}
+
+FuseOutcome fuseFiles(const FuseRequest& request) {
+  refuseToReplaceInputs(request);
+  map_store::checkNewFile(request.out, request.force);
+  FuseOutcome outcome;
+  outcome.out = request.out;
+  const std::vector<GivenMap> maps = readAll(request, outcome);
+  if (maps.empty()) {
+    complainOfLeftOut(outcome);
+    refuse(ExitCode::kUsage, "There is nothing to fuse; give maps that map_store writes.");
+  }
+  const mapping::Parameters parameters = map_store::Config().mapping;
+  WholeMap fused = maps.front().map;
+  outcome.files.push_back(begunBy(maps.front()));
+  for (std::size_t k = 1; k < maps.size(); ++k) {
+    outcome.files.push_back(bring(fused, maps[k], parameters));
+  }
+  countParts(fused.contents, outcome);
+  map_store::writeWholeMap(fused, request.out, request.force);
+  return outcome;
+}
+
+std::string toText(const FuseOutcome& outcome) {
+  std::string text;
+  for (const FusedFile& file : outcome.files) text += lineOf(file);
+  const auto changes = outcome.changes();
+  text += fmt::format(
+      "{} loops closed, {} objects merged, {} changes; {} objects before, {} after\n",
+      outcome.loops(), outcome.merges(), changes.size(), outcome.objectsBefore(), outcome.objects);
+  text += partLines(outcome) + changeTable(changes);
+  if (outcome.malformed > 0) {
+    text += fmt::format("{} rows could not be read and are left out\n", outcome.malformed);
+  }
+  return text + "written: " + outcome.out + "\n";
+}
+
+std::string toJsonText(const FuseOutcome& outcome) {
+  Json files = Json::array(), parts = Json::array(), changes = Json::array();
+  for (const FusedFile& file : outcome.files) files.push_back(toJson(file));
+  for (std::size_t k = 0; k < outcome.parts.size(); ++k) {
+    parts.push_back(
+        Json{{"sessions", toJson(outcome.parts[k])}, {"objects", outcome.objects_of_part[k]}});
+  }
+  for (const auto& change : outcome.changes()) changes.push_back(toJson(change));
+  const Json json{{"out", outcome.out},
+                  {"files", files},
+                  {"left_out", outcome.left_out},
+                  {"malformed", outcome.malformed},
+                  {"parts", parts},
+                  {"loops", outcome.loops()},
+                  {"merges", outcome.merges()},
+                  {"objects_before", outcome.objectsBefore()},
+                  {"objects", outcome.objects},
+                  {"changes", changes}};
+  return json.dump(1) + "\n";
+}
+
+void addFuseCommand(CLI::App& map) {
+  auto request = std::make_shared<FuseRequest>();
+  auto json = std::make_shared<bool>(false);
+  CLI::App* command = map.add_subcommand("fuse", "Maps of several drives or vehicles as one");
+  command->add_option("FILES", request->files, "maps that map_store or pipeline wrote")
+      ->required()
+      ->expected(1, 10000);
+  command->add_option("--out", request->out, "the fused map")->type_name("FILE")->required();
+  command->add_flag("--force", request->force, "replace --out where it is there already");
+  command->add_flag("--json", *json, "the summary as JSON");
+  command->callback([request, json] { fuse(*request, *json); });
+}
+
+}  // namespace perdure::tools
