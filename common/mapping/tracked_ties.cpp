@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/math/gaussian.h"
@@ -12,6 +13,14 @@ namespace {
 
 /// Above it, of its variance, what is known of an object's place came from where it was laid.
 constexpr double kMostLaid = 0.25;
+
+using Pairs = std::vector<std::pair<PlacedObject, PlacedObject>>;  // seen in B, known in M
+
+MatchEquations equationsAt(const LevelPose& T_Mb, const Pairs& pairs) {
+  MatchEquations equations;
+  for (const auto& [seen, known] : pairs) equations.add(seen, known, T_Mb);
+  return equations;
+}
 
 }  // namespace
 
@@ -26,7 +35,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   const LoopParameters& loop = parameters_.loop;
   const double way_m = body.way.way_m();
   const LevelPose x = body.state.graph().pose(body.here().id);
-  MatchEquations equations;
+  Pairs pairs;
   std::map<AnchorId, std::size_t> homes;
   Tie tie;
   double laid_m = 0.0;
@@ -41,7 +50,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
         planeVariance(seen) / planeVariance(laid(*T_ba, record.earlier->in_anchor));
     if (share > kMostLaid) continue;
     seen.covariance /= 1.0 - share;
-    equations.add(seen, inM(body.state, *record.earlier), x);
+    pairs.emplace_back(std::move(seen), inM(body.state, *record.earlier));
     laid_m = std::max(laid_m, planeSigma(T_ba->covariance));
     ++homes[record.earlier->anchor];
     tie.objects.push_back(id);
@@ -52,10 +61,11 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
              })->first;
   LevelGaussian by_graph = bodyByGraph(body, *body.relative.to(tie.home));
   addFloor(by_graph.covariance, loop.floor_m, loop.floor_rad);
-  const Eigen::Vector4d step =
-      equations.stepNear(inverseSymmetric(by_graph.covariance), Eigen::Vector4d::Zero());
+  const Eigen::Vector4d step = equationsAt(x, pairs).stepNear(
+      inverseSymmetric(by_graph.covariance), Eigen::Vector4d::Zero());
   tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
-  tie.T_Mb.covariance = equations.covariance();
+  // There what is left is the detections' own error, and no longer the drift.
+  tie.T_Mb.covariance = equationsAt(tie.T_Mb.mean, pairs).covariance();
   if (planeSigma(tie.T_Mb.covariance) > loop.tracked_gain * laid_m) return std::nullopt;
   return tie;
 }

@@ -30,7 +30,7 @@ class Back {
   double way_m() const { return way_.way_m(); }
   AnchorId here() const { return way_.last()->id; }
   void driveOn(int metres) {
-    for (int i = 1; i <= metres; ++i) drive(way_.last()->T_WA.p.x() - 1.0, kPi);
+    for (int i = 1; i <= metres; ++i) drive(x_ - 1.0, kPi);
     relative_ = std::make_unique<Marginals>(state_.graph(), way_.last()->id);
   }
 
@@ -63,6 +63,7 @@ class Back {
 
  private:
   void drive(double x, double yaw) {
+    x_ = x;
     Odometry o;
     o.stamp.sequence = ++sequence_;
     o.world = kWorld;
@@ -76,6 +77,7 @@ class Back {
   AnchorBuilder way_;
   std::unique_ptr<Marginals> relative_;
   std::uint64_t sequence_ = 0;
+  double x_ = 0.0;
 };
 
 /// Five objects about the body that belong to its first anchor, detected as if it stood `off` from
