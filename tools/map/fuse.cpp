@@ -14,6 +14,7 @@
 #include "services/map_store/config.h"
 #include "services/map_store/core/map_contents.h"
 #include "services/map_store/core/schema.h"
+#include "tools/map/fuse_fleet.h"
 
 namespace perdure::tools {
 namespace {
@@ -221,8 +222,29 @@ void complainOfLeftOut(const FuseOutcome& outcome) {
              "cannot be aligned and stay out; drive there again with this version.");
 }
 
-void fuse(const FuseRequest& request, bool json) {
-  const FuseOutcome outcome = fuseFiles(request);
+struct FuseCommand {
+  FuseRequest request;
+  std::string url, name;
+  bool json = false;
+};
+
+FuseOutcome run(const FuseCommand& command) {
+  if (command.url.empty()) {
+    if (command.request.files.empty() || command.request.out.empty()) {
+      refuse(ExitCode::kUsage,
+             "Give the maps and --out FILE, or --url of a fleet's server and --name.");
+    }
+    return fuseFiles(command.request);
+  }
+  if (command.name.empty()) {
+    refuse(ExitCode::kUsage, "Give --name: what the fused map is called on the server.");
+  }
+  return fuseFleet(command.request, command.url, command.name);
+}
+
+void fuse(const FuseCommand& command) {
+  const bool json = command.json;
+  const FuseOutcome outcome = run(command);
   std::cout << (json ? toJsonText(outcome) : toText(outcome));
   std::cout.flush();
   complainOfLeftOut(outcome);
@@ -313,16 +335,18 @@ std::string toJsonText(const FuseOutcome& outcome) {
 }
 
 void addFuseCommand(CLI::App& map) {
-  auto request = std::make_shared<FuseRequest>();
-  auto json = std::make_shared<bool>(false);
+  auto given = std::make_shared<FuseCommand>();
   CLI::App* command = map.add_subcommand("fuse", "Maps of several drives or vehicles as one");
-  command->add_option("FILES", request->files, "maps that map_store or pipeline wrote")
-      ->required()
-      ->expected(1, 10000);
-  command->add_option("--out", request->out, "the fused map")->type_name("FILE")->required();
-  command->add_flag("--force", request->force, "replace --out where it is there already");
-  command->add_flag("--json", *json, "the summary as JSON");
-  command->callback([request, json] { fuse(*request, *json); });
+  command->add_option("FILES", given->request.files, "maps that map_store or pipeline wrote")
+      ->expected(0, 10000);
+  command->add_option("--out", given->request.out, "the fused map")->type_name("FILE");
+  command->add_flag("--force", given->request.force, "replace --out where it is there already");
+  command->add_flag("--json", given->json, "the summary as JSON");
+  command->add_option("--url", given->url,
+                      "also the newest map of each vehicle of this fleet's server: "
+                      "postgresql://USER@HOST:PORT/DATABASE?passfile=FILE");
+  command->add_option("--name", given->name, "what the fused map is called on the server");
+  command->callback([given] { fuse(*given); });
 }
 
 }  // namespace perdure::tools

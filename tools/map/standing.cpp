@@ -34,7 +34,7 @@ bool isNear(AnchorId id, const std::optional<Station>& station, const SavedMap& 
          (at->second.T_MA.p - from).norm() <= mapping::LoopParameters().view_m;
 }
 
-std::string nameOf(const WorldId& world) {
+std::string wordsOf(const WorldId& world) {
   return fmt::format("world {}, epoch {}", world.world, world.epoch);
 }
 
@@ -43,7 +43,7 @@ std::string oftenOf(std::uint32_t n) { return n == 1 ? "once" : fmt::format("{} 
 std::string line(const Station& station, const char* what) {
   return fmt::format(
       "  {} from anchor {}, where the body was at {:.3f} s after {:.0f} m of way ({})\n", what,
-      station.anchor, toSeconds(station.time), station.way_m, nameOf(station.session));
+      station.anchor, toSeconds(station.time), station.way_m, wordsOf(station.session));
 }
 
 std::string line(const Standing::Loop& loop) {
@@ -116,7 +116,7 @@ Standing standingOf(const ObjectBelief& belief, const WorldId& world, const Save
 
 std::string toText(const Standing& s) {
   std::string text = fmt::format(
-      "On the map:\n  in M of {}{}\n", nameOf(s.frame.map),
+      "On the map:\n  in M of {}{}\n", wordsOf(s.frame.map),
       s.frame.provisional ? "; provisional: its session is not found on the map of before" : "");
   if (!s.newest) return text + "  it belongs to no anchor: it is where it was stored\n";
   text += line(*s.newest, "seen last");

@@ -204,7 +204,8 @@ class Examples {
   void fill(ObjectState& m) { m = {stamp(), bits(), world(), belief()}; }
   void fill(Recalled& m) {
     m = {bits(), world(), coin(), bits(), bits(), several([&] { return belief(); }),
-         bits(), time(),  coin(), coin(), coin(), several([&] { return mergeOrder(); })};
+         bits(), time(),  coin(), coin(), coin(), several([&] { return mergeOrder(); }),
+         several([&] { return mergeOrder(); })};
   }
   void fill(Event& m) {
     m = {stamp(), bits(),        world(), static_cast<EventKind>(below(18)), bits(), bits(),
