@@ -46,7 +46,8 @@ LoopBook::Verdict LoopBook::judge(const PoseGraph& graph, double way_m) {
     }
     if (!entry.doubted_m) entry.doubted_m = way_m;
     const double doubted_for_m = way_m - *entry.doubted_m;
-    if (entry.told && doubted_for_m >= parameters_.withdraw_after_m) verdict.withdrawn.push_back(id);
+    if (entry.told && doubted_for_m >= parameters_.withdraw_after_m)
+      verdict.withdrawn.push_back(id);
     if (!entry.told && doubted_for_m >= parameters_.give_up_after_m) verdict.given_up.push_back(id);
   }
   return verdict;

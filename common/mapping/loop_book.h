@@ -37,10 +37,10 @@ class LoopBook {
   std::vector<EdgeId> tiesOf(EdgeId loop) const;
 
   struct Verdict {
-    std::vector<LoopClosure> told;    ///< believed, for the first time
-    std::vector<EdgeId> withdrawn;    ///< told before, and contradicted for some way
-    std::vector<EdgeId> given_up;     ///< not believed, and never told
-    std::vector<EdgeId> sound;        ///< so old that what hangs on them is no longer kept
+    std::vector<LoopClosure> told;  ///< believed, for the first time
+    std::vector<EdgeId> withdrawn;  ///< told before, and contradicted for some way
+    std::vector<EdgeId> given_up;   ///< not believed, and never told
+    std::vector<EdgeId> sound;      ///< so old that what hangs on them is no longer kept
   };
   /// After an optimisation, `way_m` on the session's way.
   Verdict judge(const PoseGraph& graph, double way_m);

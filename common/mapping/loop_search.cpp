@@ -8,6 +8,8 @@
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/mapping/graph/components.h"
+#include "common/math/gaussian.h"
+#include "common/math/so3.h"
 
 namespace perdure::mapping {
 namespace {
@@ -34,7 +36,57 @@ AnchorId homeOf(const PlaceMatch& match, const std::map<ObjectId, AnchorId>& hom
       ->first;
 }
 
+const PlacedObject& withId(const std::vector<PlacedObject>& objects, ObjectId id) {
+  return *std::find_if(objects.begin(), objects.end(),
+                       [id](const PlacedObject& o) { return o.id == id; });
+}
+
+/// By how much worse than by the nearest anchor the body is known by this one: so much less is
+/// known of how what both have seen lies to each other.
+double varianceBeyond(const LevelGaussian& T_ba, const LevelGaussian& nearest) {
+  const double sigma = planeSigma(T_ba.covariance), least = planeSigma(nearest.covariance);
+  return std::max(0.0, sigma * sigma - least * least);
+}
+
+/// An edge says how the body lies to the anchors of one visit. What other visits' objects have
+/// moved in the match is how M had these lie to each other, which no object measured.
+void restOnOneVisit(LoopSearch::Found& found, const std::vector<PlacedObject>& objects,
+                    const std::map<ObjectId, AnchorId>& homes,
+                    const std::vector<PlacedObject>& seen, const MapState& state, double visit_m) {
+  const PlaceMatch& match = found.match;
+  const auto informationOf = [&](AnchorId home) {
+    double sum = 0.0;
+    for (const auto& [known, as] : match.pairs) {
+      if (!isOneVisit(state, homes.at(known), home, visit_m)) continue;
+      sum += 1.0 / (planeVariance(withId(objects, known)) + planeVariance(withId(seen, as)));
+    }
+    return sum;
+  };
+  double most = 0.0;
+  for (const auto& [known, as] : match.pairs) {
+    const double information = informationOf(homes.at(known));
+    if (information <= most) continue;
+    most = information;
+    found.home = homes.at(known);
+  }
+  MatchEquations equations;
+  const LevelPose x = match.T_MB.mean;
+  for (const auto& [known, as] : match.pairs) {
+    if (!isOneVisit(state, homes.at(known), found.home, visit_m)) continue;
+    equations.add(withId(seen, as), withId(objects, known), x);
+  }
+  const Eigen::Vector4d step = equations.stepNear(inverseSymmetric(found.prior->covariance),
+                                                  difference(found.prior->mean, x));
+  found.match.T_MB.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
+  found.match.T_MB.covariance = equations.covariance();
+}
+
 }  // namespace
+
+bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m) {
+  const Anchor &x = state.anchors().at(a), &y = state.anchors().at(b);
+  return x.session == y.session && std::abs(x.way_m - y.way_m) < visit_m;
+}
 
 bool Whereabouts::asks(AnchorId anchor) const {
   return !others_only || state.anchors().at(anchor).session != here().session;
@@ -148,13 +200,15 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
     const ObjectRecord& record = body.state.records().at(id);
     const Sighting& known = *sightingOfBefore(record, body, loop.visit_m);
     around.objects.push_back(inM(body.state, known));
+    const double beyond = varianceBeyond(*body.relative.to(known.anchor), *around.nearest);
+    around.objects.back().covariance.diagonal().head<2>().array() += beyond;
     around.homes[id] = known.anchor;
   }
   return around;
 }
 
 std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) const {
-  auto seen = seenOfLate(body);
+  const auto seen = seenOfLate(body);
   if (seen.empty()) return std::nullopt;
   Around around = mapAround(body);
   if (around.objects.empty()) return std::nullopt;
@@ -163,10 +217,11 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   addFloor(prior.covariance, parameters_.loop.floor_m, parameters_.loop.floor_rad);
   const double sigma_m = planeSigma(T_ba.covariance);
   const MapIndex index(std::move(around.objects), std::move(around.driven), parameters_.place);
-  auto match = bestMatch(std::move(seen), index, prior, parameters_.place);
+  auto match = bestMatch(seen, index, prior, parameters_.place);
   if (!match || !isBelieved(*match, sigma_m)) return std::nullopt;
-  const AnchorId home = homeOf(*match, around.homes);
-  return Found{std::move(*match), home, prior, sigma_m};
+  Found found{std::move(*match), 0, prior, sigma_m};
+  restOnOneVisit(found, index.objects(), around.homes, seen, body.state, parameters_.loop.visit_m);
+  return found;
 }
 
 /// Where the body is known well, what is asked is only which object is which.

@@ -37,6 +37,9 @@ struct Whereabouts {
 /// What is known of an object from before this visit; nothing if it is new.
 const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
                                  double visit_m);
+/// Whether a body set both anchors on one way of less than visit_m. How the anchors of two visits
+/// lie to each other is not measured by objects of both.
+bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m);
 /// The object in M.
 PlacedObject inM(const MapState& state, const Sighting& sighting);
 

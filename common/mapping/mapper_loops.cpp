@@ -25,8 +25,8 @@ void Mapper::tie() {
   const double chi2 = state_.graph().chi2(edge);
   const EdgeId id = state_.addLoop(edge);
   for (const auto& [absorbed, merge] : state_.merges()) {
-    const bool of_it = std::find(tie->objects.begin(), tie->objects.end(), merge.survivor) !=
-                       tie->objects.end();
+    const bool of_it =
+        std::find(tie->objects.begin(), tie->objects.end(), merge.survivor) != tie->objects.end();
     if (of_it) loop_book_.hang(id, merge.loop);
   }
   marginals_.reset();

@@ -14,12 +14,34 @@ namespace {
 /// Above it, of its variance, what is known of an object's place came from where it was laid.
 constexpr double kMostLaid = 0.25;
 
-using Pairs = std::vector<std::pair<PlacedObject, PlacedObject>>;  // seen in B, known in M
+struct Pair {
+  ObjectId id = 0;
+  AnchorId home = 0;         ///< of the visit before
+  PlacedObject seen, known;  ///< in B, in M
+};
 
-MatchEquations equationsAt(const LevelPose& T_Mb, const Pairs& pairs) {
+MatchEquations equationsAt(const LevelPose& T_Mb, const std::vector<Pair>& pairs) {
   MatchEquations equations;
-  for (const auto& [seen, known] : pairs) equations.add(seen, known, T_Mb);
+  for (const Pair& pair : pairs) equations.add(pair.seen, pair.known, T_Mb);
   return equations;
+}
+
+/// Those of one visit, of which the body's place is known best: an edge leads to its anchors.
+AnchorId keepOneVisit(std::vector<Pair>& pairs, const MapState& state, double visit_m) {
+  AnchorId best = 0;
+  double most = 0.0;
+  for (const Pair& of : pairs) {
+    double information = 0.0;
+    for (const Pair& pair : pairs) {
+      if (!isOneVisit(state, of.home, pair.home, visit_m)) continue;
+      information += 1.0 / (planeVariance(pair.seen) + planeVariance(pair.known));
+    }
+    if (information > most) best = of.home;
+    most = std::max(most, information);
+  }
+  std::erase_if(pairs,
+                [&](const Pair& pair) { return !isOneVisit(state, best, pair.home, visit_m); });
+  return best;
 }
 
 }  // namespace
@@ -35,9 +57,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   const LoopParameters& loop = parameters_.loop;
   const double way_m = body.way.way_m();
   const LevelPose x = body.state.graph().pose(body.here().id);
-  Pairs pairs;
-  std::map<AnchorId, std::size_t> homes;
-  Tie tie;
+  std::vector<Pair> pairs;
   double laid_m = 0.0;
   for (const ObjectId id : body.objectsOfVisit(loop.fresh_m)) {
     const ObjectRecord& record = body.state.records().at(id);
@@ -50,19 +70,18 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
         planeVariance(seen) / planeVariance(laid(*T_ba, record.earlier->in_anchor));
     if (share > kMostLaid) continue;
     seen.covariance /= 1.0 - share;
-    pairs.emplace_back(std::move(seen), inM(body.state, *record.earlier));
+    const AnchorId home = record.earlier->anchor;
+    pairs.push_back({id, home, std::move(seen), inM(body.state, *record.earlier)});
     laid_m = std::max(laid_m, planeSigma(T_ba->covariance));
-    ++homes[record.earlier->anchor];
-    tie.objects.push_back(id);
   }
-  if (tie.objects.size() < loop.least_tracked) return std::nullopt;
-  tie.home = std::max_element(homes.begin(), homes.end(), [](const auto& a, const auto& b) {
-               return a.second < b.second;
-             })->first;
+  Tie tie;
+  tie.home = keepOneVisit(pairs, body.state, loop.visit_m);
+  if (pairs.size() < loop.least_tracked) return std::nullopt;
+  for (const Pair& pair : pairs) tie.objects.push_back(pair.id);
   LevelGaussian by_graph = bodyByGraph(body, *body.relative.to(tie.home));
   addFloor(by_graph.covariance, loop.floor_m, loop.floor_rad);
-  const Eigen::Vector4d step = equationsAt(x, pairs).stepNear(
-      inverseSymmetric(by_graph.covariance), Eigen::Vector4d::Zero());
+  const Eigen::Vector4d step = equationsAt(x, pairs).stepNear(inverseSymmetric(by_graph.covariance),
+                                                              Eigen::Vector4d::Zero());
   tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
   // There what is left is the detections' own error, and no longer the drift.
   tie.T_Mb.covariance = equationsAt(tie.T_Mb.mean, pairs).covariance();

@@ -160,9 +160,9 @@ void Node::commit() {
     return;
   }
   const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
-  const auto written = database_.write({&*newest_, left_, removed_, laid_,
-                                        graph_ ? &graph : nullptr, unwritten_splits_,
-                                        acknowledged_});
+  const auto written =
+      database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr,
+                       unwritten_splits_, acknowledged_});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again

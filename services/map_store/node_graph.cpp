@@ -98,8 +98,8 @@ void Node::renameSplit(Objects& next) {
   };
   std::erase_if(splits_, [&](const auto& split) {
     const auto survivor = find(split.second);
-    const bool obeyed = find(split.first) != next.objects.end() ||
-                        survivor == next.objects.end() || survivor->recalled;
+    const bool obeyed = find(split.first) != next.objects.end() || survivor == next.objects.end() ||
+                        survivor->recalled;
     if (!obeyed) survivor->id = split.first;
     return obeyed;
   });
@@ -139,8 +139,8 @@ void Node::tellWithdrawals(const mapping::MapChange& change) {
     std::string split;
     for (const MergeOrder& order : change.splits) {
       if (order.loop != loop.id) continue;
-      split += fmt::format("{}{} from {}", split.empty() ? "" : ", ", order.absorbed,
-                           order.survivor);
+      split +=
+          fmt::format("{}{} from {}", split.empty() ? "" : ", ", order.absorbed, order.survivor);
     }
     Event event;
     event.stamp = newest_->stamp;

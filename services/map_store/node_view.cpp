@@ -7,9 +7,8 @@
 namespace perdure::map_store {
 
 bool Node::loadView() {
-  const auto done =
-      view_.load(graph_ ? mapping::MapFrames(mapper_.graph(), mapper_.anchors())
-                               : mapping::MapFrames());
+  const auto done = view_.load(graph_ ? mapping::MapFrames(mapper_.graph(), mapper_.anchors())
+                                      : mapping::MapFrames());
   if (!done) {
     blame(done.error());
     return false;

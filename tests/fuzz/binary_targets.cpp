@@ -12,7 +12,7 @@
 #include "common/wire/cdr.h"
 #include "common/wire/json.h"
 #include "services/map_store/core/belief_codec.h"
-#include "services/map_store/core/graph_codec.h"
+#include "services/map_store/core/graph/graph_codec.h"
 #include "tests/common/wire/examples.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/target.h"

@@ -48,9 +48,9 @@ FuseOutcome fuseFleet(FuseRequest request, const std::string& url, const std::st
   if (request.out.empty()) request.out = (folder.path() / "fused").string();
   FuseOutcome outcome = fuseFiles(request);
   map_store::fleet::pushMap(outcome.out, url, name);
-  outcome.out = name + " on the server" + (request.out.starts_with(folder.path().string())
-                                               ? std::string()
-                                               : ", " + request.out);
+  outcome.out =
+      name + " on the server" +
+      (request.out.starts_with(folder.path().string()) ? std::string() : ", " + request.out);
   return outcome;
 }
 

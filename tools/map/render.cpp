@@ -24,13 +24,14 @@ Json arrayOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 }  // namespace
 
 std::string toTable(const std::vector<MapObject>& objects) {
-  std::string text = fmt::format("{:>6}  {:<14} {:>6} {:>6}  {:>9} {:>9} {:>8}  {:>5} {:>5} {:>5}  {:>5}  {}\n",
-                                 "id", "class", "exists", "class", "x", "y", "z", "l", "w", "h",
-                                 "hits", "memory");
+  std::string text =
+      fmt::format("{:>6}  {:<14} {:>6} {:>6}  {:>9} {:>9} {:>8}  {:>5} {:>5} {:>5}  {:>5}  {}\n",
+                  "id", "class", "exists", "class", "x", "y", "z", "l", "w", "h", "hits", "memory");
   for (const MapObject& o : objects) {
     const Eigen::Vector3d size = sizeOf(o);
     text += fmt::format(
-        "{:>6}  {:<14} {:>6.3f} {:>6.3f}  {:>9.2f} {:>9.2f} {:>8.2f}  {:>5.2f} {:>5.2f} {:>5.2f}  {:>5}  {}{}\n",
+        "{:>6}  {:<14} {:>6.3f} {:>6.3f}  {:>9.2f} {:>9.2f} {:>8.2f}  {:>5.2f} {:>5.2f} {:>5.2f}  "
+        "{:>5}  {}{}\n",
         o.id, o.class_name, o.existence, o.class_probability, o.mean[0], o.mean[1], o.mean[2],
         size[0], size[1], size[2], o.hits, nameOf(o.memory), o.provisional ? ", provisional" : "");
   }
@@ -93,16 +94,15 @@ Json toGeoJson(const std::vector<MapObject>& objects, const std::optional<GeoAnc
     Json properties = toJson(o);
     properties["local_m"] = arrayOf(o.mean.head<3>());
     for (const char* key : {"id", "mean", "covariance", "position_m"}) properties.erase(key);
-    features.push_back({{"type", "Feature"},
-                        {"id", o.id},
-                        {"geometry",
-                         {{"type", "Point"},
-                          {"coordinates", {g.longitude_deg, g.latitude_deg, g.height_m}}}},
-                        {"properties", properties}});
+    features.push_back(
+        {{"type", "Feature"},
+         {"id", o.id},
+         {"geometry",
+          {{"type", "Point"}, {"coordinates", {g.longitude_deg, g.latitude_deg, g.height_m}}}},
+         {"properties", properties}});
   }
-  return {{"type", "FeatureCollection"},
-          {"georeferenced", anchor.has_value()},
-          {"features", features}};
+  return {
+      {"type", "FeatureCollection"}, {"georeferenced", anchor.has_value()}, {"features", features}};
 }
 
 }  // namespace perdure::tools

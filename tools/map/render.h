@@ -16,8 +16,8 @@ std::string toTable(const std::vector<MapObject>& objects);
 /// Everything about one object, with standard deviations.
 std::string toText(const MapObject& object);
 nlohmann::ordered_json toJson(const MapObject& object);
-/// RFC 7946. `anchor`: where on Earth the origin of their frame lies, yaw of its x axis from east; without one a
-/// declared default of 0°, 0° and "georeferenced": false.
+/// RFC 7946. `anchor`: where on Earth the origin of their frame lies, yaw of its x axis from east;
+/// without one a declared default of 0°, 0° and "georeferenced": false.
 nlohmann::ordered_json toGeoJson(const std::vector<MapObject>& objects,
                                  const std::optional<GeoAnchor>& anchor);
 

@@ -13,7 +13,7 @@
 #include "common/types/map.h"
 #include "common/types/objects.h"
 #include "services/map_store/core/belief_codec.h"
-#include "services/map_store/core/graph_tables.h"
+#include "services/map_store/core/graph/graph_tables.h"
 #include "services/map_store/core/schema.h"
 #include "services/map_store/core/sqlite.h"
 
@@ -48,7 +48,7 @@ struct Batch {
   /// Merges to be undone, the newest first: the survivor is as it was before, and what it is now
   /// is the absorbed one.
   std::vector<MergeOrder> splits = {};
-  std::int64_t acknowledged = 0;            ///< entries of the outbox that a server has
+  std::int64_t acknowledged = 0;  ///< entries of the outbox that a server has
 };
 
 struct Written {

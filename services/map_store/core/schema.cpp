@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/base/errors.h"
-#include "services/map_store/core/graph_tables.h"
+#include "services/map_store/core/graph/graph_tables.h"
 
 namespace perdure::map_store {
 namespace {
@@ -120,8 +120,9 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   const auto version = connection.integer("PRAGMA user_version");
   if (!version) return tl::unexpected<Reason>(version.error());
   if (*version == kSchemaVersion) return {};  // another process was first
-  const auto made = connection.execute(
-      std::string(kGraphSchema) + kMergesSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
+  const auto made =
+      connection.execute(std::string(kGraphSchema) + kMergesSchema +
+                         "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
   if (!made) return made;
   return transaction->commit();
 }

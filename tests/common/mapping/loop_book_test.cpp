@@ -109,8 +109,8 @@ class WithdrawnLoop : public ::testing::Test {
     const AnchorId a = map.anchors.begin()->first, b = map.anchors.rbegin()->first;
     Edge edge{a, b, {}, EdgeKind::kLoop};
     const LevelPose there = map.anchors.at(b).T_MA;
-    edge.T_ab.mean =
-        map.anchors.at(a).T_MA.inverse() * LevelPose{there.p + Eigen::Vector3d(20, 15, 0), there.yaw};
+    edge.T_ab.mean = map.anchors.at(a).T_MA.inverse() *
+                     LevelPose{there.p + Eigen::Vector3d(20, 15, 0), there.yaw};
     edge.T_ab.covariance = 0.04 * Eigen::Matrix4d::Identity();
     map.edges[kWrong] = {edge, 1.0};
     const auto first = map.records.begin(), last = std::prev(map.records.end());

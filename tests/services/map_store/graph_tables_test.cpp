@@ -1,6 +1,6 @@
 // The pose graph in the map's file: all of it comes back, and what is damaged takes nothing along
 // that does not hang on it.
-#include "services/map_store/core/graph_tables.h"
+#include "services/map_store/core/graph/graph_tables.h"
 
 #include <gtest/gtest.h>
 

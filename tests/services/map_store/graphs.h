@@ -5,7 +5,7 @@
 #include <random>
 #include <string>
 
-#include "services/map_store/core/graph_codec.h"
+#include "services/map_store/core/graph/graph_codec.h"
 
 namespace perdure::map_store::test {
 
@@ -36,7 +36,8 @@ class RandomGraph {
       map.edges[next++] = edge(a, b, mapping::EdgeKind::kLoop);
     }
     for (ObjectId id = 1; id <= size.records; ++id) map.records[id] = record(id, map);
-    for (ObjectId id = 1; id <= size.merges; ++id) map.merges[1000 + id] = merge(id, 1000 + id, map);
+    for (ObjectId id = 1; id <= size.merges; ++id)
+      map.merges[1000 + id] = merge(id, 1000 + id, map);
     return map;
   }
 

@@ -72,8 +72,7 @@ class LapDrive : public ::testing::Test {
                 [this](const MapTile& t) {
                   tiles_.erase({t.x, t.y, t.part});
                 },
-                [](const MapHeader&) {},
-                [this](const MapReply& r) { replies_.push_back(r); },
+                [](const MapHeader&) {}, [this](const MapReply& r) { replies_.push_back(r); },
                 [this](const Recalled& r) { recalled_.push_back(r); },
                 [this](const MapFrame& f) { frames_.push_back(f); },
                 [this](const Event& e) { events_.push_back(e); }});

@@ -35,8 +35,8 @@ class FuseFleet : public ::testing::Test {
     map.contents = mapping::test::driven(things, settings).map;
     map_store::writeWholeMap(map, folder_.file(name), false);
     fleet::pushMap(folder_.file(name), url_, name);
-    server_->run(url_, "UPDATE perdure.maps SET file = vehicle || '-1' WHERE vehicle = '" + name +
-                           "'");
+    server_->run(url_,
+                 "UPDATE perdure.maps SET file = vehicle || '-1' WHERE vehicle = '" + name + "'");
     return folder_.file(name);
   }
   std::string pulled(const std::string& name) {

@@ -110,10 +110,10 @@ TEST(Loops, WrongIsBeyondTenDegrees) {
 
 TEST(Loops, WhatTheGraphDoesNotBelieveCountsApart) {
   auto edge = loop(3, 43, {46, 0, 0, 0});
-  edge.weight = 0.29;
+  edge.weight = 0.99 * mapping::kBelieved;
   EXPECT_EQ(judged(edge).wrong(), 1U);
   EXPECT_EQ(judged(edge).wrongBelieved(), 0U);
-  edge.weight = 0.3;
+  edge.weight = mapping::kBelieved;
   EXPECT_EQ(judged(edge).wrongBelieved(), 1U);
 }
 

@@ -1,4 +1,4 @@
-#include "services/map_store/core/graph_tables.h"
+#include "services/map_store/core/graph/graph_tables.h"
 
 #include <cmath>
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace perdure::map_store {
 
-// Blobs are what core/graph_codec.h says, and the columns beside them repeat what they hold, to be
+// Blobs are what core/graph/graph_codec.h says, and the columns beside them repeat what they hold, to be
 // asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
 // weight. These have no type: REAL would lose the sign of zero.
 // A merge that hangs on a loop keeps the survivor's belief as it was: world, epoch, belief.

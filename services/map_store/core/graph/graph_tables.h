@@ -5,7 +5,7 @@
 #include <set>
 
 #include "common/base/result.h"
-#include "services/map_store/core/graph_codec.h"
+#include "services/map_store/core/graph/graph_codec.h"
 #include "services/map_store/core/sqlite.h"
 
 namespace perdure::map_store {

@@ -1,4 +1,4 @@
-#include "services/map_store/core/graph_codec.h"
+#include "services/map_store/core/graph/graph_codec.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "services/map_store/core/graph_tables.h"
+#include "services/map_store/core/graph/graph_tables.h"
 
 namespace perdure::map_store {
 namespace {
