@@ -171,7 +171,7 @@ class Strangers : public ::testing::Test {
         port_};
     command.insert(command.end(), more.begin(), more.end());
     Child node(command, folder_.file(script));
-    status_ = node.wait(150s);
+    status_ = node.wait(260s);
     return json::parse(node.log(), nullptr, false);
   }
 
