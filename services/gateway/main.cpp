@@ -136,6 +136,7 @@ void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(topics::kOdometry, [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); });
   context.on(topics::kEvents, [&](const Event& m) { node.onEvent(m); });
   context.on(topics::kHealth, [&](const Health& m) { node.onHealth(m, monotonicNs()); });
+  context.on(topics::kMapFrame, [&](const MapFrame& m) { node.onMapFrame(m); });
   context.on(topics::kMapReply, [&](const MapReply& m) { node.onMapReply(m); });
   context.on(topics::kObjects, [&](const Objects& m) {
     context.health().frameIn();
@@ -163,7 +164,8 @@ std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
       context, topics::kLandmarks, Channels{kLandmarks},
       [&](const Landmarks& m) { node.onLandmarks(m); }));
   readers.push_back(std::make_unique<ReaderOnDemand<MapTile>>(
-      context, topics::kMap, Channels{kMap}, [&](const MapTile& m) { node.onMapTile(m); },
+      context, topics::kMap, Channels{kMap, kMapScene},
+      [&](const MapTile& m) { node.onMapTile(m); },
       [&](const MapTile& key) { node.onMapTileGone(key); }));
   return readers;
 }

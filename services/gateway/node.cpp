@@ -47,9 +47,14 @@ RigidTransform Node::pose() const {
   return objects_ ? objects_->T_WB : RigidTransform();
 }
 
+WorldId Node::world() const {
+  if (odometry_) return odometry_->world;
+  return objects_ ? objects_->world : WorldId{};
+}
+
 void Node::setWanted(const Channels& wanted) {
   const Channels before = std::exchange(wanted_, wanted);
-  if (!wants(kMap)) tiles_.clear();  // their reader is closed
+  if (!wantsTiles()) map_.clear();  // their reader is closed
   for (const std::uint32_t channel : wanted) {
     if (!before.contains(channel)) sendNow(channel);
   }
@@ -60,8 +65,18 @@ void Node::sendNow(std::uint32_t channel) {
   const bool placed = odometry_ || objects_;
   switch (channel) {
     case kTransforms:
-      if (placed)
-        send(kTransforms, frameTransforms(time_, pose(), calibration_ ? &*calibration_ : nullptr));
+      if (placed) {
+        send(kTransforms, frameTransforms(time_, map_.T_MW(world()), pose(),
+                                          calibration_ ? &*calibration_ : nullptr));
+      }
+      return;
+    case kMapToOdom:
+      if (const MapFrame* frame = map_.frameOf(world())) send(kMapToOdom, mapFrameJson(*frame));
+      return;
+    case kMap:
+    case kMapScene:
+      next_map_ns_ = 0;
+      map_due_ = map_due_ || !map_.empty();  // else as soon as tiles come
       return;
     case kPose:
       if (placed) send(kPose, poseInFrame(time_, pose()));
@@ -77,7 +92,7 @@ void Node::sendNow(std::uint32_t channel) {
       return;
     case kEvents:
     case kLog:
-      for (const Event& event : events_) sendEvent(event, channel == kLog);
+      for (const Happened& one : events_) sendEvent(one, channel == kLog);
       return;
     case kHealth:
       next_health_ns_ = 0;
@@ -120,6 +135,8 @@ void Node::onFrame(std::size_t camera, const Frame& frame) {
 void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   last_.odometry_ns = now_ns;
   if (odometry.state == OdometryState::kInitialising) return;
+  // Other parts of it are in the M of another W.
+  map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);
   odometry_ = odometry;
   newest(odometry.stamp.time);
   trajectory_.add(odometry.stamp.time, odometry.world, odometry.T_WB);
@@ -188,17 +205,29 @@ void Node::sendAnnotations(std::size_t camera) {
 }
 
 void Node::onEvent(const Event& event) {
-  events_.push_back(event);
+  events_.push_back({event, placeOf(event)});
   if (events_.size() > kMostEvents) events_.pop_front();
   noteReturns(event);
-  if (wants(kEvents)) sendEvent(event, false);
-  if (wants(kLog)) sendEvent(event, true);
+  if (wants(kEvents)) sendEvent(events_.back(), false);
+  if (wants(kLog)) sendEvent(events_.back(), true);
 }
 
-void Node::sendEvent(const Event& event, bool as_log) {
-  outputs_.message(
-      {as_log ? kLog : kEvents, event.stamp.time,
-       std::make_shared<const std::string>(as_log ? eventLog(event) : eventJson(event))});
+/// Of an object: where it is believed to be; of the whole map: where the vehicle is.
+std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
+  if (event.world != world() || !(odometry_ || objects_)) return std::nullopt;
+  if (event.object_id == 0) return pose().p;
+  if (!objects_) return std::nullopt;
+  for (const ObjectBelief& object : objects_->objects) {
+    if (object.id == event.object_id) return Eigen::Vector3d(object.best().mean.head<3>());
+  }
+  return std::nullopt;
+}
+
+void Node::sendEvent(const Happened& happened, bool as_log) {
+  const Event& event = happened.event;
+  outputs_.message({as_log ? kLog : kEvents, event.stamp.time,
+                    std::make_shared<const std::string>(
+                        as_log ? eventLog(event) : eventJson(event, happened.place))});
 }
 
 /// A prediction holds until the object is seen again, or is no more.
@@ -211,26 +240,27 @@ void Node::noteReturns(const Event& event) {
   }
 }
 
-void Node::onMapTile(const MapTile& tile) {
-  tiles_[{tile.x, tile.y, tile.part}] = tile;
-  map_changed_ = true;
-}
-
-void Node::onMapTileGone(const MapTile& key) {
-  tiles_.erase({key.x, key.y, key.part});
-  map_changed_ = true;
+void Node::onMapFrame(const MapFrame& frame) {
+  map_.follow(frame);
+  for (const std::uint32_t channel : {kMapToOdom, kTransforms}) {
+    if (wants(channel)) sendNow(channel);
+  }
 }
 
 std::size_t Node::sendMap() {
-  std::vector<MapObject> objects;
-  for (const auto& [key, tile] : tiles_) {
-    for (const MapObject& object : tile.objects) {
-      if (!objects_ || object.world == objects_->world) objects.push_back(object);
+  const MapLayer::View view = map_.viewFrom(world());
+  const auto shown = nearestTo(map_.T_MW(world()) * pose().p, view.here);
+  if (wants(kMap)) send(kMap, mapJson(view, shown, time_));
+  if (wants(kMapScene)) {
+    std::set<ObjectId> working;
+    if (objects_) {
+      for (const ObjectBelief& object : objects_->objects) {
+        if (object.confirmed) working.insert(object.id);
+      }
     }
+    send(kMapScene, mapScene(shown, working, time_));
   }
-  const std::size_t all = objects.size();
-  send(kMap, mapNearBody(std::move(objects), pose().p, time_));
-  return std::min(all, kMostOfMap);
+  return shown.size();
 }
 
 bool Node::hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const {
@@ -242,8 +272,9 @@ void Node::tick(std::int64_t now_ns) {
     next_health_ns_ = now_ns + kSecond;
     send(kHealth, vital_signs_.json(now_ns, last_));
   }
-  if (wants(kMap) && map_changed_ && now_ns >= next_map_ns_) {
-    map_changed_ = false;
+  map_due_ = map_.takeChanged() || map_due_;
+  if (wantsTiles() && map_due_ && now_ns >= next_map_ns_) {
+    map_due_ = false;
     // A large map more seldom: about as many bytes a second whatever it holds.
     constexpr std::size_t kASecond = 200;
     next_map_ns_ = now_ns + kSecond * static_cast<std::int64_t>(1 + sendMap() / kASecond);

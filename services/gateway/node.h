@@ -4,6 +4,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "services/gateway/config.h"
 #include "services/gateway/core/beliefs.h"
 #include "services/gateway/core/channels.h"
+#include "services/gateway/core/map_layer.h"
 #include "services/gateway/core/scene.h"
 #include "services/gateway/core/vital_signs.h"
 #include "services/gateway/core/world.h"
@@ -47,8 +49,9 @@ class Node {
   void onHealth(const Health& health, std::int64_t now_ns) {
     vital_signs_.onHealth(health, now_ns);
   }
-  void onMapTile(const MapTile& tile);
-  void onMapTileGone(const MapTile& key);
+  void onMapFrame(const MapFrame& frame);
+  void onMapTile(const MapTile& tile) { map_.put(tile); }
+  void onMapTileGone(const MapTile& key) { map_.erase(key); }
   void onMapReply(const MapReply& reply);
   void onCall(const Call& call, std::int64_t now_ns);
   /// About ten times a second.
@@ -78,11 +81,18 @@ class Node {
   void sendNow(std::uint32_t channel);
   void sendObjects();
   void sendAnnotations(std::size_t camera);
-  void sendEvent(const Event& event, bool as_log);
+  struct Happened {
+    Event event;
+    std::optional<Eigen::Vector3d> place;  ///< in W
+  };
+  void sendEvent(const Happened& happened, bool as_log);
+  std::optional<Eigen::Vector3d> placeOf(const Event& event) const;
+  bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< how many objects it told
   void noteReturns(const Event& event);
   void newest(TimePoint time);
   RigidTransform pose() const;
+  WorldId world() const;  ///< W
   void ask(const Call& call, MapQuery query, std::int64_t now_ns);
   void askForObject(const Call& call, std::int64_t now_ns);
   void askForMap(const Call& call, std::int64_t now_ns);
@@ -102,11 +112,11 @@ class Node {
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
   std::map<std::string, Detections> detections_;  ///< newest, by camera
-  std::deque<Event> events_;
+  std::deque<Happened> events_;
   std::map<ObjectId, Event> returns_;
-  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, MapTile> tiles_;
+  MapLayer map_;
+  bool map_due_ = false;
   double latency_ms_ = -1.0;
-  bool map_changed_ = false;
   Scene scene_;
   Trajectory trajectory_;
   History history_;

@@ -131,7 +131,8 @@ void Node::onMapReply(const MapReply& reply) {
   pending_.erase(found);
   if (!reply.ok) return fail(call, reply.error);
   if (call.service == kMapQueryService) {
-    outputs_.answer({call.client, call.service, call.call, true, mapReplyJson(reply)});
+    outputs_.answer(
+        {call.client, call.service, call.call, true, mapReplyJson(reply, map_.mapOf(world()))});
   } else if (reply.beliefs.empty() || reply.beliefs.front().classes.empty()) {
     outputs_.answer({call.client, call.service, call.call, true, R"({"found":false})"});
   } else {

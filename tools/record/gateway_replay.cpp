@@ -15,7 +15,7 @@ constexpr double kBack = 3.0;  // s of the recording that are read before a plac
 bool isShown(const std::string& topic) {
   return topic == "calibration" || topic == "odometry" || topic == "landmarks" ||
          topic == "detections" || topic == "model" || topic == "objects" || topic == "events" ||
-         topic == "health" || topic.starts_with("frame/");
+         topic == "map/frame" || topic == "health" || topic.starts_with("frame/");
 }
 
 std::optional<TimePoint> sensorTimeOf(const replay::RecordedMessage& message) {
@@ -195,6 +195,8 @@ void GatewayReplay::feed(const replay::RecordedMessage& message) {
     give.operator()<Landmarks>([&](const Landmarks& m) { node_->onLandmarks(m); });
   } else if (topic == "detections") {
     give.operator()<Detections>([&](const Detections& m) { node_->onDetections(m); });
+  } else if (topic == "map/frame") {
+    give.operator()<MapFrame>([&](const MapFrame& m) { node_->onMapFrame(m); });
   } else if (topic == "events") {
     give.operator()<Event>([&](const Event& m) { node_->onEvent(m); });
   } else if (topic == "health") {

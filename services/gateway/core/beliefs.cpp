@@ -47,13 +47,14 @@ void putGlance(JsonWriter& json, const ObjectBelief& object) {
   json.key("recalled").boolean(object.recalled).end('}');
 }
 
-void putGlance(JsonWriter& json, const MapObject& object) {
+void putGlance(JsonWriter& json, const MapObject& object, bool elsewhere) {
   json.begin('{').key("id").integer(object.id).key("class").text(object.class_name);
   json.key("p").number(object.class_probability).key("r").number(object.existence);
   putState(json, object.mean, object.covariance);
   json.key("visibility").text(perdure::nameOf(object.visibility));
   json.key("confirmed").boolean(true).key("hits").integer(object.hits);
   json.key("memory").text(object.memory == Memory::kWorking ? "working" : "long_term");
+  json.key("provisional").boolean(object.provisional).key("elsewhere").boolean(elsewhere);
   json.key("first_s").number(toSeconds(object.first_seen), 3);
   json.key("last_s").number(toSeconds(object.last_seen), 3).end('}');
 }
@@ -155,11 +156,11 @@ std::string sentenceOf(const Event& e) {
     case EventKind::kRestored:
       return "the working set was restored";
     case EventKind::kLoopClosed:
-      return "the map closed a loop: " + e.detail;
+      return "the map closed a loop";
     case EventKind::kLoopWithdrawn:
-      return "the map took a loop back: " + e.detail;
+      return "the map took a loop back";
     case EventKind::kRelocalised:
-      return "this session is found on the map of before: " + e.detail;
+      return "this session is found on the map of before";
   }
   return perdure::nameOf(e.kind);
 }
@@ -184,7 +185,7 @@ std::string objectsAtAGlance(const Objects& objects, double latency_ms) {
   return json.end(']').end('}').take();
 }
 
-std::string eventJson(const Event& e) {
+std::string eventJson(const Event& e, const std::optional<Eigen::Vector3d>& place) {
   JsonWriter json;
   json.begin('{').key("timestamp");
   putTime(json, e.stamp.time);
@@ -193,12 +194,17 @@ std::string eventJson(const Event& e) {
   json.key("probability").number(e.probability).key("detail").text(e.detail);
   json.key("words").text(sentenceOf(e)).key("returns_in_s");
   putNumbers(json, e.returns_in_s, 2);
+  if (place) {
+    json.key("at");
+    putNumbers(json, {place->data(), 3}, 3);
+  }
   return json.end('}').take();
 }
 
 std::string eventLog(const Event& e) {
   constexpr int kInfo = 2, kWarning = 3;
-  const bool warns = e.kind == EventKind::kMissing || e.kind == EventKind::kGone;
+  const bool warns = e.kind == EventKind::kMissing || e.kind == EventKind::kGone ||
+                     e.kind == EventKind::kLoopWithdrawn;
   JsonWriter json;
   json.begin('{').key("timestamp");
   putTime(json, e.stamp.time);
@@ -240,10 +246,10 @@ std::string modelJson(const ModelInfo& model) {
   return json.key("input_height").integer(model.input_height).end('}').take();
 }
 
-std::string mapReplyJson(const MapReply& reply) {
+std::string mapReplyJson(const MapReply& reply, const WorldId& map) {
   JsonWriter json(256 + 512 * reply.objects.size());
   json.begin('{').key("truncated").boolean(reply.truncated).key("objects").begin('[');
-  for (const MapObject& object : reply.objects) putGlance(json, object);
+  for (const MapObject& object : reply.objects) putGlance(json, object, object.world != map);
   return json.end(']').end('}').take();
 }
 
@@ -287,19 +293,14 @@ std::string objectInFull(const ObjectBelief& object, const std::optional<Event>&
   return json.end(']').end('}').take();
 }
 
-std::string mapNearBody(std::vector<MapObject> objects, const Eigen::Vector3d& p_WB,
-                        TimePoint time) {
-  const std::size_t all = objects.size(), shown = std::min(all, kMostOfMap);
-  const auto nearer = [&](const MapObject& a, const MapObject& b) {
-    return (a.mean.head<3>() - p_WB).squaredNorm() < (b.mean.head<3>() - p_WB).squaredNorm();
-  };
-  std::partial_sort(objects.begin(), objects.begin() + static_cast<std::ptrdiff_t>(shown),
-                    objects.end(), nearer);
-  JsonWriter json(256 + 512 * shown);
+std::string mapJson(const MapLayer::View& view, const std::vector<MapObject>& shown,
+                    TimePoint time) {
+  JsonWriter json(256 + 512 * shown.size());
   json.begin('{').key("timestamp");
   putTime(json, time);
-  json.key("frame_id").text(kOdomFrame).key("all").integer(all).key("objects").begin('[');
-  for (std::size_t i = 0; i < shown; ++i) putGlance(json, objects[i]);
+  json.key("frame_id").text(kMapFrame).key("all").integer(view.here.size());
+  json.key("elsewhere").integer(view.elsewhere).key("objects").begin('[');
+  for (const MapObject& object : shown) putGlance(json, object, false);
   return json.end(']').end('}').take();
 }
 

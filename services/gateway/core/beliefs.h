@@ -9,20 +9,21 @@
 
 #include "common/types/map.h"
 #include "common/types/objects.h"
+#include "services/gateway/core/map_layer.h"
 
 namespace perdure::gateway {
 
 /// "perdure.Objects". latency_ms below 0: not known.
 std::string objectsAtAGlance(const Objects& objects, double latency_ms);
-/// "perdure.Event", and the same in words as "foxglove.Log".
-std::string eventJson(const Event& event);
+/// "perdure.Event", and the same in words as "foxglove.Log". `place`: where it happened, in W.
+std::string eventJson(const Event& event, const std::optional<Eigen::Vector3d>& place = {});
 std::string eventLog(const Event& event);
 /// "perdure.Detections"; without the model the classes have no names.
 std::string detectionsJson(const Detections& detections, const ModelInfo* model);
 std::string modelJson(const ModelInfo& model);
 
-/// "perdure.MapReply" of what the store answered.
-std::string mapReplyJson(const MapReply& reply);
+/// "perdure.MapReply" of what the store answered. `map`: M; what lies in another is "elsewhere".
+std::string mapReplyJson(const MapReply& reply, const WorldId& map);
 
 /// How an object's existence, class and visibility were, twice a second, for some minutes.
 class History {
@@ -42,11 +43,8 @@ class History {
 std::string objectInFull(const ObjectBelief& object, const std::optional<Event>& returns,
                          const std::deque<History::Sample>* history);
 
-/// So many objects of the map are told.
-inline constexpr std::size_t kMostOfMap = 2000;
-
-/// "perdure.Map": those nearest to the body of all that are on it.
-std::string mapNearBody(std::vector<MapObject> objects, const Eigen::Vector3d& p_WB,
-                        TimePoint time);
+/// "perdure.Map", in M. `view`: what is known of it; `shown`: of these the ones that are told.
+std::string mapJson(const MapLayer::View& view, const std::vector<MapObject>& shown,
+                    TimePoint time);
 
 }  // namespace perdure::gateway

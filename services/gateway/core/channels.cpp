@@ -38,6 +38,8 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras) {
       json(kEvents, "/events", "perdure.Event", event(), Delivery::kEach),
       json(kDetections, "/detections", "perdure.Detections", detections()),
       json(kMap, "/map", "perdure.Map", map(), Delivery::kLatched),
+      json(kMapToOdom, "/map/frame", "perdure.MapFrame", mapFrame(), Delivery::kLatched),
+      json(kMapScene, "/map/scene", "foxglove.SceneUpdate", sceneUpdate(), Delivery::kLatched),
       json(kModel, "/model", "perdure.Model", model(), Delivery::kLatched)};
   for (std::size_t i = 0; i < cameras.size(); ++i) addCamera(i, cameras[i], table);
   return table;

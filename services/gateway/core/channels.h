@@ -27,6 +27,8 @@ enum Channel : std::uint32_t {
   kDetections,
   kMap,
   kModel,
+  kMapToOdom,  ///< /map/frame
+  kMapScene,
   kRaw = 50,  ///< and on: topics of the bus as they are
   kCamera = 100,
 };

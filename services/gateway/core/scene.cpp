@@ -54,20 +54,26 @@ void putStrokes(JsonWriter& json, const Eigen::Vector3d& a, const Eigen::Vector3
   }
 }
 
-void putEdges(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid) {
+struct EdgeLook {
+  double thickness = 1;  ///< px
+  bool dashed = false;
+  Colour colour;
+};
+
+void putEdges(JsonWriter& json, const Cuboid& cuboid, const EdgeLook& look) {
   const auto corners = cornersOf(cuboid);
   json.key("lines").begin('[').begin('{').key("type").integer(static_cast<int>(kSegments));
   json.key("pose");
   putPose(json, {});
-  json.key("thickness").number(isInSight(object) ? 2 : 1.5).key("scale_invariant").boolean(true);
+  json.key("thickness").number(look.thickness).key("scale_invariant").boolean(true);
   json.key("points").begin('[');
-  for (const auto& [a, b] : kEdges) putStrokes(json, corners[a], corners[b], isHidden(object));
+  for (const auto& [a, b] : kEdges) putStrokes(json, corners[a], corners[b], look.dashed);
   // Which way it faces: from the middle of its floor to the middle of its front's lower edge.
   const Eigen::Vector3d floor = (corners[0] + corners[3]) / 2,
                         front = (corners[1] + corners[3]) / 2;
-  putStrokes(json, floor, front, isHidden(object));
+  putStrokes(json, floor, front, look.dashed);
   json.end(']').key("color");
-  putColour(json, classColour(object.best().name).withAlpha(opacityOf(object)));
+  putColour(json, look.colour);
   json.key("colors").begin('[').end(']').key("indices").begin('[').end(']');
   json.end('}').end(']');
 }
@@ -88,7 +94,7 @@ void putEllipsoid(JsonWriter& json, const ObjectBelief& object) {
   json.end('}').end(']');
 }
 
-void putLabel(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid) {
+void putLabel(JsonWriter& json, const Cuboid& cuboid, const std::string& text, double opacity) {
   constexpr double kAbove = 0.3;  // m
   const Eigen::Vector3d up = cuboid.T_WO.q * Eigen::Vector3d::UnitZ();
   json.key("texts").begin('[').begin('{').key("pose");
@@ -96,8 +102,8 @@ void putLabel(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid
                  Eigen::Vector3d(cuboid.T_WO.p + up * (cuboid.size.z() / 2 + kAbove))});
   json.key("billboard").boolean(true).key("font_size").number(12);
   json.key("scale_invariant").boolean(true).key("color");
-  putColour(json, {1, 1, 1, opacityOf(object)});
-  json.key("text").text(nameOf(object) + (isHidden(object) ? " (hidden)" : ""));
+  putColour(json, {1, 1, 1, opacity});
+  json.key("text").text(text);
   json.end('}').end(']');
 }
 
@@ -120,21 +126,54 @@ void putMetadata(JsonWriter& json, const ObjectBelief& object) {
   json.end(']');
 }
 
+/// Up to its metadata.
+void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id) {
+  json.begin('{').key("timestamp");
+  putTime(json, time);
+  json.key("frame_id").text(frame).key("id").text(id);
+  json.key("lifetime").raw(R"({"sec":0,"nsec":0})").key("frame_locked").boolean(true);
+}
+
+void endEntity(JsonWriter& json, std::initializer_list<const char*> without) {
+  for (const char* none : without) json.key(none).begin('[').end(']');
+  json.end('}');
+}
+
 void putEntity(JsonWriter& json, const Objects& objects, const ObjectBelief& object) {
   const Cuboid cuboid = cuboidOf(object, objects.up_W);
-  json.begin('{').key("timestamp");
-  putTime(json, objects.stamp.time);
-  json.key("frame_id").text(kOdomFrame).key("id").text(std::to_string(object.id));
-  json.key("lifetime").raw(R"({"sec":0,"nsec":0})").key("frame_locked").boolean(true);
+  beginEntity(json, objects.stamp.time, kOdomFrame, std::to_string(object.id));
   putMetadata(json, object);
   putCube(json, object, cuboid);
-  putEdges(json, object, cuboid);
+  putEdges(json, cuboid,
+           {isInSight(object) ? 2 : 1.5, isHidden(object),
+            classColour(object.best().name).withAlpha(opacityOf(object))});
   putEllipsoid(json, object);
-  putLabel(json, object, cuboid);
-  for (const char* none : {"arrows", "cylinders", "triangles", "models"}) {
-    json.key(none).begin('[').end(']');
-  }
-  json.end('}');
+  putLabel(json, cuboid, nameOf(object) + (isHidden(object) ? " (hidden)" : ""), opacityOf(object));
+  endEntity(json, {"arrows", "cylinders", "triangles", "models"});
+}
+
+void putEntity(JsonWriter& json, TimePoint time, const MapObject& object) {
+  constexpr double kFaint = 0.3, kFaintest = 0.1;
+  const Eigen::Quaterniond yaw(Eigen::AngleAxisd(object.mean[3], Eigen::Vector3d::UnitZ()));
+  const Cuboid cuboid{RigidTransform(yaw, Eigen::Vector3d(object.mean.head<3>())),
+                      object.mean.tail<3>().array().exp().matrix()};
+  const Colour colour = classColour(object.class_name);
+  beginEntity(json, time, kMapFrame, "map " + std::to_string(object.id));
+  json.key("metadata").begin('[');
+  putPair(json, "exists", percent(object.existence));
+  putPair(json, object.class_name.c_str(), percent(object.class_probability));
+  if (object.provisional) putPair(json, "provisional", "its session is not found on the map yet");
+  json.end(']').key("cubes").begin('[').begin('{').key("pose");
+  putPose(json, cuboid.T_WO);
+  json.key("size");
+  putVector(json, cuboid.size);
+  json.key("color");
+  putColour(json, colour.withAlpha(kFaintest));
+  json.end('}').end(']');
+  putEdges(json, cuboid, {1, object.provisional, colour.withAlpha(kFaint)});
+  const std::string name = object.class_name + " " + std::to_string(object.id);
+  putLabel(json, cuboid, name + (object.provisional ? " (provisional)" : ""), kFaint);
+  endEntity(json, {"spheres", "arrows", "cylinders", "triangles", "models"});
 }
 
 void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id) {
@@ -177,6 +216,18 @@ std::string Scene::update(const Objects& objects) {
   json.end(']').end('}');
   shown_ = std::move(now);
   return json.take();
+}
+
+std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,
+                     TimePoint time) {
+  JsonWriter json(1024 + 2048 * objects.size());
+  json.begin('{').key("deletions").begin('[');
+  putDeletion(json, time, kAll, "");
+  json.end(']').key("entities").begin('[');
+  for (const MapObject& object : objects) {
+    if (!working.contains(object.id)) putEntity(json, time, object);
+  }
+  return json.end(']').end('}').take();
 }
 
 }  // namespace perdure::gateway

@@ -6,7 +6,9 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "common/types/map.h"
 #include "common/types/objects.h"
 
 namespace perdure::gateway {
@@ -27,5 +29,11 @@ class Scene {
   std::deque<Gone> gone_;
   int clear_ = 0;  ///< messages that still say that all before is to be deleted
 };
+
+/// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids with their names,
+/// dashed where provisional. Each message is the whole of it and clears what was before. `objects`
+/// are in M; those in `working`, which `Scene` shows, are left out.
+std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,
+                     TimePoint time);
 
 }  // namespace perdure::gateway

@@ -137,7 +137,9 @@ Json glance() {
                  {"hits", natural()},
                  {"first_s", said(number(), "first seen, s of the sensor clock")},
                  {"last_s", said(number(), "last seen, s of the sensor clock")},
-                 {"recalled", said(boolean(), "came back from the map and not seen since")}});
+                 {"recalled", said(boolean(), "came back from the map and not seen since")},
+                 {"provisional", said(boolean(), "its session is not found on the map yet")},
+                 {"elsewhere", said(boolean(), "on a map whose place in `map` is not known")}});
 }
 
 }  // namespace
@@ -274,7 +276,8 @@ std::string event() {
                  {"class", text()},
                  {"probability", number()},
                  {"detail", text()},
-                 {"returns_in_s", said(listOf(number()), "expected, and a 90 % interval")}},
+                 {"returns_in_s", said(listOf(number()), "expected, and a 90 % interval")},
+                 {"at", said(listOf(number()), "x y z in odom, where it is known")}},
                 "perdure.Event")
       .dump();
 }
@@ -316,8 +319,25 @@ std::string map() {
   return object({{"timestamp", time()},
                  {"frame_id", text()},
                  {"all", said(natural(), "objects on the map")},
+                 {"elsewhere", said(natural(), "objects of maps whose place here is not known")},
                  {"objects", said(listOf(glance()), "those nearest to the body")}},
                 "perdure.Map")
+      .dump();
+}
+
+std::string mapFrame() {
+  return object({{"timestamp", time()},
+                 {"world", text()},
+                 {"epoch", natural()},
+                 {"map", said(text(), "the world that the map began as")},
+                 {"map_epoch", natural()},
+                 {"T_MW", said(listOf(number()), "odom in map: x y z, quaternion x y z w")},
+                 {"body_sigma", said(listOf(number()), "of the body in map: x y z m, yaw rad")},
+                 {"revision", said(natural(), "changes of the graph")},
+                 {"sessions", said(natural(), "that hang together with this one, itself included")},
+                 {"loops", said(natural(), "that are believed")},
+                 {"anchors", natural()}},
+                "perdure.MapFrame")
       .dump();
 }
 

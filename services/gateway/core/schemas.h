@@ -21,6 +21,7 @@ std::string event();
 std::string health();
 std::string detections();
 std::string map();
+std::string mapFrame();
 std::string model();
 std::string objectRequest();
 std::string mapRequest();

@@ -61,11 +61,11 @@ class Cdr {
 
 }  // namespace
 
-std::string frameTransforms(TimePoint time, const RigidTransform& T_WB,
+std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB,
                             const Calibration* calibration) {
   JsonWriter json;
   json.begin('{').key("transforms").begin('[');
-  putTransform(json, time, kMapFrame, kOdomFrame, {});
+  putTransform(json, time, kMapFrame, kOdomFrame, T_MW);
   putTransform(json, time, kOdomFrame, kBodyFrame, T_WB);
   if (calibration != nullptr) {
     for (const CameraCalibration& camera : calibration->cameras) {

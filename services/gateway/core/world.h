@@ -9,9 +9,8 @@
 
 namespace perdure::gateway {
 
-/// map → odom → base_link → <camera>_optical. `map` and `odom` are one until the bus tells the two
-/// apart.
-std::string frameTransforms(TimePoint time, const RigidTransform& T_WB,
+/// map → odom → base_link → <camera>_optical.
+std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB,
                             const Calibration* calibration);
 std::string poseInFrame(TimePoint time, const RigidTransform& T_WB);
 /// x, y, z, sigma as 32-bit floats.

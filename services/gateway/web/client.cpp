@@ -6,6 +6,24 @@
 namespace perdure::gateway::web {
 namespace {
 
+/// Ends a connection without waiting until the client has closed its side as well. Beast's own
+/// teardown waits, for as long as a handshake may take, and then forgets what the client did wrong.
+class Wire : public beast::tcp_stream {
+ public:
+  explicit Wire(beast::tcp_stream stream) : beast::tcp_stream(std::move(stream)) {}
+
+  template <class Handler>
+  friend void async_teardown(beast::role_type, Wire& wire, Handler&& handler) {
+    beast::error_code error;
+    wire.socket().shutdown(tcp::socket::shutdown_send, error);
+    asio::post(wire.get_executor(),
+               beast::bind_front_handler(std::forward<Handler>(handler), beast::error_code()));
+  }
+  friend void teardown(beast::role_type, Wire& wire, beast::error_code& error) {
+    wire.socket().shutdown(tcp::socket::shutdown_send, error);
+  }
+};
+
 class Client : public Viewer, public Connection, public std::enable_shared_from_this<Client> {
  public:
   Client(beast::tcp_stream stream, std::shared_ptr<Shared> shared)
@@ -32,7 +50,7 @@ class Client : public Viewer, public Connection, public std::enable_shared_from_
   void onWritten(beast::error_code error, std::size_t bytes);
   void noteEnd(beast::error_code error);
 
-  websocket::stream<beast::tcp_stream> socket_;
+  websocket::stream<Wire> socket_;
   beast::flat_buffer said_;
   std::shared_ptr<Shared> shared_;
   Outgoing sending_;

@@ -32,6 +32,7 @@ class Drive {
         objects_(participant, bus::topics::kObjects),
         events_(participant, bus::topics::kEvents),
         tiles_(participant, bus::topics::kMap),
+        map_frame_(participant, bus::topics::kMapFrame),
         imu_(participant, bus::topics::kImu),
         speed_(participant, bus::topics::kSpeed),
         frames_(participant, bus::topics::frame("cam0")) {
@@ -97,16 +98,34 @@ class Drive {
     frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{70});
     (void)frames_.write(frame);
     (void)objects_.write(objects);
-    if (i % 10 != 1) return;
+    if (i % 10 == 1) tellMap(i, objects);
+  }
+
+  /// A bicycle 12 m ahead in W, of an earlier session; W lies 100 m to the left in M.
+  void tellMap(std::uint64_t i, const Objects& objects) {
+    MapFrame frame;
+    frame.stamp = objects.stamp;
+    frame.world = objects.world;
+    frame.map = {70, 1};
+    frame.T_MW.p.y() = 100;
+    frame.sessions = 2;
+    frame.loops = 1;
+    (void)map_frame_.write(frame);
     MapTile tile;
     tile.revision = i;
     tile.objects.resize(1);
     tile.objects[0].id = 77;
     tile.objects[0].class_name = "bicycle";
     tile.objects[0].class_probability = tile.objects[0].existence = 0.9;
-    tile.objects[0].mean[0] = 12;
-    tile.objects[0].world = objects.world;
+    tile.objects[0].mean << 12, 100, 0, 0, 0.5, -0.5, 0;
+    tile.objects[0].world = frame.map;
+    tile.objects[0].provisional = true;
     (void)tiles_.write(tile);
+    Event loop = eventOf(EventKind::kLoopClosed, 0);
+    loop.stamp = objects.stamp;
+    loop.world = objects.world;
+    loop.detail = "loop 1, by 4 objects";
+    if (i == 1) (void)events_.write(loop);
   }
 
   bus::Writer<Calibration> calibration_;
@@ -117,6 +136,7 @@ class Drive {
   bus::Writer<Objects> objects_;
   bus::Writer<Event> events_;
   bus::Writer<MapTile> tiles_;
+  bus::Writer<MapFrame> map_frame_;
   bus::Writer<ImuSample> imu_;
   bus::Writer<SpeedSample> speed_;
   bus::Writer<Frame> frames_;
@@ -151,7 +171,7 @@ class Strangers : public ::testing::Test {
         port_};
     command.insert(command.end(), more.begin(), more.end());
     Child node(command, folder_.file(script));
-    status_ = node.wait(150s);
+    status_ = node.wait(260s);
     return json::parse(node.log(), nullptr, false);
   }
 
@@ -169,7 +189,7 @@ TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
     const json said = answer("foxglove.mjs", {protocol});
     ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("foxglove.mjs"));
     EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
-    EXPECT_EQ(said["channels"], 19);
+    EXPECT_EQ(said["channels"], 21);
     EXPECT_EQ(status_, 0);
   }
 }
@@ -185,6 +205,9 @@ TEST_F(Strangers, ABrowserShowsThePage) {
   EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
   EXPECT_EQ(said["page"]["things"], 3);
   EXPECT_EQ(said["page"]["hidden"], 1);
+  EXPECT_EQ(said["page"]["remembered"], json({12, 0, 0})) << "the map lies over the working set";
+  EXPECT_EQ(said["page"]["provisional"], 1);
+  EXPECT_EQ(said["page"]["marks"], 1);
   EXPECT_GT(said["page"]["images"], 0);
   EXPECT_EQ(status_, 0);
 }

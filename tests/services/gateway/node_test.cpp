@@ -185,24 +185,158 @@ TEST_F(GatewayNode, LetsOnlySoManyQuestionsWait) {
   EXPECT_EQ(node_.reasons().of("too_many_questions"), 6u);
 }
 
-TEST_F(GatewayNode, ShowsTheTilesOfTheMapInItsFrameOfReference) {
+MapObject onMap(ObjectId id, const WorldId& map, const Eigen::Vector3d& p_M) {
+  MapObject object;
+  object.id = id;
+  object.world = map;
+  object.class_name = "van";
+  object.mean.head<3>() = p_M;
+  return object;
+}
+
+/// M began as world 70; W, which is 77, is turned by 90 degrees in it and shifted by 100 m.
+MapFrame frameOfMap() {
+  MapFrame frame;
+  frame.stamp = frameOf(1, {}).stamp;
+  frame.world = {77, 1};
+  frame.map = {70, 1};
+  frame.T_MW = RigidTransform(
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::acos(0.0), Eigen::Vector3d::UnitZ())), {100, 0, 0});
+  frame.sessions = 2;
+  frame.loops = 3;
+  frame.covariance.diagonal() << 0.04, 0.09, 0.01, 0.0001;
+  return frame;
+}
+
+TEST_F(GatewayNode, ShowsTheTilesOfTheMapThatTheVehicleIsOn) {
   node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onMapFrame(frameOfMap());
   node_.setWanted({kMap});
   MapTile tile;
-  tile.objects.resize(2);
-  tile.objects[0].id = 1;
-  tile.objects[0].world = {77, 1};
-  tile.objects[1].id = 2;
-  tile.objects[1].world = {78, 1};
+  tile.objects = {onMap(1, {70, 1}, {5, 0, 0}), onMap(2, {78, 1}, {6, 0, 0})};
+  tile.objects[0].provisional = true;
   node_.onMapTile(tile);
   node_.tick(2 * kSecond);
   ASSERT_EQ(on(kMap).size(), 1u);
-  EXPECT_EQ(on(kMap)[0]["objects"].size(), 1u);
+  const json map = on(kMap)[0];
+  EXPECT_EQ(map["frame_id"], "map");
+  ASSERT_EQ(map["objects"].size(), 1u);
+  EXPECT_EQ(map["objects"][0]["id"], 1);
+  EXPECT_EQ(map["objects"][0]["provisional"], true);
+  EXPECT_EQ(map["elsewhere"], 1);
   node_.tick(4 * kSecond);
   EXPECT_EQ(on(kMap).size(), 1u);
   node_.onMapTileGone(tile);
   node_.tick(6 * kSecond);
   EXPECT_EQ(on(kMap).at(1)["all"], 0);
+}
+
+TEST_F(GatewayNode, WithoutAFrameOfTheMapTilesLieInTheOdometrysOwn) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  MapFrame of_before = frameOfMap();
+  of_before.world = {76, 1};  // of a W that is no more
+  node_.onMapFrame(of_before);
+  node_.setWanted({kMap, kTransforms, kMapToOdom});
+  MapTile tile;
+  tile.objects = {onMap(1, {77, 1}, {5, 0, 0}), onMap(2, {70, 1}, {6, 0, 0})};
+  node_.onMapTile(tile);
+  node_.tick(2 * kSecond);
+  EXPECT_EQ(on(kMap).at(0)["objects"].at(0)["id"], 1);
+  EXPECT_EQ(on(kTransforms).at(0)["transforms"][0]["translation"]["x"], 0);
+  EXPECT_TRUE(on(kMapToOdom).empty());
+}
+
+TEST_F(GatewayNode, TellsTheTransformFromMapToOdomAndAgainWhenItJumps) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.setWanted({kTransforms, kMapToOdom});
+  node_.onMapFrame(frameOfMap());
+  const json transform = on(kTransforms).back()["transforms"][0];
+  EXPECT_EQ(transform["parent_frame_id"], "map");
+  EXPECT_EQ(transform["child_frame_id"], "odom");
+  EXPECT_EQ(transform["translation"]["x"], 100);
+  EXPECT_NEAR(transform["rotation"]["z"].get<double>(), std::sqrt(0.5), 1e-6);
+  const json frame = on(kMapToOdom).at(0);
+  EXPECT_EQ(frame["T_MW"][0], 100);
+  EXPECT_EQ(frame["sessions"], 2);
+  EXPECT_EQ(frame["loops"], 3);
+  EXPECT_EQ(frame["body_sigma"], json({0.2, 0.3, 0.1, 0.01}));
+  MapFrame jumped = frameOfMap();
+  jumped.T_MW.p.x() = 101;
+  node_.onMapFrame(jumped);
+  EXPECT_EQ(on(kTransforms).back()["transforms"][0]["translation"]["x"], 101);
+}
+
+TEST_F(GatewayNode, TellsOfALargeMapWhatIsNearestToTheBodyInM) {
+  node_.onObjects(frameOf(1, {}), kSecond);  // the body is at the origin of W: 100 0 0 in M
+  node_.onMapFrame(frameOfMap());
+  node_.setWanted({kMap});
+  MapTile tile;
+  for (ObjectId id = 1; id <= kMostOfMap + 5; ++id) {
+    tile.objects.push_back(onMap(id, {70, 1}, {static_cast<double>(id), 0, 0}));
+  }
+  node_.onMapTile(tile);
+  node_.tick(2 * kSecond);
+  const json map = on(kMap).at(0);
+  EXPECT_EQ(map["all"], kMostOfMap + 5);
+  ASSERT_EQ(map["objects"].size(), kMostOfMap);
+  EXPECT_EQ(map["objects"][0]["id"], 100);
+}
+
+TEST_F(GatewayNode, DrawsOfTheMapWhatTheWorkingSetDoesNotHave) {
+  node_.onObjects(frameOf(1, {objectAt(1, {10, 0, 0})}), kSecond);
+  node_.onMapFrame(frameOfMap());
+  node_.setWanted({kMapScene});
+  MapTile tile;
+  tile.objects = {onMap(1, {70, 1}, {5, 0, 0}), onMap(2, {70, 1}, {6, 0, 0})};
+  tile.objects[1].provisional = true;
+  node_.onMapTile(tile);
+  node_.tick(2 * kSecond);
+  const json scene = on(kMapScene).at(0);
+  ASSERT_EQ(scene["entities"].size(), 1u);
+  EXPECT_EQ(scene["entities"][0]["frame_id"], "map");
+  EXPECT_EQ(scene["entities"][0]["cubes"][0]["pose"]["position"]["x"], 6);
+  EXPECT_EQ(scene["entities"][0]["texts"][0]["text"], "van 2 (provisional)");
+  constexpr int kAll = 1;
+  EXPECT_EQ(scene["deletions"][0]["type"], kAll);
+}
+
+TEST_F(GatewayNode, TellsWhereAnEventWas) {
+  Objects frame = frameOf(1, {objectAt(12, {10, -2, 0})});
+  frame.T_WB.p.x() = 3;
+  node_.onObjects(frame, kSecond);
+  node_.setWanted({kEvents, kLog});
+  Event loop = test::eventOf(EventKind::kLoopWithdrawn, 0);
+  loop.detail = "loop 4";
+  Event seen = test::eventOf(EventKind::kReappeared, 12),
+        absent = test::eventOf(EventKind::kGone, 9);
+  for (Event* event : {&loop, &seen, &absent}) event->world = frame.world;
+  Event other = loop;
+  other.world.epoch = 2;
+  for (const Event& event : {loop, seen, absent, other}) node_.onEvent(event);
+  const auto told = on(kEvents);
+  ASSERT_EQ(told.size(), 4u);
+  EXPECT_EQ(told[0]["at"], json({3, 0, 0}));
+  EXPECT_EQ(told[0]["words"], "the map took a loop back");
+  EXPECT_EQ(told[1]["at"], json({10, -2, 0}));
+  EXPECT_FALSE(told[2].contains("at"));
+  EXPECT_FALSE(told[3].contains("at"));
+  constexpr int kWarning = 3;
+  EXPECT_EQ(on(kLog).at(0)["level"], kWarning);
+  EXPECT_EQ(on(kLog)[0]["message"], "the map took a loop back: loop 4");
+}
+
+TEST_F(GatewayNode, AnswersSayWhatLiesOnAnotherMap) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onMapFrame(frameOfMap());
+  node_.onCall({7, kMapQueryService, 1, "{}"}, kSecond);
+  MapReply reply;
+  reply.client = 5;
+  reply.request = queries_.at(0).request;
+  reply.objects = {onMap(1, {70, 1}, {0, 0, 0}), onMap(2, {60, 1}, {0, 0, 0})};
+  node_.onMapReply(reply);
+  const json objects = json::parse(answers_.at(0).payload)["objects"];
+  EXPECT_EQ(objects[0]["elsewhere"], false);
+  EXPECT_EQ(objects[1]["elsewhere"], true);
 }
 
 TEST(GatewayConfig, RefusesAnOpenPortWithoutAToken) {

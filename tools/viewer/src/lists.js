@@ -14,13 +14,14 @@ export class ObjectList {
   }
 
   distance(o) {
-    const b = this.model.frame?.body ?? [0, 0, 0];
-    return Math.hypot(o.c[0] - b[0], o.c[1] - b[1]);
+    const b = this.model.frame?.body ?? [0, 0, 0], at = this.model.placeInW(o);
+    return at ? Math.hypot(at[0] - b[0], at[1] - b[1]) : Infinity;
   }
 
   /** Every word has to be in what is said of an object. */
   matches(o, words, onlyMap) {
-    const text = `${o.class} ${o.id} ${onlyMap ? 'remembered map' : visibilityWords(o)} ${o.confirmed ? 'confirmed' : 'unconfirmed'} ${(o.moving ?? 0) >= 0.5 ? 'moving' : ''}`.toLowerCase();
+    if (this.model.answer?.asked === this.search.value.trim()) return this.model.answer.ids.has(o.id);
+    const text = `${o.class} ${o.id} ${onlyMap ? 'remembered map' : visibilityWords(o)} ${this.model.isProvisional(o.id) ? 'provisional' : ''} ${o.elsewhere ? 'elsewhere' : ''} ${o.confirmed ? 'confirmed' : 'unconfirmed'} ${(o.moving ?? 0) >= 0.5 ? 'moving' : ''}`.toLowerCase();
     return words.every((w) => text.includes(w));
   }
 
@@ -31,7 +32,7 @@ export class ObjectList {
     const left = [...this.model.remembered.values()].filter((o) => !this.model.objects.has(o.id) && this.matches(o, words, true));
     const rank = { seen: 0, hidden: 1, away: 2 };
     here.sort((a, b) => rank[looksLike(a)] - rank[looksLike(b)] || this.distance(a) - this.distance(b));
-    left.sort((a, b) => this.distance(a) - this.distance(b));
+    left.sort((a, b) => (a.elsewhere || b.elsewhere ? Number(a.elsewhere) - Number(b.elsewhere) : this.distance(a) - this.distance(b)));
     return [here, left];
   }
 
@@ -42,7 +43,7 @@ export class ObjectList {
     const seen = here.filter((o) => looksLike(o) === 'seen').length, hidden = here.filter((o) => looksLike(o) === 'hidden').length;
     this.note.textContent = all.length === 0
       ? (this.search.value ? 'Nothing here matches; the whole map can be asked.' : 'No objects yet.')
-      : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only`;
+      : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only${this.model.elsewhere > 0 ? `; ${this.model.elsewhere} of earlier sessions: where they are from here is not known yet` : ''}`;
     const wanted = new Set(this.order);
     for (const [id, row] of this.rows) {
       if (wanted.has(id)) continue;
@@ -69,8 +70,9 @@ export class ObjectList {
     const [what, where, bar, far] = row.children;
     const put = (node, text) => { if (node.textContent !== text) node.textContent = text; };
     put(what.lastElementChild, `${o.class} ${o.id}`);
-    put(where, only ? 'on the map' : look === 'seen' && o.visibility === 'partial' ? 'partly' : { seen: 'in sight', hidden: 'hidden', away: 'out of view' }[look]);
-    put(far, `${this.distance(o).toFixed(1)} m`);
+    const provisional = this.model.isProvisional(o.id);
+    put(where, o.elsewhere ? 'elsewhere' : only ? (provisional ? 'provisional' : 'on the map') : look === 'seen' && o.visibility === 'partial' ? 'partly' : { seen: 'in sight', hidden: 'hidden', away: 'out of view' }[look]);
+    put(far, o.elsewhere ? '?' : `${this.distance(o).toFixed(1)} m`);
     bar.firstElementChild.firstElementChild.style.width = `${Math.round(100 * o.r)}%`;
     bar.firstElementChild.title = `exists: ${percent(o.r)}`;
     row.style.setProperty('--c', colourOf(o.class));
@@ -92,18 +94,20 @@ export class ObjectList {
 }
 
 export class EventLog {
-  constructor(list, model, onLink) {
+  constructor(list, model, onLink, onPlace) {
     this.list = list;
     this.model = model;
     list.addEventListener('click', (e) => {
-      const link = e.target.closest('[data-object]');
+      const link = e.target.closest('[data-object]'), place = e.target.closest('[data-at]');
       if (link) onLink(Number(link.dataset.object));
+      else if (place) onPlace(place.dataset.at.split(',').map(Number));
     });
     this.clear();
   }
 
   clear() {
     this.list.innerHTML = '<li class="empty">No events yet.</li>';
+    this.predicted = new Map(); // object → the line of its newest prediction
   }
 
   add(event) {
@@ -111,11 +115,18 @@ export class EventLog {
     const time = event.timestamp.sec + 1e-9 * event.timestamp.nsec - (this.model.firstTime ?? event.timestamp.sec);
     const line = document.createElement('li');
     line.dataset.kind = event.event;
+    if (event.at) line.dataset.at = event.at.join();
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
-      if (id) words = words.replace(new RegExp(`\\b${id}\\b`), `<a data-object="${id}">${id}</a>`);
+      // Not the digits of a time: 0.1 s.
+      if (id) words = words.replace(new RegExp(`(?<![\\d.])${id}(?!\\.?\\d)`), `<a data-object="${id}">${id}</a>`);
     }
     line.innerHTML = `<time>${time < 0 ? 'before' : `${time.toFixed(1)} s`}</time><span>${words}</span>`;
+    if (event.event === 'predicted_return') {
+      // It is told again and again until the object is seen: the newest is enough.
+      this.predicted.get(event.object_id)?.remove();
+      this.predicted.set(event.object_id, line);
+    }
     this.list.prepend(line);
     while (this.list.childElementCount > 500) this.list.lastElementChild.remove();
   }

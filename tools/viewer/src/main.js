@@ -5,7 +5,7 @@ import { EventLog, ObjectList, renderServices } from './lists.js';
 import { Model, troubleOf } from './model.js';
 import { ObjectPanel } from './object_panel.js';
 import { PlaybackBar } from './playback.js';
-import { escaped } from './words.js';
+import { MARKS, escaped } from './words.js';
 import { World } from './world.js';
 
 const $ = (id) => document.getElementById(id);
@@ -32,7 +32,7 @@ try {
 }
 const camera = new CameraView($('camera'), $('image'), $('image-caption'));
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
-const log = new EventLog($('events'), model, choose);
+const log = new EventLog($('events'), model, choose, (at) => world?.lookAtPlace(at));
 const panel = new ObjectPanel($('object'), model, connection, choose);
 
 const playback = new PlaybackBar($('playback'), connection, model);
@@ -77,9 +77,14 @@ connection.on('/map', (message) => {
   model.takeMap(message);
   world?.syncRemembered(model);
 });
+connection.on('/map/frame', (message) => {
+  model.mapFrame = message;
+  world?.setMapFrame(model.T_MW());
+});
 connection.on('/events', (event) => {
   model.takeEvent(event);
   log.add(event);
+  if (event.at && MARKS[event.event]) world?.addMark(event.at, MARKS[event.event]);
 });
 connection.on('/health', (health) => {
   model.health = health;
@@ -90,17 +95,30 @@ connection.on('/health', (health) => {
 // What is asked.
 $('search').addEventListener('input', () => list.render());
 $('ask-map').addEventListener('click', askMap);
+/** What is typed as a question: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
+function questionOf(text) {
+  const words = text.toLowerCase().split(/\s+/).filter(Boolean), numbers = words.slice(1).map(Number);
+  if (words.length === 0) return {};
+  if (/^\d+$/.test(words[0])) return { id: Number(words[0]) };
+  if (numbers.every(Number.isFinite)) {
+    const body = model.bodyInM();
+    if (words[0] === 'near' && numbers.length < 2) return { near: body, radius: numbers[0] ?? 30 };
+    if (words[0] === 'at' && numbers.length >= 2) return { near: [numbers[0], numbers[1], body[2]], radius: numbers[2] ?? 30 };
+  }
+  return { class: words.join(' ') };
+}
+
 async function askMap() {
   const word = $('search').value.trim();
-  const request = /^\d+$/.test(word) ? { id: Number(word) } : word ? { class: word.toLowerCase() } : {};
+  const request = questionOf(word);
   $('list-note').textContent = 'The map is asked …';
   try {
     const reply = await connection.call('/map/query', request);
-    for (const o of reply.objects) model.remembered.set(o.id, o);
+    model.takeAnswer(reply.objects, 'near' in request ? word : '');
     world?.syncRemembered(model);
     list.render();
     const many = reply.truncated ? ', and there are more' : '';
-    $('list-note').textContent = reply.objects.length === 0 ? `The map has nothing that is "${word}".` : `The map has ${reply.objects.length}${many}.`;
+    $('list-note').textContent = reply.objects.length === 0 ? `The map has nothing ${'near' in request ? 'there' : `that is "${word}"`}.` : `The map has ${reply.objects.length}${many}.`;
   } catch (error) {
     $('list-note').textContent = `The map does not answer: ${error.message}`;
   }
@@ -175,12 +193,17 @@ document.addEventListener('keydown', (e) => {
 function figures(now) {
   const frame = model.frame, items = [];
   if (frame) items.push(['time', `${Math.max(0, model.time - model.firstTime).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
+  const map = model.mapFrame;
+  if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor']);
   if (frame) items.push(['rate', `${model.rate(now).toFixed(0)} Hz`, ''], ['latency', frame.latency_ms >= 0 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
 }
 
+let stateAt = 0;
 function showState() {
   const now = performance.now();
+  if (now - stateAt > 1500) model.stoodStill(now);
+  stateAt = now;
   const [state, sentence] = troubleOf(model, { ...status, playback: connection.playback }, now);
   playback.render();
   const words = { live: 'live', degraded: 'degraded', stale: 'nothing comes', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };

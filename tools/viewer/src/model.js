@@ -3,7 +3,8 @@
 export class Model {
   constructor() {
     this.objects = new Map(); // id → object, of the working set
-    this.remembered = new Map(); // id → object, on the map
+    this.remembered = new Map(); // id → object, on the map, in M
+    this.mapFrame = null; // the newest perdure.MapFrame
     this.history = new Map(); // id → [[time, r], …]
     this.events = [];
     this.chosen = 0;
@@ -57,6 +58,38 @@ export class Model {
   takeMap(message) {
     this.remembered = new Map(message.objects.map((o) => [o.id, o]));
     this.onMap = message.all;
+    this.elsewhere = message.elsewhere;
+  }
+
+  /** Of a question about a place `asked` is what was typed: the list then shows what is there. */
+  takeAnswer(objects, asked) {
+    for (const o of objects) this.remembered.set(o.id, o);
+    this.answer = asked ? { asked, ids: new Set(objects.map((o) => o.id)) } : null;
+  }
+
+  /** T_MW as [x y z qx qy qz qw], where it is of the W that is shown; else W is M. */
+  T_MW() {
+    const f = this.mapFrame;
+    return f && this.world === `${f.world}/${f.epoch}` ? f.T_MW : [0, 0, 0, 0, 0, 0, 1];
+  }
+
+  /** Where an object's centre is in W: what is on the map only is in M. Null: that is not known. */
+  placeInW(o) {
+    if (o.elsewhere) return null;
+    if (o.memory === undefined) return o.c; // of the working set
+    const [x, y, z, a, b, c, w] = this.T_MW();
+    return turned([-a, -b, -c, w], [o.c[0] - x, o.c[1] - y, o.c[2] - z]);
+  }
+
+  bodyInM() {
+    const [x, y, z, a, b, c, w] = this.T_MW();
+    const p = turned([a, b, c, w], (this.frame?.body ?? [0, 0, 0]).slice(0, 3));
+    return [p[0] + x, p[1] + y, p[2] + z];
+  }
+
+  /** Its session is not found on the map of before: it may be an object of that. */
+  isProvisional(id) {
+    return this.remembered.get(id)?.provisional ?? false;
   }
 
   find(id) {
@@ -70,9 +103,20 @@ export class Model {
     return 1000 / Math.max(1, sorted.reduce((a, b) => a + b, 0) / sorted.length);
   }
 
+  /** Where the page itself stood still, what waits has not been heard yet. */
+  stoodStill(now) {
+    if (this.heardAt > 0) this.heardAt = Math.max(this.heardAt, now - 1000);
+  }
+
   silentFor(now) {
     return this.heardAt > 0 ? (now - this.heardAt) / 1000 : Infinity;
   }
+}
+
+/** A vector by a quaternion [x y z w]. */
+function turned([a, b, c, w], [x, y, z]) {
+  const u = 2 * (b * z - c * y), v = 2 * (c * x - a * z), t = 2 * (a * y - b * x);
+  return [x + w * u + b * t - c * v, y + w * v + c * u - a * t, z + w * t + a * v - b * u];
 }
 
 /** What is wrong, in a sentence with the mend; "" where all is well. Beside it how bad it is. */

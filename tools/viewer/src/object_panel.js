@@ -60,7 +60,7 @@ export class ObjectPanel {
     // A text that is being selected stays.
     if (String(getSelection()).length > 0 && this.element.contains(getSelection().anchorNode)) return;
     const top = this.element.scrollTop;
-    this.element.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o);
+    this.element.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o) + this.covariance();
     this.element.scrollTop = top;
     this.element.dataset.object = String(this.id);
   }
@@ -70,6 +70,8 @@ export class ObjectPanel {
     const tags = [`<span class="tag ${look}">${escaped(this.model.objects.has(o.id) ? visibilityWords(o) : 'on the map only')}</span>`];
     if (!o.confirmed) tags.push('<span class="tag">not confirmed yet</span>');
     if ((o.moving ?? 0) >= 0.5) tags.push('<span class="tag">moves</span>');
+    if (this.model.isProvisional(o.id)) tags.push('<span class="tag hidden" title="This session is not found on the map of before yet: it may be an object of that">provisional</span>');
+    if (o.elsewhere) tags.push('<span class="tag">of an earlier session; where it is from here is not known yet</span>');
     if (o.recalled) tags.push('<span class="tag">recalled from the map</span>');
     const note = this.note ? `<p class="dim">${escaped(this.note)}</p>` : '';
     return `<h2 style="--c:${colourOf(o.class)}"><i></i>${escaped(o.class)} ${o.id}</h2>${tags.join('')}${note}
@@ -79,8 +81,13 @@ export class ObjectPanel {
   }
 
   distance(o) {
-    const b = this.model.frame?.body;
-    return b ? `${Math.hypot(o.c[0] - b[0], o.c[1] - b[1], o.c[2] - b[2]).toFixed(1)} m` : '–';
+    const b = this.model.frame?.body, at = this.here(o);
+    return b && at ? `${Math.hypot(at[0] - b[0], at[1] - b[1], at[2] - b[2]).toFixed(1)} m` : '–';
+  }
+
+  /** In W; null: not known. What the store answered is in M, as what is on the map only. */
+  here(o) {
+    return this.model.objects.has(o.id) ? o.c : this.model.placeInW({ memory: 'long_term', ...o, elsewhere: this.model.find(o.id)?.elsewhere });
   }
 
   whereWords(o) {
@@ -175,7 +182,22 @@ export class ObjectPanel {
       ['seen', `${o.hits ?? '?'} times, first ${this.ago(o.first_s)}, last ${this.ago(o.last_s)}`],
     ];
     if ((o.moving ?? 0) > 0.01) rows.push(['moves', `${percent(o.moving)}, ${Math.hypot(...o.velocity).toFixed(1)} m/s`]);
-    return `<h3>Where it is, and how large (± 1 σ)</h3><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
+    const frame = this.model.objects.has(o.id) ? 'odom' : 'map';
+    return `<h3>Where it is in ${frame}, and how large</h3><p class="dim">± one standard deviation</p><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
+  }
+
+  /** Of the likeliest class: correlations as colours, and the covariance of a pair where one points. */
+  covariance() {
+    const P = this.full?.classes?.[0]?.covariance;
+    if (!P) return '';
+    const names = ['x', 'y', 'z', 'yaw', 'log l', 'log w', 'log h'];
+    const cells = P.flatMap((row, i) => row.map((value, k) => {
+      const rho = value / Math.max(1e-12, Math.sqrt(P[i][i] * P[k][k]));
+      const colour = `rgba(${rho < 0 ? '240,98,93' : '74,163,255'},${Math.min(1, Math.abs(rho)).toFixed(2)})`;
+      return `<i style="background:${colour}" title="${names[i]}, ${names[k]}: covariance ${value.toPrecision(3)}, correlation ${rho.toFixed(2)}"></i>`;
+    }));
+    const sigmas = names.map((n, i) => `<b>${n}</b><span>${Math.sqrt(Math.max(0, P[i][i])).toPrecision(2)}</span>`);
+    return `<h3>Covariance</h3><p class="dim">standard deviations; correlations: blue +, red −</p><div class="covariance"><div class="sigmas">${sigmas.join('')}</div><div class="matrix" role="img" aria-label="Correlations of ${names.join(', ')}">${cells.join('')}</div></div>`;
   }
 
   ago(s) {

@@ -6,7 +6,7 @@ import { colourOf, isHidden, isInSight } from './words.js';
 const BOX = new THREE.BoxGeometry(1, 1, 1);
 BOX.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * BOX.attributes.position.count).fill(1), 3));
 const SPHERE = new THREE.SphereGeometry(1, 20, 12);
-const UP = new THREE.Vector3(0, 0, 1);
+const UP = new THREE.Vector3(0, 0, 1), PALE = new THREE.Color('#c4d0dc');
 
 /** Strokes of about 0.3 m, in metres, so that a long edge has more of them than a short one. */
 function outline(size, dashed) {
@@ -65,6 +65,7 @@ export class Thing {
     if (this.className !== object.class) {
       this.className = object.class;
       this.colour = new THREE.Color(colourOf(object.class));
+      if (this.remembered) this.colour.lerp(PALE, 0.45);
       this.body.geometry = BOX;
       shapeOf(object.class, (geometry) => { if (this.className === object.class) this.body.geometry = geometry; });
     }
@@ -80,8 +81,9 @@ export class Thing {
   look() {
     const o = this.object, hidden = !this.remembered && isHidden(o), seen = !this.remembered && isInSight(o);
     const known = Math.max(0.25, o.r) * (o.confirmed ? 1 : 0.5);
-    this.body.visible = !this.remembered && !hidden;
-    this.material.opacity = seen ? Math.min(1, 0.35 + 0.65 * known) : 0.28 * known;
+    const dashed = hidden || Boolean(this.remembered && o.provisional);
+    this.body.visible = !hidden;
+    this.material.opacity = seen ? Math.min(1, 0.35 + 0.65 * known) : (this.remembered ? 0.14 : 0.28) * known;
     this.material.depthWrite = seen;
     this.material.color.copy(this.colour);
     this.material.emissive.copy(this.chosen ? this.colour : new THREE.Color(0)).multiplyScalar(0.45);
@@ -90,11 +92,11 @@ export class Thing {
     this.lines.renderOrder = hidden ? 5 : 1;
     this.lineMaterial.color.copy(hidden ? new THREE.Color('#ffd98a') : this.colour).lerp(new THREE.Color('#ffffff'), this.chosen ? 0.7 : 0.15);
     this.lineMaterial.opacity = this.chosen ? 1 : hidden ? 0.95 : seen ? 0.55 * known : this.remembered ? 0.4 : 0.5;
-    const wanted = `${hidden}/${o.size.map((s) => s.toFixed(2)).join()}`;
+    const wanted = `${dashed}/${o.size.map((s) => s.toFixed(2)).join()}`;
     if (wanted === this.outlined) return;
     this.outlined = wanted;
     this.lines.geometry.dispose();
-    this.lines.geometry = outline(o.size, hidden);
+    this.lines.geometry = outline(o.size, dashed);
   }
 
   setEllipsoid(object) {

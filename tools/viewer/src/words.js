@@ -68,5 +68,8 @@ export function visibilityWords(o) {
   return o.visibility ?? 'not known';
 }
 
+/** Events of the whole map, which are marked in it. */
+export const MARKS = { loop_closed: '#c58cff', relocalised: '#9fe5bf', loop_withdrawn: '#ff8f88' };
+
 /** A text node's worth of HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);

@@ -4,7 +4,7 @@ import { Orbit } from './orbit.js';
 import { Thing } from './things.js';
 import { colourOf, looksLike } from './words.js';
 
-const MOST_LABELS = 40;
+const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120;
 
 export class World {
   constructor(canvas, labels, onPick) {
@@ -25,11 +25,14 @@ export class World {
     this.follow = true;
     this.chosen = 0;
     this.dirty = true;
-    this.drawn = 0;
+    this.drawn = this.slow = this.restsUntil = 0;
     this.light();
     this.addGround();
     this.addVehicle();
     this.addLines();
+    this.map = new THREE.Group(); // M in W
+    this.marks = new THREE.Group();
+    this.scene.add(this.map, this.marks);
     this.orbit = new Orbit(this.camera, canvas, (shifted) => {
       this.dirty = true;
       if (shifted) this.setFollow(false);
@@ -121,6 +124,7 @@ export class World {
     if (this.shownWorld !== model.world) {
       this.shownWorld = model.world;
       this.way.geometry.setFromPoints([]);
+      this.marks.clear();
       this.heading = null;
     }
     this.sync(this.things, model.objects, false, up);
@@ -132,14 +136,43 @@ export class World {
   }
 
   syncRemembered(model) {
-    const only = new Map([...model.remembered].filter(([id]) => !model.objects.has(id)));
+    const only = new Map([...model.remembered].filter(([id, o]) => !model.objects.has(id) && !o.elsewhere));
     this.sync(this.remembered, only, true, new THREE.Vector3(0, 0, 1));
+    this.setMapFrame(model.T_MW());
+  }
+
+  /** Lays M under W: the working set stays, and the map moves where a loop is closed. */
+  setMapFrame([x, y, z, ...q]) {
+    this.map.quaternion.fromArray(q).invert();
+    this.map.position.set(-x, -y, -z).applyQuaternion(this.map.quaternion);
+    this.map.updateMatrixWorld();
+    this.dirty = true;
+  }
+
+  /** A pole where a loop was closed or taken back, or the session was found. */
+  addMark(at, colour) {
+    const pole = new THREE.Mesh(new THREE.CylinderGeometry(0.05, 0.05, 3, 8).rotateX(Math.PI / 2), new THREE.MeshBasicMaterial({ color: colour }));
+    const ring = new THREE.Mesh(new THREE.TorusGeometry(0.7, 0.06, 6, 32), pole.material);
+    const mark = new THREE.Group().add(pole, ring);
+    pole.position.z = 1.5;
+    mark.position.fromArray(at);
+    if (this.ground !== null) mark.position.z = this.ground;
+    this.marks.add(mark);
+    if (this.marks.children.length > MOST_MARKS) this.marks.remove(this.marks.children[0]);
+    this.dirty = true;
+  }
+
+  lookAtPlace(at) {
+    this.setFollow(false);
+    this.orbit.target.fromArray(at);
+    this.dirty = true;
   }
 
   sync(things, objects, remembered, up) {
     for (const [id, thing] of things) {
       if (objects.has(id)) continue;
-      this.scene.remove(thing.group, thing.ellipsoid);
+      thing.group.removeFromParent();
+      thing.ellipsoid.removeFromParent();
       thing.dispose();
       things.delete(id);
     }
@@ -148,12 +181,12 @@ export class World {
       if (!thing) {
         things.set(id, (thing = new Thing(object, remembered)));
         thing.group.userData.id = id;
-        this.scene.add(thing.group);
+        (remembered ? this.map : this.scene).add(thing.group);
         if (!remembered) this.scene.add(thing.ellipsoid);
         thing.ellipsoid.visible = this.shows.ellipsoids;
         if (remembered) thing.group.visible = this.shows.map;
         thing.choose(id === this.chosen);
-      } else if (!remembered || thing.object.last_s !== object.last_s) {
+      } else if (!remembered || thing.object !== object) {
         thing.update(object, up);
       }
     }
@@ -234,7 +267,7 @@ export class World {
     const thing = this.thing(id);
     if (!thing) return;
     this.setFollow(false);
-    this.orbit.target.copy(thing.group.position);
+    thing.group.getWorldPosition(this.orbit.target);
     this.orbit.distance = Math.min(this.orbit.distance, 5 * Math.max(...thing.object.size) + 6);
     this.dirty = true;
   }
@@ -263,21 +296,42 @@ export class World {
 
   /** Draws where something has changed; to be called each animation frame. */
   draw() {
-    if (!this.dirty) return;
+    const now = performance.now();
+    this.keepPace(now);
+    if (!this.dirty || now < this.restsUntil) return;
     this.dirty = false;
     this.orbit.apply();
     this.renderer.render(this.scene, this.camera);
     this.drawNames();
+    this.drewAt = now;
     ++this.drawn;
+  }
+
+  /** Where drawing takes long, half of the time is left to lists and clicks, and pixels are larger. */
+  keepPace(now) {
+    if (this.drewAt === undefined) return;
+    const took = now - this.drewAt; // until the frame after it
+    this.drewAt = undefined;
+    if (took < SLOW_MS) {
+      this.slow = Math.max(0, this.slow - 1);
+      return;
+    }
+    this.restsUntil = now + Math.min(took, 500);
+    const ratio = this.renderer.getPixelRatio();
+    if (++this.slow < 6 || ratio <= 0.5) return;
+    this.slow = 0;
+    this.renderer.setPixelRatio(Math.max(0.5, 0.7 * ratio));
+    this.resize();
   }
 
   drawNames() {
     const { clientWidth: width, clientHeight: height } = this.canvas, at = new THREE.Vector3();
     const candidates = [];
-    for (const [id, thing] of this.things) {
+    const chosen = this.remembered.get(this.chosen);
+    for (const [id, thing] of [...this.things, ...(chosen ? [[this.chosen, chosen]] : [])]) {
       const o = thing.object;
       if (!o.confirmed && id !== this.chosen) continue;
-      at.copy(thing.group.position);
+      thing.group.getWorldPosition(at);
       at.z += o.size[2] / 2 + 0.25;
       const distance = at.distanceTo(this.camera.position);
       at.project(this.camera);

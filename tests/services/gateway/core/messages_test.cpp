@@ -124,19 +124,6 @@ TEST(Beliefs, SayEachEventInASentence) {
   }
 }
 
-TEST(Beliefs, ShowTheNearestOfALargeMap) {
-  std::vector<MapObject> objects(3000);
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    objects[i].id = i + 1;
-    objects[i].class_name = "car";
-    objects[i].mean[0] = static_cast<double>(objects.size() - i);
-  }
-  const json map = json::parse(mapNearBody(objects, {0, 0, 0}, {}));
-  EXPECT_EQ(map["all"], 3000);
-  ASSERT_EQ(map["objects"].size(), 2000u);
-  EXPECT_EQ(map["objects"][0]["id"], 3000);
-}
-
 TEST(History, KeepsTwoSamplesASecondAndForgetsTheOldest) {
   History history;
   for (std::uint64_t i = 0; i < 8000; ++i) history.add(frameOf(i, {objectAt(1, {0, 0, 0})}));
