@@ -128,6 +128,7 @@ Context::Context(const std::string& process, const bus::Options& options,
     if (clock_steps_.recent()) counts.add("wall_clock_stepped_just_now");
   });
   every(std::chrono::seconds(1), [this] { publishHealth(); });
+  every(std::chrono::milliseconds(100), [this] { noteSilence(); });
   noteSharedMemory();
   publishHealth();
 }
@@ -216,6 +217,26 @@ std::string Context::identityEnds() const {
          "; `perdure security renew`, then restart the service";
 }
 
+/// Who falls silent or comes back is told of without waiting for the second.
+void Context::noteSilence() {
+  const auto now = Input::Clock::now();
+  const auto silent = static_cast<std::size_t>(std::count_if(
+      inputs_.begin(), inputs_.end(), [&](const Input& input) { return input.silent(now); }));
+  if (silent != silent_inputs_) publishHealth();
+  silent_inputs_ = silent;
+}
+
+/// What nothing goes out for the want of; else nothing.
+std::string Context::silence() const {
+  const auto now = Input::Clock::now();
+  std::string text;
+  for (const Input& input : inputs_) {
+    if (!input.silent(now)) continue;
+    text += (text.empty() ? "" : "; ") + input.sentence(now);
+  }
+  return text;
+}
+
 void Context::publishHealth() {
   logNewRefusals();
   noteSharedMemory();
@@ -228,6 +249,11 @@ void Context::publishHealth() {
     health.state = HealthState::kDegraded;
   }
   if (health.message.empty()) health.message = ending.empty() ? shared_memory_ : ending;
+  const std::string silent = silence();
+  if (!silent.empty() && health.state != HealthState::kFailed) {
+    health.state = HealthState::kDegraded;
+    health.message = silent;
+  }
   health.reasons = reasons().all();
   (void)health_writer_.write(health);
 }

@@ -15,6 +15,7 @@
 #include "common/bus/once.h"
 #include "common/bus/wait_loop.h"
 #include "common/service/health.h"
+#include "common/service/input.h"
 #include "common/service/process.h"
 
 namespace perdure::service {
@@ -65,6 +66,12 @@ class Context {
   /// Called once a second before Health is published: to set its state.
   void onHealth(std::function<void()> update) { on_health_ = std::move(update); }
 
+  /// Without this nothing goes out. Where it came and has fallen silent, Health is degraded and
+  /// says so, at once. Its handler calls heard().
+  Input& needs(const std::string& what, const std::string& mend) {
+    return inputs_.emplace_back(what, mend);
+  }
+
   /// What must go on beside the loop, in a thread of its own, for the watchdog to be fed: false
   /// where it hangs. Asked in the loop's thread.
   void watch(std::function<bool()> goes_on) { watched_.push_back(std::move(goes_on)); }
@@ -80,6 +87,8 @@ class Context {
 
  private:
   void publishHealth();
+  void noteSilence();
+  std::string silence() const;
   void runLoop();
   void logNewRefusals();
   void noteSharedMemory();
@@ -98,6 +107,8 @@ class Context {
   std::set<std::string> logged_refusals_;
   std::string shared_memory_;  ///< what was said of it last
   bus::WaitLoop loop_;
+  std::list<Input> inputs_;
+  std::size_t silent_inputs_ = 0;
   std::function<void()> on_health_;
   std::vector<std::function<bool()>> watched_;
   ClockSteps clock_steps_;

@@ -30,7 +30,9 @@ void run(service::Context& context, const inference::Config& config) {
   bus::Gaps gaps;
   context.on(bus::topics::kModel, [&](const ModelInfo& model) { worker->learn(model); });
   context.on(bus::topics::kSwap, [&](const SwapNotice& notice) { worker->told(notice); });
+  auto& frames = context.needs("frames", "mend the camera, or start capture");
   context.on(bus::topics::frame(config.detection.camera), [&](const Frame& frame) {
+    frames.heard();
     const auto missed = gaps.before(frame.stamp.source, frame.stamp.sequence);
     if (missed > 0) lost.add("frames_missed", missed);
     if (const auto pixels = vision::decompressed(frame)) {

@@ -69,7 +69,10 @@ void serve(service::Context& context, const map_store::Config& config) {
                         .event = context.sink(topics::kEvents)});
   context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
   context.on(topics::kEvents, [&](const Event& event) { node.onEvent(event); });
+  auto& heard =
+      context.needs("objects", "semantic_filter's Health says why, or start semantic_filter");
   context.on(topics::kObjects, [&](const Objects& objects) {
+    heard.heard();
     context.health().frameIn();
     node.onObjects(objects);
   });

@@ -80,7 +80,9 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
     node.onRecalled(m);
     if (m.restore && m.client == context.instance()) gate.open();
   });
+  auto& odometry = context.needs("odometry", "vio's Health says why, or start vio");
   context.on(topics::kOdometry, [&](const Odometry& m) {
+    odometry.heard();
     if (!odometry_once.first(m.stamp.source, m.stamp.sequence)) {
       return lost.add("odometry_repeated");
     }

@@ -104,6 +104,8 @@ void describeStart(Options& o, Fields& f) {
            {"a start at rest looks at so much time", "s"});
   f.number("start.rest_disparity", o.start.rest_disparity_px, positive(),
            {"more median image motion over that time is no rest", "px"});
+  f.number("start.still_window", o.start.still_window_s, positive(),
+           {"and at so much while most of the picture moves", "s"});
   f.number("start.rest_accel", o.start.rest_accel_m_s2, positive(),
            {"the mean force differs no more from gravity", "m/s²"});
   f.number("start.motion_window", o.start.motion_window_s, positive(),
@@ -127,6 +129,8 @@ void describeAids(Options& o, Config& c, Fields& f) {
            {"deviation between frames at rest", "m"});
   f.number("rest.rotation_sigma", o.rest.rotation_sigma, positive(),
            {"deviation between frames at rest", "rad"});
+  f.number("rest.still_share", o.rest.still_share, between(0.05, 1),
+           {"points that rest while the others move, at least, where a body stands in traffic"});
   f.number("rest.max_rate", o.rest.max_rate, positive(), {"turning faster is no rest", "rad/s"});
   f.number("rest.max_speed", o.rest.max_speed, positive(),
            {"a filter that believes to be faster does not rest", "m/s"});

@@ -35,11 +35,16 @@ void serve(service::Context& context, const vio::Config& config) {
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&]() -> const ReasonCounts& { return own; });
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
-  context.on(topics::kImu, [&](const ImuSample& m) { node.onImu(m); });
+  auto& samples = context.needs("inertial samples", "mend the IMU, or start capture");
+  context.on(topics::kImu, [&](const ImuSample& m) {
+    samples.heard();
+    node.onImu(m);
+  });
   context.on(topics::kSpeed, [&](const SpeedSample& m) { node.onSpeed(m); });
   if (config.moving_mask.enabled) {
     context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
   }
+  auto& frames = context.needs("frames", "mend the camera, or start capture");
   std::vector<bus::Once> once(config.cameras.size());
   std::vector<bus::Gaps> gaps(config.cameras.size());
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
@@ -47,7 +52,10 @@ void serve(service::Context& context, const vio::Config& config) {
       if (!once[i].first(m.stamp.source, m.stamp.sequence)) return own.add("frames_repeated");
       const auto missed = gaps[i].before(m.stamp.source, m.stamp.sequence);
       if (missed > 0) own.add("frames_missed", missed);
-      if (i == 0) context.health().frameIn();
+      if (i == 0) {
+        frames.heard();
+        context.health().frameIn();
+      }
       if (const auto pixels = vision::decompressed(m, ImageEncoding::kMono8)) {
         node.onFrame(*pixels);
       } else {

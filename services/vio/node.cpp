@@ -8,8 +8,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kDegradedFrames = 20;  // after a gap or a resumption
-constexpr int kUnaidedFrames = 5;    // without an image's help
+constexpr int kUnaidedFrames = 5;  // without an image's help
 
 double seconds(Duration d) { return toSeconds(d); }
 
@@ -71,6 +70,10 @@ std::string Node::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
   if (imu_.empty()) return "waits for inertial samples; start capture, or mend the IMU";
   if (!last_image_) return "waits for frames; start capture, or mend the camera";
+  if (!started() && last_start_reason_ == "start_picture_moves_imu_does_not") {
+    return "has no start yet: the IMU is at rest or moves evenly, and most of the picture moves; "
+           "let traffic pass, or drive off";
+  }
   if (!started()) {
     return "has no start yet (" + last_start_reason_ +
            "); stand still for a second, or move with the camera on things that stand";
@@ -188,7 +191,16 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
       seconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
     R = cameras_->estimator.predictRotation(imu_, now);
   }
-  if (!started()) return cameras_->tracker.track(first, second, R);
+  if (!started()) {
+    // Traffic before a body at rest: with the rotation known it does not outvote what rests.
+    const auto motion = cameras_->tracker.motionSince(1, 0.8);
+    constexpr std::chrono::milliseconds kEven{500};
+    if (motion && *motion > config_.core.rest.disparity_px &&
+        imuIsEven(imu_, now, kEven, cameras_->estimator.options().imu)) {
+      R = Eigen::Matrix3d::Identity();
+    }
+    return cameras_->tracker.track(first, second, R);
+  }
   const State& state = cameras_->estimator.state();
   RigidTransform T_WB = state.nav.T_WB();
   T_WB.p += seconds(now - state.time) * state.nav.v_WB;
@@ -220,6 +232,9 @@ void Node::process(const FramePair& frames) {
   FrameInput input{++frame_, stamp.time, trackImages(*first, second, now), {}, {}};
   input.motion_px =
       cameras_->tracker.motionSince(static_cast<std::size_t>(config_.core.rest.frames));
+  input.most_motion_px =
+      cameras_->tracker.motionSince(static_cast<std::size_t>(config_.core.rest.frames), 0.8);
+  input.still_share = cameras_->tracker.stillShare(framesIn(1.0));
   if (config_.core.speed.enabled) input.speed = speeds_.at(now);
   if (!started()) begin(now, input);
   if (!started()) {
@@ -237,65 +252,10 @@ void Node::process(const FramePair& frames) {
     }
     return publishWaiting(stamp);
   }
-  imu_.dropBefore(cameras_->estimator.state().time - std::chrono::seconds(1));
+  imu_.dropBefore(cameras_->estimator.state().time - std::chrono::seconds(3));
   publish(stamp, *estimate);
   publishLandmarks(stamp, *first);
   if (outputs_.innovations) outputs_.innovations(estimate->innovations);
-}
-
-bool Node::resume(TimePoint now) {
-  if (!saved_) return false;
-  SavedState saved = *std::exchange(saved_, std::nullopt);
-  const double age = seconds(now - saved.time);
-  if (age < 0.0 || age > config_.restore_age_s || imu_.empty()) {
-    reasons_.add("state_too_old");
-    world_.epoch = saved.world.epoch + 1;
-    return false;
-  }
-  if (saved.T_BC.size() != cameras_->models.size()) {
-    reasons_.add("state_other_cameras");
-    world_.epoch = saved.world.epoch + 1;
-    return false;
-  }
-  const double gap = seconds(std::min(imu_.first(), now) - saved.time);
-  coast(saved, gap);
-  cameras_->estimator.restore(saved);
-  cameras_->tracker.continueIdsFrom(saved.next_track);
-  degraded_frames_ = kDegradedFrames;
-  reasons_.add("state_resumed");
-  return true;
-}
-
-void Node::begin(TimePoint now, const FrameInput& input) {
-  if (resume(now)) return;
-  const Options& options = cameras_->estimator.options();
-  motion_initialiser_.add(input, now);
-  std::optional<double> rest_motion;
-  const double rate = calibration_->cameras[0].rate_hz > 0 ? calibration_->cameras[0].rate_hz : 20;
-  const auto frames = std::clamp<std::int64_t>(std::lround(options.start.rest_window_s * rate) - 1,
-                                               2, config_.tracker.memory);
-  rest_motion = cameras_->tracker.motionSince(static_cast<std::size_t>(frames));
-  const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
-  Result<Start> start = fail("start_waits");
-  // Older samples would say where the body was, and the next frame would end it again.
-  constexpr std::chrono::milliseconds kFresh{300};
-  const bool fresh =
-      !imu_.empty() && seconds(imu_.longestGap(now - kFresh, now)) <= config_.core.imu.gap_from_s;
-  if (!fresh) {
-    start = fail("start_without_samples");
-  } else if (rest_motion && *rest_motion < options.start.rest_disparity_px && slow) {
-    start = startAtRest(imu_, now, options);
-  } else if (input.speed && !slow) {
-    start = startWithSpeed(imu_, now, *input.speed, speeds_.samples(), options);
-  } else if (!input.speed && rest_motion) {
-    start = motion_initialiser_.start(imu_, cameras_->models);
-  }
-  if (!start) {
-    last_start_reason_ = start.error().code;
-    return reasons_.add(start.error());
-  }
-  cameras_->estimator.start(*start);
-  motion_initialiser_.clear();
 }
 
 void Node::lose(const Reason& reason) {

@@ -30,6 +30,8 @@ struct Outputs {
   Sink<std::vector<Innovation>> innovations = {};
 };
 
+inline constexpr int kDegradedFrames = 20;  ///< after a gap or a resumption
+
 class Node {
  public:
   Node(const Config& config, InstanceId instance, Outputs outputs);
@@ -66,6 +68,8 @@ class Node {
   void process(const FramePair& frames);
   TrackedFrame trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now);
   void begin(TimePoint now, const FrameInput& input);
+  Result<Start> startWithoutSpeed(TimePoint now) const;
+  std::size_t framesIn(double seconds) const;
   bool resume(TimePoint now);
   void noteGaps(TimePoint now);
   void lose(const Reason& reason);

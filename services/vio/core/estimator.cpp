@@ -67,6 +67,8 @@ void Estimator::start(const Start& start) {
   }
   database_.clear();
   previous_frame_.reset();
+  standstill_.forget();
+  if (start.at_rest) standstill_.confirm(start.time, restExpectation(*state_, options_.gravity));
 }
 
 void Estimator::restore(const SavedState& saved) {
@@ -115,25 +117,59 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
+/// Half of the picture does; a picture that a lorry fills does, too, whatever the body does.
+bool Estimator::medianRests(const FrameInput& input) const {
+  const RestOptions& o = options_.rest;
+  if (!input.motion_px || *input.motion_px > o.disparity_px) return false;
+  const RestSample sample = restSample(readings_, options_.imu);
+  return (sample.rate - state_->nav.gyro_bias).norm() <= o.max_rate + 3.0 * sample.rate_sigma;
+}
+
+bool Estimator::velocityMayBeZero() const {
+  const Eigen::Matrix3d P = state_->P().block<3, 3>(kVelocity, kVelocity);
+  const double sigma = options_.rest.speed_sigma;
+  const Eigen::Matrix3d S = P + sigma * sigma * Eigen::Matrix3d::Identity();
+  return passesGate(state_->nav.v_WB, S, 0.99);
+}
+
+/// A part of the picture moves, and yet the body may stand. A background far away rests before a
+/// body that creeps, too: the IMU must not contradict.
+bool Estimator::standsInTraffic(const ImuBuffer& imu, bool background_rests) {
+  const bool knew = standstill_.known();
+  const bool held = standstill_.holds(imu, state_->time, options_.imu);
+  if (held || knew || !background_rests) return held && velocityMayBeZero();
+  constexpr std::chrono::seconds kWindow{1};
+  return imuIsEven(imu, state_->time, kWindow, options_.imu) && velocityMayBeZero();
+}
+
 bool Estimator::restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePoint from) {
   const RestOptions& o = options_.rest;
-  if (!o.enabled || !input.motion_px || *input.motion_px > o.disparity_px) return false;
-  if (!previous_frame_ || !state_->clone(*previous_frame_) || state_->time <= from) return false;
-  if (input.speed && std::abs(input.speed->speed) > 0.1) return false;
-  if (state_->nav.v_WB.norm() > o.max_speed) return false;
-  imu.between(from, state_->time, readings_);
-  const RestSample sample = restSample(readings_, options_.imu);
-  if ((sample.rate - state_->nav.gyro_bias).norm() > o.max_rate + 3.0 * sample.rate_sigma) {
+  if (!o.enabled || !previous_frame_ || !state_->clone(*previous_frame_)) return false;
+  if (state_->time <= from) return false;
+  if ((input.speed && std::abs(input.speed->speed) > 0.1) ||
+      state_->nav.v_WB.norm() > o.max_speed) {
+    standstill_.forget();
     return false;
   }
+  imu.between(from, state_->time, readings_);
+  const bool median_rests = medianRests(input);
+  const bool disputed = input.most_motion_px && *input.most_motion_px > o.disparity_px;
+  const bool background_rests = median_rests || input.still_share >= o.still_share;
+  if ((!median_rests || disputed) && !standsInTraffic(imu, background_rests)) return false;
   State before = *state_;
-  auto done = updateRest(*state_, sample, o, options_.gravity);
+  auto done = updateRest(*state_, restSample(readings_, options_.imu), o, options_.gravity);
   if (done) done = updateNoMotion(*state_, *previous_frame_, input.frame, o);
   if (!done) {
     reasons_.add(done.error());
     *state_ = std::move(before);
+    return false;
   }
-  return done.has_value();
+  if (background_rests) {
+    standstill_.confirm(state_->time, restExpectation(*state_, options_.gravity));
+  } else {
+    reasons_.add("rest_by_imu");
+  }
+  return true;
 }
 
 std::vector<const Track*> Estimator::onceUsed(std::uint64_t frame, bool window_full) const {

@@ -14,6 +14,7 @@
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/core/state/state.h"
 #include "services/vio/core/tracks/tracks.h"
+#include "services/vio/core/update/standstill.h"
 #include "services/vio/core/update/updater_slam.h"
 
 namespace perdure::vio {
@@ -23,6 +24,7 @@ struct Start {
   TimePoint time;
   Nav nav;
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
+  bool at_rest = false;
 };
 
 struct SpeedReading {
@@ -35,6 +37,8 @@ struct FrameInput {
   TrackedFrame tracked;
   std::optional<double> motion_px;  ///< median image motion over the last frames
   std::optional<SpeedReading> speed;
+  std::optional<double> most_motion_px = {};  ///< the same of four fifths of the points
+  double still_share = 0.0;  ///< of the points: those that have kept their place for a second
 };
 
 struct FrameEstimate {
@@ -91,6 +95,9 @@ class Estimator {
  private:
   Result<void> propagateTo(const FrameInput& input, const ImuBuffer& imu);
   bool restUpdate(const FrameInput& input, const ImuBuffer& imu, TimePoint from);
+  bool medianRests(const FrameInput& input) const;
+  bool standsInTraffic(const ImuBuffer& imu, bool background_rests);
+  bool velocityMayBeZero() const;
   Result<void> visionUpdate(const FrameInput& input, FrameEstimate& out);
   std::vector<const Track*> onceUsed(std::uint64_t frame, bool window_full) const;
   void forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame);
@@ -107,6 +114,7 @@ class Estimator {
   double time_offset_s_;
   bool keeps_innovations_ = false;
   std::optional<State> state_;
+  Standstill standstill_;
   FeatureDatabase database_;
   TrackedFrame newest_;
   std::vector<ImuReading> readings_;  ///< of one interval; kept for its memory

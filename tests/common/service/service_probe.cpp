@@ -22,7 +22,9 @@ int main(int argc, char** argv) {
     context.watch([&] { return worker_goes_on; });
     const Sink<SpeedSample> speed = context.sink(bus::topics::kSpeed);
     context.countReasons([&]() -> const ReasonCounts& { return reasons; });
+    service::Input& input = context.needs("samples", "send some");
     context.on(bus::topics::kImu, [&](const ImuSample& m) {
+      if (m.sequence > 0) input.heard();
       context.health().frameIn();
       reasons.add("seen");
       if (m.sequence == 1001) std::this_thread::sleep_for(std::chrono::seconds(60));

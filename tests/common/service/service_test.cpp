@@ -113,6 +113,37 @@ TEST_F(Service, WorksTellsItsHealthAndEndsInOrderAtSigterm) {
   EXPECT_EQ(running.waitForEnd(), 0);
 }
 
+TEST_F(Service, IsDegradedWhileItsInputIsSilentAndWellWhenItComesBack) {
+  const bus::Domain domain{bus::Options{}};
+  const bus::Participant participant(domain, "test");
+  bus::WaitLoop loop(participant);
+  bus::Reader<Health> health(participant, bus::topics::kHealth);
+  bus::Writer<ImuSample> imu(participant, bus::topics::kImu);
+  Health last;
+  loop.on(health, [&](const Health& m) { last = m; });
+  Subprocess running(quietProbe());
+  ImuSample sample;
+  const auto comesTo = [&](bool sends, const auto& wanted) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!wanted() && std::chrono::steady_clock::now() < deadline) {
+      if (sends) {
+        ++sample.sequence;
+        EXPECT_TRUE(imu.write(sample));
+      }
+      loop.runOnce(std::chrono::milliseconds(20));
+    }
+    return wanted();
+  };
+  const auto well = [&] { return last.state == HealthState::kOk && last.message.empty(); };
+  EXPECT_TRUE(comesTo(true, [&] { return well() && last.frames_in > 5; }));
+  EXPECT_TRUE(comesTo(false, [&] { return last.state == HealthState::kDegraded; }));
+  EXPECT_THAT(last.message, StartsWith("no samples for "));
+  EXPECT_THAT(last.message, HasSubstr(" s; send some"));
+  EXPECT_TRUE(comesTo(true, well));
+  running.signal(SIGTERM);
+  EXPECT_EQ(running.waitForEnd(), 0);
+}
+
 /// Where systemd would listen.
 class NotifySocket {
  public:

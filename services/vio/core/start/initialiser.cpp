@@ -74,7 +74,7 @@ Result<Start> startAtRest(const ImuBuffer& imu, TimePoint now, const Options& op
   if (const auto done = updateRest(state, sample, options.rest, options.gravity, false); !done) {
     return tl::unexpected(done.error());
   }
-  return Start{now, state.nav, state.P().topLeftCorner<15, 15>()};
+  return Start{now, state.nav, state.P().topLeftCorner<15, 15>(), true};
 }
 
 Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedReading& speed,

@@ -52,6 +52,7 @@ struct CalibrationOptions {
 struct StartOptions {
   double rest_window_s = 0.5;      ///< time at rest before a start at rest
   double rest_disparity_px = 0.7;  ///< median image motion over that window
+  double still_window_s = 2.0;     ///< the same while traffic moves past a background at rest
   double rest_accel_m_s2 = 1.0;    ///< largest difference of the mean force from gravity
   double motion_window_s = 1.0;    ///< window of a start in motion
   double tilt_sigma = 0.03;        ///< rad, at a start with speed
@@ -67,8 +68,11 @@ struct RestOptions {
   double speed_sigma = 0.02;  ///< m/s
   double position_sigma_m = 0.005;
   double rotation_sigma = 0.001;  ///< rad
-  double max_rate = 0.15;         ///< rad/s, mean over a frame, bias removed
-  double max_speed = 0.5;         ///< m/s: the filter's own belief must not exceed it
+  /// Of the points, that keep their place for a second while the others move: the background of a
+  /// body that stands in traffic.
+  double still_share = 0.15;
+  double max_rate = 0.15;  ///< rad/s, mean over a frame, bias removed
+  double max_speed = 0.5;  ///< m/s: the filter's own belief must not exceed it
 };
 
 struct SpeedOptions {

@@ -13,6 +13,10 @@ namespace perdure::vio {
 namespace {
 
 constexpr double kBorder = 4.0;
+constexpr double kStill = 0.5;           // px, from its place
+constexpr std::size_t kFewestStill = 8;  // points of a background
+constexpr double kLeastSpreadOfStill =
+    0.05;  // rms distance from their centre, of the image's width
 
 Eigen::Vector2d toEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 cv::Point2f toCv(const Eigen::Vector2d& p) {
@@ -115,6 +119,12 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     p.second += found->pixel - p.pixel;  // the second camera's seed moves along
     p.pixel = found->pixel;
     p.normalised = seen->normalised;
+    if (cv::norm(p.pixel - p.place) <= kStill) {
+      ++p.still;
+    } else {
+      p.place = p.pixel;
+      p.still = 0;
+    }
     kept.push_back(std::move(p));
   }
   const std::vector<bool> good = inliers(matches, R);
@@ -272,7 +282,7 @@ TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
   return result();
 }
 
-std::optional<double> Tracker::motionSince(std::size_t frames) const {
+std::optional<double> Tracker::motionSince(std::size_t frames, double quantile) const {
   constexpr std::size_t kFewest = 10;
   if (frames == 0 || history_.size() <= frames) return std::nullopt;
   const auto& before = history_[history_.size() - 1 - frames];
@@ -284,9 +294,27 @@ std::optional<double> Tracker::motionSince(std::size_t frames) const {
     if (it->first == id) motion.push_back(static_cast<float>(cv::norm(pixel - it->second)));
   }
   if (motion.size() < kFewest) return std::nullopt;
-  std::nth_element(motion.begin(), motion.begin() + static_cast<long>(motion.size() / 2),
-                   motion.end());
-  return motion[motion.size() / 2];
+  const auto at = static_cast<long>(quantile * static_cast<double>(motion.size()));
+  std::nth_element(motion.begin(), motion.begin() + at, motion.end());
+  return motion[static_cast<std::size_t>(at)];
+}
+
+double Tracker::stillShare(std::size_t frames) const {
+  cv::Point2d sum(0, 0);
+  double squares = 0.0;
+  std::size_t n = 0;
+  for (const Point& p : points_) {
+    if (p.still < frames) continue;
+    const cv::Point2d at = p.pixel;
+    sum += at;
+    squares += at.dot(at);
+    ++n;
+  }
+  if (n < kFewestStill) return 0.0;
+  const auto count = static_cast<double>(n);
+  const double spread = std::sqrt(std::max(0.0, squares / count - sum.dot(sum) / (count * count)));
+  if (spread < kLeastSpreadOfStill * cameras_[0].width()) return 0.0;
+  return count / static_cast<double>(points_.size());
 }
 
 }  // namespace perdure::vio

@@ -46,8 +46,12 @@ class Tracker {
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {});
-  /// Median image motion in pixels from `frames` ago to now; nothing where too little is known.
-  std::optional<double> motionSince(std::size_t frames) const;
+  /// Image motion in pixels from `frames` ago to now, of which the share `quantile` of the points
+  /// has less; nothing where too little is known.
+  std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
+  /// Share of the points that have kept their place for the last `frames` images, to half a pixel;
+  /// 0 where those are few or in one place: too little to be a background.
+  double stillShare(std::size_t frames) const;
   /// Forgets all tracks; ids go on.
   void reset();
   /// No id below this will be given.
@@ -62,6 +66,8 @@ class Tracker {
     bool has_second = false;
     Eigen::Vector2d normalised;
     std::unique_ptr<Patch> patch;
+    cv::Point2f place = pixel;  ///< where it has been to half a pixel, in the last images:
+    std::size_t still = 0;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
