@@ -251,8 +251,10 @@ void Context::publishHealth() {
   if (health.message.empty()) health.message = ending.empty() ? shared_memory_ : ending;
   const std::string silent = silence();
   if (!silent.empty() && health.state != HealthState::kFailed) {
+    // What was wrong before may be why it is silent.
+    const bool well = health.state == HealthState::kOk || health.message.empty();
+    health.message = well ? silent : health.message + "; " + silent;
     health.state = HealthState::kDegraded;
-    health.message = silent;
   }
   health.reasons = reasons().all();
   (void)health_writer_.write(health);

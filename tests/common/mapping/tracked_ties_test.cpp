@@ -37,17 +37,17 @@ class Back {
   /// An object of the first anchor, known there exactly but for `known_m`; laid by the graph,
   /// and then detected at `detected` (in B) with the deviation `detected_m`.
   void seeAgain(ObjectId id, const Eigen::Vector3d& at_M, const Eigen::Vector3d& detected,
-                double detected_m, double known_m = 0.01) {
+                double detected_m, double known_m = 0.01, AnchorId home = 1) {
     ObjectRecord record;
     record.confirmed = true;
     record.session = way_.last()->session;
     record.way_m = way_.way_m();
-    Sighting before{1, {}};
+    Sighting before{home, {}};
     before.in_anchor.id = id;
-    before.in_anchor.p = state_.graph().pose(1).inverse() * at_M;
+    before.in_anchor.p = state_.graph().pose(home).inverse() * at_M;
     before.in_anchor.covariance = known_m * known_m * Eigen::Matrix4d::Identity();
     record.earlier = before;
-    const PlacedObject prior = laid(*relative_->to(1), before.in_anchor);
+    const PlacedObject prior = laid(*relative_->to(home), before.in_anchor);
     const Eigen::Matrix4d D = detected_m * detected_m * Eigen::Matrix4d::Identity();
     const Eigen::Matrix4d K = prior.covariance * inverseSymmetric(prior.covariance + D);
     record.sighting = {here(), prior};
@@ -129,6 +129,26 @@ TEST(TrackedTies, TakeTheShareOfWhatAnObjectWasLaidWithOutOfItsCovariance) {
   }
   const Eigen::Matrix4d expected = inverseSymmetric(alone.information);
   EXPECT_NEAR(planeSigma(with->T_Mb.covariance), planeSigma(expected), 0.2 * planeSigma(expected));
+}
+
+/// How the map has two visits lie to each other is no measurement.
+TEST(TrackedTies, RestOnTheObjectsOfOneVisit) {
+  Back back;
+  const Eigen::Vector3d off(0.4, -0.3, 0.0);
+  seeFive(back, off, 0.1);
+  AnchorId far = 1;  // set 140 m later
+  for (const auto& [id, anchor] : back.state().anchors()) far = anchor.way_m < 145.0 ? id : far;
+  const LevelPose x = back.state().graph().pose(back.here());
+  ObjectId id = 100;
+  for (const Eigen::Vector3d& place : {Eigen::Vector3d(5, 5, 1), Eigen::Vector3d(2, -5, 1)}) {
+    const LevelPose really{x.p + Eigen::Vector3d(0.0, 3.0, 0.0), x.yaw};
+    back.seeAgain(id++, x.p + place, really.inverse() * (x.p + place), 0.1, 0.01, far);
+  }
+  const auto tie = TrackedTies(back.parameters()).find(back.body());
+  ASSERT_TRUE(tie);
+  EXPECT_EQ(tie->home, 1u);
+  EXPECT_EQ(tie->objects, (std::vector<ObjectId>{1, 2, 3, 4, 5}));
+  EXPECT_LT((tie->T_Mb.mean.p - x.p - off).head<2>().norm(), 0.15);
 }
 
 TEST(TrackedTies, OfWhatWasHardlyDetectedAreNone) {
