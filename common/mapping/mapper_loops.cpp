@@ -174,6 +174,7 @@ void Mapper::close(const LoopSearch::Found& found) {
       active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
                              [&](const auto& pair) { return active_->pairs.contains(pair); });
   const std::optional<EdgeId> old = rests_on_the_same ? std::optional(active_->id) : std::nullopt;
+  const std::vector<EdgeId> ties = old ? loop_book_.tiesOf(*old) : std::vector<EdgeId>();
   if (old) {
     state_.removeLoop(*old);
     loop_book_.remove(*old);
@@ -181,6 +182,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   if (!found.prior) bringTogether(edge);
   const EdgeId id = state_.addLoop(edge);
   if (old) rehang(*old, id);
+  for (const EdgeId tie : ties) loop_book_.hang(tie, id);
   active_ = {id, pairsOf(match)};
   loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
   graphMoved();
