@@ -65,6 +65,10 @@ const std::vector<Entry>& entries() {
         "In a town whose blocks are equal but for a few things, a body that comes back is known to "
         "be where it is, and never one block off."},
        makeBlocks},
+      {{"kilometre",
+        "After a kilometre round a block of streets every object is the same one again, though a "
+        "camera and an IMU alone have drifted meanwhile."},
+       makeKilometre},
       {{"random",
         "Single views for training, one a second: each looks at a thing of a class drawn evenly, "
         "from any side and as large in the image as may be; the body rests in between."},

@@ -60,6 +60,8 @@ void Pipeline::openRun() {
   const auto file = outputs_->folder() / "run.mcap";
   std::filesystem::remove(file);  // of an earlier run
   run_ = std::make_unique<replay::RecordingWriter>(file);
+  // What is known before the first frame is logged at its time.
+  run_ns_ = toNanoseconds(dataset_->frameTime(first_index_).value_or(TimePoint()));
   keep("calibration", dataset_->calibration(), TimePoint());
 }
 

@@ -20,6 +20,7 @@ Scene makeStraight(std::uint64_t seed, const SceneOptions& options);
 Scene makeTraffic(std::uint64_t seed, const SceneOptions& options);
 Scene makeTown(std::uint64_t seed, const SceneOptions& options);
 Scene makeBlocks(std::uint64_t seed, const SceneOptions& options);
+Scene makeKilometre(std::uint64_t seed, const SceneOptions& options);
 Scene makeRandom(std::uint64_t seed, const SceneOptions& options);
 
 }  // namespace perdure::sim

@@ -11,22 +11,7 @@ namespace {
 
 constexpr double kTownSeconds = 520.0;
 constexpr int kColumns = 6, kRows = 5;
-constexpr double kBlockLength = 82.0, kBlockWidth = 66.0, kBeyond = 14.0;
 constexpr std::size_t kVehicles = 500;
-
-std::vector<Road> roadsOfTown() {
-  std::vector<Road> roads;
-  const double length = kBlockLength * (kColumns - 1), width = kBlockWidth * (kRows - 1);
-  for (int row = 0; row < kRows; ++row) {
-    const double y = kBlockWidth * row;
-    roads.push_back({{-kBeyond, y}, {length + kBeyond, y}, kRoadWidth});
-  }
-  for (int column = 0; column < kColumns; ++column) {
-    const double x = kBlockLength * column;
-    roads.push_back({{x, -kBeyond}, {x, width + kBeyond}, kRoadWidth});
-  }
-  return roads;
-}
 
 /// Crossings where the way turns: along the rows to and fro, then along the columns.
 std::vector<Eigen::Vector2d> turns() {
@@ -45,7 +30,7 @@ std::vector<Eigen::Vector2d> turns() {
   }
   std::vector<Eigen::Vector2d> points;
   for (const auto& crossing : crossings) {
-    const Eigen::Vector2d point(kBlockLength * crossing.x(), kBlockWidth * crossing.y());
+    const Eigen::Vector2d point(kGridX * crossing.x(), kGridY * crossing.y());
     if (points.empty() || (point - points.back()).norm() > 1.0) points.push_back(point);
   }
   return points;
@@ -75,11 +60,7 @@ Scene makeTown(std::uint64_t seed, const SceneOptions& options) {
   const SpeedLimits limits{10.5, 2.4, 1.7, 1.9};
   const Drive driven = drive(way, limits, 8.0, way.length() - 8.0, 1.2, seconds + 2.0);
   putOnWheels(builder, way, driven, seconds, options);
-  Furnishing furnishing;
-  furnishing.free_share = 0.33;
-  furnishing.tree_every = 30.0;
-  furnishing.person_every = furnishing.bicycle_every = 90.0;
-  Streets(builder, roadsOfTown(), furnishing).furnish();
+  Streets(builder, gridOfRoads(kColumns, kRows), furnishingOfGrid()).furnish();
   thinOut(builder);
   return builder.take();
 }

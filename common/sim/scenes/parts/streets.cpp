@@ -21,6 +21,29 @@ double lengthOf(const Road& road) { return (road.to - road.from).norm(); }
 
 }  // namespace
 
+std::vector<Road> gridOfRoads(int columns, int rows) {
+  constexpr double kBeyond = 14.0;
+  std::vector<Road> roads;
+  const double length = kGridX * (columns - 1), width = kGridY * (rows - 1);
+  for (int row = 0; row < rows; ++row) {
+    const double y = kGridY * row;
+    roads.push_back({{-kBeyond, y}, {length + kBeyond, y}, kRoadWidth});
+  }
+  for (int column = 0; column < columns; ++column) {
+    const double x = kGridX * column;
+    roads.push_back({{x, -kBeyond}, {x, width + kBeyond}, kRoadWidth});
+  }
+  return roads;
+}
+
+Furnishing furnishingOfGrid() {
+  Furnishing furnishing;
+  furnishing.free_share = 0.33;
+  furnishing.tree_every = 30.0;
+  furnishing.person_every = furnishing.bicycle_every = 90.0;
+  return furnishing;
+}
+
 Streets::Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishing& furnishing)
     : builder_(builder), roads_(std::move(roads)), furnishing_(furnishing) {
   builder_.scene().ground = GroundKind::kStreet;

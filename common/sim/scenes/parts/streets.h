@@ -24,6 +24,13 @@ struct Furnishing {
 inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parked cars
 inline constexpr double kLane = 1.4;        ///< of a lane's middle from the road's
 
+inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< between the roads of a grid
+/// Roads in rows (along x) and columns, that go on a little beyond the outer crossings; the first
+/// crossing is at the origin.
+std::vector<Road> gridOfRoads(int columns, int rows);
+/// How a grid of streets is furnished: a third of the slots free, few trees and people.
+Furnishing furnishingOfGrid();
+
 /// Straight roads that may cross, each with both its sides.
 class Streets {
  public:
