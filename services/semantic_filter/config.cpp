@@ -146,8 +146,6 @@ void describeExpertTracks(Parameters& p, Fields& fields) {
                  {"tracks that are fitted in one frame at most; the others wait"});
   fields.number("alignment.nats", p.alignment.nats, positive(),
                 {"log-likelihood ratio against chance from which another map counts as found"});
-  fields.number("drift.position", p.drift.position, positive(),
-                {"least map-relative drift that is taken out", "m"});
 }
 
 /// Keys of earlier versions, by the sentence that refuses them.
@@ -233,12 +231,12 @@ void describeFormer(Fields& fields) {
                            {"ground.body_height_sigma_m", "0.05 m"},
                            {"alignment.margin_nats", "10"},
                            {"alignment.pairs", "4"},
-                           {"alignment.known_share", "0.7"},
-                           {"drift.rotation", "0.004 rad"},
-                           {"drift.things", "5"},
-                           {"drift.within_m", "25 m"}};
+                           {"alignment.known_share", "0.7"}};
   for (const auto& [old, value] : fixed) {
     fields.formerly(old, std::string("is fixed at ") + value + "; leave it out");
+  }
+  for (const char* old : {"drift.position", "drift.rotation", "drift.things", "drift.within_m"}) {
+    fields.formerly(old, "is gone: the map store's graph takes drift out; leave it out");
   }
 }
 

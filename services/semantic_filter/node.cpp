@@ -85,8 +85,7 @@ void Node::onLandmarks(const Landmarks& landmarks) {
   for (Frame& frame : history_.frames()) {
     if (!frame.input.stamp.sameFrame(landmarks.stamp)) continue;
     if (frame.stepped) reasons_.add("landmarks_after_step");
-    const Eigen::Vector3d centre =
-        history_.mapFrame().inW(frame.input.view.T_WB) * frame.input.view.camera->T_BC().p;
+    const Eigen::Vector3d centre = frame.input.view.T_WB * frame.input.view.camera->T_BC().p;
     frame.input.points.clear();
     for (const auto& landmark : landmarks.landmarks) {
       if (!landmark.p_W.allFinite() || !landmark.covariance.allFinite()) continue;
@@ -199,7 +198,6 @@ void Node::flush() {
   history_.step();
   rejoin(history_.newest());
   letGo(history_.newest());
-  history_.correctDrift();
   publish(history_.newest());
   askTheMap(history_.newest());
 }
@@ -210,7 +208,7 @@ void Node::publish(const Frame& frame) {
   objects.stamp = frame.input.stamp;
   objects.instance = instance_;
   objects.world = frame.world;
-  objects.T_WB = history_.mapFrame().inW(frame.input.view.T_WB);
+  objects.T_WB = frame.input.view.T_WB;
   objects.up_W = frame.input.view.up_W;
   objects.next_id = history_.ids().next();
   objects.pose_error = frame.input.pose_error.covariance;
@@ -225,7 +223,6 @@ void Node::publish(const Frame& frame) {
       const Track now = extrapolated(object, frame.input.stamp.time, motion);
       belief.classes = toBelief(now, motion.min_speed).classes;
     }
-    if (history_.mapFrame().T_MW()) belief = history_.mapFrame().inW(std::move(belief));
   }
   auto merges = history_.takeLateMerges();
   merges.insert(merges.end(), frame.merges.begin(), frame.merges.end());

@@ -78,8 +78,7 @@ class Node {
   void onRecalledOfFormer(const Recalled& recalled);
   void letGo(const Frame& frame);
   void askTheMap(const Frame& frame);
-  /// `centre` is the question's, in that frame of reference.
-  void ask(const Archive::Question& question, const Eigen::Vector3d& centre, const WorldId& world);
+  void ask(const Archive::Question& question, const WorldId& world);
   void keepFormer();
   void rejoin(const Frame& frame);
 

@@ -25,7 +25,7 @@ void Node::letGo(const Frame& frame) {
   std::set<ObjectId> ids(leaving.archived.begin(), leaving.archived.end());
   for (const Track& o : history_.belief().tracks) {
     if (!ids.contains(o.id)) continue;
-    archive_.rememberReference(o, history_.mapFrame().T_MW());
+    archive_.rememberReference(o);
     events_.archived(o.id);
   }
   ids.insert(leaving.forgotten.begin(), leaving.forgotten.end());
@@ -37,26 +37,21 @@ void Node::askTheMap(const Frame& frame) {
   const Eigen::Vector3d& p_WB = frame.input.view.T_WB.p;
   const TimePoint now = frame.input.stamp.time;
   if (const auto question = archive_.ask(p_WB, now)) {
-    ask(*question,
-        history_.mapFrame()
-            .inW(RigidTransform(Eigen::Quaterniond::Identity(), question->centre_W))
-            .p,
-        frame.world);
+    ask(*question, frame.world);
   }
   if (const auto question = former_.ask(p_WB, now)) {
-    ask(*question, question->centre_W, *former_.world());
+    ask(*question, *former_.world());
   }
   const auto silent = archive_.takeUnanswered() + former_.takeUnanswered();
   if (silent > 0) reasons_.add("map_store_silent", silent);
 }
 
-void Node::ask(const Archive::Question& question, const Eigen::Vector3d& centre,
-               const WorldId& world) {
+void Node::ask(const Archive::Question& question, const WorldId& world) {
   MapQuery query;
   query.client = instance_;
   query.request = question.request;
   query.kind = MapQueryKind::kRecall;
-  query.low = centre;
+  query.low = question.centre_W;
   query.radius = question.radius_m;
   query.world = world;
   query.limit = kMostRecalled;
@@ -67,7 +62,7 @@ void Node::ask(const Archive::Question& question, const Eigen::Vector3d& centre,
 void Node::keepFormer() {
   std::vector<ObjectBelief> objects;
   for (const Track& o : history_.belief().tracks) {
-    objects.push_back(history_.mapFrame().inW(toBelief(o, config_.filter.motion.min_speed)));
+    objects.push_back(toBelief(o, config_.filter.motion.min_speed));
   }
   former_.keep(*world_, objects);
 }
@@ -95,22 +90,15 @@ void Node::recallLaid(const ObjectBelief& belief) {
 }
 
 void Node::restore(const ObjectBelief& belief) {
-  history_.insert(fromBelief(history_.mapFrame().inM(belief), history_.poseError().product,
-                             ExistenceEvidence::kRestore));
+  history_.insert(fromBelief(belief, history_.poseError().product, ExistenceEvidence::kRestore));
   events_.recalled(belief.id, true);
 }
 
 void Node::recall(const ObjectBelief& belief) {
   if (belief.moving > 0.5) return reasons_.add("recalled_moving");
   const auto reference = archive_.referenceAt(belief.as_of);
-  ObjectBelief there = belief;
-  if (!reference) {
-    there = history_.mapFrame().inM(std::move(there));
-  } else if (reference->T_MW) {  // W has drifted since then, M has not
-    there = turned(*reference->T_MW, std::move(there));
-  }
-  if (!isNear(there)) return;
-  Track object = fromBelief(there, reference ? reference->product : history_.poseError().product,
+  if (!isNear(belief)) return;
+  Track object = fromBelief(belief, reference ? *reference : history_.poseError().product,
                             ExistenceEvidence::kRecall);
   if (!reference) {  // of another run: how its error hangs together with this one's is not known
     for (auto& h : object.hypotheses) h.C.setZero();
@@ -119,10 +107,9 @@ void Node::recall(const ObjectBelief& belief) {
   events_.recalled(belief.id, false);
 }
 
-/// `belief` is in M.
 bool Node::isNear(const ObjectBelief& belief) const {
-  return !history_.lastPose() || archive_.near(belief.best().mean.head<3>(),
-                                               history_.mapFrame().inM(*history_.lastPose()).p);
+  return !history_.lastPose() ||
+         archive_.near(belief.best().mean.head<3>(), history_.lastPose()->p);
 }
 
 /// What can be used of it; no id of it is given out again.
@@ -165,10 +152,9 @@ void Node::insertLaid(const Recalled& recalled) {
     const auto there = std::find_if(tracks.begin(), tracks.end(), same);
     const bool again = there != tracks.end();
     // What was seen since is better known than by the graph.
-    if (again ? !there->life.recalled : !isNear(history_.mapFrame().inM(belief))) continue;
+    if (again ? !there->life.recalled : !isNear(belief)) continue;
     if (again) history_.erase({belief.id});
-    Track track = fromBelief(history_.mapFrame().inM(belief), history_.poseError().product,
-                             ExistenceEvidence::kRecall);
+    Track track = fromBelief(belief, history_.poseError().product, ExistenceEvidence::kRecall);
     for (Hypothesis& h : track.hypotheses) {
       addPoseError(h, input.view.T_WB, input.view.up_W, history_.poseError().covariance);
     }
@@ -189,7 +175,6 @@ void Node::onRecalled(const Recalled& recalled) {
     return;
   }
   if (recalled.world != *world_) return onRecalledOfFormer(recalled);
-  if (recalled.graph) history_.leaveDriftToTheMap();
   if (recalled.laid) return insertLaid(recalled);
   const bool asked = recalled.restore || for_all;
   if (!asked && !archive_.answered(recalled.request, recalled.kept, recalled.truncated)) {

@@ -76,6 +76,7 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
       ++counts_.frames;
       if (m.state != OdometryState::kInitialising) ++counts_.odometry;
       outputs_->onOdometry(m);
+      timer_.timeTowardsNext("map_store", [&] { map_->onOdometry(m); });
       filter([&] { filter_->onOdometry(m); });
     });
   } else if (message.topic == "landmarks") {

@@ -104,14 +104,6 @@ ScratchVector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
   return scored;
 }
 
-bool SemanticFilter::measuresDrift(const Track& track, const FrameContext& frame) const {
-  if (track.life.visit_began <= std::max(track.pose.drift_measured_at, track.life.first_seen))
-    return false;
-  const Hypothesis& best = track.best();
-  return track.life.confirmed && !best.moving && best.weight > 0.5 &&
-         (best.x.head<3>() - frame.view.T_WB.p).norm() < parameters_.drift.within_m;
-}
-
 Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
                                                    ScratchVector<ScoredTrack>& scored,
                                                    const FrameInput& input,
@@ -136,17 +128,10 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
   for (Eigen::Index j = 0; j < n; ++j) {
     ScoredTrack& s = scored[static_cast<std::size_t>(j)];
     Track& track = belief.tracks[s.track];
-    const auto before = measuresDrift(track, frame) ? std::optional(track.best()) : std::nullopt;
     const bool near_box =
         track.life.once_confirmed && !track.best().moving && !s.score.boxes.empty();
     if (near_box) s.before = track;
     s.assigned = update(track, s.score, association.eta.row(j), boxes, frame);
-    if (before && s.assigned && s.score.hypotheses[0].predicted) {
-      track.pose.drift_measured_at = track.as_of;
-      s.drift =
-          driftMeasurement(*before, s.score.hypotheses[0].predicted->box, boxes[*s.assigned].z,
-                           hiddenSides(s.score, *s.assigned), frame.pose_error.covariance);
-    }
     s.sound = sound(track);
     if (s.assigned && s.sound &&
         considerKeyframe(track, boxes[*s.assigned], hiddenSides(s.score, *s.assigned), frame)) {
@@ -163,7 +148,6 @@ void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput&
   reduceMixture(track, priors_, parameters_);
   if (track.hypotheses.empty() && scored.before) {
     track = updateAsMissed(*scored.before, scored.score, frame);
-    scored.drift.reset();
     if (sound(track)) reduceMixture(track, priors_, parameters_);
   }
   if (!track.hypotheses.empty()) return;
@@ -206,14 +190,12 @@ FrameInput SemanticFilter::withLearnedNoise(const Belief& belief, FrameInput inp
 }
 
 void SemanticFilter::manageAll(Belief& belief, ScratchVector<ScoredTrack>& scored,
-                               const FrameInput& input, const FrameContext& frame,
-                               StepReport& report) const {
+                               const FrameInput& input, const FrameContext& frame) const {
   std::vector<Track> lost;
   for (auto& s : scored) {
     Track& track = belief.tracks[s.track];
     if (s.sound) manage(track, s, input, frame);
     if (track.hypotheses.empty() && s.before) lost.push_back(*std::move(s.before));
-    if (s.drift) report.drift.push_back(*s.drift);
   }
   keepDeleted(belief.recently_deleted, std::move(lost), input.stamp.time, parameters_.tracks);
 }
@@ -260,7 +242,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   auto scored = scoreAll(belief, visibilities, input, frame);
   const auto explained = associateAndUpdate(belief, scored, input, frame);
   // A track that lost its shape may take its box again before that box starts another track.
-  manageAll(belief, scored, input, frame, report);
+  manageAll(belief, scored, input, frame);
   initiateTracks(belief, visibilities, explained, input, frame, ids);
   dropBroken(belief, report);
   // Identity asks who was detected in this frame, and new tracks take part.

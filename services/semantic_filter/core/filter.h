@@ -10,13 +10,11 @@
 #include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/belief/belief.h"
 #include "services/semantic_filter/core/measurement/frame.h"
-#include "services/semantic_filter/core/memory/drift.h"
 #include "services/semantic_filter/core/tracks/merge.h"
 
 namespace perdure::semantic_filter {
 
 struct StepReport {
-  std::vector<DriftMeasurement> drift;  ///< of objects that came back from an earlier visit
   std::vector<MergeRecord> merges;
   std::size_t broken = 0;  ///< tracks whose numbers went bad, and which were dropped
 };
@@ -45,7 +43,6 @@ class SemanticFilter {
     /// must not deform it.
     std::optional<Track> before = {};
     bool sound = true;  ///< after its update
-    std::optional<DriftMeasurement> drift = {};
   };
 
   NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input) const;
@@ -61,10 +58,8 @@ class SemanticFilter {
   /// Updates the scored tracks; returns Association::explained.
   Eigen::VectorXd associateAndUpdate(Belief& belief, ScratchVector<ScoredTrack>& scored,
                                      const FrameInput& input, const FrameContext& frame) const;
-  /// Whether the track measures the map-relative drift in this frame: once for each visit.
-  bool measuresDrift(const Track& track, const FrameContext& frame) const;
   void manageAll(Belief& belief, ScratchVector<ScoredTrack>& scored, const FrameInput& input,
-                 const FrameContext& frame, StepReport& report) const;
+                 const FrameContext& frame) const;
   /// Reduces the mixture of one track after its update. Where nothing is left of it, the box counts
   /// as a miss, or the state begins anew from the box; otherwise existence is 0.
   void manage(Track& track, ScoredTrack& scored, const FrameInput& input,

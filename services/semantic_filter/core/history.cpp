@@ -10,11 +10,7 @@ namespace perdure::semantic_filter {
 
 History::History(const Parameters& parameters, const ClassPriors& priors, std::size_t frames,
                  ReasonCounts& reasons)
-    : parameters_(parameters),
-      most_(frames),
-      reasons_(reasons),
-      filter_(parameters, priors),
-      drift_(parameters.drift) {}
+    : parameters_(parameters), most_(frames), reasons_(reasons), filter_(parameters, priors) {}
 
 void History::beginWorld() {
   Learned learned = std::move(belief_.learned);
@@ -23,23 +19,16 @@ void History::beginWorld() {
   frames_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
-  map_frame_ = {};
   told_not_level_ = false;
-  drift_ = DriftEstimator(parameters_.drift);
 }
 
 HistoryFrame& History::add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera) {
   advancePoseError(pose_error_, odometry, last_T_WB_, parameters_.pose);
-  const auto walk = poseWalkOf(odometry, parameters_.pose);
-  if (walk && last_T_WB_) {
-    drift_.predict(map_frame_.inM(*last_T_WB_), map_frame_.inM(odometry.T_WB), walk->rotation,
-                   walk->position);
-  }
   last_T_WB_ = odometry.T_WB;
   FrameInput input;
   input.stamp = odometry.stamp;
   input.view.camera = camera.get();
-  input.view.T_WB = map_frame_.inM(odometry.T_WB);
+  input.view.T_WB = odometry.T_WB;
   input.view.up_W = odometry.up_W;
   input.pose_error = pose_error_;
   frames_.push_back({std::move(input), odometry.world, std::move(camera), {}});
@@ -61,10 +50,6 @@ void History::step(HistoryFrame& frame) {
   StepReport report = filter_.step(belief_, frame.input, ids_);
   frame.merges = std::move(report.merges);
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
-  if (frame.input.boxes && !std::exchange(frame.drift_measured, true) && !report.drift.empty() &&
-      isLevel(frame)) {
-    drift_.add(report.drift, frame.input.view.T_WB);
-  }
   frame.stepped = true;
 }
 
@@ -81,24 +66,6 @@ bool History::isLevel(const HistoryFrame& frame) {
   if (frame.input.view.up_W.normalized().z() > kLevel) return true;
   if (!std::exchange(told_not_level_, true)) reasons_.add("frame_not_level_to_place_map");
   return false;
-}
-
-void History::correctDrift() {
-  if (drift_is_taken_out_) return;
-  const auto correction = drift_.correct(frames_.back().input.view.T_WB, pose_error_);
-  if (!correction) return;
-  const Matrix6d F = regressOn(correction->before, correction->after);
-  for (HistoryFrame& f : frames_) {
-    for (Track& t : f.before.tracks) applyCorrection(t, *correction, f.input.pose_error);
-    f.input.view.T_WB = correction->step * f.input.view.T_WB;
-    f.input.pose_error.product = (F * f.input.pose_error.product).eval();
-    f.input.pose_error.covariance = correction->after;
-  }
-  for (Track& t : belief_.tracks) applyCorrection(t, *correction, pose_error_);
-  for (Track& t : belief_.recently_deleted) applyCorrection(t, *correction, pose_error_);
-  pose_error_.product = (F * pose_error_.product).eval();
-  pose_error_.covariance = correction->after;
-  map_frame_.correct(correction->step);
 }
 
 void History::insert(const Track& track) {

@@ -1,6 +1,5 @@
 // The latest frames, each with the belief before it, so that late detections give the posterior
-// that they would have given on time. Also: the pose error from frame to frame, and the drift that
-// known objects show.
+// that they would have given on time. Also: the pose error from frame to frame.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +12,6 @@
 #include "common/base/result.h"
 #include "common/types/odometry.h"
 #include "services/semantic_filter/core/filter.h"
-#include "services/semantic_filter/core/memory/drift.h"
-#include "services/semantic_filter/core/memory/map_frame.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
@@ -25,7 +22,6 @@ struct HistoryFrame {
   std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
   Belief before;
   bool stepped = false;
-  bool drift_measured = false;           ///< a frame measures the drift once, however often stepped
   std::vector<MergeRecord> merges = {};  ///< of its latest step
 };
 
@@ -45,10 +41,6 @@ class History {
   void step();
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
-  /// Takes a significant drift out of all that refers to the pose.
-  void correctDrift();
-  /// The map's graph does that.
-  void leaveDriftToTheMap() { drift_is_taken_out_ = true; }
   /// Whether the frame is level enough to ask where the map lies; counts once a world if not.
   bool isLevel(const HistoryFrame& frame);
 
@@ -75,7 +67,6 @@ class History {
   IdBook& ids() { return ids_; }
   const IdBook& ids() const { return ids_; }
   const PoseError& poseError() const { return pose_error_; }
-  const MapFrame& mapFrame() const { return map_frame_; }
   /// Pose of the newest frame in W.
   const std::optional<RigidTransform>& lastPose() const { return last_T_WB_; }
 
@@ -92,11 +83,8 @@ class History {
   IdBook ids_;
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;
-  MapFrame map_frame_;
-  DriftEstimator drift_;
   std::vector<MergeRecord> late_merges_;
   bool told_not_level_ = false;
-  bool drift_is_taken_out_ = false;
 };
 
 }  // namespace perdure::semantic_filter

@@ -24,7 +24,6 @@ struct Parameters {
   GroundParameters ground;
   MemoryParameters memory;
   AlignmentParameters alignment;
-  DriftParameters drift;
 };
 
 }  // namespace perdure::semantic_filter
@@ -38,7 +37,6 @@ namespace perdure::semantic_filter::gates {
 inline constexpr double kWholeView = 9.0;       ///< [4, .06] beyond, a partial view is tried
 inline constexpr double kForeignBox = 14.0;     ///< [4, .007] the keyframe showed something else
 inline constexpr double kContradiction = 25.0;  ///< [4, 5e-5] the keyframe contradicts a MAP fit
-inline constexpr double kDriftOutlier = 25.0;   ///< [4, 5e-5] the box measures no drift
 
 // Two Gaussians.
 inline constexpr double kNoFusion = 24.3;  ///< [7, .001] the mean of both would be wrong
@@ -46,8 +44,7 @@ inline constexpr double kSameMode = 1.0;   ///< [7, .995] two modes of one track
 inline constexpr double kSameFit = 0.25;   ///< [7] a fit comes to a mode that is known
 inline constexpr double kUnchanged = 1.0;  ///< [7, .995] a refit changed little
 
-// One height, four numbers of a drift.
-inline constexpr double kGroundOutlier = 12.0;     ///< [1, .0005] it does not stand on this ground
-inline constexpr double kSignificantDrift = 12.0;  ///< [4, .017] not by chance
+// One height.
+inline constexpr double kGroundOutlier = 12.0;  ///< [1, .0005] it does not stand on this ground
 
 }  // namespace perdure::semantic_filter::gates

@@ -126,44 +126,6 @@ TEST(FormerMap, ALaterRunFindsTheMapOfAnEarlierRun) {
   EXPECT_GE(kept, 9u);
 }
 
-/// Mean distance between objects and their confirmed tracks in the present odometry, after driving
-/// the street there and back with drift.
-double errorAfterDrift(const Config& config, unsigned seed) {
-  Pair pair(config, longStreet(4.5, seed));
-  pair.driveTo(60);
-  pair.drift = RigidTransform(Eigen::Quaterniond(Eigen::AngleAxisd(4e-5, Eigen::Vector3d::UnitZ())),
-                              {0.001, -0.0012, 0.0});
-  for (int lap = 0; lap < 5; ++lap) {
-    pair.driveTo(8);
-    pair.driveTo(60);
-  }
-  double sum = 0.0, count = 0.0;
-  for (const TrueObject& thing : pair.things) {
-    const Eigen::Vector3d place = pair.T_W * Eigen::Vector3d(thing.x.head<3>());
-    double nearest = 3.0;
-    for (const auto& o : pair.objects.back().objects) {
-      if (o.confirmed) nearest = std::min(nearest, (o.best().mean.head<3>() - place).norm());
-    }
-    if (nearest < 3.0) sum += nearest, count += 1.0;
-  }
-  return sum / count;
-}
-
-TEST(FormerMap, ObjectsStayInPlaceRelativeToTheBodyWhileOdometryDrifts) {
-  Config config = configWith(kMemory);
-  config.filter.pose.walk_position = 0.03;
-  config.filter.pose.walk_rotation = 0.0007;
-  config.filter.motion.position_walk = 0.002;  // the objects are at rest
-  Config none = config;
-  none.filter.drift.things = 1000000;
-  double error = 0.0, without = 0.0;  // in a single street, chance changes the result by a fifth
-  for (unsigned seed = 3; seed < 7; ++seed) {
-    error += errorAfterDrift(config, seed) / 4.0;
-    without += errorAfterDrift(none, seed) / 4.0;
-  }
-  EXPECT_LT(error, 0.85 * without) << error << " m, without " << without << " m";
-}
-
 TEST(FormerMap, AnotherPlaceIsNotTakenForTheFormerMap) {
   Pair pair(configWith(kMemory), longStreet());
   pair.driveTo(60);

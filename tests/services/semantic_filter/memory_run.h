@@ -61,7 +61,6 @@ struct Pair {
   std::vector<TrueObject> things;
   WorldId world{5, 0};
   RigidTransform T_W;    ///< the frame of the objects, in that of the odometry
-  RigidTransform drift;  ///< of T_W, with each frame, about the body
   Node filter;
 
   explicit Pair(const Config& config = configWith(kMemory),
@@ -102,9 +101,6 @@ struct Pair {
   void driveTo(double until, double step = 0.4) {
     const double way = until > x ? step : -step;
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {
-      const Eigen::Vector3d about = T_W * bodyAt(x).p;
-      const RigidTransform turn(drift.q, about - drift.q * about + drift.p);
-      T_W = turn * T_W;
       Odometry odometry = odometryAt(frame, T_W * bodyAt(x));
       odometry.world = world;
       filter.onOdometry(odometry);

@@ -30,7 +30,7 @@ Recalled laid(std::vector<ObjectBelief> objects, std::vector<MergeOrder> merges 
   recalled.world = {5, 0};
   recalled.client = 9;
   recalled.next_id = 1000;
-  recalled.laid = recalled.graph = true;
+  recalled.laid = true;
   recalled.objects = std::move(objects);
   recalled.merges = std::move(merges);
   return recalled;
@@ -223,42 +223,6 @@ TEST(NodeLaid, ForAnotherFilterOrAnotherWorldNothingIsLaid) {
   pair.filter.onRecalled(other);
   EXPECT_EQ(pair.filter.belief().tracks.size(), count);
   EXPECT_EQ(pair.filter.reasons().of("recalled_of_other_world"), 1u);
-}
-
-/// Tracks that the filter no longer has where it says that they are: it took drift out.
-std::size_t corrected(bool graph) {
-  Config config = configWith(kMemory);
-  config.filter.pose.walk_position = 0.03;
-  config.filter.pose.walk_rotation = 0.0007;
-  config.filter.motion.position_walk = 0.002;
-  std::vector<TrueObject> street;
-  for (int i = 0; i < 14; ++i) {
-    street.push_back({makeState(15.0 + 5.0 * i + 0.7 * (i % 3), i % 2 == 0 ? 3.5 : -4.0, 0.75, 0.1,
-                                4.3, 1.75, 1.5),
-                      "car"});
-  }
-  Pair pair(config, street);
-  pair.driveTo(30);
-  if (graph) pair.filter.onRecalled(laid({}));
-  pair.drift = RigidTransform(Eigen::Quaterniond(Eigen::AngleAxisd(4e-5, Eigen::Vector3d::UnitZ())),
-                              {0.001, -0.0012, 0.0});
-  for (int lap = 0; lap < 3; ++lap) {
-    pair.driveTo(8);
-    pair.driveTo(50);
-  }
-  // M and W part where the filter corrects; tracks are in M, messages in W.
-  std::size_t parted = 0;
-  for (const Track& o : pair.filter.belief().tracks) {
-    for (const ObjectBelief& b : pair.objects.back().objects) {
-      if (b.id == o.id && (b.best().mean.head<3>() - o.best().x.head<3>()).norm() > 1e-6) ++parted;
-    }
-  }
-  return parted;
-}
-
-TEST(NodeLaid, WithAGraphTheFilterLeavesDriftToIt) {
-  EXPECT_GT(corrected(false), 0u) << "it corrects on its own";
-  EXPECT_EQ(corrected(true), 0u);
 }
 
 }  // namespace

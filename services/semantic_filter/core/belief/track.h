@@ -118,7 +118,6 @@ struct PublishedVisibility {
 /// What the cross-covariances of the hypotheses refer to.
 struct PoseReference {
   Matrix6d product = Matrix6d::Identity();  ///< PoseError::product at as_of
-  TimePoint drift_measured_at;              ///< when it last measured the map-relative drift
 };
 
 /// Frames that said nothing since the track was last predicted. They change no published value.

@@ -1,12 +1,23 @@
 #include "services/semantic_filter/core/measurement/pose_error.h"
 
 namespace perdure::semantic_filter {
+namespace {
 
+/// A random walk by distance travelled.
+struct PoseWalk {
+  double rotation = 0.0;  // rad/√m
+  double position = 0.0;  // m/√m
+};
+
+/// The walk that stands in for what the odometry says of its own error; nothing where its own
+/// transition and covariance are used.
 std::optional<PoseWalk> poseWalkOf(const Odometry& odometry, const PoseParameters& pose) {
   if (!odometry.has_increment) return PoseWalk{pose.walk_rotation, pose.walk_position};
   if (pose.drift_position <= 0.0 || odometry.increment_covariance.isZero(0.0)) return std::nullopt;
   return PoseWalk{pose.drift_rotation, pose.drift_position};
 }
+
+}  // namespace
 
 void advancePoseError(PoseError& error, const Odometry& odometry,
                       const std::optional<RigidTransform>& last_T_WB,

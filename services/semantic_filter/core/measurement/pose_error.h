@@ -11,16 +11,6 @@
 
 namespace perdure::semantic_filter {
 
-/// A random walk by distance travelled.
-struct PoseWalk {
-  double rotation = 0.0;  ///< rad/√m
-  double position = 0.0;  ///< m/√m
-};
-
-/// Returns the walk that stands in for what the odometry says of its own error; nothing where its
-/// own transition and covariance are used.
-std::optional<PoseWalk> poseWalkOf(const Odometry& odometry, const PoseParameters& parameters);
-
 /// Brings `error` from the frame before to the frame of `odometry`. `last_T_WB`: pose of the frame
 /// before; without one a walk adds nothing.
 void advancePoseError(PoseError& error, const Odometry& odometry,

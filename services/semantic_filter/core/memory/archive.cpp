@@ -100,12 +100,12 @@ bool Archive::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) con
   return (p_WO - p_WB).norm() <= parameters_.recall_m + parameters_.margin_m;
 }
 
-void Archive::rememberReference(const Track& track, const std::optional<RigidTransform>& T_MW) {
-  references_[track.as_of] = {track.pose.product, T_MW};
+void Archive::rememberReference(const Track& track) {
+  references_[track.as_of] = track.pose.product;
   if (references_.size() > kMostReferences) references_.erase(references_.begin());
 }
 
-std::optional<Archive::Reference> Archive::referenceAt(TimePoint as_of) const {
+std::optional<Matrix6d> Archive::referenceAt(TimePoint as_of) const {
   const auto found = references_.find(as_of);
   if (found == references_.end()) return std::nullopt;
   return found->second;

@@ -48,15 +48,11 @@ class Archive {
   /// Returns how often a question was asked again since the last call.
   std::uint64_t takeUnanswered() { return std::exchange(unanswered_, 0); }
 
-  /// What the belief of an archived track refers to, which the map does not hold: the product of
-  /// pose error transitions for its cross-covariance, and T_MW when it left.
-  struct Reference {
-    Matrix6d product;
-    std::optional<RigidTransform> T_MW;
-  };
-  void rememberReference(const Track& track, const std::optional<RigidTransform>& T_MW);
+  /// The product of pose error transitions that the cross-covariance of an archived track refers
+  /// to, which the map does not hold.
+  void rememberReference(const Track& track);
   /// Returns nothing if the belief is of another run, or if too many were archived since.
-  std::optional<Reference> referenceAt(TimePoint as_of) const;
+  std::optional<Matrix6d> referenceAt(TimePoint as_of) const;
 
   /// Forgets everything: another frame of reference begins.
   void clear();
@@ -76,7 +72,7 @@ class Archive {
   /// centre of the last question that was answered in full
   std::optional<Eigen::Vector3d> known_around_;
   std::uint64_t requests_ = 0, unanswered_ = 0;
-  std::map<TimePoint, Reference> references_;
+  std::map<TimePoint, Matrix6d> references_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -1,4 +1,4 @@
-// Parameters of the archive, of map alignment and of map-relative drift.
+// Parameters of the archive and of map alignment.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,6 @@ struct AlignmentParameters {
   double margin_nats = 10.0;  ///< and above the best other alignment
   std::int64_t pairs = 4;     ///< objects that are surely in both, at least
   double known_share = 0.7;   ///< share of what is visible that is on the map
-};
-
-struct DriftParameters {
-  double position = 0.1;    ///< least correction, m
-  double rotation = 0.004;  ///< least correction, rad
-  std::int64_t things = 5;  ///< known objects that measured it, at least
-  double within_m = 25.0;   ///< an object measures it once it is nearer
 };
 
 }  // namespace perdure::semantic_filter
