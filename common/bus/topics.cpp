@@ -50,7 +50,8 @@ Table makeTable() {
       row(kCalibration, latched(1), 0, kRecorded, kCapture, kVio | kSemanticFilter | kSubscriber),
       row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio,
           kSemanticFilter | kCapture | kMapStore | kSubscriber),  // capture follows it (pace.mode)
-      row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio, kSemanticFilter | kSubscriber),
+      row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio,
+          kSemanticFilter | kMapStore | kSubscriber),
       row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded, kInference,
           kInference | kSemanticFilter | kCapture | kSubscriber),
       row(kModel, latched(1), 0, kRecorded, kInference, kInference | kSemanticFilter | kSubscriber),

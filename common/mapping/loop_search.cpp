@@ -138,6 +138,23 @@ LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba) {
   return {T_Mb, turnedBy((T_Mb * T_ba.mean).R(), mapping::inverse(T_ba).covariance)};
 }
 
+std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body,
+                                                         const Parameters& parameters) {
+  const PoseGraph& graph = body.state.graph();
+  const Eigen::Vector3d here = graph.pose(body.here().id).p;
+  const auto of_late = body.anchorsOfVisit(parameters.loop.visit_m);
+  std::vector<std::pair<double, AnchorId>> anchors;
+  for (const auto& [id, pose] : graph.poses()) {
+    if ((id >= of_late.front() && id <= of_late.back()) || !body.asks(id)) continue;
+    anchors.emplace_back((pose.p - here).head<2>().norm(), id);
+  }
+  const double far_m =
+      parameters.loop.view_m + parameters.place.gate_sigmas * kFarther * body.deviation_m;
+  std::erase_if(anchors, [&](const auto& a) { return a.first > far_m; });
+  std::sort(anchors.begin(), anchors.end());
+  return anchors;
+}
+
 /// What was detected on the way of late, in the body's newest anchor: without what is known to have
 /// been seen before.
 std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const {
@@ -156,31 +173,12 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   return seen;
 }
 
-/// Anchors of earlier visits, nearest first, as far as the body may be off. How far that is, is
-/// asked of the first anchor of its component: nearer ones are known better.
-std::vector<std::pair<double, AnchorId>> LoopSearch::anchorsOfBefore(
-    const Whereabouts& body) const {
-  const PoseGraph& graph = body.state.graph();
-  const Eigen::Vector3d here = graph.pose(body.here().id).p;
-  const auto of_late = body.anchorsOfVisit(parameters_.loop.visit_m);
-  std::vector<std::pair<double, AnchorId>> anchors;
-  for (const auto& [id, pose] : graph.poses()) {
-    if ((id >= of_late.front() && id <= of_late.back()) || !body.asks(id)) continue;
-    anchors.emplace_back((pose.p - here).head<2>().norm(), id);
-  }
-  const double far_m =
-      parameters_.loop.view_m + parameters_.place.gate_sigmas * kFarther * body.deviation_m;
-  std::erase_if(anchors, [&](const auto& a) { return a.first > far_m; });
-  std::sort(anchors.begin(), anchors.end());
-  return anchors;
-}
-
 LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
   const LoopParameters& loop = parameters_.loop;
   Around around;
   double nearest_m = std::numeric_limits<double>::infinity();
   std::set<ObjectId> ids;
-  for (const auto& [distance, id] : anchorsOfBefore(body)) {
+  for (const auto& [distance, id] : anchorsOfBefore(body, parameters_)) {
     const auto T_ba = body.relative.to(id);
     if (!T_ba) continue;
     const double sigma = planeSigma(T_ba->covariance);

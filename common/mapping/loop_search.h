@@ -46,6 +46,12 @@ PlacedObject inM(const MapState& state, const Sighting& sighting);
 /// T_Mb as an anchor sees it: the anchor's own error in M does not count.
 LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba);
 
+/// Anchors of earlier visits, nearest first, with their distance in the plane, as far as the body
+/// may be off. How far that is, is asked of the first anchor of its component: nearer ones are
+/// known better.
+std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body,
+                                                         const Parameters& parameters);
+
 class LoopSearch {
  public:
   explicit LoopSearch(const Parameters& parameters) : parameters_(parameters) {}
@@ -65,7 +71,6 @@ class LoopSearch {
   void forget() { others_.clear(); }
 
  private:
-  std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body) const;
   std::vector<PlacedObject> seenOfLate(const Whereabouts& body) const;
   struct Around {
     std::vector<PlacedObject> objects;

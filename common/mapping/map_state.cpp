@@ -6,7 +6,10 @@
 namespace perdure::mapping {
 
 MapState::MapState(const GraphParameters& parameters, SavedMap saved)
-    : graph_(parameters), records_(std::move(saved.records)), merges_(std::move(saved.merges)) {
+    : graph_(parameters),
+      records_(std::move(saved.records)),
+      merges_(std::move(saved.merges)),
+      views_(std::move(saved.views)) {
   for (std::size_t k = 0; k < saved.classes.size(); ++k) {
     class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
   }
@@ -103,6 +106,18 @@ void MapState::erase(ObjectId id) {
   records_.erase(at);
 }
 
+const View& MapState::viewFrom(AnchorId id) const {
+  static const View kNone;
+  const auto at = views_.find(id);
+  return at == views_.end() ? kNone : at->second;
+}
+
+void MapState::putView(AnchorId id, View view) {
+  if (view.empty()) return;
+  views_.insert_or_assign(id, std::move(view));
+  views_touched_.insert(id);
+}
+
 void MapState::putMerge(ObjectId absorbed, HungMerge merge) {
   merges_.insert_or_assign(absorbed, std::move(merge));
   merges_touched_.insert(absorbed);
@@ -154,12 +169,14 @@ Unsaved MapState::unsaved() const {
   }
   for (const ObjectId id : merges_touched_) result.changed.merges[id] = merges_.at(id);
   result.merges_gone = merges_erased_;
+  for (const AnchorId id : views_touched_) result.changed.views[id] = views_.at(id);
   return result;
 }
 
 void MapState::markSaved() {
   merges_touched_.clear();
   merges_erased_.clear();
+  views_touched_.clear();
   for (const auto& [id, anchor] : anchors_) {
     saved_anchors_[id] = {graph_.pose(id), anchor.scale2};
   }

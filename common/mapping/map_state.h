@@ -33,6 +33,10 @@ class MapState {
   /// Moves a component as one: T_MA = T_MN T_NA.
   void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);
 
+  /// What an anchor looks like; empty where no landmark was seen.
+  const View& viewFrom(AnchorId id) const;
+  void putView(AnchorId id, View view);
+
   const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
   void put(ObjectId id, ObjectRecord record);
   void erase(ObjectId id);
@@ -70,6 +74,8 @@ class MapState {
   std::set<ObjectId> touched_, erased_;
   std::map<ObjectId, HungMerge> merges_;
   std::set<ObjectId> merges_touched_, merges_erased_;
+  std::map<AnchorId, View> views_;
+  std::set<AnchorId> views_touched_;
 };
 
 }  // namespace perdure::mapping

@@ -11,11 +11,18 @@
 #include "common/math/so3.h"
 
 namespace perdure::mapping {
+namespace {
+
+constexpr double kOverlap_m = 3.0;  // of way, that the views of two anchors share
+
+}  // namespace
+
 Mapper::Mapper(const Parameters& parameters, SavedMap saved)
     : parameters_(parameters),
       state_(parameters.graph, std::move(saved)),
       builder_(parameters.anchor),
       loop_search_(parameters),
+      view_search_(parameters),
       tracked_ties_(parameters),
       loop_book_(parameters.loop),
       drift_scale_(parameters.drift_scale) {}
@@ -32,6 +39,7 @@ void Mapper::begin(const Odometry& odometry) {
   tentative_.reset();
   marginals_.reset();
   loop_search_.forget();
+  view_builder_.clear();
   tracked_ties_.begin();
 }
 
@@ -80,8 +88,14 @@ void Mapper::replay(const WorldId& session) {
 void Mapper::onOdometry(const Odometry& odometry) {
   if (odometry.state == OdometryState::kInitialising) return;
   if (session_ != odometry.world) begin(odometry);
+  const auto before = builder_.last();
   auto anchor = builder_.add(odometry, state_.nextAnchor());
   if (!anchor) return;
+  if (before) {  // what was seen from there until now
+    state_.putView(before->id,
+                   view_builder_.viewFrom(before->T_WA, builder_.way_m(),
+                                          builder_.way_m() - before->way_m + kOverlap_m));
+  }
   anchor->from_previous.covariance *= odometry_variance_;
   anchor->scale2 = odometry_variance_;
   state_.add(*anchor);
@@ -139,6 +153,13 @@ void Mapper::see(const ObjectBelief& belief, const Objects& objects) {
   record.pose_error = objects.pose_error;
   record.sighting = {anchor.id, std::move(o)};
   state_.put(belief.id, std::move(record));
+}
+
+void Mapper::onLandmarks(const Landmarks& landmarks) {
+  if (!follows(landmarks.world)) return;
+  const Anchor& here = *builder_.last();
+  const Eigen::Vector3d p_WB = here.T_WA * builder_.sinceLast()->mean.p;
+  view_builder_.add(landmarks, p_WB, builder_.way_m());
 }
 
 void Mapper::onObjects(const Objects& objects) {

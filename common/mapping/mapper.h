@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/mapping/appearance/view_builder.h"
 #include "common/mapping/frames/anchor_builder.h"
 #include "common/mapping/graph/drift_scale.h"
 #include "common/mapping/graph/marginals.h"
@@ -23,6 +24,7 @@
 #include "common/mapping/parameters.h"
 #include "common/mapping/saved_map.h"
 #include "common/mapping/tracked_ties.h"
+#include "common/mapping/view_search.h"
 #include "common/types/objects.h"
 
 namespace perdure::mapping {
@@ -63,6 +65,8 @@ class Mapper {
   /// Poses come before the working set of the same frame.
   void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);
+  /// What the places of the way look like. May be left out: then objects alone say where it is.
+  void onLandmarks(const Landmarks& landmarks);
   void onMerged(ObjectId survivor, ObjectId absorbed);
   void onGone(ObjectId id);
   /// Drives along a saved session again and looks for its places among what other sessions have
@@ -125,6 +129,9 @@ class Mapper {
   bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   void tie();
   void search();
+  std::optional<LoopSearch::Found> searchNearby(const Whereabouts& here, bool new_view);
+  std::optional<LoopSearch::Found> searchElsewhere(const Whereabouts& here, bool new_view);
+  View viewOfNow() const;
   void graphMoved();
   void settle();
   void orderMerges(const LoopClosure& loop);
@@ -144,7 +151,9 @@ class Mapper {
   Parameters parameters_;
   MapState state_;
   AnchorBuilder builder_;
+  ViewBuilder view_builder_;
   LoopSearch loop_search_;
+  ViewSearch view_search_;
   TrackedTies tracked_ties_;
   LoopBook loop_book_;
   DriftScale drift_scale_;
@@ -166,6 +175,7 @@ class Mapper {
   };
   std::optional<Tentative> tentative_;
   bool replays_ = false;
+  AnchorId looked_from_ = 0;  ///< the anchor whose view was searched last
   double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };

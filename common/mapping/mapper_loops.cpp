@@ -118,19 +118,44 @@ void Mapper::undo(ObjectId absorbed, const HungMerge& merge) {
   state_.put(merge.survivor, merge.survivor_before);
 }
 
+/// What is seen now, in the newest anchor; a stored view where the way is driven along again.
+View Mapper::viewOfNow() const {
+  constexpr double kBack_m = 15.0;
+  const Anchor& here = *builder_.last();
+  if (replays_) return state_.viewFrom(here.id);
+  return view_builder_.viewFrom(here.T_WA, builder_.way_m(), kBack_m);
+}
+
+/// By objects; where these say nothing, by what the place looks like, once for each anchor.
+std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
+  auto found = loop_search_.nearby(here);
+  if (found && new_view && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
+  if (!found && new_view) found = view_search_.nearby(here, viewOfNow());
+  return found;
+}
+
+std::optional<LoopSearch::Found> Mapper::searchElsewhere(const Whereabouts& here, bool new_view) {
+  std::optional<LoopSearch::Found> found;
+  if (builder_.way_m() - searched_elsewhere_at_m_ >= parameters_.loop.elsewhere_each_m) {
+    searched_elsewhere_at_m_ = builder_.way_m();
+    found = loop_search_.elsewhere(here);
+  }
+  if (found && new_view && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
+  if (!found && new_view) found = view_search_.elsewhere(here, viewOfNow());
+  return found && isAgreedOn(*found) ? found : std::nullopt;
+}
+
 /// By way of its own map first; then, more rarely, in the parts of the map that it does not hang
 /// together with.
 void Mapper::search() {
   const Whereabouts here = body();
-  auto found = loop_search_.nearby(here);
-  const bool due = builder_.way_m() - searched_elsewhere_at_m_ >= parameters_.loop.elsewhere_each_m;
-  if (!found && due) {
-    searched_elsewhere_at_m_ = builder_.way_m();
-    found = loop_search_.elsewhere(here);
-    if (found && !isAgreedOn(*found)) return;
-  }
+  const AnchorId newest = builder_.last()->id;
+  const bool new_view = std::exchange(looked_from_, newest) != newest;
+  auto found = searchNearby(here, new_view);
+  if (!found) found = searchElsewhere(here, new_view);
   if (!found) return;
-  if (active_ && active_->pairs == pairsOf(found->match)) return;  // nothing new
+  const bool by_objects = !found->match.pairs.empty();
+  if (by_objects && active_ && active_->pairs == pairsOf(found->match)) return;  // nothing new
   close(*found);
 }
 

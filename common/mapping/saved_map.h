@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/base/ids.h"
+#include "common/mapping/appearance/view.h"
 #include "common/mapping/frames/anchor.h"
 #include "common/mapping/graph/pose_graph.h"
 #include "common/mapping/places/placed_object.h"
@@ -61,6 +62,7 @@ struct SavedMap {
   std::map<EdgeId, SavedEdge> edges;
   std::map<ObjectId, ObjectRecord> records;
   std::map<ObjectId, HungMerge> merges = {};  ///< by the absorbed object
+  std::map<AnchorId, View> views = {};        ///< what anchors look like, where landmarks were seen
 };
 
 struct Unsaved {

@@ -68,6 +68,7 @@ void serve(service::Context& context, const map_store::Config& config) {
                         .frame = context.sink(topics::kMapFrame),
                         .event = context.sink(topics::kEvents)});
   context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
+  context.on(topics::kLandmarks, [&](const Landmarks& seen) { node.onLandmarks(seen); });
   context.on(topics::kEvents, [&](const Event& event) { node.onEvent(event); });
   auto& heard =
       context.needs("objects", "semantic_filter's Health says why, or start semantic_filter");

@@ -46,6 +46,7 @@ class Node {
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onOdometry(const Odometry& odometry);
+  void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
   /// Commits and publishes what is due. `now`: a monotonic time since any origin; call it ten
   /// times a second or more often.

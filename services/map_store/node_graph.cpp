@@ -14,12 +14,14 @@ namespace {
 constexpr double kAroundALoop_m = 70.0;
 constexpr std::size_t kMostNamed = 8;  // objects, in the words of an event
 
-std::string namesOf(const mapping::PlaceMatch& match) {
-  std::string names;
+/// By what a loop was found, for people.
+std::string witnessesOf(const mapping::PlaceMatch& match) {
+  if (match.pairs.empty()) return fmt::format("{} landmarks that look alike", match.points);
+  std::string names = fmt::format("{} objects (", match.pairs.size());
   for (std::size_t k = 0; k < std::min(match.pairs.size(), kMostNamed); ++k) {
     names += fmt::format("{}{}", k == 0 ? "" : ", ", match.pairs[k].first);
   }
-  return match.pairs.size() > kMostNamed ? names + ", …" : names;
+  return names + (match.pairs.size() > kMostNamed ? ", …)" : ")");
 }
 
 /// Of another session, whose clock may have been another one.
@@ -60,6 +62,10 @@ void Node::loadGraph() {
 
 void Node::onOdometry(const Odometry& odometry) {
   if (graph_) mapper_.onOdometry(odometry);
+}
+
+void Node::onLandmarks(const Landmarks& landmarks) {
+  if (graph_) mapper_.onLandmarks(landmarks);
 }
 
 void Node::followGraph() {
@@ -164,11 +170,11 @@ void Node::tellLoops(const mapping::MapChange& change) {
     event.kind = loop.joins ? EventKind::kRelocalised : EventKind::kLoopClosed;
     event.probability = 1.0 / (1.0 + std::exp(loop.match.next - loop.match.score));
     event.detail = fmt::format(
-        "loop {}, by {} objects ({}), {:.1f} nats likelier than the best other way; the body's "
+        "loop {}, by {}, {:.1f} nats likelier than the best other way; the body's "
         "place "
         "on the map moved by {:.2f} m; anchors {} and {}",
-        loop.id, loop.match.pairs.size(), namesOf(loop.match), loop.match.score - loop.match.next,
-        loop.correction_m, loop.a, loop.b);
+        loop.id, witnessesOf(loop.match), loop.match.score - loop.match.next, loop.correction_m,
+        loop.a, loop.b);
     outputs_.event(event);
     reasons_.add(loop.joins ? "relocalised" : "loops_closed");
   }

@@ -75,6 +75,10 @@ void MapMemory::onOdometry(const Odometry& odometry) {
   waiting_.push_back([this, odometry] { node_.onOdometry(odometry); });
 }
 
+void MapMemory::onLandmarks(const Landmarks& landmarks) {
+  waiting_.push_back([this, landmarks] { node_.onLandmarks(landmarks); });
+}
+
 void MapMemory::onObjects(const Objects& objects) {
   waiting_.push_back([this, objects] {
     node_.onObjects(objects);

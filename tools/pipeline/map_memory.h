@@ -27,6 +27,7 @@ class MapMemory {
   /// Tells a filter which ids are taken.
   void giveIds(InstanceId filter, const WorldId& session);
   void onOdometry(const Odometry& odometry);
+  void onLandmarks(const Landmarks& landmarks);
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onQuery(const MapQuery& query);

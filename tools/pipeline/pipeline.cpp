@@ -337,6 +337,7 @@ void Pipeline::deliver() {
     const auto landmarks = landmarks_.find(frame);
     if (landmarks != landmarks_.end()) {
       keep("landmarks", landmarks->second, odometry.stamp.time);
+      timer_.timeTowardsNext("map_store", [&] { map_->onLandmarks(landmarks->second); });
       timer_.timeTowardsNext("semantic_filter", [&] { filter_->onLandmarks(landmarks->second); });
     }
     waits_for_detections_.insert(frame);

@@ -82,6 +82,7 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
   } else if (message.topic == "landmarks") {
     give(Landmarks(), [&](const Landmarks& m) {
       outputs_->onLandmarks(m);
+      timer_.timeTowardsNext("map_store", [&] { map_->onLandmarks(m); });
       filter([&] { filter_->onLandmarks(m); });
     });
   } else {

@@ -20,7 +20,7 @@ bool isHeardBy(const std::string& service, const std::string& topic) {
       {"inference", {"calibration", "frame/", "predictions"}},
       {"semantic_filter",
        {"calibration", "odometry", "landmarks", "detections", "model", "inference/swap"}},
-      {"map_store", {"objects", "events"}}};
+      {"map_store", {"odometry", "landmarks", "objects", "events"}}};
   const auto inputs = kInputs.find(service);
   if (inputs == kInputs.end()) {
     throw StartupError(ExitCode::kUsage, "--for " + service +

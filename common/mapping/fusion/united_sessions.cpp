@@ -150,6 +150,9 @@ void UnitedSessions::renumber(const std::map<AnchorId, AnchorId>& moved) {
     record.sighting.anchor = now(record.sighting.anchor);
     if (record.earlier) record.earlier->anchor = now(record.earlier->anchor);
   }
+  std::map<AnchorId, View> views;
+  for (auto& [id, view] : map_.graph.views) views[now(id)] = std::move(view);
+  map_.graph.views = std::move(views);
   for (auto& [theirs, ours] : anchor_of_) ours = now(ours);
 }
 
@@ -198,6 +201,8 @@ void UnitedSessions::addAnchor(AnchorId theirs, AnchorId id, AnchorId reference,
     frames_[id] = first->second;
   }
   map_.graph.anchors[id] = std::move(saved);
+  const auto view = other_.graph.views.find(theirs);
+  if (view != other_.graph.views.end()) map_.graph.views[id] = view->second;
   new_ids_.insert(id);
 }
 

@@ -25,6 +25,7 @@ struct PlaceMatch {
   double cells = 1.0;  ///< distinguishable ways inside the prior
   /// Of map and of what is seen, surely one object.
   std::vector<std::pair<ObjectId, ObjectId>> pairs;
+  std::size_t points = 0;  ///< landmarks that look alike and agree, where these say it
 };
 
 /// Returns the best way, whether good enough or not; nothing if no object is surely one of the

@@ -104,7 +104,7 @@ Result<void> create(const Connection& connection) {
   auto transaction = Transaction::begin(connection);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
   const auto made =
-      connection.execute(std::string(kSchema) + kGraphSchema + kMergesSchema +
+      connection.execute(std::string(kSchema) + kGraphSchema + kAddedSchema +
                          "PRAGMA application_id=" + std::to_string(kApplicationId) +
                          "; PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
   if (!made) return made;
@@ -114,14 +114,14 @@ Result<void> create(const Connection& connection) {
 /// Tables of older versions are the same, and their beliefs are read as they are; those of the
 /// graph are new. All or nothing.
 Result<void> adopt(const Connection& connection, const Identity& identity) {
-  if (identity.version == kSchemaVersion) return connection.execute(kMergesSchema);
+  if (identity.version == kSchemaVersion) return connection.execute(kAddedSchema);
   auto transaction = Transaction::begin(connection);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
   const auto version = connection.integer("PRAGMA user_version");
   if (!version) return tl::unexpected<Reason>(version.error());
   if (*version == kSchemaVersion) return {};  // another process was first
   const auto made =
-      connection.execute(std::string(kGraphSchema) + kMergesSchema +
+      connection.execute(std::string(kGraphSchema) + kAddedSchema +
                          "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
   if (!made) return made;
   return transaction->commit();

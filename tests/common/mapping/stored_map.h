@@ -16,6 +16,7 @@ inline void apply(const Unsaved& unsaved, SavedMap& map) {
   for (const auto& [id, edge] : unsaved.changed.edges) map.edges[id] = edge;
   for (const auto& [id, record] : unsaved.changed.records) map.records[id] = record;
   for (const auto& [id, merge] : unsaved.changed.merges) map.merges[id] = merge;
+  for (const auto& [id, view] : unsaved.changed.views) map.views[id] = view;
   for (const ObjectId id : unsaved.merges_gone) {
     map.merges.erase(id);
     EXPECT_FALSE(unsaved.changed.merges.contains(id)) << "the merge of " << id << " is both";
@@ -34,7 +35,7 @@ inline bool isEmpty(const Unsaved& unsaved) {
   return unsaved.changed.anchors.empty() && unsaved.changed.edges.empty() &&
          unsaved.changed.records.empty() && unsaved.edges_gone.empty() &&
          unsaved.records_gone.empty() && unsaved.changed.merges.empty() &&
-         unsaved.merges_gone.empty();
+         unsaved.merges_gone.empty() && unsaved.changed.views.empty();
 }
 
 template <class Map>

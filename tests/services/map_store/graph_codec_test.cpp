@@ -33,7 +33,8 @@ std::vector<Blob> oneOfEach() {
   return {
       {encodeAnchor(map.anchors.at(2).anchor), [](auto& b) { return verdict(decodeAnchor(b)); }},
       {encodeEdge(map.edges.at(1).edge), [](auto& b) { return verdict(decodeEdge(b)); }},
-      {encodeRecord(record), [](auto& b) { return verdict(decodeRecord(b)); }}};
+      {encodeRecord(record), [](auto& b) { return verdict(decodeRecord(b)); }},
+      {encodeView(map.views.at(1)), [](auto& b) { return verdict(decodeView(b)); }}};
 }
 
 TEST(GraphCodec, GivesBackEveryBitOfAnchorsEdgesAndRecords) {
@@ -64,6 +65,31 @@ TEST(GraphCodec, GivesBackEveryBitOfAnchorsEdgesAndRecords) {
     EXPECT_EQ(back->T_ab.mean.yaw, saved.edge.T_ab.mean.yaw);
     EXPECT_EQ(back->T_ab.covariance, saved.edge.T_ab.covariance);
   }
+}
+
+TEST(GraphCodec, GivesBackEveryBitOfAView) {
+  const auto map = someMap(2);
+  ASSERT_EQ(map.views.size(), 12u);
+  for (const auto& [anchor, view] : map.views) {
+    const auto back = decodeView(encodeView(view));
+    ASSERT_TRUE(back.has_value()) << back.error().detail;
+    EXPECT_TRUE(*back == view);
+    EXPECT_LE(encodeView(view).size(), 6 + 48 * view.size());
+  }
+}
+
+TEST(GraphCodec, RefusesAViewThatIsNotSound) {
+  mapping::View view = someMap(2).views.at(1);
+  view.front().p.x() = std::numeric_limits<float>::infinity();
+  EXPECT_FALSE(decodeView(encodeView(view)).has_value());
+  view.front().p.x() = 1.0F;
+  view.front().sigma = -1.0F;
+  EXPECT_FALSE(decodeView(encodeView(view)).has_value());
+  view.front().sigma = 1.0F;
+  EXPECT_TRUE(decodeView(encodeView(view)).has_value());
+  view.resize(mapping::kMostPoints + 1);
+  EXPECT_FALSE(decodeView(encodeView(view)).has_value());
+  EXPECT_FALSE(decodeView(encodeView({})).has_value());
 }
 
 TEST(GraphCodec, GivesBackEveryBitOfARecord) {

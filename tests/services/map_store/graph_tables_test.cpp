@@ -221,6 +221,33 @@ TEST_F(GraphTables, LeaveOutWhatHangsOnADamagedAnchor) {
   }
 }
 
+TEST_F(GraphTables, AViewOfAnAnchorThatIsGoneIsLeftOutAndSwept) {
+  writeSome();
+  change("DELETE FROM anchors WHERE id = 12");
+  change("UPDATE views SET points = x'0100' WHERE anchor = 3");
+  const auto graph = read();
+  EXPECT_FALSE(graph.map.views.contains(12)) << "its anchor";
+  EXPECT_FALSE(graph.map.views.contains(3)) << "its bytes";
+  EXPECT_TRUE(graph.map.views.contains(4));
+  MapDatabase database({path()});
+  (void)database.takeGraph();
+  ASSERT_TRUE(write(database, {}).has_value());
+  EXPECT_EQ(ask("SELECT count(*) FROM views WHERE anchor IN (3, 12)"), 0);
+  EXPECT_EQ(ask("SELECT count(*) FROM views WHERE anchor = 4"), 1);
+}
+
+TEST_F(GraphTables, AMapWithoutViewsIsReadAndGivenTheTable) {
+  const auto map = writeSome();
+  change("DROP TABLE views");
+  EXPECT_EQ(read().malformed, 0u) << "a reader does without";
+  EXPECT_TRUE(read().map.views.empty());
+  Unsaved more;
+  more.changed.classes = map.classes;
+  more.changed.views = map.views;
+  write(more);
+  EXPECT_EQ(ask("SELECT count(*) FROM views"), 12);
+}
+
 TEST_F(GraphTables, LeaveOutASuccessorOfAnotherSession) {
   auto map = writeSome();
   Unsaved more;

@@ -1,7 +1,9 @@
 // Pose graphs with random contents for the tests of map_store, and what they are bit by bit.
 #pragma once
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <random>
 #include <string>
 
@@ -10,7 +12,7 @@
 namespace perdure::map_store::test {
 
 struct GraphSize {
-  std::size_t anchors = 40, edges = 60, records = 100, sessions = 2, merges = 5;
+  std::size_t anchors = 40, edges = 60, records = 100, sessions = 2, merges = 5, views = 12;
 };
 
 class RandomGraph {
@@ -38,7 +40,20 @@ class RandomGraph {
     for (ObjectId id = 1; id <= size.records; ++id) map.records[id] = record(id, map);
     for (ObjectId id = 1; id <= size.merges; ++id)
       map.merges[1000 + id] = merge(id, 1000 + id, map);
+    for (std::uint64_t id = 1; id <= std::min(size.views, size.anchors); ++id) {
+      map.views[id] = view(1 + random_() % mapping::kMostPoints);
+    }
     return map;
+  }
+
+  mapping::View view(std::size_t points) {
+    mapping::View view(points);
+    for (mapping::SeenPoint& point : view) {
+      point.p = vector<3>().cast<float>();
+      point.sigma = static_cast<float>(std::abs(number()));
+      for (auto& byte : point.descriptor) byte = static_cast<std::uint8_t>(random_());
+    }
+    return view;
   }
 
   mapping::LevelPose pose() {
@@ -149,6 +164,10 @@ inline std::string bitsOf(const mapping::SavedMap& map) {
   for (const auto& [absorbed, merge] : map.merges) {
     out.put(absorbed);
     add(encodeMerge(merge));
+  }
+  for (const auto& [anchor, view] : map.views) {
+    out.put(anchor);
+    add(encodeView(view));
   }
   add(out.take());
   return bits;

@@ -1,6 +1,7 @@
 #include "services/map_store/core/graph/graph_codec.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 
@@ -168,6 +169,13 @@ bool isSound(const HungMerge& merge) {
          isSound(merge.absorbed_before);
 }
 
+bool isSound(const mapping::View& view) {
+  return !view.empty() && view.size() <= mapping::kMostPoints &&
+         std::all_of(view.begin(), view.end(), [](const mapping::SeenPoint& point) {
+           return point.p.allFinite() && std::isfinite(point.sigma) && point.sigma >= 0.0F;
+         });
+}
+
 Bytes encodeAnchor(const Anchor& anchor) {
   ByteWriter out;
   out.put(kGraphFormat);
@@ -251,6 +259,29 @@ Result<HungMerge> decodeMerge(std::span<const std::uint8_t> bytes) {
     for (ObjectRecord* record : {&merge.survivor_before, &merge.absorbed_before}) {
       take(in, *record);
       record->confirmed = in.takeFlag();
+    }
+  });
+}
+
+Bytes encodeView(const mapping::View& view) {
+  ByteWriter out;
+  out.put(kGraphFormat);
+  out.put(static_cast<std::uint32_t>(view.size()));
+  for (const mapping::SeenPoint& point : view) {
+    for (int i = 0; i < 3; ++i) out.put(std::bit_cast<std::uint32_t>(point.p[i]));
+    out.put(std::bit_cast<std::uint32_t>(point.sigma));
+    for (const std::uint8_t byte : point.descriptor) out.put(byte);
+  }
+  return out.take();
+}
+
+Result<mapping::View> decodeView(std::span<const std::uint8_t> bytes) {
+  return decode<mapping::View>("view", bytes, [](ByteReader& in, mapping::View& view) {
+    view.resize(in.takeCount(mapping::kMostPoints));
+    for (mapping::SeenPoint& point : view) {
+      for (int i = 0; i < 3; ++i) point.p[i] = std::bit_cast<float>(in.take<std::uint32_t>());
+      point.sigma = std::bit_cast<float>(in.take<std::uint32_t>());
+      for (std::uint8_t& byte : point.descriptor) byte = in.take<std::uint8_t>();
     }
   });
 }

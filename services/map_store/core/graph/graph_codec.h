@@ -21,6 +21,7 @@ bool isSound(const mapping::Anchor& anchor);
 bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
 bool isSound(const mapping::HungMerge& merge);
+bool isSound(const mapping::View& view);
 
 // The decoders refuse ("graph_malformed") what is cut short, too long, of another version or not
 // sound.
@@ -37,5 +38,9 @@ Result<mapping::ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes);
 
 Bytes encodeMerge(const mapping::HungMerge& merge);
 Result<mapping::HungMerge> decodeMerge(std::span<const std::uint8_t> bytes);
+
+/// Exact: places and deviations are floats, as they are kept.
+Bytes encodeView(const mapping::View& view);
+Result<mapping::View> decodeView(std::span<const std::uint8_t> bytes);
 
 }  // namespace perdure::map_store

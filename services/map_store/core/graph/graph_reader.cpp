@@ -102,6 +102,20 @@ Result<void> readMerges(const Connection& connection, SavedGraph& graph) {
                   });
 }
 
+Result<void> readViews(const Connection& connection, SavedGraph& graph) {
+  const auto there = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'views'");
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (*there == 0) return {};
+  auto& views = graph.map.views;
+  return takeRows(connection, "SELECT anchor, points FROM views ORDER BY anchor", graph.malformed,
+                  [&](const Statement& row) {
+                    auto view = decodeView(row.blob(1));
+                    if (!view || row.id(0) == 0) return false;
+                    views.emplace_hint(views.end(), row.id(0), *std::move(view));
+                    return true;
+                  });
+}
+
 /// A predecessor comes before, so that what hangs on one that was left out is left out too.
 void leaveOutBrokenChains(SavedGraph& graph) {
   auto& anchors = graph.map.anchors;
@@ -135,6 +149,8 @@ void leaveOutDangling(SavedGraph& graph) {
     return !map.edges.contains(merge.loop) || !isKnown(merge.survivor_before.sighting, map) ||
            !isKnown(merge.absorbed_before.sighting, map);
   });
+  graph.malformed +=
+      std::erase_if(map.views, [&](const auto& each) { return !map.anchors.contains(each.first); });
   for (auto& [id, record] : map.records) {
     if (!record.earlier || isKnown(*record.earlier, map)) continue;
     record.earlier.reset();
@@ -184,6 +200,7 @@ Result<void> readAll(const Connection& connection, SavedGraph& graph) {
   if (done) done = readEdges(connection, graph);
   if (done) done = readRecords(connection, graph);
   if (done) done = readMerges(connection, graph);
+  if (done) done = readViews(connection, graph);
   return done;
 }
 

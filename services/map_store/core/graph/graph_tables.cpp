@@ -7,8 +7,8 @@
 
 namespace perdure::map_store {
 
-// Blobs are what core/graph/graph_codec.h says, and the columns beside them repeat what they hold, to be
-// asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
+// Blobs are what core/graph/graph_codec.h says, and the columns beside them repeat what they hold,
+// to be asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
 // weight. These have no type: REAL would lose the sign of zero.
 // A merge that hangs on a loop keeps the survivor's belief as it was: world, epoch, belief.
 const char* const kGraphSchema = R"sql(
@@ -37,10 +37,11 @@ CREATE VIEW objects_in_map AS
     WHERE o.gone = 0);
 )sql";
 
-const char* const kMergesSchema = R"sql(
+const char* const kAddedSchema = R"sql(
 CREATE TABLE IF NOT EXISTS merges(
   absorbed INTEGER PRIMARY KEY, survivor INTEGER NOT NULL, loop INTEGER NOT NULL,
   done INTEGER NOT NULL, undo BLOB NOT NULL, world INTEGER, epoch INTEGER, belief BLOB);
+CREATE TABLE IF NOT EXISTS views(anchor INTEGER PRIMARY KEY, points BLOB NOT NULL);
 )sql";
 
 namespace {
@@ -57,6 +58,7 @@ constexpr char kPutMerge[] =
     "INSERT INTO merges SELECT ?1, ?2, ?3, ?4, ?5, o.world, o.epoch, o.belief "
     "FROM (SELECT 1) LEFT JOIN objects o ON o.id = ?2 WHERE true "
     "ON CONFLICT(absorbed) DO UPDATE SET survivor = ?2, loop = ?3, done = ?4, undo = ?5";
+constexpr char kPutView[] = "REPLACE INTO views VALUES(?1, ?2)";
 constexpr char kPutClass[] =
     "INSERT INTO graph_classes VALUES(?1, ?2) ON CONFLICT(number) DO UPDATE SET name = ?2 "
     "WHERE name <> ?2";
@@ -79,6 +81,7 @@ Result<void> runForEach(const Connection& connection, std::string_view sql, cons
 using AnchorRow = std::pair<const mapping::AnchorId, mapping::SavedAnchor>;
 using EdgeRow = std::pair<const mapping::EdgeId, mapping::SavedEdge>;
 using MergeRow = std::pair<const ObjectId, mapping::HungMerge>;
+using ViewRow = std::pair<const mapping::AnchorId, mapping::View>;
 using SightingRow = std::pair<const ObjectId, mapping::ObjectRecord>;
 
 void bindAnchor(Statement& to, const AnchorRow& row) {
@@ -118,6 +121,10 @@ void bindMerge(Statement& to, const MergeRow& row) {
   to.bindId(1, row.first).bindId(2, merge.survivor).bindId(3, merge.loop);
   to.bind(4, std::int64_t{merge.done});
   to.bind(5, std::span<const std::uint8_t>(encodeMerge(merge)));
+}
+
+void bindView(Statement& to, const ViewRow& row) {
+  to.bindId(1, row.first).bind(2, std::span<const std::uint8_t>(encodeView(row.second)));
 }
 
 /// Elements of `all` that may be written; how many may not is added to `refused`.
@@ -184,6 +191,8 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
   });
   const auto merges = soundOnes(changed.merges, refused,
                                 [](const mapping::HungMerge& merge) { return isSound(merge); });
+  const auto views =
+      soundOnes(changed.views, refused, [](const mapping::View& view) { return isSound(view); });
   auto done = putClasses(connection, changed.classes);
   if (done) done = deleteFrom(connection, "edges", unsaved.edges_gone);
   if (done) done = deleteFrom(connection, "sightings", unsaved.records_gone);
@@ -193,6 +202,7 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
   if (done) done = runForEach(connection, kPutSighting, records, bindSighting);
   if (done) done = deleteFrom(connection, "merges", unsaved.merges_gone, "absorbed");
   if (done) done = runForEach(connection, kPutMerge, merges, bindMerge);
+  if (done) done = runForEach(connection, kPutView, views, bindView);
   if (!done) return tl::unexpected<Reason>(done.error());
   return refused - unconfirmed;
 }
@@ -211,6 +221,7 @@ Result<void> sweepGraph(const Connection& connection) {
   if (done) done = deleteOthers(connection, "edges", map.edges);
   if (done) done = deleteOthers(connection, "sightings", map.records);
   if (done) done = deleteOthers(connection, "merges", map.merges, "absorbed");
+  if (done) done = deleteOthers(connection, "views", map.views, "anchor");
   if (!done) return done;
   const auto written = writeGraph(connection, shortened);
   if (!written) return tl::unexpected<Reason>(written.error());

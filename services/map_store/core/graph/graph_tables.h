@@ -15,9 +15,9 @@ inline constexpr int kFirstSchemaWithGraph = 3;
 
 /// SQL that makes the tables.
 extern const char* const kGraphSchema;
-/// The same of merges that hang on loops; where they are there, nothing. The first maps of schema 3
-/// were made without.
-extern const char* const kMergesSchema;
+/// The same of merges that hang on loops, and of views; where they are there, nothing. The first
+/// maps of schema 3 were made without.
+extern const char* const kAddedSchema;
 
 /// What a file holds, such that the ends of edges, the anchors of sightings and predecessors of
 /// the same session exist, and one anchor of each component is held fast.

@@ -1,0 +1,26 @@
+// What an anchor looks like: landmarks that were seen on the way from it to the next one.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace perdure::mapping {
+
+/// 256-bit BRIEF, as landmarks carry it.
+using Descriptor = std::array<std::uint8_t, 32>;
+
+struct SeenPoint {
+  Eigen::Vector3f p = Eigen::Vector3f::Zero();  ///< in the anchor's axes, m
+  float sigma = 0.0F;                           ///< deviation of p given the body's pose, m
+  Descriptor descriptor{};
+  bool operator==(const SeenPoint&) const = default;
+};
+
+/// At most kMostPoints: 48 bytes each.
+using View = std::vector<SeenPoint>;
+inline constexpr std::size_t kMostPoints = 48;
+
+}  // namespace perdure::mapping
