@@ -12,6 +12,13 @@ target_compile_options(perdure_options INTERFACE
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-Wno-maybe-uninitialized -Wno-array-bounds
     -Wno-stringop-overflow -Wno-stringop-overread -Wno-null-dereference -Wno-restrict>)
 
+# The second linker of binutils takes a fifth of the time: OpenCV's libraries name hundreds of others.
+include(CheckLinkerFlag)
+check_linker_flag(CXX -fuse-ld=gold PERDURE_GOLD)
+if(PERDURE_GOLD)
+  add_link_options(-fuse-ld=gold)
+endif()
+
 # Compiles the files of a target in batches: where many small files read the same large headers
 # that takes a third of the time. Names of unnamed namespaces must then differ within the target.
 function(perdure_together name)
@@ -56,21 +63,29 @@ if(PERDURE_BUILD_TESTS)
     <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry>)
 endif()
 
-# perdure_test(NAME SOURCES … DEPENDS … [TOGETHER] [LABELS …] [TIMEOUT s] [ARGS …]): one GoogleTest
-# program, one ctest entry. Labels: unit (default), process, scenario, golden, fuzz, data, long.
-function(perdure_test name)
-  cmake_parse_arguments(ARG "TOGETHER" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
-  if(NOT PERDURE_BUILD_TESTS)
-    return()
-  endif()
+# perdure_test_program(NAME SOURCES … DEPENDS …): a GoogleTest program in tests/, whose files are
+# compiled in batches.
+function(perdure_test_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   target_precompile_headers(${name} REUSE_FROM perdure_test_headers)
-  if(ARG_TOGETHER)
+  list(LENGTH ARG_SOURCES files)
+  if(files GREATER 1)
     perdure_together(${name})
   endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
+endfunction()
+
+# perdure_test(NAME SOURCES … DEPENDS … [LABELS …] [TIMEOUT s] [ARGS …]): one such program, one
+# ctest entry. Labels: unit (default), process, scenario, golden, fuzz, data, long.
+function(perdure_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
+  if(NOT PERDURE_BUILD_TESTS)
+    return()
+  endif()
+  perdure_test_program(${name} SOURCES ${ARG_SOURCES} DEPENDS ${ARG_DEPENDS})
   add_test(NAME ${name} COMMAND ${name} ${ARG_ARGS} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)

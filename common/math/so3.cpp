@@ -6,6 +6,7 @@ namespace perdure {
 namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallAngle = 1e-5;
+constexpr double kUpsideDown = 1e-12;
 }  // namespace
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& w) {
@@ -67,7 +68,14 @@ Eigen::Matrix3d rotationAboutZ(double yaw) {
 }
 
 Eigen::Quaterniond levelling(const Eigen::Vector3d& up) {
-  return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d from = up.normalized(), to = Eigen::Vector3d::UnitZ();
+  const double cosine = to.dot(from);
+  Eigen::Quaterniond q(0.0, 1.0, 0.0, 0.0);  // upside down every horizontal axis is as good
+  if (cosine < -1.0 + kUpsideDown) return q;
+  const double s = std::sqrt((1.0 + cosine) * 2.0);
+  q.vec() = from.cross(to) * (1.0 / s);
+  q.w() = 0.5 * s;
+  return q;
 }
 
 }  // namespace perdure

@@ -2,12 +2,13 @@
 
 #include <cmath>
 
+#include "common/math/so3.h"
+
 namespace perdure::gateway {
 
 Cuboid cuboidOf(const ObjectBelief& object, const Eigen::Vector3d& up_W) {
   const Vector7d& x = object.best().mean;
-  const Eigen::Quaterniond level =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up_W);
+  const Eigen::Quaterniond level = levelling(up_W).conjugate();
   const Eigen::Quaterniond yaw(Eigen::AngleAxisd(x[3], Eigen::Vector3d::UnitZ()));
   return {RigidTransform(Eigen::Quaterniond(level * yaw), Eigen::Vector3d(x.head<3>())),
           x.tail<3>().array().exp().matrix()};

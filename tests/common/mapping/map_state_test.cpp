@@ -14,7 +14,7 @@ using test::apply;
 using test::expectSame;
 using test::isEmpty;
 
-constexpr WorldId kFirst{1, 0}, kSecond{2, 0};
+constexpr WorldId kOlder{1, 0}, kYounger{2, 0};
 
 Anchor anchorAt(AnchorId id, AnchorId previous, const WorldId& session, double x) {
   Anchor anchor;
@@ -64,7 +64,7 @@ class Pair {
 
 TEST(MapState, ASeenObjectIsSavedOnceItIsConfirmed) {
   Pair pair;
-  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kFirst, 0.0)); });
+  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kOlder, 0.0)); });
   pair.see(7, 1, false, 1.0);
   pair.save();
   EXPECT_TRUE(pair.stored().records.empty());
@@ -78,7 +78,7 @@ TEST(MapState, ASeenObjectIsSavedOnceItIsConfirmed) {
 
 TEST(MapState, AnObjectThatIsGoneAndBegunAgainUnconfirmedIsNoLongerStored) {
   Pair pair;
-  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kFirst, 0.0)); });
+  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kOlder, 0.0)); });
   pair.see(7, 1, true, 1.0);
   pair.save();
   pair.both([](MapState& state) { state.erase(7); });
@@ -93,8 +93,8 @@ TEST(MapState, AnObjectThatIsGoneAndBegunAgainUnconfirmedIsNoLongerStored) {
 TEST(MapState, WhatCameAndWentBetweenTwoSavesLeavesNothing) {
   Pair pair;
   pair.both([](MapState& state) {
-    state.add(anchorAt(1, 0, kFirst, 0.0));
-    state.add(anchorAt(2, 1, kFirst, 12.0));
+    state.add(anchorAt(1, 0, kOlder, 0.0));
+    state.add(anchorAt(2, 1, kOlder, 12.0));
   });
   pair.save();
   pair.see(7, 1, true, 1.0);
@@ -113,8 +113,8 @@ TEST(MapState, WhatCameAndWentBetweenTwoSavesLeavesNothing) {
 TEST(MapState, AnAnchorThatIsNoLongerTheFirstOneIsSavedThoughItStaysWhereItIs) {
   Pair pair;
   pair.both([](MapState& state) {
-    state.add(anchorAt(1, 0, kFirst, 0.0));
-    state.add(anchorAt(2, 0, kSecond, 0.0));
+    state.add(anchorAt(1, 0, kOlder, 0.0));
+    state.add(anchorAt(2, 0, kYounger, 0.0));
   });
   pair.save();
   EXPECT_TRUE(pair.stored().anchors.at(2).held_fast);
@@ -199,12 +199,12 @@ TEST(MapState, NumbersOfClassesGoOnAfterARestart) {
 
 TEST(MapState, KnowsTheNewestAnchorOfEachSession) {
   MapState state({}, {});
-  EXPECT_FALSE(state.newestOf(kFirst));
-  state.add(anchorAt(1, 0, kFirst, 0.0));
-  state.add(anchorAt(2, 0, kSecond, 0.0));
-  state.add(anchorAt(3, 1, kFirst, 12.0));
-  EXPECT_EQ(state.newestOf(kFirst)->id, 3u);
-  EXPECT_EQ(state.newestOf(kSecond)->id, 2u);
+  EXPECT_FALSE(state.newestOf(kOlder));
+  state.add(anchorAt(1, 0, kOlder, 0.0));
+  state.add(anchorAt(2, 0, kYounger, 0.0));
+  state.add(anchorAt(3, 1, kOlder, 12.0));
+  EXPECT_EQ(state.newestOf(kOlder)->id, 3u);
+  EXPECT_EQ(state.newestOf(kYounger)->id, 2u);
   EXPECT_EQ(state.nextAnchor(), 4u);
 }
 

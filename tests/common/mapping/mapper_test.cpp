@@ -10,8 +10,6 @@ namespace {
 
 using namespace test;
 
-const Settings kDrifting{.seed = 4, .yaw_walk = 0.002};
-
 TEST(Mapper, ClosesTheLoopOfASecondLap) {
   std::size_t right = 0;
   for (const std::uint32_t seed : {1u, 2u, 3u}) {

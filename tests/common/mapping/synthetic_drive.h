@@ -73,6 +73,8 @@ struct Settings {
   std::size_t tracked = 99;  ///< `least_tracked`, where it is not 99
 };
 
+inline const Settings kDrifting{.seed = 4, .yaw_walk = 0.002};
+
 /// What outlasts a session: the store's file has it.
 struct Archive {
   struct Stored {

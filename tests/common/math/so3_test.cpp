@@ -71,5 +71,16 @@ TEST(RigidTransform, BoxMinusInvertsBoxPlusAndProductsCancel) {
   EXPECT_LT((T.inverse() * (T * point) - point).norm(), 1e-12);
 }
 
+TEST(So3, LevellingTakesUpToZWithoutYaw) {
+  for (const Eigen::Vector3d& up : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.3, -0.2, 0.9),
+                                    Eigen::Vector3d(2, 0, 0), Eigen::Vector3d(1e-7, 0, -1),
+                                    Eigen::Vector3d(0, 0, -3)}) {
+    const Eigen::Quaterniond q = levelling(up);
+    EXPECT_NEAR(q.norm(), 1.0, 1e-9) << up.transpose();
+    EXPECT_LT((q * up.normalized() - Eigen::Vector3d::UnitZ()).norm(), 1e-6) << up.transpose();
+    EXPECT_EQ(q.z(), 0.0) << "about a horizontal axis";
+  }
+}
+
 }  // namespace
 }  // namespace perdure

@@ -23,7 +23,7 @@ using testing::TrueObject;
 using Wire = perdure_msg_Detections;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::uint64_t kFrames = 25;
+constexpr std::uint64_t kFrameCount = 25;
 
 Detections truthAt(std::uint64_t k) {
   static const std::vector<TrueObject> street = {
@@ -154,7 +154,7 @@ void expectSameBits(const Belief& a, const Belief& b) {
 
 /// Drives with true detections; `before` may send others before those of each frame.
 void drive(Gateway& g, const std::function<void(std::uint64_t)>& before = {}) {
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
+  for (std::uint64_t k = 0; k < kFrameCount; ++k) {
     g.filter.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
     if (before) before(k);
     g.send(truthAt(k));
@@ -203,7 +203,7 @@ TEST(NodeMalformedDetections, InAnyMixtureLeaveTheBeliefAsItIs) {
 TEST(NodeMalformedDetections, InventedStampsDoNotDisplaceDetectionsThatWaitForOdometry) {
   Gateway clean, attacked;
   drive(clean);
-  for (std::uint64_t k = 0; k < kFrames; ++k) {
+  for (std::uint64_t k = 0; k < kFrameCount; ++k) {
     if (k > 0) {
       attacked.send(truthAt(k));  // before its odometry
       for (std::uint64_t i = 0; i < 40; ++i) {
@@ -225,7 +225,7 @@ TEST(NodeMalformedDetections, AModelThatContradictsItsHashIsRefused) {
   ModelInfo liar = testing::makeModelInfo();
   std::reverse(liar.classes.begin(), liar.classes.end());
   drive(attacked, [&](std::uint64_t) { attacked.filter.node.onModel(liar); });
-  EXPECT_EQ(attacked.counted("model_contradicts_its_hash"), kFrames);
+  EXPECT_EQ(attacked.counted("model_contradicts_its_hash"), kFrameCount);
   expectSameBits(clean.filter.node.belief(), attacked.filter.node.belief());
 }
 

@@ -50,7 +50,7 @@ Detections boxesAt(std::uint64_t k, double noise, double azimuth_sigma = 0.0) {
   return detectionsAt(k, std::move(list));
 }
 
-void drive(Harness& h, double noise, double azimuth_sigma = 0.0) {
+void driveWithNoise(Harness& h, double noise, double azimuth_sigma = 0.0) {
   for (std::uint64_t k = 0; k < kFrames; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
     h.node.onDetections(boxesAt(k, noise, azimuth_sigma));
@@ -64,7 +64,7 @@ double learned(const Harness& h) {
 
 double learnedFrom(double noise) {
   Harness h;
-  drive(h, noise);
+  driveWithNoise(h, noise);
   return learned(h);
 }
 
@@ -88,7 +88,7 @@ double azimuthsLearnedFrom(double sigma, double assumed = Parameters{}.box.prior
   Config config;
   config.filter.box.prior_azimuths = assumed;
   Harness h(config);
-  drive(h, 0.35, sigma);
+  driveWithNoise(h, 0.35, sigma);
   return azimuthsLearned(h, assumed);
 }
 
@@ -125,14 +125,14 @@ TEST(NodeNoiseScale, LearnsTheSameFromLateBoxes) {
 TEST(NodeNoiseScale, ReportsTheNoiseScaleOfTheBoxes) {
   Harness h;
   EXPECT_EQ(h.node.note(), "");
-  drive(h, 0.35);
+  driveWithNoise(h, 0.35);
   EXPECT_NE(h.node.note().find("boxes err 0."), std::string::npos) << h.node.note();
   EXPECT_EQ(h.node.note().find("azimuths"), std::string::npos) << h.node.note();
 }
 
 TEST(NodeNoiseScale, KeepsTheNoiseScaleWhenOdometryRestarts) {
   Harness h;
-  drive(h, 0.35, 0.1);
+  driveWithNoise(h, 0.35, 0.1);
   EXPECT_NE(h.node.note().find("azimuths err 0."), std::string::npos) << h.node.note();
   const double before = learned(h);
   const std::string note = h.node.note();

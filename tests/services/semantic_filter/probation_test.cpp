@@ -15,11 +15,11 @@ using testing::makeState;
 using testing::odometryAt;
 using testing::TrueObject;
 
-constexpr InstanceId kOld = 3, kNew = 4;
+constexpr InstanceId kOldModel = 3, kNewModel = 4;
 constexpr std::uint64_t kSwapAt = 20;
 constexpr double kSure = 0.95, kDoubtful = 0.75;  // existence
 
-const std::vector<TrueObject> kStreet = {{makeState(14, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
+const std::vector<TrueObject> kParked = {{makeState(14, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
                                          {makeState(16, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
                                          {makeState(24, 5.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
 
@@ -66,8 +66,8 @@ struct Watch : Harness {
   }
   /// Twenty frames by the old process, then the new one takes over.
   explicit Watch(bool told = true) {
-    frames(kSwapAt, kStreet, kOld);
-    if (told) node.onSwap(notice(SwapStep::kTookOver, kNew, kOld));
+    frames(kSwapAt, kParked, kOldModel);
+    if (told) node.onSwap(notice(SwapStep::kTookOver, kNewModel, kOldModel));
   }
   /// Existence of confirmed tracks, by id.
   std::map<ObjectId, double> confirmed() const {
@@ -83,17 +83,17 @@ TEST(Probation, ABlindNewProcessThatIsRolledBackCostsNothing) {
   Watch w;
   const auto before = w.confirmed();
   ASSERT_EQ(before.size(), 3U);
-  w.frames(12, {}, kNew);
+  w.frames(12, {}, kNewModel);
   EXPECT_EQ(w.objects.back().stamp.sequence, w.next - 1) << "frames are published on time";
   for (const auto& [id, existence] : before) {
     ASSERT_TRUE(w.confirmed().contains(id));
     EXPECT_GT(existence, kSure);
     EXPECT_NEAR(w.confirmed().at(id), existence, 0.02);
   }
-  w.node.onSwap(notice(SwapStep::kRolledBack, kOld, kNew));
+  w.node.onSwap(notice(SwapStep::kRolledBack, kOldModel, kNewModel));
   EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), 12U);
   EXPECT_EQ(w.node.reasons().of("detections_rolled_back"), 12U);
-  w.frames(3, kStreet, kOld);
+  w.frames(3, kParked, kOldModel);
   for (const auto& [id, existence] : before) EXPECT_TRUE(w.confirmed().contains(id));
   EXPECT_EQ(w.confirmed().size(), before.size()) << "nothing was initiated a second time";
 }
@@ -102,7 +102,7 @@ TEST(Probation, ABlindNewProcessThatIsRolledBackCostsNothing) {
 TEST(Probation, WithoutASwapAsManyEmptyFramesLowerExistence) {
   Watch w(false);
   ASSERT_EQ(w.confirmed().size(), 3U);
-  w.frames(12, {}, kNew);
+  w.frames(12, {}, kNewModel);
   for (const auto& [id, existence] : w.confirmed()) EXPECT_LT(existence, kDoubtful);
 }
 
@@ -110,16 +110,16 @@ TEST(Probation, BoxesElsewhereAreHeldBackAndInitiateNothing) {
   Watch w;
   const std::vector<TrueObject> elsewhere = {
       {makeState(12, 0.2, 0.75, 0.1, 4.3, 1.75, 1.5), "car"}};
-  w.frames(12, elsewhere, kNew);
-  w.node.onSwap(notice(SwapStep::kRolledBack, kNew, 0));  // it stopped by itself
+  w.frames(12, elsewhere, kNewModel);
+  w.node.onSwap(notice(SwapStep::kRolledBack, kNewModel, 0));  // it stopped by itself
   EXPECT_EQ(w.confirmed().size(), 3U);
   EXPECT_EQ(w.node.belief().tracks.size(), 3U);
 }
 
 TEST(Probation, RemovedObjectsAreDeletedWhenTheNewProcessHasPassed) {
   Watch w, plain(false);
-  w.frames(12, {}, kNew), plain.frames(12, {}, kNew);
-  w.node.onSwap(notice(SwapStep::kPassed, kNew, kOld));
+  w.frames(12, {}, kNewModel), plain.frames(12, {}, kNewModel);
+  w.node.onSwap(notice(SwapStep::kPassed, kNewModel, kOldModel));
   ASSERT_EQ(w.node.belief().tracks.size(), plain.node.belief().tracks.size());
   for (std::size_t i = 0; i < w.node.belief().tracks.size(); ++i) {
     EXPECT_DOUBLE_EQ(w.node.belief().tracks[i].existence, plain.node.belief().tracks[i].existence);
@@ -129,19 +129,19 @@ TEST(Probation, RemovedObjectsAreDeletedWhenTheNewProcessHasPassed) {
 
 TEST(Probation, RemovedObjectsAreDeletedWhenTheOldProcessHasNotObjectedInTime) {
   Watch w;
-  w.frames(Probation::kLongest, {}, kNew);
+  w.frames(Probation::kLongest, {}, kNewModel);
   EXPECT_EQ(w.confirmed().size(), 3U);
-  w.frames(1, {}, kNew);
+  w.frames(1, {}, kNewModel);
   for (const auto& [id, existence] : w.confirmed()) EXPECT_LT(existence, kDoubtful);
-  w.frames(5, {}, kNew);
+  w.frames(5, {}, kNewModel);
   EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), Probation::kLongest)
       << "nothing is held back a second time";
 }
 
 TEST(Probation, AProcessThatDetectsTheOthersIsTrustedAboutTheMissingOne) {
   Watch w, plain(false);
-  const std::vector<TrueObject> rest(kStreet.begin() + 1, kStreet.end());
-  w.frames(10, rest, kNew), plain.frames(10, rest, kNew);
+  const std::vector<TrueObject> rest(kParked.begin() + 1, kParked.end());
+  w.frames(10, rest, kNewModel), plain.frames(10, rest, kNewModel);
   EXPECT_EQ(w.node.reasons().of("detections_in_doubt"), 0U);
   ASSERT_EQ(w.node.belief().tracks.size(), plain.node.belief().tracks.size());
   EXPECT_LT(w.confirmed().begin()->second, kDoubtful);
@@ -149,8 +149,8 @@ TEST(Probation, AProcessThatDetectsTheOthersIsTrustedAboutTheMissingOne) {
 
 TEST(Probation, BlindFramesBetweenOthersAreUsedWhenDetectionsResume) {
   Watch w, plain(false);
-  w.frames(4, {}, kNew), plain.frames(4, {}, kNew);
-  w.frames(1, kStreet, kNew), plain.frames(1, kStreet, kNew);
+  w.frames(4, {}, kNewModel), plain.frames(4, {}, kNewModel);
+  w.frames(1, kParked, kNewModel), plain.frames(1, kParked, kNewModel);
   const auto a = w.confirmed(), b = plain.confirmed();
   ASSERT_EQ(a.size(), b.size());
   for (const auto& [id, existence] : a) EXPECT_DOUBLE_EQ(existence, b.at(id));

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 
 #include "common/math/so3.h"
@@ -23,17 +25,29 @@ Eigen::Vector3d rateAt(const TurningDrive& drive, double t) {
          Eigen::Vector3d(std::sin(5.1 * t), std::cos(4.3 * t), std::sin(3.2 * t + 1.0));
 }
 
-/// A grey value for a direction: waves of several lengths in several directions.
+constexpr int kWaves = 24;
+
+/// Of several lengths, in several directions.
+const std::array<Eigen::Vector3d, kWaves>& waves() {
+  static const auto all = [] {
+    std::array<Eigen::Vector3d, kWaves> made;
+    for (int i = 1; i <= kWaves; ++i) {
+      const Eigen::Vector3d wave(std::sin(1.7 * i), std::cos(2.3 * i), std::sin(0.9 * i + 0.4));
+      made[static_cast<std::size_t>(i - 1)] = (6.0 + 1.3 * i) * wave;
+    }
+    return made;
+  }();
+  return all;
+}
+
+/// A grey value for a direction.
 double textureAt(const Eigen::Vector3d& ray) {
-  double sum = 0.0;
-  for (int i = 1; i <= 24; ++i) {
-    const Eigen::Vector3d wave(std::sin(1.7 * i), std::cos(2.3 * i), std::sin(0.9 * i + 0.4));
-    sum += std::sin((6.0 + 1.3 * i) * wave.dot(ray) + 1.1 * i);
-  }
+  double sum = 0.0, phase = 0.0;
+  for (const Eigen::Vector3d& wave : waves()) sum += std::sin(wave.dot(ray) + (phase += 1.1));
   return 128.0 + 22.0 * sum;
 }
 
-cv::Mat imageOf(const Eigen::Quaterniond& q_WB) {
+cv::Mat rendered(const Eigen::Quaterniond& q_WB) {
   const Eigen::Quaterniond q_WC = q_WB * trueCameraPlace().q;
   cv::Mat image(kHeight, kWidth, CV_8UC1);
   for (int v = 0; v < kHeight; ++v) {
@@ -42,6 +56,14 @@ cv::Mat imageOf(const Eigen::Quaterniond& q_WB) {
       image.at<uchar>(v, u) = cv::saturate_cast<uchar>(textureAt(q_WC * ray.normalized()));
     }
   }
+  return image;
+}
+
+/// Most drives turn the same way: a view is rendered once.
+const cv::Mat& imageOf(const Eigen::Quaterniond& q_WB) {
+  static std::map<std::array<double, 4>, cv::Mat> known;
+  cv::Mat& image = known[{q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()}];
+  if (image.empty()) image = rendered(q_WB);
   return image;
 }
 

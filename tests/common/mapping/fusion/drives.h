@@ -190,4 +190,10 @@ inline Driven driven(const std::vector<Thing>& things, const DriveSettings& sett
   return Vehicle(things, settings).to(settings.to_m);
 }
 
+inline MapContents mapOfAShortDrive() {
+  static const auto things = thingsAlongBlock(1);
+  static const auto drive = driven(things, {.to_m = 100.0});
+  return drive.map;
+}
+
 }  // namespace perdure::mapping::test

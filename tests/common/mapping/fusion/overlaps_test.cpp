@@ -8,11 +8,6 @@
 namespace perdure::mapping {
 namespace {
 
-MapContents someMap() {
-  static const auto things = test::thingsAlongBlock(1);
-  return test::driven(things, {.to_m = 100.0}).map;
-}
-
 class Overlap : public ::testing::Test {
  protected:
   /// Another object of the same class, that far along and across.
@@ -44,7 +39,7 @@ class Overlap : public ::testing::Test {
     return 0;
   }
 
-  MapContents map_ = someMap();
+  MapContents map_ = test::mapOfAShortDrive();
   ObjectId car_ = car();
 };
 

@@ -7,11 +7,6 @@
 namespace perdure::mapping {
 namespace {
 
-MapContents someMap() {
-  static const auto things = test::thingsAlongBlock(1);
-  return test::driven(things, {.to_m = 100.0}).map;
-}
-
 constexpr SessionIdentity kElsewhere{71, 72};
 
 class OfProvenance : public ::testing::Test {
@@ -23,7 +18,7 @@ class OfProvenance : public ::testing::Test {
     return {kElsewhere, id, id_, belief().first_seen, last};
   }
 
-  MapContents map_ = someMap();
+  MapContents map_ = test::mapOfAShortDrive();
   ObjectId id_ = map_.objects.begin()->first;
 };
 

@@ -7,7 +7,7 @@
 namespace perdure::mapping {
 namespace {
 
-const std::vector<test::Thing>& things() {
+const std::vector<test::Thing>& block() {
   static const auto all = test::thingsAlongBlock(1);
   return all;
 }
@@ -15,7 +15,7 @@ const std::vector<test::Thing>& things() {
 SessionIdentity identityOf(const SavedMap& map) { return sessionsOf(map).front().identity; }
 
 TEST(SessionIdentity, IsThatOfTheSameDriveWhateverItsNumbersAre) {
-  const auto before = test::driven(things(), {.to_m = 100.0}).map.graph;
+  const auto before = test::driven(block(), {.to_m = 100.0}).map.graph;
   SavedMap now = before;
   now.anchors.clear();
   for (auto [id, saved] : before.anchors) {
@@ -30,8 +30,8 @@ TEST(SessionIdentity, IsThatOfTheSameDriveWhateverItsNumbersAre) {
 }
 
 TEST(SessionIdentity, DiffersBetweenDrivesAndByEveryBitOfTheFirstAnchors) {
-  const auto one = test::driven(things(), {.seed = 1, .to_m = 60.0}).map.graph;
-  const auto two = test::driven(things(), {.seed = 2, .to_m = 60.0}).map.graph;
+  const auto one = test::driven(block(), {.seed = 1, .to_m = 60.0}).map.graph;
+  const auto two = test::driven(block(), {.seed = 2, .to_m = 60.0}).map.graph;
   EXPECT_FALSE(identityOf(one).matches(identityOf(two))) << "the increments drift differently";
   SavedMap later = one;
   later.anchors.begin()->second.anchor.stamp.time += Duration(1);
@@ -39,7 +39,7 @@ TEST(SessionIdentity, DiffersBetweenDrivesAndByEveryBitOfTheFirstAnchors) {
 }
 
 TEST(SessionIdentity, MatchesWhileOneOfTheMapsKnowsOneAnchorOnly) {
-  const auto whole = test::driven(things(), {.to_m = 60.0}).map.graph;
+  const auto whole = test::driven(block(), {.to_m = 60.0}).map.graph;
   SavedMap begun = whole;
   begun.anchors.erase(std::next(begun.anchors.begin()), begun.anchors.end());
   EXPECT_EQ(identityOf(begun).second, 0u);
@@ -48,8 +48,8 @@ TEST(SessionIdentity, MatchesWhileOneOfTheMapsKnowsOneAnchorOnly) {
 }
 
 TEST(SessionIdentity, SessionsComeInTheOrderOfTheirFirstAnchors) {
-  SavedMap map = test::driven(things(), {.to_m = 60.0}).map.graph;
-  const auto other = test::driven(things(), {.seed = 2, .to_m = 60.0, .world = {4, 0}}).map.graph;
+  SavedMap map = test::driven(block(), {.to_m = 60.0}).map.graph;
+  const auto other = test::driven(block(), {.seed = 2, .to_m = 60.0, .world = {4, 0}}).map.graph;
   for (auto [id, saved] : other.anchors) {
     saved.anchor.id = id + 50;
     if (saved.anchor.previous != 0) saved.anchor.previous += 50;

@@ -9,14 +9,14 @@ namespace {
 
 using test::Driven;
 
-const std::vector<test::Thing>& things() {
+const std::vector<test::Thing>& allThings() {
   static const auto all = test::thingsAlongBlock(2);
   return all;
 }
 
 TEST(UnitedMap, RenumbersWhatCollidesAndSaysWhatItWas) {
-  const Driven a = test::driven(things(), {.seed = 1, .to_m = 120.0});
-  const Driven b = test::driven(things(), {.seed = 2, .from_m = 200.0, .to_m = 320.0});
+  const Driven a = test::driven(allThings(), {.seed = 1, .to_m = 120.0});
+  const Driven b = test::driven(allThings(), {.seed = 2, .from_m = 200.0, .to_m = 320.0});
   MapContents map = a.map;
   const Addition addition = unite(map, b.map);
   ASSERT_EQ(addition.sessions.size(), 1u);
@@ -48,8 +48,8 @@ TEST(UnitedMap, RenumbersWhatCollidesAndSaysWhatItWas) {
 }
 
 TEST(UnitedMap, KeepsIdsAndWorldsThatAreFree) {
-  const Driven a = test::driven(things(), {.seed = 1, .to_m = 100.0});
-  Driven b = test::driven(things(), {.seed = 2, .from_m = 200.0, .to_m = 300.0, .world = {7, 2}});
+  const Driven a = test::driven(allThings(), {.seed = 1, .to_m = 100.0});
+  Driven b = test::driven(allThings(), {.seed = 2, .from_m = 200.0, .to_m = 300.0, .world = {7, 2}});
   MapContents apart = b.map;
   apart.objects.clear();
   apart.graph.records.clear();
@@ -65,8 +65,8 @@ TEST(UnitedMap, KeepsIdsAndWorldsThatAreFree) {
 }
 
 TEST(UnitedMap, ASessionThatIsKnownIsNotAddedAgain) {
-  const Driven a = test::driven(things(), {.seed = 1, .to_m = 150.0});
-  const Driven b = test::driven(things(), {.seed = 2, .from_m = 200.0, .to_m = 320.0});
+  const Driven a = test::driven(allThings(), {.seed = 1, .to_m = 150.0});
+  const Driven b = test::driven(allThings(), {.seed = 2, .from_m = 200.0, .to_m = 320.0});
   MapContents map = a.map;
   (void)unite(map, b.map);
   const MapContents once = map;
@@ -82,9 +82,9 @@ TEST(UnitedMap, ASessionThatIsKnownIsNotAddedAgain) {
 }
 
 TEST(UnitedMap, WhereASessionGoesOnItsAnchorsStillFollowEachOther) {
-  test::Vehicle vehicle(things(), {.seed = 1});
+  test::Vehicle vehicle(allThings(), {.seed = 1});
   const Driven a = vehicle.to(100.0), later = vehicle.to(200.0);
-  const Driven b = test::driven(things(), {.seed = 2, .from_m = 200.0, .to_m = 320.0});
+  const Driven b = test::driven(allThings(), {.seed = 2, .from_m = 200.0, .to_m = 320.0});
   MapContents map = a.map;
   (void)unite(map, b.map);
   const Addition addition = unite(map, later.map);
@@ -107,12 +107,12 @@ TEST(UnitedMap, WhereASessionGoesOnItsAnchorsStillFollowEachOther) {
 
 /// Two vehicles went on from copies of one map: they gave the same ids to different objects.
 TEST(UnitedMap, IdsThatWereGivenAfterTwoMapsPartedAreOfDifferentObjects) {
-  test::Vehicle vehicle(things(), {.seed = 1});
+  test::Vehicle vehicle(allThings(), {.seed = 1});
   const Driven base = vehicle.to(100.0);
   const auto wentOn = [&](std::uint32_t seed, double from_m) {
     MapContents map = base.map;
     const Driven drive = test::driven(
-        things(), {.seed = seed, .from_m = from_m, .to_m = from_m + 100.0, .clock_s = 50.0});
+        allThings(), {.seed = seed, .from_m = from_m, .to_m = from_m + 100.0, .clock_s = 50.0});
     MapContents renumbered = drive.map;
     (void)unite(map, renumbered);
     map.origins.clear();  // as a filter that was given the map would have numbered them

@@ -10,9 +10,9 @@
 namespace perdure::mapping {
 namespace {
 
-const LevelGaussian kStep{{{12.0, 0.0, 0.0}, 0.0}, 0.01 * Eigen::Matrix4d::Identity()};
+const LevelGaussian kForward{{{12.0, 0.0, 0.0}, 0.0}, 0.01 * Eigen::Matrix4d::Identity()};
 
-Edge loopOf(AnchorId a, AnchorId b) { return {a, b, kStep, EdgeKind::kLoop}; }
+Edge loopOf(AnchorId a, AnchorId b) { return {a, b, kForward, EdgeKind::kLoop}; }
 
 /// By walking along believed edges from each anchor.
 std::map<AnchorId, AnchorId> walked(const PoseGraph& graph) {
@@ -44,7 +44,7 @@ TEST(Components, AreThoseThatOneCanWalk) {
     const std::size_t sessions = 1 + random() % 8;
     for (std::size_t s = 0; s < sessions; ++s) {
       graph.addFirst(++id, {});
-      for (std::size_t k = random() % 6; k > 0; --k, ++id) graph.add(id + 1, id, kStep);
+      for (std::size_t k = random() % 6; k > 0; --k, ++id) graph.add(id + 1, id, kForward);
     }
     EdgeId edge = 1000;
     for (std::size_t k = random() % 7; k > 0; --k) {

@@ -10,13 +10,13 @@
 namespace perdure::mapping {
 namespace {
 
-Eigen::Matrix4d deviations(double metres, double yaw) {
+Eigen::Matrix4d levelCovariance(double metres, double yaw) {
   return Eigen::Vector4d(metres * metres, metres * metres, metres * metres, yaw * yaw).asDiagonal();
 }
 
-const LevelGaussian kStep{{{12.0, 1.0, 0.2}, 0.1}, deviations(0.1, 0.002)};
+const LevelGaussian kOnward{{{12.0, 1.0, 0.2}, 0.1}, levelCovariance(0.1, 0.002)};
 
-PoseGraph chain(std::size_t anchors, const LevelGaussian& step = kStep) {
+PoseGraph chain(std::size_t anchors, const LevelGaussian& step = kOnward) {
   PoseGraph graph{{}};
   graph.addFirst(1, {{3.0, 4.0, 0.0}, 1.0});
   for (std::size_t i = 2; i <= anchors; ++i) graph.add(i, i - 1, step);
@@ -24,8 +24,8 @@ PoseGraph chain(std::size_t anchors, const LevelGaussian& step = kStep) {
 }
 
 /// An edge as the anchors lie, with errors that are alike in no two axes.
-Edge loop(const PoseGraph& graph, AnchorId a, AnchorId b) {
-  Eigen::Matrix4d S = deviations(0.2, 0.01);
+Edge loopBetween(const PoseGraph& graph, AnchorId a, AnchorId b) {
+  Eigen::Matrix4d S = levelCovariance(0.2, 0.01);
   S(0, 1) = S(1, 0) = 0.01;
   S(1, 3) = S(3, 1) = 0.0005;
   S(2, 2) = 0.09;
@@ -33,7 +33,7 @@ Edge loop(const PoseGraph& graph, AnchorId a, AnchorId b) {
 }
 
 /// What the optimiser adds to the covariance of each edge.
-Eigen::Matrix4d floorOfEdges() { return deviations(1e-3, 1e-5); }
+Eigen::Matrix4d floorOfEdges() { return levelCovariance(1e-3, 1e-5); }
 
 /// d(error of T_AB) by the errors of the poses of A and of B.
 struct Jacobians {
@@ -78,9 +78,9 @@ double relative(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
 
 TEST(Marginals, AreTheDenseInverseOfTheSameNormalEquations) {
   PoseGraph graph = chain(14);
-  graph.add(loop(graph, 2, 9));
-  graph.add(loop(graph, 4, 14));
-  graph.add(loop(graph, 5, 12));
+  graph.add(loopBetween(graph, 2, 9));
+  graph.add(loopBetween(graph, 4, 14));
+  graph.add(loopBetween(graph, 5, 12));
   for (const AnchorId from : {14, 7, 1}) {
     const Marginals marginals(graph, from);
     for (const auto& [id, pose] : graph.poses()) {
@@ -95,7 +95,7 @@ TEST(Marginals, AreTheDenseInverseOfTheSameNormalEquations) {
 }
 
 TEST(Marginals, ComposeAlongAChainWithoutLoops) {
-  LevelGaussian step = kStep;
+  LevelGaussian step = kOnward;
   const PoseGraph graph = chain(9, step);
   step.covariance += floorOfEdges();
   LevelGaussian expected;
@@ -127,10 +127,10 @@ TEST(Marginals, AreNothingAtTheirBeginning) {
 }
 
 TEST(Marginals, OfTwoIndependentWaysAreTighterThanTheBetterOne) {
-  PoseGraph graph = chain(2, {{{10.0, 0.0, 0.0}, 0.0}, deviations(0.3, 0.01)});
+  PoseGraph graph = chain(2, {{{10.0, 0.0, 0.0}, 0.0}, levelCovariance(0.3, 0.01)});
   const double one = Marginals(graph, 1).to(2)->covariance(0, 0);
   const LevelPose apart = graph.pose(1).inverse() * graph.pose(2);
-  graph.add({1, 2, {apart, deviations(0.4, 0.02)}, EdgeKind::kLoop});
+  graph.add({1, 2, {apart, levelCovariance(0.4, 0.02)}, EdgeKind::kLoop});
   const Eigen::Matrix4d two = Marginals(graph, 1).to(2)->covariance;
   EXPECT_NEAR(one, 0.09, 1e-5);
   EXPECT_NEAR(two(0, 0), 1.0 / (1.0 / 0.09 + 1.0 / 0.16), 1e-5);
@@ -142,7 +142,7 @@ TEST(Marginals, KnowWhatALoopMeasures) {
   const double along = Marginals(graph, 60).to(1)->covariance.trace();
   EXPECT_GT(along, 1.0);
   const LevelPose apart = graph.pose(60).inverse() * graph.pose(1);
-  graph.add({60, 1, {apart, deviations(0.05, 0.001)}, EdgeKind::kLoop});
+  graph.add({60, 1, {apart, levelCovariance(0.05, 0.001)}, EdgeKind::kLoop});
   const Marginals marginals(graph, 60);
   const double closed = marginals.to(1)->covariance.trace();
   EXPECT_LT(closed, 3.0 * 0.051 * 0.051);
@@ -158,7 +158,7 @@ TEST(Marginals, DoNotCountALoopThatTheOptimiserDoesNotBelieve) {
   const Eigen::Matrix4d along = Marginals(graph, 1).to(20)->covariance;
   LevelPose apart = graph.pose(1).inverse() * graph.pose(20);
   apart.p.x() += 100.0;
-  const EdgeId wrong = graph.add({1, 20, {apart, deviations(0.05, 0.001)}, EdgeKind::kLoop});
+  const EdgeId wrong = graph.add({1, 20, {apart, levelCovariance(0.05, 0.001)}, EdgeKind::kLoop});
   graph.optimise();
   ASSERT_LT(graph.weight(wrong), kBelieved);
   EXPECT_NEAR(Marginals(graph, 1).to(20)->covariance.trace(), along.trace(), 0.02 * along.trace());
@@ -167,7 +167,7 @@ TEST(Marginals, DoNotCountALoopThatTheOptimiserDoesNotBelieve) {
 TEST(Marginals, SayNothingOfWhatCannotBeReached) {
   PoseGraph graph = chain(5);
   graph.addFirst(100, {});
-  graph.add(101, 100, kStep);
+  graph.add(101, 100, kOnward);
   const Marginals marginals(graph, 5);
   EXPECT_TRUE(marginals.to(1));
   EXPECT_FALSE(marginals.to(100));
@@ -177,7 +177,7 @@ TEST(Marginals, SayNothingOfWhatCannotBeReached) {
   // Two that are held fast do not know of each other by that.
   EXPECT_FALSE(Marginals(graph, 1).to(100));
   EXPECT_LT(relative(Marginals(graph, 100).to(101)->covariance,
-                     compose({}, {kStep.mean, kStep.covariance + floorOfEdges()}).covariance),
+                     compose({}, {kOnward.mean, kOnward.covariance + floorOfEdges()}).covariance),
             1e-9);
 }
 

@@ -18,7 +18,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr std::size_t kAnchors = 120;
-constexpr double kStep = 12.0;
+constexpr double kStep_m = 12.0;
 
 Eigen::Matrix4d diagonal(double metres, double yaw) {
   return Eigen::Vector4d(metres * metres, metres * metres, metres * metres, yaw * yaw).asDiagonal();
@@ -40,7 +40,7 @@ class Dice {
 /// Twice round a circle: anchor i + 60 stands where anchor i stands.
 LevelPose truth(std::size_t i) {
   const double angle = 2.0 * pi * static_cast<double>(i) / 60.0;
-  const double radius = 60.0 * kStep / (2.0 * pi);
+  const double radius = 60.0 * kStep_m / (2.0 * pi);
   return {{radius * std::sin(angle), radius - radius * std::cos(angle), 0.0}, wrapAngle(angle)};
 }
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
+#include "tests/services/capture/live/times.h"
+
 namespace perdure::capture {
 namespace {
-
-constexpr std::int64_t kMs = 1'000'000, kSecond = 1'000'000'000;
 
 TEST(HostClock, GoesAsTheSystemsClocksDo) {
   const HostClock clock;

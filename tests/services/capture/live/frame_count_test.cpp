@@ -2,12 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/services/capture/live/times.h"
+
 namespace perdure::capture {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 TEST(FrameNumbers, GoOnWhenTheCameraIsOpenedAgain) {
   FrameNumbers numbers;

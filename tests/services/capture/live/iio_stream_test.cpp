@@ -9,6 +9,7 @@
 
 #include "services/capture/live/clocks.h"
 #include "tests/services/capture/live/fake_iiod.h"
+#include "tests/services/capture/live/times.h"
 
 namespace perdure::capture {
 namespace {
@@ -17,8 +18,6 @@ using namespace std::chrono_literals;
 using testing::FakeIiod;
 using testing::FakeImu;
 using ::testing::HasSubstr;
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 /// Of the process and of the test: tests run beside each other.
 std::string ownAddress() {

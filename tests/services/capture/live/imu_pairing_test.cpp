@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <random>
 
+#include "tests/services/capture/live/times.h"
+
 namespace perdure::capture {
 namespace {
-
-constexpr std::int64_t kMs = 1'000'000;
 
 Triad at(double ms, const Eigen::Vector3d& v) { return {static_cast<std::int64_t>(ms * kMs), v}; }
 Eigen::Vector3d ramp(double ms) { return {ms, -2.0 * ms, 9.81}; }

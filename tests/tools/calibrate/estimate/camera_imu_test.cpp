@@ -153,7 +153,7 @@ TEST(CameraImu, SlowMotionIsToldByItsStatedErrorsAndByTheVerdict) {
   SimulatedOptions options;
   options.board = Board::parse(kSmallGrid);
   options.seed = 16;
-  options.seconds = 16.0;
+  options.seconds = 10.0;
   options.shake = false;
   const auto simulated = simulateCalibration(options);
   const CameraImuInput input{

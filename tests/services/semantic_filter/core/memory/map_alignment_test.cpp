@@ -15,8 +15,8 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr AlignmentParameters kParameters;
+constexpr double kDegree_rad = std::numbers::pi / 180.0;
+constexpr AlignmentParameters kAlignment;
 
 /// A grid of streets with objects beside them, as in the simulator's towns: parked cars along the
 /// kerb at uneven gaps, other objects between.
@@ -32,7 +32,7 @@ class Town {
       PlacedThing thing;
       thing.id = i + 1;
       thing.p = east ? Eigen::Vector3d(s, off, 0.75) : Eigen::Vector3d(off, s, 0.75);
-      thing.yaw = car ? (east ? 0.0 : 90.0 * kDegree) : 180.0 * kDegree * any(random_);
+      thing.yaw = car ? (east ? 0.0 : 90.0 * kDegree_rad) : 180.0 * kDegree_rad * any(random_);
       thing.pmf = {{car                  ? "car"
                     : any(random_) < 0.5 ? "person"
                                          : "bench",
@@ -77,7 +77,7 @@ class Town {
     const Eigen::Vector3d deviation(0.2 + 0.5 * any(random_), 0.15, 0.1);
     Eigen::Matrix4d P = Eigen::Matrix4d::Zero();
     P.topLeftCorner<3, 3>() = R * deviation.array().square().matrix().asDiagonal() * R.transpose();
-    P(3, 3) = std::pow(10.0 * kDegree, 2);
+    P(3, 3) = std::pow(10.0 * kDegree_rad, 2);
     return P;
   }
 
@@ -102,7 +102,7 @@ std::vector<PlacedThing> in(const Turn& W, std::vector<PlacedThing> things) {
   return things;
 }
 
-const Turn kTurn{130.0 * kDegree, {410.0, -95.0, 1.3}};
+const Turn kTurn{130.0 * kDegree_rad, {410.0, -95.0, 1.3}};
 
 Eigen::Vector4d errorOf(const FrameAlignment& found) {
   Eigen::Vector4d error;
@@ -116,13 +116,13 @@ TEST(MapAlignment, ATownIsFoundInItsPlaceWithAnHonestCovariance) {
   double squared = 0.0;
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     Town town(seed);
-    const MapAlignment map(town.believed(town.truth()), kParameters);
+    const MapAlignment map(town.believed(town.truth()), kAlignment);
     const auto found = map.align(in(kTurn, town.believed(town.near({10, -5}, 25.0))));
     if (!found) continue;
     ++detected_on_revisit;
     const Eigen::Vector4d error = errorOf(*found);
     EXPECT_LT(error.head<3>().norm(), 1.0) << seed;
-    EXPECT_LT(std::abs(error[3]), 4.0 * kDegree) << seed;
+    EXPECT_LT(std::abs(error[3]), 4.0 * kDegree_rad) << seed;
     squared += squaredMahalanobis(error, found->covariance) / 4.0;
     for (const auto& [remembered, seen] : found->pairs) EXPECT_EQ(remembered + 1000, seen) << seed;
   }
@@ -135,11 +135,11 @@ TEST(MapAlignment, ATownIsFoundInItsPlaceWithAnHonestCovariance) {
 TEST(MapAlignment, AnotherTownOfTheSameKindIsNotTakenForIt) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     Town town(seed), another(seed + 1000);
-    const MapAlignment map(town.believed(town.truth()), kParameters);
+    const MapAlignment map(town.believed(town.truth()), kAlignment);
     const auto seen = in(kTurn, another.believed(another.near({10, -5}, 35.0)));
     EXPECT_FALSE(map.align(seen)) << seed;
     const auto best = map.best(seen);
-    EXPECT_TRUE(!best || best->nats < kParameters.nats) << seed << " " << best->nats;
+    EXPECT_TRUE(!best || best->nats < kAlignment.nats) << seed << " " << best->nats;
   }
 }
 
@@ -147,7 +147,7 @@ TEST(MapAlignment, MovedAndNewObjectsDoNotPreventIt) {
   std::size_t detected_on_revisit = 0;
   for (std::uint32_t seed = 1; seed <= 30; ++seed) {
     Town town(seed), another(seed + 500);
-    const MapAlignment map(town.believed(town.truth()), kParameters);
+    const MapAlignment map(town.believed(town.truth()), kAlignment);
     auto seen = town.believed(town.near({10, -5}, 35.0));
     for (std::size_t i = 0; i < seen.size(); i += 3) seen[i].p += Eigen::Vector3d(3.0, -4.0, 0.0);
     const auto guests = another.believed(another.near({10, -5}, 15.0));
@@ -170,12 +170,12 @@ TEST(MapAlignment, ARowOfEqualObjectsFitsInManyWaysUntilOneOfThemDiffers) {
     car.pmf = {{"car", 0.95}, {kOtherClass, 0.05}};
     row.push_back(car);
   }
-  const MapAlignment map(row, kParameters);
+  const MapAlignment map(row, kAlignment);
   const std::vector<PlacedThing> part(row.begin() + 4, row.begin() + 14);
   EXPECT_FALSE(map.align(in(kTurn, part)));
   const auto best = map.best(in(kTurn, part));
   ASSERT_TRUE(best);
-  EXPECT_GT(best->nats, kParameters.nats) << "it fits";
+  EXPECT_GT(best->nats, kAlignment.nats) << "it fits";
   EXPECT_GT(best->next_nats, best->nats - 3.0) << "and as well elsewhere";
 
   for (const auto& [at, name] : {std::pair{7, "truck"}, {9, "bench"}, {12, "person"}}) {
@@ -183,7 +183,7 @@ TEST(MapAlignment, ARowOfEqualObjectsFitsInManyWaysUntilOneOfThemDiffers) {
     row[i].pmf = {{name, 0.95}, {kOtherClass, 0.05}};
     row[i].p.y() = 2.5;
   }
-  const MapAlignment odd(row, kParameters);
+  const MapAlignment odd(row, kAlignment);
   const auto found = odd.align(in(kTurn, {row.begin() + 4, row.begin() + 14}));
   ASSERT_TRUE(found);
   EXPECT_LT(errorOf(*found).norm(), 0.3);
@@ -191,7 +191,7 @@ TEST(MapAlignment, ARowOfEqualObjectsFitsInManyWaysUntilOneOfThemDiffers) {
 
 TEST(MapAlignment, OfTwoSeenObjectsForOneMapObjectNeitherIsAPair) {
   Town town(2);
-  const MapAlignment map(town.believed(town.truth()), kParameters);
+  const MapAlignment map(town.believed(town.truth()), kAlignment);
   auto seen = in(kTurn, town.believed(town.near({10, -5}, 35.0)));
   const auto alone = map.align(seen);
   ASSERT_TRUE(alone);
@@ -211,16 +211,16 @@ TEST(MapAlignment, OfTwoSeenObjectsForOneMapObjectNeitherIsAPair) {
 
 TEST(MapAlignment, TooFewObjectsGiveNoAlignment) {
   Town town(1);
-  const MapAlignment map(town.believed(town.truth()), kParameters);
+  const MapAlignment map(town.believed(town.truth()), kAlignment);
   EXPECT_FALSE(map.align({}));
   EXPECT_FALSE(map.align(in(kTurn, town.believed(town.near({10, -5}, 6.0)))));
-  EXPECT_FALSE(MapAlignment({}, kParameters).align(in(kTurn, town.believed(town.truth()))));
+  EXPECT_FALSE(MapAlignment({}, kAlignment).align(in(kTurn, town.believed(town.truth()))));
 }
 
 TEST(MapAlignment, ObjectsOfKnownIdentityRefineItAroundThem) {
   Town town(4);
   FrameAlignment rough;
-  rough.yaw = kTurn.yaw + 2.0 * kDegree;
+  rough.yaw = kTurn.yaw + 2.0 * kDegree_rad;
   rough.p = kTurn.p + Eigen::Vector3d(0.4, -0.5, 0.2);
   const auto there = town.believed(town.truth()), here = in(kTurn, town.believed(town.truth()));
   std::vector<std::pair<PlacedThing, PlacedThing>> pairs;
