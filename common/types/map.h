@@ -109,6 +109,8 @@ struct Recalled {
   /// The beliefs were laid where they are by the map's graph: covariances are relative to the body,
   /// and cross_pose is zero. False: as they were in W.
   bool laid = false;
+  /// The map's graph hears this odometry, and takes its drift out.
+  bool graph = false;
   std::vector<MergeOrder> merges;  ///< to be done once `objects` are in the working set
   /// Merges to be undone before anything else: their loop was withdrawn. What was seen of the
   /// survivor since is of the absorbed one.

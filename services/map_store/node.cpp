@@ -269,6 +269,7 @@ void Node::recall(const MapQuery& query) {
   recalled.next_id = next_id_;
   recalled.objects = std::move(found->beliefs);
   recalled.request = query.request;
+  recalled.graph = by_graph;
   if (kept_of_ == query.client) recalled.kept = kept_;
   recalled.truncated = found->truncated;
   outputs_.recalled(recalled);

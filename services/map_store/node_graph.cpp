@@ -225,7 +225,7 @@ void Node::recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
   recalled.world = newest_->world;
   recalled.client = newest_->instance;
   recalled.next_id = next_id_;
-  recalled.laid = true;
+  recalled.laid = recalled.graph = true;
   recalled.merges = change.merges;
   recalled.splits = change.splits;
   std::set<ObjectId> working;

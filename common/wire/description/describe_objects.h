@@ -118,6 +118,7 @@ void describe(A& a, D& d, W& w) {
   a.time("kept_ns", d.kept, w.kept_ns);
   a.value("truncated", d.truncated, w.truncated);
   a.value("laid", d.laid, w.laid);
+  a.value("graph", d.graph, w.graph);
   a.list("merges", d.merges, w.merges, kObjects);
   a.list("splits", d.splits, w.splits, kObjects);
 }

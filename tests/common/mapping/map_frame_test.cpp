@@ -10,7 +10,7 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr double kPosition = 0.05, kYaw = 0.004;  // m/√m, rad/√m
+constexpr double kWalkPosition = 0.05, kWalkYaw = 0.004;  // m/√m, rad/√m
 
 /// An angle of two streets, a metre a step, in a W that is turned.
 LevelPose stepOf(int i) { return {{1.0, 0.0, 0.0}, i == 60 ? 1.4 : 0.0}; }
@@ -29,8 +29,8 @@ Odometry at(int i, const LevelPose& T_WB, const WorldId& world = {3, 1}) {
 
 Parameters walking() {
   Parameters parameters;
-  parameters.anchor.walk_position = kPosition;
-  parameters.anchor.walk_yaw = kYaw;
+  parameters.anchor.walk_position = kWalkPosition;
+  parameters.anchor.walk_yaw = kWalkYaw;
   return parameters;
 }
 
@@ -77,8 +77,8 @@ TEST(MapFrame, ItsCovarianceIsThatOfDrawnErrors) {
     LevelPose T = kBegin;
     for (int i = 1; i <= end; ++i) {
       LevelPose step = stepOf(i);
-      step.p += kPosition * Eigen::Vector3d(normal(random), normal(random), normal(random));
-      step.yaw += kYaw * normal(random);
+      step.p += kWalkPosition * Eigen::Vector3d(normal(random), normal(random), normal(random));
+      step.yaw += kWalkYaw * normal(random);
       T = T * step;
     }
     const LevelError error = difference(T, nominal);

@@ -8,7 +8,7 @@ namespace perdure::mapping {
 namespace {
 
 const WorldId kFirst{7, 0}, kSecond{8, 0};
-constexpr double kStep_m = 10.0;
+constexpr double kSpacing_m = 10.0;
 
 TimePoint at(double seconds) { return TimePoint{} + durationFromSeconds(seconds); }
 
@@ -23,8 +23,9 @@ std::map<AnchorId, Anchor> anchors() {
     anchor.session = first ? kFirst : kSecond;
     const double n = static_cast<double>(first ? id - 1 : id - 5);
     anchor.stamp.time = at(n);
-    anchor.T_WA = RigidTransform(rotationAboutZ(0.1 * n), Eigen::Vector3d(kStep_m * n, 0.0, 1.0));
-    anchor.from_previous.mean = {{kStep_m, 0.0, 0.0}, 0.1};
+    anchor.T_WA =
+        RigidTransform(rotationAboutZ(0.1 * n), Eigen::Vector3d(kSpacing_m * n, 0.0, 1.0));
+    anchor.from_previous.mean = {{kSpacing_m, 0.0, 0.0}, 0.1};
     anchor.from_previous.covariance = 0.01 * Eigen::Matrix4d::Identity();
     result[id] = anchor;
   }

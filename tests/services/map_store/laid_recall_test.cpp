@@ -19,6 +19,7 @@ TEST_F(LaidRecall, ALoopLaysTheFirstLapBesideTheBodyAndJoinsWhatIsOne) {
   ASSERT_THAT(recalled_, IsEmpty());
   const Recalled laid = driveToTheLoop();
   ASSERT_TRUE(laid.laid);
+  EXPECT_TRUE(laid.graph);
   EXPECT_FALSE(laid.restore);
   EXPECT_EQ(laid.client, 11u);
   EXPECT_EQ(laid.world, kHere);
@@ -142,6 +143,7 @@ TEST_F(LaidRecall, WhatLeftUnseenIsLaidAgainWhenItIsAskedFor) {
   ask(there.best().mean.head<3>(), 20.0);
   ASSERT_EQ(recalled_.size(), 2u);
   EXPECT_FALSE(recalled_[0].laid);
+  EXPECT_TRUE(recalled_[0].graph);
   EXPECT_FALSE(has(recalled_[0], there.id)) << "where it was, is no longer true";
   EXPECT_TRUE(recalled_[1].laid);
   EXPECT_TRUE(has(recalled_[1], there.id));
@@ -172,6 +174,7 @@ TEST_F(LaidRecall, TheGraphOutlivesTheProcess) {
   ask(as_stored.best().mean.head<3>(), 5.0);
   ASSERT_EQ(recalled_.size(), 1u);
   EXPECT_FALSE(recalled_.front().laid);
+  EXPECT_TRUE(recalled_.front().graph);
   ASSERT_TRUE(has(recalled_.front(), 1));
   EXPECT_EQ(recalled_.front().objects.front().best().mean, as_stored.best().mean);
   EXPECT_EQ(recalled_.front().objects.front().best().covariance, as_stored.best().covariance);
@@ -185,6 +188,7 @@ TEST_F(LaidRecall, WithoutAGraphNothingIsLaid) {
   ask(T_WB_.p, 40.0);
   ASSERT_EQ(recalled_.size(), 1u);
   EXPECT_FALSE(recalled_.front().laid);
+  EXPECT_FALSE(recalled_.front().graph);
 }
 
 TEST_F(LaidRecall, WhatIsGoneIsNotLaid) {

@@ -11,7 +11,7 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr PlaceParameters kPlace;
+constexpr PlaceParameters kIndexed;
 
 struct Scatter {
   std::vector<PlacedObject> objects;
@@ -45,7 +45,7 @@ TEST(MapIndex, VisitsEachObjectInReachAndNoneTwice) {
   std::uniform_real_distribution<double> any(-300.0, 300.0);
   for (const Eigen::Vector2d& middle : kMiddles) {
     const Scatter s = scatter(1, 400, middle);
-    const MapIndex index(s.objects, s.driven, kPlace);
+    const MapIndex index(s.objects, s.driven, kIndexed);
     for (int i = 0; i < 200; ++i) {
       const Eigen::Vector2d at = middle + Eigen::Vector2d(any(random), any(random));
       std::multiset<std::size_t> visited;
@@ -66,13 +66,13 @@ TEST(MapIndex, VisitsEachObjectInReachAndNoneTwice) {
 
 TEST(MapIndex, HasEachOrderedPairOfTwoClassesOnceByDistance) {
   const Scatter s = scatter(2, 150, {-40.0, 20.0});
-  const MapIndex index(s.objects, s.driven, kPlace);
+  const MapIndex index(s.objects, s.driven, kIndexed);
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::set<std::pair<std::size_t, std::size_t>>>
       expected;
   for (std::size_t c = 0; c < s.objects.size(); ++c) {
     for (std::size_t d = 0; d < s.objects.size(); ++d) {
       const double distance = (s.objects[c].p - s.objects[d].p).head<2>().norm();
-      if (c == d || distance < kPlace.pair_least_m || distance > kPlace.pair_most_m) continue;
+      if (c == d || distance < kIndexed.pair_least_m || distance > kIndexed.pair_most_m) continue;
       expected[{mostProbable(s.objects[c]), mostProbable(s.objects[d])}].insert({c, d});
     }
   }
@@ -102,14 +102,14 @@ TEST(MapIndex, KnowsWhatStandsNearTheWay) {
   std::uniform_real_distribution<double> any(-400.0, 400.0);
   for (const Eigen::Vector2d& middle : kMiddles) {
     const Scatter s = scatter(3, 30, middle);
-    const MapIndex index(s.objects, s.driven, kPlace);
+    const MapIndex index(s.objects, s.driven, kIndexed);
     for (int i = 0; i < 300; ++i) {
       const Eigen::Vector2d at = middle + Eigen::Vector2d(any(random), any(random));
       double nearest = 1e9;
       for (const auto& d : s.driven) nearest = std::min(nearest, (d - at).norm());
-      const double reach = kPlace.known_within_m;
+      const double reach = kIndexed.known_within_m;
       const double share =
-          0.02 + kPlace.known_share * std::exp(-0.5 * nearest * nearest / (reach * reach));
+          0.02 + kIndexed.known_share * std::exp(-0.5 * nearest * nearest / (reach * reach));
       EXPECT_NEAR(index.knownShare(at), share, 0.5 * std::exp(-8.0) + 1e-12) << nearest;
     }
   }
@@ -117,7 +117,7 @@ TEST(MapIndex, KnowsWhatStandsNearTheWay) {
 
 TEST(MapIndex, CountsClassesAndTellsHowWideTheMapIs) {
   const Scatter s = scatter(4, 200, {-5000.0, 3000.0});
-  const MapIndex index(s.objects, s.driven, kPlace);
+  const MapIndex index(s.objects, s.driven, kIndexed);
   Eigen::Vector2d mean = Eigen::Vector2d::Zero(), square = Eigen::Vector2d::Zero();
   std::map<std::uint32_t, double> shares;
   for (const PlacedObject& o : s.objects) {
@@ -132,7 +132,7 @@ TEST(MapIndex, CountsClassesAndTellsHowWideTheMapIs) {
 }
 
 TEST(MapIndex, OfNothingSaysLittle) {
-  const MapIndex index({}, {}, kPlace);
+  const MapIndex index({}, {}, kIndexed);
   std::size_t visited = 0;
   index.around({0.0, 0.0}, [&](std::size_t) { ++visited; });
   EXPECT_EQ(visited, 0u);
