@@ -10,7 +10,7 @@ import numpy as np
 
 from . import messages
 from .bus import Publisher, Subscription
-from .errors import Missing, Unavailable
+from .errors import Missing, Unavailable, Unusable
 
 _MOST = 100_000  # objects in a reply
 
@@ -110,7 +110,10 @@ class Map:
         return reply
 
     def _ask_file(self, query):
-        return _files().ask(self._path, query, self._as_stored)
+        try:
+            return _files().ask(self._path, query, self._as_stored)
+        except Unavailable as error:
+            raise Unusable(str(error)) from None  # it is there
 
     def _ask_bus(self, query):
         """The same question again each half second until it is answered: one that was sent before

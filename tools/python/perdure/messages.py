@@ -83,7 +83,7 @@ class _Pose:
         self.p = np.zeros(3)
 
     @property
-    def rotation(self):
+    def rotation(self) -> "Array":
         """(3, 3): takes directions of the second frame to the first; of ``T_WB``, B to W."""
         x, y, z, w = self.q_xyzw
         return np.array(
@@ -95,14 +95,14 @@ class _Pose:
         )
 
     @property
-    def matrix(self):
+    def matrix(self) -> "Array":
         """(4, 4): takes points of the second frame to the first."""
         m = np.eye(4)
         m[:3, :3] = self.rotation
         m[:3, 3] = self.p
         return m
 
-    def __matmul__(self, points):
+    def __matmul__(self, points) -> "Array":
         """``T_WB @ points``: (3,) or (N, 3) points of B in W, in metres."""
         return np.asarray(points) @ self.rotation.T + self.p
 
@@ -113,17 +113,17 @@ class _State:
     __slots__ = ()
 
     @property
-    def position(self):
+    def position(self) -> "Array":
         """(3,) centre, m."""
         return self.mean[:3]
 
     @property
-    def yaw(self):
+    def yaw(self) -> "float":
         """rad, about the vertical."""
         return float(self.mean[3])
 
     @property
-    def size(self):
+    def size(self) -> "Array":
         """(3,) length, width, height, m."""
         return np.exp(self.mean[4:7])
 
@@ -132,32 +132,32 @@ class _ObjectBelief(_State):
     __slots__ = ()
 
     @property
-    def best(self):
+    def best(self) -> "ClassBelief":
         """The most probable ClassBelief."""
         return self.classes[0]
 
     @property
-    def class_name(self):
+    def class_name(self) -> "str":
         """Name of the most probable class."""
         return self.classes[0].name
 
     @property
-    def class_names(self):
+    def class_names(self) -> "List[str]":
         """Names of the classes, as ``pmf`` is ordered: the most probable first."""
         return [c.name for c in self.classes]
 
     @property
-    def pmf(self):
+    def pmf(self) -> "Array":
         """(K,) probabilities of the classes, given that the object exists; they sum to 1."""
         return np.array([c.probability for c in self.classes])
 
     @property
-    def mean(self):
+    def mean(self) -> "Array":
         """(7,) of the most probable class: centre, m; yaw, rad; log of length, width, height."""
         return self.classes[0].mean
 
     @property
-    def covariance(self):
+    def covariance(self) -> "Array":
         """(7, 7) of ``mean``."""
         return self.classes[0].covariance
 
@@ -165,29 +165,29 @@ class _ObjectBelief(_State):
 class _Objects:
     __slots__ = ()
 
-    def __iter__(self):
+    def __iter__(self) -> "Iterator[ObjectBelief]":
         return iter(self.objects)
 
-    def __len__(self):
+    def __len__(self) -> "int":
         return len(self.objects)
 
     @property
-    def ids(self):
+    def ids(self) -> "npt.NDArray[np.uint64]":
         """(N,) uint64."""
         return np.array([o.id for o in self.objects], np.uint64)
 
     @property
-    def existence(self):
+    def existence(self) -> "Array":
         """(N,) probabilities."""
         return np.array([o.existence for o in self.objects])
 
     @property
-    def mean(self):
+    def mean(self) -> "Array":
         """(N, 7) of each object's most probable class."""
         return np.array([o.mean for o in self.objects]).reshape(-1, 7)
 
     @property
-    def covariance(self):
+    def covariance(self) -> "Array":
         """(N, 7, 7) of ``mean``."""
         return np.array([o.covariance for o in self.objects]).reshape(-1, 7, 7)
 
@@ -196,7 +196,7 @@ class _ObjectState:
     __slots__ = ()
 
     @property
-    def id(self):
+    def id(self) -> "int":
         """The object's id, by which the topic is keyed."""
         return self.object.id
 
@@ -209,7 +209,7 @@ class _Box:
     __slots__ = ()
 
     @property
-    def box(self):
+    def box(self) -> "Array":
         """(4,) x1, y1, x2, y2, px of the distorted image; x right, y down."""
         return np.array([self.x1, self.y1, self.x2, self.y2])
 
@@ -222,7 +222,7 @@ class _Frame:
     __slots__ = ()
 
     @property
-    def image(self):
+    def image(self) -> "npt.NDArray[np.uint8]":
         """(height, width) uint8, or (height, width, 3) in the order blue, green, red.
 
         ``pixels`` itself, without a copy, unless the frame came as JPEG: it is unpacked then.

@@ -5,7 +5,7 @@ import warnings
 from typing import Any, Dict, Iterator, NamedTuple, Sequence
 
 from . import _perdure
-from .errors import Missing, OtherVersion, Unusable
+from .errors import Missing, OtherVersion, Unavailable, Unusable
 
 
 class Recorded(NamedTuple):
@@ -25,7 +25,10 @@ class Recording:
             raise Missing(f"there is no recording {self.path}; perdure record makes them")
         if isinstance(topics, str):
             topics = [topics]
-        self._inner = _perdure.Recording(self.path, list(topics))
+        try:
+            self._inner = _perdure.Recording(self.path, list(topics))
+        except Unavailable as error:
+            raise Unusable(str(error)) from None  # it is there
 
     @property
     def topics(self) -> Dict[str, int]:
