@@ -38,4 +38,4 @@ axes.set(xlabel="x of M [m]", ylabel="y of M [m]", aspect="equal")
 axes.autoscale_view()
 if names:
     axes.legend()
-figure.savefig(out, dpi=120) if out else plt.show()
+figure.savefig(out, dpi=120, bbox_inches="tight") if out else plt.show()
