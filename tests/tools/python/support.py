@@ -100,7 +100,17 @@ class Drive:
     """Six seconds of the simulated street, and what the pipeline made of them."""
 
     def __init__(self):
+        """As ctest has made it (PERDURE_PYTHON_DRIVE), or made here."""
+        made = os.environ.get("PERDURE_PYTHON_DRIVE")
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="perdure-python-"))
+        if made:
+            shutil.copytree(made, self.folder / "out")
+        else:
+            self.make()
+        self.mcap = self.folder / "out/run.mcap"
+        self.map = self.folder / "out/map.sqlite"
+
+    def make(self):
         perdure_tool(
             "simulate", "--scene", "street", "--seconds", 6, "--rate", 10, "--size", "160x120",
             "--no-images", "--quiet", "--out", self.folder / "street",
@@ -109,8 +119,6 @@ class Drive:
             "pipeline", "--data", self.folder / "street", "--odometry", "truth", "--detections",
             "simulated", "--record", "--quiet", "--out", self.folder / "out",
         )  # fmt: skip
-        self.mcap = self.folder / "out/run.mcap"
-        self.map = self.folder / "out/map.sqlite"
 
     def remove(self):
         shutil.rmtree(self.folder)
@@ -153,3 +161,9 @@ def same(test, message, value, path=""):
 
 
 main = unittest.main
+
+if __name__ == "__main__":  # for the others: support.py FOLDER
+    drive = Drive()
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
+    shutil.copytree(drive.folder / "out", sys.argv[1])
+    drive.remove()
