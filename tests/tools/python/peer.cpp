@@ -1,5 +1,6 @@
 // The C++ side of the tests of tools/python: `write` publishes one random message of each topic and
 // prints it; `read` prints what comes of vehicle "back" until it has one of each.
+#include <functional>
 #include <iostream>
 #include <list>
 #include <memory>
@@ -29,22 +30,27 @@ void print(const std::string& topic, const nlohmann::ordered_json& value) {
 /// 0: each reader has all of it.
 int writeAll(const Participant& participant, unsigned seed) {
   std::list<std::shared_ptr<RawWriter>> writers;
+  std::list<std::function<void()>> writes;
   forEachTopic([&]<class T>(const Topic<T>& topic) {
     auto writer = std::make_shared<Writer<T>>(participant, topic, WriterOptions{.strength = 3});
     writers.push_back(writer);
     for (int i = 0; i < 500 && writer->matched() == 0; ++i) std::this_thread::sleep_for(20ms);
-    T message;
-    wire::Examples(seed).fill(message);
-    if (const auto written = writer->write(message); !written) {
-      std::cerr << topic.name << ": " << written.error().code << " " << written.error().detail;
-      std::exit(1);
-    }
-    print(topic.name, wire::toJson(message));
+    writes.push_back([writer, seed, name = topic.name] {
+      T message;
+      wire::Examples(seed).fill(message);
+      if (const auto written = writer->write(message); !written) {
+        std::cerr << name << ": " << written.error().code << ' ' << written.error().detail << '\n';
+        std::exit(1);
+      }
+      print(name, wire::toJson(message));
+    });
   });
+  std::this_thread::sleep_for(300ms);  // predictions are best effort: both ends must have met
+  for (const auto& write : writes) write();
   for (const auto& writer : writers) {
     if (!writer->waitForAcknowledgement(5)) return 1;
   }
-  std::this_thread::sleep_for(200ms);  // predictions are best effort
+  std::this_thread::sleep_for(200ms);
   return 0;
 }
 
