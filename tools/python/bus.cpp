@@ -14,16 +14,47 @@ namespace perdure::python {
 
 namespace py = pybind11;
 
-bus::Options optionsOf(const BusSettings& settings, bool listens) {
-  bus::Options options = listens ? tools::listenersOptions() : tools::servicesOptions();
+namespace {
+
+bus::Options applied(const BusSettings& settings, bus::Options options) {
   if (settings.interface) options.interface = *settings.interface;
   if (settings.vehicle) options.vehicle = *settings.vehicle;
   if (settings.security) options.security = *settings.security;
   if (settings.identity) options.identity = *settings.identity;
   if (settings.peers) options.peers = *settings.peers;
-  options = bus::withEnvironment(options);
   if (settings.domain) options.domain = *settings.domain;
-  if (listens && options.identity.empty()) options.identity = "subscriber";
+  return bus::withEnvironment(options);
+}
+
+/// Throws StartupError where a domain that is open is not what is asked for.
+void requireSame(const bus::Options& open, const bus::Options& wanted) {
+  if (wanted.interface != open.interface || wanted.peers != open.peers) {
+    throw StartupError(ExitCode::kUsage,
+                       "this process is on domain " + std::to_string(open.domain) +
+                           " by interface " + open.interface +
+                           " already, and DDS opens a domain once a process; use the same "
+                           "interface and peers, or another process");
+  }
+  const bool same = wanted.security == open.security && wanted.identity == open.identity;
+  if (!same && !(wanted.security.empty() && open.security.empty())) {
+    throw StartupError(ExitCode::kUsage, "this process is the identity " + open.identity +
+                                             " of \"" + open.security +
+                                             "\" already, and is one alone; give identity=\"" +
+                                             open.identity + "\" here too, or use another process");
+  }
+}
+
+}  // namespace
+
+bus::Options optionsOf(const BusSettings& settings) {
+  bus::Options options = applied(settings, tools::listenersOptions());
+  if (options.identity.empty()) options.identity = "subscriber";
+  return options;
+}
+
+bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process) {
+  bus::Options options = applied(settings, tools::servicesOptions());
+  if (options.identity.empty()) options.identity = bus::identityOf(process);
   return options;
 }
 
@@ -37,19 +68,12 @@ bus::Domain openDomain(const bus::Options& options) {
     open.emplace(options.domain, domain);
     return *domain;
   }
-  const bus::Options& first = at->second->options();
-  if (options.interface != first.interface || options.peers != first.peers) {
-    throw StartupError(ExitCode::kUsage,
-                       "this process is on domain " + std::to_string(options.domain) +
-                           " by interface " + first.interface +
-                           " already, and DDS opens a domain once a process; use the same "
-                           "interface and peers, or another process");
-  }
+  requireSame(at->second->options(), options);
   return at->second->as(options.vehicle, options.security, options.identity);
 }
 
 Bus::Bus(const BusSettings& settings, const std::string& process)
-    : domain_(openDomain(optionsOf(settings, true))), participant_(domain_, process) {}
+    : domain_(openDomain(optionsOf(settings))), participant_(domain_, process) {}
 
 std::string Bus::place() const {
   return "domain " + std::to_string(options().domain) + ", interface " + options().interface +

@@ -18,12 +18,15 @@ struct BusSettings {
   std::optional<std::int64_t> domain = {};
   std::optional<std::vector<std::string>> peers = {};
 };
-/// `listens`: as the commands, without shared memory, under the identity "subscriber" where none is
-/// named; else as a service. Throws StartupError.
-bus::Options optionsOf(const BusSettings& settings, bool listens);
+/// As the commands listen, without shared memory, under the identity "subscriber" where none is
+/// named. Throws StartupError.
+bus::Options optionsOf(const BusSettings& settings);
+/// The same for a service: with shared memory, under the identity of its name.
+bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process);
 
-/// The domain of these options. DDS opens one once a process: a second call gets the same. Throws
-/// StartupError where it is open in another way.
+/// The domain of these options. DDS opens one once a process, and holds all its participants to
+/// what the first one's identity may do: a second call gets the same. Throws StartupError where it
+/// is open in another way.
 bus::Domain openDomain(const bus::Options& options);
 
 class Bus {

@@ -43,7 +43,8 @@ class InferenceService {
   InferenceService(const BusSettings& settings, const ServiceOptions& options,
                    const ModelInfo& model)
       : options_(options),
-        context_(options.process, openDomain(optionsOf(settings, false)), makeLog(options.process)),
+        context_(options.process, openDomain(serviceOptionsOf(settings, options.process)),
+                 makeLog(options.process)),
         detections_(context_.writer(bus::topics::kDetections,
                                     {.strength = options.strength, .lease_s = options.lease_s})),
         frames_(context_.needs("frames", "mend the camera, or start capture")) {

@@ -4,7 +4,8 @@ Settings that every call here takes, all optional: ``interface`` (network interf
 ``domain`` (DDS domain), ``vehicle`` ("ego"), ``security`` (folder of identities), ``identity`` (a
 folder in it; "subscriber"), ``peers`` (addresses of other hosts), ``process`` (what this program
 is called in ``perdure topics``). What is not given is said by bus.yaml (/etc/perdure, config, or
-the file that PERDURE_BUS names), PERDURE_DOMAIN and CYCLONEDDS_URI, as for ``perdure echo``.
+the file that PERDURE_BUS names), PERDURE_DOMAIN and CYCLONEDDS_URI, as for ``perdure echo``;
+PERDURE_DOMAIN goes before ``domain``.
 """
 
 import atexit
