@@ -1,4 +1,4 @@
-# What is installed, in the five components that deploy/packages makes packages of. The folders are
+# What is installed, in the components that deploy/packages makes packages of. The folders are
 # those of GNUInstallDirs; PERDURE_SYSTEM_LIBDIR is where systemd and udev look, relative to the
 # prefix or absolute (Debian 12: /lib).
 include_guard()
@@ -73,6 +73,19 @@ install(DIRECTORY tools/model/perdure_model DESTINATION ${share} COMPONENT tools
 install(FILES config/simulated_detector.yaml DESTINATION ${etc} COMPONENT tools)
 
 install(DIRECTORY models/ DESTINATION ${share}/models COMPONENT models PATTERN README.md EXCLUDE)
+
+# For Python, where it was built: where Debian's python3 looks.
+if(TARGET perdure_python)
+  set(dist_packages lib/python3/dist-packages/perdure)
+  install(TARGETS _perdure _map LIBRARY DESTINATION ${dist_packages} COMPONENT python)
+  install(DIRECTORY tools/python/perdure/ DESTINATION ${dist_packages} COMPONENT python
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
+  install(FILES tools/python/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/perdure-python
+    COMPONENT python)
+  install(PROGRAMS tools/python/examples/own_detector.py tools/python/examples/parked_cars.py
+    tools/python/examples/plot_map.py
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/perdure-python/examples COMPONENT python)
+endif()
 
 # For programs of other people: find_package(Perdure), Perdure::idl, #include "idl/objects.h".
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Perdure)

@@ -96,3 +96,12 @@ function(perdure_test name)
   set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT}
     ENVIRONMENT "PERDURE_BIN=${PROJECT_BINARY_DIR}/bin;PERDURE_SOURCE=${PROJECT_SOURCE_DIR};${ARG_ENVIRONMENT}")
 endfunction()
+
+# perdure_loadable(TARGETS…): libraries that go into a module which another program loads. Calls
+# within them stay as they are in programs.
+function(perdure_loadable)
+  foreach(target ${ARGN})
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+  endforeach()
+endfunction()

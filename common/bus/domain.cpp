@@ -266,6 +266,14 @@ Domain::Domain(const Options& options)
       shared_memory_(findSharedMemory(options_)),
       domain_(keptBy(nullptr, Entity(createDomain(options_, shared_memory_.locator)))) {}
 
+Domain Domain::as(std::string vehicle, std::string security, std::string identity) const {
+  Domain same = *this;
+  same.options_.vehicle = std::move(vehicle);
+  same.options_.security = std::move(security);
+  same.options_.identity = std::move(identity);
+  return same;
+}
+
 std::string Domain::sharedMemoryText() const {
   if (options_.shared_memory_mb == 0) return {};
   if (!shared_memory_.on()) return "no shared memory: " + shared_memory_.why_not;

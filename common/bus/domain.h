@@ -66,6 +66,8 @@ class Domain {
  public:
   /// Throws StartupError (69) where DDS cannot use the interface.
   explicit Domain(const Options& options);
+  /// The same domain, for participants of another vehicle or under another identity.
+  Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
   /// What there is to say of shared memory now, for people, with the mend; empty where it was not

@@ -112,11 +112,11 @@ void start(const Program& program, const CommandLine& line) {
 
 }  // namespace
 
-Context::Context(const std::string& process, const bus::Options& options,
+Context::Context(const std::string& process, const bus::Domain& domain,
                  std::shared_ptr<spdlog::logger> log)
     : instance_(makeInstanceId()),
       log_(std::move(log)),
-      domain_(options),
+      domain_(domain),
       participant_(domain_, process),
       health_(process, instance_),
       health_writer_(participant_, bus::topics::kHealth),

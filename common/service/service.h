@@ -24,6 +24,10 @@ namespace perdure::service {
 class Context {
  public:
   Context(const std::string& process, const bus::Options& options,
+          std::shared_ptr<spdlog::logger> log)
+      : Context(process, bus::Domain(options), std::move(log)) {}
+  /// In a process that has opened its domain already.
+  Context(const std::string& process, const bus::Domain& domain,
           std::shared_ptr<spdlog::logger> log);
   ~Context();
   Context(const Context&) = delete;

@@ -5,16 +5,13 @@
 #include <string>
 
 #include "common/bus/wait_loop.h"
+#include "tools/bus_tools/settings.h"
 
 namespace CLI {
 class App;
 }
 
 namespace perdure::tools {
-
-/// The services' configuration files: of the installation (/etc/perdure) or of config/ here.
-/// Empty where there is none.
-std::string configurationFolder();
 
 /// --interface, --domain, --vehicle, --security, --identity; what they do not say is said by
 /// bus.yaml, where the services' configuration is.
@@ -30,8 +27,6 @@ double steadySeconds();
 inline constexpr const char* kUsualServices[] = {"capture", "vio", "inference", "semantic_filter",
                                                  "map_store"};
 
-/// The names that exist, for the error message of an unknown one.
-std::string knownTopics();
 [[noreturn]] void refuseTopic(const std::string& topic);
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// The parts of messages that several families share, as describe.h. Internal to common/wire.
+// The parts of messages that several families share, as describe.h.
 #pragma once
 
 #include <concepts>

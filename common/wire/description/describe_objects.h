@@ -1,4 +1,4 @@
-// The messages about objects, as describe.h. Internal to common/wire.
+// The messages about objects, as describe.h.
 #pragma once
 
 #include "common/wire/description/describe_base.h"

@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+"""An inference service of one's own: finds orange cones by their colour. own_detector.py [camera]
+
+Any network may stand in `detect`. Its class needs a prior in config/class_priors.yaml.
+"""
+import sys
+
+import numpy as np
+import perdure
+
+
+def spans(there, gap=3):
+    """First and last place of each run of True, runs nearer than `gap` taken together."""
+    places = np.flatnonzero(there)
+    cuts = np.flatnonzero(np.diff(places) > gap)
+    return list(zip(places[np.r_[0, cuts + 1]], places[np.r_[cuts, -1]])) if len(places) else []
+
+
+class Cones:
+    name = "orange"
+    classes = ["cone"]
+
+    def detect(self, image):
+        if image.ndim == 2:
+            return []  # grey: no colour to go by
+        blue, green, red = np.moveaxis(image.astype(int), 2, 0)
+        orange = (red > 150) & (red > green + 50) & (green > blue)
+        found = []
+        for x1, x2 in spans(orange.any(0)):
+            for y1, y2 in spans(orange[:, x1 : x2 + 1].any(1)):
+                filled = orange[y1 : y2 + 1, x1 : x2 + 1].mean()
+                if y2 - y1 < 6 or filled < 0.3:
+                    continue
+                found.append(
+                    perdure.Detection(
+                        box=(x1, y1, x2 + 1, y2 + 1),
+                        activations=perdure.activations([[filled]])[0],
+                    )
+                )
+        return found
+
+
+if __name__ == "__main__":
+    perdure.publish(Cones(), camera=sys.argv[1] if len(sys.argv) > 1 else "cam0")

@@ -1,0 +1,61 @@
+// The Python classes of messages, as perdure/messages.py has made them from the schema: one for
+// each struct that common/wire describes. All need the GIL.
+#pragma once
+
+#include <cxxabi.h>
+#include <pybind11/pybind11.h>
+
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <typeinfo>
+#include <vector>
+
+#include "common/bus/topics.h"
+
+namespace perdure::python {
+
+struct MessageClass {
+  std::string name;               ///< "ObjectBelief"
+  PyTypeObject* type = nullptr;   ///< kept for ever
+  std::vector<PyObject*> fields;  ///< interned, in the order of the description
+
+  /// An instance without values. Raises where the class is not registered.
+  pybind11::object make() const;
+  bool isOne(pybind11::handle object) const;
+};
+
+/// Of this module; made when it is asked for first.
+MessageClass& messageClass(const std::string& name);
+void registerClass(const std::string& name, pybind11::type type,
+                   const std::vector<std::string>& fields);
+
+/// perdure::ObjectBelief → "ObjectBelief".
+template <class D>
+const std::string& nameOfType() {
+  static const std::string name = [] {
+    int status = 0;
+    const std::unique_ptr<char, decltype(&std::free)> full(
+        abi::__cxa_demangle(typeid(D).name(), nullptr, nullptr, &status), &std::free);
+    const std::string text = full ? full.get() : typeid(D).name();
+    return text.substr(text.rfind(':') + 1);
+  }();
+  return name;
+}
+
+template <class D>
+MessageClass& messageClass() {
+  static MessageClass& it = messageClass(nameOfType<D>());
+  return it;
+}
+
+/// Calls visit(Topic<T>) for the type of every topic that there is.
+template <class Visit>
+void forEachTopic(Visit visit) {
+  for (const bus::TopicInfo& info : bus::topicTable()) {
+    const std::string name(info.name);
+    bus::withTopic(name.ends_with('/') ? name + "cam0" : name, visit);
+  }
+}
+
+}  // namespace perdure::python

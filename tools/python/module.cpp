@@ -1,0 +1,46 @@
+// perdure._perdure: the bus and recordings. What people use is in perdure/*.py.
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include "common/vision/jpeg.h"
+#include "tools/python/bus.h"
+#include "tools/python/inference_service.h"
+#include "tools/python/messages/from_python.h"
+#include "tools/python/messages/message_class.h"
+#include "tools/python/messages/raise.h"
+#include "tools/python/messages/schema.h"
+#include "tools/python/messages/to_python.h"
+#include "tools/python/recording.h"
+#include "tools/python/subscription.h"
+
+namespace {
+
+namespace py = pybind11;
+using namespace perdure;
+
+/// A frame whose pixels are an image's rows, also where it came as JPEG.
+py::object unpacked(py::handle packed) {
+  const auto frame = python::fromPython<Frame>(packed);
+  Result<Frame> image = fail("");
+  {
+    const py::gil_scoped_release decodes;
+    image = vision::decompressed(frame);
+  }
+  if (!image) python::raise("Refused", "the image cannot be unpacked: " + image.error().code);
+  return python::toPython(*image);
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_perdure, module) {
+  python::translateStartupErrors();
+  module.def("schema", &python::schema);
+  module.def("topic_types", &python::topicTypes);
+  module.def("register_class", &python::registerClass);
+  module.def("set_defaults", &python::setDefaults);
+  module.def("unpacked", &unpacked);
+  python::bindBus(module);
+  python::bindSubscription(module);
+  python::bindRecording(module);
+  python::bindInferenceService(module);
+}

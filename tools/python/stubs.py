@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Writes the type hints that follow from the topics: perdure/*.pyi.
+
+usage: PYTHONPATH=build/release/python tools/python/stubs.py [--check]
+--check writes nothing, and ends with 1 where they are not up to date.
+"""
+import inspect
+import pathlib
+import sys
+
+sys.path.pop(0)  # the sources beside this file have no compiled module
+from perdure import bus, messages  # noqa: E402
+
+FOLDER = pathlib.Path(__file__).parent / "perdure"
+HEAD = "# Made by tools/python/stubs.py of the topics' description; do not edit.\n"
+
+
+def member(name, value):
+    """A property or method of a class's own, with its docstring."""
+    if isinstance(value, property):
+        doc = (value.fget.__doc__ or "").strip().split("\n")[0]
+        hint = value.fget.__annotations__["return"]
+        lines = [f"    @property\n    def {name}(self) -> {hint}: ...  # {doc}"]
+        if value.fset:
+            lines.append(f"    @{name}.setter\n    def {name}(self, value: Any) -> None: ...")
+        return lines
+    if not callable(value) or name == "_set_defaults":
+        return []
+    given = ", ".join(f"{p}: Any" if p != "self" else p for p in inspect.signature(value).parameters)
+    return [f"    def {name}({given}) -> {value.__annotations__['return']}: ..."]
+
+
+def class_text(name, fields):
+    mixin = messages._MIXINS.get(name)
+    lines = [f"class {name}(Message):"]
+    hints = dict.fromkeys(f[0] for f in fields)
+    for field in fields:
+        if mixin is None or not hasattr(mixin, field[0]):
+            hints[field[0]] = messages.hint_of(field)
+    for field in fields:
+        if hints.get(field[0]):
+            said = messages.line_of(name, field).split(": ", 1)[1]
+            lines.append(f"    {field[0]}: {hints.pop(field[0])}  # {said}")
+    for base in reversed(mixin.__mro__[:-1] if mixin else []):
+        for key, value in vars(base).items():
+            if not key.startswith("__") or key in ("__iter__", "__len__", "__matmul__"):
+                lines += member(key, value)
+    return "\n".join(lines) + "\n"
+
+
+MESSAGES = '''from typing import Any, Dict, Iterator, List, Literal, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+SCHEMA: Dict[str, Any]
+TOPIC_TYPES: Dict[str, str]
+CLASSES: Dict[str, type]
+
+def register(module: Any) -> None: ...
+
+class Message:
+    _fields: Any
+    def __init__(self, **values: Any) -> None: ...
+    def to_dict(self) -> Dict[str, Any]: ...
+
+'''
+
+BUS = '''from typing import Any, Dict, Generic, Iterator, Literal, Optional, Tuple, TypeVar, overload
+
+from . import messages
+
+M = TypeVar("M")
+
+def topics() -> Dict[str, str]: ...
+
+class Gone:
+    message: Any
+    def __init__(self, message: Any) -> None: ...
+
+class Subscription(Generic[M]):
+    def __init__(self, names: Tuple[str, ...], *, timeout: Optional[float] = ..., count: Optional[int] = ..., gone: bool = ..., **settings: Any) -> None: ...
+    def next(self, seconds: Optional[float] = ...) -> Optional[M]: ...
+    def __iter__(self) -> Iterator[M]: ...
+    def __next__(self) -> M: ...
+    def wait_for_writer(self, seconds: Optional[float] = ...) -> bool: ...
+    @property
+    def matched(self) -> int: ...
+    @property
+    def counts(self) -> Dict[str, int]: ...
+    @property
+    def closed(self) -> bool: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> Subscription[M]: ...
+    def __exit__(self, *_: Any) -> None: ...
+
+class Publisher:
+    def __init__(self, topic: str, *, strength: int = ..., lease_s: float = ..., **settings: Any) -> None: ...
+    def write(self, message: messages.Message) -> None: ...
+    def dispose(self, message: messages.Message) -> None: ...
+    def acknowledged(self, seconds: float) -> bool: ...
+    @property
+    def matched(self) -> int: ...
+    def wait_for_reader(self, seconds: Optional[float] = ...) -> bool: ...
+
+def publisher(topic: str, *, strength: int = ..., lease_s: float = ..., **settings: Any) -> Publisher: ...
+
+'''
+
+OPTIONS = "*, timeout: Optional[float] = ..., count: Optional[int] = ..., gone: bool = ..., **settings: Any"
+
+
+def bus_text():
+    lines = [HEAD + BUS]
+    for topic, name in bus.topics().items():
+        if topic.endswith("/"):
+            continue  # a name that is not known: the overload of str
+        lines.append(
+            f'@overload\ndef subscribe(topic: Literal["{topic}"], {OPTIONS}) -> '
+            f"Subscription[messages.{name}]: ...\n"
+        )
+    lines.append(f"@overload\ndef subscribe(topic: str, {OPTIONS}) -> Subscription[Any]: ...\n")
+    lines.append(
+        f"@overload\ndef subscribe(topic: str, *more: str, {OPTIONS[3:]}) -> "
+        "Subscription[Tuple[str, Any]]: ...\n"
+    )
+    return "".join(lines)
+
+
+def messages_text():
+    return HEAD + MESSAGES + "\n".join(class_text(n, f) for n, f in messages.SCHEMA.items())
+
+
+def package_text():
+    """What perdure/__init__.py makes at run time, in words."""
+    source = (FOLDER / "__init__.py").read_text(encoding="utf-8")
+    imports = source[source.index("from .bus") : source.index("globals()")]
+    kept = [i for i in imports.split("from ")[1:] if "_CLASSES" not in i]
+    lines = [HEAD]
+    for part in kept:
+        module, names = part.split(" import ", 1)
+        for name in names.replace("(", "").replace(")", "").replace(",", " ").split():
+            lines.append(f"from {module} import {name} as {name}\n")
+    lines += [f"from .messages import {name} as {name}\n" for name in messages.CLASSES]
+    return "".join(lines)
+
+
+def main():
+    stale = []
+    made = {
+        "__init__.pyi": package_text(),
+        "bus.pyi": bus_text(),
+        "messages.pyi": messages_text(),
+    }
+    for name, text in made.items():
+        path = FOLDER / name
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            stale.append(name)
+            if "--check" not in sys.argv:
+                path.write_text(text, encoding="utf-8")
+    if stale and "--check" in sys.argv:
+        sys.exit(f"{', '.join(stale)} are not up to date: {inspect.getdoc(sys.modules[__name__])}")
+    print("made " + ", ".join(stale) if stale else "up to date")
+
+
+if __name__ == "__main__":
+    main()
