@@ -15,7 +15,7 @@ fs::path scriptOf(const std::string& name) { return sources() / "tests/interop/r
 }  // namespace
 
 Npm::Npm() {
-  for (const char* name : {"package.json", "write_mcap.mjs"})
+  for (const char* name : {"package.json", "write_mcap.mjs", "read_ros2.mjs"})
     fs::copy_file(scriptOf(name), place_.file(name));
   Child npm({"npm", "install", "--prefix", place_.file(""), "--no-audit", "--no-fund",
              "--ignore-scripts", "--prefer-offline", "--fetch-retries=0", "--fetch-timeout=10000"},
