@@ -13,7 +13,7 @@ namespace {
 
 /// A struct's fields: type and name of each, and what it is made of, before it.
 struct Definition {
-  std::string type, message, idl;
+  std::string type, message;
 };
 
 template <class X>
@@ -25,18 +25,6 @@ constexpr const char* nameOfPlain() {
   if constexpr (std::same_as<X, std::uint8_t>) return "uint8";
   if constexpr (std::same_as<X, std::uint32_t>) return "uint32";
   if constexpr (std::same_as<X, std::int32_t>) return "int32";
-}
-
-/// IDL's name for what `.msg` calls so.
-std::string idlName(const std::string& type) {
-  const std::pair<const char*, const char*> kNames[] = {
-      {"bool", "boolean"},   {"byte", "octet"},           {"uint8", "octet"}, {"float32", "float"},
-      {"float64", "double"}, {"uint32", "unsigned long"}, {"int32", "long"},  {"string", "string"}};
-  for (const auto& [name, idl] : kNames) {
-    if (type == name) return idl;
-  }
-  const auto slash = type.find('/');
-  return type.substr(0, slash) + "::msg::dds_::" + type.substr(slash + 1) + "_";
 }
 
 /// Goes through a struct and writes its fields down; `all` gets every struct once, parts first.
@@ -51,48 +39,41 @@ class Walk {
     Walk inside(all_);
     const M example{};
     M::fields(example, inside);
-    all_.push_back({M::kType, inside.message_, inside.idl_});
+    all_.push_back({M::kType, inside.message_});
   }
 
   template <Plain X>
   void operator()(const char* name, const X&) {
-    add(nameOfPlain<X>(), name, "", "");
+    add(nameOfPlain<X>(), name);
   }
-  void operator()(const char* name, const std::string&) { add("string", name, "", ""); }
-  void operator()(const char* name, const SharedBytes&) { addSequence("uint8", name); }
+  void operator()(const char* name, const std::string&) { add("string", name); }
+  void operator()(const char* name, const SharedBytes&) { add("uint8[]", name); }
   template <Plain X, std::size_t N>
   void operator()(const char* name, const std::array<X, N>&) {
-    const std::string size = fmt::format("[{}]", N);
-    add(nameOfPlain<X>(), name, size, size);
+    add(fmt::format("{}[{}]", nameOfPlain<X>(), N), name);
   }
   template <class X>
   void operator()(const char* name, const std::vector<X>&) {
     if constexpr (Plain<X>) {
-      addSequence(nameOfPlain<X>(), name);
+      add(std::string(nameOfPlain<X>()) + "[]", name);
     } else {
       visit<X>();
-      addSequence(X::kType, name);
+      add(std::string(X::kType) + "[]", name);
     }
   }
   template <Struct M>
   void operator()(const char* name, const M&) {
     visit<M>();
-    add(M::kType, name, "", "");
+    add(M::kType, name);
   }
 
  private:
-  void add(const std::string& type, const char* name, const std::string& size,
-           const std::string& idl_size) {
-    message_ += fmt::format("{}{} {}\n", type, size, name);
-    idl_ += fmt::format("        {} {}_{};\n", idlName(type), name, idl_size);
-  }
-  void addSequence(const std::string& type, const char* name) {
-    message_ += fmt::format("{}[] {}\n", type, name);
-    idl_ += fmt::format("        sequence<{}> {}_;\n", idlName(type), name);
+  void add(const std::string& type, const char* name) {
+    message_ += fmt::format("{} {}\n", type, name);
   }
 
   std::vector<Definition>& all_;
-  std::string message_, idl_;
+  std::string message_;
 };
 
 template <class M>
@@ -139,23 +120,5 @@ template std::string definitionOf<Detection2DArray>();
 template std::string definitionOf<Detection3DArray>();
 template std::string definitionOf<MarkerArray>();
 template std::string definitionOf<DiagnosticArray>();
-
-std::string idlText() {
-  std::vector<Definition> all;
-  Walk walk(all);
-  walk.visit<Image>(), walk.visit<CompressedImage>(), walk.visit<CameraInfo>();
-  walk.visit<Imu>(), walk.visit<PointCloud2>(), walk.visit<Odometry>();
-  walk.visit<TFMessage>(), walk.visit<Detection2DArray>(), walk.visit<Detection3DArray>();
-  walk.visit<MarkerArray>(), walk.visit<DiagnosticArray>();
-  std::string text;
-  for (const Definition& part : all) {
-    const auto slash = part.type.find('/');
-    text += fmt::format(
-        "module {} {{ module msg {{ module dds_ {{\n    @final\n    struct {}_ {{\n{}    }};\n"
-        "}}; }}; }};\n",
-        part.type.substr(0, slash), part.type.substr(slash + 1), part.idl);
-  }
-  return text;
-}
 
 }  // namespace perdure::ros

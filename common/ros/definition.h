@@ -1,5 +1,4 @@
-// What ROS' messages are called and how their definitions read, made of the structs' own fields:
-// `.msg` as recordings carry it, and IDL as DDS has it.
+// What ROS' messages are called and how their definitions read, made of the structs' own fields.
 #pragma once
 
 #include <string>
@@ -17,7 +16,5 @@ std::string plainName(const std::string& name);
 /// M: one of the messages that have a topic of their own.
 template <class M>
 std::string definitionOf();
-/// IDL of the whole of messages.h, with the names that ROS 2 has on DDS (`pkg::msg::dds_::Name_`).
-std::string idlText();
 
 }  // namespace perdure::ros

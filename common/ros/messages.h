@@ -1,6 +1,6 @@
 // ROS' messages as structs, named and ordered as ROS 2 (Humble and later) has them. What ROS 1
 // calls by the same name is the same but for a number in its header. Each says its fields once, for
-// every way of writing them: CDR, ROS 1's bytes, the text of the definition, IDL.
+// every way of writing them: CDR, ROS 1's bytes, the text of the definition.
 #pragma once
 
 #include <array>
