@@ -7,6 +7,7 @@
 #include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
 #include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/ros_messages.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
 #include "common/vision/jpeg.h"
@@ -47,28 +48,30 @@ Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
   const bool recorded = RecordedMessages::looksLikeOne(path);
-  if (recorded && !std::filesystem::is_directory(path)) return readRecordedDrive(options);
   if (!std::filesystem::is_directory(path)) {
+    if (RosMessages::looksLikeOne(path)) return readRosDrive(options);
+    if (recorded) return readRecordedDrive(options);
     throwMissing(path, "the dataset folder",
                  "--data takes a folder in EuRoC, KITTI raw or KITTI tracking layout, or a "
-                 "recording (.mcap)");
+                 "recording (.mcap; of ROS also .db3 and .bag)");
   }
   if (looksLikeEuroc(path)) return readEuroc(options);
   if (looksLikeKittiTracking(path)) return readKittiTracking(options);
   if (looksLikeKittiRaw(path)) return readKittiRaw(options);
+  if (RosMessages::looksLikeOne(path)) return readRosDrive(options);
   if (recorded) return readRecordedDrive(options);
   throw StartupError(ExitCode::kUnavailable,
                      path.string() +
                          " is no dataset folder that is known: give a folder with "
                          "mav0 (EuRoC), with image_02 and oxts (KITTI raw, *_sync), "
-                         "with calib (KITTI tracking), or with recordings (.mcap)");
+                         "with calib (KITTI tracking), or with recordings (.mcap, .db3, .bag)");
 }
 
 }  // namespace
 
 std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
   Recording recording = readRecording(options);
-  if (!options.rig.empty()) {
+  if (!options.rig.empty() && recording.kind != DatasetKind::kRosRecording) {
     const Calibration rig = readRig(options.rig, &recording.notes);
     applyRig(rig, options.rig.string(), recording.calibration);
   }

@@ -1,6 +1,6 @@
-// Dataset folders and recordings (MCAP) played as messages: EuRoC ASL, KITTI raw, KITTI tracking
-// and what perdure record left, known by looking. Samples and frames are merged by time, always in
-// the same order; images are decoded when asked.
+// Dataset folders and recordings played as messages: EuRoC ASL, KITTI raw, KITTI tracking, what
+// perdure record left, and recordings of ROS, known by looking. Samples and frames are merged by
+// time, always in the same order; images are decoded when asked.
 #pragma once
 
 #include <cstddef>
@@ -33,9 +33,11 @@ struct DatasetOptions {
   std::optional<ImageEncoding> second_encoding = {};  ///< of cam1
   std::filesystem::path rig = {};  ///< rig file instead of the drive's own calibration
   bool decode = true;              ///< false: frames carry stamp and size, but no pixels
+  /// Of a recording of ROS: topics by cam0, cam1, imu, where types and names do not tell.
+  std::map<std::string, std::string> topics = {};
 };
 
-enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking, kRecording };
+enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking, kRecording, kRosRecording };
 
 /// What a reader found in a folder.
 struct Recording {

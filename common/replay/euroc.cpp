@@ -136,15 +136,6 @@ class FrameList {
   std::string first_;
 };
 
-/// The frame of cam0 that was taken at the same time.
-const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
-  constexpr Duration kSame = std::chrono::milliseconds(5);
-  const auto at =
-      std::lower_bound(first.begin(), first.end(), time - kSame,
-                       [](const auto& frame, TimePoint begin) { return frame.time < begin; });
-  return at != first.end() && at->time - time <= kSame ? &*at : nullptr;
-}
-
 /// Frames of one camera; cam1's frames take the index of cam0's frame at the same time.
 void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording& recording) {
   const SensorTable table(folder / "data.csv", camera == 0 ? "frame" : "stereo",
@@ -282,12 +273,6 @@ class EurocCalibration {
   RigidTransform T_BI_;  ///< of EuRoC's body, which everything is moved from
 };
 
-double rateOf(const std::vector<Recording::FrameFile>& frames) {
-  if (frames.size() < 2) return 1.0;
-  const double seconds = toSeconds(frames.back().time - frames.front().time);
-  return seconds > 0.0 ? static_cast<double>(frames.size() - 1) / seconds : 1.0;
-}
-
 }  // namespace
 
 bool looksLikeEuroc(const fs::path& folder) {
@@ -315,7 +300,7 @@ Recording readEuroc(const DatasetOptions& options) {
     recording.calibration.cameras.push_back(calibration.camera(name, recording));
     readFrames(mav0 / name, recording.calibration.cameras.size() - 1, options.decode, recording);
     double& rate = recording.calibration.cameras.back().rate_hz;
-    if (rate <= 0.0) rate = rateOf(recording.frames);
+    if (rate <= 0.0) rate = rateOf(recording.frames, recording.calibration.cameras.size() - 1);
   }
   if (fs::exists(mav0 / "speed0" / "data.csv")) readSpeed(mav0 / "speed0", recording);
   sortFrames(recording);

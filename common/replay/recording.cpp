@@ -58,4 +58,22 @@ void sortFrames(Recording& recording) {
                    });
 }
 
+const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
+  constexpr Duration kSame = std::chrono::milliseconds(5);
+  const auto at =
+      std::lower_bound(first.begin(), first.end(), time - kSame,
+                       [](const auto& frame, TimePoint begin) { return frame.time < begin; });
+  return at != first.end() && at->time - time <= kSame ? &*at : nullptr;
+}
+
+double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera) {
+  std::vector<TimePoint> times;
+  for (const auto& frame : frames) {
+    if (frame.camera == camera) times.push_back(frame.time);
+  }
+  if (times.size() < 2) return 1.0;
+  const double seconds = toSeconds(times.back() - times.front());
+  return seconds > 0.0 ? static_cast<double>(times.size() - 1) / seconds : 1.0;
+}
+
 }  // namespace perdure::replay

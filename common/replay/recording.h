@@ -23,6 +23,8 @@ bool looksLikeKittiTracking(const std::filesystem::path& folder);
 /// Frames are counted from 0 in the order of their times. A recording without images has the frames
 /// that its odometry is about, without pixels.
 Recording readRecordedDrive(const DatasetOptions& options);
+/// What is missing in the recording the rig file says.
+Recording readRosDrive(const DatasetOptions& options);
 Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
@@ -49,5 +51,9 @@ void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& r
 }
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
+/// The frame of cam0 that was taken within 5 ms; `first` by time.
+const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time);
+/// Frames a second of a camera; 1 where they do not tell.
+double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera);
 
 }  // namespace perdure::replay

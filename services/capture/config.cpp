@@ -8,7 +8,9 @@ namespace {
 void describeDataset(Config& c, config::Fields& fields) {
   fields.text("dataset.path", c.dataset.path,
               {"folder of the drive: EuRoC, KITTI raw or KITTI tracking; or a recording of images "
-               "(.mcap)"});
+               "(.mcap; of ROS also .db3 and .bag)"});
+  fields.texts("dataset.topics", c.dataset.topics,
+               {"of a recording of ROS that has several: [cam0=TOPIC, cam1=TOPIC, imu=TOPIC]"});
   fields.text("dataset.sequence", c.dataset.sequence, {"of KITTI tracking: \"0001\""});
   fields.choice("dataset.cameras", c.dataset.cameras, {"mono", "stereo"},
                 {"mono: cam0 only; stereo: cam1 too, where the drive has one"});

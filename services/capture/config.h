@@ -11,7 +11,8 @@ namespace perdure::capture {
 
 struct DatasetConfig {
   std::string path;
-  std::string sequence;  ///< KITTI tracking only
+  std::string sequence;             ///< KITTI tracking only
+  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
   std::string cameras = "stereo";
   double lead_s = 5.0, trail_s = 0.5;
 };

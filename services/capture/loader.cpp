@@ -4,6 +4,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/data_check.h"
+#include "common/replay/ros_topics.h"
 #include "common/vision/jpeg.h"
 
 namespace perdure::capture {
@@ -63,6 +64,7 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
   options.path = config.dataset.path;
   options.sequence = config.dataset.sequence;
   options.rig = config.rig;
+  options.topics = replay::topicsOf(config.dataset.topics);
   options.source = source;
   options.encoding = encodingOf(config.image.cam0);
   options.second_encoding = encodingOf(config.image.cam1);

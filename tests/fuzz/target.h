@@ -38,6 +38,7 @@ std::vector<Target> folderTargets();
 std::vector<Target> settingTargets();
 std::vector<Target> binaryTargets();
 std::vector<Target> gatewayTargets();
+std::vector<Target> rosTargets();
 
 inline Bytes bytesOf(std::string_view text) { return {text.begin(), text.end()}; }
 inline std::string textOf(View bytes) { return {bytes.begin(), bytes.end()}; }

@@ -116,6 +116,11 @@ void addDemoCommand(CLI::App& app) {
       "demo", "The five services under supervision over a drive; deploy/demo builds and calls it");
   demo->add_option("--data", options->data, "folder of the drive; default: one that is rendered")
       ->type_name("DIR");
+  demo->add_option("--rig", options->rig, "rig file instead of the drive's own calibration");
+  demo->add_option(
+          "--topic", options->topics,
+          "of a recording of ROS where there are several: cam0=TOPIC, cam1=TOPIC, imu=TOPIC")
+      ->take_all();
   demo->add_option("--sequence", options->sequence, "of KITTI tracking, for example 0000");
   demo->add_option("--model", options->model, "the network; default: the one in models/")
       ->type_name("FILE.onnx");

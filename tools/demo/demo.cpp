@@ -16,6 +16,7 @@
 #include "common/base/errors.h"
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
+#include "common/replay/ros_topics.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -141,6 +142,8 @@ replay::DatasetOptions Demo::dataOptions() const {
   replay::DatasetOptions data;
   data.path = options_.data;
   data.sequence = options_.sequence;
+  data.rig = options_.rig;
+  data.topics = replay::topicsOf(options_.topics);
   data.decode = false;
   return data;
 }

@@ -68,6 +68,10 @@ std::vector<std::string> settingsOf(const std::string& service, const DemoOption
   if (!options.sequence.empty()) {
     settings.push_back(fmt::format("dataset.sequence=\"{}\"", options.sequence));
   }
+  if (!options.rig.empty()) settings.push_back("rig=" + fs::absolute(options.rig).string());
+  if (!options.topics.empty()) {
+    settings.push_back(fmt::format("dataset.topics=[{}]", fmt::join(options.topics, ", ")));
+  }
   for (std::string& setting : paceOf(options.rate)) settings.push_back(std::move(setting));
   return settings;
 }

@@ -15,6 +15,8 @@ struct DemoOptions {
   std::string data;   ///< empty: the drive that the demo renders for itself
   std::string model;  ///< empty: the one in ROOT/models, for that drive only
   std::string sequence, out, rate = "1";
+  std::string rig;                  ///< empty: the drive's own calibration
+  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
   std::string cache;       ///< where rendered drives are kept; empty: ROOT/out, or the user's cache
   std::string root = ".";  ///< where config/ and models/ are
   std::string programs;    ///< folder of the services; empty: that of this program

@@ -6,6 +6,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/files/class_aliases.h"
+#include "common/replay/ros_topics.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/outputs/pictures/overlay_video.h"
@@ -132,6 +133,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
   data.path = options.data;
   data.sequence = options.sequence;
   data.rig = options.rig;
+  data.topics = replay::topicsOf(options.topics);
   if (!options.image_size.empty()) data.image_size = {options.image_size[0], options.image_size[1]};
   if (pose_file_ && pose_file_->format() == replay::PoseFormat::kKitti) {
     data.frame_count = pose_file_->poses().size();

@@ -23,6 +23,7 @@ struct PipelineOptions {
   std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
+  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
   double box_origin = 0.0;
   bool outline_boxes = false;
   double from = 0.0;  ///< seconds after the first frame at which to begin

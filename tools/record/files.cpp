@@ -13,6 +13,7 @@
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "common/wire/plain_twin.h"
+#include "tools/record/ros_export.h"
 
 namespace perdure::tools {
 namespace {
@@ -115,6 +116,7 @@ void addFileCommands(CLI::App& record) {
   struct Options {
     std::vector<std::string> paths;
     std::string from, to;
+    bool ros2 = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* info = record.add_subcommand("info", "what recordings hold");
@@ -131,8 +133,11 @@ void addFileCommands(CLI::App& record) {
       "export", "copy into one file that readers without XCDR2 understand too");
   plain->add_option("from", options->from, "a file, or a folder of them")->required();
   plain->add_option("to", options->to, "the new file")->required();
+  plain->add_flag("--ros2", options->ros2,
+                  "as a recording of ROS 2: for ros2 bag play, RViz, Foxglove, Rerun, PlotJuggler");
   plain->callback([options] {
-    const ReasonCounts reasons = exportPlain(options->from, options->to);
+    const auto copy = options->ros2 ? exportRos2 : exportPlain;
+    const ReasonCounts reasons = copy(options->from, options->to);
     for (const auto& [reason, n] : reasons.all()) {
       fmt::print(stderr, "{}: {}\n", reason, n);
     }

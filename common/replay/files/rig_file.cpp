@@ -32,32 +32,47 @@ void addNotes(const SensorFile& file, std::vector<std::string>* notes) {
   notes->insert(notes->end(), keys.begin(), keys.end());
 }
 
-}  // namespace
-
-Calibration readRig(const std::filesystem::path& path, std::vector<std::string>* notes) {
+SensorFile opened(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path)) {
     throw StartupError(
         ExitCode::kUnavailable,
         path.string() + " is no rig file; `perdure calibrate` writes one (rig.yaml)");
   }
-  const SensorFile file(path);
-  Calibration rig;
+  return SensorFile(path);
+}
+
+}  // namespace
+
+RigParts readRigParts(const std::filesystem::path& path, std::vector<std::string>* notes) {
+  const SensorFile file = opened(path);
+  RigParts parts;
+  Calibration& rig = parts.sensors;
+  const auto takeTopic = [&](const SensorFile& section, const std::string& role) {
+    if (section.has("rostopic")) parts.topics[role] = section.text("rostopic");
+  };
   for (const std::string name : {"cam0", "cam1"}) {
     if (!file.has(name)) continue;
     const SensorFile section = file.section(name);
     const auto in_chain =
         rig.cameras.empty() ? std::nullopt : placeInChain(section, rig.cameras.back());
     rig.cameras.push_back(readCamera(section, name, in_chain));
+    takeTopic(section, name);
     addNotes(section, notes);
   }
-  if (rig.cameras.empty() || rig.cameras[0].name != "cam0") file.wrong("cam0", "is missing");
   if (file.has("imu0")) {
     const SensorFile imu = file.section("imu0");
     rig.imu = readImuCalibration(imu);
+    takeTopic(imu, "imu");
     for (auto& camera : rig.cameras) camera.T_BC = imu.T_BS().inverse() * camera.T_BC;
     addNotes(imu, notes);
   }
-  return rig;
+  return parts;
+}
+
+Calibration readRig(const std::filesystem::path& path, std::vector<std::string>* notes) {
+  const SensorFile file = opened(path);
+  if (!file.has("cam0")) file.wrong("cam0", "is missing");
+  return readRigParts(path, notes).sensors;
 }
 
 std::string rigText(const Calibration& rig, const std::string& comment) {

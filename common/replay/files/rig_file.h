@@ -5,6 +5,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -12,7 +13,14 @@
 
 namespace perdure::replay {
 
+/// What a rig file has, which may be cameras alone or the IMU alone.
+struct RigParts {
+  Calibration sensors;
+  std::map<std::string, std::string> topics;  ///< of ROS, by cam0, cam1, imu: Kalibr's `rostopic`
+};
 /// Throws StartupError with the key and the mend. `notes` gets a sentence for each unknown key.
+RigParts readRigParts(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);
+/// The same of a file that must have cam0.
 Calibration readRig(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);
 
 /// All digits; `comment` may have several lines.

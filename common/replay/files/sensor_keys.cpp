@@ -1,6 +1,7 @@
 // Cameras and inertial units out of the keys that EuRoC, Kalibr and ROS have for them.
 #include <algorithm>
 
+#include "common/camera/lens.h"
 #include "common/replay/files/sensor_file.h"
 #include "common/replay/files/text_file.h"
 
@@ -58,50 +59,9 @@ std::vector<double> coefficientsOf(const SensorFile& file) {
   return {};
 }
 
-/// Brown's model has four coefficients, five with k3, or eight (rational).
-void setRadial(const SensorFile& file, std::vector<double> values, CameraCalibration& camera) {
-  while (values.size() > 8 && values.back() == 0.0)
-    values.pop_back();  // thin prism, tilt: not used
-  if (values.size() != 4 && values.size() != 5 && values.size() != 8) {
-    file.wrong("distortion_coefficients", "is missing or has not 4, 5 or 8 numbers");
-  }
-  while (values.size() > 4 && values.back() == 0.0) values.pop_back();
-  camera.distortion = DistortionModel::kRadialTangential;
-  if (values.size() > 4) {
-    camera.distortion = DistortionModel::kRational;
-    values.resize(8, 0.0);
-  }
-  camera.distortion_coefficients = std::move(values);
-}
-
 void readLens(const SensorFile& file, CameraCalibration& camera) {
-  const std::string model = distortionName(file);
-  std::vector<double> values = coefficientsOf(file);
-  if (isOneOf(model, {"radial-tangential", "radtan", "plumb_bob", "brown", "rational_polynomial",
-                      "rational"})) {
-    return setRadial(file, std::move(values), camera);
-  }
-  if (isOneOf(model, {"equidistant", "equi", "fisheye", "kannala_brandt"})) {
-    if (values.size() != 4)
-      file.wrong("distortion_coefficients", "is missing or has not 4 numbers");
-    camera.distortion = DistortionModel::kEquidistant;
-    camera.distortion_coefficients = std::move(values);
-    return;
-  }
-  if (!isOneOf(model, {"", "none"})) {
-    file.wrong("distortion_model",
-               "is `" + model +
-                   "`; radial-tangential (radtan, plumb_bob), equidistant (equi) and "
-                   "none are known");
-  }
-  const bool any = std::any_of(values.begin(), values.end(), [](double d) { return d != 0.0; });
-  if (any) {
-    file.wrong("distortion_model",
-               model.empty() ? "is missing, but there are coefficients: write radial-tangential or "
-                               "equidistant"
-                             : "is none, but there are coefficients: write radial-tangential or "
-                               "equidistant");
-  }
+  const auto set = setLens(camera, distortionName(file), coefficientsOf(file));
+  if (!set) file.wrong(set.error().code, set.error().detail);
 }
 
 RigidTransform placeOf(const SensorFile& file, const std::optional<RigidTransform>& given) {

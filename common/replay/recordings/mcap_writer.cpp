@@ -22,9 +22,9 @@ Result<int> opened(const std::filesystem::path& path, int flags) {
   return fail("file", path.string() + ": " + std::strerror(errno));
 }
 
-std::vector<std::uint8_t> beginning() {
+std::vector<std::uint8_t> beginning(const std::string& profile = {}) {
   std::vector<std::uint8_t> bytes(kMagic.begin(), kMagic.end()), header;
-  Put(header).text("");  // no profile
+  Put(header).text(profile);
   Put(header).text(kLibrary);
   Put(bytes).record(Op::kHeader, header);
   return bytes;
@@ -132,11 +132,12 @@ Chunk pack(const Draft& draft) {
   return chunk;
 }
 
-Result<Writer> Writer::create(const std::filesystem::path& path) {
+Result<Writer> Writer::create(const std::filesystem::path& path, const std::string& profile) {
   const auto file = opened(path, O_WRONLY | O_CREAT | O_EXCL);
   if (!file) return tl::unexpected(file.error());
   Writer writer(path, *file);
-  if (auto written = writer.write(beginning()); !written) return tl::unexpected(written.error());
+  if (auto written = writer.write(beginning(profile)); !written)
+    return tl::unexpected(written.error());
   return writer;
 }
 

@@ -55,7 +55,7 @@ Chunk pack(const Draft& draft);
 class Writer {
  public:
   /// A new file. Reasons: "file" (the detail is the system's).
-  static Result<Writer> create(const std::filesystem::path& path);
+  static Result<Writer> create(const std::filesystem::path& path, const std::string& profile = {});
   /// An existing one, from `end` on: what is behind is cut off. `chunks` and `counted` are what
   /// stands before.
   static Result<Writer> resume(const std::filesystem::path& path, std::uint64_t end,

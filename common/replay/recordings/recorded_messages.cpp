@@ -80,7 +80,11 @@ void RecordedMessages::openFile(const fs::path& path) {
     if (channel == catalogue.channels.end() || n == 0) continue;
     TopicCount& topic = topics_[topicOf(channel->second.topic)];
     const auto schema = catalogue.schemas.find(channel->second.schema);
-    if (schema != catalogue.schemas.end()) topic.type = schema->second.name;
+    topic.encoding = channel->second.encoding;
+    if (schema != catalogue.schemas.end()) {
+      topic.type = schema->second.name;
+      topic.schema_encoding = schema->second.encoding;
+    }
     topic.messages += n;
   }
   for (const auto& chunk : reader->chunks()) {

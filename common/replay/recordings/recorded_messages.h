@@ -37,6 +37,7 @@ class RecordedMessages {
  public:
   struct TopicCount {
     std::string type;
+    std::string schema_encoding = {}, encoding = {};  ///< "omgidl", "ros2msg"; "cdr", "ros1"
     std::uint64_t messages = 0;
   };
 

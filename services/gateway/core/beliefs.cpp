@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/gateway/core/cuboid.h"
+#include "common/types/cuboid.h"
 #include "services/gateway/core/pieces.h"
 
 namespace perdure::gateway {

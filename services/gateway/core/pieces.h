@@ -7,6 +7,7 @@
 
 #include "common/base/time.h"
 #include "common/math/rigid_transform.h"
+#include "common/types/class_colour.h"
 #include "services/gateway/core/json_writer.h"
 
 namespace perdure::gateway {
@@ -14,14 +15,6 @@ namespace perdure::gateway {
 /// The frames of REP-105 and REP-103; the camera's is <name>_optical. The odometry's W is `odom`.
 inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link";
 std::string opticalFrame(const std::string& camera);
-
-/// Linear, 0 … 1.
-struct Colour {
-  double r = 0, g = 0, b = 0, a = 1;
-  Colour withAlpha(double alpha) const { return {r, g, b, alpha}; }
-};
-/// The colour of a class in all pictures: known classes have their own.
-Colour classColour(const std::string& class_name);
 
 /// {"sec", "nsec"}; before 1970 is 0.
 void putTime(JsonWriter& json, TimePoint time);

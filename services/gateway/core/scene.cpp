@@ -4,15 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/gateway/core/cuboid.h"
+#include "common/types/cuboid.h"
 #include "services/gateway/core/pieces.h"
 
 namespace perdure::gateway {
 namespace {
 
 constexpr int kTold = 100;
-constexpr double kDash = 0.25, kGap = 0.2;  // m
-constexpr int kMostDashes = 40;             // of an edge
 constexpr double kEllipsoidSigmas = 2.0;
 enum DeletionType { kMatching = 0, kAll = 1 };
 enum LineType { kSegments = 2 };
@@ -35,25 +33,6 @@ void putCube(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid)
   json.end(']');
 }
 
-/// Ends of short strokes from a to b; of the whole line where it is not dashed.
-void putStrokes(JsonWriter& json, const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool dashed) {
-  const double length = (b - a).norm();
-  if (!dashed || length < 2 * kDash) {
-    putVector(json, a);
-    putVector(json, b);
-    return;
-  }
-  const int strokes =
-      std::clamp(static_cast<int>(std::round(length / (kDash + kGap))), 2, kMostDashes);
-  // As many gaps as fit between the strokes, which begin and end at the corners.
-  const double unit = 1.0 / (strokes * (kDash + kGap) - kGap);
-  for (int i = 0; i < strokes; ++i) {
-    const double from = i * (kDash + kGap) * unit;
-    putVector(json, a + from * (b - a));
-    putVector(json, a + (from + kDash * unit) * (b - a));
-  }
-}
-
 struct EdgeLook {
   double thickness = 1;  ///< px
   bool dashed = false;
@@ -61,17 +40,12 @@ struct EdgeLook {
 };
 
 void putEdges(JsonWriter& json, const Cuboid& cuboid, const EdgeLook& look) {
-  const auto corners = cornersOf(cuboid);
   json.key("lines").begin('[').begin('{').key("type").integer(static_cast<int>(kSegments));
   json.key("pose");
   putPose(json, {});
   json.key("thickness").number(look.thickness).key("scale_invariant").boolean(true);
   json.key("points").begin('[');
-  for (const auto& [a, b] : kEdges) putStrokes(json, corners[a], corners[b], look.dashed);
-  // Which way it faces: from the middle of its floor to the middle of its front's lower edge.
-  const Eigen::Vector3d floor = (corners[0] + corners[3]) / 2,
-                        front = (corners[1] + corners[3]) / 2;
-  putStrokes(json, floor, front, look.dashed);
+  for (const Eigen::Vector3d& end : strokesOf(cuboid, look.dashed)) putVector(json, end);
   json.end(']').key("color");
   putColour(json, look.colour);
   json.key("colors").begin('[').end(']').key("indices").begin('[').end(']');

@@ -1,13 +1,15 @@
-// An object's cuboid in W: its corners, its edges, and how it is labelled.
+// An object's cuboid in W: its corners, its edges, and how it is labelled, as all pictures of live
+// scenes have it.
 #pragma once
 
 #include <array>
 #include <string>
+#include <vector>
 
 #include "common/math/rigid_transform.h"
 #include "common/types/objects.h"
 
-namespace perdure::gateway {
+namespace perdure {
 
 struct Cuboid {
   RigidTransform T_WO;
@@ -32,6 +34,10 @@ inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
                                                             {2, 6},
                                                             {3, 7}}};
 
+/// Ends of strokes, two and two: the edges, and one from the middle of the floor to the front's
+/// lower edge, which says where it faces. Dashed: short ones with gaps between.
+std::vector<Eigen::Vector3d> strokesOf(const Cuboid& cuboid, bool dashed);
+
 /// Something on the map hides it now.
 inline bool isHidden(const ObjectBelief& object) {
   return object.visibility == Visibility::kOccluded;
@@ -42,4 +48,4 @@ inline bool isInSight(const ObjectBelief& object) {
 /// "car 76"
 std::string nameOf(const ObjectBelief& object);
 
-}  // namespace perdure::gateway
+}  // namespace perdure

@@ -1,0 +1,340 @@
+// Bags of ROS 1 (format 2.0): records of named fields and data, messages in chunks, an index behind
+// each. The file is gone through by the heads of its records, so that a bag that was never closed
+// (`.bag.active`, or renamed) is read as far as it goes.
+#include <bzlib.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <functional>
+#include <queue>
+#include <tuple>
+
+#include "common/base/errors.h"
+#include "common/replay/recordings/mcap_format.h"
+#include "common/replay/recordings/ros_messages.h"
+
+namespace perdure::replay {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+using HeadFields = std::map<std::string, std::string>;
+
+constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+constexpr std::uint64_t kMostHead = 1u << 20;
+constexpr std::uint64_t kMostChunk = 512u << 20;
+
+enum class Op : std::uint8_t { kMessage = 2, kIndex = 4, kChunk = 5, kConnection = 7 };
+
+template <class X>
+X numberIn(std::string_view bytes) {
+  X x = 0;
+  mcap::Take take({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  take.number(x);
+  return x;
+}
+
+/// "name=value" after their lengths; nothing where they do not fit.
+std::optional<HeadFields> fieldsOf(Bytes head) {
+  HeadFields fields;
+  mcap::Take take(head);
+  while (!take.rest().empty()) {
+    std::string field;
+    if (!take.text(field)) return std::nullopt;
+    const auto sign = field.find('=');
+    if (sign == std::string::npos) return std::nullopt;
+    fields[field.substr(0, sign)] = field.substr(sign + 1);
+  }
+  return fields;
+}
+
+std::uint64_t nanoseconds(std::uint32_t seconds, std::uint32_t rest) {
+  return std::uint64_t{seconds} * 1'000'000'000 + rest;
+}
+
+std::optional<Op> opOf(const HeadFields& fields) {
+  const auto op = fields.find("op");
+  if (op == fields.end() || op->second.size() != 1) return std::nullopt;
+  return static_cast<Op>(op->second[0]);
+}
+
+std::string valueOf(const HeadFields& fields, const std::string& name) {
+  const auto found = fields.find(name);
+  return found == fields.end() ? "" : found->second;
+}
+
+/// What there is of it; in steps, so that memory is asked for by what comes.
+std::vector<std::uint8_t> unpackedBz2(std::vector<std::uint8_t>& packed) {
+  constexpr std::size_t kStep = 1u << 20;
+  std::vector<std::uint8_t> bytes;
+  bz_stream stream{};
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return bytes;
+  stream.next_in = reinterpret_cast<char*>(packed.data());
+  stream.avail_in = static_cast<unsigned int>(packed.size());
+  int state = BZ_OK;
+  while (state == BZ_OK && bytes.size() < kMostChunk) {
+    const std::size_t before = bytes.size();
+    bytes.resize(before + kStep);
+    stream.next_out = reinterpret_cast<char*>(bytes.data() + before);
+    stream.avail_out = kStep;
+    state = BZ2_bzDecompress(&stream);
+    bytes.resize(before + kStep - stream.avail_out);
+    if (bytes.size() == before) break;  // nothing more comes
+  }
+  BZ2_bzDecompressEnd(&stream);
+  return bytes;
+}
+
+struct ChunkPlace {
+  std::uint64_t at = 0, packed = 0;
+  std::uint32_t unpacked = 0;
+  std::string compression = {};
+  std::uint64_t start_ns = UINT64_MAX, end_ns = 0;
+  std::set<std::uint32_t> connections = {};
+};
+
+class Bag : public RosSource {
+ public:
+  explicit Bag(const std::filesystem::path& path) : path_(path) {
+    open();
+    walk();
+    for (ChunkPlace& chunk : chunks_) {
+      if (chunk.connections.empty()) {
+        indexByLooking(chunk);
+      } else if (!knowsAllOf(chunk)) {
+        learnConnections(chunk);
+      }
+    }
+    for (const auto& [connection, n] : counts_) {
+      const auto known = connections_.find(connection);
+      if (known == connections_.end()) continue;
+      RosTopic& topic = topics_[known->second.first];
+      topic.type = known->second.second;
+      topic.encoding = ros::Encoding::kRos1;
+      topic.messages += n;
+    }
+    std::stable_sort(chunks_.begin(), chunks_.end(),
+                     [](const auto& a, const auto& b) { return a.start_ns < b.start_ns; });
+  }
+  ~Bag() override { close(file_); }
+  Bag(const Bag&) = delete;
+  Bag& operator=(const Bag&) = delete;
+
+  void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) override {
+    wanted_ = wanted;
+    from_ns_ = from_ns;
+    next_chunk_ = 0;
+    pending_ = {};
+  }
+
+  std::optional<RosMessage> next() override {
+    while (next_chunk_ < chunks_.size() &&
+           (pending_.empty() || chunks_[next_chunk_].start_ns <= pending_.top().message.log_ns)) {
+      load(chunks_[next_chunk_++]);
+    }
+    if (pending_.empty()) return std::nullopt;
+    RosMessage message = pending_.top().message;
+    pending_.pop();
+    return message;
+  }
+
+ private:
+  struct Pending {
+    RosMessage message;
+    std::uint64_t order = 0;
+    bool operator<(const Pending& other) const {  // the queue's top is the largest
+      return std::tie(message.log_ns, order) > std::tie(other.message.log_ns, other.order);
+    }
+  };
+  using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
+
+  void open() {
+    file_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat status {};
+    if (file_ < 0 || fstat(file_, &status) != 0 || !S_ISREG(status.st_mode)) {
+      throw StartupError(ExitCode::kUnavailable,
+                         path_.string() + ": " + (file_ < 0 ? std::strerror(errno) : "not a file"));
+    }
+    size_ = static_cast<std::uint64_t>(status.st_size);
+    const auto begin = read(0, kMagic.size());
+    if (std::equal(begin.begin(), begin.end(), kMagic.begin(), kMagic.end())) return;
+    close(file_);
+    const bool older = std::string(begin.begin(), begin.end()).starts_with("#ROSBAG V1");
+    throw StartupError(
+        ExitCode::kUnavailable,
+        path_.string() + (older ? " is a bag of format 1; `rosbag fix` makes a newer "
+                                  "one of it"
+                                : " is no bag of ROS 1; fetch it again"));
+  }
+
+  std::vector<std::uint8_t> read(std::uint64_t at, std::uint64_t length) const {
+    std::vector<std::uint8_t> bytes(at < size_ ? std::min(length, size_ - at) : 0);
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+      const ssize_t n =
+          pread(file_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(at + done));
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) break;
+      done += static_cast<std::size_t>(n);
+    }
+    bytes.resize(done);
+    return bytes;
+  }
+
+  void walk() {
+    std::uint64_t at = kMagic.size();
+    while (at < size_) {
+      const auto length = numberAt(at);
+      const std::uint64_t data_at = at + 8 + length.value_or(0);
+      if (!length || *length > kMostHead || data_at > size_) return cutAt(at);
+      const auto fields = fieldsOf(read(at + 4, *length));
+      const auto data = numberAt(data_at - 4);
+      if (!fields || !data || *data > size_ - data_at) return cutAt(at);
+      take(*fields, data_at, *data);
+      at = data_at + *data;
+    }
+  }
+
+  std::optional<std::uint32_t> numberAt(std::uint64_t at) const {
+    const auto bytes = read(at, 4);
+    std::uint32_t number = 0;
+    return mcap::Take(bytes).number(number) ? std::optional(number) : std::nullopt;
+  }
+
+  void cutAt(std::uint64_t at) {
+    count({"unfinished", path_.string() + " was not finished: " + std::to_string(size_ - at) +
+                             " bytes at its end are lost; `rosbag reindex` makes it whole"});
+  }
+
+  void take(const HeadFields& fields, std::uint64_t at, std::uint32_t length) {
+    const auto op = opOf(fields);
+    if (op == Op::kChunk) {
+      chunks_.push_back({at, length, numberIn<std::uint32_t>(valueOf(fields, "size")),
+                         valueOf(fields, "compression")});
+    } else if (op == Op::kConnection) {
+      takeConnection(fields, length > kMostHead ? std::vector<std::uint8_t>() : read(at, length));
+    } else if (op == Op::kIndex && !chunks_.empty()) {
+      takeIndex(fields, read(at, length));
+    }
+  }
+
+  void takeConnection(const HeadFields& fields, Bytes data) {
+    const auto more = fieldsOf(data);
+    if (!more) return count({"connection_damaged", path_.string() + ": a topic of no type"});
+    connections_[numberIn<std::uint32_t>(valueOf(fields, "conn"))] = {valueOf(fields, "topic"),
+                                                                      valueOf(*more, "type")};
+  }
+
+  void takeIndex(const HeadFields& fields, Bytes entries) {
+    const auto connection = numberIn<std::uint32_t>(valueOf(fields, "conn"));
+    mcap::Take take(entries);
+    std::uint32_t seconds = 0, rest = 0, offset = 0;
+    while (take.number(seconds) && take.number(rest) && take.number(offset)) {
+      note(chunks_.back(), connection, nanoseconds(seconds, rest));
+    }
+  }
+
+  void note(ChunkPlace& chunk, std::uint32_t connection, std::uint64_t log_ns) {
+    chunk.start_ns = std::min(chunk.start_ns, log_ns);
+    chunk.end_ns = std::max(chunk.end_ns, log_ns);
+    chunk.connections.insert(connection);
+    ++counts_[connection];
+  }
+
+  bool knowsAllOf(const ChunkPlace& chunk) const {
+    return std::all_of(chunk.connections.begin(), chunk.connections.end(),
+                       [this](std::uint32_t one) { return connections_.contains(one); });
+  }
+
+  /// Where the file lacks its end: the chunk in which a connection is first used has its record.
+  void learnConnections(const ChunkPlace& chunk) {
+    if (const auto records = unpack(chunk))
+      forEachMessage(**records, [](std::uint32_t, std::uint64_t, Bytes) {});
+  }
+
+  void indexByLooking(ChunkPlace& chunk) {
+    const auto records = unpack(chunk);
+    if (!records) return count(records.error());
+    forEachMessage(**records, [&](std::uint32_t connection, std::uint64_t log_ns, Bytes) {
+      note(chunk, connection, log_ns);
+    });
+  }
+
+  Result<Records> unpack(const ChunkPlace& chunk) const {
+    auto packed = read(chunk.at, chunk.packed);
+    if (packed.size() != chunk.packed) return fail("file", path_.string() + " cannot be read");
+    if (chunk.compression.empty() || chunk.compression == "none")
+      return std::make_shared<const std::vector<std::uint8_t>>(std::move(packed));
+    if (chunk.compression != "bz2") {
+      return fail("chunk_" + chunk.compression,
+                  path_.string() + ": chunks packed by " + chunk.compression +
+                      " are not read; `rosbag decompress` unpacks them");
+    }
+    auto records = unpackedBz2(packed);
+    if (records.size() != chunk.unpacked) {
+      return fail("chunk_damaged", path_.string() + ": a chunk does not unpack");
+    }
+    return std::make_shared<const std::vector<std::uint8_t>>(std::move(records));
+  }
+
+  void forEachMessage(Bytes records,
+                      const std::function<void(std::uint32_t, std::uint64_t, Bytes)>& visit) {
+    mcap::Take take(records);
+    while (!take.rest().empty()) {
+      std::uint32_t length = 0;
+      Bytes head, data;
+      const bool whole = take.number(length) && take.bytes(head, length) && take.number(length) &&
+                         take.bytes(data, length);
+      const auto fields = whole ? fieldsOf(head) : std::nullopt;
+      if (!fields) {
+        return count({"chunk_damaged", path_.string() + ": a chunk ends within a record"});
+      }
+      const auto op = opOf(*fields);
+      if (op == Op::kConnection) takeConnection(*fields, data);
+      if (op != Op::kMessage) continue;
+      const auto time = numberIn<std::uint64_t>(valueOf(*fields, "time"));
+      visit(numberIn<std::uint32_t>(valueOf(*fields, "conn")),
+            nanoseconds(static_cast<std::uint32_t>(time), static_cast<std::uint32_t>(time >> 32)),
+            data);
+    }
+  }
+
+  bool isWanted(std::uint32_t connection) const {
+    const auto known = connections_.find(connection);
+    return known != connections_.end() && wanted_.contains(known->second.first);
+  }
+
+  void load(const ChunkPlace& chunk) {
+    const bool any = std::any_of(chunk.connections.begin(), chunk.connections.end(),
+                                 [this](std::uint32_t connection) { return isWanted(connection); });
+    if (!any || chunk.end_ns < from_ns_) return;
+    const auto records = unpack(chunk);
+    if (!records) return count(records.error());
+    forEachMessage(**records, [&](std::uint32_t connection, std::uint64_t log_ns, Bytes data) {
+      if (!isWanted(connection)) return;
+      pending_.push({{connections_.at(connection).first, log_ns, data, *records}, order_++});
+    });
+  }
+
+  std::filesystem::path path_;
+  int file_ = -1;
+  std::uint64_t size_ = 0;
+  std::map<std::uint32_t, std::pair<std::string, std::string>> connections_;  ///< topic and type
+  std::map<std::uint32_t, std::uint64_t> counts_;
+  std::vector<ChunkPlace> chunks_;  ///< by time
+  std::set<std::string> wanted_;
+  std::uint64_t from_ns_ = 0, order_ = 0;
+  std::size_t next_chunk_ = 0;
+  std::priority_queue<Pending> pending_;
+};
+
+}  // namespace
+
+std::unique_ptr<RosSource> openBag(const std::filesystem::path& file) {
+  return std::make_unique<Bag>(file);
+}
+
+}  // namespace perdure::replay

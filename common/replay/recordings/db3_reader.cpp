@@ -1,0 +1,107 @@
+// rosbag2's SQLite files: topics(id, name, type, serialization_format, …) and messages(id,
+// topic_id, timestamp, data).
+#include <sqlite3.h>
+
+#include "common/base/errors.h"
+#include "common/replay/recordings/ros_messages.h"
+#include "common/ros/definition.h"
+
+namespace perdure::replay {
+namespace {
+
+struct Close {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Statement = std::unique_ptr<sqlite3_stmt, Close>;
+
+std::string textIn(sqlite3_stmt* row, int column) {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  return text == nullptr ? "" : text;
+}
+
+class Db3 : public RosSource {
+ public:
+  explicit Db3(const std::filesystem::path& path) : path_(path) {
+    sqlite3* database = nullptr;
+    const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY, nullptr);
+    database_.reset(database);
+    if (opened != SQLITE_OK) refuse(sqlite3_errmsg(database));
+    readTopics();
+  }
+
+  void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) override {
+    std::string ids;
+    for (const auto& [id, name] : names_) {
+      if (wanted.contains(name)) ids += (ids.empty() ? "" : ",") + std::to_string(id);
+    }
+    rows_ = prepared(
+        "SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= ? AND "
+        "topic_id IN (" +
+        ids + ") ORDER BY timestamp, id");
+    sqlite3_bind_int64(rows_.get(), 1, static_cast<sqlite3_int64>(from_ns));
+  }
+
+  std::optional<RosMessage> next() override {
+    if (!rows_) return std::nullopt;
+    const int got = sqlite3_step(rows_.get());
+    if (got != SQLITE_ROW) {
+      if (got != SQLITE_DONE) {
+        count({"database_damaged", path_.string() + ": " + sqlite3_errmsg(database_.get()) +
+                                       "; what comes before is read"});
+      }
+      rows_.reset();
+      return std::nullopt;
+    }
+    const auto* bytes = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows_.get(), 2));
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows_.get(), 2));
+    const auto data = std::make_shared<const std::vector<std::uint8_t>>(bytes, bytes + size);
+    return RosMessage{names_.at(sqlite3_column_int64(rows_.get(), 0)),
+                      static_cast<std::uint64_t>(sqlite3_column_int64(rows_.get(), 1)), *data,
+                      data};
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw StartupError(ExitCode::kUnavailable,
+                       path_.string() + " is no recording of rosbag2 (" + why +
+                           "); give the folder or the .db3 that `ros2 bag record` made");
+  }
+
+  Statement prepared(const std::string& query) const {
+    sqlite3_stmt* statement = nullptr;
+    if (sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &statement, nullptr) != SQLITE_OK)
+      refuse(sqlite3_errmsg(database_.get()));
+    return Statement(statement);
+  }
+
+  void readTopics() {
+    const auto topics = prepared("SELECT id, name, type, serialization_format FROM topics");
+    while (sqlite3_step(topics.get()) == SQLITE_ROW) {
+      if (textIn(topics.get(), 3) != "cdr") continue;
+      const std::string name = textIn(topics.get(), 1);
+      names_[sqlite3_column_int64(topics.get(), 0)] = name;
+      topics_[name].type = ros::plainName(textIn(topics.get(), 2));
+    }
+    const auto counts = prepared("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id");
+    while (sqlite3_step(counts.get()) == SQLITE_ROW) {
+      const auto name = names_.find(sqlite3_column_int64(counts.get(), 0));
+      if (name == names_.end()) continue;
+      topics_[name->second].messages +=
+          static_cast<std::uint64_t>(sqlite3_column_int64(counts.get(), 1));
+    }
+  }
+
+  std::filesystem::path path_;
+  std::unique_ptr<sqlite3, Close> database_;
+  std::map<sqlite3_int64, std::string> names_;
+  Statement rows_;
+};
+
+}  // namespace
+
+std::unique_ptr<RosSource> openDb3(const std::filesystem::path& file) {
+  return std::make_unique<Db3>(file);
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,151 @@
+#include "common/replay/recordings/ros_messages.h"
+
+#include <algorithm>
+
+#include "common/base/errors.h"
+#include "common/replay/recordings/recorded_messages.h"
+#include "common/ros/definition.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isRosEncoding(const std::string& schema_encoding) {
+  return schema_encoding == "ros2msg" || schema_encoding == "ros2idl" ||
+         schema_encoding == "ros1msg";
+}
+
+/// MCAP of both ROS. Where the schema says which, not the profile: converters write what they like
+/// into that.
+class McapSource : public RosSource {
+ public:
+  explicit McapSource(const fs::path& path) : messages_(path) {
+    for (const auto& [name, topic] : messages_.topics()) {
+      if (!isRosEncoding(topic.schema_encoding)) continue;
+      const bool old = topic.encoding == "ros1";
+      topics_[name] = {ros::plainName(topic.type), old ? ros::Encoding::kRos1 : ros::Encoding::kCdr,
+                       topic.messages};
+    }
+    reasons_ = messages_.reasons();
+    last_problem_ = messages_.lastProblem();
+  }
+
+  void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) override {
+    messages_.rewind([wanted](const std::string& topic) { return wanted.contains(topic); },
+                     from_ns);
+  }
+
+  std::optional<RosMessage> next() override {
+    auto message = messages_.next();
+    reasons_ = messages_.reasons();
+    last_problem_ = messages_.lastProblem();
+    if (!message) return std::nullopt;
+    return RosMessage{std::move(message->topic), message->log_ns, message->data, message->keeper};
+  }
+
+ private:
+  RecordedMessages messages_;
+};
+
+std::vector<fs::path> filesWith(const fs::path& path, const char* extension) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) {
+    return path.extension() == extension ? std::vector{path} : std::vector<fs::path>();
+  }
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(path, ignored)) {
+    if (entry.path().extension() == extension) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// rosbag2 packs whole files where it is told to: "run_0.db3.zstd".
+std::vector<fs::path> packedFiles(const fs::path& path) {
+  auto files = filesWith(path, ".zstd");
+  std::erase_if(files, [](const fs::path& file) {
+    const auto inner = file.stem().extension();
+    return inner != ".db3" && inner != ".mcap";
+  });
+  return files;
+}
+
+void refusePacked(const fs::path& path) {
+  const auto packed = packedFiles(path);
+  if (packed.empty()) return;
+  throw StartupError(ExitCode::kUnavailable,
+                     packed.front().string() + " is packed as a whole; unpack it first: zstd -d " +
+                         packed.front().string());
+}
+
+bool holdsRos(const fs::path& path) {
+  const RecordedMessages messages(path);
+  return std::any_of(messages.topics().begin(), messages.topics().end(),
+                     [](const auto& topic) { return isRosEncoding(topic.second.schema_encoding); });
+}
+
+}  // namespace
+
+bool RosMessages::looksLikeOne(const fs::path& path) {
+  if (!filesWith(path, ".bag").empty() || !filesWith(path, ".db3").empty()) return true;
+  if (!packedFiles(path).empty()) return true;
+  return !filesWith(path, ".mcap").empty() && holdsRos(path);
+}
+
+RosMessages::RosMessages(const fs::path& path) {
+  refusePacked(path);
+  for (const auto& file : filesWith(path, ".bag")) sources_.push_back(openBag(file));
+  for (const auto& file : filesWith(path, ".db3")) sources_.push_back(openDb3(file));
+  if (sources_.empty()) sources_.push_back(std::make_unique<McapSource>(path));
+  for (const auto& source : sources_) {
+    for (const auto& [name, topic] : source->topics()) {
+      RosTopic& all = topics_[name];
+      const std::uint64_t before = all.messages;
+      all = topic;
+      all.messages += before;
+    }
+  }
+}
+
+ReasonCounts RosMessages::reasons() const {
+  ReasonCounts all;
+  for (const auto& source : sources_) {
+    for (const auto& [reason, n] : source->reasons().all()) all.add(reason, n);
+  }
+  return all;
+}
+
+std::string RosMessages::lastProblem() const {
+  std::string last;
+  for (const auto& source : sources_) {
+    if (!source->lastProblem().empty()) last = source->lastProblem();
+  }
+  return last;
+}
+
+void RosMessages::rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) {
+  heads_.clear();
+  std::set<std::string> known;
+  for (const std::string& topic : wanted) {
+    if (topics_.contains(topic)) known.insert(topic);
+  }
+  for (const auto& source : sources_) {
+    source->rewind(known, from_ns);
+    heads_.push_back(source->next());
+  }
+}
+
+std::optional<RosMessage> RosMessages::next() {
+  std::size_t first = heads_.size();
+  for (std::size_t i = 0; i < heads_.size(); ++i) {
+    if (heads_[i] && (first == heads_.size() || heads_[i]->log_ns < heads_[first]->log_ns))
+      first = i;
+  }
+  if (first == heads_.size()) return std::nullopt;
+  auto message = std::move(heads_[first]);
+  heads_[first] = sources_[first]->next();
+  return message;
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,314 @@
+// A recording of ROS as a dataset: images, inertial samples, and what camera_info and tf_static say
+// of the calibration; the rig file says the rest. Images are taken out when they are asked for.
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "common/base/errors.h"
+#include "common/replay/files/rig_file.h"
+#include "common/replay/recording.h"
+#include "common/replay/ros_topics.h"
+#include "common/ros/images.h"
+#include "common/ros/sensors.h"
+#include "common/vision/decode.h"
+#include "common/vision/image.h"
+
+namespace perdure::replay {
+namespace {
+
+constexpr char kTransforms[] = "/tf_static";
+constexpr int kLooksForBits = 5;  ///< images of 16 bits that tell how many are used
+
+/// One image in the recording: all that is kept of it until it is asked for.
+struct RosImage {
+  TimePoint time;
+  std::uint64_t log_ns = 0;
+};
+
+std::string_view textOf(const SharedBytes& bytes) {
+  return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
+}
+
+Result<Frame> unpacked(const ros::CompressedImage& image) {
+  const auto pixels = vision::decodeImage(textOf(image.data), std::nullopt);
+  if (!pixels) return tl::unexpected(pixels.error());
+  Frame frame;
+  const auto set = vision::setPixels(frame, *pixels);
+  return set ? Result<Frame>(frame) : tl::unexpected(set.error());
+}
+
+TimePoint stampOf(const ros::Header& header, std::uint64_t log_ns) {
+  const TimePoint time = ros::timeOf(header.stamp);
+  return time == TimePoint() ? fromNanoseconds(static_cast<std::int64_t>(log_ns)) : time;
+}
+
+/// Gives one camera's images in the order of the recording fast, and any other by going back.
+class RosImages {
+ public:
+  RosImages(const std::filesystem::path& path, CameraTopics topics, int bits)
+      : messages_(path), topics_(std::move(topics)), bits_(bits) {
+    rewind(0);
+  }
+
+  Result<Frame> at(const RosImage& wanted) {
+    if (last_ns_ >= wanted.log_ns) rewind(wanted.log_ns);
+    while (const auto message = messages_.next()) {
+      last_ns_ = message->log_ns;
+      if (message->log_ns < wanted.log_ns) continue;
+      if (message->log_ns > wanted.log_ns) break;
+      const auto [time, frame] =
+          topics_.compressed ? take<ros::CompressedImage>(*message) : take<ros::Image>(*message);
+      if (time == wanted.time) return frame;
+    }
+    last_ns_ = UINT64_MAX;
+    return fail("image_missing", topics_.image + " has no image of " +
+                                     std::to_string(toNanoseconds(wanted.time)) + " ns any more");
+  }
+
+ private:
+  template <class M>
+  std::pair<TimePoint, Result<Frame>> take(const RosMessage& message) {
+    const auto image = messages_.valueOf<M>(message);
+    if (!image) return {TimePoint::min(), tl::unexpected(image.error())};
+    const TimePoint time = stampOf(image->header, message.log_ns);
+    if constexpr (std::same_as<M, ros::Image>) {
+      return {time, ros::frameOf(*image, bits_)};
+    } else {
+      return {time, unpacked(*image)};
+    }
+  }
+
+  void rewind(std::uint64_t from_ns) {
+    messages_.rewind({topics_.image}, from_ns);
+    last_ns_ = 0;
+  }
+
+  RosMessages messages_;
+  CameraTopics topics_;
+  int bits_;
+  std::uint64_t last_ns_ = 0;
+};
+
+/// What the recording told of one camera.
+struct RosCamera {
+  CameraTopics topics;
+  std::vector<RosImage> images = {};
+  std::optional<ros::CameraInfo> info = {};
+  std::string frame_id = {};
+  int bits = 0, looks = 0;
+};
+
+class RosDriveReader {
+ public:
+  explicit RosDriveReader(const DatasetOptions& options)
+      : options_(options), file_(options.path.string()), messages_(options.path) {
+    if (!options.rig.empty()) rig_ = readRigParts(options.rig, &recording_.notes);
+  }
+
+  Recording read() {
+    recording_.kind = DatasetKind::kRosRecording;
+    const ChosenTopics chosen = chooseTopics(messages_.topics(), wantedTopics(), file_);
+    for (const auto& topics : chosen.cameras) addCamera(topics);
+    imu_ = chosen.imu;
+    readMessages();
+    requireImages();
+    for (std::size_t i = 0; i < cameras_.size(); ++i) addFrames(i);
+    sortFrames(recording_);
+    orderImu(recording_);
+    for (std::size_t i = 0; i < cameras_.size(); ++i)
+      recording_.calibration.cameras.push_back(calibrationOf(i));
+    if (!recording_.imu.empty()) recording_.calibration.imu = imuCalibration();
+    noteTopics();
+    return std::move(recording_);
+  }
+
+ private:
+  [[noreturn]] void stop(const std::string& what) const {
+    throw StartupError(ExitCode::kUnavailable, file_ + ": " + what);
+  }
+
+  std::map<std::string, std::string> wantedTopics() const {
+    auto wanted = rig_ ? rig_->topics : std::map<std::string, std::string>();
+    for (const auto& [role, topic] : options_.topics) wanted[role] = topic;
+    return wanted;
+  }
+
+  void addCamera(const CameraTopics& topics) {
+    const bool second = !cameras_.empty();
+    const bool in_rig = rig_ && rig_->sensors.camera("cam0") != nullptr;
+    if (second && in_rig && rig_->sensors.camera("cam1") == nullptr) {
+      recording_.notes.push_back(topics.image + " is not used: " + options_.rig.string() +
+                                 " has no section cam1");
+      return;
+    }
+    cameras_.push_back({topics});
+  }
+
+  void readMessages() {
+    std::set<std::string> wanted{kTransforms};
+    if (!imu_.empty()) wanted.insert(imu_);
+    for (const RosCamera& camera : cameras_) {
+      wanted.insert(camera.topics.image);
+      if (!camera.topics.info.empty()) wanted.insert(camera.topics.info);
+    }
+    messages_.rewind(wanted);
+    while (const auto message = messages_.next()) take(*message);
+    const ReasonCounts reasons = messages_.reasons();
+    for (const auto& [reason, n] : reasons.all()) recording_.reasons.add(reason, n);
+    if (!messages_.lastProblem().empty()) recording_.notes.push_back(messages_.lastProblem());
+    if (unstamped_ == 0) return;
+    recording_.notes.push_back(file_ + ": " + std::to_string(unstamped_) +
+                               " messages have no stamp in their header and got the time at which "
+                               "they were recorded");
+  }
+
+  template <class M>
+  std::optional<M> valueIn(const RosMessage& message, const char* kind) {
+    auto value = messages_.valueOf<M>(message);
+    if (value) return *std::move(value);
+    recording_.reasons.add(std::string(kind) + "_malformed");
+    return std::nullopt;
+  }
+
+  void take(const RosMessage& message) {
+    if (message.topic == kTransforms) {
+      if (messages_.topics().at(message.topic).type != ros::TFMessage::kType) return;
+      if (const auto value = valueIn<ros::TFMessage>(message, "tf_static")) tree_.add(*value);
+    } else if (message.topic == imu_) {
+      if (const auto value = valueIn<ros::Imu>(message, "imu")) takeImu(*value, message.log_ns);
+    }
+    for (RosCamera& camera : cameras_) {
+      if (message.topic == camera.topics.info && !camera.info)
+        camera.info = valueIn<ros::CameraInfo>(message, "camera_info");
+      if (message.topic == camera.topics.image) takeImage(camera, message);
+    }
+  }
+
+  void takeImu(const ros::Imu& imu, std::uint64_t log_ns) {
+    if (imu_frame_.empty()) imu_frame_ = imu.header.frame_id;
+    ImuSample sample = ros::sampleOf(imu);
+    sample.time = stamp(imu.header, log_ns);
+    recording_.imu.push_back(sample);
+  }
+
+  void takeImage(RosCamera& camera, const RosMessage& message) {
+    if (camera.topics.compressed) {
+      const auto image = valueIn<ros::CompressedImage>(message, "frame");
+      if (image) addImage(camera, image->header, message.log_ns);
+    } else if (const auto image = valueIn<ros::Image>(message, "frame")) {
+      addImage(camera, image->header, message.log_ns);
+      if (camera.looks++ < kLooksForBits)
+        camera.bits = std::max(camera.bits, ros::usedBits(*image));
+    }
+  }
+
+  void addImage(RosCamera& camera, const ros::Header& header, std::uint64_t log_ns) {
+    if (camera.frame_id.empty()) camera.frame_id = header.frame_id;
+    camera.images.push_back({stamp(header, log_ns), log_ns});
+  }
+
+  TimePoint stamp(const ros::Header& header, std::uint64_t log_ns) {
+    if (ros::timeOf(header.stamp) == TimePoint()) ++unstamped_;
+    return stampOf(header, log_ns);
+  }
+
+  void requireImages() const {
+    if (!cameras_.front().images.empty()) return;
+    const std::string problem = messages_.lastProblem();
+    stop(cameras_.front().topics.image + " has no whole image" +
+         (problem.empty() ? "; record it again" : ": " + problem));
+  }
+
+  void addFrames(std::size_t index) {
+    RosCamera& camera = cameras_[index];
+    orderByTime(camera.images, index == 0 ? "frame" : "stereo", recording_,
+                [](const RosImage& seen) { return seen.time; });
+    const auto store = std::make_shared<RosImages>(options_.path, camera.topics, camera.bits);
+    const std::vector<Recording::FrameFile> first = recording_.frames;
+    if (index == 0) recording_.frame_count = camera.images.size();
+    for (const RosImage& seen : camera.images) {
+      Recording::FrameFile frame{seen.time, recording_.frames.size(), index, {}};
+      frame.load = [store, seen] { return store->at(seen); };
+      if (index > 0) {
+        const auto* pair = pairOf(first, seen.time);
+        if (pair == nullptr) {
+          recording_.reasons.add("stereo_unmatched");
+          continue;
+        }
+        frame.index = pair->index, frame.time = pair->time;
+      }
+      recording_.frames.push_back(std::move(frame));
+    }
+  }
+
+  CameraCalibration calibrationOf(std::size_t index) const {
+    const std::string name = "cam" + std::to_string(index);
+    const CameraCalibration* in_rig = rig_ ? rig_->sensors.camera(name) : nullptr;
+    CameraCalibration camera = in_rig ? *in_rig : cameraBy(name, cameras_[index]);
+    camera.name = name;
+    if (camera.rate_hz <= 0.0) camera.rate_hz = rateOf(recording_.frames, index);
+    return camera;
+  }
+
+  CameraCalibration cameraBy(const std::string& name, const RosCamera& camera) const {
+    const std::string mend = "; write " + name +
+                             " into a rig file (`perdure calibrate` makes one) "
+                             "and give it with --rig";
+    if (!camera.info) {
+      stop("no camera_info goes with " + camera.topics.image + ": the lens of " + name +
+           " is not known" + mend);
+    }
+    auto calibration = ros::cameraOf(*camera.info, camera.topics.rectified);
+    if (!calibration) stop(camera.topics.image + ": " + calibration.error().detail + mend);
+    if (imu_.empty()) return *calibration;
+    const std::string& frame =
+        camera.frame_id.empty() ? camera.info->header.frame_id : camera.frame_id;
+    const auto T_BC = tree_.find(imu_frame_, frame);
+    if (!T_BC) {
+      stop("where " + name + " (frame `" + frame + "`) is on the inertial unit (frame `" +
+           imu_frame_ + "`) is not known: " +
+           (tree_.empty() ? "the recording has no /tf_static"
+                          : "/tf_static has no way between the two frames") +
+           "; record /tf_static, or write " + name +
+           " with T_cam_imu (or T_BS, camera in the IMU's frame) into a rig file and give it with "
+           "--rig");
+    }
+    calibration->T_BC = *T_BC;
+    return *calibration;
+  }
+
+  ImuCalibration imuCalibration() const {
+    if (!rig_ || !rig_->sensors.imu) {
+      stop("the noise of the inertial unit on " + imu_ +
+           " is not known, for ROS' messages do not tell it; write imu0 into a rig file with "
+           "gyroscope_noise_density, gyroscope_random_walk, accelerometer_noise_density, "
+           "accelerometer_random_walk (its data sheet or Kalibr's imu.yaml has them) and rate_hz, "
+           "and give it with --rig");
+    }
+    return *rig_->sensors.imu;
+  }
+
+  void noteTopics() {
+    std::string said = file_ + ": ";
+    for (std::size_t i = 0; i < cameras_.size(); ++i)
+      said += "cam" + std::to_string(i) + " is " + cameras_[i].topics.image + ", ";
+    said += imu_.empty() ? "and there is no inertial unit" : "the inertial unit is " + imu_;
+    recording_.notes.push_back(said);
+  }
+
+  DatasetOptions options_;
+  std::string file_;
+  RosMessages messages_;
+  std::optional<RigParts> rig_;
+  Recording recording_;
+  std::vector<RosCamera> cameras_;
+  std::string imu_, imu_frame_;
+  ros::FrameTree tree_;
+  std::size_t unstamped_ = 0;
+};
+
+}  // namespace
+
+Recording readRosDrive(const DatasetOptions& options) { return RosDriveReader(options).read(); }
+
+}  // namespace perdure::replay

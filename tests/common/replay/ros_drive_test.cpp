@@ -1,0 +1,203 @@
+// Recordings of ROS as datasets: what is chosen, what is said where something is missing. By
+// rosbag2's SQLite, which is written here; tests/interop/ros has the files of strangers.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/replay/dataset.h"
+#include "common/replay/ros_topics.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tests/interop/ros/drive_plan.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+using test::PlanOptions;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+
+/// A tiny drive as a folder, as .db3, and the rig file with the noise of its inertial unit.
+struct Twin {
+  fs::path folder, file, rig;
+};
+
+Twin twinOf(const std::string& name, const PlanOptions& options = {}, bool stereo = false) {
+  Twin twin{tinyEuroc(name + "_source", stereo), freshFolder(name) / "run_0.db3",
+            freshFolder(name + "_rig") / "rig.yaml"};
+  const auto dataset = Dataset::open({.path = twin.folder});
+  test::writeDb3(*dataset, twin.file, options);
+  test::writeImuRig(*dataset, twin.rig);
+  return twin;
+}
+
+void expectSame(const Dataset& a, const Dataset& b) {
+  const CameraCalibration &one = a.calibration().cameras[0], &other = b.calibration().cameras[0];
+  EXPECT_EQ(one.width, other.width);
+  EXPECT_EQ(one.fy, other.fy);
+  EXPECT_EQ(one.distortion, other.distortion);
+  EXPECT_EQ(one.distortion_coefficients, other.distortion_coefficients);
+  EXPECT_LT((one.T_BC.matrix() - other.T_BC.matrix()).norm(), 1e-12);
+  EXPECT_EQ(a.calibration().imu->gyro_noise, b.calibration().imu->gyro_noise);
+}
+
+class Images : public testing::TestWithParam<PlanOptions::Images> {};
+
+TEST_P(Images, OfASqliteRecordingAreThoseOfTheFolder) {
+  const Twin twin = twinOf("ros_same", {.images = GetParam()}, true);
+  const auto folder = Dataset::open({.path = twin.folder});
+  for (const fs::path& path : {twin.file, twin.file.parent_path()}) {
+    const auto recorded = Dataset::open({.path = path, .rig = twin.rig});
+    EXPECT_EQ(recorded->kind(), DatasetKind::kRosRecording);
+    EXPECT_EQ(recorded->frameCount(), 5u);
+    expectSame(*folder, *recorded);
+    const auto again = Dataset::open({.path = twin.folder});
+    const test::Given a = test::allOf(*again), b = test::allOf(*recorded);
+    EXPECT_EQ(a.order, b.order);
+    EXPECT_EQ(a.pixels.size(), 10u);
+    EXPECT_EQ(a.pixels, b.pixels);
+    EXPECT_TRUE(recorded->reasons().all().empty());
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Ros, Images,
+                         testing::Values(PlanOptions::Images::kRaw, PlanOptions::Images::kPng));
+
+TEST(RosDrive, GivesAnyImageOutOfTurn) {
+  const Twin twin = twinOf("ros_turns");
+  const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});
+  const auto all = test::allOf(*Dataset::open({.path = twin.folder})).pixels;
+  for (const std::uint64_t index : {3u, 0u, 4u, 4u, 1u}) {
+    const auto frame = dataset->frameAt(index);
+    ASSERT_TRUE(frame) << index;
+    EXPECT_TRUE(std::equal(frame->data->begin(), frame->data->end(), all[index].begin()));
+  }
+}
+
+TEST(RosDrive, MessagesWithoutStampsGetTheTimeOfTheirRecordingAndThatIsSaid) {
+  const Twin twin = twinOf("ros_unstamped", {.stamps = false});
+  const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});
+  EXPECT_EQ(dataset->frameTime(0), fromNanoseconds(1'001'000'000));
+  EXPECT_THAT(dataset->recording().notes, Contains(HasSubstr("have no stamp")));
+}
+
+TEST(RosDrive, WhereTheCameraIsMustBeKnown) {
+  const Twin twin = twinOf("ros_placeless", {.transforms = false});
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = twin.file, .rig = twin.rig}); }),
+              AllOf(HasSubstr("has no /tf_static"), HasSubstr("T_cam_imu"), HasSubstr("--rig")));
+}
+
+TEST(RosDrive, TheNoiseOfTheInertialUnitMustBeKnown) {
+  const Twin twin = twinOf("ros_noise");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = twin.file}); }),
+              AllOf(HasSubstr("/imu0 is not known"), HasSubstr("gyroscope_noise_density")));
+}
+
+TEST(RosDrive, ARigFileGoesBeforeWhatTheRecordingSays) {
+  const Twin twin = twinOf("ros_rig", {.transforms = false});
+  auto rig = readText(twin.folder / "mav0" / "cam0" / "sensor.yaml");
+  rig = rig.substr(rig.find("T_BS"));
+  std::string text = "cam0:\n  rostopic: /cam0/image_raw\n  ";
+  for (const char c : rig) text += c == '\n' ? "\n  " : std::string(1, c);
+  text.replace(text.find("20.0, 21.0"), 10, "25.0, 26.0");
+  writeText(twin.rig, text + "\n" + readText(twin.rig));
+  const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});
+  EXPECT_EQ(dataset->calibration().cameras[0].fx, 25.0);
+}
+
+TEST(RosDrive, AnyBytesAreReadOrRefused) {
+  const Twin twin = twinOf("ros_fuzz");
+  const std::string whole = readText(twin.file);
+  std::mt19937_64 random(4);
+  int read = 0, refused = 0;
+  for (int i = 0; i < 60; ++i) {
+    std::string bytes = whole;
+    for (std::uint64_t n = 1 + random() % 20; n > 0; --n)
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+    if (random() % 4 == 0) bytes.resize(random() % bytes.size());
+    writeText(twin.file, bytes);
+    const std::string refusal = startupErrorOf([&] {
+      read +=
+          test::allOf(*Dataset::open({.path = twin.file, .rig = twin.rig})).order.empty() ? 0 : 1;
+    });
+    refused += refusal.empty() ? 0 : 1;
+  }
+  EXPECT_GT(read, 5);
+  EXPECT_GT(refused, 5);
+}
+
+TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheMend) {
+  const fs::path folder = freshFolder("ros_none");
+  writeText(folder / "a.bag", "#ROSBAG V1.2\n");
+  writeText(folder / "b.bag", "something else");
+  writeText(folder / "c.db3", "nothing of the kind, and long enough for a head of SQLite's files");
+  const auto errorOf = [&](const char* name) {
+    return startupErrorOf([&] { Dataset::open({.path = folder / name}); });
+  };
+  EXPECT_THAT(errorOf("a.bag"), HasSubstr("rosbag fix"));
+  EXPECT_THAT(errorOf("b.bag"), HasSubstr("is no bag of ROS 1"));
+  EXPECT_THAT(errorOf("c.db3"), HasSubstr("ros2 bag record"));
+  const fs::path packed = freshFolder("ros_packed");
+  writeText(packed / "run_0.db3.zstd", "");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = packed}); }), HasSubstr("zstd -d"));
+}
+
+RosTopics topicsOfTypes(std::vector<std::pair<const char*, const char*>> list) {
+  RosTopics topics;
+  for (const auto& [name, type] : list)
+    topics[name] = {std::string("sensor_msgs/") + type, ros::Encoding::kCdr, 3};
+  return topics;
+}
+
+TEST(RosTopics, AreChosenByTypeWhereThereIsOne) {
+  const auto chosen =
+      chooseTopics(topicsOfTypes({{"/camera/image_raw", "Image"},
+                                  {"/camera/image_raw/compressed", "CompressedImage"},
+                                  {"/camera/image_rect", "Image"},
+                                  {"/camera/depth/image", "Image"},
+                                  {"/camera/camera_info", "CameraInfo"},
+                                  {"/imu/data", "Imu"}}),
+                   {}, "f");
+  ASSERT_EQ(chosen.cameras.size(), 1u);
+  EXPECT_EQ(chosen.cameras[0].image, "/camera/image_raw");
+  EXPECT_EQ(chosen.cameras[0].info, "/camera/camera_info");
+  EXPECT_FALSE(chosen.cameras[0].compressed);
+  EXPECT_EQ(chosen.imu, "/imu/data");
+}
+
+TEST(RosTopics, OfTwoThatAreAPairTheLeftOneIsFirst) {
+  const auto chosen =
+      chooseTopics(topicsOfTypes({{"/right/image_raw/compressed", "CompressedImage"},
+                                  {"/left/image_raw/compressed", "CompressedImage"},
+                                  {"/left/camera_info", "CameraInfo"}}),
+                   {}, "f");
+  ASSERT_EQ(chosen.cameras.size(), 2u);
+  EXPECT_EQ(chosen.cameras[0].image, "/left/image_raw/compressed");
+  EXPECT_TRUE(chosen.cameras[0].compressed);
+  EXPECT_EQ(chosen.cameras[0].info, "/left/camera_info");
+  EXPECT_EQ(chosen.cameras[1].info, "");
+  EXPECT_EQ(chosen.imu, "");
+}
+
+TEST(RosTopics, WhereSeveralMayBeMeantOneMustBeNamed) {
+  const auto topics = topicsOfTypes({{"/front/image_raw", "Image"},
+                                     {"/rear/image_rect_color", "Image"},
+                                     {"/a/imu", "Imu"},
+                                     {"/b/imu", "Imu"}});
+  const auto errorOf = [&](const std::vector<std::string>& wanted) {
+    return startupErrorOf([&] { chooseTopics(topics, topicsOf(wanted), "f"); });
+  };
+  EXPECT_THAT(errorOf({}), AllOf(HasSubstr("/front/image_raw, /rear/image_rect_color"),
+                                 HasSubstr("cam0=TOPIC")));
+  EXPECT_THAT(errorOf({"cam0=/front/image_raw"}), HasSubstr("/a/imu, /b/imu"));
+  EXPECT_THAT(errorOf({"cam0=/side"}), AllOf(HasSubstr("on /side"), HasSubstr("/front/image_raw")));
+  EXPECT_THAT(errorOf({"front"}), HasSubstr("cam0=TOPIC"));
+  const auto chosen =
+      chooseTopics(topics, topicsOf({"cam0=/rear/image_rect_color", "imu=/b/imu"}), "f");
+  EXPECT_TRUE(chosen.cameras[0].rectified);
+  EXPECT_EQ(chosen.imu, "/b/imu");
+}
+
+}  // namespace
+}  // namespace perdure::replay
