@@ -23,13 +23,9 @@ void describeDetector(Parameters& p, Fields& fields) {
 
 void describePose(PoseParameters& p, Fields& fields) {
   fields.number("pose.walk_position", p.walk_position, atLeast(0),
-                {"random walk of poses that come without covariance", "m/√m"});
+                {"random walk of the pose error, by distance; exact poses have none", "m/√m"});
   fields.number("pose.walk_rotation", p.walk_rotation, atLeast(0),
                 {"the same of their rotation", "rad/√m"});
-  fields.number("pose.drift_position", p.drift_position, atLeast(0),
-                {"random walk of odometry, in place of its own covariance; 0: that", "m/√m"});
-  fields.number("pose.drift_rotation", p.drift_rotation, atLeast(0),
-                {"the same of its rotation", "rad/√m"});
 }
 
 void describeTracks(Parameters& p, Fields& fields) {
@@ -174,7 +170,9 @@ void describeFormer(Fields& fields) {
                              {"tend.merge_overlap", "tracks.merge_overlap"},
                              {"tend.max_objects", "tracks.max_objects"},
                              {"smooth.keyframes", "smoothing.keyframes"},
-                             {"smooth.per_frame", "smoothing.per_frame"}};
+                             {"smooth.per_frame", "smoothing.per_frame"},
+                             {"pose.drift_position", "pose.walk_position, of all odometry"},
+                             {"pose.drift_rotation", "pose.walk_rotation, of all odometry"}};
   for (const auto& [old, now] : renamed) fields.formerly(old, std::string("is now ") + now);
   fields.formerly("context", "is gone: context is no longer laid over the classes; leave it out");
   // Constants in the rooms' parameters.h.

@@ -20,7 +20,7 @@ struct Layers {
 const std::vector<Layers> kLayers{
     {"common/wire/", {"description", ""}},
     {"common/bus/", {"security", ""}},
-    {"common/mapping/", {"frames", "graph", "places", "", "fusion"}},
+    {"common/mapping/", {"frames", "graph", "places", "appearance", "", "fusion"}},
     {"common/replay/", {"files", "recordings", ""}},
     {"common/sim/scenes/", {"parts", ""}},
     {"services/semantic_filter/core/",

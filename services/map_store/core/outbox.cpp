@@ -16,7 +16,8 @@ constexpr std::array kFollowed = {Followed{OutboxTable::kClasses, "graph_classes
                                   Followed{OutboxTable::kPoses, "anchor_poses", "id"},
                                   Followed{OutboxTable::kEdges, "edges", "id"},
                                   Followed{OutboxTable::kObjects, "objects", "id"},
-                                  Followed{OutboxTable::kSightings, "sightings", "id"}};
+                                  Followed{OutboxTable::kSightings, "sightings", "id"},
+                                  Followed{OutboxTable::kViews, "views", "anchor"}};
 
 /// A row has one entry, with the number of its last change.
 std::string enter(OutboxTable table, const std::string& id) {
@@ -53,11 +54,23 @@ std::string schema() {
          "REPLACE INTO meta VALUES('outbox_acknowledged', 0);";
 }
 
-Result<bool> isThere(const Connection& connection) {
-  const auto tables =
-      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'outbox'");
-  if (!tables) return tl::unexpected<Reason>(tables.error());
-  return *tables > 0;
+Result<bool> isThere(const Connection& connection, const char* what = "outbox") {
+  const auto found = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" +
+                                        std::string(what) + "'");
+  if (!found) return tl::unexpected<Reason>(found.error());
+  return *found > 0;
+}
+
+std::string removal() {
+  std::string sql =
+      "DROP TABLE IF EXISTS outbox; DROP TRIGGER IF EXISTS outbox_meta_INSERT;"
+      "DROP TRIGGER IF EXISTS outbox_meta_UPDATE;";
+  for (const Followed& table : kFollowed) {
+    for (const char* event : {"INSERT", "UPDATE", "DELETE"}) {
+      sql += std::string("DROP TRIGGER IF EXISTS outbox_") + table.name + "_" + event + ";";
+    }
+  }
+  return sql;
 }
 
 Result<std::string> text(const Connection& connection, std::string_view sql) {
@@ -73,10 +86,10 @@ Result<std::string> text(const Connection& connection, std::string_view sql) {
 Result<void> openOutbox(const Connection& connection) {
   auto transaction = Transaction::begin(connection);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto there = isThere(connection);
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (*there) return {};
-  const auto made = connection.execute(schema());
+  const auto follows_all = isThere(connection, "outbox_views_INSERT");
+  if (!follows_all) return tl::unexpected<Reason>(follows_all.error());
+  if (*follows_all) return {};
+  const auto made = connection.execute(removal() + schema());
   return made ? transaction->commit() : made;
 }
 
@@ -86,15 +99,7 @@ Result<void> dropOutbox(const Connection& connection) {
   if (!*there) return {};
   auto transaction = Transaction::begin(connection);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  std::string sql =
-      "DROP TABLE outbox; DROP TRIGGER outbox_meta_INSERT;"
-      "DROP TRIGGER outbox_meta_UPDATE;";
-  for (const Followed& table : kFollowed) {
-    for (const char* event : {"INSERT", "UPDATE", "DELETE"}) {
-      sql += std::string("DROP TRIGGER outbox_") + table.name + "_" + event + ";";
-    }
-  }
-  const auto dropped = connection.execute(sql);
+  const auto dropped = connection.execute(removal());
   return dropped ? transaction->commit() : dropped;
 }
 

@@ -19,9 +19,10 @@ enum class OutboxTable : std::int64_t {
   kEdges = 3,
   kObjects = 4,
   kSightings = 5,
-  kWorking = 6,  ///< the working set with its header and the map's revision: one entry, id 0
+  kViews = 6,
+  kWorking = 7,  ///< the working set with its header and the map's revision: one entry, id 0
 };
-inline constexpr std::int64_t kOutboxTables = 7;
+inline constexpr std::int64_t kOutboxTables = 8;
 
 /// Where an outbox stands. Each change has a number larger than all before it.
 struct OutboxMark {
@@ -31,7 +32,8 @@ struct OutboxMark {
   std::int64_t last = 0;          ///< the newest number given
 };
 
-/// Makes the outbox where there is none. All or nothing.
+/// Makes the outbox where there is none, and anew where it does not follow every table. All or
+/// nothing.
 Result<void> openOutbox(const Connection& connection);
 /// Removes it: without a server it would gather what nobody takes.
 Result<void> dropOutbox(const Connection& connection);

@@ -32,6 +32,7 @@ CREATE FUNCTION perdure.clear(of_map bigint) RETURNS void LANGUAGE sql AS $$
   DELETE FROM perdure.edges WHERE map = of_map;
   DELETE FROM perdure.objects WHERE map = of_map;
   DELETE FROM perdure.sightings WHERE map = of_map;
+  DELETE FROM perdure.views WHERE map = of_map;
   DELETE FROM perdure.working WHERE map = of_map;
 $$;
 CREATE FUNCTION perdure.attach(a_vehicle text, a_file text, an_outbox text, acknowledged bigint,

@@ -9,7 +9,7 @@
 
 namespace perdure::map_store::fleet {
 
-inline constexpr std::int64_t kServerSchema = 1;
+inline constexpr std::int64_t kServerSchema = 2;
 /// Payload: "MAP X Y", the map's number and the tile that changed there.
 inline constexpr char kTilesChannel[] = "perdure_tiles";
 /// Payload: "MAP REVISION VEHICLE", once a commit, when all of it is there.

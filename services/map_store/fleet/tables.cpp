@@ -72,7 +72,8 @@ std::array<Table, static_cast<std::size_t>(kOutboxTables) - 1> makeTables() {
                  {"y", kReal},
                  {"z", kReal},
                  {"yaw", kReal},
-                 {"record", kBlob}}}};
+                 {"record", kBlob}}},
+          Table{"views", {{"anchor", kInteger}, {"points", kBlob}}}};
 }
 
 const char* typeOf(Kind kind) {

@@ -174,8 +174,8 @@ Odometry World::odometry(std::uint64_t frame, double t_s) {
     const PoseParameters& pose = told_.config.filter.pose;
     const double metres = (T_WB.p - last_T_WB_->p).norm();
     Eigen::Matrix<double, 6, 1> sigma;
-    sigma << Eigen::Vector3d::Constant(std::sqrt(metres) * pose.drift_rotation),
-        Eigen::Vector3d::Constant(std::sqrt(metres) * pose.drift_position);
+    sigma << Eigen::Vector3d::Constant(std::sqrt(metres) * pose.walk_rotation),
+        Eigen::Vector3d::Constant(std::sqrt(metres) * pose.walk_position);
     o.transition.topLeftCorner<3, 3>() = T_WB.R().transpose() * last_T_WB_->R();
     o.increment_covariance = sigma.cwiseAbs2().asDiagonal();
     pose_error_ = (o.transition * pose_error_).eval();

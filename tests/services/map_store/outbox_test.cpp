@@ -131,5 +131,18 @@ TEST_F(Outbox, IsAnotherOneAfterATimeWithoutServer) {
   EXPECT_NE(markOf(path_).outbox, before.outbox);
 }
 
+TEST_F(Outbox, OneThatDoesNotFollowEveryTableIsBegunAnew) {
+  { const MapDatabase database({.path = path_, .outbox = true}); }
+  const OutboxMark before = markOf(path_);
+  {
+    const auto connection = Connection::open(path_, Connection::Mode::kReadWriteCreate).value();
+    ASSERT_TRUE(connection.execute("DROP TRIGGER outbox_views_INSERT").has_value());
+  }
+  { const MapDatabase database({.path = path_, .outbox = true}); }
+  EXPECT_NE(markOf(path_).outbox, before.outbox);
+  { const MapDatabase again({.path = path_, .outbox = true}); }
+  EXPECT_EQ(markOf(path_).file, before.file);
+}
+
 }  // namespace
 }  // namespace perdure::map_store

@@ -38,12 +38,9 @@ struct ClutterParameters {
 };
 
 struct PoseParameters {
-  /// Walk of poses that come without covariance.
+  /// Walk of the pose error, whatever the odometry says of it. Exact poses have none.
   double walk_position = 0.005;   ///< m/√m
   double walk_rotation = 0.0002;  ///< rad/√m
-  /// Walk of odometry, in place of the covariance that it reports; 0: that covariance.
-  double drift_position = 0.015;   ///< m/√m
-  double drift_rotation = 0.0003;  ///< rad/√m
 };
 
 }  // namespace perdure::semantic_filter

@@ -3,18 +3,9 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// A random walk by distance travelled.
-struct PoseWalk {
-  double rotation = 0.0;  // rad/√m
-  double position = 0.0;  // m/√m
-};
-
-/// The walk that stands in for what the odometry says of its own error; nothing where its own
-/// transition and covariance are used.
-std::optional<PoseWalk> poseWalkOf(const Odometry& odometry, const PoseParameters& pose) {
-  if (!odometry.has_increment) return PoseWalk{pose.walk_rotation, pose.walk_position};
-  if (pose.drift_position <= 0.0 || odometry.increment_covariance.isZero(0.0)) return std::nullopt;
-  return PoseWalk{pose.drift_rotation, pose.drift_position};
+/// Nothing that was driven adds an error.
+bool isExact(const Odometry& odometry) {
+  return odometry.has_increment && odometry.increment_covariance.isZero(0.0);
 }
 
 }  // namespace
@@ -22,9 +13,8 @@ std::optional<PoseWalk> poseWalkOf(const Odometry& odometry, const PoseParameter
 void advancePoseError(PoseError& error, const Odometry& odometry,
                       const std::optional<RigidTransform>& last_T_WB,
                       const PoseParameters& parameters) {
-  const auto walk = poseWalkOf(odometry, parameters);
-  error.reported = !walk;
-  if (!walk) {
+  error.reported = isExact(odometry);
+  if (error.reported) {
     error.covariance = odometry.covariance.topLeftCorner<6, 6>();
     error.product = (odometry.transition * error.product).eval();
     return;
@@ -34,8 +24,8 @@ void advancePoseError(PoseError& error, const Odometry& odometry,
   Matrix6d A = Matrix6d::Identity();
   A.topLeftCorner<3, 3>() = odometry.T_WB.R().transpose() * last_T_WB->R();
   Eigen::Matrix<double, 6, 1> q;
-  q << Eigen::Vector3d::Constant(walk->rotation * walk->rotation),
-      Eigen::Vector3d::Constant(walk->position * walk->position);
+  q << Eigen::Vector3d::Constant(parameters.walk_rotation * parameters.walk_rotation),
+      Eigen::Vector3d::Constant(parameters.walk_position * parameters.walk_position);
   const double metres = (odometry.T_WB.p - last_T_WB->p).norm();
   error.covariance = (A * error.covariance * A.transpose()).eval();
   error.covariance.diagonal() += metres * q;

@@ -17,9 +17,9 @@
 namespace perdure::map_store::test {
 
 /// Tables that a vehicle and its server have in common, and what follows from them.
-inline constexpr const char* kCommonTables[] = {"graph_classes", "anchors",  "anchor_poses",
-                                                "edges",         "objects",  "sightings",
-                                                "working",       "positions"};
+inline constexpr const char* kCommonTables[] = {"graph_classes", "anchors", "anchor_poses",
+                                                "edges",         "objects", "sightings",
+                                                "views",         "working", "positions"};
 
 /// All rows of a table by their bits, in order.
 inline std::vector<std::string> rowsOf(const std::string& path, const std::string& table) {

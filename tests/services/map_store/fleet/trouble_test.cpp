@@ -153,7 +153,8 @@ TEST(FleetTrouble, AUserWithoutRights) {
 
 TEST(FleetTrouble, AnotherVersionsSchemaIsLeftAlone) {
   auto* server = PERDURE_SERVER_OR_SKIP();
-  for (const std::string version : {"0", "2"}) {
+  for (const std::int64_t other : {fleet::kServerSchema - 1, fleet::kServerSchema + 1}) {
+    const std::string version = std::to_string(other);
     const std::string url = server->makeDatabase();
     server->run(url,
                 "CREATE SCHEMA perdure; CREATE TABLE perdure.about(version bigint NOT NULL); "
@@ -161,7 +162,8 @@ TEST(FleetTrouble, AnotherVersionsSchemaIsLeftAlone) {
                     version + ")");
     const auto trouble = troubleWith(url);
     EXPECT_GE(trouble.reasons.of("server_schema"), 1u);
-    EXPECT_THAT(trouble.sentence, HasSubstr("schema " + version + ", this program knows 1"));
+    EXPECT_THAT(trouble.sentence, HasSubstr("schema " + version + ", this program knows " +
+                                            std::to_string(fleet::kServerSchema)));
     EXPECT_THAT(trouble.sentence, HasSubstr("use the same version of Perdure"));
     const TemporaryFolder folder;
     EXPECT_THROW(fleet::pullMap(url, "red", folder.file("x.sqlite")), StartupError);
