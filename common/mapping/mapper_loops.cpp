@@ -129,7 +129,7 @@ View Mapper::viewOfNow() const {
 /// By objects; where these say nothing, by what the place looks like, once for each anchor.
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
-  if (found && new_view && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
+  if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.nearby(here, viewOfNow());
   return found;
 }
@@ -140,7 +140,7 @@ std::optional<LoopSearch::Found> Mapper::searchElsewhere(const Whereabouts& here
     searched_elsewhere_at_m_ = builder_.way_m();
     found = loop_search_.elsewhere(here);
   }
-  if (found && new_view && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
+  if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.elsewhere(here, viewOfNow());
   return found && isAgreedOn(*found) ? found : std::nullopt;
 }
@@ -208,7 +208,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   const EdgeId id = state_.addLoop(edge);
   if (old) rehang(*old, id);
   for (const EdgeId tie : ties) loop_book_.hang(tie, id);
-  active_ = {id, pairsOf(match)};
+  if (!match.pairs.empty()) active_ = {id, pairsOf(match)};
   loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
   graphMoved();
 }

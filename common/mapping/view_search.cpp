@@ -114,10 +114,14 @@ std::optional<LoopSearch::Found> ViewSearch::elsewhere(const Whereabouts& body,
 
 bool ViewSearch::contradicts(const LoopSearch::Found& found, const Whereabouts& body,
                              const View& seen) const {
-  const AnchorId component = componentsOf(body.state.graph()).at(found.home);
+  const auto components = componentsOf(body.state.graph());
+  // What was seen on this visit says where the body was taken to be.
+  const auto of_late = body.anchorsOfVisit(parameters_.loop.visit_m);
   std::vector<Way> ways;
-  for (const auto& [id, of] : componentsOf(body.state.graph())) {
-    if (of != component || body.state.viewFrom(id).empty()) continue;
+  for (const auto& [id, component] : components) {
+    const bool of_before = (id < of_late.front() || id > of_late.back()) && body.asks(id);
+    if (component != components.at(found.home) || !of_before) continue;
+    if (body.state.viewFrom(id).empty()) continue;
     const double distance =
         (body.state.graph().pose(id).p - found.match.T_MB.mean.p).head<2>().norm();
     if (distance > parameters_.loop.view_m) continue;

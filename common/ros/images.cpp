@@ -62,7 +62,8 @@ Result<cv::Mat> rowsOf(const Image& image, const PixelForm& encoding) {
   const std::uint64_t least = std::uint64_t{image.width} * CV_ELEM_SIZE(encoding.type);
   const std::uint64_t bytes = std::uint64_t{image.step} * image.height;
   const bool sized = image.width > 0 && image.height > 0 && image.width <= 65535 &&
-                     image.height <= 65535 && image.step >= least;
+                     image.height <= 65535 && image.step >= least &&
+                     image.step % CV_ELEM_SIZE1(encoding.type) == 0;
   const bool halves = CV_MAT_CN(encoding.type) != 2 || image.width % 2 == 0;
   if (!sized || !halves || image.data == nullptr || image.data->size() < bytes) {
     return fail("image_malformed", fmt::format("an image of {}x{} ({}), {} bytes a row, does not "

@@ -18,6 +18,7 @@ class ViewBuilder {
   /// What was seen on the last `back_m` of the way, in an anchor's axes: of the best placed ones at
   /// most kMostPoints.
   View viewFrom(const RigidTransform& T_WA, double way_m, double back_m) const;
+  std::size_t size() const { return seen_.size(); }
   /// Another session begins.
   void clear() { seen_.clear(); }
 

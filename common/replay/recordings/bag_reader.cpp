@@ -25,7 +25,7 @@ using HeadFields = std::map<std::string, std::string>;
 
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::uint64_t kMostHead = 1u << 20;
-constexpr std::uint64_t kMostChunk = 512u << 20;
+constexpr std::uint64_t kMostChunk = 64u << 20;  // rosbag writes 768 kB
 
 enum class Op : std::uint8_t { kMessage = 2, kIndex = 4, kChunk = 5, kConnection = 7 };
 

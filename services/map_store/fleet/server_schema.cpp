@@ -219,7 +219,9 @@ Result<void> checkVersion(Link& link) {
   if (version->integer(0, 0) == kServerSchema) return {};
   return fail("server_schema", "the maps there have schema " +
                                    std::to_string(version->integer(0, 0)) +
-                                   ", this program knows " + std::to_string(kServerSchema));
+                                   ", this program knows " + std::to_string(kServerSchema) +
+                                   ". Vehicles send all again where schema perdure is dropped "
+                                   "there");
 }
 
 }  // namespace

@@ -85,7 +85,7 @@ TEST(RosImages, WhatCannotBeIsRefused) {
   for (const Image& image :
        {imageOf("mono8", 2, 2, 2, {1, 2, 3}), imageOf("mono8", 2, 2, 1, {1, 2, 3, 4}),
         imageOf("mono8", 0, 2, 2, {1, 2, 3, 4}), imageOf("uyvy", 1, 1, 2, {1, 2}),
-        imageOf("bgr8", 70000, 1, 210000, {})}) {
+        imageOf("bgr8", 70000, 1, 210000, {}), imageOf("mono16", 1, 2, 3, {1, 2, 3, 4, 5, 6})}) {
     EXPECT_EQ(frameOf(image).error().code, "image_malformed");
   }
 }

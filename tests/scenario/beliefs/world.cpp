@@ -158,7 +158,7 @@ RigidTransform World::truePose(double t_s) const {
   return RigidTransform(Eigen::Matrix3d(rotationAboutZ(yaw) * expSo3({0.0, pitch, 0.0})), p);
 }
 
-/// The walk that the filter's `pose.drift_*` says, with the covariance that belongs to it.
+/// The walk that the filter's `pose.walk_*` says, with the covariance that belongs to it.
 Odometry World::odometry(std::uint64_t frame, double t_s) {
   const RigidTransform T_WB = truePose(t_s);
   Odometry o;

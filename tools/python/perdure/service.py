@@ -162,5 +162,7 @@ def publish(
                         raise
                     traceback.print_exc(file=sys.stderr)
                     service.failed(f"detect failed: {type(error).__name__}: {error}; see its log")
+            if service.ended:
+                service.next(0)  # raises what has ended it, if it was not a signal
     finally:
         service.close()

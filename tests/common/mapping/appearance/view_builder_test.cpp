@@ -45,6 +45,21 @@ TEST(ViewBuilder, LeavesOutWhatSaysLittle) {
   EXPECT_EQ(view[0].descriptor[0], 1);
 }
 
+TEST(ViewBuilder, DoesNotGrowWhileTheBodyRests) {
+  ViewBuilder builder;
+  for (std::uint64_t message = 0; message < 100; ++message) {
+    Landmarks landmarks;
+    for (std::uint64_t k = 0; k < 50; ++k) {
+      landmarks.landmarks.push_back(landmarkAt(1 + 50 * message + k, {10.0, 0.0, 1.0}, 0.1));
+    }
+    builder.add(landmarks, Eigen::Vector3d::Zero(), 3.0);
+  }
+  EXPECT_LE(builder.size(), 2000u);
+  const View view = builder.viewFrom(kNoTurn, 3.0, 10.0);
+  ASSERT_EQ(view.size(), kMostPoints);
+  EXPECT_GT(builder.size(), 1000u);
+}
+
 TEST(ViewBuilder, KeepsTheBestPlacedOnesAndForgetsTheWayBehind) {
   ViewBuilder builder;
   Landmarks landmarks;
