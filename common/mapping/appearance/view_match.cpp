@@ -1,14 +1,13 @@
 #include "common/mapping/appearance/view_match.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <utility>
 #include <vector>
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/math/gaussian.h"
+#include "common/math/hamming_distance.h"
 #include "common/math/so3.h"
 
 namespace perdure::mapping {
@@ -130,17 +129,6 @@ double chanceOf(const std::vector<Alike>& pairs) {
 }
 
 }  // namespace
-
-int hammingDistance(const Descriptor& a, const Descriptor& b) {
-  int bits = 0;
-  for (std::size_t k = 0; k < a.size(); k += sizeof(std::uint64_t)) {
-    std::uint64_t x = 0, y = 0;
-    std::memcpy(&x, a.data() + k, sizeof(x));
-    std::memcpy(&y, b.data() + k, sizeof(y));
-    bits += std::popcount(x ^ y);
-  }
-  return bits;
-}
 
 std::optional<ViewMatch> matchViews(const View& stored, const View& seen) {
   const std::vector<Alike> pairs = alikeOnes(stored, seen);

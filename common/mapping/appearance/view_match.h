@@ -18,9 +18,6 @@ struct ViewMatch {
   double nats = 0.0;
 };
 
-/// Bits of two descriptors that differ, [0, 256].
-int hammingDistance(const Descriptor& a, const Descriptor& b);
-
 /// Returns the best way, whether good enough or not; nothing where less than four points agree.
 std::optional<ViewMatch> matchViews(const View& stored, const View& seen);
 

@@ -185,5 +185,30 @@ TEST(ViewSearch, WhereFourStreetsLookAlikeItDoesNotGuess) {
   for (const LoopClosure& loop : marks.loops()) EXPECT_FALSE(loop.joins);
 }
 
+/// At an anchor of the second lap, with what was seen from there.
+TEST(ViewSearch, AViewContradictsALoopThatLeadsElsewhereAndNotATrueOne) {
+  Marks marks(4);
+  Mapper mapper(drifting());
+  marks.drive(mapper, 1.4 * kLap_m, 0.0005);
+  SavedMap saved;
+  apply(mapper.unsaved(), saved);
+  const Parameters parameters = drifting();
+  const MapState state(parameters.graph, saved);
+  const auto& [here, seen] = *saved.views.rbegin();
+  AnchorBuilder way(parameters.anchor);
+  way.resume(saved.anchors.at(here).anchor);
+  ASSERT_GT(way.way_m(), 1.2 * kLap_m);
+  const Marginals relative(state.graph(), here);
+  const Whereabouts body{state, way, relative};
+  const ViewSearch search(parameters);
+  LoopSearch::Found found;
+  found.home = saved.anchors.begin()->first;
+  found.match.T_MB.mean = state.graph().pose(here);
+  EXPECT_FALSE(search.contradicts(found, body, seen)) << "where it is";
+  found.match.T_MB.mean.p.x() += 8.0;
+  EXPECT_TRUE(search.contradicts(found, body, seen)) << "eight metres off";
+  EXPECT_FALSE(search.contradicts(found, body, {})) << "nothing is seen";
+}
+
 }  // namespace
 }  // namespace perdure::mapping

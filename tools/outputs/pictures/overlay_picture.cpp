@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/math/so3.h"
+#include "common/types/cuboid.h"
 #include "tools/outputs/pictures/drawing.h"
 
 namespace perdure::tools {
@@ -17,20 +18,6 @@ constexpr double kDimmed = 0.88;            // the image, so that lines stand ou
 constexpr double kLeastProbability = 0.15;  // fainter boxes are not drawn
 constexpr int kSamples = 16;                // of an edge: lenses bend it
 const Colour kWhite(255, 255, 255), kGrey(165, 165, 165), kNight(38, 34, 30);
-
-// The edges of a box by the corners of cornersOf, each once.
-constexpr std::array<std::array<std::size_t, 2>, 12> kEdges = {{{0, 1},
-                                                                {2, 3},
-                                                                {4, 5},
-                                                                {6, 7},
-                                                                {0, 2},
-                                                                {1, 3},
-                                                                {4, 6},
-                                                                {5, 7},
-                                                                {0, 4},
-                                                                {1, 5},
-                                                                {2, 6},
-                                                                {3, 7}}};
 
 int even(double value) { return static_cast<int>(value) / 2 * 2; }
 

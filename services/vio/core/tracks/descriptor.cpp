@@ -1,7 +1,6 @@
 #include "services/vio/core/tracks/descriptor.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 namespace perdure::vio {
@@ -86,14 +85,6 @@ std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector
     byte = static_cast<std::uint8_t>(bits);
   }
   return d;
-}
-
-int hammingDistance(const Descriptor& a, const Descriptor& b) {
-  int bits = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    bits += std::popcount(static_cast<std::uint8_t>(a[i] ^ b[i]));
-  }
-  return bits;
 }
 
 }  // namespace perdure::vio

@@ -15,7 +15,4 @@ using Descriptor = std::array<std::uint8_t, 32>;
 /// Of a CV_8UC1 image. Nothing nearer than 16 pixels to the border.
 std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector2d& pixel);
 
-/// Number of bits that differ.
-int hammingDistance(const Descriptor& a, const Descriptor& b);
-
 }  // namespace perdure::vio

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "common/math/gaussian.h"
+#include "common/math/hamming_distance.h"
 
 namespace perdure::mapping {
 namespace {

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "common/math/hamming_distance.h"
 #include "common/math/so3.h"
 #include "services/vio/core/tracks/descriptor.h"
 #include "tests/services/vio/simulated_drive.h"
