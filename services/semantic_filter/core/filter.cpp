@@ -134,7 +134,8 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
     s.assigned = update(track, s.score, association.eta.row(j), boxes, frame);
     s.sound = sound(track);
     if (s.assigned && s.sound &&
-        considerKeyframe(track, boxes[*s.assigned], hiddenSides(s.score, *s.assigned), frame)) {
+        considerKeyframe(track, boxes[*s.assigned],
+                         hiddenSides(s.score, *s.assigned, boxes[*s.assigned]), frame)) {
       to_refit.push_back(&track);
     }
   }
@@ -155,7 +156,7 @@ void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput&
     const BoxDetection& box = (*input.boxes)[*scored.assigned];
     const auto range = rangeFromLandmarks(box, input.points, parameters_.initiation);
     if (reinitialise(track, pmf, box, range, frame)) {
-      considerKeyframe(track, box, hiddenSides(scored.score, *scored.assigned), frame);
+      considerKeyframe(track, box, hiddenSides(scored.score, *scored.assigned, box), frame);
       reduceMixture(track, priors_, parameters_);
     }
   }
@@ -234,6 +235,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   auto visibilities = updateVisibility(belief, heard);
   if (!heard.boxes) return report;
   FrameInput input = withLearnedNoise(belief, heard);
+  markSidesBesideNearer(*input.boxes);
   // Both change what a box or a miss means, so that they come before any score.
   explainPartialViews(belief, visibilities, input, parameters_, priors_);
   const FrameContext frame = contextOf(belief, input);

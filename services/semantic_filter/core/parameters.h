@@ -38,6 +38,10 @@ inline constexpr double kWholeView = 9.0;       ///< [4, .06] beyond, a partial 
 inline constexpr double kForeignBox = 14.0;     ///< [4, .007] the keyframe showed something else
 inline constexpr double kContradiction = 25.0;  ///< [4, 5e-5] the keyframe contradicts a MAP fit
 
+// Two boxes of one image.
+inline constexpr double kSameEdge = 4.0;  ///< [1, .05] their sides are not the same edge
+inline constexpr double kLower = 4.0;     ///< [1, .05] one reaches lower than the other
+
 // Two Gaussians.
 inline constexpr double kNoFusion = 24.3;  ///< [7, .001] the mean of both would be wrong
 inline constexpr double kSameMode = 1.0;   ///< [7, .995] two modes of one track are one

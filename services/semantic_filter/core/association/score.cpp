@@ -112,7 +112,8 @@ std::optional<Explanation> explain(const BoxDetection& detection, const Predicte
                                    double lookalike_nats, const Judge& judge) {
   const auto& [box, covariance] = predicted;
   if (!mayOverlap(detection.z, box, covariance)) return std::nullopt;
-  const auto sides = scoreBox(detection.z, box, covariance, hidden, judge.parameters->box);
+  const auto sides = scoreBox(detection.z, box, covariance,
+                              withSidesBesideNearer(hidden, detection), judge.parameters->box);
   if (!sides) return std::nullopt;
   const double log_ratio = logRatio(detection, *judge.model, class_name, lookalike_nats) +
                            sides->log_density -
@@ -148,8 +149,9 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
   return result;
 }
 
-std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box) {
-  std::array<bool, 4> hidden = score.visibility.hidden_sides;
+std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
+                                const BoxDetection& detection) {
+  std::array<bool, 4> hidden = withSidesBesideNearer(score.visibility.hidden_sides, detection);
   const auto at = std::find(score.boxes.begin(), score.boxes.end(), box) - score.boxes.begin();
   const auto i = static_cast<std::size_t>(at);
   if (i == score.boxes.size()) return hidden;

@@ -74,7 +74,8 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
 
 /// Returns the hidden sides of a box, given the hypothesis that explains it best. `box`: index
 /// among the boxes of the frame.
-std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box);
+std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
+                                const BoxDetection& detection);
 
 /// Returns ψ: "the track made this box" against "it made none, or does not exist". `box`: index
 /// into TrackScore::boxes.

@@ -101,6 +101,51 @@ std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const M
   return e;
 }
 
+namespace {
+
+/// Length that two intervals share.
+double shared(double a1, double a2, double b1, double b2) {
+  return std::min(a2, b2) - std::max(a1, b1);
+}
+
+/// Variance of a side with b.
+double variance(const BoxMeasurement& z, int side) { return z.variance[side] + z.lasting[side]; }
+
+/// Whether two sides may be the same edge in the image.
+bool sameEdge(const BoxMeasurement& a, int side_a, const BoxMeasurement& b, int side_b) {
+  const double d = a.sides[side_a] - b.sides[side_b];
+  return a.measured[side_a] &&
+         d * d < gates::kSameEdge * (variance(a, side_a) + variance(b, side_b));
+}
+
+/// Marks the sides of `far` at which `near` begins.
+void markBeside(BoxDetection& far, const BoxDetection& near) {
+  constexpr double kFaces = 0.5;  // share of the side that the nearer box covers
+  const BoxMeasurement &a = far.z, &b = near.z;
+  const bool rows = shared(a.sides[1], a.sides[3], b.sides[1], b.sides[3]) > kFaces * a.height();
+  const bool columns = shared(a.sides[0], a.sides[2], b.sides[0], b.sides[2]) > kFaces * a.width();
+  far.beside_nearer[0] |= rows && sameEdge(a, 0, b, 2);
+  far.beside_nearer[2] |= rows && sameEdge(a, 2, b, 0);
+  far.beside_nearer[3] |= columns && sameEdge(a, 3, b, 1);
+}
+
+}  // namespace
+
+void markSidesBesideNearer(std::vector<BoxDetection>& boxes) {
+  for (BoxDetection& far : boxes) {
+    for (const BoxDetection& near : boxes) {
+      const double lower = near.z.sides[3] - far.z.sides[3];
+      const double noise = variance(far.z, 3) + variance(near.z, 3);
+      if (lower > 0.0 && lower * lower > gates::kLower * noise) markBeside(far, near);
+    }
+  }
+}
+
+std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box) {
+  for (std::size_t i = 0; i < 4; ++i) hidden[i] = hidden[i] || box.beside_nearer[i];
+  return hidden;
+}
+
 std::optional<std::vector<double>> topDownRatios(const Detection& detection, const Model& model,
                                                  const ClutterParameters& clutter) {
   if (detection.activations.size() != model.classes.size() + 1) return std::nullopt;

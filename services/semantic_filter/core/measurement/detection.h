@@ -4,6 +4,7 @@
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -58,7 +59,16 @@ struct BoxDetection {
   double lookalike = 0.0;          ///< share of *other* objects that resemble a known class
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
+  /// Sides (x1, y1, x2, y2) at which a nearer box of the same image begins: the object may reach on
+  /// behind it.
+  std::array<bool, 4> beside_nearer{};
 };
+
+/// Marks `beside_nearer` of all boxes of an image. Of two things on one ground the nearer one
+/// reaches lower in the image.
+void markSidesBesideNearer(std::vector<BoxDetection>& boxes);
+/// Returns `hidden` and the sides beside nearer boxes.
+std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box);
 
 /// Returns what is wrong with a detection, or nullptr. The names are those that Health counts:
 /// "detections_not_finite", "detections_box_inside_out", "detections_classes_mismatch",

@@ -164,6 +164,14 @@ double frequencies(const FrameContext& frame) {
   return std::max(std::min(sum, 10.0), 1e-9);
 }
 
+/// The object may reach on behind what is nearer.
+BoxDetection censoredBesideNearer(BoxDetection detection) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    detection.z.measured[i] = detection.z.measured[i] && !detection.beside_nearer[i];
+  }
+  return detection;
+}
+
 /// Sets existence from the weights, normalises them, and enters the reasons of both in the ledger:
 /// the prior, the activations and, for the PMF, the geometry of the fits.
 void bookInitiation(Track& track, const ScratchVector<Candidate>& kept,
@@ -230,14 +238,15 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   const auto ray = centreRay(detection.z, frame.view);
   if (!ray) return std::nullopt;
   const auto kept = candidates(detection, frame);
+  const BoxDetection seen = censoredBesideNearer(detection);
   Track track;
   const double other = frame.parameters->clutter.other_prior;
   const double named = (1.0 - other) / frequencies(frame);
   for (const auto& c : kept) {
-    addClass(track, c.prior, named * std::exp(c.log_weight), detection,
-             yawStarts(c.prior, frame, *ray), range, frame);
+    addClass(track, c.prior, named * std::exp(c.log_weight), seen, yawStarts(c.prior, frame, *ray),
+             range, frame);
   }
-  addOther(track, other * std::exp(detection.log_ratio_other), detection, *ray, range, frame);
+  addOther(track, other * std::exp(detection.log_ratio_other), seen, *ray, range, frame);
   if (track.hypotheses.empty()) return std::nullopt;
   track.life.first_seen = track.life.last_seen = track.as_of = now;
   track.pose.product = frame.pose_error.product;

@@ -41,7 +41,7 @@ void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
   for (std::size_t i = 0; i < shares.box.size(); ++i) {
     if (shares.box[i] < kNegligible) continue;
     const BoxMeasurement& z = boxes[score.boxes[i]].z;
-    auto hidden = score.visibility.hidden_sides;
+    auto hidden = withSidesBesideNearer(score.visibility.hidden_sides, boxes[score.boxes[i]]);
     const int part = scored.matches[i].part;
     if (part >= 0) hidden[static_cast<std::size_t>(part)] = true;
     parts.push_back(updateWithBox(h, z, hidden, repetition, frame, at_prior));

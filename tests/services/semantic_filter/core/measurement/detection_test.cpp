@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+#include <vector>
+
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -42,6 +47,55 @@ TEST(BoxStyles, TakeTheShapesOfThePriorsIfTheBoxesEncloseOutlines) {
   EXPECT_DOUBLE_EQ(model.styles->of("unicorn").offset[3], -0.02)
       << "of a class that the network does not know: the mean";
   EXPECT_TRUE(model.styles->of(kOtherClass).shape.is_cuboid);
+}
+
+using Sides = std::array<bool, 4>;
+
+constexpr Sides kNone{};
+
+/// Boxes with sides at these pixels, in an image in which the border is far.
+std::vector<BoxDetection> boxesAt(std::initializer_list<Eigen::Vector4d> sides) {
+  std::vector<BoxDetection> boxes(sides.size());
+  std::transform(sides.begin(), sides.end(), boxes.begin(), [](const Eigen::Vector4d& s) {
+    BoxDetection box;
+    box.z = measure({s[0], s[1], s[2], s[3]}, 1242, 375, {});
+    return box;
+  });
+  markSidesBesideNearer(boxes);
+  return boxes;
+}
+
+TEST(SidesBesideNearer, AreWhereABoxThatReachesLowerBegins) {
+  const auto boxes = boxesAt({{200, 100, 260, 150}, {262, 90, 380, 190}, {90, 90, 199, 190}});
+  EXPECT_EQ(boxes[0].beside_nearer, (Sides{true, false, true, false}));
+  EXPECT_EQ(boxes[1].beside_nearer, kNone);
+  EXPECT_EQ(boxes[2].beside_nearer, kNone);
+}
+
+TEST(SidesBesideNearer, AreTheLowerOneWhereANearerBoxCoversTheFoot) {
+  const auto boxes = boxesAt({{200, 100, 260, 150}, {180, 151, 280, 250}});
+  EXPECT_EQ(boxes[0].beside_nearer, (Sides{false, false, false, true}));
+}
+
+TEST(SidesBesideNearer, AreNotThoseWithinTheNearerBox) {
+  const auto boxes = boxesAt({{200, 100, 300, 150}, {262, 90, 380, 190}});
+  EXPECT_EQ(boxes[0].beside_nearer, kNone) << "the network has drawn the whole object";
+}
+
+TEST(SidesBesideNearer, AreNoneOfBoxesThatReachEquallyLow) {
+  const auto boxes = boxesAt({{200, 100, 260, 150}, {261, 100, 320, 151}});
+  EXPECT_EQ(boxes[0].beside_nearer, kNone);
+  EXPECT_EQ(boxes[1].beside_nearer, kNone);
+}
+
+TEST(SidesBesideNearer, AreNotWhereTheNearerBoxCoversLessThanHalfOfTheSide) {
+  const auto boxes = boxesAt({{200, 100, 260, 180}, {262, 150, 380, 250}});
+  EXPECT_EQ(boxes[0].beside_nearer, kNone);
+}
+
+TEST(SidesBesideNearer, AreNotAtTheBorderWhichCensorsThem) {
+  const auto boxes = boxesAt({{0, 100, 60, 150}, {-40, 90, 1, 190}});
+  EXPECT_EQ(boxes[0].beside_nearer, kNone);
 }
 
 }  // namespace

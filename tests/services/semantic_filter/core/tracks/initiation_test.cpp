@@ -1,0 +1,75 @@
+#include "services/semantic_filter/core/tracks/initiation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "services/semantic_filter/core/association/score.h"
+#include "tests/services/semantic_filter/scene.h"
+
+namespace perdure::semantic_filter {
+namespace {
+
+using testing::detect;
+using testing::makeState;
+
+/// Two cars in a row along the street. The network shows of the far one what the near one leaves.
+class InitiationInARow : public ::testing::Test, protected testing::UsualFrame {
+ protected:
+  InitiationInARow() {
+    frame.view.T_WB = RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1.2));
+    std::mt19937 random(1);
+    for (const State& x : {near_, far_}) {
+      Detection d = *detect({x, "car"}, frame.view, parameters.box, 0.0, 3.0, random);
+      if (!boxes_.empty()) d.box.x1 = boxes_.front().z.sides[2];
+      boxes_.push_back(
+          *makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box, {}));
+    }
+  }
+
+  /// Range of the car that the second box begins, m, and its deviation.
+  std::pair<double, double> born() const {
+    const auto track = initiate(boxes_[1], std::nullopt, {}, frame);
+    double mean = 0.0, square = 0.0, weight = 0.0;
+    for (const Hypothesis& h : track->hypotheses) {
+      if (h.class_name != "car") continue;
+      mean += h.weight * h.x[0];
+      square += h.weight * (h.x[0] * h.x[0] + h.P(0, 0));
+      weight += h.weight;
+    }
+    mean /= weight;
+    return {mean, std::sqrt(square / weight - mean * mean)};
+  }
+
+  const State near_ = makeState(18.0, 3.5, 0.75, 0.0, 4.2, 1.75, 1.5);
+  const State far_ = makeState(24.0, 3.5, 0.75, 0.0, 4.2, 1.75, 1.5);
+  std::vector<BoxDetection> boxes_;
+};
+
+TEST_F(InitiationInARow, APartThatEndsAtANearerCarIsNotTakenForAWholeOneFartherAway) {
+  const auto [whole, whole_sigma] = born();
+  markSidesBesideNearer(boxes_);
+  ASSERT_TRUE(boxes_[1].beside_nearer[0]);
+  const auto [part, part_sigma] = born();
+  EXPECT_LT(std::abs(part - 24.0), 0.5 * std::abs(whole - 24.0));
+  EXPECT_LT(std::abs(part - 24.0), part_sigma);
+}
+
+TEST_F(InitiationInARow, ATrackOfTheWholeCarExplainsThePart) {
+  Track track = testing::makeObject(1, "car", far_, 0.01);
+  const auto score = [&] {
+    return scoreTrack(track, {.state = Visibility::kVisible, .fraction = 0.9}, {boxes_[1]}, frame);
+  };
+  const auto likelihoodOf = [](const TrackScore& s) {
+    return s.boxes.empty() ? 0.0 : s.hypotheses.front().matches.front().likelihood;
+  };
+  const double before = likelihoodOf(score());
+  markSidesBesideNearer(boxes_);
+  const TrackScore after = score();
+  EXPECT_GT(likelihoodOf(after), 10.0 * before);
+  EXPECT_TRUE(hiddenSides(after, 0, boxes_[1])[0]) << "the update does not compare it";
+}
+
+}  // namespace
+}  // namespace perdure::semantic_filter
