@@ -272,9 +272,7 @@ void Node::onDetections(const ros::Detection2DArray& detections, std::int64_t no
 void Node::giveDetections(const ros::Detection2DArray& message, const FrameStamp& stamp,
                           std::int64_t now_ns) {
   BoxesRead read = boxesOf(message, model_.classes, config_.detections.other_share);
-  for (const auto& [code, n] : read.refused.all())
-    for (std::uint64_t i = 0; i < n; ++i)
-      troubles_.add("detections", {code, read.sentence}, now_ns);
+  for (const Reason& reason : read.refused) troubles_.add("detections", reason, now_ns);
   Detections detections;
   detections.stamp = stamp;
   detections.camera = config_.detections.camera;

@@ -91,8 +91,7 @@ BoxesRead boxesOf(const ros::Detection2DArray& message, const std::vector<std::s
                   double other_share) {
   BoxesRead read;
   const auto refuse = [&](const char* code, const std::string& sentence) {
-    read.refused.add(code);
-    read.sentence = sentence;
+    read.refused.push_back({code, sentence});
   };
   for (const ros::Detection2D& one : message.detections) {
     const auto box = boxOf(one.bbox);

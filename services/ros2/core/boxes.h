@@ -35,8 +35,7 @@ std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double
 
 struct BoxesRead {
   std::vector<Detection> detections;
-  ReasonCounts refused;  ///< box_malformed, score_malformed, class_unknown
-  std::string sentence;  ///< of the last refusal
+  std::vector<Reason> refused;  ///< box_malformed, score_malformed, class_unknown
 };
 /// `classes`: lower-case. A class_id is one of them, or its number.
 BoxesRead boxesOf(const ros::Detection2DArray& message, const std::vector<std::string>& classes,

@@ -108,7 +108,8 @@ TEST_F(Ros2Node, BothImagesOfAPairAreOneFrameWhicheverComesFirst) {
     EXPECT_EQ(frames_[i].stamp.time, frames_[i + 1].stamp.time);
   }
   for (int i = 0; i < 6; ++i) see(1250 + i * 100, 1);
-  EXPECT_EQ(node_->troubles().counts().of("cam1_unpaired"), 2u);
+  EXPECT_EQ(node_->troubles().counts().of("cam1_unpaired"), 3u)
+      << "one of seven is of when the calibration came; four may wait";
 }
 
 /// 12 bits in 16: a dark start does not settle it.
