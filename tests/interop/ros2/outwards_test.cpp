@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using ::testing::HasSubstr;
 
-constexpr std::int64_t kBegin = 1'700'000'000'000'000'000;
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000;
 constexpr std::int64_t kFrame = 100'000'000;
 
 ObjectBelief carAt(const Eigen::Vector3d& p) {
@@ -37,7 +37,7 @@ ObjectBelief carAt(const Eigen::Vector3d& p) {
 /// All that Perdure's services would say of one frame.
 class Vehicle {
  public:
-  explicit Vehicle(BridgeRig& rig) : rig_(rig), participant_(rig.participant) {
+  explicit Vehicle(BridgeRig& rig) : participant_(rig.participant) {
     Calibration c;
     c.source = 77;
     c.cameras = {tests::cameraAhead(64, 48, 50)};
@@ -53,7 +53,7 @@ class Vehicle {
   }
   void sayFrame() {
     const FrameStamp stamp{77, next_,
-                           fromNanoseconds(kBegin + kFrame * static_cast<std::int64_t>(next_)), 1};
+                           fromNanoseconds(kStart + kFrame * static_cast<std::int64_t>(next_)), 1};
     ++next_;
     Frame frame{stamp,
                 "cam0",
@@ -92,7 +92,6 @@ class Vehicle {
   std::size_t readersOfFrames() const { return frame_.matched(); }
 
  private:
-  BridgeRig& rig_;
   const bus::Participant& participant_;
   std::uint64_t next_ = 1;
   bus::Writer<Calibration> calibration_{participant_, bus::topics::kCalibration};
@@ -133,7 +132,7 @@ TEST(Ros2Outwards, EveryTopicIsReceivedWithItsValues) {
   EXPECT_EQ(image["step"], 64);
   EXPECT_EQ(image["sum"], 7 * 64 * 48);
   EXPECT_EQ(image["header"]["frame"], "cam0_optical");
-  EXPECT_EQ((image["header"]["stamp"].get<std::int64_t>() - kBegin) % kFrame, 0);
+  EXPECT_EQ((image["header"]["stamp"].get<std::int64_t>() - kStart) % kFrame, 0);
   const json& packed = all["/perdure/cam0/image_raw/compressed"];
   EXPECT_EQ(packed["jpeg"], true) << "made of a raw frame, for someone wants it";
   EXPECT_EQ(packed["format"], "mono8; jpeg compressed mono8");

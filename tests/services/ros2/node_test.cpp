@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr std::int64_t kBegin = 1'700'000'000'000'000'000, kMs = 1'000'000;
+constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000, kMilli = 1'000'000;
 
 class Ros2Node : public ::testing::Test {
  protected:
@@ -37,8 +37,8 @@ class Ros2Node : public ::testing::Test {
   }
   ros::Image imageAt(std::int64_t ms, std::uint16_t value = 200, bool deep = false) {
     ros::Image m;
-    m.header = {{static_cast<std::int32_t>((kBegin + ms * kMs) / 1'000'000'000),
-                 static_cast<std::uint32_t>((kBegin + ms * kMs) % 1'000'000'000)},
+    m.header = {{static_cast<std::int32_t>((kEpoch + ms * kMilli) / 1'000'000'000),
+                 static_cast<std::uint32_t>((kEpoch + ms * kMilli) % 1'000'000'000)},
                 "eye"};
     m.width = 4, m.height = 2;
     m.encoding = deep ? "mono16" : "mono8";
@@ -50,7 +50,7 @@ class Ros2Node : public ::testing::Test {
     return m;
   }
   void see(std::int64_t ms, std::size_t camera = 0) {
-    node_->onImage(camera, imageAt(ms), ms * kMs);
+    node_->onImage(camera, imageAt(ms), ms * kMilli);
   }
   ros::Detection2DArray boxesAt(std::int64_t ms) {
     ros::Detection2DArray m;
@@ -72,24 +72,24 @@ TEST_F(Ros2Node, GivesFramesOnceItsCalibrationIsKnown) {
   ASSERT_FALSE(frames_.empty());
   EXPECT_EQ(frames_.front().stamp.sequence, 0u) << "numbers of what went out, without a gap";
   EXPECT_EQ(frames_.back().stamp.sequence, frames_.size() - 1);
-  EXPECT_EQ(frames_.back().stamp.captured_ns, 900 * kMs);
+  EXPECT_EQ(frames_.back().stamp.captured_ns, 900 * kMilli);
   EXPECT_EQ(node_->troubles().counts().of("cam0_before_calibration"), 10 - frames_.size());
-  EXPECT_EQ(node_->health(900 * kMs).first, HealthState::kOk);
+  EXPECT_EQ(node_->health(900 * kMilli).first, HealthState::kOk);
   EXPECT_EQ(model_.classes, std::vector<std::string>{"car"});
 }
 
 TEST_F(Ros2Node, DetectionsThatComeBeforeTheirImageWaitForIt) {
   make();
   for (int i = 0; i < 10; ++i) see(i * 100);
-  node_->onDetections(boxesAt(1000), 990 * kMs);
+  node_->onDetections(boxesAt(1000), 990 * kMilli);
   EXPECT_TRUE(found_.empty());
   see(1000);
   ASSERT_EQ(found_.size(), 1u);
   EXPECT_TRUE(found_[0].stamp.sameFrame(frames_.back().stamp));
-  node_->onDetections(boxesAt(55), 1001 * kMs);
+  node_->onDetections(boxesAt(55), 1001 * kMilli);
   EXPECT_EQ(node_->troubles().counts().of("detections_of_no_frame"), 1u);
-  EXPECT_THAT(node_->health(1001 * kMs).second, HasSubstr("has to copy the stamp of its image"));
-  for (int i = 0; i < 40; ++i) node_->onDetections(boxesAt(100'000 + i), 1002 * kMs);
+  EXPECT_THAT(node_->health(1001 * kMilli).second, HasSubstr("has to copy the stamp of its image"));
+  for (int i = 0; i < 40; ++i) node_->onDetections(boxesAt(100'000 + i), 1002 * kMilli);
   EXPECT_EQ(node_->troubles().counts().of("detections_of_no_frame"), 25u)
       << "of those of the future sixteen wait";
 }
@@ -115,11 +115,11 @@ TEST_F(Ros2Node, BothImagesOfAPairAreOneFrameWhicheverComesFirst) {
 /// 12 bits in 16: a dark start does not settle it.
 TEST_F(Ros2Node, BrighterImagesOf16BitsRaiseTheBits) {
   make();
-  for (int i = 0; i < 8; ++i) node_->onImage(0, imageAt(i * 100, 250, true), i * 100 * kMs);
+  for (int i = 0; i < 8; ++i) node_->onImage(0, imageAt(i * 100, 250, true), i * 100 * kMilli);
   EXPECT_EQ((*frames_.back().data)[0], 250);
-  node_->onImage(0, imageAt(800, 0x0F00, true), 800 * kMs);
+  node_->onImage(0, imageAt(800, 0x0F00, true), 800 * kMilli);
   EXPECT_EQ((*frames_.back().data)[0], 0xF0);
-  node_->onImage(0, imageAt(900, 0x0080, true), 900 * kMs);
+  node_->onImage(0, imageAt(900, 0x0080, true), 900 * kMilli);
   EXPECT_EQ((*frames_.back().data)[0], 0x08) << "and dark ones are dark from then on";
 }
 
@@ -128,10 +128,10 @@ TEST_F(Ros2Node, SaysForAWhileWhatWasWrongLast) {
   for (int i = 0; i < 10; ++i) see(i * 100);
   ros::Image odd = imageAt(1000);
   odd.encoding = "32FC1";
-  node_->onImage(0, odd, 1000 * kMs);
-  EXPECT_EQ(node_->health(2000 * kMs).first, HealthState::kDegraded);
-  EXPECT_THAT(node_->health(2000 * kMs).second, HasSubstr("images are `32FC1`"));
-  EXPECT_EQ(node_->health(7000 * kMs).first, HealthState::kOk);
+  node_->onImage(0, odd, 1000 * kMilli);
+  EXPECT_EQ(node_->health(2000 * kMilli).first, HealthState::kDegraded);
+  EXPECT_THAT(node_->health(2000 * kMilli).second, HasSubstr("images are `32FC1`"));
+  EXPECT_EQ(node_->health(7000 * kMilli).first, HealthState::kOk);
 }
 
 TEST(Ros2Config, KnowsWhatATopicCarriesByItsName) {
