@@ -25,10 +25,10 @@ export PERDURE_DOMAIN=58
 bridge=$!
 for ((i = 0; i < 100; ++i)); do
   "$PERDURE_BIN/perdure" status > "$folder/status" 2>&1 || true
-  ! grep -q '─ ros2 *ok' "$folder/status" || break
+  ! grep -q ' ros2  ' "$folder/status" || break
   kill -0 "$bridge" 2> /dev/null || break
 done
-grep -q '─ ros2 *ok' "$folder/status" || fail "status does not know it: $(cat "$folder/status" "$folder/log")"
+grep -q ' ros2  ' "$folder/status" || fail "status does not know it: $(cat "$folder/status" "$folder/log")"
 kill "$bridge"
 status=0
 wait "$bridge" || status=$?
