@@ -50,7 +50,7 @@ install(CODE "
 install(DIRECTORY config/models/ DESTINATION ${share}/models COMPONENT services)
 install(DIRECTORY deploy/systemd/ DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system
   COMPONENT services FILES_MATCHING PATTERN "*.service" PATTERN "*.target" PATTERN "*.conf"
-  PATTERN "perdure-gateway.service" EXCLUDE)
+  PATTERN "perdure-gateway.service" EXCLUDE PATTERN "perdure-ros2.service" EXCLUDE)
 install(FILES deploy/packages/host/60-perdure.rules
   DESTINATION ${PERDURE_SYSTEM_LIBDIR}/udev/rules.d COMPONENT services)
 foreach(kind sysctl sysusers tmpfiles)
@@ -65,6 +65,12 @@ install(FILES deploy/systemd/perdure-gateway.service
 install(FILES config/gateway.yaml DESTINATION ${etc} COMPONENT gateway)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/share/perdure/viewer DESTINATION ${share} COMPONENT gateway
   OPTIONAL)
+
+# The bridge to ROS 2.
+install(TARGETS perdure-ros2 COMPONENT ros2)
+install(FILES deploy/systemd/perdure-ros2.service
+  DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system COMPONENT ros2)
+install(FILES config/ros2.yaml DESTINATION ${etc} COMPONENT ros2)
 
 # The command, with what model import runs.
 install(TARGETS perdure COMPONENT tools)

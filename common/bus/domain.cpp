@@ -262,9 +262,19 @@ std::string foreignXml(const Options& options) {
 }
 
 Domain::Domain(const Options& options)
-    : options_(withEnvironment(options)),
-      shared_memory_(findSharedMemory(options_)),
+    : Domain(withEnvironment(options), findSharedMemory(withEnvironment(options))) {}
+
+Domain::Domain(Options options, SharedMemory memory)
+    : options_(std::move(options)),
+      shared_memory_(std::move(memory)),
       domain_(keptBy(nullptr, Entity(createDomain(options_, shared_memory_.locator)))) {}
+
+Domain Domain::foreign(Options options) {
+  options.shared_memory_mb = 0;
+  options.security.clear();
+  options.identity.clear();
+  return {std::move(options), SharedMemory()};
+}
 
 Domain Domain::as(std::string vehicle, std::string security, std::string identity) const {
   Domain same = *this;

@@ -60,12 +60,15 @@ struct SharedMemory {
   bool on() const { return !locator.empty(); }
 };
 
-/// One a process. Where CYCLONEDDS_URI is set it is used instead of bus.interface and
-/// bus.shared_memory_mb, as Cyclone does.
+/// One a process, and one more for programs that are not ours. Where CYCLONEDDS_URI is set it is
+/// used instead of bus.interface and bus.shared_memory_mb, as Cyclone does.
 class Domain {
  public:
   /// Throws StartupError (69) where DDS cannot use the interface.
   explicit Domain(const Options& options);
+  /// Another one in the same process, for programs that are not ours: `options.domain` stands as it
+  /// is, and there is no shared memory and no security in it.
+  static Domain foreign(Options options);
   /// The same domain, for participants of another vehicle or under another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
@@ -78,6 +81,8 @@ class Domain {
   const std::shared_ptr<const Entity>& entity() const { return domain_; }
 
  private:
+  Domain(Options options, SharedMemory memory);
+
   Options options_;
   SharedMemory shared_memory_;
   std::shared_ptr<const Entity> domain_;

@@ -9,7 +9,8 @@ namespace {
 constexpr double kCameraHz = 10.0;
 constexpr double kImuHz = 100.0;
 constexpr std::string_view kFramePrefix = "frame/";
-constexpr Roles kWatchers = Role::kRecord | Role::kOperator | Role::kGateway;  // they read all
+constexpr Roles kWatchers = Role::kRecord | Role::kOperator | Role::kGateway | Role::kRos2 |
+                            Role::kRos2Driver;  // they read all
 
 template <class T>
 TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded, Roles writers,
@@ -44,17 +45,19 @@ Table makeTable() {
   constexpr Roles kServices = kCapture | kVio | kInference | kSemanticFilter | kMapStore;
   return {
       TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), shared(4), kCameraHz, kRecorded,
-                kCapture | kPlayer, kVio | kInference | kWatchers},
-      row(kImu, latched(512), kImuHz, kRecorded, kCapture, kVio),
+                kCapture | kPlayer | kRos2Driver, kVio | kInference | kWatchers},
+      row(kImu, latched(512), kImuHz, kRecorded, kCapture | kRos2Driver, kVio),
       row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
-      row(kCalibration, latched(1), 0, kRecorded, kCapture, kVio | kSemanticFilter | kSubscriber),
-      row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio,
+      row(kCalibration, latched(1), 0, kRecorded, kCapture | kRos2Driver,
+          kVio | kSemanticFilter | kSubscriber),
+      row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio | kRos2Driver,
           kSemanticFilter | kCapture | kMapStore | kSubscriber),  // capture follows it (pace.mode)
       row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio,
           kSemanticFilter | kMapStore | kSubscriber),
-      row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded, kInference,
+      row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded, kInference | kRos2Driver,
           kInference | kSemanticFilter | kCapture | kSubscriber),
-      row(kModel, latched(1), 0, kRecorded, kInference, kInference | kSemanticFilter | kSubscriber),
+      row(kModel, latched(1), 0, kRecorded, kInference | kRos2Driver,
+          kInference | kSemanticFilter | kSubscriber),
       row(kSwap, reliable(16), 0, kRecorded, kInference, kInference | kSemanticFilter),
       row(kObjects, reliable(8), kCameraHz, kRecorded, kSemanticFilter,
           kMapStore | kVio | kSubscriber),  // vio masks what moves (input.moving_mask)
@@ -70,7 +73,8 @@ Table makeTable() {
       row(kMapQuery, reliable(16), 0, kRecorded,
           kSemanticFilter | kOperator | kSubscriber | kGateway, kMapStore),
       row(kMapReply, reliable(16), 0, kRecorded, kMapStore, kSubscriber),
-      row(kHealth, latched(1, 1.0), 1.0, kRecorded, kServices | kRecord | kGateway, kSubscriber),
+      row(kHealth, latched(1, 1.0), 1.0, kRecorded,
+          kServices | kRecord | kGateway | kRos2 | kRos2Driver, kSubscriber),
   };
 }
 

@@ -1,5 +1,6 @@
 // The one loop of a service: waits for messages, ticks and wake-ups, and calls handlers in the
-// order of their registration. Handlers run in the thread that calls run().
+// order of their registration. Handlers run in the thread that calls run(). Readers may be of
+// several participants, in several domains.
 #pragma once
 
 #include <atomic>
@@ -29,8 +30,17 @@ class WaitLoop {
   void on(CdrReader& reader, CdrReader::Handler handler) {
     attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
-  /// Not any more; the reader may end then. Not from a handler of messages or ticks: those are being
-  /// gone through.
+  /// The same of a reader of bytes that another folder has (common/bus/foreign).
+  template <class BytesReader>
+  void onBytes(BytesReader& reader, typename BytesReader::Handler handler) {
+    attach(reader, [this, &reader, handler = std::move(handler)] {
+      return reader.drainBatch([&](const auto& message) {
+        if (!stopped_) handler(message);
+      });
+    });
+  }
+  /// Not any more; the reader may end then. Not from a handler of messages or ticks: those are
+  /// being gone through.
   void off(const Endpoint& reader);
   /// First after one period; a late tick is not made up for.
   void every(std::chrono::nanoseconds period, std::function<void()> tick);

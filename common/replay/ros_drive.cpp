@@ -17,12 +17,12 @@ namespace perdure::replay {
 namespace {
 
 constexpr char kTransforms[] = "/tf_static";
-constexpr int kLooksForBits = 5;  ///< images of 16 bits that tell how many are used
 
 /// One image in the recording: all that is kept of it until it is asked for.
 struct RosImage {
   TimePoint time;
   std::uint64_t log_ns = 0;
+  std::uint64_t number = 0;  ///< in the order of the recording
 };
 
 std::string_view textOf(const SharedBytes& bytes) {
@@ -42,7 +42,8 @@ TimePoint stampOf(const ros::Header& header, std::uint64_t log_ns) {
   return time == TimePoint() ? fromNanoseconds(static_cast<std::int64_t>(log_ns)) : time;
 }
 
-/// Gives one camera's images in the order of the recording fast, and any other by going back.
+/// Gives one camera's images in the order of the recording fast, also where many were recorded at
+/// one time, and any other by going back.
 class RosImages {
  public:
   RosImages(const std::filesystem::path& path, CameraTopics topics, int bits)
@@ -51,16 +52,17 @@ class RosImages {
   }
 
   Result<Frame> at(const RosImage& wanted) {
-    if (last_ns_ >= wanted.log_ns) rewind(wanted.log_ns);
+    if (next_ > wanted.number) rewind(wanted.log_ns);
     while (const auto message = messages_.next()) {
-      last_ns_ = message->log_ns;
       if (message->log_ns < wanted.log_ns) continue;
       if (message->log_ns > wanted.log_ns) break;
       const auto [time, frame] =
           topics_.compressed ? take<ros::CompressedImage>(*message) : take<ros::Image>(*message);
-      if (time == wanted.time) return frame;
+      if (time != wanted.time) continue;
+      next_ = wanted.number + 1;
+      return frame;
     }
-    last_ns_ = UINT64_MAX;
+    next_ = UINT64_MAX;
     return fail("image_missing", topics_.image + " has no image of " +
                                      std::to_string(toNanoseconds(wanted.time)) + " ns any more");
   }
@@ -80,13 +82,13 @@ class RosImages {
 
   void rewind(std::uint64_t from_ns) {
     messages_.rewind({topics_.image}, from_ns);
-    last_ns_ = 0;
+    next_ = 0;
   }
 
   RosMessages messages_;
   CameraTopics topics_;
   int bits_;
-  std::uint64_t last_ns_ = 0;
+  std::uint64_t next_ = 0;  ///< number from which on images lie ahead
 };
 
 /// What the recording told of one camera.
@@ -95,7 +97,7 @@ struct RosCamera {
   std::vector<RosImage> images = {};
   std::optional<ros::CameraInfo> info = {};
   std::string frame_id = {};
-  int bits = 0, looks = 0;
+  int bits = 8;  ///< of 16, as many as the brightest needs: the drive may begin in the dark
 };
 
 class RosDriveReader {
@@ -197,14 +199,13 @@ class RosDriveReader {
       if (image) addImage(camera, image->header, message.log_ns);
     } else if (const auto image = valueIn<ros::Image>(message, "frame")) {
       addImage(camera, image->header, message.log_ns);
-      if (camera.looks++ < kLooksForBits)
-        camera.bits = std::max(camera.bits, ros::usedBits(*image));
+      if (camera.bits < 16) camera.bits = std::max(camera.bits, ros::usedBits(*image));
     }
   }
 
   void addImage(RosCamera& camera, const ros::Header& header, std::uint64_t log_ns) {
     if (camera.frame_id.empty()) camera.frame_id = header.frame_id;
-    camera.images.push_back({stamp(header, log_ns), log_ns});
+    camera.images.push_back({stamp(header, log_ns), log_ns, camera.images.size()});
   }
 
   TimePoint stamp(const ros::Header& header, std::uint64_t log_ns) {

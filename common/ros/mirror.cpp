@@ -1,6 +1,7 @@
 #include "common/ros/mirror.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "common/ros/bytes.h"
 #include "common/ros/definition.h"
@@ -10,34 +11,67 @@
 #include "common/ros/sensors.h"
 
 namespace perdure::ros {
+namespace {
+
+std::string compressedTopic(const std::string& image) { return image + "/compressed"; }
+
+}  // namespace
 
 template <class M>
-void Mirror::say(const std::string& topic, const M& message, bool latched) {
+Outlet Mirror::outletOf(const std::string& topic, bool latched) const {
+  return {topic, M::kType, latched, definitionOf<M>()};
+}
+
+template <class Make>
+void Mirror::say(const std::string& topic, Make make, bool latched) {
+  using M = std::invoke_result_t<Make>;
   auto known = outlets_.find(topic);
-  if (known == outlets_.end()) {
-    known = outlets_.emplace(topic, Outlet{topic, M::kType, latched, definitionOf<M>()}).first;
+  if (known == outlets_.end()) known = outlets_.emplace(topic, outletOf<M>(topic, latched)).first;
+  if (latched || !wanted_ || wanted_(known->second)) out_(known->second, cdrOf(make()));
+}
+
+std::vector<Outlet> Mirror::outlets(const std::vector<std::string>& cameras) const {
+  std::vector<Outlet> all{outletOf<TFMessage>("/tf"),
+                          outletOf<TFMessage>("/tf_static", true),
+                          outletOf<Odometry>(prefix_ + "/odometry"),
+                          outletOf<Imu>(prefix_ + "/imu"),
+                          outletOf<PointCloud2>(prefix_ + "/landmarks"),
+                          outletOf<Detection2DArray>(prefix_ + "/detections"),
+                          outletOf<Detection3DArray>(prefix_ + "/objects"),
+                          outletOf<MarkerArray>(prefix_ + "/markers"),
+                          outletOf<DiagnosticArray>(prefix_ + "/diagnostics")};
+  for (const std::string& camera : cameras) {
+    all.push_back(outletOf<Image>(imageTopic(camera)));
+    all.push_back(outletOf<CompressedImage>(compressedTopic(imageTopic(camera))));
+    all.push_back(outletOf<CameraInfo>(prefix_ + "/" + camera + "/camera_info", true));
   }
-  out_(known->second, cdrOf(message));
+  return all;
 }
 
 void Mirror::sayInfo(const CameraCalibration& camera, TimePoint time) {
-  say(prefix_ + "/" + camera.name + "/camera_info", infoOf(camera, time), true);
+  say(
+      prefix_ + "/" + camera.name + "/camera_info", [&] { return infoOf(camera, time); }, true);
 }
 
 void Mirror::onCalibration(const Calibration& calibration) {
   calibration_ = calibration;
-  say("/tf_static", fixedFrames(calibration), true);
+  say(
+      "/tf_static", [&] { return fixedFrames(calibration); }, true);
   for (const CameraCalibration& camera : calibration.cameras) sayInfo(camera, newest_);
+}
+
+void Mirror::onImage(const Frame& frame) {
+  const std::string topic = imageTopic(frame.camera);
+  if (isCompressed(frame.encoding)) {
+    say(compressedTopic(topic), [&] { return compressedOf(frame); });
+  } else {
+    say(topic, [&] { return imageOf(frame); });
+  }
 }
 
 void Mirror::onFrame(const Frame& frame) {
   newest_ = std::max(newest_, frame.stamp.time);
-  const std::string topic = prefix_ + "/" + frame.camera + "/image_raw";
-  if (isCompressed(frame.encoding)) {
-    say(topic + "/compressed", compressedOf(frame));
-  } else {
-    say(topic, imageOf(frame));
-  }
+  onImage(frame);
   const auto* camera = calibration_ ? calibration_->camera(frame.camera) : nullptr;
   if (camera != nullptr) sayInfo(*camera, frame.stamp.time);
 }
@@ -45,7 +79,7 @@ void Mirror::onFrame(const Frame& frame) {
 void Mirror::onImu(const ImuSample& sample) {
   gyro_ = sample.gyro;
   const bool known = calibration_ && calibration_->imu;
-  say(prefix_ + "/imu", imuOf(sample, known ? &*calibration_->imu : nullptr));
+  say(prefix_ + "/imu", [&] { return imuOf(sample, known ? &*calibration_->imu : nullptr); });
 }
 
 RigidTransform Mirror::inMap(const WorldId& world) const {
@@ -55,12 +89,13 @@ RigidTransform Mirror::inMap(const WorldId& world) const {
 void Mirror::onOdometry(const perdure::Odometry& odometry) {
   if (odometry.state == OdometryState::kInitialising) return;
   newest_ = std::max(newest_, odometry.stamp.time);
-  say(prefix_ + "/odometry", odometryOf(odometry, gyro_));
-  say("/tf", movingFrames(odometry.stamp.time, inMap(odometry.world), odometry.T_WB));
+  say(prefix_ + "/odometry", [&] { return odometryOf(odometry, gyro_); });
+  say("/tf",
+      [&] { return movingFrames(odometry.stamp.time, inMap(odometry.world), odometry.T_WB); });
 }
 
 void Mirror::onLandmarks(const Landmarks& landmarks) {
-  say(prefix_ + "/landmarks", cloudOf(landmarks));
+  say(prefix_ + "/landmarks", [&] { return cloudOf(landmarks); });
 }
 
 void Mirror::onModel(const ModelInfo& model) {
@@ -70,17 +105,20 @@ void Mirror::onModel(const ModelInfo& model) {
 
 void Mirror::onDetections(const Detections& detections) {
   const auto model = models_.find(detections.model_hash);
-  say(prefix_ + "/detections",
-      detections2dOf(detections, model == models_.end() ? nullptr : &model->second));
+  say(prefix_ + "/detections", [&] {
+    return detections2dOf(detections, model == models_.end() ? nullptr : &model->second);
+  });
 }
 
 void Mirror::onObjects(const Objects& objects) {
-  say(prefix_ + "/objects", detections3dOf(objects));
-  say(prefix_ + "/markers", markersOf(objects));
+  say(prefix_ + "/objects", [&] { return detections3dOf(objects); });
+  say(prefix_ + "/markers", [&] { return markersOf(objects); });
 }
 
 void Mirror::onHealth(const Health& health) {
-  say(prefix_ + "/diagnostics", DiagnosticArray{headerOf(newest_, ""), {statusOf(health)}});
+  say(prefix_ + "/diagnostics", [&] {
+    return DiagnosticArray{headerOf(newest_, ""), {statusOf(health)}};
+  });
 }
 
 }  // namespace perdure::ros

@@ -30,11 +30,21 @@ struct Outlet {
 class Mirror {
  public:
   using Out = std::function<void(const Outlet& outlet, std::vector<std::uint8_t> cdr)>;
-  /// `prefix` stands before all topics but /tf and /tf_static.
-  Mirror(std::string prefix, Out out) : prefix_(std::move(prefix)), out_(std::move(out)) {}
+  /// Whether somebody reads it. What nobody reads is not made, unless it is latched.
+  using Wanted = std::function<bool(const Outlet& outlet)>;
+  /// `prefix` stands before all topics but /tf and /tf_static. Without `wanted` all is.
+  Mirror(std::string prefix, Out out, Wanted wanted = {})
+      : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
+
+  /// All that may be written of a vehicle with these cameras, for those who tell beforehand.
+  std::vector<Outlet> outlets(const std::vector<std::string>& cameras) const;
 
   void onCalibration(const Calibration& calibration);  ///< tf_static, camera_info
   void onFrame(const Frame& frame);  ///< image_raw or image_raw/compressed, camera_info
+  void onImage(const Frame& frame);  ///< the same without camera_info
+  std::string imageTopic(const std::string& camera) const {  ///< image_raw
+    return prefix_ + "/" + camera + "/image_raw";
+  }
   void onImu(const ImuSample& sample);
   void onOdometry(const perdure::Odometry& odometry);  ///< odometry, tf
   void onLandmarks(const Landmarks& landmarks);
@@ -46,13 +56,17 @@ class Mirror {
   void onHealth(const Health& health);
 
  private:
+  /// `make()` gives the message, and is called where somebody wants it.
+  template <class Make>
+  void say(const std::string& topic, Make make, bool latched = false);
   template <class M>
-  void say(const std::string& topic, const M& message, bool latched = false);
+  Outlet outletOf(const std::string& topic, bool latched = false) const;
   void sayInfo(const CameraCalibration& camera, TimePoint time);
   RigidTransform inMap(const WorldId& world) const;
 
   std::string prefix_;
   Out out_;
+  Wanted wanted_;
   std::map<std::string, Outlet> outlets_;
   std::optional<Calibration> calibration_;
   std::map<std::uint64_t, ModelInfo> models_;

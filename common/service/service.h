@@ -36,6 +36,7 @@ class Context {
   InstanceId instance() const { return instance_; }
   bus::Participant& participant() { return participant_; }
   const std::string& vehicle() const { return domain_.options().vehicle; }
+  const bus::Options& busOptions() const { return domain_.options(); }
   bus::WaitLoop& loop() { return loop_; }
   HealthMeter& health() { return health_; }
   spdlog::logger& log() { return *log_; }

@@ -19,7 +19,7 @@ struct Layers {
 };
 const std::vector<Layers> kLayers{
     {"common/wire/", {"description", ""}},
-    {"common/bus/", {"security", ""}},
+    {"common/bus/", {"security", "", "foreign"}},
     {"common/mapping/", {"frames", "graph", "places", "appearance", "", "fusion"}},
     {"common/replay/", {"files", "recordings", ""}},
     {"common/sim/scenes/", {"parts", ""}},
@@ -30,6 +30,7 @@ const std::vector<Layers> kLayers{
     {"services/gateway/", {"core", "protocol", "web", ""}},
     {"services/inference/core/", {"", "network", "decode", "takeover"}},
     {"services/map_store/", {"core", "fleet", ""}},
+    {"services/ros2/", {"core", ""}},
     {"tools/bus_tools/", {"", "status", "doctor"}},
     {"tools/calibrate/", {"estimate", ""}},
     {"tools/evaluate/", {"", "memory"}},

@@ -17,7 +17,7 @@ expect 0 "--data DIR" deploy/demo --help
 expect 64 "unknown option '--everything'" deploy/install --everything
 expect 0 "--runtime" deploy/install --help
 expect 64 "unknown option '--everything'" deploy/package --everything
-expect 0 "perdure-{services,tools,gateway,python,models,dev}" deploy/package --help
+expect 0 "perdure-{services,tools,gateway,ros2,python,models,dev}" deploy/package --help
 for script in deploy/demo deploy/install deploy/package tests/run .ci/run; do bash -n "$script"; done
 # What libcamera loads as it runs is no library that a program depends on: the list has to name it.
 eval "$(sed -n '/^runtime=(/,/)$/p' deploy/install)"

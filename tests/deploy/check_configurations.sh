@@ -2,7 +2,7 @@
 # Every configuration file of a service is accepted by it, and a wrong one is refused with 78.
 set -euo pipefail
 cd "$PERDURE_SOURCE"
-for service in capture vio inference semantic-filter map-store gateway; do
+for service in capture vio inference semantic-filter map-store gateway ros2; do
   file=config/${service//-/_}.yaml
   if [ -e "$file" ]; then "$PERDURE_BIN/perdure-$service" --config "$file" --check-config; fi
   wrong=$(mktemp)

@@ -40,6 +40,24 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
+/// To the topics that were named: what a driver of ROS stands for is what it writes; of others it
+/// is what they read.
+void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
+  if (topics.empty()) return;
+  if (role != bus::Role::kRos2Driver) {
+    permissions.reads = topics;
+    return;
+  }
+  for (const std::string& topic : topics) {
+    const std::string row = topic.starts_with("frame/") ? "frame/*" : topic;
+    const auto& all = permissions.writes;
+    if (std::find(all.begin(), all.end(), row) != all.end()) continue;
+    throw StartupError(ExitCode::kUsage, "a ros2_driver stands for no " + topic);
+  }
+  permissions.writes = topics;
+  permissions.writes.emplace_back("health");
+}
+
 void requireTopics(const std::vector<std::string>& topics) {
   for (const std::string& topic : topics) {
     if (bus::findTopic(topic) != nullptr) continue;
@@ -149,7 +167,7 @@ void Authority::write(const std::string& name, const Known& known, const Validit
   const auto owner = owner_name.empty() ? ownerOf(folder) : ownerNamed(owner_name);
   const Subject subject{name, known.role};
   Permissions permissions = permissionsOf(roleNamed(known.role));
-  if (!known.topics.empty()) permissions.reads = known.topics;
+  narrow(permissions, roleNamed(known.role), known.topics);
   const bus::Key key = makeKey();
   const bus::Certificate certificate = issue(signer(), key.get(), subject, validity);
   const std::string pem = toPem(certificate.get());

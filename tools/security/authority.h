@@ -23,8 +23,9 @@ class Authority {
 
   struct Wanted {
     std::string name, role;
-    std::vector<std::string> topics = {};  ///< read instead of the role's; "frame/*" among them
-    std::string owner = {};                ///< user of the files; empty: as they are, or ours
+    /// Read instead of the role's, "frame/*" among them; of a ros2_driver what it writes.
+    std::vector<std::string> topics = {};
+    std::string owner = {};  ///< user of the files; empty: as they are, or ours
   };
   /// Throws StartupError: a name that is taken or is none, an unknown role, topic or user.
   void add(const Wanted& wanted, const Validity& validity);

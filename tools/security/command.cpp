@@ -30,7 +30,8 @@ std::string serviceUser() {
 }
 
 bool madeAtFirst(bus::Role role) {
-  return role != bus::Role::kPlayer && role != bus::Role::kSubscriber;
+  return role != bus::Role::kPlayer && role != bus::Role::kSubscriber &&
+         role != bus::Role::kRos2Driver;
 }
 
 void init(const Request& request) {
@@ -122,12 +123,15 @@ void addSecurityCommand(CLI::App& app) {
   addDays(*made, *request);
   addOwner(*made, *request, "user of all files; else the services' are perdure's, made by root");
   CLI::App* added = subcommand(*security, "add", "one more identity", request, &add);
-  added->add_option("role", request->wanted.role, "subscriber, player, or as `init` makes them")
+  added
+      ->add_option("role", request->wanted.role,
+                   "subscriber, player, ros2_driver, or as `init` makes them")
       ->required();
   added->add_option("name", request->wanted.name, "the folder's name, for bus.identity")
       ->required();
   added->add_option("--topics", request->wanted.topics,
-                    "what it reads, instead of what its role reads: objects, frame/cam0, …");
+                    "what it reads, instead of what its role reads: objects, frame/cam0, …; of a "
+                    "ros2_driver what it writes");
   addDays(*added, *request);
   addOwner(*added, *request, "user of the files");
   CLI::App* renewed = subcommand(*security, "renew", "new keys and certificates, of all or of some",

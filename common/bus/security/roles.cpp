@@ -5,16 +5,18 @@
 namespace perdure::bus {
 
 std::span<const RoleName> roleNames() {
-  static constexpr std::array<RoleName, 10> kNames{{{Role::kCapture, "capture"},
-                                                   {Role::kVio, "vio"},
-                                                   {Role::kInference, "inference"},
-                                                   {Role::kSemanticFilter, "semantic_filter"},
-                                                   {Role::kMapStore, "map_store"},
-                                                   {Role::kRecord, "record"},
-                                                   {Role::kOperator, "operator"},
-                                                   {Role::kPlayer, "player"},
-                                                   {Role::kSubscriber, "subscriber"},
-                                                   {Role::kGateway, "gateway"}}};
+  static constexpr std::array<RoleName, 12> kNames{{{Role::kCapture, "capture"},
+                                                    {Role::kVio, "vio"},
+                                                    {Role::kInference, "inference"},
+                                                    {Role::kSemanticFilter, "semantic_filter"},
+                                                    {Role::kMapStore, "map_store"},
+                                                    {Role::kRecord, "record"},
+                                                    {Role::kOperator, "operator"},
+                                                    {Role::kPlayer, "player"},
+                                                    {Role::kSubscriber, "subscriber"},
+                                                    {Role::kGateway, "gateway"},
+                                                    {Role::kRos2, "ros2"},
+                                                    {Role::kRos2Driver, "ros2_driver"}}};
   return kNames;
 }
 

@@ -16,11 +16,13 @@ enum class Role : std::uint32_t {
   kInference = 1u << 2,
   kSemanticFilter = 1u << 3,
   kMapStore = 1u << 4,
-  kRecord = 1u << 5,      ///< `perdure record`: reads everything
-  kOperator = 1u << 6,    ///< the other commands: read everything, write queries
-  kPlayer = 1u << 7,      ///< `perdure play`: writes everything; made on demand only
-  kSubscriber = 1u << 8,  ///< programs of other people: results, and queries of the map
-  kGateway = 1u << 9,     ///< shows what is on the bus: reads everything, writes queries
+  kRecord = 1u << 5,       ///< `perdure record`: reads everything
+  kOperator = 1u << 6,     ///< the other commands: read everything, write queries
+  kPlayer = 1u << 7,       ///< `perdure play`: writes everything; made on demand only
+  kSubscriber = 1u << 8,   ///< programs of other people: results, and queries of the map
+  kGateway = 1u << 9,      ///< shows what is on the bus: reads everything, writes queries
+  kRos2 = 1u << 10,        ///< the bridge to ROS 2 outwards: reads everything
+  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also what they stand for; on demand only
 };
 
 /// A set of roles.

@@ -26,6 +26,7 @@ using HeadFields = std::map<std::string, std::string>;
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::uint64_t kMostHead = 1u << 20;
 constexpr std::uint64_t kMostChunk = 64u << 20;  // rosbag writes 768 kB
+constexpr std::uint64_t kMostHeld = 1u << 30;    // of chunks that are unpacked at one time
 
 enum class Op : std::uint8_t { kMessage = 2, kIndex = 4, kChunk = 5, kConnection = 7 };
 
@@ -307,12 +308,29 @@ class Bag : public RosSource {
     return known != connections_.end() && wanted_.contains(known->second.first);
   }
 
+  /// Chunks whose times overlap are unpacked together; rosbag's own overlap by fractions of a
+  /// second.
+  void hold(const Records& records) {
+    std::erase_if(held_, [](const auto& one) { return one.expired(); });
+    std::uint64_t sum = records->size();
+    for (const auto& one : held_)
+      if (const auto still = one.lock()) sum += still->size();
+    if (sum > kMostHeld) {
+      throw StartupError(ExitCode::kUnavailable,
+                         path_.string() +
+                             ": the times of more than 1 GiB of its chunks overlap; "
+                             "record again, or sort it: `rosbag filter IN OUT True`");
+    }
+    held_.push_back(records);
+  }
+
   void load(const ChunkPlace& chunk) {
     const bool any = std::any_of(chunk.connections.begin(), chunk.connections.end(),
                                  [this](std::uint32_t connection) { return isWanted(connection); });
     if (!any || chunk.end_ns < from_ns_) return;
     const auto records = unpack(chunk);
     if (!records) return count(records.error());
+    hold(*records);
     forEachMessage(**records, [&](std::uint32_t connection, std::uint64_t log_ns, Bytes data) {
       if (!isWanted(connection)) return;
       pending_.push({{connections_.at(connection).first, log_ns, data, *records}, order_++});
@@ -329,6 +347,7 @@ class Bag : public RosSource {
   std::uint64_t from_ns_ = 0, order_ = 0;
   std::size_t next_chunk_ = 0;
   std::priority_queue<Pending> pending_;
+  std::vector<std::weak_ptr<const std::vector<std::uint8_t>>> held_;
 };
 
 }  // namespace

@@ -75,6 +75,21 @@ TEST(RosDrive, GivesAnyImageOutOfTurn) {
   }
 }
 
+TEST(RosDrive, ImagesThatWereRecordedAtOneMomentAreReadInOrderAndOutOfTurn) {
+  const Twin twin = twinOf("ros_moment", {.one_log_time = true}, true);
+  const auto all = test::allOf(*Dataset::open({.path = twin.folder}));
+  const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});
+  const test::Given read = test::allOf(*dataset);
+  EXPECT_EQ(read.order, all.order);
+  EXPECT_EQ(read.pixels, all.pixels);
+  for (const std::uint64_t index : {3u, 0u, 4u, 4u, 1u}) {
+    const auto frame = dataset->frameAt(index);
+    ASSERT_TRUE(frame) << index;
+    EXPECT_TRUE(std::equal(frame->data->begin(), frame->data->end(), all.pixels[2 * index].begin()))
+        << index;
+  }
+}
+
 TEST(RosDrive, MessagesWithoutStampsGetTheTimeOfTheirRecordingAndThatIsSaid) {
   const Twin twin = twinOf("ros_unstamped", {.stamps = false});
   const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});

@@ -198,7 +198,7 @@ void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions&
     const auto* frame = std::get_if<Frame>(&*message);
     if (imu == nullptr && frame == nullptr) continue;
     const std::int64_t ns = toNanoseconds(imu ? imu->time : frame->stamp.time);
-    const std::int64_t log_ns = ns + kLogDelay;
+    const std::int64_t log_ns = (options.one_log_time ? 0 : ns) + kLogDelay;
     if (!begun && options.transforms)
       database.add("/tf_static", log_ns, transformsOf(dataset.calibration()));
     begun = true;

@@ -12,9 +12,10 @@ namespace perdure::test {
 struct PlanOptions {
   enum class Images { kRaw, kPng };
   Images images = Images::kRaw;
-  bool transforms = true;   ///< /tf_static
-  bool stamps = true;       ///< of headers
-  std::string suffix = {};  ///< of cam0's name space: "/cam0SUFFIX/image_raw"
+  bool transforms = true;     ///< /tf_static
+  bool stamps = true;         ///< of headers
+  bool one_log_time = false;  ///< of writeDb3: all was recorded at one moment
+  std::string suffix = {};    ///< of cam0's name space: "/cam0SUFFIX/image_raw"
 };
 
 /// FOLDER/plan.json, of everything that the dataset gives.

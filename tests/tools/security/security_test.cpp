@@ -144,6 +144,15 @@ TEST_F(Security, GivesASubscriberTheTopicsThatAreNamed) {
                                   "</topics></publish>"));
 }
 
+TEST_F(Security, GivesADriverOfRosTheTopicsThatItStandsFor) {
+  authority_.add({"eye", "ros2_driver", {"frame/cam0", "calibration"}}, validFor(30));
+  EXPECT_THAT(contents("eye/permissions.p7s"),
+              HasSubstr("<publish><topics><topic>perdure/ego/frame/cam0</topic>"
+                        "<topic>perdure/ego/calibration</topic><topic>perdure/ego/health</topic>"
+                        "</topics></publish>"));
+  EXPECT_THROW(authority_.add({"ear", "ros2_driver", {"objects"}}, validFor(30)), StartupError);
+}
+
 TEST(Permissions, AreTheLeastThatEachRoleNeeds) {
   EXPECT_THAT(permissionsOf(Role::kSubscriber).writes, ElementsAre("map/query"));
   EXPECT_THAT(permissionsOf(Role::kSubscriber).reads, Not(Contains("frame/*")));
@@ -154,6 +163,11 @@ TEST(Permissions, AreTheLeastThatEachRoleNeeds) {
   EXPECT_THAT(permissionsOf(Role::kRecord).writes, ElementsAre("health"));
   EXPECT_THAT(permissionsOf(Role::kGateway).writes, ElementsAre("map/query", "health"));
   EXPECT_THAT(permissionsOf(Role::kGateway).reads, Contains("frame/*"));
+  EXPECT_THAT(permissionsOf(Role::kRos2).writes, ElementsAre("health"));
+  EXPECT_THAT(permissionsOf(Role::kRos2).reads, Contains("frame/*"));
+  EXPECT_THAT(
+      permissionsOf(Role::kRos2Driver).writes,
+      ElementsAre("frame/*", "imu", "calibration", "odometry", "detections", "model", "health"));
   EXPECT_THAT(permissionsOf(Role::kPlayer).reads, IsEmpty());
 }
 

@@ -1,0 +1,36 @@
+// What is wrong with what comes, counted by input and reason, with the sentence that says the mend.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace perdure::ros2 {
+
+class Troubles {
+ public:
+  void add(const std::string& input, const Reason& reason, std::int64_t now_ns) {
+    const std::string code = input + "_" + reason.code;
+    counts_.add(code);
+    first_.emplace(code, reason.detail);
+    if (!reason.detail.empty()) last_ = reason.detail, last_ns_ = now_ns, any_ = true;
+  }
+  const ReasonCounts& counts() const { return counts_; }
+  /// The sentence of the first of each kind.
+  const std::map<std::string, std::string>& sentences() const { return first_; }
+  /// The newest sentence, where it is at most this old; else nothing.
+  std::string newest(std::int64_t now_ns, std::int64_t longest_ns) const {
+    return any_ && now_ns - last_ns_ <= longest_ns ? last_ : std::string();
+  }
+
+ private:
+  ReasonCounts counts_;
+  std::map<std::string, std::string> first_;
+  std::string last_;
+  std::int64_t last_ns_ = 0;
+  bool any_ = false;
+};
+
+}  // namespace perdure::ros2

@@ -1,0 +1,321 @@
+// perdure-ros2: Perdure's topics for ROS 2, and drivers of ROS 2 for Perdure, without ROS.
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "common/bus/topics.h"
+#include "common/replay/files/rig_file.h"
+#include "common/ros/bytes.h"
+#include "common/service/service.h"
+#include "common/vision/jpeg.h"
+#include "services/ros2/node.h"
+#include "services/ros2/ros_side.h"
+
+namespace {
+
+using namespace perdure;
+namespace topics = bus::topics;
+
+std::int64_t monotonicNs() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+/// A reader of the bus that is there while somebody of ROS wants what is made of it.
+class Follower {
+ public:
+  virtual ~Follower() = default;
+  virtual void follow() = 0;
+};
+
+template <class T>
+class FollowerOf : public Follower {
+ public:
+  FollowerOf(service::Context& context, bus::Topic<T> topic, std::function<bool()> wanted,
+             Sink<T> handler)
+      : context_(context),
+        topic_(std::move(topic)),
+        wanted_(std::move(wanted)),
+        handler_(std::move(handler)) {
+    context.countReasons([this](ReasonCounts& counts) {
+      for (const auto& [reason, n] : before_.all()) counts.add(reason, n);
+      if (reader_) reader_->report(counts);
+    });
+  }
+  void follow() override {
+    if (wanted_() == (reader_ != nullptr)) return;
+    if (reader_) {
+      reader_->report(before_);
+      context_.loop().off(*reader_);
+      reader_.reset();
+      return;
+    }
+    reader_ = std::make_unique<bus::Reader<T>>(context_.participant(), topic_);
+    context_.loop().on(*reader_, handler_);
+  }
+
+ private:
+  service::Context& context_;
+  const bus::Topic<T> topic_;
+  const std::function<bool()> wanted_;
+  const Sink<T> handler_;
+  std::unique_ptr<bus::Reader<T>> reader_;
+  ReasonCounts before_;
+};
+
+/// Outwards: what is on the bus, as ROS has it.
+class Outwards {
+ public:
+  Outwards(service::Context& context, const ros2::Config& config, ros2::RosSide& ros)
+      : context_(context),
+        config_(config),
+        ros_(ros),
+        mirror_(
+            config.prefix, [&](const auto& outlet, auto cdr) { ros.write(outlet, std::move(cdr)); },
+            [&](const auto& outlet) { return ros.wants(outlet.topic); }) {
+    for (const ros::Outlet& outlet : mirror_.outlets(config.shown_cameras)) {
+      if (config.tf || !outlet.topic.starts_with("/tf")) ros.advertise(outlet);
+    }
+    listenAlways();
+    followWhatIsWanted();
+    context.loop().onWake([this] {
+      for (const auto& one : followers_) one->follow();
+    });
+    context.every(std::chrono::milliseconds(200), [this] { context_.loop().wake(); });
+    context.countReasons([this]() -> const ReasonCounts& { return reasons_; });
+  }
+
+ private:
+  std::string topic(const char* name) const { return config_.prefix + "/" + name; }
+
+  /// What is latched, and what others need: small, and seldom.
+  void listenAlways() {
+    context_.on(topics::kCalibration, [this](const Calibration& m) { mirror_.onCalibration(m); });
+    context_.on(topics::kModel, [this](const ModelInfo& m) { mirror_.onModel(m); });
+    context_.on(topics::kMapFrame, [this](const MapFrame& m) { mirror_.onMapFrame(m); });
+    context_.on(topics::kHealth, [this](const Health& m) { mirror_.onHealth(m); });
+    context_.on(topics::kOdometry, [this](const Odometry& m) { mirror_.onOdometry(m); });
+  }
+
+  template <class T>
+  void add(const bus::Topic<T>& topic, std::vector<std::string> outlets, Sink<T> handler) {
+    followers_.push_back(std::make_unique<FollowerOf<T>>(
+        context_, topic,
+        [this, outlets = std::move(outlets)] {
+          return std::any_of(outlets.begin(), outlets.end(),
+                             [this](const std::string& one) { return ros_.wants(one); });
+        },
+        std::move(handler)));
+  }
+
+  void followWhatIsWanted() {
+    // The rate of turn is in the odometry's twist.
+    add<ImuSample>(topics::kImu, {topic("imu"), topic("odometry")},
+                   [this](const ImuSample& m) { mirror_.onImu(m); });
+    add<Landmarks>(topics::kLandmarks, {topic("landmarks")},
+                   [this](const Landmarks& m) { mirror_.onLandmarks(m); });
+    add<Detections>(topics::kDetections, {topic("detections")},
+                    [this](const Detections& m) { mirror_.onDetections(m); });
+    add<Objects>(topics::kObjects, {topic("objects"), topic("markers")}, [this](const Objects& m) {
+      mirror_.onObjects(m);
+      context_.health().frameOut();
+    });
+    for (const std::string& camera : config_.shown_cameras) {
+      const std::string image = mirror_.imageTopic(camera);
+      add<Frame>(topics::frame(camera),
+                 {image, image + "/compressed", topic((camera + "/camera_info").c_str())},
+                 [this](const Frame& m) { onFrame(m); });
+    }
+  }
+
+  /// Raw and compressed, each where it is wanted, whatever travels on the bus.
+  void onFrame(const Frame& frame) {
+    mirror_.onFrame(frame);
+    const std::string image = mirror_.imageTopic(frame.camera);
+    const bool packed = isCompressed(frame.encoding);
+    if (!ros_.wants(packed ? image : image + "/compressed")) return;
+    const auto other = packed ? vision::decompressed(frame)
+                              : vision::compressed(frame, static_cast<int>(config_.image_quality));
+    if (other) {
+      mirror_.onImage(*other);
+    } else {
+      reasons_.add(other.error());
+    }
+  }
+
+  service::Context& context_;
+  const ros2::Config& config_;
+  ros2::RosSide& ros_;
+  ros::Mirror mirror_;
+  std::vector<std::unique_ptr<Follower>> followers_;
+  ReasonCounts reasons_;
+};
+
+/// Inwards: what drivers of ROS say, as Perdure's topics.
+class Inwards {
+ public:
+  Inwards(service::Context& context, const ros2::Config& config, ros2::RosSide& ros)
+      : context_(context),
+        config_(config),
+        ros_(ros),
+        node_(config, rigOf(config, context), context.instance(), outputs()) {
+    context.countReasons([this]() -> const ReasonCounts& { return node_.troubles().counts(); });
+    listenToCameras();
+    listenToOthers();
+    listenToOwnFrames();
+    node_.start();
+  }
+
+  std::pair<HealthState, std::string> health() {
+    for (const auto& [code, sentence] : node_.troubles().sentences()) {
+      if (sentence.empty() || !logged_.insert(code).second) continue;
+      context_.log().warn("{}, first: {}", code, sentence);
+    }
+    return node_.health(monotonicNs());
+  }
+
+ private:
+  static Calibration rigOf(const ros2::Config& config, service::Context& context) {
+    if (config.rig.empty()) return {};
+    std::vector<std::string> notes;
+    Calibration rig = replay::readRigParts(config.rig, &notes).sensors;
+    for (const std::string& note : notes) context.log().info("{}", note);
+    return rig;
+  }
+
+  ros2::Outputs outputs() {
+    ros2::Outputs to;
+    for (const ros2::CameraInput& camera : config_.cameras())
+      frames_[camera.name] = context_.sink(topics::frame(camera.name));
+    to.frame = [this](const Frame& m) {
+      frames_.at(m.camera)(m);
+      if (m.camera == config_.cam0.name) context_.health().frameOut();
+    };
+    if (config_.cam0.given()) to.calibration = context_.sink(topics::kCalibration);
+    if (config_.imu.given()) to.imu = context_.sink(topics::kImu);
+    if (config_.odometry.given()) to.odometry = context_.sink(topics::kOdometry);
+    if (config_.detections.given()) {
+      constexpr double kLease = 1.0;  // s; detectors of ROS have no rate that is known
+      auto& detections = context_.writer(
+          topics::kDetections,
+          {.strength = static_cast<std::int32_t>(config_.detections.strength), .lease_s = kLease});
+      to.detections = [&detections](const Detections& m) { (void)detections.write(m); };
+      to.model = context_.sink(topics::kModel);
+    }
+    return to;
+  }
+
+  /// A reader whose messages go to `take` as structs; bytes that are none are counted.
+  template <class M>
+  void read(const std::string& input, const std::string& topic, int depth,
+            std::function<void(const M&)> take, bool latched = false) {
+    ros_.read(
+        input, topic, M::kType, config_.reliable, latched, depth,
+        [this, input, topic, take = std::move(take)](const SharedBytes& cdr) {
+          auto message =
+              ros::messageOf<M>(*cdr, ros::Encoding::kCdr, std::make_shared<SharedBytes>(cdr));
+          if (message) return take(*message);
+          node_.onMalformed(input,
+                            {"malformed", topic + " has messages that are no whole " + M::kType +
+                                              "; is its writer of another "
+                                              "version of ROS?"},
+                            monotonicNs());
+        });
+  }
+
+  void listenToCameras() {
+    constexpr int kImages = 4, kInfos = 4;
+    const auto cameras = config_.cameras();
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      const ros2::CameraInput& camera = cameras[i];
+      auto& images = context_.needs("images of " + camera.name, "start its driver again");
+      const auto onImage = [this, i, &images](const auto& m) {
+        images.heard();
+        if (i == 0) context_.health().frameIn();
+        node_.onImage(i, m, monotonicNs());
+      };
+      if (camera.compressed()) {
+        read<ros::CompressedImage>(camera.name, camera.image, kImages, onImage);
+      } else {
+        read<ros::Image>(camera.name, camera.image, kImages, onImage);
+      }
+      read<ros::CameraInfo>(camera.name + "_info", camera.infoTopic(), kInfos,
+                            [this, i](const auto& m) { node_.onInfo(i, m, monotonicNs()); });
+    }
+    if (cameras.empty() && !config_.odometry.given()) return;
+    constexpr int kTransforms = 100;
+    read<ros::TFMessage>(
+        "tf_static", "/tf_static", kTransforms, [this](const auto& m) { node_.onTransforms(m); },
+        true);
+  }
+
+  void listenToOthers() {
+    constexpr int kSamples = 512, kPoses = 128, kBoxes = 16;
+    if (config_.imu.given()) {
+      auto& samples = context_.needs("inertial samples", "start the driver of the IMU again");
+      read<ros::Imu>("imu", config_.imu.topic, kSamples, [this, &samples](const auto& m) {
+        samples.heard();
+        node_.onImu(m, monotonicNs());
+      });
+    }
+    if (config_.odometry.given()) {
+      auto& poses = context_.needs("odometry of ROS", "start the node that says it again");
+      read<ros::Odometry>("odometry", config_.odometry.topic, kPoses,
+                          [this, &poses](const auto& m) {
+                            poses.heard();
+                            node_.onOdometry(m, monotonicNs());
+                          });
+    }
+    if (config_.detections.given()) {
+      read<ros::Detection2DArray>("detections", config_.detections.topic, kBoxes,
+                                  [this](const auto& m) { node_.onDetections(m, monotonicNs()); });
+    }
+  }
+
+  /// Poses and boxes of frames that Perdure's capture takes.
+  void listenToOwnFrames() {
+    if (config_.cam0.given() || !(config_.odometry.given() || config_.detections.given())) return;
+    context_.on(topics::frame(config_.detections.camera), [this](const Frame& m) {
+      if (!once_.first(m.stamp.source, m.stamp.sequence)) return;
+      node_.onOwnFrame(m, monotonicNs());
+    });
+  }
+
+  service::Context& context_;
+  const ros2::Config& config_;
+  ros2::RosSide& ros_;
+  std::map<std::string, Sink<Frame>> frames_;
+  ros2::Node node_;
+  bus::Once once_;
+  std::set<std::string> logged_;
+};
+
+void serve(service::Context& context, const ros2::Config& config) {
+  ros2::RosSide ros(context, config);
+  std::unique_ptr<Inwards> in;
+  std::unique_ptr<Outwards> out;
+  if (config.anyInput()) in = std::make_unique<Inwards>(context, config, ros);
+  if (config.out) out = std::make_unique<Outwards>(context, config, ros);
+  context.onHealth([&] {
+    if (!in) return;
+    const auto [state, sentence] = in->health();
+    const std::string unheard = state == HealthState::kOk ? ros.unheard() : std::string();
+    if (unheard.empty()) return context.health().state(state, sentence);
+    context.health().state(HealthState::kDegraded, unheard);
+  });
+  context.run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros2::Config config;
+  return service::runService(
+      argc, argv,
+      {.process = "ros2",
+       .summary = "Perdure's topics for ROS 2, and drivers of ROS 2 for Perdure, without ROS.",
+       .describe = [&](config::Fields& fields) { ros2::describe(config, fields); },
+       .body = [&](service::Context& context) { serve(context, config); },
+       .verify = [&] { ros2::verify(config); }});
+}

@@ -1,0 +1,72 @@
+// Where ROS may be: a domain of its own beside a closed bus, and what is refused at the start.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/interop/ros2/bridge_rig.h"
+#include "tests/services/run_until.h"
+
+namespace perdure::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+/// A domain beside the one of the bus, for ROS.
+std::string besideDomain(const bus::Domain& domain) {
+  return std::to_string((bus::withEnvironment(domain.options()).domain + 101) % 230);
+}
+
+std::string refusal(const Settings& settings, int status) {
+  Folder folder;
+  std::vector<std::string> command{(programs() / "perdure-ros2").string()};
+  for (const std::string& setting : settings) command.insert(command.end(), {"--set", setting});
+  Child bridge(command, folder.file("log"));
+  EXPECT_EQ(bridge.wait(20s), status) << bridge.log();
+  return bridge.log();
+}
+
+TEST(Ros2Places, RosHasADomainOfItsOwnBesideAClosedBus) {
+  BridgeRig rig;
+  const std::string security = rig.folder.file("security");
+  Child init({(programs() / "perdure").string(), "security", "init", "--dir", security},
+             rig.folder.file("init"));
+  ASSERT_EQ(init.wait(60s), 0) << init.log();
+  EXPECT_THAT(refusal({"bus.security=" + security}, 78),
+              HasSubstr("ROS without SROS2 cannot join it: set ros.domain"));
+  Child add({(programs() / "perdure").string(), "security", "add", "ros2_driver", "camera_of_ros",
+             "--topics", "frame/cam0", "calibration", "--dir", security},
+            rig.folder.file("add"));
+  ASSERT_EQ(add.wait(60s), 0) << add.log();
+
+  const std::string beside = besideDomain(rig.domain);
+  const std::vector<std::string> bridge{(programs() / "perdure-ros2").string(), "--set",
+                                        "bus.security=" + security, "--set",
+                                        "ros.domain=" + beside};
+  const Child reading(bridge, rig.folder.file("reading"));
+  rig.listen({"/perdure/diagnostics"}, beside);
+  EXPECT_TRUE(eventually(40s, [&] { return !rig.heard().empty(); })) << reading.log() << rig.log();
+
+  auto writing = bridge;
+  writing.insert(writing.end(), {"--set", "in.cam0.image=/camera/image_raw"});
+  Child refused(writing, rig.folder.file("refused"));
+  EXPECT_EQ(refused.wait(20s), 78) << refused.log();
+  EXPECT_THAT(refused.log(), HasSubstr("the identity of this process may not make"));
+  writing.insert(writing.end(), {"--set", "bus.identity=camera_of_ros"});
+  Child allowed(writing, rig.folder.file("allowed"));
+  EXPECT_EQ(allowed.wait(2s), -1) << "it runs; " << allowed.log();
+}
+
+TEST(Ros2Places, WhatCannotBeIsRefusedWithTheMend) {
+  EXPECT_THAT(refusal({"in.imu.topic=/imu"}, 78), HasSubstr("camera and IMU come from one source"));
+  EXPECT_THAT(refusal({"in.cam0.image=camera/image"}, 78), HasSubstr("is no topic of ROS"));
+  EXPECT_THAT(refusal({"in.detections.topic=/boxes"}, 78),
+              HasSubstr("list the detector's classes, as [car, person]"));
+  EXPECT_THAT(refusal({"ros.interface=eth7"}, 78), HasSubstr("ros.domain of its own"));
+  EXPECT_THAT(refusal({"out.enabled=false"}, 78),
+              HasSubstr("nothing goes out and nothing comes in"));
+  EXPECT_THAT(refusal({"ros.domain=200", "ros.interface=absent7"}, 69),
+              HasSubstr("bus.interface names an interface"));
+}
+
+}  // namespace
+}  // namespace perdure::test
