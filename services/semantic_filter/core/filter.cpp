@@ -235,7 +235,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   auto visibilities = updateVisibility(belief, heard);
   if (!heard.boxes) return report;
   FrameInput input = withLearnedNoise(belief, heard);
-  markSidesBesideNearer(*input.boxes);
+  markSidesBesideNearer(*input.boxes, input.view);
   // Both change what a box or a miss means, so that they come before any score.
   explainPartialViews(belief, visibilities, input, parameters_, priors_);
   const FrameContext frame = contextOf(belief, input);

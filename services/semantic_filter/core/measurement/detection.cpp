@@ -118,6 +118,15 @@ bool sameEdge(const BoxMeasurement& a, int side_a, const BoxMeasurement& b, int 
          d * d < gates::kSameEdge * (variance(a, side_a) + variance(b, side_b));
 }
 
+/// Whether `a` stands lower in the image than `b`. `slope` (dy/dx): of a level line. What of the
+/// lower side stands on the ground is not known where the camera leans.
+bool reachesLower(const BoxMeasurement& a, const BoxMeasurement& b, double slope) {
+  const double apart = 0.5 * (a.sides[0] + a.sides[2] - b.sides[0] - b.sides[2]);
+  const double lower =
+      a.sides[3] - b.sides[3] - slope * apart - 0.5 * std::abs(slope) * (a.width() + b.width());
+  return lower > 0.0 && lower * lower > gates::kLower * (variance(a, 3) + variance(b, 3));
+}
+
 /// Marks the sides of `far` at which `near` begins.
 void markBeside(BoxDetection& far, const BoxDetection& near) {
   constexpr double kFaces = 0.5;  // share of the side that the nearer box covers
@@ -131,12 +140,13 @@ void markBeside(BoxDetection& far, const BoxDetection& near) {
 
 }  // namespace
 
-void markSidesBesideNearer(std::vector<BoxDetection>& boxes) {
+void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view) {
+  const Eigen::Vector3d up = view.T_WC().R().transpose() * view.up_W;
+  if (up.y() >= 0.0) return;  // the camera is upside down
+  const double slope = -up.x() / up.y();
   for (BoxDetection& far : boxes) {
     for (const BoxDetection& near : boxes) {
-      const double lower = near.z.sides[3] - far.z.sides[3];
-      const double noise = variance(far.z, 3) + variance(near.z, 3);
-      if (lower > 0.0 && lower * lower > gates::kLower * noise) markBeside(far, near);
+      if (reachesLower(near.z, far.z, slope)) markBeside(far, near);
     }
   }
 }

@@ -64,9 +64,9 @@ struct BoxDetection {
   std::array<bool, 4> beside_nearer{};
 };
 
-/// Marks `beside_nearer` of all boxes of an image. Of two things on one ground the nearer one
-/// reaches lower in the image.
-void markSidesBesideNearer(std::vector<BoxDetection>& boxes);
+/// Marks `beside_nearer` of all boxes of an image. Of two things on one level ground the nearer one
+/// stands lower in the image, seen along gravity.
+void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view);
 /// Returns `hidden` and the sides beside nearer boxes.
 std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box);
 

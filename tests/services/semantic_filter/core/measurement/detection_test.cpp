@@ -53,15 +53,19 @@ using Sides = std::array<bool, 4>;
 
 constexpr Sides kNone{};
 
-/// Boxes with sides at these pixels, in an image in which the border is far.
-std::vector<BoxDetection> boxesAt(std::initializer_list<Eigen::Vector4d> sides) {
+/// Boxes with sides at these pixels, in an image of a camera that leans to the left by `lean`, rad.
+std::vector<BoxDetection> boxesAt(std::initializer_list<Eigen::Vector4d> sides, double lean = 0.0) {
+  const CameraModel camera{makeCamera()};
+  const Eigen::Quaterniond leaning(Eigen::AngleAxisd(-lean, Eigen::Vector3d::UnitX()));
+  const View view{&camera, RigidTransform(leaning, Eigen::Vector3d::Zero()),
+                  Eigen::Vector3d::UnitZ()};
   std::vector<BoxDetection> boxes(sides.size());
   std::transform(sides.begin(), sides.end(), boxes.begin(), [](const Eigen::Vector4d& s) {
     BoxDetection box;
     box.z = measure({s[0], s[1], s[2], s[3]}, 1242, 375, {});
     return box;
   });
-  markSidesBesideNearer(boxes);
+  markSidesBesideNearer(boxes, view);
   return boxes;
 }
 
@@ -86,6 +90,14 @@ TEST(SidesBesideNearer, AreNoneOfBoxesThatReachEquallyLow) {
   const auto boxes = boxesAt({{200, 100, 260, 150}, {261, 100, 320, 151}});
   EXPECT_EQ(boxes[0].beside_nearer, kNone);
   EXPECT_EQ(boxes[1].beside_nearer, kNone);
+}
+
+TEST(SidesBesideNearer, AreToldByGravityWhereTheCameraLeans) {
+  const std::initializer_list<Eigen::Vector4d> row{{200, 100, 260, 150}, {262, 90, 380, 190}};
+  EXPECT_TRUE(boxesAt(row, 0.1)[0].beside_nearer[2]);
+  EXPECT_TRUE(boxesAt(row, -0.1)[0].beside_nearer[2]);
+  EXPECT_EQ(boxesAt(row, 0.5)[0].beside_nearer, kNone) << "which one stands lower is not known";
+  EXPECT_EQ(boxesAt(row, 3.1)[0].beside_nearer, kNone) << "upside down";
 }
 
 TEST(SidesBesideNearer, AreNotWhereTheNearerBoxCoversLessThanHalfOfTheSide) {

@@ -49,7 +49,7 @@ class InitiationInARow : public ::testing::Test, protected testing::UsualFrame {
 
 TEST_F(InitiationInARow, APartThatEndsAtANearerCarIsNotTakenForAWholeOneFartherAway) {
   const auto [whole, whole_sigma] = born();
-  markSidesBesideNearer(boxes_);
+  markSidesBesideNearer(boxes_, frame.view);
   ASSERT_TRUE(boxes_[1].beside_nearer[0]);
   const auto [part, part_sigma] = born();
   EXPECT_LT(std::abs(part - 24.0), 0.5 * std::abs(whole - 24.0));
@@ -65,7 +65,7 @@ TEST_F(InitiationInARow, ATrackOfTheWholeCarExplainsThePart) {
     return s.boxes.empty() ? 0.0 : s.hypotheses.front().matches.front().likelihood;
   };
   const double before = likelihoodOf(score());
-  markSidesBesideNearer(boxes_);
+  markSidesBesideNearer(boxes_, frame.view);
   const TrackScore after = score();
   EXPECT_GT(likelihoodOf(after), 10.0 * before);
   EXPECT_TRUE(hiddenSides(after, 0, boxes_[1])[0]) << "the update does not compare it";
