@@ -112,8 +112,7 @@ std::optional<Explanation> explain(const BoxDetection& detection, const Predicte
                                    double lookalike_nats, const Judge& judge) {
   const auto& [box, covariance] = predicted;
   if (!mayOverlap(detection.z, box, covariance)) return std::nullopt;
-  const auto sides = scoreBox(detection.z, box, covariance,
-                              withSidesBesideNearer(hidden, detection), judge.parameters->box);
+  const auto sides = scoreBox(detection.z, box, covariance, hidden, judge.parameters->box);
   if (!sides) return std::nullopt;
   const double log_ratio = logRatio(detection, *judge.model, class_name, lookalike_nats) +
                            sides->log_density -
