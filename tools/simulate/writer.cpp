@@ -10,22 +10,7 @@
 #include "common/sim/truth_files.h"
 
 namespace perdure::tools {
-namespace {
-
 namespace fs = std::filesystem;
-
-std::string transformYaml(const RigidTransform& T_BS) {
-  const Eigen::Matrix4d m = T_BS.matrix();
-  std::string numbers;
-  for (int row = 0; row < 4; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      numbers += fmt::format("{}{}", numbers.empty() ? "" : ", ", m(row, column));
-    }
-  }
-  return fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", numbers);
-}
-
-}  // namespace
 
 void writeWhole(const fs::path& file, std::span<const char> bytes) {
   std::error_code error;
@@ -34,14 +19,10 @@ void writeWhole(const fs::path& file, std::span<const char> bytes) {
 }
 
 std::string cameraYaml(const CameraCalibration& camera) {
-  return fmt::format("sensor_type: camera\ncomment: simulated {}\n\n", camera.name) +
-         transformYaml(camera.T_BC) + "\n" + replay::cameraKeys(camera);
+  return replay::cameraYaml(camera, "simulated " + camera.name);
 }
 
-std::string imuYaml(const ImuCalibration& imu) {
-  return "sensor_type: imu\ncomment: simulated\n\n" + transformYaml({}) + "\n" +
-         replay::imuKeys(imu);
-}
+std::string imuYaml(const ImuCalibration& imu) { return replay::imuYaml(imu, "simulated"); }
 
 std::string speedYaml(const sim::SpeedErrors& speed) {
   return fmt::format(
@@ -51,7 +32,7 @@ std::string speedYaml(const sim::SpeedErrors& speed) {
 
 std::string groundTruthYaml() {
   return "sensor_type: visual-inertial\ncomment: exact states of the simulated body\n\n" +
-         transformYaml({});
+         replay::transformKey({});
 }
 
 std::string imageListCsv(const std::vector<TimePoint>& stamps, const std::string& extension) {

@@ -173,4 +173,25 @@ std::string imuKeys(const ImuCalibration& imu) {
       imu.rate_hz, imu.gyro_noise, imu.gyro_bias_walk, imu.accel_noise, imu.accel_bias_walk);
 }
 
+std::string transformKey(const RigidTransform& T_BS) {
+  const Eigen::Matrix4d m = T_BS.matrix();
+  std::string numbers;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      numbers += fmt::format("{}{}", numbers.empty() ? "" : ", ", m(row, column));
+    }
+  }
+  return fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", numbers);
+}
+
+std::string cameraYaml(const CameraCalibration& camera, const std::string& comment) {
+  return fmt::format("sensor_type: camera\ncomment: {}\n\n", comment) + transformKey(camera.T_BC) +
+         "\n" + cameraKeys(camera);
+}
+
+std::string imuYaml(const ImuCalibration& imu, const std::string& comment) {
+  return fmt::format("sensor_type: imu\ncomment: {}\n\n", comment) + transformKey({}) + "\n" +
+         imuKeys(imu);
+}
+
 }  // namespace perdure::replay

@@ -71,5 +71,9 @@ ImuCalibration readImuCalibration(const SensorFile& file);
 /// What the two read, a key a line and all digits, but for T_BS.
 std::string cameraKeys(const CameraCalibration& camera);
 std::string imuKeys(const ImuCalibration& imu);
+std::string transformKey(const RigidTransform& T_BS);
+/// A whole sensor.yaml. The IMU is the body.
+std::string cameraYaml(const CameraCalibration& camera, const std::string& comment);
+std::string imuYaml(const ImuCalibration& imu, const std::string& comment);
 
 }  // namespace perdure::replay

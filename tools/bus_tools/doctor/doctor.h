@@ -35,6 +35,11 @@ Findings checkBus(const bus::Options& options, double seconds);
 /// (empty: the recording's own) by the innovations of vio over it.
 Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds);
 
+/// Writes a copy of a recording to `folder` with what is sure mended, and looks at it again. The
+/// progress goes to standard error. Throws StartupError as writeDrive does.
+Findings fixRecording(const std::string& recording, const std::string& rig,
+                      const std::string& folder);
+
 /// The largest bus.shared_memory_mb in the folder's files; 0 where none is set.
 std::int64_t configuredSharedMemory(const std::string& folder);
 

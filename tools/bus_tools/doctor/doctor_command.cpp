@@ -18,7 +18,7 @@ struct DoctorOptions {
   std::string configuration = configurationFolder();
   std::string report;
   bool images = false;
-  std::string recording, rig;
+  std::string recording, rig, copy;
   double rig_seconds = 60.0;
 };
 
@@ -34,11 +34,11 @@ const char* wordOf(Verdict verdict) {
   return "FAIL";
 }
 
-void stopIfFailed(const Findings& findings) {
+void stopIfFailed(const Findings& findings, int status = 1) {
   const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
     return finding.verdict == Verdict::kFail;
   });
-  if (failed) throw CLI::RuntimeError(1);
+  if (failed) throw CLI::RuntimeError(status);
 }
 
 void runDoctor(const DoctorOptions& given) {
@@ -46,10 +46,15 @@ void runDoctor(const DoctorOptions& given) {
     throw StartupError(ExitCode::kUsage,
                        "--rig is judged by a recording; give --data DRIVE (with images) as well");
   }
+  if (!given.copy.empty() && given.recording.empty()) {
+    throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
+  }
   if (!given.recording.empty()) {
-    const Findings findings = checkRigBy(given.recording, given.rig, given.rig_seconds);
+    const Findings findings = given.copy.empty()
+                                  ? checkRigBy(given.recording, given.rig, given.rig_seconds)
+                                  : fixRecording(given.recording, given.rig, given.copy);
     std::cout << toText(findings);
-    return stopIfFailed(findings);
+    return stopIfFailed(findings, static_cast<int>(ExitCode::kData));
   }
   DoctorOptions options = given;
   options.bus.shared_memory_mb =
@@ -111,6 +116,11 @@ void addDoctorCommand(CLI::App& app) {
       ->type_name("DRIVE");
   command->add_option("--rig", options->rig,
                       "the rig file to judge; the recording's own calibration where not given");
+  command
+      ->add_option("--fix", options->copy,
+                   "with --data: a new folder for a copy with what is sure mended (units, columns "
+                   "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
+      ->type_name("FOLDER");
   command->add_option("--rig-seconds", options->rig_seconds, "of the recording, at most")
       ->check(CLI::Range(5.0, 3600.0))
       ->capture_default_str();

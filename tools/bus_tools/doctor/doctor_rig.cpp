@@ -1,23 +1,38 @@
+#include <unistd.h>
+
+#include <cstdio>
+
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/calibrate/rig_check.h"
 #include "tools/data_check/data_check.h"
+#include "tools/data_check/mended_copy.h"
 
 namespace perdure::tools {
 namespace {
 
 /// Whether vio can run over it at all.
-bool checkRecording(const std::string& data, const std::string& rig, Findings& findings) {
-  using Grade = replay::DataFinding::Grade;
-  const auto dataset = replay::Dataset::open({.path = data, .rig = rig});
-  for (const auto& note : dataset->recording().notes) findings.push_back({Verdict::kWarn, note});
+bool addFindings(const replay::DataFindings& of_data, Findings& findings) {
   bool usable = true;
-  for (const auto& finding : checkDrive(dataset->recording(), {})) {
-    const bool fatal = finding.grade == Grade::kFatal;
+  for (const auto& finding : of_data) {
+    const bool fatal = finding.grade == replay::DataFinding::Grade::kFatal;
     findings.push_back({fatal ? Verdict::kFail : Verdict::kWarn, finding.text});
     usable = usable && !fatal;
   }
+  return usable;
+}
+
+bool checkRecording(const std::string& data, const std::string& rig, Findings& findings) {
+  const auto dataset = replay::Dataset::open({.path = data, .rig = rig});
+  for (const auto& note : dataset->recording().notes) findings.push_back({Verdict::kWarn, note});
+  const bool usable = addFindings(checkDrive(dataset->recording(), {}), findings);
   if (findings.empty()) findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
   return usable;
+}
+
+void showProgress(std::size_t done, std::size_t all) {
+  constexpr std::size_t kEvery = 50;
+  if (!isatty(STDERR_FILENO) || (done % kEvery != 0 && done != all)) return;
+  std::fprintf(stderr, "\r%zu of %zu images%s", done, all, done == all ? "\n" : "");
 }
 
 }  // namespace
@@ -33,6 +48,33 @@ Findings checkRigBy(const std::string& recording, const std::string& rig, double
                                                                              : Verdict::kFail;
     findings.push_back({verdict, judgement.text});
   }
+  return findings;
+}
+
+Findings fixRecording(const std::string& recording, const std::string& rig,
+                      const std::string& folder) {
+  const auto dataset = replay::Dataset::open({.path = recording, .rig = rig});
+  const MendedDrive drive = mendDrive(dataset->recording());
+  Findings findings;
+  for (const auto& note : dataset->recording().notes) findings.push_back({Verdict::kOk, note});
+  for (const auto& [reason, count] : dataset->recording().reasons.all()) {
+    findings.push_back({Verdict::kOk, "left out: " + reason + ", " + std::to_string(count)});
+  }
+  for (const auto& mend : drive.mends) findings.push_back({Verdict::kOk, mend});
+  if (findings.empty() && rig.empty()) {
+    if (addFindings(drive.left, findings)) {
+      findings.push_back({Verdict::kOk, "there is nothing to mend; no copy is written"});
+    } else {
+      findings.push_back({Verdict::kWarn, "no mend of this is sure; no copy is written"});
+    }
+    return findings;
+  }
+  if (const auto left_out = writeDrive(drive.recording, folder, showProgress)) {
+    findings.push_back(
+        {Verdict::kWarn, std::to_string(left_out) + " images cannot be read and are left out"});
+  }
+  findings.push_back({Verdict::kOk, "written: " + folder});
+  checkRecording(folder, {}, findings);
   return findings;
 }
 

@@ -1,0 +1,125 @@
+#include "tools/data_check/mended_copy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "common/base/errors.h"
+#include "common/math/so3.h"
+#include "tests/tools/data_check/turning_drive.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::Dataset;
+using testing::HasSubstr;
+using testing::SizeIs;
+using tests::makeTurningDrive;
+using tests::TurningDrive;
+
+fs::path newFolder(const std::string& name) {
+  const fs::path folder = fs::temp_directory_path() / "perdure_mended" / name;
+  fs::remove_all(folder);
+  return folder;
+}
+
+/// The copy of a drive after its mends, read again.
+replay::Recording mended(const std::string& name, const TurningDrive& drive,
+                         std::size_t mends = 1) {
+  const auto root = makeTurningDrive("to_mend_" + name, drive);
+  const MendedDrive result = mendDrive(Dataset::open({.path = root})->recording());
+  EXPECT_THAT(result.mends, SizeIs(mends));
+  EXPECT_THAT(result.left, SizeIs(0));
+  const fs::path copy = newFolder(name);
+  EXPECT_EQ(writeDrive(result.recording, copy), 0U);
+  return Dataset::open({.path = copy})->recording();
+}
+
+replay::Recording sound() {
+  return Dataset::open({.path = makeTurningDrive("to_mend_sound")})->recording();
+}
+
+/// Largest difference of what the samples of two recordings say.
+double largestDifference(const replay::Recording& a, const replay::Recording& b) {
+  EXPECT_EQ(a.imu.size(), b.imu.size());
+  double largest = 0.0;
+  for (std::size_t i = 0; i < std::min(a.imu.size(), b.imu.size()); ++i) {
+    EXPECT_EQ(a.imu[i].time, b.imu[i].time);
+    largest = std::max({largest, (a.imu[i].gyro - b.imu[i].gyro).norm(),
+                        (a.imu[i].accel - b.imu[i].accel).norm()});
+  }
+  return largest;
+}
+
+TEST(MendedCopy, AForceInGIsOneInMetresAndTheImagesAreTheSame) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& s) { s.accel /= 9.80665; };
+  const auto copy = mended("g", drive), truth = sound();
+  EXPECT_LT(largestDifference(copy, truth), 1e-6);
+  ASSERT_EQ(copy.frames.size(), truth.frames.size());
+  for (std::size_t i = 0; i < copy.frames.size(); ++i) {
+    EXPECT_EQ(copy.frames[i].time, truth.frames[i].time);
+    EXPECT_EQ(fs::file_size(copy.frames[i].path), fs::file_size(truth.frames[i].path));
+  }
+  EXPECT_EQ(copy.calibration.cameras.front().fx, truth.calibration.cameras.front().fx);
+}
+
+TEST(MendedCopy, SeveralFaultsAreMendedOneAfterTheOther) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& s) {
+    s.accel /= 9.80665;
+    s.gyro *= 180.0 / M_PI;
+  };
+  EXPECT_LT(largestDifference(mended("two", drive, 2), sound()), 1e-6);
+}
+
+TEST(MendedCopy, ColumnsAreExchangedAndTheTransformIsTurnedRound) {
+  TurningDrive exchanged;
+  exchanged.change = [](ImuSample& s) { std::swap(s.gyro, s.accel); };
+  EXPECT_LT(largestDifference(mended("columns", exchanged), sound()), 1e-6);
+  TurningDrive inverted;
+  inverted.written_T_BC = tests::trueCameraPlace().inverse();
+  const auto copy = mended("inverted", inverted);
+  const RigidTransform off =
+      copy.calibration.cameras.front().T_BC.inverse() * tests::trueCameraPlace();
+  EXPECT_LT(logSO3(off.R()).norm() + off.p.norm(), 1e-6);
+}
+
+TEST(MendedCopy, WhatIsNotSureIsLeftAndSaid) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& s) { s.gyro *= M_PI / 180.0; };  // why, nobody knows
+  const auto root = makeTurningDrive("to_mend_unsure", drive);
+  const MendedDrive result = mendDrive(Dataset::open({.path = root})->recording());
+  EXPECT_THAT(result.mends, SizeIs(0));
+  ASSERT_THAT(result.left, SizeIs(1));
+  EXPECT_EQ(result.left.front().code, "gyro_too_small");
+}
+
+TEST(MendedCopy, AFolderThatHoldsSomethingIsNotTouched) {
+  const fs::path folder = newFolder("full");
+  fs::create_directories(folder);
+  std::ofstream(folder / "mine") << "1";
+  try {
+    writeDrive(sound(), folder);
+    FAIL() << "it was written";
+  } catch (const StartupError& error) {
+    EXPECT_EQ(error.code(), ExitCode::kUsage);
+    EXPECT_THAT(error.what(), HasSubstr("give another name"));
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+}
+
+TEST(MendedCopy, AnImageThatIsGoneIsLeftOutAndCounted) {
+  auto recording = sound();
+  recording.frames.front().path = "/nonexistent.png";
+  const fs::path folder = newFolder("gone");
+  EXPECT_EQ(writeDrive(recording, folder), 1U);
+  EXPECT_EQ(Dataset::open({.path = folder})->recording().frames.size(),
+            recording.frames.size() - 1);
+}
+
+}  // namespace
+}  // namespace perdure::tools
