@@ -20,6 +20,8 @@ namespace {
 // Beyond these a filter is lost, whatever it believes.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
 constexpr double kMaxSpeedSigma = 10.0;
+// Each new point of the state is an update of its own; those that wait are used once.
+constexpr std::size_t kMostAdmitted = 6;
 
 std::int64_t asInt(std::size_t n) { return static_cast<std::int64_t>(n); }
 
@@ -67,6 +69,7 @@ void Estimator::start(const Start& start) {
   }
   database_.clear();
   previous_frame_.reset();
+  agreed_ = false;
   standstill_.forget();
   if (start.at_rest) standstill_.confirm(start.time, restExpectation(*state_, options_.gravity));
 }
@@ -236,6 +239,7 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
   std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
     return std::tuple(b.first, a.second->id) < std::tuple(a.first, b.second->id);
   });
+  if (candidates.size() > kMostAdmitted) candidates.resize(kMostAdmitted);
   for (const auto& [views, track] : candidates) {
     if (asInt(state_->points.size()) >= options_.window.slam_features) break;
     const auto added = initialisePoint(*state_, *track, options_.vision);
@@ -251,9 +255,10 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
 Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out) {
   const bool full = asInt(state_->clones.size()) > options_.window.clones;
   dropLostPoints(input.frame);
-  const auto slam = updateSlam(*state_, database_, options_.vision, reasons_,
+  const auto slam = updateSlam(*state_, database_, options_.vision, agreed_, reasons_,
                                keeps_innovations_ ? &out.innovations : nullptr);
   if (!slam) return tl::unexpected(slam.error());
+  agreed_ = slam->used > slam->gated;
   for (const PointState& point : state_->points) database_.erase(point.id);
   if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;
   const std::vector<const Track*> tracks = onceUsed(input.frame, full);
