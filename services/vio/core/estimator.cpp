@@ -20,8 +20,6 @@ namespace {
 // Beyond these a filter is lost, whatever it believes.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
 constexpr double kMaxSpeedSigma = 10.0;
-// Each new point of the state is an update of its own; those that wait are used once.
-constexpr std::size_t kMostAdmitted = 6;
 
 std::int64_t asInt(std::size_t n) { return static_cast<std::int64_t>(n); }
 
@@ -239,7 +237,6 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
   std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
     return std::tuple(b.first, a.second->id) < std::tuple(a.first, b.second->id);
   });
-  if (candidates.size() > kMostAdmitted) candidates.resize(kMostAdmitted);
   for (const auto& [views, track] : candidates) {
     if (asInt(state_->points.size()) >= options_.window.slam_features) break;
     const auto added = initialisePoint(*state_, *track, options_.vision);
