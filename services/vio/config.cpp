@@ -20,6 +20,8 @@ void describeImu(Options& o, Config& c, Fields& f) {
            {"accelerometer noise density", "m/s²/√Hz", allan});
   f.number("imu.accel_bias_walk", o.imu.accel_walk, positive(),
            {"accelerometer bias random walk", "m/s³/√Hz", allan});
+  f.number("imu.inflation", c.imu_inflation, between(1, 100),
+           {"on the noise, in propagation: a data sheet's unit is at rest"});
   f.number("imu.interpolation_from", o.imu.interpolation_from_s, positive(),
            {"samples further apart are momentary values: interpolation adds noise", "s"});
   f.number("imu.interpolation_gyro", o.imu.interpolation_gyro, atLeast(0),

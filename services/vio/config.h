@@ -18,6 +18,7 @@ struct Config {
   std::vector<std::string> cameras{"cam0", "cam1"};  ///< main: whose frames are read
   bool stereo = true;                                ///< use the second camera where there is one
   bool prefer_calibration = true;   ///< the IMU noise that comes with the calibration
+  double imu_inflation = 3.0;       ///< on the densities of the inertial noise, in motion
   double imu_slack_s = 0.0;         ///< samples are awaited this long past a frame
   double pair_tolerance_s = 0.01;   ///< of two cameras' stamps
   double speed_wait_s = 0.12;       ///< a frame waits this long for its speed sample

@@ -56,6 +56,7 @@ void Node::onCalibration(const Calibration& calibration) {
     options.imu.gyro_walk = std::max(calibration.imu->gyro_bias_walk, 1e-7);
     options.imu.accel_walk = std::max(calibration.imu->accel_bias_walk, 1e-6);
   }
+  options.imu.inflation = config_.imu_inflation;
   cameras_ = std::make_unique<Cameras>(config_, options, models);
   if (outputs_.innovations) cameras_->estimator.keepInnovations();
   motion_initialiser_ = MotionInitialiser(options);

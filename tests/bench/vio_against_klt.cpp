@@ -4,55 +4,20 @@
 // more than milliseconds where the machine is shared.
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 #include <vector>
 
 #include "common/replay/dataset.h"
 #include "common/vision/image.h"
 #include "services/vio/node.h"
+#include "tests/bench/plain_tracker.h"
 
 namespace {
 
 using namespace perdure;
 
-double cpuMs() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
-
-/// OpenCV's defaults: windows of 21 pixels, three levels above the image. Filled up to 200 points
-/// when fewer than 150 are left.
-class PlainTracker {
- public:
-  void follow(const cv::Mat& image) {
-    std::vector<cv::Point2f> kept;
-    if (!before_.empty() && !points_.empty()) {
-      std::vector<cv::Point2f> now;
-      std::vector<std::uint8_t> found;
-      cv::calcOpticalFlowPyrLK(before_, image, points_, now, found, cv::noArray());
-      for (std::size_t i = 0; i < now.size(); ++i) {
-        if (found[i]) kept.push_back(now[i]);
-      }
-    }
-    if (kept.size() < 150) {
-      cv::Mat open(image.size(), CV_8UC1, cv::Scalar(255));
-      for (const cv::Point2f& p : kept) cv::circle(open, cv::Point(p), 12, 0, cv::FILLED);
-      std::vector<cv::Point2f> fresh;
-      cv::goodFeaturesToTrack(image, fresh, 200 - static_cast<int>(kept.size()), 0.01, 12.0, open);
-      kept.insert(kept.end(), fresh.begin(), fresh.end());
-    }
-    points_ = std::move(kept);
-    before_ = image.clone();
-  }
-
- private:
-  cv::Mat before_;
-  std::vector<cv::Point2f> points_;
-};
+using bench::cpuMs;
+using bench::PlainTracker;
 
 double quantile(std::vector<double> values, double q) {
   const auto at = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));

@@ -201,7 +201,12 @@ void finishFolder(const fs::path& out, const Journal& journal) {
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report) {
   require(options);
-  const sim::Scene scene = sim::makeScene(options.scene, options.seed, options.world);
+  return simulate(sim::makeScene(options.scene, options.seed, options.world), options, report);
+}
+
+bool simulate(const sim::Scene& scene, const SimulateOptions& options,
+              const std::function<void(const SimulateProgress&)>& report) {
+  require(options);
   claim(options.out, descriptionOf(options, scene).dump(2) + "\n");
   if (fs::exists(options.out / sim::kVisibilityTruthFile)) return false;
   Run run(options, scene);

@@ -32,5 +32,9 @@ struct SimulateProgress {
 /// an unknown scene, and a folder that holds something else. `report` may be empty.
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
+/// The same of a scene that the caller made; options.scene and options.seed do not count, and
+/// options.world must be those with which it was made.
+bool simulate(const sim::Scene& scene, const SimulateOptions& options,
+              const std::function<void(const SimulateProgress&)>& report);
 
 }  // namespace perdure::tools

@@ -67,6 +67,7 @@ void Estimator::start(const Start& start) {
   }
   database_.clear();
   previous_frame_.reset();
+  agreed_ = false;
   standstill_.forget();
   if (start.at_rest) standstill_.confirm(start.time, restExpectation(*state_, options_.gravity));
 }
@@ -251,9 +252,10 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
 Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out) {
   const bool full = asInt(state_->clones.size()) > options_.window.clones;
   dropLostPoints(input.frame);
-  const auto slam = updateSlam(*state_, database_, options_.vision, reasons_,
+  const auto slam = updateSlam(*state_, database_, options_.vision, agreed_, reasons_,
                                keeps_innovations_ ? &out.innovations : nullptr);
   if (!slam) return tl::unexpected(slam.error());
+  agreed_ = slam->used > slam->gated;
   for (const PointState& point : state_->points) database_.erase(point.id);
   if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;
   const std::vector<const Track*> tracks = onceUsed(input.frame, full);

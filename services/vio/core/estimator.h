@@ -119,6 +119,7 @@ class Estimator {
   TrackedFrame newest_;
   std::vector<ImuReading> readings_;  ///< of one interval; kept for its memory
   ReasonCounts reasons_;
+  bool agreed_ = false;  ///< most points of the last image met their predictions
   std::optional<std::uint64_t> previous_frame_;
   Matrix6d previous_pose_covariance_ = Matrix6d::Zero();
 };

@@ -175,8 +175,13 @@ Eigen::Vector2d SimulatedDrive::pixelOf(std::size_t point, double t) const {
   return cameras_[0].project(T_WC.inverse() * points_[point]).value_or(Eigen::Vector2d(-1, -1));
 }
 
-TrackedFrame SimulatedDrive::see(double t) {
+RigidTransform SimulatedDrive::seenFrom(double t) const {
   const RigidTransform T_WB = truth(t + options_.time_offset_s).T_WB();
+  return t >= options_.jump_from_s && t < options_.jump_until_s ? options_.jump * T_WB : T_WB;
+}
+
+TrackedFrame SimulatedDrive::see(double t) {
+  const RigidTransform T_WB = seenFrom(t);
   std::vector<std::size_t> seen, fresh;
   std::vector<std::array<std::optional<ImagePoint>, kMaxCameras>> views(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {

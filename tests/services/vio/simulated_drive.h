@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/camera/camera_model.h"
+#include "common/math/rigid_transform.h"
 #include "services/vio/core/estimator.h"
 #include "services/vio/core/propagation/imu_buffer.h"
 
@@ -28,6 +29,9 @@ struct DriveOptions {
   double rest_s = 0.0;          ///< stands still this long at the start
   int points = 600;             ///< of a street: for each 150 m
   int points_per_image = 100;
+  /// The world that the cameras see is moved by so much, from then until then (their clock).
+  RigidTransform jump;
+  double jump_from_s = 1e9, jump_until_s = 1e9;
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
 };
 
@@ -44,6 +48,8 @@ class SimulatedDrive {
   TimePoint time(double t) const { return fromNanoseconds(1'000'000'000) + durationFromSeconds(t); }
   /// All samples in [0, until].
   std::vector<ImuReading> imu(double until);
+  /// Where the body is for the images: truth, but for the jump.
+  RigidTransform seenFrom(double t) const;
   /// What the cameras see at image time `t` (their clock).
   TrackedFrame see(double t);
   Eigen::Vector2d pixelOf(std::size_t point, double t) const;

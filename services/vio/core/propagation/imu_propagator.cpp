@@ -46,9 +46,10 @@ Densities densities(const ImuReading& a, const ImuReading& b, double dt, const I
   const auto added = [&](double span, const Vector3d& change, double floor, double gap) {
     return interpolationDensity(std::max(span, dt), dt, change.squaredNorm(), floor, gap, noise);
   };
-  return {noise.gyro * noise.gyro +
+  const double inflation2 = noise.inflation * noise.inflation;
+  return {inflation2 * noise.gyro * noise.gyro +
               added(b.gyro_span_s, b.gyro - a.gyro, noise.interpolation_gyro, noise.gap_gyro),
-          noise.accel * noise.accel +
+          inflation2 * noise.accel * noise.accel +
               added(b.accel_span_s, b.accel - a.accel, noise.interpolation_accel, noise.gap_accel)};
 }
 
@@ -85,8 +86,10 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   Q.block<3, 3>(kPosition, kVelocity) = d.accel2 * dt * dt / 2.0 * I;
   Q.block<3, 3>(kVelocity, kPosition) = d.accel2 * dt * dt / 2.0 * I;
   Q.block<3, 3>(kVelocity, kVelocity) = d.accel2 * dt * I;
-  Q.block<3, 3>(kGyroBias, kGyroBias) = noise.gyro_walk * noise.gyro_walk * dt * I;
-  Q.block<3, 3>(kAccelBias, kAccelBias) = noise.accel_walk * noise.accel_walk * dt * I;
+  const double gyro_walk = noise.inflation * noise.gyro_walk;
+  const double accel_walk = noise.inflation * noise.accel_walk;
+  Q.block<3, 3>(kGyroBias, kGyroBias) = gyro_walk * gyro_walk * dt * I;
+  Q.block<3, 3>(kAccelBias, kAccelBias) = accel_walk * accel_walk * dt * I;
 
   x.F = (F * x.F).eval();
   x.Q = (F * x.Q * F.transpose() + Q).eval();

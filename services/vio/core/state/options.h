@@ -11,6 +11,9 @@ struct ImuNoise {
   double gyro_walk = 2.0e-5;   ///< rad/s²/√Hz
   double accel = 2.0e-3;       ///< m/s²/√Hz
   double accel_walk = 3.0e-3;  ///< m/s³/√Hz
+  /// On all four where the state is propagated: errors that a unit at rest does not show. Whether
+  /// the body rests is judged without it.
+  double inflation = 1.0;
   /// Samples further apart than this are treated as sampled, not averaged: the error of the
   /// linear interpolation between them joins the noise.
   double interpolation_from_s = 0.02;
@@ -38,6 +41,10 @@ struct VisionOptions {
   /// Largest standard deviation along the ray, relative to the depth, at which a point may enter
   /// the state.
   double max_relative_sigma = 0.4;
+  /// Where nearly all points of a frame contradict the prediction, the pose may have jumped so far.
+  /// never.
+  double jump_position_m = 0.3;
+  double jump_rotation = 0.03;  ///< rad
 };
 
 /// Standard deviations of what the calibration says.

@@ -96,6 +96,19 @@ void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vec
   clones.push_back({frame, image_time, nav.T_WB(), there.T_WB(), at});
 }
 
+void State::widenPose(double rotation, double position_m) {
+  Eigen::Matrix<double, 6, 1> variance;
+  variance << Eigen::Vector3d::Constant(rotation * rotation),
+      Eigen::Vector3d::Constant(position_m * position_m);
+  const int at = clones.back().at;
+  for (int i = 0; i < 6; ++i) {
+    P_(i, i) += variance[i];
+    P_(at + i, at + i) += variance[i];
+    P_(i, at + i) += variance[i];
+    P_(at + i, i) += variance[i];
+  }
+}
+
 void State::removeClone(std::uint64_t frame) {
   const auto it =
       std::find_if(clones.begin(), clones.end(), [&](const Clone& c) { return c.frame == frame; });

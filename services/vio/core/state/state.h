@@ -111,6 +111,9 @@ class State {
   /// Adds a clone of the present pose. rate_B: angular rate, which ties it to the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
+  /// Adds to the covariance of the present pose, and of the newest clone, which is the same.
+  /// Deviations in rad and m, about the body's and along the world's axes.
+  void widenPose(double rotation, double position_m);
   void removeClone(std::uint64_t frame);
   /// Adds a point with its covariance and its cross-covariance (3 × size()).
   void addPoint(std::uint64_t id, const Eigen::Vector3d& p_W, const Eigen::Matrix3d& covariance,

@@ -147,7 +147,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
 
 void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked) {
   const auto missing = options_.max_points - static_cast<std::int64_t>(points_.size());
-  if (missing <= 0) return;
+  if (missing <= 0 || 10 * missing < options_.max_points) return;
   const int columns = static_cast<int>(options_.grid_columns);
   const int rows = static_cast<int>(options_.grid_rows);
   const auto per_cell =

@@ -14,6 +14,7 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, not_triangulated = 0, gated = 0;
+  bool jumped = false;  ///< the pose was widened
 };
 
 /// Triangulates each track, gates it, and updates the state with all that pass at once. Counts

@@ -12,6 +12,8 @@ namespace perdure::vio {
 namespace {
 
 constexpr int kFailuresToLeave = 3;
+constexpr int kFewestJumped = 8;
+constexpr double kFarOff = 25.0;  ///< mean square of the rows, in variances of a pixel
 
 /// The newest clone's views of one point: rows × [extrinsics, clone, point].
 struct PointRows {
@@ -57,6 +59,52 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   return rows;
 }
 
+/// A point of the state that the newest image sees.
+struct Seen {
+  std::size_t point;  ///< of state.points
+  const ImagePoint* pixel;
+  PointRows rows;
+  bool passes = false;
+
+  void judge(const State& state, double probability) {
+    const auto of_views = [&] { return state.project(rows.H, rows.measurement().blocks); };
+    passes = passesGateWith(rows.r, of_views, probability);
+  }
+  /// Its views are further off than the pixels' noise can be, even if the prediction were exact.
+  bool isFarOff() const {
+    return !passes && rows.r.squaredNorm() > kFarOff * static_cast<double>(rows.r.size());
+  }
+};
+
+/// Those behind the camera are added to `leaving`.
+std::vector<Seen> seenPoints(const State& state, const FeatureDatabase& database,
+                             const VisionOptions& options, ReasonCounts& reasons,
+                             std::vector<std::uint64_t>& leaving) {
+  std::vector<Seen> seen;
+  seen.reserve(state.points.size());
+  for (std::size_t i = 0; i < state.points.size(); ++i) {
+    const Track* track = database.find(state.points[i].id);
+    if (!track || !track->seenAt(state.clones.back().frame)) continue;
+    const Observation& newest = track->observations.back();
+    auto rows = rowsOf(state, state.points[i], newest, options.sigma_px);
+    if (!rows) {
+      reasons.add(rows.error());
+      leaving.push_back(state.points[i].id);
+      continue;
+    }
+    seen.push_back({i, &*newest.seen[0], std::move(*rows)});
+    seen.back().judge(state, options.gate_probability);
+  }
+  return seen;
+}
+
+/// Not one thing that moves: nearly all that is seen is somewhere else at once.
+bool haveJumped(const std::vector<Seen>& seen) {
+  const auto far =
+      std::count_if(seen.begin(), seen.end(), [](const Seen& s) { return s.isFarOff(); });
+  return far >= kFewestJumped && 4 * far > 3 * static_cast<std::ptrdiff_t>(seen.size());
+}
+
 /// The first two rows are the first camera's: it always sees.
 Innovation innovationOf(const State& state, const PointRows& rows, const ImagePoint& seen,
                         double sigma_px, bool used) {
@@ -71,38 +119,38 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
 }  // namespace
 
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
-                                const VisionOptions& options, ReasonCounts& reasons,
+                                const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations) {
   check(!state.clones.empty(), "the newest pose is cloned");
   UpdateCounts counts;
-  std::vector<PointRows> used;
-  used.reserve(state.points.size());
   std::vector<std::uint64_t> leaving;
-  for (PointState& point : state.points) {
-    const Track* track = database.find(point.id);
-    if (!track || !track->seenAt(state.clones.back().frame)) continue;
-    const auto rows = rowsOf(state, point, track->observations.back(), options.sigma_px);
-    const auto of_views = [&] { return state.project(rows->H, rows->measurement().blocks); };
-    const bool passes = rows && passesGateWith(rows->r, of_views, options.gate_probability);
-    if (rows && innovations) {
-      innovations->push_back(innovationOf(state, *rows, *track->observations.back().seen[0],
-                                          options.sigma_px, passes));
+  std::vector<Seen> seen = seenPoints(state, database, options, reasons, leaving);
+  counts.gated = static_cast<int>(leaving.size());
+  if (may_jump && haveJumped(seen)) {
+    reasons.add("images_jumped");
+    counts.jumped = true;
+    state.widenPose(options.jump_rotation, options.jump_position_m);
+    for (Seen& s : seen) s.judge(state, options.gate_probability);
+  }
+  std::vector<Measurement> used;
+  used.reserve(seen.size());
+  for (const Seen& s : seen) {
+    if (innovations) {
+      innovations->push_back(innovationOf(state, s.rows, *s.pixel, options.sigma_px, s.passes));
     }
-    if (passes) {
+    PointState& point = state.points[s.point];
+    if (s.passes) {
       point.failed_gates = 0;
-      used.push_back(*rows);
+      used.push_back(s.rows.measurement());
       ++counts.used;
       continue;
     }
     ++counts.gated;
-    reasons.add(rows ? "slam_gated" : rows.error().code);
-    if (!rows || ++point.failed_gates >= kFailuresToLeave) leaving.push_back(point.id);
+    reasons.add("slam_gated");
+    if (++point.failed_gates >= kFailuresToLeave) leaving.push_back(point.id);
   }
   if (!used.empty()) {
-    std::vector<Measurement> measurements;
-    measurements.reserve(used.size());
-    for (const PointRows& rows : used) measurements.push_back(rows.measurement());
-    if (const auto done = state.update(measurements); !done) return tl::unexpected(done.error());
+    if (const auto done = state.update(used); !done) return tl::unexpected(done.error());
   }
   for (const std::uint64_t id : leaving) state.removePoint(id);
   return counts;

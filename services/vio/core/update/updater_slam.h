@@ -18,8 +18,12 @@ struct Innovation {
 /// Updates the state's points with what the newest clone sees of them. A point whose innovation
 /// fails the gate three times in a row, or that lies behind the camera, leaves the state.
 /// `innovations`, where it is given, is filled.
+///
+/// Where most points fail at once, and by far, the images contradict the prediction as a whole:
+/// the pose is then widened by `VisionOptions::jump_*` before the gates are asked again, counted as
+/// "images_jumped". `may_jump`: whether such a contradiction would be a sudden one.
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
-                                const VisionOptions& options, ReasonCounts& reasons,
+                                const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations = nullptr);
 
 /// Puts the track's point into the state, and uses all its views. Fails with the reason of

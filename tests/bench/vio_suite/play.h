@@ -1,0 +1,43 @@
+// Plays a clip through vio, under several settings at once: each image is decoded once.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/replay/dataset.h"
+#include "services/vio/config.h"
+#include "tests/bench/vio_suite/score.h"
+
+namespace perdure::bench {
+
+struct Variant {
+  std::string name;
+  vio::Config config;
+};
+
+struct Outcome {
+  Accuracy accuracy;
+  double first_s = 0.0;           ///< from the first frame to the first output that may be used
+  double ms = 0.0, ms_p99 = 0.0;  ///< CPU of this thread for a frame, without decoding
+  double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not asked
+  Innovations innovations;                ///< where asked for
+  std::size_t frames = 0, resets = 0;
+  std::map<std::string, std::uint64_t> reasons;
+};
+
+struct PlayOptions {
+  double from_s = 0.0, until_s = 1e9;  ///< of the clip's time
+  bool klt = true, innovations = false;
+};
+
+/// In the order of `variants`. `progress`: the share of the clip that is done.
+std::vector<Outcome> play(const std::filesystem::path& folder, const std::vector<Variant>& variants,
+                          const PlayOptions& options, const std::function<void(double)>& progress);
+
+/// gt_tum.txt of the folder, or the dataset's own truth.
+replay::PoseFile truthOf(const std::filesystem::path& folder, const replay::Dataset& dataset);
+
+}  // namespace perdure::bench

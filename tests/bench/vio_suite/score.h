@@ -1,0 +1,64 @@
+// What a trajectory with covariances is worth against truth.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "common/replay/files/pose_file.h"
+#include "common/types/odometry.h"
+#include "services/vio/core/update/updater_slam.h"
+
+namespace perdure::bench {
+
+inline constexpr std::array<double, 4> kDistances{2.0, 5.0, 10.0, 50.0};  ///< m
+
+/// Squared normalised errors for each dimension at one time, W laid on the truth at the first
+/// output by position and yaw.
+struct NeesAt {
+  double seconds = 0.0;  ///< since the first output
+  double position = 0.0, yaw = 0.0, velocity = 0.0;
+  double position_error = 0.0, yaw_error = 0.0;  ///< m, rad
+};
+
+struct Accuracy {
+  std::size_t poses = 0;
+  double length_m = 0.0;
+  double ate_m = 0.0;  ///< rms, position and yaw aligned
+  double scale = 1.0;  ///< of the estimate, by which it fits the truth best
+  /// rms error over each of kDistances, as a share of it; nothing where the clip is shorter.
+  std::array<std::optional<double>, kDistances.size()> relative;
+  std::vector<NeesAt> nees;    ///< every ten seconds
+  int in_band = 0, asked = 0;  ///< of them: those in the 95 % band of one sample
+};
+
+/// Outputs that may be used, by time, of one world.
+Accuracy accuracyOf(const std::vector<Odometry>& odometry, const replay::PoseFile& truth,
+                    double time_offset_s);
+
+/// How a start went: `odometry` from its first output on, W laid on the truth there by position and
+/// yaw.
+struct StartJudgement {
+  double scale = 0.0, way_m = 0.0;
+  double error_m = 0.0, deviations = 0.0;             ///< of the last position
+  NeesAt nees;                                        ///< of the last output
+  double velocity_error = 0.0, velocity_sigma = 0.0;  ///< of the first output, m/s
+};
+StartJudgement judgeStart(const std::vector<Odometry>& odometry, const replay::PoseFile& truth);
+
+/// How images met the predictions, over a run.
+class Innovations {
+ public:
+  void add(const std::vector<vio::Innovation>& frame);
+  /// Mean of rᵀ S⁻¹ r for each row: 1 where noise and covariance are right.
+  double size() const { return rows_ > 0 ? nis_ / rows_ : 0.0; }
+  /// Correlation of a frame's median residual with that of the frame before: 0 where it is white.
+  double whiteness() const { return power_ > 0 ? product_ / power_ : 0.0; }
+  double used() const { return count_ > 0 ? used_ / count_ : 0.0; }
+
+ private:
+  double nis_ = 0, rows_ = 0, used_ = 0, count_ = 0, product_ = 0, power_ = 0;
+  std::optional<Eigen::Vector2d> before_;
+};
+
+}  // namespace perdure::bench
