@@ -27,8 +27,8 @@ struct ImuNoise {
 
 struct WindowOptions {
   std::int64_t clones = 11;           ///< poses in the sliding window
-  std::int64_t slam_features = 40;    ///< points kept in the state
-  std::int64_t msckf_features = 30;   ///< points used once, per frame
+  std::int64_t slam_features = 36;    ///< points kept in the state
+  std::int64_t msckf_features = 24;   ///< points used once, per frame
   std::int64_t min_observations = 4;  ///< of a track that is used once
   bool first_estimates = true;        ///< Jacobians on a path that no update moves
 };

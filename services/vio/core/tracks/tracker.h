@@ -22,7 +22,7 @@
 namespace perdure::vio {
 
 struct TrackerOptions {
-  std::int64_t max_points = 150;
+  std::int64_t max_points = 130;
   std::int64_t grid_columns = 8, grid_rows = 6;
   std::int64_t pyramid_levels = 3;  ///< above the image itself; 1 at least
   std::int64_t stereo_levels = 4;
