@@ -148,7 +148,7 @@ void msckf(benchmark::State& loop) {
   int used = 0;
   measure(
       loop, [&] { state = run.cloned(); },
-      [&] { used = updateMsckf(state, tracks, run.options().vision, true, reasons)->used; });
+      [&] { used = updateMsckf(state, tracks, run.options().vision, reasons)->used; });
   loop.counters["points"] = used;
 }
 

@@ -281,7 +281,7 @@ TEST(Ros2InwardsClock, ADriverWithAClockOfItsOwnIsPlacedByWhenItSpeaks) {
   }
   rig.speak(lines);
   ASSERT_TRUE(runUntil(
-      rig.loop, [&] { return bus.samples.size() >= 20; }, 40s))
+      rig.loop, [&] { return bus.samples.size() >= 20 && !bus.frames.empty(); }, 40s))
       << rig.log();
   const double i = static_cast<double>(bus.samples.back().sequence);
   EXPECT_GT(i, 10);

@@ -85,7 +85,7 @@ TEST(MendedCopy, ColumnsAreExchangedAndTheTransformIsTurnedRound) {
   const auto copy = mended("inverted", inverted);
   const RigidTransform off =
       copy.calibration.cameras.front().T_BC.inverse() * tests::trueCameraPlace();
-  EXPECT_LT(logSO3(off.R()).norm() + off.p.norm(), 1e-6);
+  EXPECT_LT(logSo3(off.R()).norm() + off.p.norm(), 1e-6);
 }
 
 TEST(MendedCopy, WhatIsNotSureIsLeftAndSaid) {

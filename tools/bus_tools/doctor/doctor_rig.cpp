@@ -58,7 +58,7 @@ Findings fixRecording(const std::string& recording, const std::string& rig,
   Findings findings;
   for (const auto& note : dataset->recording().notes) findings.push_back({Verdict::kOk, note});
   for (const auto& [reason, count] : dataset->recording().reasons.all()) {
-    findings.push_back({Verdict::kOk, "left out: " + reason + ", " + std::to_string(count)});
+    findings.push_back({Verdict::kOk, "counted while reading: " + reason + ", " + std::to_string(count)});
   }
   for (const auto& mend : drive.mends) findings.push_back({Verdict::kOk, mend});
   if (findings.empty() && rig.empty()) {

@@ -42,7 +42,6 @@ struct VisionOptions {
   /// the state.
   double max_relative_sigma = 0.4;
   /// Where nearly all points of a frame contradict the prediction, the pose may have jumped so far.
-  /// never.
   double jump_position_m = 0.3;
   double jump_rotation = 0.03;  ///< rad
 };
