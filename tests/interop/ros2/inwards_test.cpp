@@ -274,7 +274,7 @@ TEST(Ros2InwardsClock, ADriverWithAClockOfItsOwnIsPlacedByWhenItSpeaks) {
   Bus bus(rig);
   std::vector<json> lines{transforms()};
   constexpr std::int64_t kItsOwn = 42'000 * kMs;
-  for (int i = 0; i < 80; ++i) {
+  for (int i = 0; i < 400; ++i) {  // 12 s: latched transforms come some seconds after a match
     lines.push_back(info(0.03 * i, kBegin + i * 30 * kMs));
     lines.push_back(image(0.03 * i, kBegin + i * 30 * kMs));
     lines.push_back(imu(0.03 * i, kItsOwn + i * 30 * kMs));
