@@ -189,6 +189,7 @@ std::string eventJson(const Event& e, const std::optional<Eigen::Vector3d>& plac
   JsonWriter json;
   json.begin('{').key("timestamp");
   putTime(json, e.stamp.time);
+  json.key("world").text(toHex(e.world.world)).key("epoch").integer(e.world.epoch);
   json.key("event").text(perdure::nameOf(e.kind)).key("object_id").integer(e.object_id);
   json.key("other_id").integer(e.other_id).key("class").text(e.class_name);
   json.key("probability").number(e.probability).key("detail").text(e.detail);

@@ -270,6 +270,8 @@ std::string object() {
 
 std::string event() {
   return object({{"timestamp", time()},
+                 {"world", said(text(), "which odom frame, with the epoch")},
+                 {"epoch", natural()},
                  {"event", text()},
                  {"object_id", natural()},
                  {"other_id", natural()},

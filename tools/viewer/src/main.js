@@ -84,7 +84,7 @@ connection.on('/map/frame', (message) => {
 connection.on('/events', (event) => {
   model.takeEvent(event);
   log.add(event);
-  if (event.at && MARKS[event.event]) world?.addMark(event.at, MARKS[event.event]);
+  if (event.at && MARKS[event.event]) world?.addMark(event.at, MARKS[event.event], `${event.world}/${event.epoch}`);
 });
 connection.on('/health', (health) => {
   model.health = health;

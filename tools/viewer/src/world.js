@@ -124,7 +124,10 @@ export class World {
     if (this.shownWorld !== model.world) {
       this.shownWorld = model.world;
       this.way.geometry.setFromPoints([]);
-      this.marks.clear();
+      for (const mark of [...this.marks.children]) {
+        if (mark.userData.world === model.world) mark.visible = true;
+        else this.marks.remove(mark);
+      }
       this.heading = null;
     }
     this.sync(this.things, model.objects, false, up);
@@ -149,13 +152,18 @@ export class World {
     this.dirty = true;
   }
 
-  /** A pole where a loop was closed or taken back, or the session was found. */
-  addMark(at, colour) {
+  /**
+   * A pole where a loop was closed or taken back, or the session was found. `world` says in which W
+   * `at` is: events may be heard before the first objects of their W.
+   */
+  addMark(at, colour, world) {
     const pole = new THREE.Mesh(new THREE.CylinderGeometry(0.05, 0.05, 3, 8).rotateX(Math.PI / 2), new THREE.MeshBasicMaterial({ color: colour }));
     const ring = new THREE.Mesh(new THREE.TorusGeometry(0.7, 0.06, 6, 32), pole.material);
     const mark = new THREE.Group().add(pole, ring);
     pole.position.z = 1.5;
     mark.position.fromArray(at);
+    mark.userData.world = world;
+    mark.visible = this.shownWorld === undefined || this.shownWorld === world;
     if (this.ground !== null) mark.position.z = this.ground;
     this.marks.add(mark);
     if (this.marks.children.length > MOST_MARKS) this.marks.remove(this.marks.children[0]);

@@ -106,6 +106,20 @@ await pause(300);
 check(await page.$eval('#camera', (e) => e.hidden), 'C closes the camera');
 await page.keyboard.press('c');
 
+// A pole whose event is heard before the objects of its W stays; poles of another W go.
+const poles = await page.evaluate(() => {
+  const { model, world } = window.perdure, shown = model.world;
+  world.addMark([1, 2, 0], '#ffffff', 'ab/1');
+  const before = world.marks.children.filter((m) => m.visible).length;
+  const kept = ['ab/1', shown].map((name) => {
+    model.world = name;
+    world.setObjects(model);
+    return world.marks.children.filter((m) => m.visible).length;
+  });
+  return [before, ...kept];
+});
+check(String(poles) === '1,1,0', `poles stay with their W (${poles})`);
+
 // A phone.
 await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
 await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });
