@@ -5,7 +5,9 @@
 // Elements that no copy has any more leave their memory to the next ones of the thread.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
@@ -43,12 +45,16 @@ class SharedVector {
     static const Vector kEmpty;
     return block_ ? block_->items : kEmpty;
   }
-  /// Its own from now on. References to elements are void once a copy was made.
-  Vector& write() {
+  /// Its own from now on, with room for `room` elements. References to elements are void once a copy
+  /// was made.
+  Vector& write(std::size_t room = 0) {
     if (!block_) {
       block_ = takeBlock();
+      block_->items.reserve(room);
     } else if (block_->owners.load(std::memory_order_acquire) > 1) {
       Block* own = takeBlock();
+      // Room to grow: blocks go round, and soon all have enough.
+      own->items.reserve(std::max(room, std::bit_ceil(block_->items.size() + 1)));
       own->items = block_->items;
       leave();
       block_ = own;

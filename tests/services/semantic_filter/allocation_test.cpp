@@ -26,7 +26,7 @@ double allocationsOfAFrame(std::size_t in_view) {
 
 TEST(FilterAllocations, AreFewInASteadyState) {
   if (!tests::allocationsAreCounted()) GTEST_SKIP() << "a sanitizer owns malloc";
-  EXPECT_LE(allocationsOfAFrame(20), 80.0) << "new tracks and keyframes; 1,694 before";
+  EXPECT_LE(allocationsOfAFrame(20), 64.0) << "new tracks and keyframes; 1,694 before";
 }
 
 }  // namespace

@@ -7,6 +7,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kSameView = 0.5;  // view change below which observations share one count
+constexpr std::size_t kRoom = 32;  // counts that most visits have room for
 
 }  // namespace
 
@@ -25,7 +26,7 @@ void DetectionRate::addTo(Counts& counts, const Count& count, const ViewScales& 
 
 void DetectionRate::add(const ViewRay& from, double expected, bool found,
                         const ViewScales& scales) {
-  addTo(now_.write(), {from, expected, found ? 1.0 : 0.0}, scales);
+  addTo(now_.write(kRoom), {from, expected, found ? 1.0 : 0.0}, scales);
 }
 
 void DetectionRate::beginVisit(const ViewScales& scales) {

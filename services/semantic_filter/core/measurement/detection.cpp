@@ -80,7 +80,7 @@ std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const M
   BoxDetection e;
   const double zero = detection.activations[0];
   double best = -clutter.max_log_ratio, odds = 0.0;
-  std::vector<double>& log_ratio = e.log_ratio.write();
+  std::vector<double>& log_ratio = e.log_ratio.write(model.classes.size());
   for (std::size_t k = 0; k < model.classes.size(); ++k) {
     const double ratio = detection.activations[k + 1] - zero;
     log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));

@@ -71,8 +71,7 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
   // Begins with the newest: it is usually the most similar.
   const Keyframes& known = track.batch.keyframes.read();
   if (std::any_of(known.rbegin(), known.rend(), same)) return false;
-  Keyframes& all = track.batch.keyframes.write();
-  all.reserve(kMostKeyframes + 1);
+  Keyframes& all = track.batch.keyframes.write(kMostKeyframes + 1);
   all.push_back(std::make_shared<const Keyframe>(std::move(keyframe)));
   thin(place, all, scales, static_cast<std::size_t>(parameters.keyframes));
   return true;

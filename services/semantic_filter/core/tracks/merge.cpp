@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "common/base/scratch.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
@@ -276,7 +277,9 @@ void mergeTwo(Track& a, Track& b, const FrameContext& frame) {
 
 std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame) {
   std::vector<MergeRecord> merges;
-  std::vector<Ball> balls;
+  const ScratchScope scope;
+  ScratchVector<Ball> balls;
+  balls.reserve(tracks.size());
   for (const Track& o : tracks) balls.push_back(ballOf(o));
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     for (std::size_t j = i + 1; j < tracks.size();) {
