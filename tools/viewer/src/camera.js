@@ -97,7 +97,7 @@ export class CameraView {
     for (const t of message.texts) {
       const width = pen.measureText(t.text).width + 8 * scale, height = 16 * scale;
       const box = { x: Math.min(t.position.x, canvas.width - width), y: Math.max(0, t.position.y - height) };
-      if (taken.some((o) => Math.abs(o.x - box.x) < (o.w + width) / 2 && Math.abs(o.y - box.y) < height)) continue;
+      if (taken.some((o) => box.x < o.x + o.w && o.x < box.x + width && Math.abs(o.y - box.y) < height)) continue;
       taken.push({ ...box, w: width });
       pen.fillStyle = css(t.background_color);
       pen.fillRect(box.x, box.y, width, height);
