@@ -94,6 +94,9 @@ check(await page.$eval('[data-panel=events]', (e) => !e.hidden), '3 opens the ev
 await page.screenshot({ path: join(out, 'events.png') });
 await page.keyboard.press('4');
 await pause(1200);
+// The test writes what three services would.
+const services = await page.$eval('#services', (e) => e.innerText);
+for (const topic of ['frame/cam0', 'odometry', 'detections']) check(services.includes(`test stands in for it: it writes ${topic}`), `who writes ${topic} stands in (${services})`);
 await page.screenshot({ path: join(out, 'services.png') });
 await page.keyboard.press('t');
 await pause(400);
