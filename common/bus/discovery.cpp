@@ -1,5 +1,6 @@
 #include "common/bus/discovery.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <functional>
@@ -44,7 +45,36 @@ Entity builtinReader(const Participant& participant, dds_entity_t topic) {
   return Entity(dds_create_reader(participant.handle(), topic, nullptr, nullptr));
 }
 
+/// The topic without which a service's work is missed; "frame/" is of any camera. Empty: nobody
+/// stands in for it.
+std::string_view essentialTopicOf(std::string_view service) {
+  if (service == "capture") return "frame/";
+  if (service == "vio") return "odometry";
+  if (service == "inference") return "detections";
+  return {};
+}
+
 }  // namespace
+
+bool standsIn(std::string_view service, std::string_view topic, std::string_view process) {
+  const std::string_view essential = essentialTopicOf(service);
+  constexpr std::string_view kOurs[] = {"capture", "vio", "inference", "semantic_filter",
+                                        "map_store"};  // none of them does another's work
+  if (essential.empty() || process.empty()) return false;
+  if (std::find(std::begin(kOurs), std::end(kOurs), process) != std::end(kOurs)) return false;
+  return essential.ends_with('/') ? topic.starts_with(essential) : topic == essential;
+}
+
+std::optional<StandIn> standInFor(std::string_view service,
+                                  const std::vector<RemoteEndpoint>& endpoints,
+                                  const std::string& prefix) {
+  for (const RemoteEndpoint& endpoint : endpoints) {
+    if (!endpoint.writer || !endpoint.wire_name.starts_with(prefix)) continue;
+    const std::string topic = endpoint.wire_name.substr(prefix.size());
+    if (standsIn(service, topic, endpoint.process)) return StandIn{endpoint.process, topic};
+  }
+  return std::nullopt;
+}
 
 Discovery::Discovery(const Participant& participant)
     : participants_(builtinReader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT)),

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/bus/domain.h"
@@ -15,6 +17,18 @@ struct RemoteEndpoint {
   std::string process;  ///< of its participant, where it has a name
   bool writer = false;
 };
+
+/// Whether `process`, which writes `topic`, does the work of the service `service` in its place: of
+/// "capture" (images), "vio" (odometry) or "inference" (detections), as a bridge or a driver may.
+bool standsIn(std::string_view service, std::string_view topic, std::string_view process);
+
+struct StandIn {
+  std::string process, topic;
+};
+/// Who stands in for `service`; topics are named without `prefix`.
+std::optional<StandIn> standInFor(std::string_view service,
+                                  const std::vector<RemoteEndpoint>& endpoints,
+                                  const std::string& prefix);
 
 /// Watches discovery. It takes about a second until all of a running system is known.
 class Discovery {

@@ -181,11 +181,7 @@ void Endpoint::addRefusals(ReasonCounts& counts) const {
 RawReader::RawReader(const Participant& participant, const std::string& topic)
     : Endpoint(topic, createReader(participant, topic)) {}
 
-std::size_t RawReader::matched() const {
-  dds_subscription_matched_status_t status{};
-  dds_get_subscription_matched_status(handle(), &status);
-  return status.current_count;
-}
+std::size_t RawReader::matched() const { return matchedWriters(handle()); }
 
 std::size_t RawReader::silent() const {
   dds_liveliness_changed_status_t liveliness{};
@@ -214,12 +210,8 @@ std::optional<std::int32_t> RawReader::strongestBut(const RawWriter& own) const 
 
 void RawReader::report(ReasonCounts& counts) const {
   addRefusals(counts);
-  dds_requested_incompatible_qos_status_t qos{};
-  dds_get_requested_incompatible_qos_status(handle(), &qos);
-  add(counts, "incompatible_qos", qos.total_count);
-  dds_sample_lost_status_t lost{};
-  dds_get_sample_lost_status(handle(), &lost);
-  add(counts, "sample_lost", lost.total_count);
+  add(counts, "incompatible_qos", writersWithOtherQos(handle()));
+  add(counts, "sample_lost", samplesLost(handle()));
   dds_sample_rejected_status_t rejected{};
   dds_get_sample_rejected_status(handle(), &rejected);
   add(counts, "sample_rejected", rejected.total_count);
@@ -264,11 +256,7 @@ RawWriter::RawWriter(const Participant& participant, const std::string& topic,
       strength_(options.strength),
       in_shared_memory_(dds_is_shared_memory_available(handle())) {}
 
-std::size_t RawWriter::matched() const {
-  dds_publication_matched_status_t status{};
-  dds_get_publication_matched_status(handle(), &status);
-  return status.current_count;
-}
+std::size_t RawWriter::matched() const { return matchedReaders(handle()); }
 
 void RawWriter::setStrength(std::int32_t strength) {
   const QosPtr qos(dds_create_qos());
@@ -292,9 +280,7 @@ bool RawWriter::waitForAcknowledgement(double seconds) {
 
 void RawWriter::report(ReasonCounts& counts) const {
   addRefusals(counts);
-  dds_offered_incompatible_qos_status_t qos{};
-  dds_get_offered_incompatible_qos_status(handle(), &qos);
-  add(counts, "incompatible_qos", qos.total_count);
+  add(counts, "incompatible_qos", readersWithOtherQos(handle()));
   add(counts, "liveliness_lost", livelinessLost());
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/ros/autoware.h"
 #include "common/ros/bytes.h"
 
 namespace perdure::ros {
@@ -120,5 +121,6 @@ template std::string definitionOf<Detection2DArray>();
 template std::string definitionOf<Detection3DArray>();
 template std::string definitionOf<MarkerArray>();
 template std::string definitionOf<DiagnosticArray>();
+template std::string definitionOf<autoware::TrackedObjects>();
 
 }  // namespace perdure::ros

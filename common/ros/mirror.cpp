@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "common/ros/autoware.h"
 #include "common/ros/bytes.h"
 #include "common/ros/definition.h"
 #include "common/ros/frames.h"
@@ -40,6 +41,8 @@ std::vector<Outlet> Mirror::outlets(const std::vector<std::string>& cameras) con
                           outletOf<Detection3DArray>(prefix_ + "/objects"),
                           outletOf<MarkerArray>(prefix_ + "/markers"),
                           outletOf<DiagnosticArray>(prefix_ + "/diagnostics")};
+  if (!tracked_objects_.empty())
+    all.push_back(outletOf<autoware::TrackedObjects>(tracked_objects_));
   for (const std::string& camera : cameras) {
     all.push_back(outletOf<Image>(imageTopic(camera)));
     all.push_back(outletOf<CompressedImage>(compressedTopic(imageTopic(camera))));
@@ -113,6 +116,8 @@ void Mirror::onDetections(const Detections& detections) {
 void Mirror::onObjects(const Objects& objects) {
   say(prefix_ + "/objects", [&] { return detections3dOf(objects); });
   say(prefix_ + "/markers", [&] { return markersOf(objects); });
+  if (tracked_objects_.empty()) return;
+  say(tracked_objects_, [&] { return autoware::trackedObjectsOf(objects, inMap(objects.world)); });
 }
 
 void Mirror::onHealth(const Health& health) {

@@ -36,6 +36,9 @@ class Mirror {
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
 
+  /// Objects go as Autoware's TrackedObjects to this topic besides; empty: they do not.
+  void sayTrackedObjects(const std::string& topic) { tracked_objects_ = topic; }
+
   /// All that may be written of a vehicle with these cameras, for those who tell beforehand.
   std::vector<Outlet> outlets(const std::vector<std::string>& cameras) const;
 
@@ -51,7 +54,7 @@ class Mirror {
   void onModel(const ModelInfo& model);
   void onDetections(const Detections& detections);
   void onMapFrame(const MapFrame& frame) { map_frame_ = frame; }
-  void onObjects(const Objects& objects);  ///< objects, markers
+  void onObjects(const Objects& objects);  ///< objects, markers, Autoware's
   /// Diagnostics, at the newest time that was heard of.
   void onHealth(const Health& health);
 
@@ -64,7 +67,7 @@ class Mirror {
   void sayInfo(const CameraCalibration& camera, TimePoint time);
   RigidTransform inMap(const WorldId& world) const;
 
-  std::string prefix_;
+  std::string prefix_, tracked_objects_;
   Out out_;
   Wanted wanted_;
   std::map<std::string, Outlet> outlets_;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/bus/discovery.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
 #include "common/wire/cdr.h"
@@ -153,6 +154,7 @@ std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
   Channels for_detections{kDetections};
   for (std::size_t i = 0; i < config.cameras.size(); ++i) {
     for_detections.insert(cameraChannel(i, kAnnotations));
+    for_detections.insert(cameraChannel(i, kLikelihood));
     readers.push_back(std::make_unique<ReaderOnDemand<Frame>>(
         context, topics::frame(config.cameras[i]), Channels{cameraChannel(i, kImage)},
         [&node, i](const Frame& m) { node.onFrame(i, m); }));
@@ -181,6 +183,22 @@ void listenToRaw(service::Context& context, web::Server& server,
         }));
     ++id;
   }
+}
+
+/// Services that others stand in for: the bridge to ROS 2, a driver of one's own.
+std::map<std::string, std::string> standIns(const bus::Participant& participant,
+                                            bus::Discovery& discovery,
+                                            const gateway::VitalSigns& heard) {
+  std::map<std::string, std::string> sentences;
+  std::vector<bus::RemoteEndpoint> endpoints;
+  for (const char* service : {"capture", "vio", "inference"}) {
+    if (heard.hears(service, monotonicNs())) continue;
+    if (endpoints.empty()) endpoints = discovery.endpoints();
+    if (const auto other = bus::standInFor(service, endpoints, participant.wireName(""))) {
+      sentences[service] = other->process + " stands in for it: it writes " + other->topic;
+    }
+  }
+  return sentences;
 }
 
 web::Content contentFor(const service::Context& context, const gateway::Config& config) {
@@ -248,9 +266,11 @@ void serve(service::Context& context, const gateway::Config& config, const std::
     const web::Stats stats = server.stats();
     for (const auto& [reason, n] : stats.reasons.all()) counts.add(reason, n);
   });
+  bus::Discovery discovery(context.participant());
   context.onHealth([&] {
     const web::Stats stats = server.stats();
     const std::int64_t now = monotonicNs();
+    node.setStandIns(standIns(context.participant(), discovery, node.vitalSigns()));
     context.health().setDropped(stats.dropped);
     server.setTexts(
         node.vitalSigns().healthz(now),

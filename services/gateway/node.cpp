@@ -155,6 +155,9 @@ void Node::onDetections(const Detections& detections) {
   constexpr std::size_t kMostCameras = 16;
   if (!detections_.contains(detections.camera) && detections_.size() >= kMostCameras) return;
   detections_[detections.camera] = detections;
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
+    if (awaited_.contains(i) && config_.cameras[i] == detections.camera) sendAnnotations(i, true);
+  }
   if (wants(kDetections)) {
     send(kDetections, detectionsJson(detections, model_ ? &*model_ : nullptr));
   }
@@ -167,6 +170,7 @@ void Node::onModel(const ModelInfo& model) {
 
 void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   last_.objects_ns = now_ns;
+  sendAwaited();
   const bool again = objects_ && objects.stamp.time + kLongBack < objects_->stamp.time;
   if (again || (objects_ && objects_->world != objects.world)) {
     history_.clear();
@@ -186,7 +190,7 @@ void Node::sendObjects() {
   for (const std::uint32_t channel : {kObjects, kScene}) {
     if (wants(channel)) sendNow(channel);
   }
-  for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i);
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i, false);
   if (odometry_) return;  // it tells where the body is
   for (const std::uint32_t channel : {kTransforms, kPose}) {
     if (wants(channel)) sendNow(channel);
@@ -194,14 +198,36 @@ void Node::sendObjects() {
   if (wants(kTrajectory) && trajectory_pace_.due(objects_->stamp.time)) sendNow(kTrajectory);
 }
 
-void Node::sendAnnotations(std::size_t camera) {
-  const std::uint32_t channel = cameraChannel(camera, kAnnotations);
-  if (!wants(channel) || !cameras_[camera]) return;
+/// Of one frame the detections may be heard after the objects: they are waited for.
+void Node::sendAnnotations(std::size_t camera, bool now) {
+  const bool wanted =
+      wants(cameraChannel(camera, kAnnotations)) || wants(cameraChannel(camera, kLikelihood));
+  awaited_.erase(camera);
+  if (!cameras_[camera] || !wanted) return;
   const auto found = detections_.find(config_.cameras[camera]);
   const bool same = found != detections_.end() && found->second.stamp.sameFrame(objects_->stamp);
-  outputs_.message({channel, objects_->stamp.time,
-                    std::make_shared<const std::string>(imageAnnotations(
-                        *objects_, *cameras_[camera], same ? &found->second : nullptr))});
+  constexpr std::chrono::milliseconds kLately{500};
+  const bool may_come = found != detections_.end() && !same &&
+                        found->second.stamp.time < objects_->stamp.time &&
+                        objects_->stamp.time - found->second.stamp.time < kLately;
+  if (may_come && !now) {
+    awaited_.insert(camera);
+    return;
+  }
+  const Detections* detections = same ? &found->second : nullptr;
+  const auto say = [&](CameraPart part, std::string payload) {
+    outputs_.message({cameraChannel(camera, part), objects_->stamp.time,
+                      std::make_shared<const std::string>(std::move(payload))});
+  };
+  if (wants(cameraChannel(camera, kAnnotations)))
+    say(kAnnotations, imageAnnotations(*objects_, *cameras_[camera], detections));
+  if (wants(cameraChannel(camera, kLikelihood)))
+    say(kLikelihood,
+        likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr));
+}
+
+void Node::sendAwaited() {
+  for (const std::size_t camera : std::set<std::size_t>(awaited_)) sendAnnotations(camera, true);
 }
 
 void Node::onEvent(const Event& event) {
@@ -268,6 +294,7 @@ bool Node::hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const {
 }
 
 void Node::tick(std::int64_t now_ns) {
+  sendAwaited();
   if (wants(kHealth) && now_ns >= next_health_ns_) {
     next_health_ns_ = now_ns + kSecond;
     send(kHealth, vital_signs_.json(now_ns, last_));

@@ -57,6 +57,9 @@ class Node {
   /// About ten times a second.
   void tick(std::int64_t now_ns);
 
+  void setStandIns(std::map<std::string, std::string> sentences) {
+    vital_signs_.setStandIns(std::move(sentences));
+  }
   const VitalSigns& vitalSigns() const { return vital_signs_; }
   std::size_t objects() const { return objects_ ? objects_->objects.size() : 0; }
   /// The last of objects and odometry is older than that, or there was none.
@@ -80,7 +83,8 @@ class Node {
   void send(std::uint32_t channel, std::string payload);
   void sendNow(std::uint32_t channel);
   void sendObjects();
-  void sendAnnotations(std::size_t camera);
+  void sendAnnotations(std::size_t camera, bool now);
+  void sendAwaited();
   struct Happened {
     Event event;
     std::optional<Eigen::Vector3d> place;  ///< in W
@@ -112,6 +116,7 @@ class Node {
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
   std::map<std::string, Detections> detections_;  ///< newest, by camera
+  std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for those of objects_' frame
   std::deque<Happened> events_;
   std::map<ObjectId, Event> returns_;
   MapLayer map_;

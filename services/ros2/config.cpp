@@ -24,6 +24,9 @@ void describeOut(Config& c, config::Fields& fields) {
   fields.texts("out.cameras", c.shown_cameras, {"cameras whose images may be subscribed"});
   fields.boolean("out.tf", c.tf,
                  {"writes /tf and /tf_static; false where another node says odom to base_link"});
+  fields.text(
+      "out.tracked_objects", c.tracked_objects,
+      {"topic of autoware_perception_msgs/TrackedObjects, as Autoware hears it; empty: none"});
   fields.integer("out.image_quality", c.image_quality, config::between(1, 100),
                  {"of the JPEG of image_raw/compressed; what is JPEG already stays as it is"});
 }
@@ -145,6 +148,7 @@ void verify(const Config& c) {
   requireTopic("in.odometry.topic", c.odometry.topic);
   requireTopic("in.detections.topic", c.detections.topic);
   requireTopic("out.prefix", c.prefix);
+  requireTopic("out.tracked_objects", c.tracked_objects);
   if (c.cam1.given() && !c.cam0.given()) {
     refuseConfig("in.cam1.image is given and in.cam0.image is not; the first camera is cam0");
   }

@@ -49,6 +49,7 @@ struct Config {
   std::string prefix = "/perdure";
   std::vector<std::string> shown_cameras = {"cam0"};
   bool tf = true;
+  std::string tracked_objects;
   std::int64_t image_quality = 80;
 
   CameraInput cam0{"cam0", {}}, cam1{"cam1", {}};

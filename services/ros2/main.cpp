@@ -74,6 +74,7 @@ class Outwards {
         mirror_(
             config.prefix, [&](const auto& outlet, auto cdr) { ros.write(outlet, std::move(cdr)); },
             [&](const auto& outlet) { return ros.wants(outlet.topic); }) {
+    mirror_.sayTrackedObjects(config.tracked_objects);
     for (const ros::Outlet& outlet : mirror_.outlets(config.shown_cameras)) {
       if (config.tf || !outlet.topic.starts_with("/tf")) ros.advertise(outlet);
     }
@@ -117,9 +118,12 @@ class Outwards {
                    [this](const Landmarks& m) { mirror_.onLandmarks(m); });
     add<Detections>(topics::kDetections, {topic("detections")},
                     [this](const Detections& m) { mirror_.onDetections(m); });
-    add<Objects>(topics::kObjects, {topic("objects"), topic("markers")}, [this](const Objects& m) {
+    std::vector<std::string> of_objects{topic("objects"), topic("markers")};
+    if (!config_.tracked_objects.empty()) of_objects.push_back(config_.tracked_objects);
+    add<Objects>(topics::kObjects, std::move(of_objects), [this](const Objects& m) {
       mirror_.onObjects(m);
-      context_.health().frameOut();
+      // Of a bridge that takes images its rate is theirs: `perdure status` reads it there.
+      if (!config_.cam0.given()) context_.health().frameOut();
     });
     for (const std::string& camera : config_.shown_cameras) {
       const std::string image = mirror_.imageTopic(camera);

@@ -39,6 +39,7 @@ ask /healthz | grep -q '^HTTP/1.1 200' || fail "/healthz: $(ask /healthz)"
 ask /metrics | grep -q '^perdure_gateway_clients 0' || fail "/metrics: $(ask /metrics)"
 if [ -e "$PERDURE_BUILD/share/perdure/viewer/index.html" ]; then
   ask / | grep -q '<title>Perdure</title>' || fail "the installed page is not found"
+  ask /foxglove_layout.json | grep -q '"3D!perdure"' || fail "the layout for Foxglove is not served"
 fi
 kill "$gateway"
 status=0

@@ -34,6 +34,7 @@ struct ServiceOptions {
   std::string process, camera;
   std::int32_t strength = 1;
   double lease_s = 0.0;
+  bool expects = false;  ///< it answers the filter's predictions
 };
 
 /// The service's loop has a thread of its own, so that Health and liveliness go on while Python
@@ -98,6 +99,16 @@ class InferenceService {
     say(HealthState::kDegraded, why);
   }
 
+  /// The filter's newest, once each.
+  std::optional<Predictions> predictions() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(expected_, std::nullopt);
+  }
+  void count(const std::string& reason) {
+    const std::lock_guard lock(mutex_);
+    reasons_.add(reason);
+  }
+
   bool ended() const { return ended_; }
   std::uint64_t framesIn() { return context_.health().framesIn(); }
   std::uint64_t framesOut() { return context_.health().framesOut(); }
@@ -111,6 +122,12 @@ class InferenceService {
   void wire() {
     say(HealthState::kStarting, "waits for frames");
     context_.on(bus::topics::frame(options_.camera), [this](const Frame& frame) { offer(frame); });
+    if (options_.expects) {
+      context_.on(bus::topics::kPredictions, [this](const Predictions& predictions) {
+        const std::lock_guard lock(mutex_);
+        expected_ = predictions;
+      });
+    }
     context_.countReasons([this](ReasonCounts& counts) {
       const std::lock_guard lock(mutex_);
       for (const auto& [reason, n] : reasons_.all()) counts.add(reason, n);
@@ -172,6 +189,7 @@ class InferenceService {
   std::mutex mutex_;
   std::condition_variable came_;
   std::optional<Frame> newest_;
+  std::optional<Predictions> expected_;
   std::optional<Clock::time_point> busy_since_;
   bus::Gaps gaps_;
   ReasonCounts reasons_;
@@ -209,11 +227,11 @@ void answer(InferenceService& service, py::handle message) {
 
 std::unique_ptr<InferenceService> start(const BusSettings& settings, const std::string& process,
                                         const std::string& camera, py::handle model,
-                                        std::int32_t strength, double lease_s) {
+                                        std::int32_t strength, double lease_s, bool expects) {
   auto info = fromPython<ModelInfo>(model);
   const py::gil_scoped_release opens;
   return std::make_unique<InferenceService>(
-      settings, ServiceOptions{process, camera, strength, lease_s}, info);
+      settings, ServiceOptions{process, camera, strength, lease_s, expects}, info);
 }
 
 }  // namespace
@@ -221,8 +239,14 @@ std::unique_ptr<InferenceService> start(const BusSettings& settings, const std::
 void bindInferenceService(py::module_& module) {
   py::class_<InferenceService>(module, "InferenceService")
       .def(py::init(&start), py::arg("settings"), py::arg("process"), py::arg("camera"),
-           py::arg("model"), py::arg("strength"), py::arg("lease_s"))
+           py::arg("model"), py::arg("strength"), py::arg("lease_s"), py::arg("expects"))
       .def("next", &nextFrame, py::arg("seconds"))
+      .def("predictions",
+           [](InferenceService& service) -> py::object {
+             const auto predictions = service.predictions();
+             return predictions ? toPython(*predictions) : py::none();
+           })
+      .def("count", &InferenceService::count, py::arg("reason"))
       .def("answer", &answer)
       .def("failed", &InferenceService::failed)
       .def("close", &InferenceService::close, py::call_guard<py::gil_scoped_release>())

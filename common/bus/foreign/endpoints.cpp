@@ -79,11 +79,7 @@ std::string countOf(const ForeignTopic& topic) {
 ForeignReader::ForeignReader(const Participant& participant, const ForeignTopic& topic)
     : Endpoint(countOf(topic), foreignReader(participant, topic)) {}
 
-std::size_t ForeignReader::matched() const {
-  dds_subscription_matched_status_t status{};
-  dds_get_subscription_matched_status(handle(), &status);
-  return status.current_count;
-}
+std::size_t ForeignReader::matched() const { return matchedWriters(handle()); }
 
 bool ForeignReader::drainBatch(const Handler& handler) {
   std::array<ddsi_serdata*, kBatch> data{};
@@ -98,12 +94,8 @@ bool ForeignReader::drainBatch(const Handler& handler) {
 }
 
 void ForeignReader::report(ReasonCounts& counts) const {
-  dds_requested_incompatible_qos_status_t qos{};
-  dds_get_requested_incompatible_qos_status(handle(), &qos);
-  add(counts, "incompatible_qos", qos.total_count);
-  dds_sample_lost_status_t lost{};
-  dds_get_sample_lost_status(handle(), &lost);
-  add(counts, "sample_lost", lost.total_count);
+  add(counts, "incompatible_qos", writersWithOtherQos(handle()));
+  add(counts, "sample_lost", samplesLost(handle()));
 }
 
 ForeignWriter::ForeignWriter(const Participant& participant, const ForeignTopic& topic)
@@ -111,11 +103,7 @@ ForeignWriter::ForeignWriter(const Participant& participant, const ForeignTopic&
 
 ForeignWriter::~ForeignWriter() { ddsi_sertype_unref(type_); }
 
-std::size_t ForeignWriter::matched() const {
-  dds_publication_matched_status_t status{};
-  dds_get_publication_matched_status(handle(), &status);
-  return status.current_count;
-}
+std::size_t ForeignWriter::matched() const { return matchedReaders(handle()); }
 
 Result<void> ForeignWriter::write(std::vector<std::uint8_t> cdr) {
   ddsi_serdata* message = messageOf(type_, std::move(cdr));
@@ -130,9 +118,7 @@ Result<void> ForeignWriter::write(std::vector<std::uint8_t> cdr) {
 
 void ForeignWriter::report(ReasonCounts& counts) const {
   addRefusals(counts);
-  dds_offered_incompatible_qos_status_t qos{};
-  dds_get_offered_incompatible_qos_status(handle(), &qos);
-  add(counts, "incompatible_qos", qos.total_count);
+  add(counts, "incompatible_qos", readersWithOtherQos(handle()));
 }
 
 }  // namespace perdure::bus

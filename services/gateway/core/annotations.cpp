@@ -1,5 +1,7 @@
 #include "services/gateway/core/annotations.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -36,7 +38,7 @@ void putPoint(JsonWriter& json, const Point& p) {
 }
 
 void putLines(JsonWriter& json, TimePoint time, PointsType type, const std::vector<Point>& points,
-              const Colour& colour, double thickness) {
+              const Colour& colour, double thickness, const Colour& fill = {0, 0, 0, 0}) {
   json.begin('{').key("timestamp");
   putTime(json, time);
   json.key("type").integer(static_cast<int>(type)).key("points").begin('[');
@@ -44,7 +46,7 @@ void putLines(JsonWriter& json, TimePoint time, PointsType type, const std::vect
   json.end(']').key("outline_color");
   putColour(json, colour);
   json.key("outline_colors").begin('[').end(']').key("fill_color");
-  putColour(json, {0, 0, 0, 0});
+  putColour(json, fill);
   json.key("thickness").number(thickness).end('}');
 }
 
@@ -66,9 +68,9 @@ void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
   json.end('}');
 }
 
-/// Draws an object's cuboid; its label where it is in the image.
-std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const ObjectBelief& object,
-                               const CameraModel& camera) {
+/// The strokes of its cuboid in the image.
+std::vector<Point> projected(const Objects& objects, const ObjectBelief& object,
+                             const CameraModel& camera) {
   const RigidTransform T_CW = (objects.T_WB * camera.T_BC()).inverse();
   auto corners = cornersOf(cuboidOf(object, objects.up_W));
   for (Eigen::Vector3d& corner : corners) corner = T_CW * corner;
@@ -78,6 +80,13 @@ std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const O
   }
   addStrokes(camera, (corners[0] + corners[3]) / 2, (corners[1] + corners[3]) / 2, isHidden(object),
              strokes);
+  return strokes;
+}
+
+/// Draws an object's cuboid; its label where it is in the image.
+std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const ObjectBelief& object,
+                               const CameraModel& camera) {
+  const std::vector<Point> strokes = projected(objects, object, camera);
   if (strokes.empty()) return std::nullopt;
   const Colour colour = classColour(object.best().name);
   putLines(json, objects.stamp.time, kLineList, strokes,
@@ -107,7 +116,116 @@ void putDetection(JsonWriter& json, TimePoint time, const Detection& detection) 
            {1, 1, 1, bright}, 1);
 }
 
+/// By Andrew's chain.
+std::vector<Point> convexHull(std::vector<Point> points) {
+  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  std::vector<Point> hull;
+  const auto extend = [&hull](const Point& p, std::size_t keep) {
+    const auto turns = [&](const Point& a, const Point& b) {
+      return (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x()) > 0;
+    };
+    while (hull.size() > keep && !turns(hull[hull.size() - 2], hull.back())) hull.pop_back();
+    hull.push_back(p);
+  };
+  for (const Point& p : points) extend(p, 1);
+  const std::size_t lower = hull.size();
+  for (auto p = points.rbegin(); p != points.rend(); ++p) extend(*p, lower);
+  if (hull.size() > 1) hull.pop_back();
+  return hull;
+}
+
+Box boundsOf(const std::vector<Point>& points, const CameraModel& camera) {
+  Point low = points.front(), high = points.front();
+  for (const Point& p : points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  const Point size(camera.width(), camera.height());
+  low = low.cwiseMax(Point::Zero()).cwiseMin(size);
+  high = high.cwiseMax(Point::Zero()).cwiseMin(size);
+  return {low.x(), low.y(), high.x(), high.y()};
+}
+
+struct Said {
+  double likelihood = 0.0;
+  bool asked = false;  ///< the answer to a prediction, by no box of its own
+};
+
+/// What the network says of `object` being there rather than clutter, with even odds before.
+std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
+                           const Detections& detections, const ModelInfo& model) {
+  constexpr double kLeastOverlap = 0.3;
+  const auto name = std::find(model.classes.begin(), model.classes.end(), object.best().name);
+  const auto k = static_cast<std::size_t>(name - model.classes.begin()) + 1;
+  const Detection* of = nullptr;
+  double best = kLeastOverlap;
+  for (const Detection& one : detections.detections) {
+    if (k >= one.activations.size()) continue;  // a class that the network does not know
+    const double overlap = one.primed ? (one.primed_for == object.id ? best : 0.0)
+                                      : intersectionOverUnion(one.box, region);
+    if (overlap >= best) of = &one, best = overlap;
+  }
+  if (of == nullptr) return std::nullopt;
+  const double nats = of->activations[k] - of->activations[0];
+  return Said{1.0 / (1.0 + std::exp(-nats)), of->primed};
+}
+
+struct Region {
+  std::vector<Point> outline;
+  double distance = 0.0;
+  Colour colour;
+  double brightness = 0.0;
+  Label label;
+};
+
+std::optional<Region> regionOf(const Objects& objects, const ObjectBelief& object,
+                               const CameraModel& camera, const Detections* detections,
+                               const ModelInfo* model) {
+  const std::vector<Point> strokes = projected(objects, object, camera);
+  if (strokes.size() < 3) return std::nullopt;
+  const Box bounds = boundsOf(strokes, camera);
+  if (bounds.width() <= 0 || bounds.height() <= 0) return std::nullopt;
+  const auto said = detections != nullptr && model != nullptr
+                        ? saidOf(object, bounds, *detections, *model)
+                        : std::nullopt;
+  Region region;
+  region.outline = convexHull(strokes);
+  region.distance = (object.best().mean.head<3>() - objects.T_WB.p).norm();
+  region.colour = classColour(object.best().name);
+  region.brightness = said ? said->likelihood : 0.0;
+  const std::string value =
+      said ? fmt::format("{:.2f}{}", said->likelihood, said->asked ? " top-down" : "")
+           : "nothing said";
+  region.label = {Point(std::max(2.0, bounds.x1), std::max(14.0, bounds.y1)),
+                  nameOf(object) + " " + value, region.colour.withAlpha(0.75)};
+  return region;
+}
+
 }  // namespace
+
+std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
+                              const Detections* detections, const ModelInfo* model) {
+  std::vector<Region> regions;
+  for (const ObjectBelief& object : objects.objects) {
+    if (!object.confirmed || !isInSight(object)) continue;
+    if (auto region = regionOf(objects, object, camera, detections, model))
+      regions.push_back(*std::move(region));
+  }
+  // What is nearer is drawn over what is farther.
+  std::sort(regions.begin(), regions.end(),
+            [](const Region& a, const Region& b) { return a.distance > b.distance; });
+  JsonWriter json(1024 + 2048 * regions.size());
+  json.begin('{').key("timestamp");
+  putTime(json, objects.stamp.time);
+  json.key("circles").begin('[').end(']').key("points").begin('[');
+  for (const Region& region : regions) {
+    const double b = region.brightness;
+    putLines(json, objects.stamp.time, kLineLoop, region.outline, region.colour.withAlpha(0.9), 1.5,
+             {b, b, b, 0.85});
+  }
+  json.end(']').key("texts").begin('[');
+  for (const Region& region : regions) putLabel(json, objects.stamp.time, region.label);
+  return json.end(']').end('}').take();
+}
 
 std::string imageAnnotations(const Objects& objects, const CameraModel& camera,
                              const Detections* detections) {

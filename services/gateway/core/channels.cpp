@@ -20,6 +20,8 @@ void addCamera(std::size_t index, const std::string& camera, std::vector<Channel
                        Delivery::kLatched));
   table.push_back(json(cameraChannel(index, kAnnotations), (prefix + "/annotations").c_str(),
                        "foxglove.ImageAnnotations", schemas::imageAnnotations()));
+  table.push_back(json(cameraChannel(index, kLikelihood), (prefix + "/likelihood").c_str(),
+                       "foxglove.ImageAnnotations", schemas::imageAnnotations()));
 }
 
 }  // namespace

@@ -32,7 +32,13 @@ enum Channel : std::uint32_t {
   kRaw = 50,  ///< and on: topics of the bus as they are
   kCamera = 100,
 };
-enum CameraPart : std::uint32_t { kImage = 0, kCalibration, kAnnotations, kPerCamera = 10 };
+enum CameraPart : std::uint32_t {
+  kImage = 0,
+  kCalibration,
+  kAnnotations,
+  kLikelihood,
+  kPerCamera = 10
+};
 
 constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
   return kCamera + kPerCamera * static_cast<std::uint32_t>(camera) + part;

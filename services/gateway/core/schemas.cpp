@@ -295,7 +295,8 @@ std::string health() {
                                {"rate_hz", number()},
                                {"cpu", said(number(), "of one core; below 0: not known yet")},
                                {"rss_mb", number()},
-                               {"reasons", Json{{"type", "object"}}}});
+                               {"reasons", Json{{"type", "object"}}},
+                               {"stood_in_for", said(boolean(), "another process does its work")}});
   return object({{"vehicle", text()},
                  {"services", listOf(service)},
                  {"silent_s", said(object({{"objects", number()}, {"odometry", number()}}),

@@ -27,6 +27,9 @@ class VitalSigns {
   explicit VitalSigns(std::string vehicle) : vehicle_(std::move(vehicle)) {}
 
   void onHealth(const Health& health, std::int64_t now_ns);
+  bool hears(const std::string& process, std::int64_t now_ns) const;
+  /// Services that are not heard, and in a sentence who does their work instead.
+  void setStandIns(std::map<std::string, std::string> sentences);
 
   /// "perdure.Health"
   std::string json(std::int64_t now_ns, const Silence& last) const;
@@ -44,6 +47,7 @@ class VitalSigns {
   };
   const std::string vehicle_;
   std::map<std::string, Service> services_;
+  std::map<std::string, std::string> stand_ins_;
 };
 
 }  // namespace perdure::gateway

@@ -176,6 +176,50 @@ TEST_P(Ros2Inwards, CameraImuOdometryAndDetectionsBecomePerdures) {
 }
 INSTANTIATE_TEST_SUITE_P(ReliableAndBestEffort, Ros2Inwards, ::testing::Bool());
 
+/// A node of the tree that `perdure status --json` prints; null where there is none.
+json nodeOf(const json& tree, const std::string& name) {
+  if (tree.value("name", "") == name) return tree;
+  for (const json& child : tree.value("children", json::array())) {
+    if (const json found = nodeOf(child, name); !found.is_null()) return found;
+  }
+  return nullptr;
+}
+
+TEST(Ros2Inwards, StatusSaysThatTheBridgeStandsIn) {
+  BridgeRig rig;
+  rig.startBridge(kAll);
+  Bus bus(rig);
+  std::vector<json> lines{transforms()};
+  for (int i = 0; i < 500; ++i) {
+    const double after = 0.05 * i;
+    const std::int64_t stamp = kBegin + i * 50 * kMs;
+    lines.push_back(info(after, stamp));
+    lines.push_back(imu(after, stamp));
+    lines.push_back(odometry(after, stamp - 10 * kMs, 0.5 * i - 0.1));
+    lines.push_back(image(after, stamp));
+    lines.push_back(boxes(after + 0.02, stamp, json::array()));
+  }
+  rig.speak(lines);
+  ASSERT_TRUE(runUntil(
+      rig.loop, [&] { return bus.found.size() > 5 && bus.poses.size() > 5; }, 40s))
+      << rig.log();
+  Child status({(programs() / "perdure").string(), "status", "--json"}, rig.folder.file("status"));
+  int left = -1;
+  ASSERT_TRUE(runUntil(
+      rig.loop, [&] { return (left = status.wait(1ms)) >= 0; }, 30s));
+  const json tree = json::parse(status.log(), nullptr, false);
+  ASSERT_TRUE(tree.is_object()) << status.log();
+  const std::pair<const char*, const char*> stood_in[] = {
+      {"capture", "frame/cam0"}, {"vio", "odometry"}, {"inference", "detections"}};
+  for (const auto& [service, topic] : stood_in) {
+    const json node = nodeOf(tree, service);
+    EXPECT_EQ(node["level"], "ok") << node.dump();
+    EXPECT_EQ(node["text"], std::string("ros2 stands in for it: it writes ") + topic);
+  }
+  EXPECT_EQ(nodeOf(tree, "semantic_filter")["level"], "failed") << "it does not run, and is missed";
+  EXPECT_GT(nodeOf(tree, "frame/cam0")["rate_hz"], 5) << "by the bridge's Health";
+}
+
 TEST(Ros2InwardsWrong, IsCountedAndSaysTheMend) {
   BridgeRig rig;
   rig.startBridge(kAll);

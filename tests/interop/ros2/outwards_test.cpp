@@ -206,6 +206,34 @@ TEST(Ros2Outwards, EveryTopicIsReceivedWithItsValues) {
   EXPECT_TRUE(status["values"].contains("cpu_s"));
 }
 
+TEST(Ros2Outwards, AutowareHearsTrackedObjectsWhereItIsTold) {
+  const std::string topic = "/perception/object_recognition/tracking/objects";
+  BridgeRig rig;
+  rig.startBridge({"out.tracked_objects=" + topic});
+  Vehicle vehicle(rig);
+  rig.listen({topic});
+  auto all = newestOfAll(rig, vehicle, 1);
+  ASSERT_EQ(all.size(), 1u) << rig.log();
+  EXPECT_EQ(all[topic]["header"]["frame"], "map");
+  const json& objects = all[topic]["objects"];
+  ASSERT_EQ(objects.size(), 1u);
+  const json& car = objects[0];
+  EXPECT_EQ(car["uuid"], json({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 12}));
+  EXPECT_NEAR(car["existence"].get<double>(), 0.8, 1e-6);
+  ASSERT_EQ(car["classification"].size(), 2u);
+  EXPECT_EQ(car["classification"][0][0], 1) << "CAR";
+  EXPECT_NEAR(car["classification"][0][1].get<double>(), 0.75, 1e-6);
+  EXPECT_EQ(car["classification"][1][0], 0) << "UNKNOWN";
+  EXPECT_NEAR(car["pose"]["p"][0].get<double>(), 110.0, 1e-6) << "W lies 100 m ahead in M";
+  EXPECT_NEAR(car["covariance"][0].get<double>(), 0.04, 1e-9);
+  EXPECT_NEAR(car["covariance"][35].get<double>(), 0.04, 1e-9) << "the yaw's, about z";
+  EXPECT_EQ(car["orientation"], 1) << "front and back are not told apart while it stands";
+  EXPECT_EQ(car["stationary"], true);
+  EXPECT_EQ(car["type"], 0);
+  EXPECT_NEAR(car["size"][0].get<double>(), 4.0, 1e-5);
+  EXPECT_NEAR(car["size"][2].get<double>(), 1.5, 1e-5);
+}
+
 TEST(Ros2Outwards, ReadsImagesOnlyWhileSomebodyOfRosDoes) {
   BridgeRig rig;
   rig.startBridge({});

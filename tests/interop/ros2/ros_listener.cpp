@@ -146,6 +146,26 @@ json linesOf(const diagnostic_msgs::msg::dds_::DiagnosticArray_& m) {
   return {{"header", of(m.header())}, {"status", all}};
 }
 
+json linesOf(const autoware_perception_msgs::msg::dds_::TrackedObjects_& m) {
+  json all = json::array();
+  for (const auto& o : m.objects()) {
+    json labels = json::array();
+    for (const auto& c : o.classification()) labels.push_back({c.label(), c.probability()});
+    const auto& k = o.kinematics();
+    all.push_back({{"uuid", o.object_id().uuid()},
+                   {"existence", o.existence_probability()},
+                   {"classification", labels},
+                   {"pose", of(k.pose_with_covariance().pose())},
+                   {"covariance", k.pose_with_covariance().covariance()},
+                   {"linear", xyz(k.twist_with_covariance().twist().linear())},
+                   {"orientation", k.orientation_availability()},
+                   {"stationary", k.is_stationary()},
+                   {"type", o.shape().type()},
+                   {"size", xyz(o.shape().dimensions())}});
+  }
+  return {{"header", of(m.header())}, {"objects", all}};
+}
+
 class Listener {
  public:
   explicit Listener(std::uint32_t domain, std::set<std::string> wanted)
@@ -206,5 +226,8 @@ int main(int argc, char** argv) {
                                                                            Quality::kDefault);
   all.hear<MarkerArray_, MarkerArray_PubSubType>("/perdure/markers", Quality::kDefault);
   all.hear<DiagnosticArray_, DiagnosticArray_PubSubType>("/perdure/diagnostics", Quality::kDefault);
+  all.hear<autoware_perception_msgs::msg::dds_::TrackedObjects_,
+           autoware_perception_msgs::msg::dds_::TrackedObjects_PubSubType>(
+      "/perception/object_recognition/tracking/objects", Quality::kDefault);
   all.run();
 }

@@ -89,7 +89,8 @@ class Drive {
     detections.stamp = objects.stamp;
     detections.camera = "cam0";
     detections.model_hash = 9;
-    detections.detections = {test::detectionOf({100, 100, 200, 200}, {0.F, 2.F})};
+    detections.detections = {test::detectionOf({100, 100, 200, 200}, {0.F, 2.F}),
+                             test::detectionOf({364, 202, 539, 278}, {0.F, 2.F})};  // the first
     (void)detections_.write(detections);
     Frame frame;
     frame.stamp = objects.stamp;
@@ -189,7 +190,7 @@ TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
     const json said = answer("foxglove.mjs", {protocol});
     ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("foxglove.mjs"));
     EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
-    EXPECT_EQ(said["channels"], 21);
+    EXPECT_EQ(said["channels"], 22);
     EXPECT_EQ(status_, 0);
   }
 }

@@ -104,10 +104,22 @@ TEST_F(GatewayNode, DrawsTheDetectionsOfTheSameFrame) {
   node_.onDetections(detections);
   node_.onObjects(frameOf(1, {}), kSecond);
   node_.onObjects(frameOf(2, {}), kSecond);
+  node_.tick(kSecond);  // those of the second do not come
   const auto drawn = on(cameraChannel(0, kAnnotations));
   ASSERT_EQ(drawn.size(), 2u);
   EXPECT_EQ(drawn[0]["points"].size(), 1u);
   EXPECT_EQ(drawn[1]["points"].size(), 0u);
+  // They are heard after the objects: each frame is drawn once, with its own.
+  detections.stamp = frameOf(3, {}).stamp;
+  node_.onObjects(frameOf(3, {}), kSecond);
+  EXPECT_EQ(on(cameraChannel(0, kAnnotations)).size(), 2u);
+  node_.onDetections(detections);
+  node_.onObjects(frameOf(4, {}), kSecond);
+  node_.onObjects(frameOf(5, {}), kSecond);
+  const auto later = on(cameraChannel(0, kAnnotations));
+  ASSERT_EQ(later.size(), 4u);
+  EXPECT_EQ(later[2]["points"].size(), 1u);
+  EXPECT_EQ(later[3]["points"].size(), 0u);
 }
 
 TEST_F(GatewayNode, AnswersAboutAnObjectOfTheWorkingSetAtOnce) {

@@ -120,6 +120,13 @@ class Examples(unittest.TestCase):
         boxes = [d.box.tolist() for d in own_detector.Cones().detect(image)]
         self.assertEqual(boxes, [[10, 20, 20, 40], [50, 25, 62, 45]])
         self.assertEqual(own_detector.Cones().detect(image[:, :, 0]), [])
+        # Where cones are expected: half of one is there, and nothing.
+        expected = [perdure.Prediction(class_name="cone") for _ in range(2)]
+        expected[0].box, expected[1].box = (5, 20, 15, 40), (60, 5, 75, 20)
+        nats = own_detector.Cones().look(image, expected)
+        self.assertGreater(nats[0], 1)
+        self.assertLess(nats[1], -1)
+        self.assertTrue(np.isnan(own_detector.Cones().look(image[:, :, 0], expected)).all())
 
 
 class Installed(unittest.TestCase):

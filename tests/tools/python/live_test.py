@@ -226,6 +226,21 @@ perdure.publish(Network(), longest_s=2.0, vehicle="driven")
 """
 
 
+# From frame 30 on it finds nothing of its own accord, and says where the filter asks.
+LOOKS = FROM_RECORDING.replace(
+    "        return recorded",
+    """        self.number = int(image[0, 0])
+        if self.number >= 30: return []
+        return recorded""",
+).replace(
+    "perdure.publish",
+    """    def look(self, image, expected):
+        assert all(p.class_name in self.classes and p.object_id for p in expected)
+        return [NATS] * len(expected)
+perdure.publish""",
+)
+
+
 class Network(unittest.TestCase):
     def frames(self, spoiled):
         """Sends images whose first pixel is the frame's number; when it is asked for the next one,
@@ -289,6 +304,98 @@ class Network(unittest.TestCase):
         self.assertIn("car", {o.class_name for o in objects if o.existence > 0.9})
         states = [h for h in came["health"] if h.process == "inference"]
         self.assertTrue(any(h.frames_out > 0 for h in states))
+
+    def run_looking(self, nats):
+        """Detections from frame 30 on, and objects by their id in the last frame."""
+        heard = {
+            t: perdure.subscribe(t, vehicle="driven", timeout=20)
+            for t in ("detections", "objects")
+        }
+        with Child(
+            support.BIN / "perdure-semantic-filter", "--config",
+            support.SOURCE / "config/semantic_filter.yaml", "--set", "bus.vehicle=driven",
+        ), Child(*script(LOOKS.replace("NATS", str(nats))), drive.mcap) as network:  # fmt: skip
+            next(perdure.subscribe("model", vehicle="driven", timeout=20))
+            later, last = [], None
+            for pose in self.frames(spoiled=()):
+                found = next(heard["detections"])
+                if found.stamp.sequence >= 30:
+                    later.append(found)
+                # The filter's predictions of the frame before are there for the next one.
+                while pose.stamp.sequence > 0 and (
+                    last is None or last.stamp.sequence < pose.stamp.sequence - 1
+                ):
+                    last = next(heard["objects"])
+            while last is None or last.stamp.sequence < pose.stamp.sequence:
+                last = next(heard["objects"])
+            network.process.terminate()
+            said = network.end()
+        self.assertEqual(network.process.returncode, 0, said)
+        return later, {o.id: o for o in last}
+
+    def test_it_answers_where_the_filter_expects_objects(self):
+        recorded = {m.stamp.sequence: m for _, _, m in perdure.read(drive.mcap, "detections")}
+        kept, gone = self.run_looking(1.5), self.run_looking(-1.5)
+        answers = [(f, d) for f in kept[0] for d in f.detections]
+        self.assertGreater(len(answers), 20)
+        near = 0
+        for found, answer in answers:
+            self.assertTrue(answer.primed)
+            self.assertGreater(answer.primed_for, 0)
+            np.testing.assert_allclose(answer.activations, [0] + [1.5] * (len(answer.activations) - 1))
+            boxes = [d.box for d in recorded[found.stamp.sequence].detections if not d.primed]
+            near += any(perdure.service._overlaps(answer.box[None], b[None])[0, 0] > 0.5 for b in boxes)
+        self.assertGreater(near, 0.5 * len(answers), "answers are where the objects are")
+        # What is said to be there stays; what is said not to be there goes.
+        asked = {d.primed_for for _, d in answers} & {d.primed_for for f in gone[0] for d in f.detections}
+        self.assertGreater(len(asked), 2)
+        exists = [[run[1][i].existence if i in run[1] else 0.0 for i in asked] for run in (kept, gone)]
+        self.assertGreater(np.mean(exists[0]), np.mean(exists[1]) + 0.3, exists)
+        self.assertGreater(np.mean(np.array(exists[0]) > exists[1]), 0.6, exists)  # some were merged
+
+    def test_answers_of_a_wrong_shape_are_refused(self):
+        asked = [perdure.Prediction(object_id=3, class_name="lamp")]
+        asked[0].box = (1, 2, 5, 9)
+        answers = perdure.service._answers_of
+        for said, pattern in (
+            ([1, 2], r"shape \(1,\), one for each prediction, not \(2,\)"),
+            (([1], [[1, 2]]), r"boxes of shape \(1, 4\), not \(1, 2\)"),
+        ):
+            with self.assertRaisesRegex(perdure.Refused, pattern):
+                answers(said, asked, 2)
+        self.assertEqual(answers([np.nan], asked, 2), [])
+        (cut,) = answers(([-80.0], [[2, 2, 6, 9]]), asked, 2)
+        self.assertEqual(cut.activations.tolist(), [0, -5, -5])
+        self.assertEqual(cut.box.tolist(), [2, 2, 6, 9])
+
+    def test_predictions_of_another_frame_are_not_used(self):
+        stamp = lambda t: perdure.FrameStamp(source=4, time_ns=t)  # noqa: E731
+        frame = perdure.Frame(stamp=stamp(10**9), camera="cam0", width=100, height=50)
+        moves = perdure.Prediction(object_id=3, class_name="car", velocity_x2=50.0)
+        moves.box = (60, 10, 90, 40)
+        unknown = perdure.Prediction(object_id=4, class_name="boat")
+        unknown.box = moves.box
+        outside = perdure.Prediction(object_id=5, class_name="car")
+        outside.box = (-30, 10, -5, 40)
+        expected = perdure.service._expected_in
+        said = perdure.Predictions(
+            stamp=stamp(10**9 - 4 * 10**8), camera="cam0", predictions=[moves, unknown, outside]
+        )
+        (one,) = expected(said, frame, ["car"])
+        self.assertEqual(one.box.tolist(), [60, 10, 100, 40], "moved on, and its part inside")
+        self.assertEqual(moves.box.tolist(), [60, 10, 90, 40])
+        for stale in (
+            perdure.Predictions(stamp=stamp(10**9 + 1), camera="cam0"),
+            perdure.Predictions(stamp=stamp(4 * 10**8), camera="cam0"),
+            perdure.Predictions(stamp=stamp(10**9), camera="cam1"),
+            perdure.Predictions(stamp=perdure.FrameStamp(source=5, time_ns=10**9), camera="cam0"),
+        ):
+            with self.assertRaises(LookupError):
+                expected(stale, frame, ["car"])
+        met = perdure.Detection(activations=[0, 1])
+        met.box = (58, 11, 99, 40)
+        self.assertEqual(perdure.service._unmet([one], [met]), [])
+        self.assertEqual(perdure.service._unmet([one], []), [one])
 
     def test_a_service_that_never_works_ends_with_the_reason(self):
         for returns, pattern in (

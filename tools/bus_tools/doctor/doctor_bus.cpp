@@ -10,13 +10,19 @@
 namespace perdure::tools {
 namespace {
 
-Findings checkUsualServices(const std::vector<std::string>& participants) {
+Findings checkUsualServices(const std::vector<std::string>& participants,
+                            const std::vector<bus::RemoteEndpoint>& endpoints,
+                            const std::string& prefix) {
   Findings findings;
   for (const char* service : kUsualServices) {
     const auto n = std::count(participants.begin(), participants.end(), service);
     if (n > 0) {
       findings.push_back({Verdict::kOk, std::string(service) + " is on the bus" +
                                             (n > 1 ? " " + std::to_string(n) + " times" : "")});
+    } else if (const auto other = bus::standInFor(service, endpoints, prefix)) {
+      findings.push_back({Verdict::kOk, std::string(service) + " is not on the bus; " +
+                                            other->process + " stands in for it: it writes " +
+                                            other->topic});
     } else {
       findings.push_back({Verdict::kWarn, std::string(service) +
                                               " is not on the bus; is it running, with the same "
@@ -105,8 +111,9 @@ Findings checkBus(const bus::Options& options, double seconds) {
     runLoop(loop, seconds);
     const std::vector<std::string> participants = discovery.participants();
     findings.push_back(checkCount(participants.size()));
-    append(findings, checkUsualServices(participants));
-    append(findings, checkTypes(discovery.endpoints(), participant.wireName("")));
+    const std::vector<bus::RemoteEndpoint> endpoints = discovery.endpoints();
+    append(findings, checkUsualServices(participants, endpoints, participant.wireName("")));
+    append(findings, checkTypes(endpoints, participant.wireName("")));
     for (const auto& [name, health] : processes) {
       findings.push_back(findingOf(health));
       append(findings, checkCounts(health));

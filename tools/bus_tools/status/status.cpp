@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/bus/discovery.h"
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
@@ -75,11 +76,45 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
   return node;
 }
 
+bool isHeard(const StatusSeen& seen, const std::string& process) {
+  const auto it = seen.services.find(process);
+  return it != seen.services.end() && it->second.age_s <= kSilentHealth;
+}
+
+/// The process that writes what `service` would, where that is not heard; empty where none does.
+std::string standInFor(const StatusSeen& seen, const std::string& service) {
+  if (isHeard(seen, service)) return {};
+  for (const auto& [name, topic] : seen.topics) {
+    for (const std::string& process : topic.written_by) {
+      if (bus::standsIn(service, name, process)) return process;
+    }
+  }
+  return {};
+}
+
+/// Whether its data come is judged where sensors and topics are.
+StatusNode standingIn(const StatusSeen& seen, const std::string& service,
+                      const std::string& process) {
+  std::string topics;
+  for (const auto& [name, topic] : seen.topics) {
+    if (bus::standsIn(service, name, process) && topic.written_by.contains(process))
+      topics += (topics.empty() ? "" : ", ") + name;
+  }
+  StatusNode node{service};
+  node.text = process + " stands in for it: it writes " + topics;
+  node.data = {{"stand_in", process}};
+  return node;
+}
+
 StatusNode judgeServices(const StatusSeen& seen) {
   StatusNode node{"services"};
   for (const char* name : kUsualServices) {
     const auto it = seen.services.find(name);
-    node.add(judgeService(name, it == seen.services.end() ? nullptr : &it->second));
+    if (const std::string process = standInFor(seen, name); !process.empty()) {
+      node.add(standingIn(seen, name, process));
+    } else {
+      node.add(judgeService(name, it == seen.services.end() ? nullptr : &it->second));
+    }
   }
   for (const auto& [name, service] : seen.services) {
     const bool usual = std::find(std::begin(kUsualServices), std::end(kUsualServices), name) !=
@@ -169,18 +204,22 @@ double expectedOf(const StatusSeen& seen, const std::string& name) {
 
 StatusNode judgeTopics(const StatusSeen& seen, const Source& source) {
   StatusNode node{"topics"};
+  const std::string foreign_odometry = standInFor(seen, "vio");
   for (const auto& [name, topic] : seen.topics) {
     if (name.starts_with("frame/") || name == "imu" || name == "speed") continue;  // sensors
     if (name == "health") continue;                                                // services
-    node.add(judgeTopic(name, topic, expectedOf(seen, name), source));
+    const bool none = name == "landmarks" && topic.writers == 0 && !foreign_odometry.empty();
+    node.add(judgeTopic(name, topic, none ? 0.0 : expectedOf(seen, name), source));
+    if (none)
+      addSentence(node.children.back().text, "the odometry of " + foreign_odometry + " has none");
   }
   return node;
 }
 
-/// By what capture says of its frames: they are not read here, for their size.
-TopicSeen framesOf(const StatusSeen& seen, TopicSeen topic) {
-  const auto capture = seen.services.find("capture");
-  if (capture == seen.services.end() || capture->second.age_s > kSilentHealth) return topic;
+/// By what their source says of its frames: they are not read here, for their size.
+TopicSeen framesOf(const StatusSeen& seen, const std::string& source, TopicSeen topic) {
+  if (!isHeard(seen, source)) return topic;
+  const auto capture = seen.services.find(source);
   topic.rate_hz = capture->second.frames_hz;
   topic.age_s.reset();
   if (topic.rate_hz > 0) topic.age_s = 0.0;
@@ -198,15 +237,21 @@ StatusNode judgeSpeed(StatusNode node, const TopicSeen& topic, const Source& sou
 
 StatusNode judgeSensors(const StatusSeen& seen, const Source& source) {
   StatusNode node{"sensors"};
+  const std::string stand_in = standInFor(seen, "capture");
+  const std::string source_of_frames = stand_in.empty() ? "capture" : stand_in;
   if (!seen.calibration) {
     node.level = Level::kDegraded;
-    node.text = "no calibration is heard: capture gives it when it has found its source";
+    node.text =
+        "no calibration is heard: " + source_of_frames + " gives it when it has found its source";
   }
   for (const auto& [name, topic] : seen.topics) {
     if (name.starts_with("frame/")) {
       const bool somebody_has_it = expectedOf(seen, name) > 0 || topic.writers > 0;
       if (!somebody_has_it) continue;
-      node.add(judgeTopic(name, framesOf(seen, topic), expectedOf(seen, name), source));
+      // A stand-in without Health does not tell how many there are.
+      const bool told = stand_in.empty() || isHeard(seen, stand_in);
+      node.add(judgeTopic(name, framesOf(seen, source_of_frames, topic),
+                          told ? expectedOf(seen, name) : 0.0, source));
     } else if (name == "imu") {
       node.add(judgeTopic(name, topic, expectedOf(seen, name), source));
     } else if (name == "speed" && seen.calibration && seen.calibration->has_speed) {

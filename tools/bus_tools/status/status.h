@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,9 @@ struct TopicSeen {
   std::size_t writers = 0, readers = 0;
   std::size_t messages = 0;  ///< in the window of the rate
   double rate_hz = 0.0;
-  std::optional<double> age_s;       ///< nothing where no message came
-  std::optional<double> latency_ms;  ///< median, from capture to here; of one host
+  std::optional<double> age_s;            ///< nothing where no message came
+  std::optional<double> latency_ms;       ///< median, from capture to here; of one host
+  std::set<std::string> written_by = {};  ///< names of processes, where they have one
 };
 
 struct DiskSeen {

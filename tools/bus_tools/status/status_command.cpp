@@ -14,7 +14,8 @@ namespace {
 
 constexpr const char* kStatusHelp = R"(
 Expected rates are those of the topic table for the camera and the IMU of `calibration`; images are
-not read, their rate is what capture says. Exit status: 0 ok, 1 degraded, 2 failed or nobody there.)";
+not read, their rate is what capture says. A bridge or a driver that writes what capture, vio or
+inference would stands in for it. Exit status: 0 ok, 1 degraded, 2 failed or nobody there.)";
 
 struct StatusOptions {
   bus::Options bus;

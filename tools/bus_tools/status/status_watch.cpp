@@ -129,6 +129,7 @@ StatusSeen StatusWatch::seen() {
     if (!endpoint.wire_name.starts_with(prefix) || endpoint.process == "perdure status") continue;
     TopicSeen& topic = seen.topics[endpoint.wire_name.substr(prefix.size())];
     ++(endpoint.writer ? topic.writers : topic.readers);
+    if (endpoint.writer && !endpoint.process.empty()) topic.written_by.insert(endpoint.process);
   }
   return seen;
 }

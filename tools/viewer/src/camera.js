@@ -12,6 +12,7 @@ export class CameraView {
     this.pen = canvas.getContext('2d');
     this.images = []; // {time, at, bitmap}
     this.annotations = null;
+    this.likelihood = false; // draws regions as bright as their class is likely, over a darker image
     this.drawn = 0;
     setInterval(() => this.drawLate(), 100);
   }
@@ -27,6 +28,11 @@ export class CameraView {
   takeAnnotations(message) {
     this.annotations = { time: seconds(message.timestamp), message, at: performance.now() };
     this.drawMatching();
+  }
+
+  showLikelihood(on) {
+    this.likelihood = on;
+    this.annotations = null; // of the other kind
   }
 
   drawMatching() {
@@ -55,6 +61,10 @@ export class CameraView {
     this.figure.classList.add('has-image');
     this.caption.textContent = '';
     this.shownTime = time;
+    if (this.likelihood) {
+      pen.fillStyle = 'rgba(0,0,40,0.55)';
+      pen.fillRect(0, 0, canvas.width, canvas.height);
+    }
     if (message) this.drawAnnotations(message);
     ++this.drawn;
   }
@@ -75,6 +85,10 @@ export class CameraView {
       } else {
         p.points.forEach((q, i) => (i ? pen.lineTo(q.x, q.y) : pen.moveTo(q.x, q.y)));
         pen.closePath();
+        if (p.fill_color.a > 0) {
+          pen.fillStyle = css(p.fill_color);
+          pen.fill();
+        }
       }
       pen.stroke();
     }
@@ -83,7 +97,7 @@ export class CameraView {
     for (const t of message.texts) {
       const width = pen.measureText(t.text).width + 8 * scale, height = 16 * scale;
       const box = { x: Math.min(t.position.x, canvas.width - width), y: Math.max(0, t.position.y - height) };
-      if (taken.some((o) => Math.abs(o.x - box.x) < (o.w + width) / 2 && Math.abs(o.y - box.y) < height)) continue;
+      if (taken.some((o) => box.x < o.x + o.w && o.x < box.x + width && Math.abs(o.y - box.y) < height)) continue;
       taken.push({ ...box, w: width });
       pen.fillStyle = css(t.background_color);
       pen.fillRect(box.x, box.y, width, height);

@@ -135,6 +135,7 @@ export class EventLog {
 export function renderServices(element, health) {
   const open = new Set([...element.querySelectorAll('details[open]')].map((d) => d.dataset.process));
   const articles = health.services.map((s) => {
+    if (s.stood_in_for) return `<article data-state="ok"><h3>${escaped(s.process)} <span class="dim">stood in for</span></h3><p>${escaped(s.message)}</p></article>`;
     const silent = s.age_s > 2.5;
     const reasons = Object.entries(s.reasons).map(([name, n]) => `<span>${escaped(name)}</span><span>${n}</span>`).join('');
     const cpu = s.cpu >= 0 ? `${(100 * s.cpu).toFixed(0)} % CPU, ` : '';

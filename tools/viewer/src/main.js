@@ -63,8 +63,9 @@ function lookThroughCamera() {
   if (!first || cameraTopic || !showsCamera) return;
   cameraTopic = first.topic;
   connection.on(cameraTopic, (view) => camera.takeImage(view).catch((e) => console.warn(`image: ${e.message}`)));
-  connection.on(cameraTopic.replace(/image$/, 'annotations'), (m) => camera.takeAnnotations(m));
+  connection.on(overlayTopic(), (m) => camera.takeAnnotations(m));
 }
+const overlayTopic = () => cameraTopic.replace(/image$/, camera.likelihood ? 'likelihood' : 'annotations');
 let showsCamera = true;
 
 connection.on('/objects', (message) => {
@@ -139,10 +140,16 @@ const toggles = {
     if (showsCamera) lookThroughCamera();
     else if (cameraTopic) {
       connection.off(cameraTopic); // nobody looks: nothing is sent
-      connection.off(cameraTopic.replace(/image$/, 'annotations'));
+      connection.off(overlayTopic());
       cameraTopic = '';
     }
     return showsCamera;
+  },
+  b: () => {
+    if (cameraTopic) connection.off(overlayTopic());
+    camera.showLikelihood(!camera.likelihood);
+    if (cameraTopic) connection.on(overlayTopic(), (m) => camera.takeAnnotations(m));
+    return camera.likelihood;
   },
 };
 function toggle(key) {

@@ -4,7 +4,7 @@ import { Orbit } from './orbit.js';
 import { Thing } from './things.js';
 import { colourOf, looksLike } from './words.js';
 
-const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120;
+const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120, ANSWERED_MS = 150;
 
 export class World {
   constructor(canvas, labels, onPick) {
@@ -25,7 +25,7 @@ export class World {
     this.follow = true;
     this.chosen = 0;
     this.dirty = true;
-    this.drawn = this.slow = this.restsUntil = 0;
+    this.drawn = this.slow = this.took = this.restsUntil = 0;
     this.light();
     this.addGround();
     this.addVehicle();
@@ -259,6 +259,8 @@ export class World {
     this.thing(id)?.choose(true);
     this.showBlocker();
     this.dirty = true;
+    // What is said of it goes before the next picture, where that takes long.
+    if (this.took >= SLOW_MS) this.restsUntil = Math.max(this.restsUntil, performance.now() + ANSWERED_MS);
   }
 
   /** A line from what is chosen to what hides it. */
@@ -320,6 +322,7 @@ export class World {
     if (this.drewAt === undefined) return;
     const took = now - this.drewAt; // until the frame after it
     this.drewAt = undefined;
+    this.took = took;
     if (took < SLOW_MS) {
       this.slow = Math.max(0, this.slow - 1);
       return;

@@ -169,6 +169,75 @@ TEST(Annotations, LeaveOutWhatIsBehindAndDrawBoxesAsBrightAsTheyAreLikely) {
   EXPECT_TRUE(message["texts"].empty());
 }
 
+ModelInfo carsAndPersons() {
+  ModelInfo model;
+  model.classes = {"person", "car"};
+  return model;
+}
+
+TEST(Likelihood, IsTheBrightnessOfTheRegionWhoseBoxMeetsIt) {
+  const Calibration calibration = test::forwardCamera();
+  const CameraModel camera(calibration.cameras[0]);
+  ObjectBelief near = objectAt(4, {10, 0, 0}), far = objectAt(5, {20, 6, 0});
+  near.classes[0].mean[3] = 0;
+  Detections detections;
+  detections.detections = {
+      test::detectionOf({275, 202, 365, 278}, {0.F, 3.F, 1.F}),   // the near one's
+      test::detectionOf({300, 210, 330, 260}, {0.F, -9.F, 9.F}),  // inside, of too little overlap
+      test::detectionOf({1, 2, 3, 4}, {0.F, 9.F, 9.F})};
+  const ModelInfo model = carsAndPersons();
+  const json message =
+      json::parse(likelihoodRegions(frameOf(1, {near, far}), camera, &detections, &model));
+  ASSERT_EQ(message["points"].size(), 2u);
+  // The farther one is drawn first, and black: the network says nothing of it.
+  EXPECT_EQ(message["points"][0]["fill_color"]["r"], 0);
+  EXPECT_EQ(message["texts"][0]["text"], "car 5 nothing said");
+  EXPECT_NEAR(message["points"][1]["fill_color"]["r"], 1 / (1 + std::exp(-1.0)), 1e-3);
+  EXPECT_EQ(message["texts"][1]["text"], "car 4 0.73");
+  // The hull is that of its rear face, 8 m away.
+  double left = 1e9, right = -1e9;
+  for (const auto& p : message["points"][1]["points"]) {
+    left = std::min(left, p["x"].get<double>());
+    right = std::max(right, p["x"].get<double>());
+  }
+  EXPECT_NEAR(left, 320 - 400 * 0.9 / 8, 0.1);
+  EXPECT_NEAR(right, 320 + 400 * 0.9 / 8, 0.1);
+  EXPECT_LE(message["points"][1]["points"].size(), 20u);
+}
+
+TEST(Likelihood, IsTheAnswerToThePredictionWhereNoBoxMeetsIt) {
+  const Calibration calibration = test::forwardCamera();
+  const CameraModel camera(calibration.cameras[0]);
+  Detection answer = test::detectionOf({275, 202, 365, 278}, {0.F, 0.F, -1.F});
+  answer.primed = true;
+  answer.primed_for = 4;
+  Detections detections;
+  detections.detections = {answer};
+  const ModelInfo model = carsAndPersons();
+  const json message = json::parse(
+      likelihoodRegions(frameOf(1, {objectAt(4, {10, 0, 0}), objectAt(5, {10, 0.2, 0})}), camera,
+                        &detections, &model));
+  std::set<std::string> said;
+  for (const auto& one : message["texts"]) said.insert(one["text"]);
+  EXPECT_EQ(said, (std::set<std::string>{"car 4 0.27 top-down", "car 5 nothing said"}));
+}
+
+TEST(Likelihood, LeavesOutWhatIsHiddenAndDoesNotNeedAModel) {
+  const Calibration calibration = test::forwardCamera();
+  const CameraModel camera(calibration.cameras[0]);
+  ObjectBelief hidden = objectAt(4, {10, 0, 0}), other = objectAt(5, {10, 0, 0}, kOtherClass);
+  hidden.visibility = Visibility::kOccluded;
+  Detections detections;
+  detections.detections = {test::detectionOf({275, 202, 365, 278}, {0.F, 3.F, 1.F})};
+  const json without =
+      json::parse(likelihoodRegions(frameOf(1, {hidden, other}), camera, &detections, nullptr));
+  ASSERT_EQ(without["points"].size(), 1u);
+  const ModelInfo model = carsAndPersons();
+  const json with =
+      json::parse(likelihoodRegions(frameOf(1, {hidden, other}), camera, &detections, &model));
+  EXPECT_EQ(with["texts"][0]["text"], "other 5 nothing said") << "it is no class of the network";
+}
+
 TEST(World, ThinsALongWayAndKeepsItsShape) {
   Trajectory way;
   for (int i = 0; i < 100000; ++i) {
@@ -197,6 +266,31 @@ TEST(World, PutsAnImageIntoCdrAsItsIdlSays) {
                              'l', 0, 0, 0, 0,   3,   0,   0,   0,   9,   8,   7,   0,  // data
                              5,   0, 0, 0, 'j', 'p', 'e', 'g', 0};
   EXPECT_EQ(cdr, expected);
+}
+
+TEST(VitalSigns, TellOfAServiceThatAnotherProcessStandsInFor) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  VitalSigns signs("ego");
+  Health capture;
+  capture.process = "capture";
+  capture.state = HealthState::kOk;
+  Health bridge = capture;
+  bridge.process = "ros2";
+  signs.onHealth(capture, kSecond);
+  signs.onHealth(bridge, 10 * kSecond);
+  EXPECT_TRUE(signs.hears("ros2", 10 * kSecond));
+  EXPECT_FALSE(signs.hears("capture", 10 * kSecond));
+  EXPECT_FALSE(signs.hears("vio", 10 * kSecond));
+  EXPECT_THAT(signs.healthz(10 * kSecond), HasSubstr("\"status\":\"degraded\""));
+  signs.setStandIns({{"capture", "ros2 stands in for it: it writes frame/cam0"}});
+  EXPECT_THAT(signs.healthz(10 * kSecond), HasSubstr("\"status\":\"ok\""));
+  EXPECT_THAT(signs.healthz(10 * kSecond), HasSubstr("\"capture\":\"stood_in_for\""));
+  const json services = json::parse(signs.json(10 * kSecond, {}))["services"];
+  ASSERT_EQ(services.size(), 2u);
+  EXPECT_EQ(services[0]["process"], "capture");
+  EXPECT_EQ(services[0]["stood_in_for"], true);
+  EXPECT_THAT(services[0]["message"], HasSubstr("ros2 stands in for it"));
+  EXPECT_EQ(services[1]["process"], "ros2");
 }
 
 TEST(VitalSigns, TellSilenceProcessorTimeAndReasons) {

@@ -1,6 +1,7 @@
 // Foxglove's own client against the gateway: every channel that is advertised is subscribed, decoded
 // and compared with Foxglove's schemas; every service is called.
 // usage: node foxglove.mjs NODE_MODULES PORT SUBPROTOCOL
+import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 
@@ -99,5 +100,44 @@ for (const topic of channels.keys()) if (!got.has(topic)) fail(`${topic}: nothin
 for (const { service, answer } of answers.values()) if (answer === null) fail(`${service.name}: no answer`);
 if (times === 0) fail('no time was told');
 if (socket.protocol !== subprotocol) fail(`it speaks ${socket.protocol}`);
-console.log(JSON.stringify({ problems: [...new Set(problems)].slice(0, 20), channels: channels.size, messages: [...got.values()].reduce((a, b) => a + b, 0) }));
+// The layout for Foxglove names nothing that is not advertised, and nothing of another schema.
+const layout = JSON.parse(readFileSync(new URL('../../../../tools/viewer/src/foxglove_layout.json', import.meta.url)));
+let named = 0;
+function expectChannel(where, topic, ...kinds) {
+  ++named;
+  const channel = channels.get(topic);
+  if (!channel) fail(`layout: ${where} names ${topic}, which nobody advertises`);
+  else if (kinds.length > 0 && !kinds.includes(channel.schemaName.replace('::', '.'))) fail(`layout: ${where} shows ${topic} of ${channel.schemaName}`);
+  return channel;
+}
+/** "/objects.objects[:]{id==$object}.r": each member is in the schema, also of the filters. */
+function expectPath(where, path) {
+  const [topic] = path.match(/^[\w/]+/);
+  const channel = expectChannel(where, topic);
+  let at = channel && JSON.parse(channel.schema);
+  for (const [, member, filter, slice] of path.slice(topic.length).matchAll(/\.(\w+)|\{([^}]*)\}|\[([\d:]*)\]/g)) {
+    if (!at) return;
+    if (slice !== undefined) at = at.items;
+    else if (filter !== undefined) {
+      const [name, value] = filter.split(/[=!<>]=?/);
+      if (!at.properties?.[name]) fail(`layout: ${where}: ${path} has no ${name}`);
+      if (value[0] === '$' && !(value.slice(1) in layout.globalVariables)) fail(`layout: ${where}: ${value} is no variable`);
+    } else if (!(at = at.properties?.[member])) fail(`layout: ${where}: ${path} has no ${member}`);
+  }
+}
+const DRAWN = ['foxglove.SceneUpdate', 'foxglove.PoseInFrame', 'foxglove.PosesInFrame', 'foxglove.PointCloud'];
+for (const [panel, config] of Object.entries(layout.configById)) {
+  for (const topic of Object.keys(config.topics ?? {})) expectChannel(panel, topic, ...DRAWN);
+  const { imageTopic, calibrationTopic, annotations = {} } = config.imageMode ?? {};
+  if (imageTopic) expectChannel(panel, imageTopic, 'foxglove.CompressedImage');
+  if (calibrationTopic) expectChannel(panel, calibrationTopic, 'foxglove.CameraCalibration');
+  for (const topic of Object.keys(annotations)) expectChannel(panel, topic, 'foxglove.ImageAnnotations');
+  if (config.topicToRender) expectChannel(panel, config.topicToRender, 'foxglove.Log');
+  for (const path of [config.topicPath, ...(config.paths ?? []).map((p) => p.value)]) if (path) expectPath(panel, path);
+}
+const placed = (node) => (typeof node === 'string' ? [node] : [...placed(node.first), ...placed(node.second)]);
+if (String(placed(layout.layout).sort()) !== String(Object.keys(layout.configById).sort())) fail('layout: a panel has no place, or a place no panel');
+for (const kind of ['3D', 'Image', 'Plot', 'RosOut']) if (!Object.keys(layout.configById).some((p) => p.startsWith(`${kind}!`))) fail(`layout: no ${kind}`);
+
+console.log(JSON.stringify({ named, problems: [...new Set(problems)].slice(0, 20), channels: channels.size, messages: [...got.values()].reduce((a, b) => a + b, 0) }));
 process.exit(problems.length > 0 ? 1 : 0);

@@ -94,6 +94,9 @@ check(await page.$eval('[data-panel=events]', (e) => !e.hidden), '3 opens the ev
 await page.screenshot({ path: join(out, 'events.png') });
 await page.keyboard.press('4');
 await pause(1200);
+// The test writes what three services would.
+const services = await page.$eval('#services', (e) => e.innerText);
+for (const topic of ['frame/cam0', 'odometry', 'detections']) check(services.includes(`test stands in for it: it writes ${topic}`), `who writes ${topic} stands in (${services})`);
 await page.screenshot({ path: join(out, 'services.png') });
 await page.keyboard.press('t');
 await pause(400);
@@ -105,6 +108,36 @@ await page.keyboard.press('c');
 await pause(300);
 check(await page.$eval('#camera', (e) => e.hidden), 'C closes the camera');
 await page.keyboard.press('c');
+
+// B: objects as bright as their class is likely. The test's network says exp(2) : 1 of the first car,
+// nothing of the second; the third is hidden.
+await page.keyboard.press('b');
+const shown = await page.evaluate(() => window.perdure.camera.drawn);
+await page.waitForFunction((n) => window.perdure.camera.annotations?.message.texts.some((t) => /said|\d\.\d\d/.test(t.text)) && window.perdure.camera.drawn > n + 2, { timeout: 20000, polling: 50 }, shown).catch(() => {});
+const likelihood = await page.evaluate(() => {
+  const { canvas, annotations } = window.perdure.camera, pen = canvas.getContext('2d');
+  const { points, texts } = annotations.message;
+  const within = points.map((p) => {
+    const sum = p.points.reduce((a, q) => [a[0] + q.x, a[1] + q.y], [0, 0]);
+    return [...pen.getImageData(Math.round(sum[0] / p.points.length), Math.round(sum[1] / p.points.length), 1, 1).data].slice(0, 3);
+  });
+  return { texts: texts.map((t) => t.text), within, corner: [...pen.getImageData(3, canvas.height - 3, 1, 1).data].slice(0, 3),
+    pressed: document.querySelector('[data-key=b]').getAttribute('aria-pressed') };
+});
+figures.likelihood = likelihood;
+check(likelihood.pressed === 'true' && likelihood.texts.length === 2, `the hidden car has no likelihood (${likelihood.texts})`);
+const bright = (name) => likelihood.within[likelihood.texts.findIndex((t) => t.startsWith(name))]?.[0];
+check(likelihood.texts.includes('car 1 0.88') && bright('car 1') > 190, `car 1 is bright (${JSON.stringify(likelihood)})`);
+check(likelihood.texts.includes('car 2 nothing said') && bright('car 2') < 20, `car 2 is black (${JSON.stringify(likelihood)})`);
+check(likelihood.corner[0] < 60, `the image is darker (${likelihood.corner})`);
+await page.screenshot({ path: join(out, 'likelihood.png') });
+await page.keyboard.press('?');
+await pause(300);
+check((await page.$eval('#help', (e) => e.innerText)).includes('as bright as their class is likely'), 'the help tells of B');
+await page.screenshot({ path: join(out, 'help.png') });
+await page.keyboard.press('Escape');
+await page.keyboard.press('b');
+check(await page.$eval('[data-key=b]', (e) => e.getAttribute('aria-pressed')) === 'false', 'B again closes it');
 
 // A pole whose event is heard before the objects of its W stays; poles of another W go.
 const poles = await page.evaluate(() => {

@@ -83,6 +83,74 @@ TEST(Status, AServiceThatIsMissingOrSilentHasFailed) {
   EXPECT_THAT(find(judge(seen), "map_store").text, HasSubstr("says nothing for 1.6 s"));
 }
 
+/// The bridge to ROS 2 takes a camera, an IMU and a foreign odometry.
+StatusSeen bridged() {
+  StatusSeen seen = sound();
+  seen.services["ros2"] = seen.services.at("capture");
+  seen.services["ros2"].health.process = "ros2";
+  seen.services.erase("capture");
+  seen.services.erase("vio");
+  for (const char* name : {"frame/cam0", "imu", "calibration", "odometry", "health"})
+    seen.topics[name].written_by = {"ros2"};
+  seen.topics["landmarks"] = {0, 2, 0, 0.0, {}, {}};
+  return seen;
+}
+
+TEST(Status, IsOkWhereTheBridgeStandsInForCaptureAndVio) {
+  const StatusNode root = judge(bridged());
+  EXPECT_EQ(root.level, Level::kOk) << toText(root, false);
+  EXPECT_EQ(find(root, "capture").text, "ros2 stands in for it: it writes frame/cam0");
+  EXPECT_EQ(find(root, "vio").text, "ros2 stands in for it: it writes odometry");
+  EXPECT_EQ(toJson(find(root, "vio"))["stand_in"], "ros2");
+  EXPECT_THAT(find(root, "frame/cam0").text, HasSubstr("20.0 of 20 Hz"));
+  EXPECT_THAT(find(root, "landmarks").text, HasSubstr("the odometry of ros2 has none"));
+}
+
+TEST(Status, AStandInWhoseDataDoNotComeHasFailed) {
+  StatusSeen seen = bridged();
+  seen.topics["odometry"].age_s = 2.0;
+  EXPECT_EQ(dominating(seen, "odometry"), Level::kFailed);
+  seen = bridged();
+  seen.services["ros2"].frames_hz = 0.0;
+  EXPECT_EQ(dominating(seen, "frame/cam0"), Level::kFailed);
+  seen = bridged();
+  seen.services["ros2"].age_s = 3.0;
+  EXPECT_EQ(dominating(seen, "ros2"), Level::kFailed);
+  seen = bridged();
+  seen.calibration.reset();
+  EXPECT_EQ(dominating(seen, "sensors"), Level::kDegraded);
+  EXPECT_THAT(find(judge(seen), "sensors").text, HasSubstr("ros2 gives it"));
+}
+
+TEST(Status, WhatWritesOtherTopicsStandsInForNobody) {
+  StatusSeen seen = bridged();
+  seen.topics["odometry"].written_by = {};
+  EXPECT_EQ(dominating(seen, "vio"), Level::kFailed);
+  EXPECT_THAT(find(judge(seen), "vio").text, HasSubstr("is not heard"));
+  seen = sound();
+  seen.services.erase("semantic_filter");
+  seen.topics["objects"].written_by = {"ros2"};
+  EXPECT_EQ(dominating(seen, "semantic_filter"), Level::kFailed);
+}
+
+TEST(Status, AServiceThatIsHeardIsJudgedItself) {
+  StatusSeen seen = bridged();
+  seen.services["vio"] = sound().services.at("vio");
+  seen.services["vio"].health.state = HealthState::kFailed;
+  EXPECT_EQ(dominating(seen, "vio"), Level::kFailed);
+  seen.services["vio"].age_s = 60.0;  // it was stopped, and the bridge took over
+  EXPECT_EQ(judge(seen).level, Level::kOk);
+}
+
+TEST(Status, AStandInWithoutHealthDoesNotTellItsRateOfFrames) {
+  StatusSeen seen = bridged();
+  seen.services.erase("ros2");
+  for (auto& [name, topic] : seen.topics) {
+    if (topic.written_by.contains("ros2")) topic.written_by = {"my driver"};
+  }
+  EXPECT_EQ(judge(seen).level, Level::kOk) << toText(judge(seen), false);
+}
+
 TEST(Status, AServiceThatWasStartedJustNowIsWorthTelling) {
   StatusSeen seen = sound();
   seen.services["vio"].up_s = 4.0;
