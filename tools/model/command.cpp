@@ -30,6 +30,7 @@ with what the file says, and looks at a picture. Writes
   perdure model import yolov8n.onnx --image street.jpg        names are in the file
   perdure model import net.onnx --classes car,person          names in the network's order
   perdure model import net.onnx --classes coco.names --family yolov7 --size 640x640
+  perdure model import yolov8n.onnx --input camera --image street.jpg   wide cameras: a wide input
   perdure-inference --set model.path=yolov8n.perdure.onnx     then run it
 
 Look at the picture: colours, mean and scale of the input are the usual ones of the family, and
@@ -99,6 +100,10 @@ void import(const Request& request) {
   const TemporaryFolder folder;
   ImportRequest wanted{request.network, out, request.unchecked ? fs::path() : folder.path(),
                        request.arguments};
+  if (!request.image.empty()) {  // what "--input camera" goes by
+    const Frame picture = readPicture(request.image);
+    wanted.arguments.push_back(fmt::format("--camera={}x{}", picture.width, picture.height));
+  }
   std::fflush(stdout);
   if (const int status = importNetwork(wanted); status != 0) throw CLI::RuntimeError(status);
   const fs::path description = out.string() + ".model.json";
@@ -136,12 +141,16 @@ void addImport(CLI::App& model, const std::shared_ptr<Request>& request) {
   passOn(*command, *request, "--classes", "names in the network's order, or a file with one a line",
          "NAMES");
   passOn(*command, *request, "--family",
-         "instead of a guess: yolov5, yolov7, yolov8 (also v11), yolox, nanodet, fastestdet, ssd, "
-         "detr",
+         "instead of a guess: yolov5, yolov7, yolov8 (also v9 to v12 and 26), yolox, nanodet, "
+         "picodet, rtmdet, fastestdet, yolo-fastestv2, ssd, detr",
          "NAME");
   passOn(*command, *request, "--size", "of an input without a fixed size", "WxH");
+  passOn(*command, *request, "--input",
+         "another size than the file's, of a network that is convolutional; camera: the shape of "
+         "--image, with as many pixels",
+         "WxH|camera");
   passOn(*command, *request, "--anchors",
-         "yolov5, yolov7: W,H,W,H,… of each level, / between levels", "LIST");
+         "yolov5, yolov7, yolo-fastestv2: W,H,W,H,… of each level, / between levels", "LIST");
   passOn(*command, *request, "--priors", "ssd: a line x y width height for each box, in shares",
          "FILE");
   passOn(*command, *request, "--variances", "ssd: of centre and size (0.1,0.2)", "V,V");
