@@ -10,6 +10,7 @@
 
 #include "common/base/errors.h"
 #include "tools/model/check.h"
+#include "tools/model/import_run.h"
 #include "tools/model/importer.h"
 #include "tools/model/look.h"
 
@@ -35,13 +36,6 @@ with what the file says, and looks at a picture. Writes
 
 Look at the picture: colours, mean and scale of the input are the usual ones of the family, and
 boxes that are a little off say that they are other ones here.)";
-
-struct Request {
-  fs::path network, out, image;
-  double threshold = 0.25;
-  bool unchecked = false;
-  std::vector<std::string> arguments;
-};
 
 /// A folder that is gone with its owner.
 class TemporaryFolder {
@@ -95,7 +89,9 @@ void compare(const fs::path& network, const fs::path& reference) {
   std::printf("OpenCV      answers as the file says (within %.0e)\n", answers.difference);
 }
 
-void import(const Request& request) {
+}  // namespace
+
+void importAndLook(const ImportOptions& request) {
   const fs::path out = importedPath(request.network, request.out);
   const TemporaryFolder folder;
   ImportRequest wanted{request.network, out, request.unchecked ? fs::path() : folder.path(),
@@ -121,9 +117,11 @@ void import(const Request& request) {
               out.c_str(), description.c_str(), out.c_str());
 }
 
+namespace {
+
 /// An option that the Python part takes as it is.
-void passOn(CLI::App& command, Request& request, const std::string& name, const std::string& help,
-            const std::string& type) {
+void passOn(CLI::App& command, ImportOptions& request, const std::string& name,
+            const std::string& help, const std::string& type) {
   command
       .add_option_function<std::string>(
           name,
@@ -134,7 +132,7 @@ void passOn(CLI::App& command, Request& request, const std::string& name, const 
       ->type_name(type);
 }
 
-void addImport(CLI::App& model, const std::shared_ptr<Request>& request) {
+void addImport(CLI::App& model, const std::shared_ptr<ImportOptions>& request) {
   CLI::App* command = model.add_subcommand("import", "Make a detector's ONNX file ready for use");
   command->footer(kImportHelp);
   command->add_option("network", request->network, "the .onnx file")->required()->type_name("FILE");
@@ -174,10 +172,10 @@ void addImport(CLI::App& model, const std::shared_ptr<Request>& request) {
   command->add_flag("--no-check", request->unchecked,
                     "do not compare OpenCV's answers with the file's (seconds, for large networks "
                     "minutes)");
-  command->callback([request] { import(*request); });
+  command->callback([request] { importAndLook(*request); });
 }
 
-void addLook(CLI::App& model, const std::shared_ptr<Request>& request) {
+void addLook(CLI::App& model, const std::shared_ptr<ImportOptions>& request) {
   CLI::App* command =
       model.add_subcommand("look", "Draw what a network with a model.json sees in a picture");
   command->add_option("network", request->network, "the .onnx or .cfg file")
@@ -202,13 +200,16 @@ void addModelCommand(CLI::App& app) {
   model->footer(
       "\nA network is an ONNX file and a model.json that says what its numbers mean. `import` "
       "writes\nboth from the file that a training framework exports; `look` shows what one sees; "
-      "`calibrate`\nfits what it says to labelled frames.\n"
+      "`calibrate`\nfits what it says to labelled frames. `list` tells networks that are known to "
+      "work, `fetch`\n"
+      "takes one of them.\n"
       "\n  perdure model import yolov8n.onnx --image street.jpg\n"
       "  perdure model look yolov8n.perdure.onnx --image other.jpg --out other.png\n"
       "\nperdure model import --help tells the options; services/inference/README.md the "
       "families.");
-  addImport(*model, std::make_shared<Request>());
-  addLook(*model, std::make_shared<Request>());
+  addImport(*model, std::make_shared<ImportOptions>());
+  addLook(*model, std::make_shared<ImportOptions>());
+  addFetch(*model);
   addCalibrate(*model);
 }
 
