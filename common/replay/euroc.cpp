@@ -30,7 +30,9 @@ void addNotes(const SensorTable& table, Recording& recording) {
 }
 
 std::string judgeImu(const Fields& fields) {
-  if (fields.size() != 7) return std::to_string(fields.size()) + " columns; " + kImuColumns;
+  if (fields.size() != 7)
+    return std::to_string(fields.size()) + " columns; " + kImuColumns +
+           (fields.size() > 7 ? "; perdure doctor --data DRIVE --fix COPY leaves others out" : "");
   if (!parseNumbers({fields.begin() + 1, fields.end()}))
     return std::string("not seven numbers; ") + kImuColumns;
   return {};

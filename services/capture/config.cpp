@@ -42,6 +42,12 @@ void describeLive(Config& c, config::Fields& fields) {
                 {"live: of an image; 0: automatic", "ms"});
   fields.number("camera.gain", c.camera.gain, config::between(0, 100),
                 {"live: analogue gain; 0: automatic"});
+  fields.choice("camera.flip", c.camera.flip, {"none", "horizontal", "vertical", "both"},
+                {"live: images are mirrored by the camera, where it can; the rig is of the images "
+                 "as they come"});
+  fields.numbers("camera.crop", c.camera.crop, config::between(0, 65535),
+                 {"live: region of interest [x, y, width, height] in pixels of the sensor; empty: "
+                  "all of it. The rig must be of images that were cropped so"});
   fields.text("imu.uri", c.imu.uri,
               {"live: libiio's context of the IMU: local:, or ip:HOST of an iiod"});
   fields.text("imu.gyro", c.imu.gyro,
@@ -97,6 +103,12 @@ void requireSource(const Config& config) {
     throw StartupError(ExitCode::kConfiguration,
                        "source: libcamera needs rig: a file with the lens of the camera, its place "
                        "on the IMU and the IMU's noise; `perdure calibrate` writes it.");
+  }
+  const auto& crop = config.camera.crop;
+  if (live && !crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1)) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "camera.crop is not [x, y, width, height] with a width and height above 0; "
+                       "give these four, or none.");
   }
   if (live && !config.imu.mount.empty() && config.imu.mount.size() != 9) {
     throw StartupError(ExitCode::kConfiguration,

@@ -158,6 +158,12 @@ void readTensors(JsonReader& reader, ModelDescription& model, Level& level) {
       level.tensor = reader.text("tensor", true);
       level.anchors = anchorsOf(reader);
       break;
+    case Family::kYoloFastestV2:
+      level.box = reader.text("box", true);
+      level.objectness = reader.text("objectness", true);
+      level.classes = reader.text("classes", true);
+      level.anchors = anchorsOf(reader);
+      break;
     case Family::kYolov8:
     case Family::kNanoDet:
       level.tensor = reader.text("tensor", false);
@@ -232,8 +238,11 @@ void readHeads(JsonReader& reader, const std::string& file, ModelDescription& mo
   if (distances && !whole_boxes) {
     model.bins = model.family == Family::kNanoDet ? 8 : 16;
     model.cell_offset = model.family == Family::kNanoDet ? 0.0 : 0.5;
-    reader.integer("bins", model.bins, 2, 64);
+    reader.integer("bins", model.bins, 1, 64);
     reader.number("cell_offset", model.cell_offset, 0, 1);
+    if (model.bins == 1) {
+      reader.choice<bool>("distances", model.exponents, {{"linear", false}, {"exp", true}}, false);
+    }
   }
   const bool needs_outputs = model.family == Family::kSsd || model.family == Family::kDetr;
   if (!whole_boxes && !needs_outputs) readLevels(reader, model);

@@ -119,7 +119,10 @@ void readAll(JsonReader& reader, const std::string& file, ModelDescription& mode
                          {"yolov5", Family::kYolov5},
                          {"yolov7", Family::kYolov5},
                          {"yolov8", Family::kYolov8},
+                         {"rtmdet", Family::kYolov8},
                          {"nanodet", Family::kNanoDet},
+                         {"picodet", Family::kNanoDet},
+                         {"yolo-fastestv2", Family::kYoloFastestV2},
                          {"ssd", Family::kSsd},
                          {"detr", Family::kDetr}});
   if (const Json* input = reader.need("input")) readInput(*input, reader, model.input);

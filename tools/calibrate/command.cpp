@@ -189,6 +189,7 @@ void addCalibrateCommand(CLI::App& app) {
   addCommon(*board, *line, "FILE.svg");
   board->callback([line] { runBoard(*line); });
   addSimulate(*command, line);
+  addCalibrateImport(*command);
   command->require_subcommand(0, 1);
   command->final_callback([command, line] {
     if (command->get_subcommands().empty()) runCalibrate(*line);

@@ -8,5 +8,7 @@ class App;
 namespace perdure::tools {
 
 void addCalibrateCommand(CLI::App& app);
+/// Its part `import`.
+void addCalibrateImport(CLI::App& calibrate);
 
 }  // namespace perdure::tools

@@ -10,6 +10,7 @@
 
 #include "common/base/errors.h"
 #include "tools/model/check.h"
+#include "tools/model/import_run.h"
 #include "tools/model/importer.h"
 #include "tools/model/look.h"
 
@@ -30,17 +31,11 @@ with what the file says, and looks at a picture. Writes
   perdure model import yolov8n.onnx --image street.jpg        names are in the file
   perdure model import net.onnx --classes car,person          names in the network's order
   perdure model import net.onnx --classes coco.names --family yolov7 --size 640x640
+  perdure model import yolov8n.onnx --input camera --image street.jpg   wide cameras: a wide input
   perdure-inference --set model.path=yolov8n.perdure.onnx     then run it
 
 Look at the picture: colours, mean and scale of the input are the usual ones of the family, and
 boxes that are a little off say that they are other ones here.)";
-
-struct Request {
-  fs::path network, out, image;
-  double threshold = 0.25;
-  bool unchecked = false;
-  std::vector<std::string> arguments;
-};
 
 /// A folder that is gone with its owner.
 class TemporaryFolder {
@@ -94,11 +89,17 @@ void compare(const fs::path& network, const fs::path& reference) {
   std::printf("OpenCV      answers as the file says (within %.0e)\n", answers.difference);
 }
 
-void import(const Request& request) {
+}  // namespace
+
+void importAndLook(const ImportOptions& request) {
   const fs::path out = importedPath(request.network, request.out);
   const TemporaryFolder folder;
   ImportRequest wanted{request.network, out, request.unchecked ? fs::path() : folder.path(),
                        request.arguments};
+  if (!request.image.empty()) {  // what "--input camera" goes by
+    const Frame picture = readPicture(request.image);
+    wanted.arguments.push_back(fmt::format("--camera={}x{}", picture.width, picture.height));
+  }
   std::fflush(stdout);
   if (const int status = importNetwork(wanted); status != 0) throw CLI::RuntimeError(status);
   const fs::path description = out.string() + ".model.json";
@@ -116,9 +117,11 @@ void import(const Request& request) {
               out.c_str(), description.c_str(), out.c_str());
 }
 
+namespace {
+
 /// An option that the Python part takes as it is.
-void passOn(CLI::App& command, Request& request, const std::string& name, const std::string& help,
-            const std::string& type) {
+void passOn(CLI::App& command, ImportOptions& request, const std::string& name,
+            const std::string& help, const std::string& type) {
   command
       .add_option_function<std::string>(
           name,
@@ -129,19 +132,23 @@ void passOn(CLI::App& command, Request& request, const std::string& name, const 
       ->type_name(type);
 }
 
-void addImport(CLI::App& model, const std::shared_ptr<Request>& request) {
+void addImport(CLI::App& model, const std::shared_ptr<ImportOptions>& request) {
   CLI::App* command = model.add_subcommand("import", "Make a detector's ONNX file ready for use");
   command->footer(kImportHelp);
   command->add_option("network", request->network, "the .onnx file")->required()->type_name("FILE");
   passOn(*command, *request, "--classes", "names in the network's order, or a file with one a line",
          "NAMES");
   passOn(*command, *request, "--family",
-         "instead of a guess: yolov5, yolov7, yolov8 (also v11), yolox, nanodet, fastestdet, ssd, "
-         "detr",
+         "instead of a guess: yolov5, yolov7, yolov8 (also v9 to v12 and 26), yolox, nanodet, "
+         "picodet, rtmdet, fastestdet, yolo-fastestv2, ssd, detr",
          "NAME");
   passOn(*command, *request, "--size", "of an input without a fixed size", "WxH");
+  passOn(*command, *request, "--input",
+         "another size than the file's, of a network that is convolutional; camera: the shape of "
+         "--image, with as many pixels",
+         "WxH|camera");
   passOn(*command, *request, "--anchors",
-         "yolov5, yolov7: W,H,W,H,… of each level, / between levels", "LIST");
+         "yolov5, yolov7, yolo-fastestv2: W,H,W,H,… of each level, / between levels", "LIST");
   passOn(*command, *request, "--priors", "ssd: a line x y width height for each box, in shares",
          "FILE");
   passOn(*command, *request, "--variances", "ssd: of centre and size (0.1,0.2)", "V,V");
@@ -165,10 +172,10 @@ void addImport(CLI::App& model, const std::shared_ptr<Request>& request) {
   command->add_flag("--no-check", request->unchecked,
                     "do not compare OpenCV's answers with the file's (seconds, for large networks "
                     "minutes)");
-  command->callback([request] { import(*request); });
+  command->callback([request] { importAndLook(*request); });
 }
 
-void addLook(CLI::App& model, const std::shared_ptr<Request>& request) {
+void addLook(CLI::App& model, const std::shared_ptr<ImportOptions>& request) {
   CLI::App* command =
       model.add_subcommand("look", "Draw what a network with a model.json sees in a picture");
   command->add_option("network", request->network, "the .onnx or .cfg file")
@@ -193,13 +200,16 @@ void addModelCommand(CLI::App& app) {
   model->footer(
       "\nA network is an ONNX file and a model.json that says what its numbers mean. `import` "
       "writes\nboth from the file that a training framework exports; `look` shows what one sees; "
-      "`calibrate`\nfits what it says to labelled frames.\n"
+      "`calibrate`\nfits what it says to labelled frames. `list` tells networks that are known to "
+      "work, `fetch`\n"
+      "takes one of them.\n"
       "\n  perdure model import yolov8n.onnx --image street.jpg\n"
       "  perdure model look yolov8n.perdure.onnx --image other.jpg --out other.png\n"
       "\nperdure model import --help tells the options; services/inference/README.md the "
       "families.");
-  addImport(*model, std::make_shared<Request>());
-  addLook(*model, std::make_shared<Request>());
+  addImport(*model, std::make_shared<ImportOptions>());
+  addLook(*model, std::make_shared<ImportOptions>());
+  addFetch(*model);
   addCalibrate(*model);
 }
 

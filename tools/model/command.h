@@ -8,6 +8,8 @@ class App;
 namespace perdure::tools {
 
 void addModelCommand(CLI::App& app);
+/// Its parts `list` and `fetch`.
+void addFetch(CLI::App& model);
 /// Its part `calibrate`.
 void addCalibrate(CLI::App& model);
 

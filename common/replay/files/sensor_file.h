@@ -58,7 +58,8 @@ class SensorFile {
 ///
 /// One of the three transforms must be there. Where `T_BC_given` is given it may be missing.
 /// Models: none; radial-tangential, radtan, plumb_bob (4 coefficients, 5 with k3, 8 rational);
-/// equidistant, equi, fisheye, kannala_brandt. Time offset, readout and rate are 0 where they are
+/// equidistant, equi, fisheye, kannala_brandt; Kalibr's omni, eucm and ds become the equidistant
+/// lens that is nearest to them (common/camera/wide_lens.h). Time offset, readout and rate are 0 where they are
 /// missing.
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given = {});

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "common/camera/lens.h"
+#include "common/camera/wide_lens.h"
 #include "common/replay/files/sensor_file.h"
 #include "common/replay/files/text_file.h"
 
@@ -43,9 +44,10 @@ std::string distortionName(const SensorFile& file) {
   const std::string lens = toLower(file.text("camera_model"));
   const auto dash = lens.find('-');
   if (!isOneOf(lens.substr(0, dash), {"", "pinhole", "perspective", "kannala_brandt"})) {
-    file.wrong("camera_model", "is `" + lens +
-                                   "`; pinhole lenses are read, with radtan or equidistant "
-                                   "distortion: calibrate as pinhole-radtan or pinhole-equi");
+    file.wrong("camera_model",
+               "is `" + lens +
+                   "`; pinhole lenses are read, with radtan or equidistant distortion, and omni, "
+                   "eucm and ds: calibrate as pinhole-radtan, pinhole-equi or ds-none");
   }
   const std::string model = toLower(file.text("distortion_model"));
   if (model.empty() && lens == "kannala_brandt") return "equidistant";
@@ -59,8 +61,50 @@ std::vector<double> coefficientsOf(const SensorFile& file) {
   return {};
 }
 
+/// Kalibr's unified, extended unified and double sphere lenses; nothing where it is another.
+std::optional<WideLens> wideLensOf(const SensorFile& file) {
+  const std::string lens = toLower(file.text("camera_model"));
+  const std::string model = lens.substr(0, lens.find('-'));
+  WideLens wide;
+  std::vector<double> v;
+  if (model == "omni" || model == "mei" || model == "unified") {
+    v = file.numbers("intrinsics", 5);  // xi, focal lengths, centre
+    v.insert(v.begin() + 1, 0.0);
+  } else if (model == "eucm" || model == "ds" || model == "double_sphere") {
+    wide.kind = model == "eucm" ? WideLens::Kind::kExtendedUnified : WideLens::Kind::kDoubleSphere;
+    v = file.numbers("intrinsics", 6);  // xi and alpha, or alpha and beta
+  } else {
+    return std::nullopt;
+  }
+  wide.a = v[0], wide.b = v[1], wide.fx = v[2], wide.fy = v[3], wide.cx = v[4], wide.cy = v[5];
+  const bool alpha = wide.kind == WideLens::Kind::kUnified ||
+                     (wide.kind == WideLens::Kind::kExtendedUnified ? wide.a : wide.b) >= 0.0;
+  if (!(wide.fx > 0 && wide.fy > 0) || !alpha) {
+    file.wrong("intrinsics", "are of no lens that can be");
+  }
+  return wide;
+}
+
+void readWideLens(const SensorFile& file, WideLens wide, CameraCalibration& camera) {
+  const std::string model = toLower(file.text("distortion_model"));
+  const auto values = coefficientsOf(file);
+  const bool any = std::any_of(values.begin(), values.end(), [](double d) { return d != 0.0; });
+  const bool radial = isOneOf(model, {"radtan", "radial-tangential", "plumb_bob"});
+  if (any && (!radial || wide.kind != WideLens::Kind::kUnified || values.size() != 4)) {
+    file.wrong("distortion_model", "is `" + model +
+                                       "` on a wide lens; calibrate as ds-none, omni-radtan or "
+                                       "pinhole-equi");
+  }
+  if (any) std::copy_n(values.begin(), 4, wide.distortion.begin());
+  const auto fit = fitEquidistant(wide, camera);
+  if (!fit) file.wrong(fit.error().code, fit.error().detail);
+}
+
 void readLens(const SensorFile& file, CameraCalibration& camera) {
-  const auto set = setLens(camera, distortionName(file), coefficientsOf(file));
+  if (const auto wide = wideLensOf(file)) return readWideLens(file, *wide, camera);
+  const std::string name = distortionName(file);
+  readFocalLengths(file, camera);
+  const auto set = setLens(camera, name, coefficientsOf(file));
   if (!set) file.wrong(set.error().code, set.error().detail);
 }
 
@@ -82,7 +126,6 @@ CameraCalibration readCamera(const SensorFile& file, const std::string& name,
   CameraCalibration camera;
   camera.name = name;
   readSize(file, camera);
-  readFocalLengths(file, camera);
   readLens(file, camera);
   camera.T_BC = placeOf(file, T_BC_given);
   camera.rate_hz = file.number("rate_hz", 1e-3, 0.0);

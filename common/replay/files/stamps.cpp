@@ -170,7 +170,8 @@ std::string whyNoStamp(std::string_view text) {
   } else if (magnitude >= 1e11) {
     unit = "milliseconds", factor = "1000000";
   }
-  return why + "; it looks like " + unit + ": multiply the column by " + factor;
+  return why + "; it looks like " + unit + ": multiply the column by " + factor +
+         ", or let perdure doctor --data DRIVE --fix COPY do it";
 }
 
 StampOrder orderOf(const std::vector<TimePoint>& stamps) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/types/sensors.h"
@@ -19,6 +20,8 @@ struct CameraSettings {
   std::string format = "auto";          ///< libcamera's name, as "YUYV"; auto: the best it has
   double rate_hz = 20.0;
   double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
+  std::string flip = "none";             ///< none, horizontal, vertical, both
+  std::vector<double> crop = {};         ///< x, y, width, height, pixels of the sensor; empty: all
   double readout_s = 0.0;                ///< first to last row
   int jpeg_quality = 0;                  ///< 1 … 100: images travel as JPEG; 0: raw
   std::string encoding = "as_is";        ///< as_is, mono8, bgr8

@@ -149,7 +149,8 @@ class IioStream::Device {
   Device() = default;
 
   Result<void> connect(const IioSettings& settings) {
-    context_.reset(iio_create_context_from_uri(settings.uri.c_str()));
+    const std::string uri(settings.uri.c_str());  // libiio 0.24 writes into a URI with a port
+    context_.reset(iio_create_context_from_uri(uri.c_str()));
     if (!context_) {
       return fail("imu_absent", fmt::format("no IIO context at {}: {}; is the driver loaded, or "
                                             "iiod running there? See imu.uri.",

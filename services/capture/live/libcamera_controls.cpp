@@ -58,6 +58,13 @@ AskedControls controlsFor(const CameraSettings& settings,
   if (settings.gain > 0.0) {
     asking.set(controls::AnalogueGain, static_cast<float>(settings.gain), "camera.gain");
   }
+  if (settings.crop.size() == 4) {
+    const auto& c = settings.crop;
+    asking.set(controls::ScalerCrop,
+               libcamera::Rectangle(static_cast<int>(c[0]), static_cast<int>(c[1]),
+                                    static_cast<unsigned>(c[2]), static_cast<unsigned>(c[3])),
+               "camera.crop");
+  }
   return std::move(asking).asked();
 }
 

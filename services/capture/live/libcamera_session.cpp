@@ -46,6 +46,12 @@ const std::array<std::pair<PixelFormat, PixelLayout>, 11> kFormats = {{
     {formats::R8, PixelLayout::kGrey},
 }};
 
+libcamera::Transform transformOf(const std::string& flip) {
+  if (flip == "horizontal") return libcamera::Transform::HFlip;
+  if (flip == "vertical") return libcamera::Transform::VFlip;
+  return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
+}
+
 /// libcamera's manager: one at a time in a process. Used by one thread.
 class Cameras {
  public:
@@ -91,8 +97,8 @@ class Session final : public CameraSession, public libcamera::Object {
                        stream().pixelFormat.toString());
   }
   std::string note() const override {
-    return refused_ ? "The camera refuses what camera.exposure_ms and camera.gain ask for; are "
-                      "they in its range?"
+    return refused_ ? "The camera refuses what camera.exposure_ms, camera.gain and camera.crop "
+                      "ask for; are they in its range?"
                     : asked_.missing;
   }
   bool gone() const override { return gone_; }
@@ -214,6 +220,8 @@ Result<void> Session::configure() {
   chooseFormat(wanted);
   wanted.size = {settings_.width, settings_.height};
   wanted.bufferCount = kBuffers;
+  const libcamera::Transform turned = transformOf(settings_.flip);
+  configuration_->transform = turned;
   const bool valid = configuration_->validate() != libcamera::CameraConfiguration::Invalid;
   const auto known = std::find_if(kFormats.begin(), kFormats.end(), [&](const auto& entry) {
     return entry.first == wanted.pixelFormat;
@@ -228,6 +236,12 @@ Result<void> Session::configure() {
                     wanted.size.height, settings_.format, settings_.width, settings_.height));
   }
   layout_ = known->second;
+  if (configuration_->transform != turned) {
+    return fail("camera_absent",
+                fmt::format("the camera {} cannot mirror its images; set camera.flip to none, and "
+                            "calibrate it as it is mounted.",
+                            camera_->id()));
+  }
   return {};
 }
 

@@ -26,6 +26,8 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
   settings.rate_hz = config.camera.rate_hz;
   settings.exposure_ms = config.camera.exposure_ms;
   settings.gain = config.camera.gain;
+  settings.flip = config.camera.flip;
+  settings.crop = config.camera.crop;
   settings.readout_s = camera.readout_s;
   settings.encoding = config.image.cam0;
   if (config.image.compress == "jpeg")

@@ -17,11 +17,12 @@ enum class Family {
   kYoloFastest,
   kFastestDet,
   kPerdure,
-  kYolov5,  ///< and v7
-  kYolov8,  ///< and v11
-  kNanoDet,
+  kYolov5,   ///< and v7
+  kYolov8,   ///< and v9 to v12, YOLO26, RTMDet
+  kNanoDet,  ///< and PicoDet
   kSsd,
   kDetr,  ///< and its relatives with sigmoids (RT-DETR)
+  kYoloFastestV2,
 };
 
 /// How an image is brought to the input size.
@@ -44,7 +45,8 @@ struct Input {
 /// One resolution of the head, by the names of its raw (pre-activation) tensors.
 struct Level {
   int stride = 0;  ///< pixels of input per cell
-  /// YOLOX and FastestDet: three tensors (1,4,H,W), (1,1,H,W), (1,K,H,W).
+  /// YOLOX and FastestDet: three tensors (1,4,H,W), (1,1,H,W), (1,K,H,W). YOLO-FastestV2: for A
+  /// anchors (1,4·A,H,W), (1,A,H,W), and one (1,K,H,W) for all of them.
   std::string box, objectness, classes;
   /// YOLO-Fastest: one tensor (1,H,W,A·(5+K)) and A anchors (width, height, pixels of input).
   /// YOLOv5: (1,A·(5+K),H,W) or (1,A,H,W,5+K), and anchors. YOLOv8: (1,4·bins+K,H,W), or `box`
@@ -117,7 +119,9 @@ struct ModelDescription {
   std::vector<Level> levels;
   Outputs outputs;
   BoxForm box_form;  ///< of `outputs` with whole boxes
-  int bins = 0;      ///< YOLOv8, NanoDet: a distance to a side is the mean over 0 … bins − 1
+  /// YOLOv8, NanoDet: a distance to a side is the mean over 0 … bins − 1; 1: the value itself
+  int bins = 0;
+  bool exponents = false;    ///< of one bin: the value is the distance's logarithm
   double cell_offset = 0.5;  ///< YOLOv8, NanoDet: a cell's point is (g + offset)·s
   Azimuth azimuth;
   double reach = 0.0;         ///< perdure: cells that a cell's centre may lie outside its box

@@ -64,6 +64,33 @@ TEST_P(Images, OfASqliteRecordingAreThoseOfTheFolder) {
 INSTANTIATE_TEST_SUITE_P(Ros, Images,
                          testing::Values(PlanOptions::Images::kRaw, PlanOptions::Images::kPng));
 
+// How many bits are used is what all images say: by the first three alone it would be eight, and
+// the others would be white.
+TEST(RosDrive, ImagesOf16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
+  const Twin twin = twinOf("ros_dark", {.dark = 3});
+  const auto bright = test::allOf(*Dataset::open({.path = twin.folder})).pixels;
+  const auto pixels = test::allOf(*Dataset::open({.path = twin.file, .rig = twin.rig})).pixels;
+  ASSERT_EQ(pixels.size(), bright.size());
+  ASSERT_EQ(pixels.size(), 5u);
+  int brightest = 0;
+  for (std::size_t i = 3; i < 5; ++i) {
+    brightest = std::max<int>(brightest, *std::max_element(bright[i].begin(), bright[i].end()));
+  }
+  int shift = 2;  // ten bits at least: one more than the dark has
+  while (brightest * 16 >= 256 << shift) shift += 2;
+  EXPECT_GE(brightest * 16, 256) << "eight bits must not do";
+  for (std::size_t i = 0; i < 5; ++i) {
+    ASSERT_EQ(pixels[i].size(), bright[i].size());
+    std::size_t wrong = 0;
+    for (std::size_t k = 0; k < bright[i].size(); ++k) {
+      const int value = i < 3 ? bright[i][k] / 16 : bright[i][k] * 16;
+      const int off = (pixels[i][k] << shift) - value;  // rounded down, or to the nearest
+      wrong += std::abs(off) < 1 << shift ? 0 : 1;
+    }
+    EXPECT_EQ(wrong, 0u) << "image " << i;
+  }
+}
+
 TEST(RosDrive, GivesAnyImageOutOfTurn) {
   const Twin twin = twinOf("ros_turns");
   const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});

@@ -148,6 +148,21 @@ ros::Image imageOf(const Frame& frame, const ros::Header& header) {
   return image;
 }
 
+/// Grey values times 16, and a sixteenth in the dark.
+ros::Image twelveBitsOf(const Frame& frame, const ros::Header& header, bool dark) {
+  ros::Image image = imageOf(frame, header);
+  auto bytes = std::make_shared<std::vector<std::uint8_t>>();
+  for (const std::uint8_t grey : *frame.data) {
+    const int value = dark ? grey / 16 : grey * 16;
+    bytes->push_back(static_cast<std::uint8_t>(value & 0xFF));
+    bytes->push_back(static_cast<std::uint8_t>(value >> 8));
+  }
+  image.encoding = "mono16";
+  image.step = 2 * frame.width;
+  image.data = std::move(bytes);
+  return image;
+}
+
 ros::CompressedImage packedOf(const Frame& frame, const ros::Header& header) {
   auto png = std::make_shared<const std::vector<std::uint8_t>>(pngOf(frame));
   return {header, "png", png};
@@ -193,6 +208,7 @@ fs::path writePlan(replay::Dataset& dataset, const fs::path& folder, const PlanO
 void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions& options) {
   Db3 database(file);
   bool begun = false;
+  std::size_t images = 0;
   while (const auto message = dataset.next()) {
     const auto* imu = std::get_if<ImuSample>(&*message);
     const auto* frame = std::get_if<Frame>(&*message);
@@ -211,7 +227,10 @@ void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions&
     const auto* camera = dataset.calibration().camera(frame->camera);
     database.add(spaceOf(frame->camera, options) + "/camera_info", log_ns, infoOf(*camera, header));
     const std::string topic = imageTopic(frame->camera, options);
-    if (options.images == PlanOptions::Images::kPng) {
+    if (options.dark) {
+      const bool dark = images++ < *options.dark;
+      database.add(topic, log_ns, twelveBitsOf(*frame, header, dark));
+    } else if (options.images == PlanOptions::Images::kPng) {
       database.add(topic, log_ns, packedOf(*frame, header));
     } else {
       database.add(topic, log_ns, imageOf(*frame, header));

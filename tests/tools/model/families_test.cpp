@@ -139,7 +139,10 @@ INSTANTIATE_TEST_SUITE_P(All, Families,
                          ::testing::Values("yolov5", "yolov5_heads", "yolov5_suppressed", "yolov7",
                                            "yolov8", "yolov8_masks", "yolov8_open_size",
                                            "yolov8_whole", "yolox", "yolox_decoded", "nanodet",
-                                           "ssd", "ssd_offsets", "detr", "detr_sigmoids"),
+                                           "ssd", "ssd_offsets", "detr", "detr_sigmoids", "yolov10",
+                                           "yolov10_both", "yolo26", "rtmdet", "rtmdet_suppressed",
+                                           "picodet", "picodet_leftovers", "yolo_fastestv2",
+                                           "yolov8_qdq", "yolov8_dynamic", "yolov8_qlinear"),
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace

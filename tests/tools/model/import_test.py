@@ -135,10 +135,11 @@ class Files(Importing):
 
 class Inputs(Importing):
     def convolution(self, shape=(1, 3, 64, 64), kind=TensorProto.FLOAT, more=None):
+        """`more`: further inputs, each with a convolution of its own."""
         inputs = {"images": (kind, list(shape)), **(more or {})}
         weight = np.zeros((8, 3, 8, 8), np.float32)
-        return self.graph([helper.make_node("Conv", ["images", "w"], ["out"], strides=[8, 8])], {"out": None},
-                          {"w": weight}, inputs)
+        nodes = [helper.make_node("Conv", [name, "w"], [f"{name}_out"], strides=[8, 8]) for name in inputs]
+        return self.graph(nodes, {f"{name}_out": None for name in inputs}, {"w": weight}, inputs)
 
     def test_channels_last_bytes_batches_and_open_sizes_have_their_mends(self):
         cases = [(dict(shape=(1, 64, 64, 3)), "has its channels last; export with [1,3,height,width]"),
@@ -153,6 +154,60 @@ class Inputs(Importing):
     def test_another_size_than_the_fixed_one_is_refused(self):
         self.assertIn("fixed at 64x64; leave --size out",
                       self.refused(self.made(tiny.yolox), NAMES, "--size=320x320")[0])
+
+    def test_a_convolutional_network_takes_another_size(self):
+        """The answers of the same weights at that size: computed with the file at an open size."""
+        for make in (tiny.yolox, tiny.yolov8, tiny.nanodet):
+            path = self.made(make)
+            told, description = self.run_import(path, NAMES, "--input=128x64")
+            self.assertIn("its input is 128x64; the file was made for 64x64", told)
+            self.assertEqual((description["input"]["width"], description["input"]["height"]), (128, 64))
+            graph = Graph.load(self.folder / "out.onnx")
+            graph.infer_shapes()
+            image = np.random.default_rng(3).uniform(-1, 1, (1, 3, 64, 128)).astype(np.float32)
+            wide = graph.evaluate({"images": image}, graph.outputs)[0]
+            self.run_import(path, NAMES)
+            whole = Graph.load(self.folder / "out.onnx")
+            for half in (0, 1):  # these networks look at patches: each half of the picture answers alone
+                part = image[:, :, :, 64 * half:64 * (half + 1)]
+                for name, value in whole.evaluate({"images": part}, whole.outputs)[0].items():
+                    if name in graph.outputs and value.shape[3] * 2 == wide[name].shape[3]:
+                        there = np.split(wide[name], 2, axis=3)[half]
+                        np.testing.assert_allclose(there, value, atol=1e-4)
+
+    def test_the_cameras_shape_keeps_the_number_of_pixels(self):
+        told, status = self.refused(self.made(tiny.yolov8), NAMES, "--input=camera")
+        self.assertEqual(status, 64)
+        self.assertIn("give one with --image", told)
+        told, description = self.run_import(self.made(tiny.yolov8), NAMES, "--input=camera", "--camera=1242x375")
+        self.assertEqual((description["input"]["width"], description["input"]["height"]), (128, 32))
+
+    def test_a_size_that_cannot_be_is_refused(self):
+        self.assertIn("multiples of 32", self.refused(self.made(tiny.yolov8), NAMES, "--input=100x64")[0])
+        self.assertIn("is not WIDTHxHEIGHT", self.refused(self.made(tiny.yolov8), NAMES, "--input=0x64")[0])
+        whole = self.refused(self.made(tiny.ssd), NAMES, "--input=128x64")[0]
+        self.assertIn("gives whole boxes for an input of 64x64", whole)
+
+    def test_places_that_were_learned_are_not_moved(self):
+        """A constant for each cell is added: no other size has one."""
+        net = tiny.Net(21, **tiny.UNIT)
+        outputs = []
+        for stride in (8, 16, 32):
+            features = net.level(stride)
+            cells = tiny.SIZE // stride
+            placed = net.node("Add", [features, net.normal(1, tiny.CHANNELS, cells, cells)])
+            net.values[placed] = net.values[features]
+            outputs += [(net.head(placed, n), [1, n, cells, cells]) for n in (64, tiny.K)]
+        net.save(self.folder / "placed", outputs, [[0] * 7], [])
+        self.assertIn("its operator Add is of one size",
+                      self.refused(self.folder / "placed/net.onnx", NAMES, "--input=128x64")[0])
+
+    def test_eight_bits_with_a_scale_that_is_computed_are_refused(self):
+        nodes = [helper.make_node("ReduceMax", ["images"], ["top"], keepdims=0),
+                 helper.make_node("QuantizeLinear", ["images", "top"], ["q"]),
+                 helper.make_node("DequantizeLinear", ["q", "top"], ["out"])]
+        self.assertIn("import the float network that it was made from",
+                      self.refused(self.graph(nodes, {"out": None}, opset=13), NAMES)[0])
 
     def test_wrong_options_are_usage(self):
         path = self.made(tiny.yolox)

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 
+#include "common/base/subprocess.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
 #include "tests/tools/model/python.h"
@@ -41,6 +43,91 @@ Answer answerOf(const fs::path& network, const fs::path& description, const Fram
   EXPECT_TRUE(out) << out.error().detail;
   return {out ? out->detections : std::vector<Detection>{},
           inference::logit(file.description.calibration.clutter_rate)};
+}
+
+std::string cocoNames() { return (source() / "config/models/coco.names").string(); }
+
+fs::path streetPicture() {
+  return data() / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync/image_02/data/0000000000.jpg";
+}
+
+/// Imports a network of ../shared/data, or one that was made of it, and says what it sees.
+std::vector<Sight> seenBy(const fs::path& network, const std::vector<std::string>& more = {}) {
+  const fs::path folder = fs::temp_directory_path() / ("perdure_seen_" + std::to_string(getpid()));
+  const fs::path out = importedPath(network, folder);
+  std::vector<std::string> arguments = {"--classes=" + cocoNames()};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  EXPECT_EQ(importNetwork({network, out, folder / "reference", arguments}), 0);
+  EXPECT_LT(checkAnswers(out, folder / "reference").difference, kMostDifference);
+  const Frame frame = readPicture(streetPicture());
+  const Look look = lookAt(out, &frame, 0.3);
+  fs::remove_all(folder);
+  return look.sights;
+}
+
+void expectSame(const std::vector<Sight>& a, const std::vector<Sight>& b, double px, double score) {
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_GT(a.size(), 4u);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].name, b[i].name);
+    EXPECT_NEAR(a[i].score, b[i].score, score);
+    EXPECT_NEAR(a[i].box.x1, b[i].box.x1, px);
+    EXPECT_NEAR(a[i].box.y2, b[i].box.y2, px);
+  }
+}
+
+class RealWeights : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(data() / "weights")) GTEST_SKIP() << "../shared/data is absent: no network";
+    if (!testing::pythonHasOnnx()) GTEST_SKIP() << "python3-onnx is not installed";
+  }
+  static fs::path weights(const std::string& name) { return data() / "weights" / name; }
+};
+
+// Two files of the same weights, exported at two sizes: each re-shaped is the other.
+TEST_F(RealWeights, ReshapedToASizeAnswerAsTheFileOfThatSize) {
+  const fs::path wide = weights("nanodet-plus-m_768x256.onnx");
+  const fs::path small = weights("nanodet-plus-m_640x192.onnx");
+  expectSame(seenBy(wide, {"--input=640x192"}), seenBy(small), 1e-2, 1e-4);
+  expectSame(seenBy(small, {"--input=768x256"}), seenBy(wide), 1e-2, 1e-4);
+}
+
+TEST_F(RealWeights, PicoDetSeesTheStreetThoughItsConstantsStandAmongItsInputs) {
+  const auto sights = seenBy(weights("picodet_s_768x256.onnx"));
+  const auto has = [&](const std::string& name, double x1, double y1, double x2, double y2) {
+    return std::any_of(sights.begin(), sights.end(), [&](const Sight& s) {
+      return s.name == name && std::abs(s.box.x1 - x1) < 10 && std::abs(s.box.y1 - y1) < 10 &&
+             std::abs(s.box.x2 - x2) < 10 && std::abs(s.box.y2 - y2) < 10;
+    });
+  };
+  // As YOLOX-nano sees them, with another decode rule.
+  EXPECT_TRUE(has("person", 772, 168, 882, 368));
+  EXPECT_TRUE(has("car", 295, 170, 453, 287));
+}
+
+fs::path quantised(const fs::path& network, const fs::path& folder, const std::string& way) {
+  const fs::path out = folder / (network.stem().string() + "_" + way + ".onnx");
+  const auto made = runProgram(
+      {.command = {"/usr/bin/python3", (source() / "tests/tools/model/quantise.py").string(),
+                   network.string(), out.string(), way}});
+  EXPECT_EQ(made.status, 0) << made.output;
+  return out;
+}
+
+// What rounding the weights to eight bits costs by itself (.03 in a score here) is not the
+// import's.
+TEST_F(RealWeights, OfEightBitsAnswerAsTheFloatsThatTheBitsStandFor) {
+  const fs::path folder = fs::temp_directory_path() / ("perdure_bits_" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  for (const char* name : {"nanodet-plus-m_640x192.onnx", "yolox_nano_416.onnx"}) {
+    const auto floats = seenBy(quantised(weights(name), folder, "rounded"));
+    for (const char* way : {"qdq", "dynamic"}) {
+      SCOPED_TRACE(std::string(name) + " " + way);
+      expectSame(seenBy(quantised(weights(name), folder, way)), floats, 0.5, 1e-3);
+    }
+  }
+  fs::remove_all(folder);
 }
 
 class RealFiles : public ::testing::TestWithParam<const char*> {};

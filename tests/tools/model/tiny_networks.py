@@ -348,10 +348,16 @@ def detr_sigmoids(folder):
     net.save(folder, [(whole, [1, 12, 4 + K])], centre_rows(b * SIZE, o), [CLASSES])
 
 
+def later():
+    """Those of later years are in a file of their own, which reads this one."""
+    import tiny_networks_later
+    return tiny_networks_later.ALL
+
+
 ALL = (yolov5, yolov5_heads, yolov7, yolov5_suppressed, yolov8, yolov8_masks, yolov8_open_size, yolov8_whole, yolox,
        yolox_decoded, nanodet,
        ssd, ssd_offsets, detr, detr_sigmoids)
 
 if __name__ == "__main__":
-    for make in ALL:
+    for make in (*ALL, *later()):
         make(Path(sys.argv[1]) / make.__name__)

@@ -35,6 +35,12 @@ Findings checkBus(const bus::Options& options, double seconds);
 /// (empty: the recording's own) by the innovations of vio over it.
 Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds);
 
+/// model.path of inference.yaml in the folder; empty where none is set.
+std::string configuredNetwork(const std::string& folder);
+/// Warns where a letterboxed network shows a third of its input no image of the recording's cam0.
+/// Throws StartupError as the service does.
+Findings checkNetworkShape(const std::string& recording, const std::string& network);
+
 /// Writes a copy of a recording to `folder` with what is sure mended, and looks at it again. The
 /// progress goes to standard error. Throws StartupError as writeDrive does.
 Findings fixRecording(const std::string& recording, const std::string& rig,

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -18,7 +19,7 @@ struct DoctorOptions {
   std::string configuration = configurationFolder();
   std::string report;
   bool images = false;
-  std::string recording, rig, copy;
+  std::string recording, rig, copy, network;
   double rig_seconds = 60.0;
 };
 
@@ -50,9 +51,16 @@ void runDoctor(const DoctorOptions& given) {
     throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
   }
   if (!given.recording.empty()) {
-    const Findings findings = given.copy.empty()
-                                  ? checkRigBy(given.recording, given.rig, given.rig_seconds)
-                                  : fixRecording(given.recording, given.rig, given.copy);
+    Findings findings = given.copy.empty()
+                            ? checkRigBy(given.recording, given.rig, given.rig_seconds)
+                            : fixRecording(given.recording, given.rig, given.copy);
+    const bool named = !given.network.empty();
+    const auto network = named ? given.network : configuredNetwork(given.configuration);
+    std::error_code error;
+    if (named || std::filesystem::is_regular_file(network, error)) {
+      const Findings shape = checkNetworkShape(given.recording, network);
+      findings.insert(findings.end(), shape.begin(), shape.end());
+    }
     std::cout << toText(findings);
     return stopIfFailed(findings, static_cast<int>(ExitCode::kData));
   }
@@ -121,6 +129,11 @@ void addDoctorCommand(CLI::App& app) {
                    "with --data: a new folder for a copy with what is sure mended (units, columns "
                    "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
       ->type_name("FOLDER");
+  command
+      ->add_option("--model", options->network,
+                   "with --data: the network whose input is compared with the camera's shape; "
+                   "model.path of inference.yaml where not given")
+      ->type_name("FILE");
   command->add_option("--rig-seconds", options->rig_seconds, "of the recording, at most")
       ->check(CLI::Range(5.0, 3600.0))
       ->capture_default_str();

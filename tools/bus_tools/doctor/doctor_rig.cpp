@@ -6,6 +6,7 @@
 #include "tools/calibrate/rig_check.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/mended_copy.h"
+#include "tools/data_check/mended_text.h"
 
 namespace perdure::tools {
 namespace {
@@ -53,12 +54,15 @@ Findings checkRigBy(const std::string& recording, const std::string& rig, double
 
 Findings fixRecording(const std::string& recording, const std::string& rig,
                       const std::string& folder) {
-  const auto dataset = replay::Dataset::open({.path = recording, .rig = rig});
+  const MendedText text(recording);
+  const auto dataset = replay::Dataset::open({.path = text.drive(), .rig = rig});
   const MendedDrive drive = mendDrive(dataset->recording());
   Findings findings;
+  for (const auto& mend : text.mends()) findings.push_back({Verdict::kOk, mend});
   for (const auto& note : dataset->recording().notes) findings.push_back({Verdict::kOk, note});
   for (const auto& [reason, count] : dataset->recording().reasons.all()) {
-    findings.push_back({Verdict::kOk, "counted while reading: " + reason + ", " + std::to_string(count)});
+    findings.push_back(
+        {Verdict::kOk, "counted while reading: " + reason + ", " + std::to_string(count)});
   }
   for (const auto& mend : drive.mends) findings.push_back({Verdict::kOk, mend});
   if (findings.empty() && rig.empty()) {

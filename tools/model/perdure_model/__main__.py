@@ -16,7 +16,7 @@ except ImportError as missing:
     sys.exit(69)
 
 from . import heads as tracing
-from . import level_families, output_families, sayings
+from . import level_families, output_families, quantised, reshaping, sayings
 from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault
 from .finding import INPUTS
 from .graph import Graph
@@ -37,6 +37,8 @@ def parsed(arguments):
     parser.add_argument("--classes", default="")
     parser.add_argument("--family", default="", choices=["", *sayings.FAMILIES])
     parser.add_argument("--size", default="")
+    parser.add_argument("--input", default="")
+    parser.add_argument("--camera", default="")
     parser.add_argument("--anchors", default="")
     parser.add_argument("--priors", type=Path)
     parser.add_argument("--variances", default="0.1,0.2")
@@ -57,7 +59,8 @@ class Request:
         self.boxes, self.y_first = args.boxes, args.y_first
         self.names = names_of(args.classes) if args.classes else None
         try:
-            self.size = [int(n) for n in args.size.split("x")] if args.size else None
+            self.size, self.camera = (pair_of(text) for text in (args.size, args.camera))
+            self.new_size = args.input if args.input == "camera" else pair_of(args.input)
             groups = [numbers(g) for g in args.anchors.split("/")] if args.anchors else []
             self.anchors = [list(zip(g[::2], g[1::2])) for g in groups] or None
             self.variances = numbers(args.variances)
@@ -65,11 +68,21 @@ class Request:
                           for k in ("colour", "fit", "scale", "mean", "pad") if (v := getattr(args, k))}
         except ValueError as e:
             raise Fault(f"a number was expected: {e}; sizes are 640x640, lists 1,2,3", USAGE)
-        if self.size is not None and len(self.size) != 2 or any(len(g) % 2 for g in groups) or len(self.variances) != 2:
-            raise Fault("--size is WIDTHxHEIGHT, --anchors pairs W,H, --variances two numbers", USAGE)
+        if any(len(g) % 2 for g in groups) or len(self.variances) != 2:
+            raise Fault("--anchors are pairs W,H, --variances two numbers", USAGE)
+        if self.new_size == "camera" and not self.camera:
+            raise Fault("--input camera takes the shape of the camera's pictures; give one with --image", USAGE)
         if self.input.get("scale") and len(self.input["scale"]) == 1:
             self.input["scale"] = self.input["scale"][0]
         self.priors = priors_of(args.priors) if args.priors else None
+
+
+def pair_of(text):
+    """640x480; None where there is no text."""
+    pair = [int(n) for n in text.split("x")] if text else None
+    if pair is not None and (len(pair) != 2 or min(pair) < 1 or max(pair) > 8192):
+        raise ValueError(f"{text} is not WIDTHxHEIGHT")
+    return pair
 
 
 def names_of(text):
@@ -170,6 +183,19 @@ def cut(path, graph, found):
         found.notes.append(f"{', '.join(gone)} was cut off: Perdure takes the heads before it")
 
 
+def other_size(args, graph, found, size, request):
+    """The input's size by --input; of the camera's shape with as many pixels."""
+    if not request.new_size:
+        return size
+    steps = [level["stride"] for level in found.keys.get("levels", [])] or [32]
+    new = request.new_size if request.new_size != "camera" else reshaping.of_camera(size, request.camera,
+                                                                                  min(max(steps), 32))
+    if list(new) != list(size):
+        reshaping.reshape(args.network, graph, found, size, new)
+        found.notes.append(f"its input is {new[0]}x{new[1]}; the file was made for {size[0]}x{size[1]}")
+    return list(new)
+
+
 def description(args, found, names, size, request):
     keys = dict(found.keys)
     if keys.get("boxes", {}).get("form") == "offsets":
@@ -201,12 +227,15 @@ def write_reference(graph, size, given, outputs, folder):
 def run(args):
     request = Request(args)
     graph = Graph.load(args.network)
+    eight_bits = quantised.to_float(graph)
     size = graph.fix_input(args.network, request.size)
     graph.fold()
     request.names = request.names or names_in(graph)
     found = recognise(args.network, graph, size, request)
     names = check_names(args.network, found, request, graph)
+    found.notes += [eight_bits] if eight_bits else []
     cut(args.network, graph, found)
+    size = other_size(args, graph, found, size, request)
     outputs = list(found.cuts.values())
     given = {**INPUTS[found.family], **request.input}
     if args.reference:  # of the graph as it was, so that a wrong repair shows too

@@ -6,6 +6,8 @@ from .numpy_ops import sigmoid, softmax
 
 YOLOV5_ANCHORS = [[[10, 13], [16, 30], [33, 23]], [[30, 61], [62, 45], [59, 119]], [[116, 90], [156, 198], [373, 326]]]
 YOLOV7_ANCHORS = [[[12, 16], [19, 36], [40, 28]], [[36, 75], [76, 55], [72, 146]], [[142, 110], [192, 243], [459, 401]]]
+YOLO_FASTESTV2_ANCHORS = [[[12.64, 19.39], [37.88, 51.48], [55.71, 138.31]],
+                          [[126.91, 78.23], [131.57, 214.55], [279.92, 258.87]]]
 
 
 def planes(head):
@@ -33,16 +35,18 @@ def yolov5(heads, strides, anchors):
     return np.concatenate(rows)
 
 
-def distances(head, bins):
+def distances(head, bins, exponents=False):
+    if bins == 1:
+        return np.exp(planes(head)) if exponents else planes(head)
     p = softmax(planes(head).reshape(-1, 4, bins), 2)
     return (p * np.arange(bins)).sum(2)
 
 
-def yolov8(heads, strides, bins):
+def yolov8(heads, strides, bins, offset=0.5, exponents=False):
     """`heads`: (box, classes) of each level. Rows of centre, size, classes."""
     rows = []
     for (box, classes), stride in zip(heads, strides):
-        d, at = distances(box, bins), cells(box) + 0.5
+        d, at = distances(box, bins, exponents), cells(box) + offset
         rows.append(np.concatenate([centred((at - d[:, :2]) * stride, (at + d[:, 2:]) * stride),
                                     sigmoid(planes(classes))], 1))
     return np.concatenate(rows)
@@ -64,6 +68,12 @@ def fastestdet(heads):
     return np.concatenate([sigmoid(objectness), box, softmax(classes, 1)], 1)
 
 
+def yolo_fastestv2(heads):
+    """What its files decode themselves: sigmoids of the boxes and objectness, the soft-max, a row for each cell."""
+    box, objectness, classes = (planes(h) for h in heads[0])
+    return np.concatenate([sigmoid(box), sigmoid(objectness), softmax(classes, 1)], 1)
+
+
 def nanodet(heads, classes):
     rows = [planes(h) for h in heads]
     return np.concatenate([np.concatenate([sigmoid(r[:, :classes]), r[:, classes:]], 1) for r in rows])
@@ -74,7 +84,7 @@ def as_rows(value, columns):
     value = np.asarray(value)
     if value.dtype.kind != "f" or value.ndim < 2 or value.shape[0] != 1:
         return None
-    if value.shape[-1] == columns:
+    if value.shape[-1] == columns and value.ndim < 6:
         return value.reshape(-1, columns)
     return value.reshape(columns, -1).T if value.ndim in (3, 4) and value.shape[1] == columns else None
 

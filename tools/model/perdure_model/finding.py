@@ -13,6 +13,11 @@ INPUTS = {
     "detr": {"fit": "resize", "colour": "rgb", "scale": [1 / 58.395, 1 / 57.12, 1 / 57.375],
              "mean": [123.675, 116.28, 103.53]},
 }
+INPUTS["picodet"] = {"fit": "resize", "colour": "rgb", "scale": [1 / 58.395, 1 / 57.12, 1 / 57.375],
+                     "mean": [123.675, 116.28, 103.53]}
+INPUTS["rtmdet"] = {"fit": "letterbox_top_left", "pad": 114, "colour": "bgr",
+                    "scale": [1 / 57.375, 1 / 57.12, 1 / 58.395], "mean": [103.53, 116.28, 123.675]}
+INPUTS["yolo-fastestv2"] = INPUTS["fastestdet"]
 INPUTS["yolov7"] = INPUTS["yolov8"] = INPUTS["yolov5"]
 
 

@@ -8,6 +8,7 @@ from .faults import UNAVAILABLE, Fault
 from .numpy_ops import OPS
 
 LARGEST_CONSTANT = 1 << 22  # values
+KEEPS_SHAPE = ("HardSwish", "Mish")
 
 
 class Node:
@@ -60,6 +61,9 @@ class Graph:
             if i.name not in constants:
                 tensor = i.type.tensor_type
                 inputs[i.name] = (tensor.elem_type, [d.dim_value or None for d in tensor.shape.dim])
+        read = {i for n in graph.node for i in n.input}
+        # Tools that simplify leave the inputs of what they folded away: whatever nothing reads is no input.
+        inputs = {name: what for name, what in inputs.items() if name in read} or inputs
         opset = max([o.version for o in model.opset_import if o.domain in ("", "ai.onnx")] or [1])
         metadata = {p.key: p.value for p in model.metadata_props}
         nodes = [Node.of(n) for n in graph.node]
@@ -126,6 +130,11 @@ class Graph:
     def constant(self, name):
         return self.constants.get(name)
 
+    def origin(self, name):
+        """The names that an exporter gave to a convolution: of its answer and of its weights."""
+        node = next((n for n in self.nodes if name in n.outputs), None)
+        return " ".join([name, *(node.inputs[1:] if node else [])])
+
     def ancestors(self, names):
         """The nodes that the tensors depend on, in the graph's order."""
         producers, wanted, todo = self.producers(), set(), list(names)
@@ -140,7 +149,12 @@ class Graph:
 
     def infer_shapes(self):
         try:
-            model = shape_inference.infer_shapes(self.to_model(), data_prop=True)
+            model = self.to_model()
+            for node in model.graph.node:  # of a newer opset than the file says, which stops the inference
+                if node.op_type in KEEPS_SHAPE:
+                    node.op_type = "Relu"
+                    del node.attribute[:]
+            model = shape_inference.infer_shapes(model, data_prop=True)
         except Exception:  # an operator that this onnx does not know, or a graph at odds with itself
             return
         for info in [*model.graph.value_info, *model.graph.output]:

@@ -1,4 +1,5 @@
-"""Families that are known by their heads: YOLOv5, v7, v8, v11, YOLOX, NanoDet, FastestDet."""
+"""Families that are known by their heads: YOLOv5, v7, v8 to v12 and 26, YOLOX, RTMDet, NanoDet, PicoDet, FastestDet,
+YOLO-FastestV2."""
 
 import numpy as np
 
@@ -59,6 +60,9 @@ class Levels:
             return finding
         finding.disagreement = min((e for m in mine for e in [decoding.disagreement(m, values)] if e is not None),
                                    default=None)
+        if finding.disagreement is None:  # boxes without their scores beside them are taken where they agree
+            boxes = [e for m in mine if m.shape[1] > 4 for e in [decoding.disagreement(m[:, :4], values)]]
+            finding.disagreement = min((e for e in boxes if e is not None and e < AGREES), default=None)
         if finding.disagreement is None:
             why = f"its {', '.join(sorted(set(stuck)))} was not computed" if stuck else "it has none for each box"
             finding.compared = f"not compared with the file's own decoding: {why}"
@@ -89,28 +93,66 @@ def yolox(levels):
     return levels.finish(found, [decoding.yolox(heads, levels.strides, d) for d in (True, False)], random)
 
 
-def yolov8(levels):
-    """Bins of four distances, and classes."""
-    if not levels.count(2):
-        return None
-    order = [0, 1]
-    first, second = levels.same_channels(0), levels.same_channels(1)
+def box_and_classes(levels):
+    """(the index of the boxes' head, of the classes', channels of both) of levels with two heads; None elsewhere."""
+    first, second = (levels.same_channels(i) for i in (0, 1)) if levels.count(2) else (None, None)
     wanted = len(levels.request.names or [])
     if first is None or second is None:
         return None
-    if (second == 64 and first != 64) or (first == wanted and second % 4 == 0 and second >= 32 and first != 64):
-        order = [1, 0]
-    sides, classes = (first, second) if order == [0, 1] else (second, first)
-    if sides % 4 or sides < 8 or (sides != 64 and "Softmax" not in levels.kinds):
+    few = (second == 4 and first != 4) or (second == 64 and first not in (4, 64))
+    if few or (first == wanted and second % 4 == 0 and second >= 32 and first != 64):
+        return 1, 0, second, first
+    return 0, 1, first, second
+
+
+def two_heads(levels, found, alternatives):
+    """Boxes and classes apart. `alternatives`: {what model.json says of it: our decoding}; the first holds where the
+    file has no decoding of its own."""
+    box, classes, _, _ = box_and_classes(levels)
+    found.cuts, keys = levels.cuts(["box", "classes"] if box == 0 else ["classes", "box"])
+    random = levels.random()
+    heads = [[level[box], level[classes]] for level in random[0]]
+    best = None
+    for said, decode in alternatives:
+        tried = Finding(found.family, found.classes, found.cuts, {"activation": {"class": "sigmoid"}, **said,
+                                                                 "levels": keys}, list(found.notes))
+        levels.finish(tried, [decode(heads)], random)
+        if best is None or (tried.disagreement is not None and
+                            (best.disagreement is None or tried.disagreement < best.disagreement)):
+            best = tried
+    return best
+
+
+def yolov8(levels):
+    """Bins of four distances, or (YOLO26) the distances themselves, and classes."""
+    heads = box_and_classes(levels)
+    if heads is None:
+        return None
+    _, _, sides, classes = heads
+    if sides % 4 or (sides not in (4, 64) and "Softmax" not in levels.kinds):
         return None
     bins = sides // 4
-    roles = ["box", "classes"] if order == [0, 1] else ["classes", "box"]
-    names, keys = levels.cuts(roles)
-    found = Finding("yolov8", classes, names, {"activation": {"class": "sigmoid"}, "bins": bins, "levels": keys})
-    random = levels.random()
-    heads = [[level[i] for i in order] for level in random[0]]
-    levels.finish(found, [decoding.yolov8(heads, levels.strides, bins)], random)
-    return found if sides == 64 or found.disagreement is not None else None
+    found = two_heads(levels, Finding("yolov8", classes), [
+        ({"bins": bins}, lambda h: decoding.yolov8(h, levels.strides, bins))])
+    sure = sides == 64 or levels.request.family == "yolov8"
+    return found if sure or (found.disagreement or 1) < AGREES or (sides != 4 and found.disagreement) else None
+
+
+def rtmdet(levels):
+    """Four distances from the corner of the cell, or their logarithms, and classes."""
+    heads = box_and_classes(levels)
+    if heads is None or heads[2] != 4:
+        return None
+    ways = [(way, offset) for way in ("linear", "exp") for offset in (0.0, 0.5)]
+    ways.sort(key=lambda w: w != ("exp" if "Exp" in levels.kinds else "linear", levels.request.cell_offset or 0.0))
+    found = two_heads(levels, Finding("rtmdet", heads[3]), [
+        ({"bins": 1, "cell_offset": offset, "distances": way},
+         lambda h, o=offset, e=way == "exp": decoding.yolov8(h, levels.strides, 1, o, e)) for way, offset in ways])
+    if found.disagreement is None:
+        found.notes.append(f"nothing in the file says where its boxes lie: taken as rtmdet's, distances "
+                           f"{found.keys['distances']}, cell_offset {found.keys['cell_offset']:g}; look at the "
+                           "picture, or give --cell-offset, or --family yolov8 (YOLO26)")
+    return found
 
 
 def nanodet(levels):
@@ -120,17 +162,43 @@ def nanodet(levels):
     bins = levels.request.bins or 8
     if channels is None or channels <= 4 * bins or (wanted and channels != wanted + 4 * bins):
         return None
+    hard = any(n.kind == "HardSwish" for n in levels.graph.nodes)  # NanoDet has leaky ones
+    family = levels.request.family or ("picodet" if hard and len(levels.levels) > 3 else "nanodet")
     names, keys = levels.cuts(["tensor"])
-    found = Finding("nanodet", channels - 4 * bins, names,
+    found = Finding(family, channels - 4 * bins, names,
                     {"activation": {"class": "sigmoid"}, "bins": bins, "levels": keys})
     offset = levels.request.cell_offset
-    found.keys["cell_offset"] = (0.0 if len(levels.levels) > 3 else 0.5) if offset is None else offset
+    plus = family == "nanodet" and len(levels.levels) > 3
+    found.keys["cell_offset"] = (0.0 if plus else 0.5) if offset is None else offset
     if offset is None:
-        found.notes.append(f"cell_offset is {found.keys['cell_offset']:g}, as in "
-                           f"{'NanoDet-Plus (four strides)' if len(levels.levels) > 3 else 'NanoDet (three strides)'}; "
-                           "if all boxes lie half a cell aside give --cell-offset")
+        as_in = "NanoDet-Plus (four strides)" if plus else "PicoDet" if family == "picodet" else "NanoDet (three strides)"
+        found.notes.append(f"cell_offset is {found.keys['cell_offset']:g}, as in {as_in}; if all boxes lie half a cell "
+                           "aside give --cell-offset")
     random = levels.random()
     return levels.finish(found, [decoding.nanodet([level[0] for level in random[0]], found.classes)], random)
+
+
+def yolo_fastestv2(levels):
+    """Boxes of all anchors, their objectness, and one soft-max of classes for all of them."""
+    request = levels.request
+    given = request.anchors
+    count = len(given[0]) if given else 3
+    channels = [levels.same_channels(i) for i in range(3)] if levels.count(3) else []
+    if channels[:2] != [4 * count, count] or channels[2] is None:
+        return None
+    names, keys = levels.cuts(["box", "objectness", "classes"])
+    found = Finding("yolo-fastestv2", channels[2], names, {"activation": {"class": "softmax"}, "levels": keys})
+    anchors = given or decoding.YOLO_FASTESTV2_ANCHORS
+    if len(anchors) != len(keys):
+        raise Fault(f"the network has {len(keys)} levels and its anchors are not known; say --anchors "
+                    "W,H,W,H,…/W,H,…, a group for each level")
+    if not given:
+        found.notes.append("its anchors are not in the file: those of yolo-fastestv2 for COCO were taken; give "
+                           "--anchors if it was trained with others")
+    for key, pairs in zip(keys, anchors):
+        key["anchors"] = pairs
+    random = levels.random()
+    return levels.finish(found, [decoding.yolo_fastestv2([level]) for level in random[0]], random)
 
 
 def anchors_of(levels, count, classes):
@@ -201,18 +269,33 @@ def yolov8_with_more(levels):
     return found
 
 
-RULES = {"yolox": yolox, "fastestdet": yolox, "yolov8": yolov8, "yolov5": yolov5, "yolov7": yolov5, "nanodet": nanodet}
+RULES = {"yolox": yolox, "fastestdet": yolox, "yolov8": yolov8, "yolov5": yolov5, "yolov7": yolov5, "nanodet": nanodet,
+         "picodet": nanodet, "rtmdet": rtmdet, "yolo-fastestv2": yolo_fastestv2}
+ONE_TO_ONE = "one2one"  # in the names of a branch that was trained to answer once for each object
+
+
+def dense(levels):
+    """Levels without their one-to-one branch, where the file has both (YOLOv10, YOLO26): the dense branch is the
+    likelihood."""
+    kept = [[h for h in level if ONE_TO_ONE not in levels.graph.origin(h.name)] for level in levels.levels]
+    if all(len(level) == 2 for level in kept) and levels.count(4):
+        return Levels(levels.graph, kept, levels.size, levels.request), "of its two branches the dense one is taken"
+    alone = all(not level for level in kept)
+    return levels, "its heads answer once for each object (one-to-one), so that weak second boxes are rare" if alone else ""
 
 
 def candidates(levels, family):
     """Findings of all rules that fit, those that decode as the file does first."""
     if family and family not in RULES:
         return []
+    levels, note = dense(levels)
     rules = [RULES[family]] if family else list(dict.fromkeys(RULES.values()))
     if family in ("", "yolov8"):
         rules.append(yolov8_with_more)
     found = [f for f in (rule(levels) for rule in rules) if f is not None]
     if family:
         found = [f for f in found if f.family == family]
+    for finding in found:
+        finding.notes += [note] if note else []
     agree = [f for f in found if f.disagreement is None or f.disagreement < AGREES]
     return sorted(agree or found, key=lambda f: f.disagreement is None)

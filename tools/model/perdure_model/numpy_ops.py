@@ -41,6 +41,7 @@ for _name, _function in {
         "Sqrt": np.sqrt, "Neg": np.negative, "Abs": np.abs, "Floor": np.floor, "Ceil": np.ceil,
         "Tanh": np.tanh, "Sin": np.sin, "Cos": np.cos, "Erf": erf, "Relu": lambda x: np.maximum(x, 0),
         "Reciprocal": lambda x: (1 / x).astype(x.dtype), "Sigmoid": sigmoid, "Identity": lambda x: x,
+        "Mish": lambda x: (x * np.tanh(np.logaddexp(x, 0))).astype(x.dtype),
         "Softplus": lambda x: np.logaddexp(x, 0).astype(x.dtype),
         "PRelu": lambda x, s: np.where(x < 0, x * s, x),
         "HardSwish": lambda x: x * np.clip(x / x.dtype.type(6) + x.dtype.type(0.5), 0, 1),

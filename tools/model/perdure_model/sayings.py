@@ -2,7 +2,8 @@
 
 from .faults import Fault
 
-FAMILIES = ("yolov5", "yolov7", "yolov8", "yolox", "nanodet", "fastestdet", "ssd", "detr")
+FAMILIES = ("yolov5", "yolov7", "yolov8", "yolox", "nanodet", "picodet", "rtmdet", "fastestdet", "yolo-fastestv2", "ssd",
+            "detr")
 
 EXPORTS = {
     "yolov5": "python export.py --weights FILE.pt --include onnx --opset 12",
@@ -10,6 +11,10 @@ EXPORTS = {
     "yolov8": "yolo export model=FILE.pt format=onnx opset=12 nms=False",
     "yolox": "python tools/export_onnx.py -n NAME -c FILE.pth --output-name FILE.onnx",
     "nanodet": "python tools/export_onnx.py --cfg_path CONFIG --model_path FILE.ckpt",
+    "picodet": "tools/export_model.py -c CONFIG -o weights=FILE --export_serving_model=False export.post_process=False, "
+               "then paddle2onnx",
+    "rtmdet": "the raw answers of its heads (mmdetection: mode='tensor'), by torch.onnx.export",
+    "yolo-fastestv2": "python pytorch2onnx.py --data DATA --weights FILE.pth --output FILE.onnx",
     "fastestdet": "python test.py --yaml CONFIG --weight FILE.pth --img IMAGE --onnx",
     "ssd": "boxes [1,N,4] and scores [1,N,classes+1] as they are before the suppression "
            "(TensorFlow: export_tflite_ssd_graph.py --add_postprocessing_op=false)",
@@ -23,7 +28,7 @@ INSIDE = ("TopK", "GridSample", "Einsum", "GatherElements", "GatherND", "Scatter
 def exports(family):
     if family in EXPORTS:
         return f"Export {family} so: {EXPORTS[family]}"
-    return "Exports that work:" + "".join(f"\n  {k:10} {v}" for k, v in EXPORTS.items())
+    return "Exports that work:" + "".join(f"\n  {k:14} {v}" for k, v in EXPORTS.items())
 
 
 def refuse_choosing(path, operators, family):

@@ -70,6 +70,8 @@ void decodeLevels(const ModelDescription& model, const DecodeOptions& options,
       decodeAnchors(model, options, level, *first, out);
     } else if (model.family == Family::kYolov5) {
       decodeYolov5(model, options, level, *first, out);
+    } else if (model.family == Family::kYoloFastestV2) {
+      decodeYoloFastestV2(model, options, level, first, out);
     } else if (model.family == Family::kPerdure) {
       decodePerdure(model, options, level, {first, per_level}, out);
     } else {

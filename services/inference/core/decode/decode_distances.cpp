@@ -1,5 +1,7 @@
 #include "services/inference/core/decode/decode_distances.h"
 
+#include <cmath>
+
 #include "services/inference/core/decode/weigh.h"
 
 namespace perdure::inference {
@@ -58,8 +60,9 @@ Box boxOf(const ModelDescription& model, double x, double y, double s, const Lev
           std::size_t cell) {
   const auto distance = [&](std::size_t side) {
     const std::size_t first = side * static_cast<std::size_t>(model.bins);
-    return s * meanDistance(view.sides + first * view.channel_step + cell * view.cell_step,
-                            view.channel_step, model.bins);
+    const float* raw = view.sides + first * view.channel_step + cell * view.cell_step;
+    if (model.bins > 1) return s * meanDistance(raw, view.channel_step, model.bins);
+    return s * (model.exponents ? std::exp(double{*raw}) : double{*raw});
   };
   return {x - distance(0), y - distance(1), x + distance(2), y + distance(3)};
 }
@@ -81,6 +84,9 @@ void decodeDistances(const ModelDescription& model, const DecodeOptions& options
       const double x = (static_cast<int>(i) % columns + model.cell_offset) * s;
       const double y = (static_cast<int>(i) / columns + model.cell_offset) * s;
       candidate.box = boxOf(model, x, y, s, view, i);
+      const Box& box = candidate.box;
+      if (model.bins == 1 && (box.x2 <= box.x1 || box.y2 <= box.y1))
+        continue;  // negative distances
       out.push_back(std::move(candidate));
     }
   }

@@ -1,4 +1,4 @@
-// Raw heads of YOLOv5 and YOLOv7: anchors, every value through a sigmoid.
+// Raw heads of YOLOv5, YOLOv7 and YOLO-FastestV2: anchors, boxes through a sigmoid.
 #pragma once
 
 #include <vector>
@@ -12,5 +12,10 @@ namespace perdure::inference {
 ///   centre (g − ½ + 2σ(t))·s, size anchor·(2σ(t))²
 void decodeYolov5(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor& tensor, std::vector<Candidate>& out);
+
+/// `tensors`: (1,4·A,H,W), (1,A,H,W) and (1,K,H,W) of one level, shapes checked: boxes as above,
+/// objectness, and the classes of a cell, which all of its anchors share.
+void decodeYoloFastestV2(const ModelDescription& model, const DecodeOptions& options,
+                         const Level& level, const Tensor* tensors, std::vector<Candidate>& out);
 
 }  // namespace perdure::inference

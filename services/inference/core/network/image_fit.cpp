@@ -56,6 +56,12 @@ ImageFit fitOf(const Input& input, int image_width, int image_height) {
   return fit;
 }
 
+double paddedShare(const Input& input, int image_width, int image_height) {
+  const ImageFit fit = fitOf(input, image_width, image_height);
+  const double all = static_cast<double>(input.width) * input.height;
+  return 1.0 - static_cast<double>(fit.width) * fit.height / all;
+}
+
 Result<cv::Mat> makeBlob(const Input& input, const Frame& frame) {
   const auto view = viewOf(frame);
   if (!view) return view;

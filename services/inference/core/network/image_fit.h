@@ -31,6 +31,9 @@ struct ImageFit {
 
 ImageFit fitOf(const Input& input, int image_width, int image_height);
 
+/// Which share of the input shows no image; 0 where nothing is letterboxed.
+double paddedShare(const Input& input, int image_width, int image_height);
+
 /// The blob (1,3,H,W) of float32 for the network. Mono images are repeated in all three channels.
 /// Reasons: "frame_malformed" where the frame's size and its data do not agree.
 Result<cv::Mat> makeBlob(const Input& input, const Frame& frame);

@@ -78,6 +78,11 @@ void addLevelShapes(const ModelDescription& model, const Level& level, std::vect
     case Family::kYolov5:
       plane(anchored);
       break;
+    case Family::kYoloFastestV2:
+      plane(4 * static_cast<int>(level.anchors.size()));
+      plane(static_cast<int>(level.anchors.size()));
+      plane(classes);
+      break;
     case Family::kYolov8:
     case Family::kNanoDet:
       if (level.tensor.empty()) {

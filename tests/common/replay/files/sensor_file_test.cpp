@@ -62,8 +62,10 @@ TEST(SensorFileOfOthers, FiveAndEightCoefficientsAreTaken) {
 }
 
 TEST(SensorFileOfOthers, ALensThatIsNotReadIsNamedWithTheMend) {
-  EXPECT_THAT(errorOfYaml(std::string(kPlace) + kSize + "camera_model: ds\n"),
+  EXPECT_THAT(errorOfYaml(std::string(kPlace) + kSize + "camera_model: scaramuzza\n"),
               HasSubstr("pinhole-equi"));
+  EXPECT_THAT(errorOfYaml(std::string(kPlace) + kSize + "camera_model: ds\n"),
+              HasSubstr("intrinsics is missing or has not 6 numbers"));
   EXPECT_THAT(errorOfYaml(lens("fov", "[0.9]")), HasSubstr("`fov`"));
   EXPECT_THAT(errorOfYaml(lens("none", "[0.9, 0, 0, 0]")), HasSubstr("is none, but there are"));
 }

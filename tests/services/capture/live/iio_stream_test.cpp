@@ -30,7 +30,7 @@ std::string ownAddress() {
 class Stream : public ::testing::Test {
  protected:
   void open(IioSettings settings = {}) {
-    settings.uri = "ip:" + address_;
+    settings.uri = "ip:" + address_ + port_;
     stream_ = std::make_unique<IioStream>(settings, [this](const IioScan& scan) {
       const std::lock_guard lock(mutex_);
       scans_.push_back(scan);
@@ -51,6 +51,7 @@ class Stream : public ::testing::Test {
   }
 
   const std::string address_ = ownAddress();
+  std::string port_ = {};
   std::mutex mutex_;
   std::vector<IioScan> scans_;
   std::vector<std::int64_t> arrived_ns_;
@@ -175,6 +176,16 @@ TEST_F(Stream, GoesOnWhenTheImuComesBack) {
   iiod->fallSilent();
   ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_lost") == 2; }))
       << "nothing came, and the connection stood";
+}
+
+// libiio writes into a URI that has a port: a later try must have it whole.
+TEST_F(Stream, BehindAPortTheImuIsFoundWhenItComes) {
+  port_ = ":30431";
+  open();
+  ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_absent") >= 2; }));
+  EXPECT_THAT(stream_->state().problem(), HasSubstr(address_ + port_));
+  const FakeIiod iiod(address_, {{}});
+  EXPECT_TRUE(flows(50)) << stream_->state().problem();
 }
 
 TEST_F(Stream, FollowsAClockThatIsSetThereAndCountsIt) {

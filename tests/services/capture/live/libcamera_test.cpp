@@ -67,6 +67,21 @@ TEST(LibcameraControls, AskForTheRateWhereThereIsAControlOfIt) {
               ElementsAre(40'000, 40'000));
 }
 
+TEST(LibcameraControls, ARegionOfInterestIsAskedForOrMissed) {
+  const libcamera::ControlId& id = controls::ScalerCrop;
+  const libcamera::ControlInfoMap offered(
+      libcamera::ControlInfoMap::Map{
+          {&id, libcamera::ControlInfo(libcamera::Rectangle(0, 0, 64, 64),
+                                       libcamera::Rectangle(0, 0, 3280, 2464))}},
+      controls::controls);
+  CameraSettings settings;
+  settings.crop = {100, 50, 1280, 960};
+  EXPECT_EQ(controlsFor(settings, offered).list.get(controls::ScalerCrop),
+            libcamera::Rectangle(100, 50, 1280, 960));
+  const libcamera::ControlInfoMap none(libcamera::ControlInfoMap::Map{}, controls::controls);
+  EXPECT_THAT(controlsFor(settings, none).missing, HasSubstr("ScalerCrop (camera.crop)"));
+}
+
 TEST(LibcameraLog, KeepsTheWordsOfWarningsAndWhatIsWorse) {
   EXPECT_EQ(worthLogging("[0:01:02.34] [77] ERROR V4L2 v4l2_videodevice.cpp:1697 /dev/video0: "
                          "Failed to queue buffer 0\n"),

@@ -181,6 +181,50 @@ TEST(DecodeYolov8, ReadsTheExportedPlanesAndTheTwoPartsBeforeTheSigmoid) {
   EXPECT_NEAR(sure[0].activations[2], -25.0, 1e-4);
 }
 
+// Two cells, one bin: the values are the distances themselves (YOLO26, RTMDet).
+TEST(DecodeYolov8, OfOneBinTheValueIsTheDistanceOrItsLogarithm) {
+  const std::string level = R"("levels": [{"stride": 16, "box": "b", "classes": "c"}])";
+  const Values sides = {0.5F, 1, 0.25F, -3, 0.75F, 1, 0.5F, 1}, classes = {1, 2, -1, 0};
+  const auto linear = decoded(parsed("yolov8", kSigmoid + R"("bins": 1, )" + level),
+                              {{{1, 4, 1, 2}, sides}, {{1, 2, 1, 2}, classes}});
+  ASSERT_EQ(linear.size(), 1u) << "a box whose sides are beyond each other is none";
+  expectBox(linear[0].box, 8 - 8, 8 - 4, 8 + 12, 8 + 8);
+  const auto exponents = decoded(
+      parsed("rtmdet", kSigmoid + R"("bins": 1, "cell_offset": 0, "distances": "exp", )" + level),
+      {{{1, 4, 1, 2}, sides}, {{1, 2, 1, 2}, classes}});
+  ASSERT_EQ(exponents.size(), 2u);
+  const auto e = [](double x) { return 16 * std::exp(x); };
+  expectBox(exponents[0].box, -e(0.5), -e(0.25), e(0.75), e(0.5));
+  expectBox(exponents[1].box, 16 - e(1), -e(-3), 16 + e(1), e(1));
+  EXPECT_THAT(faultsOf("yolov8", kSigmoid + R"("bins": 4, "distances": "exp", )" + level),
+              HasSubstr("distances"));
+}
+
+TEST(DecodeYoloFastestV2, AnchorsOfACellShareItsClasses) {
+  const auto model = parsed("yolo-fastestv2", R"("activation": {"class": "softmax"}, "levels": [
+      {"stride": 16, "box": "b", "objectness": "o", "classes": "c", "anchors": [[10, 20], [30, 5]]}])");
+  const Values box = randomValues(8 * 2, 21, 1.0F), objectness = {1, -0.5F, 0.25F, 2};
+  const Values classes = {0.5F, 1, -0.5F, 3};
+  const auto out =
+      decoded(model, {{{1, 8, 1, 2}, box}, {{1, 2, 1, 2}, objectness}, {{1, 2, 1, 2}, classes}});
+  ASSERT_EQ(out.size(), 4u);
+  for (std::size_t a = 0; a < 2; ++a) {
+    for (std::size_t cell = 0; cell < 2; ++cell) {
+      const auto raw = [&](std::size_t v) { return logistic(box[(4 * a + v) * 2 + cell]); };
+      const double x = (2 * raw(0) - 0.5 + static_cast<double>(cell)) * 16;
+      const double y = (2 * raw(1) - 0.5) * 16;
+      const double w = std::pow(2 * raw(2), 2) * (a == 0 ? 10 : 30);
+      const double h = std::pow(2 * raw(3), 2) * (a == 0 ? 20 : 5);
+      const Candidate& c = out[a * 2 + cell];
+      expectBox(c.box, x - w / 2, y - h / 2, x + w / 2, y + h / 2);
+      const double share = logistic(double{classes[cell]} - double{classes[2 + cell]});
+      const double found = logistic(objectness[a * 2 + cell]);
+      EXPECT_NEAR(c.activations[1], logOdds(found * share), 1e-4);
+      EXPECT_NEAR(c.activations[2], logOdds(found * (1 - share)), 1e-4);
+    }
+  }
+}
+
 TEST(DecodeNanoDet, HasItsClassesFirstAndCellsBeyondTheBorder) {
   const auto whole =
       parsed("nanodet", kApplied + R"("bins": 2, "outputs": {"predictions": "output"},
@@ -306,9 +350,9 @@ TEST(DescriptionOfFamilies, TellsAllFaultsAtOnce) {
         "boxes.variances: is not a list of two numbers", "levels: is not a known key"}) {
     EXPECT_THAT(ssd, HasSubstr(part));
   }
-  const std::string v8 = faultsOf("yolov8", kSigmoid + R"("bins": 1, "cell_offset": 2,
+  const std::string v8 = faultsOf("yolov8", kSigmoid + R"("bins": 0, "cell_offset": 2,
       "levels": [{"stride": 5, "box": "b"}])");
-  for (const char* part : {"bins: is not an integer from 2 to 64", "cell_offset: is not a number",
+  for (const char* part : {"bins: is not an integer from 1 to 64", "cell_offset: is not a number",
                            "levels[0].stride: does not divide", "levels[0].classes: is missing"}) {
     EXPECT_THAT(v8, HasSubstr(part));
   }

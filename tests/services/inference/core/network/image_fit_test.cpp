@@ -27,6 +27,13 @@ Frame frame(std::uint32_t width, std::uint32_t height, ImageEncoding encoding,
   return f;
 }
 
+TEST(ImageFit, ShareOfTheInputThatStaysGrey) {
+  EXPECT_NEAR(paddedShare(input(Fit::kLetterboxCentre), 832, 416), 0.5, 1e-9);
+  EXPECT_NEAR(paddedShare(input(Fit::kLetterboxTopLeft), 1242, 375), 0.7, 0.01);
+  EXPECT_EQ(paddedShare(input(Fit::kLetterboxTopLeft), 500, 500), 0.0);
+  EXPECT_EQ(paddedShare(input(Fit::kResize), 1242, 375), 0.0);
+}
+
 TEST(ImageFit, LetterboxUsesOneScaleAndResizeTwo) {
   const ImageFit letterbox = fitOf(input(Fit::kLetterboxTopLeft), 1242, 375);
   EXPECT_EQ(letterbox.width, 416);

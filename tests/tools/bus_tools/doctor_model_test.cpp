@@ -1,0 +1,51 @@
+// What doctor says of a network's input beside a camera's images.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "common/replay/dataset.h"
+#include "tests/common/replay/tiny_datasets.h"
+#include "tools/bus_tools/doctor/doctor.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+/// A description alone: nothing here runs the network.
+fs::path networkOf(const fs::path& folder, int width, int height) {
+  std::ofstream(folder / "net.onnx") << "no network";
+  std::ofstream(folder / "net.onnx.model.json")
+      << R"({"family": "yolox", "classes": ["car"], "activation": {"class": "sigmoid"},
+            "input": {"width": )"
+      << width << R"(, "height": )" << height << R"(, "fit": "letterbox_centre", "colour": "bgr"},
+            "levels": [{"stride": 32, "box": "b", "objectness": "o", "classes": "c"}]})";
+  return folder / "net.onnx";
+}
+
+TEST(DoctorOfNetworks, WarnsOfAShapeThatWastesAThirdOfTheInput) {
+  const fs::path drive = replay::tinyEuroc("doctor_shape");
+  const fs::path folder = replay::freshFolder("doctor_network");
+  const auto camera = replay::Dataset::open({.path = drive})->calibration().cameras.front();
+  const int side = 32 * 8;
+  const auto other = static_cast<int>(side * camera.height / camera.width / 32 * 32);
+  EXPECT_TRUE(checkNetworkShape(drive, networkOf(folder, side, std::max(32, other))).empty());
+  const Findings found = checkNetworkShape(drive, networkOf(folder, 4 * side, 64));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].verdict, Verdict::kWarn);
+  EXPECT_THAT(found[0].text, HasSubstr("--input camera --image PICTURE"));
+}
+
+TEST(DoctorOfNetworks, TheServicesOwnIsTakenFromItsConfiguration) {
+  const fs::path folder = replay::freshFolder("doctor_config");
+  EXPECT_EQ(configuredNetwork(folder), "");
+  std::ofstream(folder / "inference.yaml") << "model:\n  path: /here/net.onnx\n";
+  EXPECT_EQ(configuredNetwork(folder), "/here/net.onnx");
+  std::ofstream(folder / "inference.yaml") << "model: [\n";
+  EXPECT_EQ(configuredNetwork(folder), "");
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,178 @@
+// Rigs from what others have calibrated: the numbers are those of the native file, to the last
+// digit that matters, and what is not known is told by its name.
+#include "tools/calibrate/import.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/base/errors.h"
+#include "common/replay/files/rig_file.h"
+
+namespace perdure::calibrate {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class RigImport : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("perdure_rig_import_" + std::to_string(getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path file(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  std::string errorOf(const std::vector<fs::path>& files,
+                      const std::vector<RigidTransform>& places = {}) const {
+    try {
+      importRig(files, places);
+    } catch (const StartupError& e) {
+      return e.what();
+    }
+    return "it was taken";
+  }
+  fs::path folder_;
+};
+
+const std::string kNative =
+    "cam0:\n  T_BS:\n    cols: 4\n    rows: 4\n"
+    "    data: [0, 0, 1, 0.07, -1, 0, 0, 0.01, 0, -1, 0, -0.02, 0, 0, 0, 1]\n"
+    "  rate_hz: 20\n  resolution: [752, 480]\n  intrinsics: [458.654, 457.296, 367.215, 248.375]\n"
+    "  distortion_model: radial-tangential\n"
+    "  distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n"
+    "  time_offset_s: 0.0031\n"
+    "imu0:\n  rate_hz: 200\n  gyroscope_noise_density: 1.6968e-04\n"
+    "  gyroscope_random_walk: 1.9393e-05\n  accelerometer_noise_density: 2.0e-3\n"
+    "  accelerometer_random_walk: 3.0e-3\n";
+
+// The same: T_cam_imu is the inverse of T_BS.
+const std::string kChain =
+    "cam0:\n  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.01]\n  - [0.0, 0.0, -1.0, -0.02]\n"
+    "  - [1.0, 0.0, 0.0, -0.07]\n  - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: []\n"
+    "  camera_model: pinhole\n"
+    "  distortion_coeffs: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n"
+    "  distortion_model: radtan\n  intrinsics: [458.654, 457.296, 367.215, 248.375]\n"
+    "  resolution: [752, 480]\n  rostopic: /cam0/image_raw\n  timeshift_cam_imu: 0.0031\n";
+
+const std::string kKalibrImu =
+    "rostopic: /imu0\nupdate_rate: 200.0\ngyroscope_noise_density: 1.6968e-04\n"
+    "gyroscope_random_walk: 1.9393e-05\naccelerometer_noise_density: 2.0e-3\n"
+    "accelerometer_random_walk: 3.0e-3\n";
+
+const std::string kCameraInfo =
+    "image_width: 752\nimage_height: 480\ncamera_name: narrow\n"
+    "camera_matrix:\n  rows: 3\n  cols: 3\n"
+    "  data: [458.654, 0, 367.215, 0, 457.296, 248.375, 0, 0, 1]\n"
+    "distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
+    "  data: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0]\n"
+    "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+    "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]\n";
+
+void expectSame(const Calibration& a, const Calibration& b) {
+  ASSERT_EQ(a.cameras.size(), b.cameras.size());
+  for (std::size_t i = 0; i < a.cameras.size(); ++i) {
+    const auto &c = a.cameras[i], &d = b.cameras[i];
+    EXPECT_LT((c.T_BC.matrix() - d.T_BC.matrix()).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_EQ(c.width, d.width);
+    EXPECT_EQ(c.fx, d.fx);
+    EXPECT_EQ(c.cy, d.cy);
+    EXPECT_EQ(c.distortion, d.distortion);
+    EXPECT_EQ(c.distortion_coefficients, d.distortion_coefficients);
+    EXPECT_EQ(c.time_offset_s, d.time_offset_s);
+  }
+  ASSERT_EQ(a.imu.has_value(), b.imu.has_value());
+  if (!a.imu) return;
+  EXPECT_EQ(a.imu->rate_hz, b.imu->rate_hz);
+  EXPECT_EQ(a.imu->gyro_noise, b.imu->gyro_noise);
+  EXPECT_EQ(a.imu->accel_bias_walk, b.imu->accel_bias_walk);
+}
+
+TEST_F(RigImport, KalibrsFilesAreTheNativeRig) {
+  const Calibration native = replay::readRig(file("native.yaml", kNative));
+  const auto imported =
+      importRig({file("camchain-imucam.yaml", kChain), file("imu.yaml", kKalibrImu)});
+  EXPECT_TRUE(imported.ignored.empty()) << imported.ignored.front();
+  expectSame(imported.rig, native);
+  // And what is written is read as the same.
+  expectSame(replay::readRig(file("rig.yaml", replay::rigText(imported.rig, "imported"))), native);
+}
+
+TEST_F(RigImport, CameraInfoIsTheSameWithAPlace) {
+  const auto info = file("ost.yaml", kCameraInfo),
+             imu =
+                 file("imu.yaml",
+                      "imu0:\n  model: calibrated\n  T_i_b: "
+                      "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n  rate_hz: 200\n  "
+                      "gyroscope_noise_density: 1.6968e-04\n  gyroscope_random_walk: 1.9393e-05\n  "
+                      "accelerometer_noise_density: 2.0e-3\n  accelerometer_random_walk: 3.0e-3\n");
+  const std::string why = errorOf({info, imu});
+  EXPECT_THAT(why, HasSubstr("does not say where the camera is on the IMU"));
+  EXPECT_THAT(why, HasSubstr("--T_BS"));
+  const auto T_BS = transformOf("0 0 1 .07  -1 0 0 .01  0 -1 0 -.02  0 0 0 1");
+  auto imported = importRig({info, imu}, {T_BS});
+  EXPECT_TRUE(imported.ignored.empty());
+  imported.rig.cameras[0].time_offset_s = 0.0031;  // camera_info has none
+  expectSame(imported.rig, replay::readRig(file("native.yaml", kNative)));
+  EXPECT_THAT(errorOf({info, imu}, {T_BS, T_BS}), HasSubstr("--T_BS was given 2 times, and 1"));
+}
+
+TEST_F(RigImport, TwoSensorsOfEuRoCAreSeenFromTheIMU) {
+  const std::string imu =
+      "T_BS:\n  data: [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 200\n"
+      "gyroscope_noise_density: 1e-4\ngyroscope_random_walk: 1e-5\n"
+      "accelerometer_noise_density: 2e-3\naccelerometer_random_walk: 3e-3\n";
+  std::string camera = kNative.substr(6, kNative.find("imu0:") - 6), flat;
+  for (std::size_t i = 0; i < camera.size(); ++i) {  // the section, two blanks to the left
+    if (camera.compare(i, 2, "  ") == 0 && (i == 0 || camera[i - 1] == '\n'))
+      ++i;
+    else
+      flat += camera[i];
+  }
+  const auto imported = importRig({file("cam.yaml", flat), file("imu.yaml", imu)});
+  EXPECT_NEAR(imported.rig.cameras[0].T_BC.p.x(), 0.07 - 0.5, 1e-12);
+}
+
+TEST_F(RigImport, DoubleSphereBecomesTheNearestEquidistantLens) {
+  std::string chain = kChain;
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    chain.replace(chain.find(from), from.size(), to);
+  };
+  replace("camera_model: pinhole", "camera_model: ds");
+  replace("[458.654, 457.296, 367.215, 248.375]", "[-0.2345, 0.5694, 156.7, 156.7, 376, 240]");
+  replace("[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]", "[]");
+  replace("distortion_model: radtan", "distortion_model: none");
+  const auto camera = importRig({file("chain.yaml", chain)}).rig.cameras[0];
+  EXPECT_EQ(camera.distortion, DistortionModel::kEquidistant);
+  EXPECT_NEAR(camera.fx, 156.7 / (1 - 0.2345), 2.0);  // near the axis: f/(1 + xi), for small alpha
+  replace("camera_model: ds", "camera_model: scaramuzza");
+  EXPECT_THAT(errorOf({file("chain.yaml", chain)}), HasSubstr("calibrate as pinhole-radtan"));
+}
+
+TEST_F(RigImport, WhatIsUnknownOrMissingIsToldByName) {
+  EXPECT_THAT(importRig({file("chain.yaml", kChain + "  tilt: 3\ncam2:\n  x: 1\n")}).ignored,
+              ElementsAre(HasSubstr("cam0: the key `tilt`"), HasSubstr("the key `cam2`")));
+  EXPECT_THAT(errorOf({file("other.yaml", "colour: red\n")}),
+              HasSubstr("has none of the keys cam0"));
+  EXPECT_THAT(errorOf({file("imu.yaml", kKalibrImu)}), HasSubstr("no file has a camera"));
+  const auto chain = file("chain.yaml", kChain);
+  EXPECT_THAT(errorOf({chain, chain, chain}), HasSubstr("is a third camera"));
+  const auto imu = file("imu.yaml", kKalibrImu);
+  EXPECT_THAT(errorOf({chain, imu, imu}), HasSubstr("is a second IMU"));
+  EXPECT_THAT(errorOf({chain, file("scaled.yaml", "imu0:\n  model: scale-misalignment\n")}),
+              HasSubstr("--imu-models calibrated"));
+  EXPECT_THROW(transformOf("1 0 0 0"), StartupError);
+  EXPECT_THROW(transformOf("1 0 0 x 0 1 0 0 0 0 1 0 0 0 0 1"), StartupError);
+  EXPECT_THROW(transformOf("2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"), StartupError);
+}
+
+}  // namespace
+}  // namespace perdure::calibrate

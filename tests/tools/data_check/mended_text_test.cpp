@@ -1,0 +1,119 @@
+// Tables that cannot be read as they are: stamps in seconds, orientations beside the samples.
+#include "tools/data_check/mended_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "common/base/errors.h"
+#include "common/replay/dataset.h"
+#include "tests/tools/data_check/turning_drive.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::Dataset;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using tests::makeTurningDrive;
+
+/// Each line of numbers changed; a line that is no number, by `head`.
+void rewrite(const fs::path& file, const std::function<std::string(const std::string&)>& change,
+             const std::string& head = "#other") {
+  std::ifstream in(file);
+  std::string text;
+  for (std::string line; std::getline(in, line);) {
+    text += (line.empty() || line[0] == '#' ? head : change(line)) + "\n";
+  }
+  in.close();
+  std::ofstream(file) << text;
+}
+
+std::string inSeconds(const std::string& line) {
+  const auto at = line.find(',');
+  const std::string stamp = line.substr(0, at);
+  return stamp.substr(0, stamp.size() - 9) + "." + stamp.substr(stamp.size() - 9) + line.substr(at);
+}
+
+void expectSound(const MendedText& text) {
+  const auto recording = Dataset::open({.path = text.drive()})->recording();
+  const auto sound = Dataset::open({.path = makeTurningDrive("text_sound")})->recording();
+  ASSERT_EQ(recording.imu.size(), sound.imu.size());
+  for (std::size_t i = 0; i < sound.imu.size(); ++i) {
+    EXPECT_EQ(recording.imu[i].time, sound.imu[i].time);
+    EXPECT_EQ(recording.imu[i].gyro, sound.imu[i].gyro);
+    EXPECT_EQ(recording.imu[i].accel, sound.imu[i].accel);
+  }
+  ASSERT_EQ(recording.frames.size(), sound.frames.size());
+  EXPECT_EQ(recording.frames.back().time, sound.frames.back().time);
+  EXPECT_TRUE(fs::exists(recording.frames.back().path));
+}
+
+TEST(MendedText, SoundFoldersAreLeftAlone) {
+  const auto root = makeTurningDrive("text");
+  const MendedText text(root);
+  EXPECT_EQ(text.drive(), root);
+  EXPECT_THAT(text.mends(), IsEmpty());
+}
+
+TEST(MendedText, StampsInSecondsBecomeNanosecondsExactly) {
+  const auto root = makeTurningDrive("text_seconds");
+  rewrite(root / "mav0/imu0/data.csv", inSeconds);
+  EXPECT_THROW(Dataset::open({.path = root}), StartupError);
+  fs::path gone;
+  {
+    const MendedText text(root);
+    EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("they were seconds")));
+    expectSound(text);
+    gone = text.drive();
+  }
+  EXPECT_FALSE(fs::exists(gone));
+  // Of the camera, too, and where the folder is given as mav0/.
+  rewrite(root / "mav0/cam0/data.csv", inSeconds);
+  const MendedText both(root / "mav0/");
+  EXPECT_EQ(both.mends().size(), 2U);
+  expectSound(both);
+}
+
+TEST(MendedText, AQuaternionAmongTheColumnsIsLeftOut) {
+  const auto root = makeTurningDrive("text_quaternion");
+  rewrite(root / "mav0/imu0/data.csv", [](const std::string& line) {
+    const auto at = line.find(',');
+    return line.substr(0, at) + ",0.6,0,0.8,0" + line.substr(at);
+  });
+  const MendedText text(root);
+  EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("columns 6, 7, 8, 9, 10, 11 are taken")));
+  expectSound(text);
+}
+
+TEST(MendedText, TenColumnsNeedAHeadThatNamesThem) {
+  const auto ten = [](const std::string& line) {  // accelerations, angles, rates of turn
+    std::istringstream in(line);
+    std::vector<std::string> words;
+    for (std::string word; std::getline(in, word, ',');) words.push_back(word);
+    return words[0] + "," + words[4] + "," + words[5] + "," + words[6] + ",0.1,0.2,0.3," +
+           words[1] + "," + words[2] + "," + words[3];
+  };
+  const auto root = makeTurningDrive("text_ten");
+  const auto file = root / "mav0/imu0/data.csv";
+  rewrite(file, ten, "#timestamp,a_x,a_y,a_z,roll,pitch,yaw,w_x,w_y,w_z");
+  const MendedText text(root);
+  EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("8, 9, 10, 2, 3, 4")));
+  expectSound(text);
+  rewrite(
+      file, [](const std::string& line) { return line; }, "#numbers");
+  try {
+    const MendedText unsure(root);
+    FAIL() << "it was taken";
+  } catch (const StartupError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("Name all of them in its first line"));
+    EXPECT_EQ(e.code(), ExitCode::kData);
+  }
+}
+
+}  // namespace
+}  // namespace perdure::tools

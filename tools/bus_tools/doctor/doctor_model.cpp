@@ -1,0 +1,45 @@
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+
+#include "common/replay/dataset.h"
+#include "services/inference/core/network/image_fit.h"
+#include "services/inference/model_file.h"
+#include "tools/bus_tools/doctor/doctor.h"
+
+namespace perdure::tools {
+namespace {
+
+constexpr double kMostWaste = 1.0 / 3.0;
+
+}  // namespace
+
+std::string configuredNetwork(const std::string& folder) {
+  try {
+    const YAML::Node yaml = YAML::LoadFile(folder + "/inference.yaml");
+    const YAML::Node path = yaml["model"] ? yaml["model"]["path"] : YAML::Node();
+    return path && path.IsScalar() ? path.Scalar() : "";
+  } catch (const YAML::Exception&) {
+    return {};  // there is none, or the service says what is wrong with it
+  }
+}
+
+Findings checkNetworkShape(const std::string& recording, const std::string& network) {
+  const auto dataset = replay::Dataset::open({.path = recording, .decode = false});
+  if (dataset->calibration().cameras.empty()) return {};
+  const auto& camera = dataset->calibration().cameras.front();
+  const auto file = inference::readModelFile(network, "", inference::standardModelFolders());
+  const inference::Input& input = file.description.input;
+  const double waste = inference::paddedShare(input, static_cast<int>(camera.width),
+                                              static_cast<int>(camera.height));
+  if (waste <= kMostWaste) return {};
+  return {{Verdict::kWarn,
+           fmt::format("{:.0f} % of the input of {} ({}x{}) stays grey beside images of {}x{}: "
+                       "perdure model import NETWORK --input camera --image PICTURE gives it the "
+                       "camera's shape",
+                       100 * waste, std::filesystem::path(network).filename().string(), input.width,
+                       input.height, camera.width, camera.height)}};
+}
+
+}  // namespace perdure::tools

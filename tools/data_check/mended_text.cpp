@@ -1,0 +1,271 @@
+#include "tools/data_check/mended_text.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "common/base/checked_file.h"
+#include "common/base/errors.h"
+#include "common/replay/files/stamps.h"
+#include "common/replay/files/text_file.h"
+
+namespace perdure::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using replay::split;
+
+constexpr double kLeastGravity = 8.3, kMostGravity = 11.3;
+constexpr char kSeven[] =
+    "timestamp [ns], w_x, w_y, w_z [rad/s], a_x, a_y, a_z [m/s^2] are awaited";
+
+struct Table {
+  fs::path file;
+  std::vector<std::string> head;
+  std::vector<std::vector<std::string>> rows;
+};
+
+char separatorIn(const std::string& line) {
+  for (const char one : {',', ';'}) {
+    if (line.find(one) != line.npos) return one;
+  }
+  return ' ';
+}
+
+std::vector<std::string> wordsOf(const std::string& line) {
+  const auto fields = split(line, separatorIn(line));
+  std::vector<std::string> words(fields.begin(), fields.end());
+  while (words.size() > 1 && words.back().empty()) words.pop_back();
+  return words;
+}
+
+Table tableOf(const fs::path& file) {
+  Table table{file, {}, {}};
+  for (const auto& line : replay::readLines(file, "EuRoC keeps data.csv in each folder")) {
+    const bool number = line.text.find_first_of("0123456789+-.") == 0;
+    if (number) {
+      table.rows.push_back(wordsOf(line.text));
+    } else if (table.head.empty() && table.rows.empty()) {
+      table.head = wordsOf(replay::toLower(line.text.substr(line.text.starts_with('#') ? 1 : 0)));
+    }
+  }
+  return table;
+}
+
+/// `text` times 10^places as whole nanoseconds; nothing where it is no plain decimal number.
+std::optional<std::string> shifted(std::string_view text, std::size_t places) {
+  const auto point = text.find('.');
+  std::string whole(text.substr(0, point));
+  std::string rest(point == text.npos ? std::string_view() : text.substr(point + 1));
+  const auto digits = [](const std::string& s) {
+    return std::all_of(s.begin(), s.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
+  if (whole.empty() || !digits(whole) || !digits(rest)) return std::nullopt;
+  rest.resize(places, '0');  // beyond a nanosecond nothing is known
+  whole += rest;
+  const auto first = std::min(whole.find_first_not_of('0'), whole.size() - 1);
+  return whole.substr(first);
+}
+
+/// How many digits the stamps are short of nanoseconds; 0 where they are nanoseconds.
+std::size_t placesShort(const Table& table) {
+  std::size_t others = 0;
+  std::vector<double> values;
+  for (const auto& row : table.rows) {
+    const auto value = replay::parseNumber(row[0]);
+    if (!value) continue;
+    values.push_back(*value);
+    if (!replay::parseNanoseconds(row[0])) ++others;
+  }
+  if (values.empty() || 2 * others < values.size()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  const double middle = values[values.size() / 2];
+  return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
+}
+
+bool mendStamps(Table& table, std::vector<std::string>& mends) {
+  const std::size_t places = placesShort(table);
+  if (places == 0) return false;
+  for (auto& row : table.rows) {
+    if (auto stamp = shifted(row[0], places)) row[0] = *std::move(stamp);
+  }
+  const char* unit = places == 9 ? "seconds" : places == 6 ? "milliseconds" : "microseconds";
+  mends.push_back(
+      fmt::format("{}: the stamps are nanoseconds now (they were {})", table.file.string(), unit));
+  return true;
+}
+
+enum class Column { kOther, kTurn, kForce };
+
+Column columnNamed(const std::string& name) {
+  const auto has = [&](const char* part) { return name.find(part) != name.npos; };
+  if (has("orient") || has("roll") || has("pitch") || has("yaw") || has("quat")) {
+    return Column::kOther;
+  }
+  if (has("angular") || has("gyr") || has("omega") || name.starts_with('w')) return Column::kTurn;
+  const bool force = has("accel") || has("linear") || name.starts_with("a_") || name == "ax" ||
+                     name == "ay" || name == "az";
+  return force ? Column::kForce : Column::kOther;
+}
+
+using Six = std::vector<std::size_t>;  ///< columns of w_x, w_y, w_z, a_x, a_y, a_z
+
+std::optional<Six> byHead(const Table& table, std::size_t columns) {
+  if (table.head.size() != columns) return std::nullopt;
+  Six turns, forces;
+  for (std::size_t i = 1; i < columns; ++i) {
+    const Column column = columnNamed(table.head[i]);
+    if (column == Column::kTurn) turns.push_back(i);
+    if (column == Column::kForce) forces.push_back(i);
+  }
+  if (turns.size() != 3 || forces.size() != 3) return std::nullopt;
+  turns.insert(turns.end(), forces.begin(), forces.end());
+  return turns;
+}
+
+/// The median of the length of `count` columns from `first` on, and how far it departs from it.
+struct Length {
+  double median = 0, spread = 0;
+};
+
+Length lengthOf(const Table& table, std::size_t first, std::size_t count) {
+  std::vector<double> lengths;
+  for (const auto& row : table.rows) {
+    double sum = 0;
+    for (std::size_t i = first; i < first + count && i < row.size(); ++i) {
+      const double value = replay::parseNumber(row[i]).value_or(NAN);
+      sum += value * value;
+    }
+    if (std::isfinite(sum)) lengths.push_back(std::sqrt(sum));
+  }
+  if (lengths.empty()) return {};
+  std::sort(lengths.begin(), lengths.end());
+  const double median = lengths[lengths.size() / 2];
+  return {median, std::max(median - lengths.front(), lengths.back() - median)};
+}
+
+/// Without a head: four columns of length 1 in every row are a quaternion, and of the other two
+/// threes one measures gravity.
+std::optional<Six> byQuaternion(const Table& table, std::size_t columns) {
+  if (columns != 11) return std::nullopt;
+  std::optional<std::size_t> at;
+  for (const std::size_t first : {1, 4, 7}) {
+    const Length length = lengthOf(table, first, 4);
+    if (std::abs(length.median - 1) > 1e-2 || length.spread > 1e-2) continue;
+    if (at) return std::nullopt;
+    at = first;
+  }
+  if (!at) return std::nullopt;
+  Six rest;
+  for (std::size_t i = 1; i < columns; ++i) {
+    if (i < *at || i >= *at + 4) rest.push_back(i);
+  }
+  const auto isGravity = [&](std::size_t first) {
+    const double length = lengthOf(table, first, 3).median;
+    return length > kLeastGravity && length < kMostGravity;
+  };
+  if (isGravity(rest[0]) && !isGravity(rest[3]))
+    std::rotate(rest.begin(), rest.begin() + 3, rest.end());
+  return rest;
+}
+
+bool mendColumns(Table& table, std::vector<std::string>& mends) {
+  std::map<std::size_t, std::size_t> counts;
+  for (const auto& row : table.rows) ++counts[row.size()];
+  const auto usual = std::max_element(counts.begin(), counts.end(),
+                                      [](auto& a, auto& b) { return a.second < b.second; });
+  if (usual == counts.end() || usual->first == 7 || usual->first < 7) return false;
+  const std::size_t columns = usual->first;
+  auto six = byHead(table, columns);
+  if (!six) six = byQuaternion(table, columns);
+  if (!six) {
+    throw StartupError(
+        ExitCode::kData,
+        fmt::format("{} has {} columns and {}; which are they? Name all of them in its first line, "
+                    "such as #timestamp,roll,pitch,yaw,w_x,w_y,w_z,a_x,a_y,a_z",
+                    table.file.string(), columns, kSeven));
+  }
+  for (auto& row : table.rows) {
+    if (row.size() != columns) continue;  // the reader counts it
+    std::vector<std::string> kept = {row[0]};
+    for (const std::size_t i : *six) kept.push_back(row[i]);
+    row = std::move(kept);
+  }
+  table.head.clear();
+  std::vector<std::size_t> numbers = *six;
+  for (auto& n : numbers) ++n;
+  mends.push_back(fmt::format(
+      "{}: of its {} columns {} are taken as w_x, w_y, w_z, a_x, a_y, a_z, the others left out",
+      table.file.string(), columns, fmt::join(numbers, ", ")));
+  return true;
+}
+
+void writeTable(const Table& table, const fs::path& to) {
+  std::string text;
+  if (!table.head.empty()) text += fmt::format("#{}\n", fmt::join(table.head, ","));
+  for (const auto& row : table.rows) text += fmt::format("{}\n", fmt::join(row, ","));
+  writeChecked(to, text);
+}
+
+/// Links to all that lies in `from`, but for the names in `without`.
+void linkAll(const fs::path& from, const fs::path& to, const std::string& without) {
+  fs::create_directories(to);
+  for (const auto& entry : fs::directory_iterator(from)) {
+    if (entry.path().filename() == without) continue;
+    fs::create_symlink(fs::absolute(entry.path()), to / entry.path().filename());
+  }
+}
+
+}  // namespace
+
+MendedText::MendedText(const fs::path& given) : drive_(given) {
+  const fs::path absolute = fs::absolute(given).lexically_normal();
+  const fs::path folder = absolute.has_filename() ? absolute : absolute.parent_path();
+  const fs::path mav0 = folder.filename() == "mav0" ? folder : folder / "mav0";
+  std::error_code error;
+  if (!fs::is_directory(mav0, error)) return;
+  std::vector<Table> changed;
+  for (const auto& sensor : fs::directory_iterator(mav0)) {
+    const fs::path file = sensor.path() / "data.csv";
+    if (!fs::is_regular_file(file, error)) continue;
+    Table table = tableOf(file);
+    const bool stamps = mendStamps(table, mends_);
+    const bool columns =
+        sensor.path().filename().string().starts_with("imu") && mendColumns(table, mends_);
+    if (stamps || columns) changed.push_back(std::move(table));
+  }
+  if (changed.empty()) return;
+  std::string name = (fs::temp_directory_path() / "perdure-mended-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) {
+    throw StartupError(ExitCode::kUnavailable, name + " cannot be made; is the disk full?");
+  }
+  temporary_ = name;
+  drive_ = temporary_ / "drive";
+  try {
+    linkAll(mav0.parent_path(), drive_, mav0.filename());
+    linkAll(mav0, drive_ / "mav0", "");
+    for (const Table& table : changed) {
+      const fs::path sensor = table.file.parent_path();
+      const fs::path here = drive_ / "mav0" / sensor.filename();
+      fs::remove(here);
+      linkAll(sensor, here, "data.csv");
+      writeTable(table, here / "data.csv");
+    }
+  } catch (...) {
+    fs::remove_all(temporary_, error);
+    throw;
+  }
+}
+
+MendedText::~MendedText() {
+  std::error_code error;
+  if (!temporary_.empty()) fs::remove_all(temporary_, error);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,158 @@
+"""Networks of eight bits taken apart to float: QuantizeLinear and DequantizeLinear around each operator (QDQ),
+quantisation at run time (DynamicQuantizeLinear with ConvInteger, MatMulInteger), QLinearConv and QLinearMatMul."""
+
+import numpy as np
+from onnx import TensorProto
+
+from .faults import Fault
+from .graph import Node
+
+# Behind these a quantisation that begins at zero stands for the Relu that the quantising tool took out.
+LINEAR = ("Conv", "ConvTranspose", "Gemm", "MatMul", "Add", "BatchNormalization")
+
+
+def dequantised(value, scale, zero, axis):
+    """(value - zero)·scale, by channels along `axis` where there are several."""
+    value = np.asarray(value).astype(np.float32)
+    scale = np.asarray(scale, np.float32)
+    zero = np.zeros_like(scale) if zero is None else np.asarray(zero).astype(np.float32)
+    if scale.size > 1:
+        shape = [1] * value.ndim
+        shape[axis % value.ndim] = scale.size
+        scale, zero = scale.reshape(shape), zero.reshape(shape) if zero.size > 1 else zero
+    elif value.ndim or scale.ndim:
+        scale, zero = scale.reshape(()), zero.reshape(())
+    return ((value - zero) * scale).astype(np.float32)
+
+
+class Floats:
+    def __init__(self, graph):
+        self.graph, self.constants = graph, graph.constants
+        self.same = {}   # tensor of integers or behind them: the float tensor that it was made from
+        self.nodes, self.kinds, self.sums = [], {}, set()
+        self.count = 0
+
+    def real(self, name):
+        return self.same.get(name, name)
+
+    def emit(self, kind, inputs, output, attributes=None):
+        self.nodes.append(Node(kind, inputs, [output], attributes))
+        self.kinds[output] = kind
+        self.graph.types[output] = TensorProto.FLOAT
+        return output
+
+    def constant(self, value, name):
+        self.constants[name] = np.asarray(value)
+        return name
+
+    def fixed(self, node, index):
+        """A constant input; None where it is left out."""
+        if len(node.inputs) <= index or node.inputs[index] == "":
+            return None
+        value = self.constants.get(node.inputs[index])
+        if value is None:
+            raise Fault(f"the {('scale', 'zero point')[index > 1]} of an operator {node.kind} is computed inside the "
+                        "network, which cannot be taken apart to float; import the float network that it was made from")
+        return value
+
+    def alias(self, output, source):
+        if output in self.graph.outputs:
+            self.emit("Identity", [source], output)
+        else:
+            self.same[output] = source
+
+    def limited(self, output, source, scale, zero):
+        """What quantisation does beyond rounding: from zero on, it cuts off what is below."""
+        zero = np.zeros((), np.uint8) if zero is None else np.asarray(zero)
+        begins = zero.size == 1 and int(zero.ravel()[0]) == np.iinfo(zero.dtype).min
+        if not begins or self.kinds.get(source) not in LINEAR:
+            return self.alias(output, source)
+        steps = int(np.iinfo(zero.dtype).max) - int(zero.ravel()[0])
+        high = np.float32(steps * np.float32(np.asarray(scale).ravel()[0]))
+        bounds = [self.constant(np.float32(0), f"{output}_low"), self.constant(high, f"{output}_high")]
+        if self.graph.opset >= 11:
+            self.emit("Clip", [source, *bounds], output)
+        else:
+            self.emit("Clip", [source], output, {"min": 0.0, "max": float(high)})
+
+    def weight(self, node, index, zero, axis, scale=None):
+        """A quantised constant of `node` as float; a tensor that is computed stays itself."""
+        name = node.inputs[index]
+        if name not in self.constants:
+            return self.real(name)
+        value = dequantised(self.constants[name], np.float32(1) if scale is None else scale, zero, axis)
+        return self.constant(value, f"{name}_float{self.count}")
+
+    def integer(self, node, kind):
+        """ConvInteger and MatMulInteger: their scales are factors behind them."""
+        zero = self.constants.get(node.inputs[3]) if len(node.inputs) > 3 and node.inputs[3] else None
+        weight = self.weight(node, 1, zero, 0 if kind == "Conv" else -1)
+        if kind == "Conv" and weight not in self.constants:
+            raise Fault("the weights of an operator ConvInteger are computed inside the network; import the float "
+                        "network that it was made from")
+        first = self.weight(node, 0, self.constants.get(node.inputs[2]) if len(node.inputs) > 2 else None, 0)
+        self.emit(kind, [first, weight], node.outputs[0], node.attributes)
+        self.sums.add(node.outputs[0])
+
+    def linear(self, node, kind):
+        """QLinearConv and QLinearMatMul: x, its scale and zero, w, its scale and zero, those of the answer, bias."""
+        x_scale, w_scale, w_zero = self.fixed(node, 1), self.fixed(node, 4), self.fixed(node, 5)
+        axis = 0 if kind == "Conv" else -1
+        inputs = [self.weight(node, 0, self.fixed(node, 2), 0, x_scale), self.weight(node, 3, w_zero, axis, w_scale)]
+        if len(node.inputs) > 8 and node.inputs[8]:
+            bias = self.constants[node.inputs[8]].astype(np.float32) * np.float32(x_scale) * np.ravel(w_scale)
+            inputs.append(self.constant(bias.astype(np.float32), f"{node.inputs[8]}_float{self.count}"))
+        out = self.emit(kind, inputs, f"{node.outputs[0]}_float", node.attributes)
+        self.limited(node.outputs[0], out, self.fixed(node, 6), self.fixed(node, 7))
+
+    def take(self, node):
+        """True where `node` was of integers and is float now."""
+        if node.domain:
+            return False
+        if node.kind == "DequantizeLinear":
+            source = node.inputs[0]
+            if source in self.constants and self.constants[source].dtype.kind in "iu":
+                value = dequantised(self.constants[source], self.fixed(node, 1), self.fixed(node, 2),
+                                    node.attributes.get("axis", 1))
+                self.constant(value, f"{node.outputs[0]}_float")
+                source = f"{node.outputs[0]}_float"
+            self.alias(node.outputs[0], self.real(source))
+        elif node.kind == "QuantizeLinear":
+            self.limited(node.outputs[0], self.real(node.inputs[0]), self.fixed(node, 1), self.fixed(node, 2))
+        elif node.kind == "DynamicQuantizeLinear":
+            self.alias(node.outputs[0], self.real(node.inputs[0]))
+            self.constant(np.float32(1), node.outputs[1])
+            self.constant(np.uint8(0), node.outputs[2])
+        elif node.kind in ("ConvInteger", "MatMulInteger"):
+            self.integer(node, node.kind[:-len("Integer")])
+        elif node.kind in ("QLinearConv", "QLinearMatMul"):
+            self.linear(node, node.kind[len("QLinear"):])
+        elif node.kind == "Cast" and self.real(node.inputs[0]) in self.sums:
+            self.alias(node.outputs[0], self.real(node.inputs[0]))
+        else:
+            return False
+        self.count += 1
+        return True
+
+
+QUANTISED = ("DequantizeLinear", "QuantizeLinear", "DynamicQuantizeLinear", "ConvInteger", "MatMulInteger",
+             "QLinearConv", "QLinearMatMul")
+
+
+def to_float(graph):
+    """The graph without integers; returns what was taken apart, for people ("" where nothing was)."""
+    found = sorted({n.kind for n in graph.nodes if n.kind in QUANTISED and not n.domain})
+    if not found:
+        return ""
+    floats = Floats(graph)
+    for node in graph.nodes:
+        node.inputs = [floats.real(i) for i in node.inputs]
+        if not floats.take(node):
+            floats.nodes.append(node)
+            for output in node.outputs:
+                floats.kinds[output] = node.kind
+    graph.nodes = floats.nodes
+    for kept in (graph.types, graph.shapes):  # of tensors that are gone
+        for name in floats.same:
+            kept.pop(name, None)
+    return f"its eight-bit operators ({', '.join(found)}) were taken apart to float: it is as fast as the float network"
