@@ -111,7 +111,7 @@ void describeStart(Options& o, Fields& f) {
   f.number("start.rest_accel", o.start.rest_accel_m_s2, positive(),
            {"the mean force differs no more from gravity", "m/s²"});
   f.number("start.motion_window", o.start.motion_window_s, positive(),
-           {"a start in motion looks at so much time", "s"});
+           {"a start in motion looks at so much time, at most", "s"});
   f.number("start.tilt_sigma", o.start.tilt_sigma, positive(), {"at a start with speed", "rad"});
   f.number("start.gyro_bias_sigma", o.start.gyro_bias_sigma, positive(), {"in motion", "rad/s"});
   f.number("start.accel_bias_sigma", o.start.accel_bias_sigma, positive(),

@@ -68,7 +68,7 @@ class Node {
   void process(const FramePair& frames);
   TrackedFrame trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now);
   void begin(TimePoint now, const FrameInput& input);
-  Result<Start> startWithoutSpeed(TimePoint now) const;
+  Result<Start> startWithoutSpeed(TimePoint now);
   std::size_t framesIn(double seconds) const;
   bool resume(TimePoint now);
   void noteGaps(TimePoint now);

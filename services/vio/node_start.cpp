@@ -37,11 +37,13 @@ std::size_t Node::framesIn(double seconds) const {
 
 /// Where the IMU is at rest, one camera says nothing of a speed: then it needs a background that
 /// rests, too. A part of one is waited for.
-Result<Start> Node::startWithoutSpeed(TimePoint now) const {
+Result<Start> Node::startWithoutSpeed(TimePoint now) {
   const Options& options = cameras_->estimator.options();
   const StartOptions& o = options.start;
-  constexpr std::chrono::milliseconds kEven{500};
-  if (imuIsEven(imu_, now, kEven, options.imu)) {
+  constexpr std::chrono::milliseconds kEven{500}, kShortestEven{250};
+  if (imu_.empty() || now - imu_.first() < kShortestEven) return fail("start_window_short");
+  const Duration even = std::min<Duration>(kEven, now - imu_.first());
+  if (imuIsEven(imu_, now, even, options.imu)) {
     const auto still = [&](double seconds) {
       return cameras_->tracker.stillShare(framesIn(seconds)) >= options.rest.still_share;
     };
@@ -63,6 +65,10 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   const auto frames = std::min(framesIn(options.start.rest_window_s),
                                static_cast<std::size_t>(config_.tracker.memory));
   const std::optional<double> rest_motion = cameras_->tracker.motionSince(frames);
+  // Rest takes a window to show; motion shows as soon as points have moved by more than that
+  // allows.
+  const auto moved = rest_motion ? rest_motion : cameras_->tracker.motionSince(framesIn(0.25));
+  const bool moves = moved && *moved >= options.start.rest_disparity_px;
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
   Result<Start> start = fail("start_waits");
   // Older samples would say where the body was, and the next frame would end it again.
@@ -75,7 +81,7 @@ void Node::begin(TimePoint now, const FrameInput& input) {
     start = startAtRest(imu_, now, options);
   } else if (input.speed && !slow) {
     start = startWithSpeed(imu_, now, *input.speed, speeds_.samples(), options);
-  } else if (!input.speed && rest_motion) {
+  } else if (!input.speed && moves) {
     start = startWithoutSpeed(now);
   }
   if (!start) {

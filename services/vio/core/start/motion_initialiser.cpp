@@ -10,6 +10,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/vio/core/start/initialiser.h"
+#include "services/vio/core/start/motion_refinement.h"
 
 namespace perdure::vio {
 namespace {
@@ -19,7 +20,17 @@ using Eigen::Vector3d;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr std::size_t kKeyframes = 12, kFewestTracks = 15;
+constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 40;
+constexpr double kShortestWindow = 0.25;  // s
+constexpr double kGrowth = 0.2;           // of a window before it is searched again
+constexpr double kMostNoise = 1.25;       // of the residuals, relative to what they should be
+constexpr double kFewestInFront = 0.8;    // share of the points, of the linear solution
+constexpr double kMostLinearPx = 3.0;     // its residual
+// A start is used as soon as its velocity is known to this share of the largest in the window. With
+// a larger one, windows are taken whose noise looks like motion.
+constexpr double kVelocityShare = 0.12;
+constexpr double kUsualDepth = 3.0;  // m
+constexpr double kAsLikely = 9.0;    // of the cost
 constexpr double kFewestParallaxPx = 2.0;
 
 struct Keyframe {
@@ -247,11 +258,111 @@ void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
   while (frames_.front().time < imu_time - window) frames_.pop_front();
 }
 
+namespace {
+
+/// Tracks of at least three views, the longest first, placed by the poses of the window.
+std::vector<WindowPoint> windowPoints(const MotionWindow& window,
+                                      const std::vector<const TrackedFrame*>& tracked,
+                                      const std::vector<CameraModel>& cameras) {
+  std::map<std::uint64_t, WindowPoint> tracks;
+  for (std::size_t k = 0; k < tracked.size(); ++k) {
+    for (const TrackedPoint& p : tracked[k]->points) {
+      for (std::size_t c = 0; c < cameras.size(); ++c) {
+        if (!p.seen[c]) continue;
+        const RigidTransform& T_BC = cameras[c].T_BC();
+        tracks[p.id].views.push_back(
+            {k, T_BC.R(), T_BC.p, p.seen[c]->normalised, p.seen[c]->to_pixels});
+      }
+    }
+  }
+  std::vector<WindowPoint> points;
+  for (auto& [id, point] : tracks) {
+    if (point.views.size() >= kFewestViews) points.push_back(std::move(point));
+  }
+  std::stable_sort(points.begin(), points.end(), [](const WindowPoint& a, const WindowPoint& b) {
+    return a.views.size() > b.views.size();
+  });
+  if (points.size() > kMostPoints) points.resize(kMostPoints);
+  for (WindowPoint& point : points) {
+    Matrix3d F = Matrix3d::Zero();
+    Vector3d b = Vector3d::Zero();
+    for (const WindowView& v : point.views) {
+      const WindowPose& pose = window.poses[v.keyframe];
+      const Vector3d ray = pose.R_B0_B * v.R_BC * v.normalised.homogeneous().normalized();
+      const Matrix3d across = Matrix3d::Identity() - ray * ray.transpose();
+      F += across;
+      b += across * (pose.p_B0 + pose.R_B0_B * v.p_BC);
+    }
+    F.diagonal().array() += 1e-9 * F.trace();
+    point.p_B0 = F.ldlt().solve(b);
+  }
+  return points;
+}
+
+/// Where a point would be `depth` m from the camera that saw it first.
+Vector3d alongFirstView(const WindowPoint& point, const MotionWindow& window, double depth) {
+  const WindowView& v = point.views.front();
+  const WindowPose& pose = window.poses[v.keyframe];
+  return pose.p_B0 + pose.R_B0_B * (v.p_BC + depth * (v.R_BC * v.normalised.homogeneous()));
+}
+
+/// The state at the newest pose, with yaw 0, from the error [θ, v, gravity, b_g, b_a] of a window.
+Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error) {
+  const WindowPose& last = w.poses.back();
+  const Matrix3d R_B0_B = last.R_B0_B * expSo3(error.head<3>());
+  const Vector3d gravity = w.gravity_B0 + acrossGravity(w.gravity_B0) * error.segment<2>(6);
+  Nav nav;
+  nav.q_WB = levelAttitude(-R_B0_B.transpose() * gravity);
+  nav.v_WB = nav.q_WB * (R_B0_B.transpose() * (last.v_B0 + error.segment<3>(3)));
+  nav.gyro_bias = w.gyro_bias + error.segment<3>(8);
+  nav.accel_bias = w.accel_bias + error.segment<3>(11);
+  return nav;
+}
+
+Start startOf(const RefinedWindow& refined, const Options& options) {
+  using Error = Eigen::Matrix<double, kWindowError, 1>;
+  Start start;
+  start.time = refined.window.poses.back().time;
+  start.nav = navOf(refined.window, Error::Zero());
+  Eigen::Matrix<double, 15, kWindowError> J;
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < kWindowError; ++i) {
+    const Nav a = navOf(refined.window, kStep * Error::Unit(i));
+    const Nav b = navOf(refined.window, -kStep * Error::Unit(i));
+    J.col(i) << logSo3(b.q_WB.conjugate() * a.q_WB), Vector3d::Zero(), a.v_WB - b.v_WB,
+        a.gyro_bias - b.gyro_bias, a.accel_bias - b.accel_bias;
+  }
+  J /= 2.0 * kStep;
+  // Yaw and position are W's own. The camera's mounting turns the velocity.
+  const double turned = options.calibration.extrinsic_rotation * start.nav.v_WB.norm();
+  start.covariance = startCovariance(start.nav, 1e-4, 1e-4, 1e-4, Vector3d::Constant(turned));
+  start.covariance += J * refined.covariance * J.transpose();
+  start.covariance = (0.5 * (start.covariance + start.covariance.transpose())).eval();
+  return start;
+}
+
+}  // namespace
+
 Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
-                                       const std::vector<CameraModel>& cameras) const {
+                                       const std::vector<CameraModel>& cameras) {
+  if (frames_.empty()) return fail("start_window_short");
+  const TimePoint now = frames_.back().time;
+  // A search costs as much as some frames, and another view of the same says little more.
+  if (failed_ && now < next_attempt_) return tl::unexpected(*failed_);
+  Result<Start> result = attempt(imu, cameras);
+  failed_.reset();
+  if (!result) {
+    failed_ = result.error();
+    const double window_s = toSeconds(now - frames_.front().time);
+    next_attempt_ = now + durationFromSeconds(kGrowth * window_s);
+  }
+  return result;
+}
+
+Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
+                                         const std::vector<CameraModel>& cameras) const {
   if (frames_.size() < 5 || imu.empty() || imu.first() > frames_.front().time ||
-      toSeconds(frames_.back().time - frames_.front().time) <
-          0.9 * options_.start.motion_window_s) {
+      toSeconds(frames_.back().time - frames_.front().time) < kShortestWindow) {
     return fail("start_window_short");
   }
   const std::size_t count = std::min(kKeyframes, frames_.size());
@@ -289,34 +400,52 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   }
   const Views views = viewsOf(keyframes, cameras);
   if (views.size() < kFewestTracks) return fail("start_few_tracks");
-  std::map<std::uint64_t, PointEstimate> points;
+  std::map<std::uint64_t, PointEstimate> estimates;
   Solution s;
   s.x.setZero();
-  for (int i = 0; i < 4; ++i) s = solveOnce(views, keyframes, points, s.x, options_.gravity);
-  if (!s.x.allFinite() || s.in_front < 0.8 || s.rms_px > 3.0) return fail("start_inconsistent");
-
-  // Deviations of v0 and g; the accelerometer's unknown bias adds its share.
-  const Matrix6 covariance = inverse(s.information);
-  const double bias = options_.start.accel_bias_sigma, t = keyframes.back().t;
-  const double sigma_g = std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
-  const double sigma_v = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
-  const double speed = s.x.head<3>().norm();
-  if (!std::isfinite(sigma_v) || sigma_v > 0.2 + 0.3 * speed || sigma_g > 2.0) {
-    return fail("start_unobservable");
+  for (int i = 0; i < 4; ++i) s = solveOnce(views, keyframes, estimates, s.x, options_.gravity);
+  if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
+    return fail("start_inconsistent");
   }
-  const Vector3d up_B0 = -s.x.tail<3>();
-  const Keyframe& last = keyframes.back();
-  const Vector3d v_B0 = s.x.head<3>() + t * s.x.tail<3>() + last.dv;
-  Start start;
-  start.time = times.back();
-  start.nav.q_WB = levelAttitude(last.R.transpose() * up_B0);
-  start.nav.v_WB = start.nav.q_WB * (last.R.transpose() * v_B0);
-  start.nav.gyro_bias = gyro_bias;
-  // The gyro bias that is left turns gravity while the window lasts.
-  const double turned = options_.start.gyro_bias_sigma * t;
-  const double velocity = 2.0 * sigma_v + (bias + 0.5 * turned * options_.gravity) * t + 0.05;
-  start.covariance = startCovariance(start.nav, 0.02 + (sigma_g + bias) / options_.gravity, 0.01,
-                                     bias, Vector3d::Constant(velocity));
+
+  MotionWindow window;
+  window.gyro_bias = gyro_bias;
+  window.gravity_B0 = s.x.tail<3>();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Keyframe& k = keyframes[i];
+    window.poses.push_back({times[i], k.R,
+                            s.x.head<3>() * k.t + 0.5 * k.t * k.t * s.x.tail<3>() + k.dp,
+                            s.x.head<3>() + k.t * s.x.tail<3>() + k.dv});
+  }
+  window.points = windowPoints(window, tracked, cameras);
+  // The linear solution may be near nothing at all: no motion, no depth. Another search begins
+  // where all points are as far as things usually are.
+  std::vector<RefinedWindow> minima;
+  Result<RefinedWindow> refined = refine(window, imu, options_);
+  if (refined) minima.push_back(*refined);
+  for (WindowPoint& point : window.points) point.p_B0 = alongFirstView(point, window, kUsualDepth);
+  if (const auto other = refine(std::move(window), imu, options_)) {
+    minima.push_back(*other);
+    if (!refined || other->cost < refined->cost) refined = other;
+  }
+  // Another minimum that fits about as well: the window does not say which is right.
+  for (const RefinedWindow& other : minima) {
+    const double apart =
+        (other.window.poses.back().v_B0 - refined->window.poses.back().v_B0).norm();
+    if (other.cost < refined->cost + kAsLikely &&
+        apart > kVelocityShare * refined->window.poses.back().v_B0.norm()) {
+      return fail("start_unobservable");
+    }
+  }
+  if (!refined) return tl::unexpected(refined.error());
+  if (refined->noise_ratio > kMostNoise) return fail("start_inconsistent");
+  Start start = startOf(*refined, options_);
+  const double sigma_v = std::sqrt(start.covariance.block<3, 3>(kVelocity, kVelocity).trace());
+  double fastest = 0.0;
+  for (const WindowPose& pose : refined->window.poses) {
+    fastest = std::max(fastest, pose.v_B0.norm());
+  }
+  if (!(sigma_v <= kVelocityShare * fastest)) return fail("start_unobservable");
   return start;
 }
 
