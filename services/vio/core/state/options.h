@@ -60,7 +60,7 @@ struct StartOptions {
   double rest_disparity_px = 0.7;  ///< median image motion over that window
   double still_window_s = 2.0;     ///< the same while traffic moves past a background at rest
   double rest_accel_m_s2 = 1.0;    ///< largest difference of the mean force from gravity
-  double motion_window_s = 1.0;    ///< window of a start in motion
+  double motion_window_s = 2.0;    ///< of a start in motion, at most
   double tilt_sigma = 0.03;        ///< rad, at a start with speed
   double gyro_bias_sigma = 0.02;   ///< rad/s
   double accel_bias_sigma = 0.1;   ///< m/s²
