@@ -138,6 +138,7 @@ void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   // Other parts of it are in the M of another W.
   map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);
   odometry_ = odometry;
+  placeEvents();
   newest(odometry.stamp.time);
   trajectory_.add(odometry.stamp.time, odometry.world, odometry.T_WB);
   if (!pose_pace_.due(odometry.stamp.time)) return;
@@ -177,6 +178,7 @@ void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
     returns_.clear();
   }
   objects_ = objects;
+  placeEvents();
   const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
   constexpr double kLongest = 1e4;  // ms; beyond it is another host's clock, or a recording
   latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
@@ -232,10 +234,22 @@ void Node::sendAwaited() {
 
 void Node::onEvent(const Event& event) {
   events_.push_back({event, placeOf(event)});
+  unplaced_ = unplaced_ || (event.object_id == 0 && !events_.back().place);
   if (events_.size() > kMostEvents) events_.pop_front();
   noteReturns(event);
   if (wants(kEvents)) sendEvent(events_.back(), false);
   if (wants(kLog)) sendEvent(events_.back(), true);
+}
+
+/// An event may be heard before the first pose of its W. Who asks later is told where it was.
+void Node::placeEvents() {
+  if (!unplaced_) return;
+  unplaced_ = false;
+  for (Happened& happened : events_) {
+    if (happened.event.object_id != 0 || happened.place) continue;
+    happened.place = placeOf(happened.event);
+    unplaced_ = unplaced_ || !happened.place;
+  }
 }
 
 /// Of an object: where it is believed to be; of the whole map: where the vehicle is.

@@ -91,6 +91,7 @@ class Node {
   };
   void sendEvent(const Happened& happened, bool as_log);
   std::optional<Eigen::Vector3d> placeOf(const Event& event) const;
+  void placeEvents();
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< how many objects it told
   void noteReturns(const Event& event);
@@ -117,6 +118,7 @@ class Node {
   std::optional<ModelInfo> model_;
   std::map<std::string, Detections> detections_;  ///< newest, by camera
   std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for those of objects_' frame
+  bool unplaced_ = false;          ///< an event of the whole map came before the first pose
   std::deque<Happened> events_;
   std::map<ObjectId, Event> returns_;
   MapLayer map_;

@@ -52,7 +52,9 @@ class Import {
                                      "where they are",
                                      places_.size(), given_));
     }
-    for (auto& camera : cameras) camera.T_BC = T_B_I_.inverse() * camera.T_BC;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (in_body_[i]) cameras[i].T_BC = T_B_I_.inverse() * cameras[i].T_BC;
+    }
     return std::move(result_);
   }
 
@@ -86,6 +88,7 @@ class Import {
       place = places_[given_++];
     }
     cameras.push_back(replay::readCamera(file, name, place));
+    in_body_.push_back(!place && file.has("T_BS"));
     result_.found.push_back(fmt::format("{} from {}", name, from));
     noteKeys(file);
   }
@@ -110,7 +113,8 @@ class Import {
 
   std::vector<RigidTransform> places_;
   std::size_t given_ = 0;
-  RigidTransform T_B_I_;  ///< of EuRoC's sensor.yaml; our body is the IMU
+  std::vector<bool> in_body_;  ///< by camera: its file says where it is in EuRoC's body
+  RigidTransform T_B_I_;       ///< of EuRoC's sensor.yaml; our body is the IMU
   ImportedRig result_;
 };
 

@@ -312,6 +312,19 @@ TEST_F(GatewayNode, DrawsOfTheMapWhatTheWorkingSetDoesNotHave) {
   EXPECT_EQ(scene["deletions"][0]["type"], kAll);
 }
 
+TEST_F(GatewayNode, WhoAsksLaterIsToldWhereAnEventBeforeTheFirstPoseWas) {
+  Objects frame = frameOf(1, {});
+  frame.T_WB.p.x() = 3;
+  Event loop = test::eventOf(EventKind::kLoopClosed, 0);
+  loop.world = frame.world;
+  node_.onEvent(loop);
+  node_.onObjects(frame, kSecond);
+  node_.setWanted({kEvents});
+  const auto told = on(kEvents);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0]["at"], json({3, 0, 0}));
+}
+
 TEST_F(GatewayNode, TellsWhereAnEventWas) {
   Objects frame = frameOf(1, {objectAt(12, {10, -2, 0})});
   frame.T_WB.p.x() = 3;

@@ -31,8 +31,8 @@ TEST(DoctorOfNetworks, WarnsOfAShapeThatWastesAThirdOfTheInput) {
   const auto camera = replay::Dataset::open({.path = drive})->calibration().cameras.front();
   const int side = 32 * 8;
   const auto other = static_cast<int>(side * camera.height / camera.width / 32 * 32);
-  EXPECT_TRUE(checkNetworkShape(drive, networkOf(folder, side, std::max(32, other))).empty());
-  const Findings found = checkNetworkShape(drive, networkOf(folder, 4 * side, 64));
+  EXPECT_TRUE(checkNetworkShape(drive, "", networkOf(folder, side, std::max(32, other))).empty());
+  const Findings found = checkNetworkShape(drive, "", networkOf(folder, 4 * side, 64));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].verdict, Verdict::kWarn);
   EXPECT_THAT(found[0].text, HasSubstr("--input camera --image PICTURE"));

@@ -139,6 +139,10 @@ TEST_F(RigImport, TwoSensorsOfEuRoCAreSeenFromTheIMU) {
   }
   const auto imported = importRig({file("cam.yaml", flat), file("imu.yaml", imu)});
   EXPECT_NEAR(imported.rig.cameras[0].T_BC.p.x(), 0.07 - 0.5, 1e-12);
+  // What is said of the camera in the IMU's frame is that already.
+  const auto given = importRig({file("ros.yaml", kCameraInfo), file("imu.yaml", imu)},
+                               {transformOf("1 0 0 .05  0 1 0 0  0 0 1 0  0 0 0 1")});
+  EXPECT_NEAR(given.rig.cameras[0].T_BC.p.x(), 0.05, 1e-12);
 }
 
 TEST_F(RigImport, DoubleSphereBecomesTheNearestEquidistantLens) {

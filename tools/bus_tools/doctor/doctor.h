@@ -38,8 +38,10 @@ Findings checkRigBy(const std::string& recording, const std::string& rig, double
 /// model.path of inference.yaml in the folder; empty where none is set.
 std::string configuredNetwork(const std::string& folder);
 /// Warns where a letterboxed network shows a third of its input no image of the recording's cam0.
-/// Throws StartupError as the service does.
-Findings checkNetworkShape(const std::string& recording, const std::string& network);
+/// `rig`: a file in place of the recording's own calibration; empty: none. Throws StartupError as
+/// the service does.
+Findings checkNetworkShape(const std::string& recording, const std::string& rig,
+                           const std::string& network);
 
 /// Writes a copy of a recording to `folder` with what is sure mended, and looks at it again. The
 /// progress goes to standard error. Throws StartupError as writeDrive does.

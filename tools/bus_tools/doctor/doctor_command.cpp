@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
@@ -58,8 +60,16 @@ void runDoctor(const DoctorOptions& given) {
     const auto network = named ? given.network : configuredNetwork(given.configuration);
     std::error_code error;
     if (named || std::filesystem::is_regular_file(network, error)) {
-      const Findings shape = checkNetworkShape(given.recording, network);
-      findings.insert(findings.end(), shape.begin(), shape.end());
+      // A recording that needs a mend may not open: then its copy does.
+      const auto& recording = given.copy.empty() ? given.recording : given.copy;
+      try {
+        const Findings shape = checkNetworkShape(recording, given.rig, network);
+        findings.insert(findings.end(), shape.begin(), shape.end());
+      } catch (const StartupError& e) {
+        // What was found of the recording is told all the same.
+        findings.push_back({named ? Verdict::kFail : Verdict::kWarn,
+                            fmt::format("the network's shape was not looked at: {}", e.what())});
+      }
     }
     std::cout << toText(findings);
     return stopIfFailed(findings, static_cast<int>(ExitCode::kData));

@@ -23,6 +23,7 @@ constexpr double kGyroBiasPrior = 0.3;  // rad/s: what a bias may be before anyt
 constexpr double kHuber = 2.0;          // deviations of a view beyond which it counts linearly
 constexpr double kLeastDepth = 0.1;     // m, of a point at the beginning
 constexpr int kIterations = 50;
+constexpr double kLittleDamping = 1e-3;
 constexpr double kLeastGain = 0.1;  // of the cost, below which no step is taken
 
 // Order of the error: what belongs to the window, then [θ, p, v] of all poses but the first.
@@ -142,7 +143,6 @@ double priorCost(const MotionWindow& w, const Options& o) {
              (o.calibration.time_offset_s * o.calibration.time_offset_s);
 }
 
-/// Infinite where a point is behind a camera that sees it.
 double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
   double cost = priorCost(e.window, o);
   for (std::size_t i = 0; i < inertial.increments.size(); ++i) {
@@ -296,6 +296,8 @@ Eigen::Matrix<double, 3, 2> acrossGravity(const Vector3d& gravity_B0) {
 }
 
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options) {
+  if (window.poses.size() < 2) return fail("start_window_short");
+  std::erase_if(window.points, [](const WindowPoint& p) { return p.views.size() < 2; });
   Estimate e{std::move(window), {}};
   e.rays = raysOf(e.window);
   auto inertial = inertialOf(e.window, imu, options.imu);
@@ -311,8 +313,11 @@ Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Op
     double expected = dx.dot(n.b);
     for (const Normal::Point& p : n.points) expected += p.F_b.dot(p.F_inverse * p.F_b);
     if (expected < kLeastGain) {
-      settled = true;
-      break;
+      settled = damping < kLittleDamping;
+      if (settled) break;
+      damping *= 0.01;  // it may be the damping alone that makes the step small
+      growth = 2.0;
+      continue;
     }
     Estimate next = e;
     move(next, dx, n);
