@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <optional>
 
@@ -57,19 +59,31 @@ Table tableOf(const fs::path& file) {
   return table;
 }
 
-/// `text` times 10^places as whole nanoseconds; nothing where it is no plain decimal number.
+/// `text`, with or without an exponent, times 10^places as whole nanoseconds; nothing where it is
+/// no decimal number, or too large.
 std::optional<std::string> shifted(std::string_view text, std::size_t places) {
-  const auto point = text.find('.');
-  std::string whole(text.substr(0, point));
-  std::string rest(point == text.npos ? std::string_view() : text.substr(point + 1));
-  const auto digits = [](const std::string& s) {
-    return std::all_of(s.begin(), s.end(), [](char c) { return c >= '0' && c <= '9'; });
-  };
-  if (whole.empty() || !digits(whole) || !digits(rest)) return std::nullopt;
-  rest.resize(places, '0');  // beyond a nanosecond nothing is known
-  whole += rest;
-  const auto first = std::min(whole.find_first_not_of('0'), whole.size() - 1);
-  return whole.substr(first);
+  text = replay::trim(text);
+  std::int64_t exponent = 0;
+  if (const auto e = text.find_first_of("eE"); e != text.npos) {
+    const auto value = replay::parseInteger(text.substr(e + 1));
+    if (!value || std::abs(*value) > 64) return std::nullopt;
+    exponent = *value;
+    text = text.substr(0, e);
+  }
+  if (text.starts_with('+')) text.remove_prefix(1);
+  const auto point = std::min(text.find('.'), text.size());
+  std::string digits(text.substr(0, point));
+  if (point < text.size()) digits += text.substr(point + 1);
+  const bool number =
+      std::all_of(digits.begin(), digits.end(), [](char c) { return c >= '0' && c <= '9'; });
+  if (digits.empty() || !number) return std::nullopt;
+  const auto whole =
+      static_cast<std::int64_t>(point) + exponent + static_cast<std::int64_t>(places);
+  // Beyond a nanosecond nothing is known.
+  digits.resize(static_cast<std::size_t>(std::max<std::int64_t>(whole, 0)), '0');
+  digits.erase(0, digits.find_first_not_of('0'));
+  if (digits.empty()) digits = "0";
+  return replay::parseNanoseconds(digits) ? std::optional(digits) : std::nullopt;
 }
 
 /// How many digits the stamps are short of nanoseconds; 0 where they are nanoseconds.
@@ -92,10 +106,17 @@ std::size_t placesShort(const Table& table) {
 bool mendStamps(Table& table, std::vector<std::string>& mends) {
   const std::size_t places = placesShort(table);
   if (places == 0) return false;
-  for (auto& row : table.rows) {
-    if (auto stamp = shifted(row[0], places)) row[0] = *std::move(stamp);
-  }
   const char* unit = places == 9 ? "seconds" : places == 6 ? "milliseconds" : "microseconds";
+  for (auto& row : table.rows) {
+    auto stamp = shifted(row[0], places);
+    if (!stamp) {
+      throw StartupError(ExitCode::kData,
+                         fmt::format("{}: most stamps are {}, and `{}` is no such stamp; correct "
+                                     "or remove that line",
+                                     table.file.string(), unit, row[0]));
+    }
+    row[0] = *std::move(stamp);
+  }
   mends.push_back(
       fmt::format("{}: the stamps are nanoseconds now (they were {})", table.file.string(), unit));
   return true;
@@ -114,6 +135,21 @@ Column columnNamed(const std::string& name) {
   return force ? Column::kForce : Column::kOther;
 }
 
+/// The axis that a name has as a word of its own, or as its last letter before a unit; else 0.
+char axisOf(const std::string& name) {
+  const std::string bare = name.substr(0, name.find_first_of("[("));
+  const auto letter = [&](std::size_t i) {
+    return i < bare.size() && std::isalnum(static_cast<unsigned char>(bare[i])) != 0;
+  };
+  char axis = 0;
+  for (std::size_t i = 0; i < bare.size(); ++i) {
+    if (bare[i] < 'x' || bare[i] > 'z' || letter(i + 1)) continue;
+    if (i == 0 || !letter(i - 1)) return bare[i];
+    axis = bare[i];
+  }
+  return axis;
+}
+
 using Six = std::vector<std::size_t>;  ///< columns of w_x, w_y, w_z, a_x, a_y, a_z
 
 std::optional<Six> byHead(const Table& table, std::size_t columns) {
@@ -126,6 +162,14 @@ std::optional<Six> byHead(const Table& table, std::size_t columns) {
   }
   if (turns.size() != 3 || forces.size() != 3) return std::nullopt;
   turns.insert(turns.end(), forces.begin(), forces.end());
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (axisOf(table.head[turns[i]]) == "xyz"[i % 3]) continue;
+    throw StartupError(
+        ExitCode::kData,
+        fmt::format("{}: the column `{}` stands where the axis {} is awaited; name and order the "
+                    "columns by axis x, y, z, such as w_x,w_y,w_z,a_x,a_y,a_z",
+                    table.file.string(), table.head[turns[i]], "xyz"[i % 3]));
+  }
   return turns;
 }
 
@@ -151,7 +195,7 @@ Length lengthOf(const Table& table, std::size_t first, std::size_t count) {
 }
 
 /// Without a head: four columns of length 1 in every row are a quaternion, and of the other two
-/// threes one measures gravity.
+/// threes exactly one measures gravity.
 std::optional<Six> byQuaternion(const Table& table, std::size_t columns) {
   if (columns != 11) return std::nullopt;
   std::optional<std::size_t> at;
@@ -170,8 +214,8 @@ std::optional<Six> byQuaternion(const Table& table, std::size_t columns) {
     const double length = lengthOf(table, first, 3).median;
     return length > kLeastGravity && length < kMostGravity;
   };
-  if (isGravity(rest[0]) && !isGravity(rest[3]))
-    std::rotate(rest.begin(), rest.begin() + 3, rest.end());
+  if (isGravity(rest[0]) == isGravity(rest[3])) return std::nullopt;
+  if (isGravity(rest[0])) std::rotate(rest.begin(), rest.begin() + 3, rest.end());
   return rest;
 }
 

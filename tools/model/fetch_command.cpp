@@ -24,9 +24,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFetchHelp = R"(
-Takes a known network from its makers' release with curl, checks its size and sha256, imports it,
-and writes the calibration that was measured in a place of that kind. What is there already, with
-the right sum, is not taken again: so a file that was carried here by hand is imported too.
+Takes a known network from the address in the list with curl, checks its size and sha256, imports
+it, and writes the calibration that was measured in a place of that kind, where the input has the
+size it was measured at. What is there already, with the right sum, is not taken again: so a file
+that was carried here by hand is imported too.
 
   perdure model list                                 the names, licences, sizes, sums, addresses
   perdure model fetch yolox-nano --for street        into ./networks
@@ -127,7 +128,7 @@ fs::path classesOf(const KnownNetwork& network) {
   std::error_code error;
   for (const std::string& folder : inference::standardModelFolders()) {
     const fs::path file = fs::path(folder) / network.classes_file;
-    if (fs::is_regular_file(file, error)) return file;
+    if (fs::is_regular_file(file, error)) return fs::absolute(file).lexically_normal();
   }
   throw StartupError(ExitCode::kUnavailable,
                      network.classes_file + " is missing beside the descriptions of networks");
@@ -150,15 +151,28 @@ fs::path describeDarknet(const fs::path& path) {
   return to;
 }
 
-void calibrated(const fs::path& description, const KnownNetwork& network, const KnownUse& use) {
+/// Why the calibration is left out; "" where it holds.
+std::string whyUncalibrated(const nlohmann::ordered_json& description, const KnownNetwork& network,
+                            const KnownUse& use, bool resized) {
+  if (use.calibration.is_null()) return "no calibration was measured for " + use.name;
+  if (!resized) return {};
+  const auto& input = description.at("input");
+  const std::string size =
+      fmt::format("{}x{}", input.at("width").get<int>(), input.at("height").get<int>());
+  if (size == network.input) return {};
+  return fmt::format("the calibration was measured at {}, not at this size", network.input);
+}
+
+/// `resized`: --input was given.
+void calibrated(const fs::path& description, const KnownNetwork& network, const KnownUse& use,
+                bool resized) {
   std::ifstream in(description);
   auto json = nlohmann::ordered_json::parse(in);
   in.close();
   for (const auto& [key, value] : network.keys.items()) json[key] = value;
-  if (use.calibration.is_null()) {
+  if (const std::string why = whyUncalibrated(json, network, use, resized); !why.empty()) {
     writeChecked(description, json.dump(1) + "\n");
-    std::printf("note        no calibration was measured for %s: perdure model calibrate\n",
-                use.name.c_str());
+    std::printf("note        %s: perdure model calibrate\n", why.c_str());
     return;
   }
   for (const auto& [key, value] : use.calibration.items()) json["calibration"][key] = value;
@@ -166,16 +180,29 @@ void calibrated(const fs::path& description, const KnownNetwork& network, const 
   std::printf("calibrated  %s (%s)\n", use.calibration.dump().c_str(), use.measured.c_str());
 }
 
-void sayOnly(const KnownNetwork& network, const fs::path& out) {
+/// Of the import: what is known of the network, and what the user asks for.
+std::vector<std::string> importArguments(const KnownNetwork& network, const std::string& input) {
+  std::vector<std::string> arguments = {"--classes=" + classesOf(network).string(),
+                                        "--family=" + network.family};
+  if (!input.empty()) arguments.push_back("--input=" + input);
+  return arguments;
+}
+
+void sayOnly(const KnownNetwork& network, const FetchRequest& request) {
   std::printf("%s", describe(network).c_str());
-  std::printf("would make %s, and there:\n", out.c_str());
+  std::printf("would make the folder %s and do this:\n", request.out.c_str());
   for (const KnownFile& file : network.files) {
-    std::printf("%s\n", byHand(file, out / file.name).c_str());
+    std::printf("%s\n", byHand(file, request.out / file.name).c_str());
   }
-  const bool onnx = fs::path(network.files.front().name).extension() == ".onnx";
-  std::printf(
-      onnx ? "  perdure model import %s --classes %s\n" : "  its description beside %s (%s)\n",
-      (out / network.files.front().name).c_str(), network.classes_file.c_str());
+  const fs::path path = request.out / network.files.front().name;
+  if (path.extension() != ".onnx") {
+    std::printf("  write its description, %s.model.json\n", path.c_str());
+    return;
+  }
+  auto arguments = importArguments(network, request.input);
+  if (!request.image.empty()) arguments.push_back("--image=" + request.image.string());
+  std::printf("  perdure model import %s %s\n", path.c_str(),
+              fmt::format("{}", fmt::join(arguments, " ")).c_str());
 }
 
 void fetch(const FetchRequest& request) {
@@ -188,7 +215,7 @@ void fetch(const FetchRequest& request) {
                                              " is a Darknet network, of the size of its "
                                              ".cfg; leave --input out");
   }
-  if (request.dry) return sayOnly(network, request.out);
+  if (request.dry) return sayOnly(network, request);
   std::error_code error;
   fs::create_directories(request.out, error);
   if (error) {
@@ -200,15 +227,14 @@ void fetch(const FetchRequest& request) {
   fs::path description;
   if (onnx) {
     ImportOptions options{.network = path, .out = {}, .image = request.image};
-    options.arguments = {"--classes=" + classesOf(network).string(), "--family=" + network.family};
-    if (!request.input.empty()) options.arguments.push_back("--input=" + request.input);
+    options.arguments = importArguments(network, request.input);
     importAndLook(options);
     path = importedPath(path, "");
     description = path.string() + ".model.json";
   } else {
     description = describeDarknet(path);
   }
-  calibrated(description, network, use);
+  calibrated(description, network, use, !request.input.empty());
   std::printf("use it      perdure-inference --set model.path=%s --set 'detection.classes=[%s]'\n",
               path.c_str(), fmt::format("{}", fmt::join(use.classes, ", ")).c_str());
 }

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
 #include "services/inference/model_file.h"
 
 namespace perdure::tools {
@@ -29,7 +30,11 @@ fs::path ownList() {
 }
 
 KnownFile fileOf(const Json& json) {
-  KnownFile file{json.at("name"), json.at("url"), json.at("sha256"), json.at("bytes")};
+  if (!json.at("bytes").is_number_unsigned()) {
+    throw std::invalid_argument("\"bytes\" of a file is no whole number from 0 on");
+  }
+  KnownFile file{json.at("name"), json.at("url"),
+                 replay::toLower(json.at("sha256").get<std::string>()), json.at("bytes")};
   const bool plain = !file.name.empty() && file.name.find('/') == std::string::npos;
   if (!plain || file.name.front() == '.' || file.sha256.size() != 64) {
     throw std::invalid_argument("a file has no plain name, or no sha256 of 64 digits");

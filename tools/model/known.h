@@ -1,4 +1,4 @@
-// Networks that are known to work: where their makers keep them, and what is known of each.
+// Networks that are known to work: where their files are, and what is known of each.
 #pragma once
 
 #include <cstdint>

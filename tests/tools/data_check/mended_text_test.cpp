@@ -79,6 +79,30 @@ TEST(MendedText, StampsInSecondsBecomeNanosecondsExactly) {
   expectSound(both);
 }
 
+TEST(MendedText, StampsInSecondsMayHaveAnExponent) {
+  const auto root = makeTurningDrive("text_exponent");
+  const auto file = root / "mav0/imu0/data.csv";
+  rewrite(file, [](const std::string& line) {  // 1234567890 becomes 1.234567890e+00
+    const auto at = line.find(',');
+    const std::string stamp = line.substr(0, at);
+    return stamp.substr(0, 1) + "." + stamp.substr(1) + "e+" + std::to_string(stamp.size() - 10) +
+           line.substr(at);
+  });
+  {
+    const MendedText text(root);
+    EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("they were seconds")));
+    expectSound(text);
+  }
+  std::ofstream(file, std::ios::app) << "-1.5e+00,0,0,0,0,0,9.8\n";
+  try {
+    const MendedText negative(root);
+    FAIL() << "it was taken";
+  } catch (const StartupError& e) {
+    EXPECT_THAT(e.what(), HasSubstr(file.string()));
+    EXPECT_THAT(e.what(), HasSubstr("`-1.5e+00` is no such stamp"));
+  }
+}
+
 TEST(MendedText, AQuaternionAmongTheColumnsIsLeftOut) {
   const auto root = makeTurningDrive("text_quaternion");
   rewrite(root / "mav0/imu0/data.csv", [](const std::string& line) {
@@ -88,6 +112,24 @@ TEST(MendedText, AQuaternionAmongTheColumnsIsLeftOut) {
   const MendedText text(root);
   EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("columns 6, 7, 8, 9, 10, 11 are taken")));
   expectSound(text);
+  // Accelerations in g: none of the threes measures gravity.
+  rewrite(root / "mav0/imu0/data.csv", [](const std::string& line) {
+    return line.substr(0, line.find(',')) + ",0.6,0,0.8,0,0.1,0.2,0.3,0,0.1,1";
+  });
+  EXPECT_THROW(MendedText{root}, StartupError);
+}
+
+TEST(MendedText, AxesInAnotherOrderAreRefused) {
+  const auto root = makeTurningDrive("text_axes");
+  rewrite(
+      root / "mav0/imu0/data.csv", [](const std::string& line) { return line + ",0"; },
+      "#timestamp,w_z [rad/s],w_y [rad/s],w_x [rad/s],a_x,a_y,a_z,roll");
+  try {
+    const MendedText text(root);
+    FAIL() << "it was taken";
+  } catch (const StartupError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("`w_z [rad/s]` stands where the axis x is awaited"));
+  }
 }
 
 TEST(MendedText, TenColumnsNeedAHeadThatNamesThem) {

@@ -13,6 +13,7 @@
 #include <sstream>
 #include <thread>
 
+#include "common/base/errors.h"
 #include "common/base/subprocess.h"
 #include "services/inference/model_file.h"
 #include "tests/tools/model/python.h"
@@ -129,8 +130,15 @@ TEST_F(Fetch, TakesChecksImportsAndCalibrates) {
   EXPECT_THAT(answer.output, HasSubstr("'detection.classes=[car, person]'"));
   const auto file = inference::readModelFile((out() / "tiny.perdure.onnx").string(), "", {});
   EXPECT_EQ(file.description.input.width, 128);
-  EXPECT_DOUBLE_EQ(file.description.calibration.clutter_rate, 0.66);
+  EXPECT_NE(file.description.calibration.clutter_rate, 0.66);
+  EXPECT_THAT(answer.output, HasSubstr("the calibration was measured at 64x64, not at this size: "
+                                       "perdure model calibrate"));
   EXPECT_DOUBLE_EQ(file.description.box_sigma, 0.07);
+
+  const auto usual = fetched({"--input", "64x64"});
+  ASSERT_EQ(usual.status, 0) << usual.output;
+  const auto same = inference::readModelFile((out() / "tiny.perdure.onnx").string(), "", {});
+  EXPECT_DOUBLE_EQ(same.description.calibration.clutter_rate, 0.66);
 
   // What is there is not taken again: without the server, and for a place of another kind.
   server_->stop(std::chrono::seconds(5));
@@ -162,9 +170,11 @@ TEST_F(Fetch, SaysWhatItWouldDoWhereThereIsNoNetwork) {
   EXPECT_THAT(answer.output, HasSubstr("sha256sum -c"));
   EXPECT_TRUE(fs::is_empty(out()));
   fs::remove_all(out());
-  const auto dry = fetched({"--dry-run"});
+  const auto dry = fetched({"--dry-run", "--input", "128x64"});
   EXPECT_EQ(dry.status, 0);
-  EXPECT_THAT(dry.output, HasSubstr("would make " + out().string()));
+  EXPECT_THAT(dry.output, HasSubstr("would make the folder " + out().string()));
+  EXPECT_THAT(dry.output, HasSubstr("perdure model import " + path + " --classes=/"));
+  EXPECT_THAT(dry.output, HasSubstr("coco.names --family=yolox --input=128x64\n"));
   EXPECT_THAT(dry.output, HasSubstr("curl -L -o " + path));
   EXPECT_FALSE(fs::exists(out()));
 }
@@ -180,6 +190,21 @@ TEST_F(Fetch, WrongNamesAreUsage) {
   EXPECT_THAT(name.output, HasSubstr("tiny is not a known network; known are other"));
   std::ofstream(folder_ / "list.json") << "[]";
   EXPECT_EQ(fetched().status, 78);
+}
+
+TEST(KnownNetworks, OfAnotherListAreLookedAt) {
+  const fs::path list =
+      fs::temp_directory_path() / ("perdure_known_" + std::to_string(getpid()) + ".json");
+  json known;
+  std::ifstream(sourceTree() / "config/models/known/networks.json") >> known;
+  json& file = known["networks"][0]["files"][0];
+  file["sha256"] = std::string(64, 'A');
+  std::ofstream(list) << known;
+  EXPECT_EQ(knownNetworks(list).front().files.front().sha256, std::string(64, 'a'));
+  file["bytes"] = -1;
+  std::ofstream(list) << known;
+  EXPECT_THROW(knownNetworks(list), StartupError);
+  fs::remove(list);
 }
 
 TEST(KnownNetworks, OfTheListHaveAllThatIsNeeded) {

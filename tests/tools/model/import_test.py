@@ -26,6 +26,7 @@ from perdure_model.faults import Fault
 from perdure_model.graph import Graph, Node
 from perdure_model.numpy_ops import OPS
 from perdure_model.opencv import Repair
+from perdure_model.quantised import dequantised, to_float
 
 NAMES = "--classes=car,person,dog"
 
@@ -434,6 +435,21 @@ class Computing(unittest.TestCase):
         graph.infer_shapes()
         self.assertEqual(Repair(graph).run(), {})
         self.assertEqual([n.kind for n in graph.nodes], ["ReduceMax", "Clip", "Shape", "Div"])
+
+    def test_zero_points_by_channel_need_no_scale_by_channel(self):
+        weight = np.array([[1, 2], [3, 4], [5, 6]], np.int8)
+        np.testing.assert_array_equal(dequantised(weight, np.float32(1), np.array([1, 2], np.int8), -1),
+                                      [[0, 0], [2, 2], [4, 4]])
+        np.testing.assert_array_equal(dequantised(weight, np.array([2, 1, 1]), np.int8(1), 0), [[0, 2], [2, 3], [4, 5]])
+        with self.assertRaisesRegex(Fault, "3 values, which is not the number of channels"):
+            dequantised(weight, np.float32(1), np.array([1, 2, 3], np.int8), -1)
+
+    def test_a_computed_bias_of_eight_bits_is_refused(self):
+        constants = {"s": np.float32(1), "z": np.uint8(0), "w": np.ones((1, 1, 1, 1), np.uint8)}
+        node = Node("QLinearConv", ["images", "s", "z", "w", "s", "z", "s", "z", "computed"], ["y"], {})
+        graph = Graph([node], constants, {"images": (TensorProto.UINT8, [1, 1, 4, 4])}, ["y"], 12, {})
+        with self.assertRaisesRegex(Fault, "the bias of an operator QLinearConv is computed"):
+            to_float(graph)
 
     def test_pooling_and_resizing_have_the_values_of_the_standard(self):
         x = np.arange(16, dtype=np.float32).reshape(1, 1, 4, 4)

@@ -16,12 +16,18 @@ def dequantised(value, scale, zero, axis):
     value = np.asarray(value).astype(np.float32)
     scale = np.asarray(scale, np.float32)
     zero = np.zeros_like(scale) if zero is None else np.asarray(zero).astype(np.float32)
-    if scale.size > 1:
+
+    def along(part):
+        if part.size == 1:
+            return part.reshape(())
+        if value.ndim == 0 or part.size != value.shape[axis % value.ndim]:
+            raise Fault(f"a scale or zero point has {part.size} values, which is not the number of channels of its "
+                        f"tensor (of the shape {list(value.shape)}); import the float network that it was made from")
         shape = [1] * value.ndim
-        shape[axis % value.ndim] = scale.size
-        scale, zero = scale.reshape(shape), zero.reshape(shape) if zero.size > 1 else zero
-    elif value.ndim or scale.ndim:
-        scale, zero = scale.reshape(()), zero.reshape(())
+        shape[axis % value.ndim] = part.size
+        return part.reshape(shape)
+
+    scale, zero = along(scale), along(zero)
     return ((value - zero) * scale).astype(np.float32)
 
 
@@ -100,6 +106,9 @@ class Floats:
         axis = 0 if kind == "Conv" else -1
         inputs = [self.weight(node, 0, self.fixed(node, 2), 0, x_scale), self.weight(node, 3, w_zero, axis, w_scale)]
         if len(node.inputs) > 8 and node.inputs[8]:
+            if node.inputs[8] not in self.constants:
+                raise Fault("the bias of an operator QLinearConv is computed inside the network, which cannot be "
+                            "taken apart to float; import the float network that it was made from")
             bias = self.constants[node.inputs[8]].astype(np.float32) * np.float32(x_scale) * np.ravel(w_scale)
             inputs.append(self.constant(bias.astype(np.float32), f"{node.inputs[8]}_float{self.count}"))
         out = self.emit(kind, inputs, f"{node.outputs[0]}_float", node.attributes)
