@@ -19,6 +19,18 @@ if(PERDURE_GOLD)
   add_link_options(-fuse-ld=gold)
 endif()
 
+# What nearly every file reads first, compiled once: three seconds of each file. Code for
+# modules (perdure_loadable) needs headers of its own.
+file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/common_headers.cpp CONTENT "")
+foreach(kind common loadable)
+  add_library(perdure_${kind}_headers STATIC ${PROJECT_BINARY_DIR}/common_headers.cpp)
+  target_link_libraries(perdure_${kind}_headers PRIVATE perdure_options Eigen3::Eigen)
+  target_precompile_headers(perdure_${kind}_headers PRIVATE <Eigen/Core> <Eigen/Geometry>
+    <algorithm> <chrono> <functional> <map> <memory> <string> <tl/expected.hpp> <vector>)
+endforeach()
+set_target_properties(perdure_loadable_headers PROPERTIES POSITION_INDEPENDENT_CODE ON)
+target_compile_options(perdure_loadable_headers PRIVATE -fno-semantic-interposition)
+
 # Compiles the files of a target in batches: where many small files read the same large headers
 # that takes a third of the time. Names of unnamed namespaces must then differ within the target.
 function(perdure_together name)
@@ -35,6 +47,7 @@ function(perdure_library name)
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC perdure_options ${ARG_DEPENDS})
+    target_precompile_headers(${name} REUSE_FROM perdure_common_headers)
     if(ARG_TOGETHER)
       perdure_together(${name})
     endif()
@@ -49,7 +62,30 @@ function(perdure_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS})
+  target_precompile_headers(${name} REUSE_FROM perdure_common_headers)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+endfunction()
+
+# What no test of `tests/run` needs is built by name, or all of it as `long_tests`: benchmarks, and
+# what only tests labelled long use.
+add_custom_target(long_tests)
+function(perdure_only_when_asked name)
+  set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+  add_dependencies(long_tests ${name})
+endfunction()
+
+# perdure_benchmark(NAME SOURCES … DEPENDS … [SMOKE ARGS…]): an executable in bench/, built when
+# asked. SMOKE: a test labelled long runs it with these, to see that it runs.
+function(perdure_benchmark name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;SMOKE" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE perdure_options ${ARG_DEPENDS})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bench)
+  perdure_only_when_asked(${name})
+  if(ARG_SMOKE)
+    add_test(NAME ${name}_runs COMMAND ${name} ${ARG_SMOKE} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+    set_tests_properties(${name}_runs PROPERTIES LABELS "bench;long" TIMEOUT 300)
+  endif()
 endfunction()
 
 # What every test reads first, compiled once; and the tests' own files are optimised less: what they
@@ -89,6 +125,8 @@ function(perdure_test name)
   add_test(NAME ${name} COMMAND ${name} ${ARG_ARGS} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
+  elseif(long IN_LIST ARG_LABELS)
+    perdure_only_when_asked(${name})
   endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
@@ -97,11 +135,24 @@ function(perdure_test name)
     ENVIRONMENT "PERDURE_BIN=${PROJECT_BINARY_DIR}/bin;PERDURE_SOURCE=${PROJECT_SOURCE_DIR};${ARG_ENVIRONMENT}")
 endfunction()
 
+# perdure_fast(NAME): a library in which a vehicle's time goes. GCC would take the optimisation of a
+# precompiled header, not this one, without a word.
+function(perdure_fast name)
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O3>)
+  set_target_properties(${name} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)
+endfunction()
+
 # perdure_loadable(TARGETS…): libraries that go into a module which another program loads. Calls
 # within them stay as they are in programs.
 function(perdure_loadable)
   foreach(target ${ARGN})
     set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
     target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+    get_target_property(reused ${target} PRECOMPILE_HEADERS_REUSE_FROM)
+    if(reused)
+      set_target_properties(${target} PROPERTIES
+        PRECOMPILE_HEADERS_REUSE_FROM perdure_loadable_headers)
+      add_dependencies(${target} perdure_loadable_headers)
+    endif()
   endforeach()
 endfunction()
