@@ -65,6 +65,38 @@ void describeLive(Config& c, config::Fields& fields) {
                   "device's own mount matrix"});
 }
 
+void describeVehicle(Config& c, config::Fields& fields) {
+  fields.choice("speed.source", c.speed.source, {"none", "can", "udp", "gnss"},
+                {"live: where the vehicle's speed comes from: its CAN bus, lines of UDP, or the "
+                 "receiver of gnss.source"});
+  fields.text("speed.can.interface", c.speed.can_interface,
+              {"live: network interface of the CAN bus (SocketCAN)"});
+  fields.texts("speed.can.signals", c.speed.can_signals,
+               {"live: a signal for each wheel, or the one of the speed, as the vehicle's DBC file "
+                "has it: ID START|LENGTH@ORDER SIGN (FACTOR,OFFSET) [LOW|HIGH] \"UNIT\""});
+  fields.text("speed.can.reverse", c.speed.can_reverse,
+              {"live: the signal by which the vehicle says that it goes backwards, and == VALUE; "
+               "empty: the speed has its sign itself"});
+  fields.text(
+      "speed.address", c.speed.address,
+      {"live: HOST:PORT that lines of UDP come to: a speed in m/s, also with its deviation; "
+       "or RMC or VTG of NMEA 0183"});
+  fields.number("speed.sigma", c.speed.sigma, config::positive(),
+                {"live: deviation of the speed (of one wheel) beside its resolution", "m/s"});
+  fields.number("speed.latency_s", c.speed.latency_s, config::between(0, 2),
+                {"live: how old a speed is when it comes", "s"});
+  fields.choice("gnss.source", c.gnss.source, {"none", "gpsd", "nmea"},
+                {"live: receiver of satellites that says where on Earth the map is: of gpsd, or "
+                 "sentences of NMEA 0183 by UDP"});
+  fields.text("gnss.address", c.gnss.address,
+              {"live: HOST:PORT of gpsd, or that NMEA comes to; empty: 127.0.0.1:2947, "
+               "127.0.0.1:10110"});
+  fields.number("gnss.most_sigma", c.gnss.most_sigma, config::positive(),
+                {"live: a fix that states more is not used", "m"});
+  fields.numbers("gnss.antenna", c.gnss.antenna, config::between(-100, 100),
+                 {"live: place of the antenna in the body [x, y, z]; empty: its origin", "m"});
+}
+
 }  // namespace
 
 void describe(Config& c, config::Fields& fields) {
@@ -77,6 +109,7 @@ void describe(Config& c, config::Fields& fields) {
        "sensors (the camera is asked for images of its size), and instead of a drive's own"});
   describeDataset(c, fields);
   describeLive(c, fields);
+  describeVehicle(c, fields);
   fields.choice("pace.mode", c.pace.mode, {"clock", "follow"},
                 {"clock: the drive's own times; follow: as fast as the readers answer"});
   fields.number("pace.rate", c.pace.rate, config::between(0.01, 100),
@@ -114,6 +147,20 @@ void requireSource(const Config& config) {
     throw StartupError(ExitCode::kConfiguration,
                        "imu.mount has " + std::to_string(config.imu.mount.size()) +
                            " numbers; give the 9 of a rotation, row by row, or none.");
+  }
+  if (live && !config.gnss.antenna.empty() && config.gnss.antenna.size() != 3) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "gnss.antenna is not [x, y, z]; give these three in metres, or none.");
+  }
+  if (live && config.speed.source == "gnss" && config.gnss.source == "none") {
+    throw StartupError(ExitCode::kConfiguration,
+                       "speed.source: gnss needs a receiver: set gnss.source to gpsd or nmea.");
+  }
+  if (live && config.speed.source == "udp" && config.gnss.source == "nmea" &&
+      config.speed.address == config.gnss.address) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "speed.address and gnss.address are the same, and one of them would hear "
+                       "nothing; set speed.source: gnss, which takes both from one receiver.");
   }
   if (!live && config.dataset.path.empty()) {
     throw StartupError(ExitCode::kConfiguration,

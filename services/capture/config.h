@@ -54,11 +54,27 @@ struct ImuConfig {
   std::vector<double> mount;  ///< empty, or 9: rows of R in v_B = R v_device
 };
 
+struct SpeedConfig {
+  std::string source = "none";
+  std::string can_interface = "can0", can_reverse;
+  std::vector<std::string> can_signals;
+  std::string address = "127.0.0.1:5600";
+  double sigma = 0.05, latency_s = 0.0;
+};
+
+struct GnssConfig {
+  std::string source = "none", address;
+  double most_sigma = 5.0;
+  std::vector<double> antenna;  ///< empty, or 3: in the body
+};
+
 struct Config {
   std::string source = "dataset";
   std::string rig;
   CameraConfig camera;
   ImuConfig imu;
+  SpeedConfig speed;
+  GnssConfig gnss;
   DatasetConfig dataset;
   ImageConfig image;
   PaceConfig pace;

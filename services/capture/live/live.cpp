@@ -1,5 +1,8 @@
 #include "services/capture/live/live.h"
 
+#include <cmath>
+#include <numbers>
+
 #include "common/replay/files/rig_file.h"
 #include "services/capture/live/libcamera_session.h"
 
@@ -14,6 +17,7 @@ Calibration rigOf(const Config& config, InstanceId source) {
   rig.source = source;
   std::erase_if(rig.cameras, [](const CameraCalibration& c) { return c.name != kCamera; });
   rig.cameras.front().rate_hz = config.camera.rate_hz;
+  rig.has_speed = config.speed.source != "none";
   return rig;
 }
 
@@ -40,16 +44,21 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
 Live::Live(service::Context& context, const Config& config)
     : context_(context),
       frames_(context.writer(bus::topics::frame(kCamera))),
-      imu_(context.sink(bus::topics::kImu)) {
-  const Calibration rig = rigOf(config, context.instance());
-  (void)context_.writer(bus::topics::kCalibration).write(rig);
+      calibrations_(context.writer(bus::topics::kCalibration)),
+      imu_(context.sink(bus::topics::kImu)),
+      speed_(context.sink(bus::topics::kSpeed)),
+      rig_(rigOf(config, context.instance())),
+      vehicle_(config.speed, config.gnss,
+               {[this](const SpeedReading& reading) { offer(reading); },
+                [this](const EarthPlace& place) { offer(place); }}) {
+  (void)calibrations_.write(rig_);
   context_.countReasons([this](ReasonCounts& counts) { report(counts); });
   context_.onHealth([this] { updateHealth(); });
   context_.loop().onWake([this] { pump(); });
-  if (rig.imu) openImu(config.imu);
+  if (rig_.imu) openImu(config.imu);
   camera_ = std::make_unique<LiveCamera>(
       libcameraOpener(
-          cameraSettings(config, rig.cameras.front()),
+          cameraSettings(config, rig_.cameras.front()),
           [this](const std::string& line) { context_.log().warn("libcamera: {}", line); }),
       config.camera.rate_hz, [this](CameraImage image) { offer(Message(std::move(image))); });
 }
@@ -122,6 +131,28 @@ void Live::publish(const InertialPair& sample) {
   imu_(out);
 }
 
+void Live::publish(const SpeedReading& reading) {
+  if (reading.time_ns <= last_speed_ns_) return reasons_.add("speed_out_of_order");
+  last_speed_ns_ = reading.time_ns;
+  SpeedSample out;
+  out.source = context_.instance();
+  out.sequence = speeds_++;
+  out.time = clock_.at(reading.time_ns);
+  out.speed = reading.speed;
+  out.sigma = reading.sigma;
+  speed_(out);
+}
+
+void Live::publish(const EarthPlace& place) {
+  rig_.anchor = GeoAnchor{clock_.at(place.time_ns), place.latitude_deg, place.longitude_deg,
+                          place.height_m, place.yaw};
+  (void)calibrations_.write(rig_);
+  context_.log().info("stood at {:.7f}° {:.7f}°, heading {:.1f}° from north, ±{:.2f} m",
+                      place.latitude_deg, place.longitude_deg,
+                      std::remainder(90.0 - place.yaw * 180.0 / std::numbers::pi, 360.0),
+                      place.sigma_m);
+}
+
 std::string Live::imuYield() {
   const std::lock_guard lock(pairing_mutex_);
   return yield_.look(readings_, samples_);
@@ -134,7 +165,8 @@ void Live::updateHealth() {
     problem = joined(problem, imu->state().problem());
     names = joined(names, imu->state().name(), "; ");
   }
-  problem = joined(problem, imuYield());
+  problem = joined(joined(problem, imuYield()), vehicle_.problem());
+  names = joined(names, vehicle_.name(), "; ");
   if (names != said_ && !names.empty()) context_.log().info("gives {}", names);
   said_ = names;
   if (note != noted_ && !note.empty()) context_.log().warn("{}", note);
@@ -149,6 +181,7 @@ void Live::report(ReasonCounts& counts) const {
   };
   add(reasons_);
   add(camera_->state().reasons());
+  vehicle_.report(counts);
   for (const auto& imu : imus_) add(imu->state().reasons());
   const std::lock_guard lock(pairing_mutex_);
   add(pairing_.reasons());

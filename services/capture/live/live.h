@@ -1,4 +1,4 @@
-// Live sensors on the bus: a camera, an IMU, and the rig's calibration.
+// Live sensors on the bus: a camera, an IMU, the vehicle's speed, and the rig's calibration.
 #pragma once
 
 #include <memory>
@@ -15,6 +15,7 @@
 #include "services/capture/live/imu_pairing.h"
 #include "services/capture/live/imu_yield.h"
 #include "services/capture/live/live_camera.h"
+#include "services/capture/vehicle/vehicle.h"
 
 namespace perdure::capture {
 
@@ -25,7 +26,7 @@ class Live {
   Live(service::Context& context, const Config& config);
 
  private:
-  using Message = std::variant<CameraImage, InertialPair>;
+  using Message = std::variant<CameraImage, InertialPair, SpeedReading, EarthPlace>;
 
   void openImu(const ImuConfig& config);
   void scanned(const IioScan& scan);
@@ -33,6 +34,9 @@ class Live {
   void pump();
   void publish(CameraImage image);
   void publish(const InertialPair& sample);
+  void publish(const SpeedReading& reading);
+  /// The calibration again, with where on Earth the body stood.
+  void publish(const EarthPlace& place);
   void updateHealth();
   std::string imuYield();
   void report(ReasonCounts& counts) const;
@@ -40,10 +44,15 @@ class Live {
   service::Context& context_;
   const HostClock clock_;
   bus::Writer<Frame>& frames_;
+  bus::Writer<Calibration>& calibrations_;
   Sink<ImuSample> imu_;
+  Sink<SpeedSample> speed_;
+  Calibration rig_;
   BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of an IMU
   std::uint64_t samples_ = 0;
   std::int64_t last_ns_ = 0;  ///< of the last inertial sample
+  std::uint64_t speeds_ = 0;
+  std::int64_t last_speed_ns_ = 0;
   ReasonCounts reasons_;
   std::string said_;   ///< names of the sensors, as logged last
   std::string noted_;  ///< what the camera does not do as asked, as logged last
@@ -54,6 +63,7 @@ class Live {
   // The threads of these use all of the above: they go first.
   std::vector<std::unique_ptr<IioStream>> imus_;
   std::unique_ptr<LiveCamera> camera_;
+  Vehicle vehicle_;
 };
 
 }  // namespace perdure::capture

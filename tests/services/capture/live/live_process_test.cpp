@@ -1,5 +1,8 @@
 // perdure-capture with live sensors: an IMU behind an iiod, and no camera at all.
+#include <arpa/inet.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -119,6 +122,70 @@ TEST_F(LiveProcess, SaysThatAnImuWithAFrozenClockGivesNoSamples) {
   EXPECT_GT(last_health_.reasons["imu_out_of_order"], 0U);
 }
 
+/// Datagrams to the addresses that capture listens to.
+class Vehicle {
+ public:
+  explicit Vehicle(const std::string& host) { (void)inet_aton(host.c_str(), &host_); }
+  ~Vehicle() { ::close(socket_); }
+  void send(int port, const std::string& text) const {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_addr = host_;
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
+    (void)::sendto(socket_, text.data(), text.size(), 0, reinterpret_cast<const sockaddr*>(&to),
+                   sizeof to);
+  }
+
+ private:
+  in_addr host_{};
+  int socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+};
+
+/// RMC and GGA of a drive to the east at 10 m/s.
+std::string sentencesOf(int second) {
+  const auto whole = [](const std::string& text) {
+    unsigned sum = 0;
+    for (const char c : text) sum ^= static_cast<unsigned char>(c);
+    return fmt::format("${}*{:02X}\r\n", text, sum);
+  };
+  return whole(fmt::format("GNRMC,1200{:02d}.00,A,4900.0,N,00824.0,E,19.438,90.0,010126,,,A",
+                           second)) +
+         whole(fmt::format("GNGGA,1200{:02d}.00,4900.0,N,00824.0,E,1,12,0.7,65.0,M,45.0,M,,",
+                           second));
+}
+
+TEST_F(LiveProcess, GivesTheSpeedAndTheVehiclesPlaceOnEarth) {
+  const Vehicle vehicle(address_);
+  std::vector<SpeedSample> speeds;
+  bus::Reader<SpeedSample> speed(participant_, bus::topics::kSpeed);
+  loop_.on(speed, [&](const SpeedSample& s) { speeds.push_back(s); });
+  const Child capture(
+      command({"imu.uri=ip:" + address_, "speed.source=udp", "speed.address=" + address_ + ":5600",
+               "gnss.source=nmea", "gnss.address=" + address_ + ":10110"}),
+      folder_.file("log"));
+  ASSERT_TRUE(runUntil(
+      loop_, [&] { return last_health_.message.find("says nothing") != std::string::npos; }))
+      << last_health_.message << capture.log();
+  EXPECT_TRUE(calibration_.has_speed);
+  EXPECT_FALSE(calibration_.anchor);
+  int calls = 0;
+  ASSERT_TRUE(runUntil(loop_,
+                       [&] {
+                         vehicle.send(5600, "10.0 0.05");
+                         if (++calls % 4 == 0) vehicle.send(10110, sentencesOf(calls / 4 % 60));
+                         return calibration_.anchor.has_value() && speeds.size() >= 20;
+                       }))
+      << last_health_.message << capture.log();
+  EXPECT_DOUBLE_EQ(speeds.back().speed, 10.0);
+  EXPECT_DOUBLE_EQ(speeds.back().sigma, 0.05);
+  EXPECT_GT(speeds.back().time, speeds.front().time);
+  EXPECT_DOUBLE_EQ(calibration_.anchor->latitude_deg, 49.0);
+  EXPECT_DOUBLE_EQ(calibration_.anchor->longitude_deg, 8.4);
+  EXPECT_NEAR(calibration_.anchor->height_m, 110.0, 1e-9);
+  EXPECT_NEAR(calibration_.anchor->yaw, 0.0, 1e-12) << "to the east";
+  EXPECT_NEAR(toSeconds(calibration_.anchor->time - speeds.back().time), 0.0, 5.0);
+}
+
 TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
   const auto messageOf = [&](const std::vector<std::string>& words, int status) {
     Child capture(words, folder_.file("log"));
@@ -128,6 +195,8 @@ TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
   EXPECT_THAT(messageOf(command({}, rig(false)), 69), HasSubstr("cam0 is missing"));
   EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0]"}), 78),
               HasSubstr("imu.mount has 3 numbers"));
+  EXPECT_THAT(messageOf(command({"speed.source=can"}), 78), HasSubstr("speed.can.signals"));
+  EXPECT_THAT(messageOf(command({"speed.source=gnss"}), 78), HasSubstr("set gnss.source"));
   auto without = command({});
   without.resize(without.size() - 2);
   EXPECT_THAT(messageOf(without, 78), HasSubstr("perdure calibrate"));

@@ -1,0 +1,106 @@
+#include "services/capture/vehicle/can_signal.h"
+
+#include <fmt/format.h>
+
+#include <regex>
+
+namespace perdure::capture {
+namespace {
+
+constexpr std::uint32_t kExtendedFlag = 0x80000000U, kStandardMask = 0x7ffU,
+                        kExtendedMask = 0x1fffffffU;
+constexpr unsigned kMostBits = 64 * 8;  // of a CAN FD frame
+
+/// Bit k of a signal, 0 the lowest, in DBC's numbers: byte · 8 + bit.
+unsigned positionOf(const CanSignal& s, unsigned k) {
+  if (s.little_endian) return s.start + k;
+  // The first bit is the highest: from there down each byte, and on in the next one from its top.
+  const unsigned from_top = s.length - 1 - k;
+  const unsigned sequential = s.start / 8 * 8 + (7 - s.start % 8) + from_top;
+  return sequential / 8 * 8 + (7 - sequential % 8);
+}
+
+Result<CanSignal> withId(CanSignal signal, const std::string& text) {
+  const bool hexadecimal = text.size() > 1 && (text[1] == 'x' || text[1] == 'X');
+  const unsigned long long id = std::stoull(text, nullptr, hexadecimal ? 16 : 10);
+  const bool flagged = (id & kExtendedFlag) != 0 && id <= 0xffffffffULL;
+  signal.extended = flagged || id > kStandardMask;
+  signal.id = static_cast<std::uint32_t>(id) & (signal.extended ? kExtendedMask : kStandardMask);
+  if (!flagged && id > kExtendedMask) return fail("can_signal", "its id has more than 29 bits");
+  return signal;
+}
+
+}  // namespace
+
+Result<CanSignal> parseCanSignal(const std::string& text) {
+  static const std::regex kLine(
+      R"re(\s*(0[xX][0-9a-fA-F]{1,8}|\d{1,10})\s+(?:SG_\s+\w+\s*(M|m\d+M?)?\s*:\s*)?)re"
+      R"re((\d{1,3})\|(\d{1,3})@([01])([+-])\s*\(\s*([-+.\deE]+)\s*,\s*([-+.\deE]+)\s*\))re"
+      R"re(\s*(?:\[\s*([-+.\deE]+)\s*\|\s*([-+.\deE]+)\s*\])?\s*(?:"([^"]*)")?.*)re");
+  std::smatch m;
+  if (!std::regex_match(text, m, kLine)) {
+    return fail("can_signal",
+                "it is not ID START|LENGTH@ORDER SIGN (FACTOR,OFFSET) [LOW|HIGH] \"UNIT\", as "
+                "0x1a0 7|16@0+ (0.01,0) [0|655.35] \"km/h\"");
+  }
+  if (m[2].length() > 0 && m[2].str() != "M") {
+    return fail("can_signal", "it is multiplexed (" + m[2].str() + "), which is not read");
+  }
+  CanSignal signal;
+  try {
+    signal.start = static_cast<unsigned>(std::stoul(m[3]));
+    signal.length = static_cast<unsigned>(std::stoul(m[4]));
+    signal.little_endian = m[5] == "1";
+    signal.is_signed = m[6] == "-";
+    signal.factor = std::stod(m[7]);
+    signal.offset = std::stod(m[8]);
+    if (m[9].length() > 0) signal.low = std::stod(m[9]);
+    if (m[10].length() > 0) signal.high = std::stod(m[10]);
+  } catch (const std::exception&) {
+    return fail("can_signal", "one of its numbers is none");
+  }
+  signal.unit = m[11];
+  if (signal.length < 1 || signal.length > 64) return fail("can_signal", "it has not 1 to 64 bits");
+  if (signal.factor == 0.0) return fail("can_signal", "its factor is 0");
+  if (signal.start >= kMostBits || positionOf(signal, signal.length - 1) >= kMostBits ||
+      positionOf(signal, 0) >= kMostBits) {
+    return fail("can_signal", "it ends behind the 64 bytes that a frame can have");
+  }
+  return withId(signal, m[1]);
+}
+
+Result<std::int64_t> rawValueOf(const CanSignal& signal, std::span<const std::uint8_t> data) {
+  std::uint64_t raw = 0;
+  for (unsigned k = 0; k < signal.length; ++k) {
+    const unsigned position = positionOf(signal, k);
+    if (position / 8 >= data.size()) {
+      return fail("speed_can_short", fmt::format("a frame of CAN id {:#x} has {} bytes, which the "
+                                                 "signal goes beyond; look at its place in the DBC",
+                                                 signal.id, data.size()));
+    }
+    raw |= static_cast<std::uint64_t>(data[position / 8] >> (position % 8) & 1U) << k;
+  }
+  const unsigned unused = 64 - signal.length;
+  if (!signal.is_signed) return static_cast<std::int64_t>(raw);
+  return static_cast<std::int64_t>(raw << unused) >> unused;
+}
+
+Result<double> valueOf(const CanSignal& signal, std::span<const std::uint8_t> data) {
+  const auto raw = rawValueOf(signal, data);
+  if (!raw) return tl::unexpected(raw.error());
+  const std::uint64_t ones = ~std::uint64_t{0} >> (64 - signal.length);
+  const auto bits = static_cast<std::uint64_t>(*raw) & ones;
+  const std::uint64_t unknown = signal.is_signed ? (ones >> 1) + 1 : ones;
+  const double number = signal.is_signed ? static_cast<double>(*raw) : static_cast<double>(bits);
+  const double value = number * signal.factor + signal.offset;
+  const bool outside = signal.high > signal.low && (value < signal.low || value > signal.high);
+  if (outside || (signal.length >= 8 && bits == unknown)) {
+    return fail("speed_can_invalid",
+                fmt::format("CAN id {:#x} says {:g} {}, which its unit does not believe itself or "
+                            "the range of the DBC excludes",
+                            signal.id, value, signal.unit));
+  }
+  return value;
+}
+
+}  // namespace perdure::capture

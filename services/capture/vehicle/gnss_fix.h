@@ -1,0 +1,20 @@
+// Where a receiver of satellites says that its antenna is.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace perdure::capture {
+
+struct GnssFix {
+  std::int64_t time_ns = 0;                                  ///< CLOCK_BOOTTIME
+  double latitude_deg = 0, longitude_deg = 0, height_m = 0;  ///< WGS 84, over the ellipsoid
+  double sigma_m = 0;                                        ///< horizontal, one deviation
+  std::optional<double> speed;                               ///< m/s over ground
+  std::optional<double> course;  ///< over ground: radians from east, counter-clockwise, (−π, π]
+};
+
+/// From degrees clockwise from north to radians counter-clockwise from east, (−π, π].
+double courseOf(double degrees_from_north);
+
+}  // namespace perdure::capture

@@ -1,0 +1,51 @@
+#include "services/capture/vehicle/gpsd.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace perdure::capture {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kSigmasOfEph = 2.4477;  // 95 % of a circle: √(χ²₂)
+constexpr double kUnstated_m = 10.0;     // where it says nothing of its error
+
+std::optional<double> number(const Json& json, const char* key) {
+  const auto it = json.find(key);
+  if (it == json.end() || !it->is_number()) return std::nullopt;
+  const double value = it->get<double>();
+  return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time_ns) {
+  const Json json = Json::parse(line, nullptr, false);
+  if (!json.is_object()) return fail("gpsd_malformed", "gpsd said a line that is no JSON object");
+  const auto kind = json.find("class");
+  if (kind == json.end() || !kind->is_string()) {
+    return fail("gpsd_malformed", "gpsd said an object without its class");
+  }
+  if (kind->get<std::string>() != "TPV") return std::nullopt;
+  const auto latitude = number(json, "lat"), longitude = number(json, "lon");
+  auto height = number(json, "altHAE");
+  if (!height) height = number(json, "alt");
+  if (number(json, "mode").value_or(0) < 3 || !latitude || !longitude || !height) {
+    return fail("gpsd_no_fix", "gpsd has no fix in three dimensions");
+  }
+  if (std::abs(*latitude) > 90.0 || std::abs(*longitude) > 180.0) {
+    return fail("gpsd_malformed", "gpsd said a place that is not on Earth");
+  }
+  GnssFix fix;
+  fix.time_ns = time_ns;
+  fix.latitude_deg = *latitude;
+  fix.longitude_deg = *longitude;
+  fix.height_m = *height;
+  fix.sigma_m = number(json, "eph").value_or(kUnstated_m * kSigmasOfEph) / kSigmasOfEph;
+  fix.speed = number(json, "speed");
+  if (const auto track = number(json, "track")) fix.course = courseOf(*track);
+  return fix;
+}
+
+}  // namespace perdure::capture

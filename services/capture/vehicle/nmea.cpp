@@ -1,0 +1,157 @@
+#include "services/capture/vehicle/nmea.h"
+
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+
+namespace perdure::capture {
+namespace {
+
+constexpr double kKnot = 1852.0 / 3600.0;
+constexpr std::size_t kLongest = 256;  // 82 by the standard, which many exceed
+
+/// Field i of a sentence, 0 being its name; empty where there is none.
+std::string_view field(std::string_view sentence, std::size_t i) {
+  for (; i > 0; --i) {
+    const auto comma = sentence.find(',');
+    if (comma == std::string_view::npos) return {};
+    sentence.remove_prefix(comma + 1);
+  }
+  return sentence.substr(0, sentence.find(','));
+}
+
+std::optional<double> number(std::string_view text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+/// ddmm.mmmm or dddmm.mmmm with its hemisphere, in degrees.
+std::optional<double> angle(std::string_view text, std::string_view hemisphere, double most) {
+  const auto value = number(text);
+  if (!value || *value < 0.0 || hemisphere.size() != 1) return std::nullopt;
+  const double whole = std::floor(*value / 100.0), minutes = *value - 100.0 * whole;
+  const double degrees = whole + minutes / 60.0;
+  const bool negative = hemisphere == "S" || hemisphere == "W";
+  if (minutes >= 60.0 || degrees > most || !(negative || hemisphere == "N" || hemisphere == "E")) {
+    return std::nullopt;
+  }
+  return negative ? -degrees : degrees;
+}
+
+/// What stands between $ and *, where the sum behind it is right.
+Result<std::string_view> sentenceOf(std::string_view line) {
+  while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) {
+    line.remove_suffix(1);
+  }
+  const auto star = line.rfind('*');
+  if (line.size() < 9 || line.size() > kLongest || line.front() != '$' ||
+      star == std::string_view::npos || star + 3 != line.size()) {
+    return fail("nmea_malformed", "a line is not $…*SUM, as NMEA 0183 has them");
+  }
+  unsigned stated = 0, sum = 0;
+  const auto [end, error] = std::from_chars(&line[star + 1], &line[star + 1] + 2, stated, 16);
+  for (const char c : line.substr(1, star - 1)) sum ^= static_cast<unsigned char>(c);
+  if (error != std::errc() || end != &line[star + 1] + 2 || stated != sum) {
+    return fail("nmea_checksum", "a sentence of NMEA does not have the sum that stands behind it");
+  }
+  return line.substr(1, star - 1);
+}
+
+/// Deviation of a range for GGA's quality: of a horizontal place after times HDOP.
+double rangeSigma(double quality) {
+  if (quality == 4) return 0.02;    // RTK, fixed
+  if (quality == 5) return 0.3;     // RTK, float
+  return quality == 2 ? 1.0 : 3.0;  // differential; alone
+}
+
+tl::unexpected<Reason> noFix() {
+  return fail("nmea_no_fix", "the receiver of satellites has no fix");
+}
+
+}  // namespace
+
+double courseOf(double degrees_from_north) {
+  const double from_east = 90.0 - degrees_from_north;
+  const double turns = std::ceil(from_east / 360.0 - 0.5);
+  return (from_east - 360.0 * turns) * std::numbers::pi / 180.0;
+}
+
+Result<NmeaReader::Said> NmeaReader::read(std::string_view line, std::int64_t time_ns) {
+  const auto sentence = sentenceOf(line);
+  if (!sentence) return tl::unexpected(sentence.error());
+  const std::string_view name = field(*sentence, 0);
+  if (name.size() != 5) return Said{};
+  const std::string_view kind = name.substr(2);
+  if (kind == "RMC") return readRmc(*sentence, time_ns);
+  if (kind == "VTG") return readVtg(*sentence);
+  if (kind == "GGA") return readGga(*sentence, time_ns);
+  if (kind == "GST") readGst(*sentence);
+  return Said{};
+}
+
+Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int64_t time_ns) {
+  rmc_utc_.clear();
+  if (field(sentence, 2) != "A") return noFix();
+  const auto knots = number(field(sentence, 7));
+  speed_ = knots ? std::optional(*knots * kKnot) : std::nullopt;
+  const auto course = number(field(sentence, 8));
+  course_ = course ? std::optional(courseOf(*course)) : std::nullopt;
+  rmc_utc_ = field(sentence, 1);
+  Said said = whole(time_ns);
+  said.speed = speed_;
+  return said;
+}
+
+Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence) {
+  if (field(sentence, 9) == "N") return noFix();
+  Said said;
+  if (const auto kmh = number(field(sentence, 7))) {
+    said.speed = *kmh / 3.6;
+  } else if (const auto knots = number(field(sentence, 5))) {
+    said.speed = *knots * kKnot;
+  }
+  return said;
+}
+
+Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int64_t time_ns) {
+  gga_utc_.clear();
+  const double quality = number(field(sentence, 6)).value_or(0.0);
+  if (quality < 1.0) return noFix();
+  const auto latitude = angle(field(sentence, 2), field(sentence, 3), 90.0);
+  const auto longitude = angle(field(sentence, 4), field(sentence, 5), 180.0);
+  const auto above_sea = number(field(sentence, 9));
+  if (!latitude || !longitude || !above_sea) {
+    return fail("nmea_malformed", "GGA says that there is a fix, and has no place or height");
+  }
+  place_.latitude_deg = *latitude;
+  place_.longitude_deg = *longitude;
+  place_.height_m = *above_sea + number(field(sentence, 11)).value_or(0.0);
+  place_.sigma_m =
+      stated_sigma_m_.value_or(number(field(sentence, 8)).value_or(1.0) * rangeSigma(quality));
+  gga_utc_ = field(sentence, 1);
+  return whole(time_ns);
+}
+
+/// Deviations of latitude and longitude, as the receiver computes them.
+void NmeaReader::readGst(std::string_view sentence) {
+  const auto north = number(field(sentence, 6)), east = number(field(sentence, 7));
+  stated_sigma_m_ = north && east ? std::optional(std::hypot(*north, *east)) : std::nullopt;
+}
+
+NmeaReader::Said NmeaReader::whole(std::int64_t time_ns) {
+  if (rmc_utc_.empty() || rmc_utc_ != gga_utc_) return {};
+  GnssFix fix = place_;
+  fix.time_ns = time_ns;
+  fix.speed = speed_;
+  fix.course = course_;
+  rmc_utc_.clear();
+  gga_utc_.clear();
+  return {{}, fix};
+}
+
+}  // namespace perdure::capture

@@ -1,0 +1,213 @@
+#include "services/capture/vehicle/vehicle.h"
+
+#include <fmt/format.h>
+#include <linux/can.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+
+#include "common/base/errors.h"
+#include "services/capture/vehicle/gpsd.h"
+
+namespace perdure::capture {
+namespace {
+
+constexpr const char *kGpsd = "127.0.0.1:2947", *kNmea = "127.0.0.1:10110";
+
+std::uint32_t kernelId(const CanSignal& signal) {
+  return signal.extended ? signal.id | CAN_EFF_FLAG : signal.id;
+}
+
+OpenSocket socketOf(const SpeedConfig& config) {
+  if (config.source == "udp") return udpSocket(config.address);
+  if (config.source != "can") return {};
+  const auto settings = wheelSettings(config.can_signals, config.can_reverse, config.sigma);
+  std::vector<std::uint32_t> ids;
+  for (const CanSignal& signal : settings.wheels) ids.push_back(kernelId(signal));
+  if (settings.reverse) ids.push_back(kernelId(*settings.reverse));
+  return canSocket(config.can_interface, std::move(ids));
+}
+
+std::string addressOf(const GnssConfig& config) {
+  if (!config.address.empty()) return config.address;
+  return config.source == "gpsd" ? kGpsd : kNmea;
+}
+
+OpenSocket socketOf(const GnssConfig& config) {
+  if (config.source == "none") return {};
+  if (config.source == "nmea") return udpSocket(addressOf(config));
+  return tcpSocket(addressOf(config), std::string(kGpsdWatch));
+}
+
+AnchorSettings anchorSettings(const GnssConfig& config) {
+  AnchorSettings settings{config.most_sigma, Eigen::Vector3d::Zero()};
+  if (config.antenna.size() == 3) settings.antenna = Eigen::Vector3d(config.antenna.data());
+  return settings;
+}
+
+std::string nameOf(const SpeedConfig& config) {
+  return config.source == "can" ? "speed of " + config.can_interface : "speed at " + config.address;
+}
+
+std::string_view withoutBlanks(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t,"), last = text.find_last_not_of(" \t,");
+  return first == std::string_view::npos ? std::string_view{}
+                                         : text.substr(first, last - first + 1);
+}
+
+}  // namespace
+
+Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int64_t time_ns) {
+  const auto number = [](std::string_view& text, double& value) {
+    text = withoutBlanks(text);
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || !std::isfinite(value)) return false;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    return text.empty() || text.find_first_of(" \t,") == 0;
+  };
+  SpeedReading reading{time_ns, 0.0, sigma};
+  bool right = number(line, reading.speed);
+  if (right && !withoutBlanks(line).empty()) right = number(line, reading.sigma) && line.empty();
+  if (right && reading.sigma > 0.0) return reading;
+  return fail("speed_malformed",
+              "a line of speed is not \"SPEED\" or \"SPEED SIGMA\" in m/s, nor a sentence of NMEA");
+}
+
+Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs)
+    : Vehicle(speed, gnss, std::move(outputs), socketOf(speed), socketOf(gnss)) {}
+
+Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs,
+                 OpenSocket speed_socket, OpenSocket gnss_socket)
+    : speed_(speed), gnss_(gnss), outputs_(std::move(outputs)), anchor_(anchorSettings(gnss)) {
+  if (speed.source == "can") {
+    wheels_.emplace(wheelSettings(speed.can_signals, speed.can_reverse, speed.sigma));
+  }
+  if (speed_socket) {
+    const bool can = speed.source == "can";
+    const auto lines = [this](std::string_view line, std::int64_t t) { onSpeedLine(line, t); };
+    speed_stream_ = std::make_unique<SocketStream>("speed", nameOf(speed), std::move(speed_socket),
+                                                   [this, can, lines](const Packet& packet) {
+                                                     if (can) return onCan(packet);
+                                                     speed_lines_.add(packet, lines);
+                                                     speed_lines_.end(packet.time_ns, lines);
+                                                   });
+  }
+  if (gnss_socket) {
+    const bool datagrams = gnss.source == "nmea";
+    const auto lines = [this](std::string_view line, std::int64_t t) { onGnssLine(line, t); };
+    gnss_stream_ = std::make_unique<SocketStream>("gnss", gnss.source + " at " + addressOf(gnss),
+                                                  std::move(gnss_socket),
+                                                  [this, datagrams, lines](const Packet& packet) {
+                                                    gnss_lines_.add(packet, lines);
+                                                    if (datagrams)
+                                                      gnss_lines_.end(packet.time_ns, lines);
+                                                  });
+  }
+}
+
+void Vehicle::onCan(const Packet& packet) {
+  // A classic frame begins like one of CAN FD: id, length, data from byte 8 on.
+  canfd_frame frame{};
+  if (packet.bytes.size() != CAN_MTU && packet.bytes.size() != CANFD_MTU) {
+    return count({"speed_malformed", "what came of the CAN bus is no frame"});
+  }
+  std::memcpy(&frame, packet.bytes.data(), packet.bytes.size());
+  const bool extended = (frame.can_id & CAN_EFF_FLAG) != 0;
+  const std::uint32_t id = frame.can_id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+  const std::size_t length =
+      std::min<std::size_t>(frame.len, packet.bytes.size() == CAN_MTU ? 8 : 64);
+  std::optional<SpeedReading> reading;
+  {
+    const std::lock_guard lock(mutex_);
+    reading = wheels_->frame(id, extended, {frame.data, length}, packet.time_ns);
+  }
+  if (reading) give(*reading);
+}
+
+void Vehicle::onSpeedLine(std::string_view line, std::int64_t time_ns) {
+  if (line.front() == '$') {
+    const auto said = speed_nmea_.read(line, time_ns);
+    if (!said) return count(said.error());
+    if (said->speed) give({time_ns, *said->speed, speed_.sigma});
+    return;
+  }
+  const auto reading = readSpeedLine(line, speed_.sigma, time_ns);
+  reading ? give(*reading) : count(reading.error());
+}
+
+void Vehicle::onGnssLine(std::string_view line, std::int64_t time_ns) {
+  if (gnss_.source == "gpsd") {
+    const auto fix = readGpsd(line, time_ns);
+    if (!fix) return count(fix.error());
+    if (*fix) take(**fix);
+    return;
+  }
+  const auto said = gnss_nmea_.read(line, time_ns);
+  if (!said) return count(said.error());
+  if (said->fix) take(*said->fix);
+}
+
+void Vehicle::take(const GnssFix& fix) {
+  {
+    const std::lock_guard lock(mutex_);
+    gnss_trouble_.clear();
+  }
+  if (speed_.source == "gnss" && fix.speed) give({fix.time_ns, *fix.speed, speed_.sigma});
+  if (const auto place = anchor_.offer(fix, backwards_)) outputs_.place(*place);
+}
+
+void Vehicle::give(SpeedReading reading) {
+  {
+    const std::lock_guard lock(mutex_);
+    speed_trouble_.clear();
+  }
+  backwards_ = reading.speed < 0.0;
+  reading.time_ns -= std::llround(1e9 * speed_.latency_s);
+  outputs_.speed(reading);
+}
+
+void Vehicle::count(const Reason& reason) {
+  const std::lock_guard lock(mutex_);
+  reasons_.add(reason);
+  const bool of_speed = reason.code.starts_with("speed_") || gnss_.source == "none";
+  (of_speed ? speed_trouble_ : gnss_trouble_) = reason.detail;
+}
+
+std::string Vehicle::problem() const {
+  std::string all;
+  const auto add = [&all](const std::string& more) {
+    if (more.empty()) return;
+    all = joined(all, more.back() == '.' ? more : more + ".");
+  };
+  for (const auto* stream : {speed_stream_.get(), gnss_stream_.get()}) {
+    if (stream) add(stream->state().problem());
+  }
+  const std::lock_guard lock(mutex_);
+  add(wheels_ ? wheels_->trouble() : speed_trouble_);
+  add(gnss_trouble_);
+  return all;
+}
+
+std::string Vehicle::name() const {
+  std::string all;
+  for (const auto* stream : {speed_stream_.get(), gnss_stream_.get()}) {
+    if (stream) all = joined(all, stream->state().name(), "; ");
+  }
+  return all;
+}
+
+void Vehicle::report(ReasonCounts& counts) const {
+  const auto add = [&counts](const ReasonCounts& more) {
+    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
+  };
+  for (const auto* stream : {speed_stream_.get(), gnss_stream_.get()}) {
+    if (stream) add(stream->state().reasons());
+  }
+  const std::lock_guard lock(mutex_);
+  add(reasons_);
+  if (wheels_) add(wheels_->reasons());
+}
+
+}  // namespace perdure::capture

@@ -1,0 +1,49 @@
+#include "services/capture/vehicle/gpsd.h"
+
+#include <gmock/gmock.h>
+
+namespace perdure::capture {
+namespace {
+
+TEST(Gpsd, ReadsATpvReport) {
+  // As gpsd_json(5) shows it, with the height over the ellipsoid of later versions.
+  const auto fix = readGpsd(
+      R"({"class":"TPV","device":"/dev/pts/1","time":"2005-06-08T10:34:48.283Z","ept":0.005,)"
+      R"("lat":46.498293369,"lon":7.567411672,"alt":1343.127,"altHAE":1392.5,"eph":36.0,)"
+      R"("track":10.3788,"speed":0.091,"climb":-0.085,"mode":3})",
+      77);
+  ASSERT_TRUE(fix) << fix.error().detail;
+  ASSERT_TRUE(*fix);
+  EXPECT_EQ((*fix)->time_ns, 77);
+  EXPECT_DOUBLE_EQ((*fix)->latitude_deg, 46.498293369);
+  EXPECT_DOUBLE_EQ((*fix)->longitude_deg, 7.567411672);
+  EXPECT_DOUBLE_EQ((*fix)->height_m, 1392.5);
+  EXPECT_NEAR((*fix)->sigma_m, 14.71, 0.01) << "eph holds 95 %";
+  EXPECT_DOUBLE_EQ((*fix)->speed.value(), 0.091);
+  EXPECT_NEAR((*fix)->course.value(), 1.389652, 1e-6);
+}
+
+TEST(Gpsd, SaysNothingOfOtherReports) {
+  for (const char* line : {R"({"class":"VERSION","release":"3.22"})", R"({"class":"SKY"})"}) {
+    const auto fix = readGpsd(line, 1);
+    ASSERT_TRUE(fix) << line;
+    EXPECT_FALSE(*fix) << line;
+  }
+}
+
+TEST(Gpsd, SaysWhatIsNone) {
+  const auto code = [](const char* line) {
+    const auto fix = readGpsd(line, 1);
+    return fix ? std::string("read") : fix.error().code;
+  };
+  EXPECT_EQ(code("no"), "gpsd_malformed");
+  EXPECT_EQ(code("[1]"), "gpsd_malformed");
+  EXPECT_EQ(code(R"({"class":7})"), "gpsd_malformed");
+  EXPECT_EQ(code(R"({"class":"TPV","mode":1})"), "gpsd_no_fix");
+  EXPECT_EQ(code(R"({"class":"TPV","mode":2,"lat":1,"lon":2,"alt":3})"), "gpsd_no_fix");
+  EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":"1","lon":2,"alt":3})"), "gpsd_no_fix");
+  EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":91,"lon":2,"alt":3})"), "gpsd_malformed");
+}
+
+}  // namespace
+}  // namespace perdure::capture
