@@ -49,7 +49,7 @@ Table makeTable() {
       row(kImu, latched(512), kImuHz, kRecorded, kCapture | kRos2Driver, kVio),
       row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
       row(kCalibration, latched(1), 0, kRecorded, kCapture | kRos2Driver,
-          kVio | kSemanticFilter | kSubscriber),
+          kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: its place on Earth
       row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio | kRos2Driver,
           kSemanticFilter | kCapture | kMapStore | kSubscriber),  // capture follows it (pace.mode)
       row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio,

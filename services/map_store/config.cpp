@@ -19,10 +19,12 @@ void describe(Config& c, config::Fields& fields) {
        "give postgresql://USER@HOST:PORT/DATABASE?passfile=FILE"});
   fields.text("store.vehicle", c.fleet.vehicle,
               {"the name of this vehicle's map there; empty: the host's name", "", ""});
-  fields.numbers("store.earth_anchor", c.fleet.earth_anchor, {},
-                 {"where the map's frame of reference lies on Earth, for the server's geometry: "
-                  "latitude, longitude, height, yaw of its x axis from east; []: not known",
-                  "°, m", "give four numbers, or []"});
+  fields.numbers(
+      "store.earth_anchor", c.fleet.earth_anchor, {},
+      {"where the map's frame of reference lies on Earth, for the server's geometry: "
+       "latitude, longitude, height, yaw of its x axis from east; []: as the map knows it "
+       "from the calibration",
+       "°, m", "give four numbers, or []"});
   fields.number("tiles.size", c.tile_size_m, config::between(1.0, 10000.0),
                 {"width of the squares in which the map is published", "m", ""});
   fields.number("tiles.period", c.tile_period_s, config::between(0.05, 60.0),

@@ -67,6 +67,7 @@ void serve(service::Context& context, const map_store::Config& config) {
                         .recalled = context.sink(topics::kRecalled),
                         .frame = context.sink(topics::kMapFrame),
                         .event = context.sink(topics::kEvents)});
+  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
   context.on(topics::kLandmarks, [&](const Landmarks& seen) { node.onLandmarks(seen); });
   context.on(topics::kEvents, [&](const Event& event) { node.onEvent(event); });

@@ -162,7 +162,7 @@ void Node::commit() {
   const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
   const auto written =
       database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr,
-                       unwritten_splits_, acknowledged_});
+                       unwritten_splits_, acknowledged_, newEarthAnchor()});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again

@@ -20,6 +20,7 @@
 #include "services/map_store/core/map_places.h"
 #include "services/map_store/core/reply_cache.h"
 #include "services/map_store/core/tile_book.h"
+#include "services/map_store/earth_place.h"
 
 namespace perdure::map_store {
 
@@ -46,6 +47,8 @@ class Node {
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onOdometry(const Odometry& odometry);
+  /// What it says of the vehicle's place on Earth is kept with the map.
+  void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
   /// Commits and publishes what is due. `now`: a monotonic time since any origin; call it ten
@@ -73,6 +76,7 @@ class Node {
   void split(const std::vector<MergeOrder>& splits);
   void renameSplit(Objects& objects);
   void resendOrders();
+  std::string newEarthAnchor();
   /// Sends what the graph has laid near a place, with what else has changed.
   void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
                   const mapping::MapChange& change, bool lay_again);
@@ -99,6 +103,9 @@ class Node {
   const Outputs outputs_;
   MapDatabase database_;
   mapping::Mapper mapper_;
+  EarthPlace earth_;
+  std::optional<std::pair<std::uint64_t, TimePoint>>
+      told_earth_;      ///< revision of the graph, known()
   bool graph_ = false;  ///< it is on, and what is stored of it was read
   ReplyCache replies_;
   TileBook tiles_;

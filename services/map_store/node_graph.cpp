@@ -61,7 +61,25 @@ void Node::loadGraph() {
 }
 
 void Node::onOdometry(const Odometry& odometry) {
+  earth_.onOdometry(odometry);
   if (graph_) mapper_.onOdometry(odometry);
+}
+
+/// Where on Earth M lies, where that has changed since it was written last; else empty.
+std::string Node::newEarthAnchor() {
+  const auto known = earth_.known();
+  if (!known || told_earth_ == std::pair(mapper_.revision(), *known)) return {};
+  const WorldId& world = newest_->world;
+  const mapping::MapFrames frames(mapper_.graph(), mapper_.anchors());
+  const auto place = earth_.ofMap(world, [&](TimePoint time) -> std::optional<RigidTransform> {
+    const auto anchor = frames.anchorOf(nullptr, world, time);
+    const bool alone = mapper_.anchors().empty();  // without a graph W is M
+    const auto frame = frames.at(anchor, world);
+    if (frame.provisional || (anchor == 0 && !alone)) return std::nullopt;
+    return frame.T_MW;
+  });
+  if (place) told_earth_ = std::pair(mapper_.revision(), *known);
+  return place.value_or("");
 }
 
 void Node::onLandmarks(const Landmarks& landmarks) {

@@ -135,8 +135,12 @@ void chooseKind(Request& request) {
   }
 }
 
+/// As given; else as the map's file has it.
 std::optional<GeoAnchor> anchorOf(const Request& request) {
-  if (request.anchor.empty()) return std::nullopt;
+  if (request.anchor.empty()) {
+    const bool known = !request.db.empty() && request.frame == "M";
+    return known ? earthAnchorOfMapFile(request.db) : std::nullopt;
+  }
   const auto& a = request.anchor;
   return GeoAnchor{{}, a[0], a[1], a[2], a[3] * std::numbers::pi / 180.0};
 }
@@ -272,7 +276,7 @@ void addMapCommand(CLI::App& app) {
   exporting
       ->add_option("--anchor", request->anchor,
                    "LATITUDE LONGITUDE HEIGHT YAW: where M's origin lies, degrees and metres; "
-                   "yaw of its x axis from east")
+                   "yaw of its x axis from east; without: as the map's file knows it")
       ->expected(4);
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });

@@ -1,7 +1,9 @@
 #include "tools/map/map_source.h"
 
 #include <chrono>
+#include <numbers>
 #include <optional>
+#include <sstream>
 
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
@@ -87,6 +89,27 @@ MapReply askMapFile(const std::string& path, const MapQuery& query, MapFrameChoi
   reply.objects = std::move(found->objects);
   reply.beliefs = std::move(found->beliefs);
   return reply;
+}
+
+std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path) {
+  const auto connection = openAtOneState(path);
+  const map_store::MapReader reader(&connection);
+  const auto text = reader.earthAnchor();
+  if (!text) cannotRead(path, text.error());
+  std::istringstream numbers(*text);
+  GeoAnchor anchor;
+  double yaw_deg = 0.0;
+  if (!(numbers >> anchor.latitude_deg >> anchor.longitude_deg >> anchor.height_m >> yaw_deg)) {
+    return std::nullopt;
+  }
+  anchor.yaw = yaw_deg * std::numbers::pi / 180.0;
+  const auto working = reader.working();
+  const auto graph = reader.graph();
+  if (!graph) cannotRead(path, graph.error());
+  const WorldId newest = working && *working ? (*working)->world : WorldId{};
+  const mapping::MapFrames frames(mapping::MapState({}, graph->map));
+  const auto last = frames.anchorOf(nullptr, newest, TimePoint::max());
+  return frames.at(last, newest).provisional ? std::nullopt : std::optional(anchor);
 }
 
 Standing askStanding(const std::string& path, ObjectId id) {

@@ -1,12 +1,14 @@
 // Where questions about the map go: to the running map_store over DDS, or to its file.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/bus/domain.h"
 #include "common/types/map.h"
+#include "common/types/sensors.h"
 #include "services/map_store/core/map_database.h"
 #include "tools/map/standing.h"
 
@@ -26,6 +28,9 @@ enum class MapFrameChoice { kM, kW };
 /// where it names none in the newest session's M, or its W.
 MapReply askMapFile(const std::string& path, const MapQuery& query,
                     MapFrameChoice frame = MapFrameChoice::kM);
+/// Where on Earth the origin of the newest session's M lies, and its yaw; nothing where the file
+/// does not know it. Throws StartupError.
+std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);
 /// Of an object that the file has. Throws StartupError.
 Standing askStanding(const std::string& path, ObjectId id);
 /// All objects of a map's file in full. Throws StartupError.

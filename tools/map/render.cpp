@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tools/outputs/frames/geodesy.h"
+#include "common/earth/geodesy.h"
 
 namespace perdure::tools {
 namespace {

@@ -10,7 +10,7 @@
 #include "common/base/errors.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/math/so3.h"
-#include "tools/outputs/frames/geodesy.h"
+#include "common/earth/geodesy.h"
 #include "tools/outputs/ledger_json.h"
 #include "tools/outputs/pictures/evolution_picture.h"
 #include "tools/outputs/pictures/map_picture.h"

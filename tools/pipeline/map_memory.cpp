@@ -71,6 +71,8 @@ void MapMemory::giveIds(InstanceId filter, const WorldId& session) {
   node_.onQuery(query);
 }
 
+void MapMemory::onCalibration(const Calibration& calibration) { node_.onCalibration(calibration); }
+
 void MapMemory::onOdometry(const Odometry& odometry) {
   waiting_.push_back([this, odometry] { node_.onOdometry(odometry); });
 }

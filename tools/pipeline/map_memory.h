@@ -26,6 +26,7 @@ class MapMemory {
 
   /// Tells a filter which ids are taken.
   void giveIds(InstanceId filter, const WorldId& session);
+  void onCalibration(const Calibration& calibration);
   void onOdometry(const Odometry& odometry);
   void onLandmarks(const Landmarks& landmarks);
   void onObjects(const Objects& objects);

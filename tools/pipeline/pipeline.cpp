@@ -53,6 +53,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   openFilter();
   outputs_->onCalibration(dataset_->calibration());
   filter_->onCalibration(dataset_->calibration());
+  map_->onCalibration(dataset_->calibration());
   if (inference_) learn(inference_->model());
   if (simulated_) learn(simulated_->info());
 }

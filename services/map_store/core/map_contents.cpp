@@ -119,6 +119,7 @@ Result<void> readMeta(const Connection& connection, WholeMap& map) {
   return forRows(connection, "SELECT key, value FROM meta", [&](const Statement& row) {
     if (row.text(0) == "revision") map.revision = row.id(1);
     if (row.text(0) == "tile_size_m" && row.real(1) > 0.0) map.tile_size_m = row.real(1);
+    if (row.text(0) == "earth_anchor") map.earth_anchor = row.text(1);
   });
 }
 
@@ -149,6 +150,7 @@ Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Uns
   Batch batch;
   batch.working = &working;
   batch.graph = &graph;
+  batch.earth_anchor = map.earth_anchor;
   for (const auto& [id, object] : map.contents.objects) {
     batch.left[id] = {object.world, object.belief};
     if (object.ended) {

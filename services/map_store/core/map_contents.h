@@ -15,6 +15,7 @@ struct WholeMap {
   double tile_size_m = 32.0;
   std::uint64_t revision = 0;
   std::int64_t schema = 0;
+  std::string earth_anchor;  ///< where M lies (earth_place.h); empty: not known
   /// Rows and parts of the graph that could not be read; left out.
   std::uint64_t malformed = 0;
 };

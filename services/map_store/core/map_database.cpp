@@ -357,6 +357,10 @@ Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
     change.shut_out.insert(id);
   }
   if (done) done = putWorking(*batch.working, change);
+  if (done && !batch.earth_anchor.empty()) {
+    done = runOnce(connection_, "REPLACE INTO meta VALUES('earth_anchor', ?1)",
+                   std::string_view(batch.earth_anchor));
+  }
   if (!done) return tl::unexpected<Reason>(done.error());
   return nextRevision(change);
 }

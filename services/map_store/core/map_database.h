@@ -49,6 +49,7 @@ struct Batch {
   /// is the absorbed one.
   std::vector<MergeOrder> splits = {};
   std::int64_t acknowledged = 0;  ///< entries of the outbox that a server has
+  std::string earth_anchor = {};  ///< of M (earth_place.h); empty: as it is stored
 };
 
 struct Written {
@@ -103,6 +104,8 @@ class MapReader {
   Result<SavedGraph> graph() const { return readGraph(*connection_); }
   /// Frames of reference that the map has something of.
   Result<std::set<std::uint64_t>> worlds() const;
+  /// Where on Earth M lies, as earthAnchorOfMap() writes it; empty: not known.
+  Result<std::string> earthAnchor() const;
   Result<std::uint64_t> revision() const;
   Result<ObjectId> largestId() const;
 

@@ -274,6 +274,14 @@ Result<std::set<std::uint64_t>> MapReader::worlds() const {
   return worlds;
 }
 
+Result<std::string> MapReader::earthAnchor() const {
+  auto row = connection_->prepare("SELECT value FROM meta WHERE key = 'earth_anchor'");
+  if (!row) return tl::unexpected<Reason>(row.error());
+  const auto there = row->step();
+  if (!there) return tl::unexpected<Reason>(there.error());
+  return *there ? row->text(0) : std::string();
+}
+
 Result<std::uint64_t> MapReader::revision() const {
   const auto value =
       connection_->integer("SELECT coalesce((SELECT value FROM meta WHERE key = 'revision'), 0)");

@@ -10,7 +10,7 @@ struct Parameters {
   std::string url;      ///< of a PostgreSQL database; empty: there is no server
   std::string vehicle;  ///< the name that the map has there; empty: the host's
   /// Of M: latitude and longitude [°, WGS 84], height over the ellipsoid [m], yaw of the x axis
-  /// from east [°]. Empty where it is not known.
+  /// from east [°]. Empty: as the map's file knows it, if it does.
   std::vector<double> earth_anchor;
 };
 

@@ -1,9 +1,11 @@
 #include "services/map_store/fleet/pusher.h"
 
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include "services/map_store/core/belief_codec.h"
+#include "services/map_store/core/map_database.h"
 #include "services/map_store/fleet/tables.h"
 
 namespace perdure::map_store::fleet {
@@ -65,6 +67,14 @@ class Snapshot {
   const Connection* connection_;
 };
 
+/// As the file knows it; empty where it does not.
+std::vector<double> earthAnchorOf(const Connection& connection) {
+  std::vector<double> numbers;
+  std::istringstream text(MapReader(&connection).earthAnchor().value_or(""));
+  for (double number = 0.0; text >> number;) numbers.push_back(number);
+  return numbers.size() == 4 ? numbers : std::vector<double>();
+}
+
 }  // namespace
 
 struct Pusher::Draft {
@@ -102,8 +112,9 @@ Result<void> Pusher::introduce(Link& link) {
   Values values;
   values.put(std::string_view(vehicle_)).put(std::string_view(mark_.file));
   values.put(std::string_view(mark_.outbox)).put(mark_.acknowledged).put(mark_.last);
+  told_earth_ = earth_anchor_.size() == 4 ? earth_anchor_ : earthAnchorOf(*connection_);
   for (std::size_t i = 0; i < 4; ++i) {
-    earth_anchor_.size() == 4 ? values.put(earth_anchor_[i]) : values.null();
+    told_earth_.size() == 4 ? values.put(told_earth_[i]) : values.null();
   }
   const auto row = link.ask(kAttach, values);
   if (!row) return tl::unexpected<Reason>(row.error());
@@ -140,6 +151,10 @@ Result<bool> Pusher::hasMore() const {
 }
 
 Result<Portion> Pusher::push(Link& link, std::int64_t most_rows) {
+  if (earth_anchor_.empty() && earthAnchorOf(*connection_) != told_earth_) {
+    const auto told = attach(link);
+    if (!told) return tl::unexpected<Reason>(told.error());
+  }
   const auto snapshot = Snapshot::begin(*connection_);
   if (!snapshot) return tl::unexpected<Reason>(snapshot.error());
   return pushPortion(link, most_rows, true);

@@ -24,7 +24,8 @@ struct Portion {
 
 class Pusher {
  public:
-  /// `earth_anchor`: empty or four numbers (parameters.h). The file is opened for reading only.
+  /// `earth_anchor`: four numbers (parameters.h), or empty: as the file knows it. The file is
+  /// opened for reading only.
   Pusher(std::string file, std::string vehicle, std::vector<double> earth_anchor);
 
   /// Asks the server where it stands. Before the first push of each link, and after a push that
@@ -58,6 +59,7 @@ class Pusher {
 
   const std::string file_, vehicle_;
   const std::vector<double> earth_anchor_;
+  std::vector<double> told_earth_;  ///< what the server was told, that or the file's own
   std::optional<Connection> connection_;
   OutboxMark mark_;
   bool has_outbox_ = true;

@@ -108,7 +108,7 @@ CREATE VIEW perdure.objects_in_map AS
 )sql";
 
 // M lies at (latitude, longitude, height), its x axis turned by yaw from east: by way of ECEF, as
-// tools/outputs/geodesy.cpp does it. EPSG:4978 is ECEF, 4979 WGS 84 with heights. @ is where
+// common/earth/geodesy.cpp does it. EPSG:4978 is ECEF, 4979 WGS 84 with heights. @ is where
 // PostGIS lives.
 constexpr char kOnEarth[] = R"sql(
 CREATE FUNCTION perdure.on_earth(x float8, y float8, z float8, latitude float8, longitude float8,

@@ -13,7 +13,7 @@
 #include "services/map_store/fleet/server_schema.h"
 #include "tests/services/map_store/fleet/files.h"
 #include "tests/services/map_store/fleet/postgres_server.h"
-#include "tools/outputs/frames/geodesy.h"
+#include "common/earth/geodesy.h"
 
 namespace perdure::map_store {
 namespace {

@@ -1,11 +1,11 @@
-#include "tools/outputs/frames/geodesy.h"
+#include "common/earth/geodesy.h"
 
 #include <cmath>
 #include <numbers>
 
 #include "common/math/so3.h"
 
-namespace perdure::tools {
+namespace perdure {
 namespace {
 constexpr double kA = 6378137.0;            // semi-major axis, m
 constexpr double kF = 1.0 / 298.257223563;  // flattening
@@ -55,4 +55,4 @@ Geodetic GeoReference::operator()(const Eigen::Vector3d& p_W) const {
   return fromEcef(origin_ecef_ + enu_axes_ * (R_EW_ * (p_W - p_WB_)));
 }
 
-}  // namespace perdure::tools
+}  // namespace perdure

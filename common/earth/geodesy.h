@@ -7,7 +7,7 @@
 #include "common/math/rigid_transform.h"
 #include "common/types/sensors.h"
 
-namespace perdure::tools {
+namespace perdure {
 
 struct Geodetic {
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;
@@ -32,4 +32,4 @@ class GeoReference {
   Eigen::Vector3d p_WB_;
 };
 
-}  // namespace perdure::tools
+}  // namespace perdure
