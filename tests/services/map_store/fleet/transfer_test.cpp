@@ -171,7 +171,7 @@ TEST(FleetGeometry, PlacesOnEarthAreThoseOfTheExactConversion) {
       "perdure.objects_local l JOIN perdure.objects_wgs84 w USING(key)");
   ASSERT_TRUE(places) << places.error().detail;
   EXPECT_EQ(places->rows(), 60);
-  const tools::GeoReference reference(anchor, {});
+  const GeoReference reference(anchor, {});
   for (int row = 0; row < places->rows(); ++row) {
     const auto exact =
         reference({places->real(row, 0), places->real(row, 1), places->real(row, 2)});
@@ -191,7 +191,7 @@ TEST(FleetGeometry, PlacesOnEarthAreThoseOfTheExactConversion) {
             4);
 }
 
-TEST(FleetGeometry, WithoutAPlaceOnEarthThereAreLocalPlacesOnly) {
+TEST(FleetGeometry, WithoutAPlaceOnEarthThereAreLocalPlacesUntilItIsKnown) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   if (!server->hasPostgis()) GTEST_SKIP() << "PostGIS is not installed (deploy/install --fleet)";
   const TemporaryFolder folder;
@@ -201,6 +201,20 @@ TEST(FleetGeometry, WithoutAPlaceOnEarthThereAreLocalPlacesOnly) {
   ASSERT_TRUE(vehicle.fleet().finish(kLong)) << vehicle.fleet().progress().trouble;
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_local"), 3);
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_wgs84"), 0);
+
+  // The vehicle's receiver finds itself while the server is attached.
+  const Objects next = test::workingSet(4, {});
+  Calibration rig;
+  rig.anchor = GeoAnchor{next.stamp.time, 49.0, 8.4, 110.0, 0.0};
+  Odometry odometry;
+  odometry.stamp = next.stamp;
+  odometry.world = next.world;
+  odometry.state = OdometryState::kTracking;
+  vehicle.node().onCalibration(rig);
+  vehicle.node().onOdometry(odometry);
+  vehicle.step(4);
+  ASSERT_TRUE(vehicle.fleet().finish(kLong)) << vehicle.fleet().progress().trouble;
+  EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_wgs84"), 4);
 }
 
 /// For the README's table; says nothing about passing.
