@@ -110,65 +110,59 @@ class BytesOnDemand : public OnDemand {
 };
 
 /// What is heard even while nobody looks, for who comes late: then seldom and, of what is told
-/// whole each time, the newest alone. The rest costs no more than its way through DDS.
+/// whole each time, the newest alone. It is one reader all along: nothing is lost where somebody
+/// begins to look.
 template <class T>
 class Overheard : public OnDemand {
  public:
   enum class Which { kAll, kNewest };
 
-  Overheard(service::Context& context, bus::Topic<T> topic, Which which, gateway::Channels channels,
-            Sink<T> handler)
+  Overheard(service::Context& context, const bus::Topic<T>& topic, Which which,
+            gateway::Channels channels, Sink<T> handler)
       : OnDemand(context, std::move(channels)),
-        topic_(std::move(topic)),
         which_(which),
-        handler_(std::move(handler)) {
+        handler_(std::move(handler)),
+        reader_(context.participant(), topic.name) {
     context.countReasons([this](ReasonCounts& counts) {
-      for (const auto& [reason, n] : before_.all()) counts.add(reason, n);
-      if (reader_) reader_->report(counts);
-      if (seldom_) seldom_->report(counts);
+      reader_.report(counts);
+      for (const auto& [reason, n] : malformed_.all()) counts.add(reason, n);
     });
-    close();
   }
-  /// Of what has come while nobody looks.
+  /// What has come while nobody looks.
   void hear() {
-    if (!seldom_) return;
-    std::vector<std::uint8_t> newest;
-    while (seldom_->drainBatch([&](const bus::CdrMessage& message) {
-      if (which_ == Which::kAll) return take(message.bytes);
-      newest.assign(message.bytes.begin(), message.bytes.end());
-    })) {
-    }
-    if (!newest.empty()) take(newest);
+    if (!looked_at_) take(which_);
   }
 
  private:
-  void take(std::span<const std::uint8_t> bytes) {
+  void take(Which which) {
+    std::vector<std::uint8_t> newest;
+    while (reader_.drainBatch([&](const bus::CdrMessage& message) {
+      if (which == Which::kAll) return hand(message.bytes);
+      newest.assign(message.bytes.begin(), message.bytes.end());
+    })) {
+    }
+    if (!newest.empty()) hand(newest);
+  }
+  void hand(std::span<const std::uint8_t> bytes) {
     const auto value = wire::decodeCdr<T>(bytes, nullptr);
     if (value) return handler_(*value);
-    before_.add(topic_.name + "_malformed_" + value.error().code);
+    malformed_.add(reader_.topic() + "_malformed_" + value.error().code);
   }
   void open() override {
-    hear();
-    if (seldom_) seldom_->report(before_);
-    seldom_.reset();
-    reader_ = std::make_unique<bus::Reader<T>>(context_.participant(), topic_);
-    context_.loop().on(*reader_, handler_);
+    looked_at_ = true;
+    take(which_);
+    context_.loop().on(reader_, [this](const bus::CdrMessage& m) { hand(m.bytes); });
   }
   void close() override {
-    if (reader_) {
-      reader_->report(before_);
-      context_.loop().off(*reader_);
-      reader_.reset();
-    }
-    seldom_ = std::make_unique<bus::CdrReader>(context_.participant(), topic_.name);
+    context_.loop().off(reader_);
+    looked_at_ = false;
   }
 
-  const bus::Topic<T> topic_;
   const Which which_;
   const Sink<T> handler_;
-  std::unique_ptr<bus::Reader<T>> reader_;
-  std::unique_ptr<bus::CdrReader> seldom_;
-  ReasonCounts before_;
+  bus::CdrReader reader_;
+  bool looked_at_ = false;
+  ReasonCounts malformed_;
 };
 
 /// Topics of @final types, which readers of CDR decode by their IDL.

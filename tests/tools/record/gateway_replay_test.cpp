@@ -133,7 +133,7 @@ TEST_F(Replayed, HasTheGraphThatWasToldLastBeforeThePlace) {
   startPaused();
   client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":2,"channelId":15}]})");
   control(false, 1, 18 * kSecond);
-  json graph;
+  json graph = json::object();
   for (int i = 0; i < 10 && graph.value("anchors", json::array()).empty(); ++i) {
     graph = json::parse(client_->readMessage(2), nullptr, false);
   }
