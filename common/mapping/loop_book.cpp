@@ -29,6 +29,16 @@ std::vector<EdgeId> LoopBook::tiesOf(EdgeId loop) const {
   return ties;
 }
 
+bool LoopBook::isTold(EdgeId id) const {
+  const auto at = entries_.find(id);
+  return at == entries_.end() || at->second.told;
+}
+
+const LoopClosure* LoopBook::closureOf(EdgeId id) const {
+  const auto at = entries_.find(id);
+  return at == entries_.end() || !at->second.loop ? nullptr : &*at->second.loop;
+}
+
 LoopBook::Verdict LoopBook::judge(const PoseGraph& graph, double way_m) {
   Verdict verdict;
   for (const auto& [id, edge] : graph.edges()) {

@@ -35,6 +35,11 @@ class LoopBook {
   /// A tie by objects that were merged by this loop.
   void hang(EdgeId tie, EdgeId loop) { ties_[tie] = loop; }
   std::vector<EdgeId> tiesOf(EdgeId loop) const;
+  /// Whether it was told; so is what an earlier process has left.
+  bool isTold(EdgeId id) const;
+  /// How it was found; null where that was before the last start or session. Valid until the next
+  /// call of another function.
+  const LoopClosure* closureOf(EdgeId id) const;
 
   struct Verdict {
     std::vector<LoopClosure> told;  ///< believed, for the first time

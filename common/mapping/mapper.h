@@ -33,6 +33,9 @@ namespace perdure::mapping {
 struct LoopWithdrawal {
   EdgeId id = 0;
   AnchorId a = 0, b = 0;
+  Edge edge;                                              ///< as it was
+  std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< that it found to be one: known, seen
+  std::size_t points = 0;                                 ///< landmarks by which it was found
 };
 
 /// What has changed since it was asked for last.
@@ -112,6 +115,23 @@ class Mapper {
   };
   std::vector<Along> along(const WorldId& session) const;
 
+  /// A loop or tie that is in the graph.
+  struct Loop {
+    EdgeId id = 0;
+    Edge edge;
+    double weight = 1.0;
+    bool told = false;  ///< a loop waits until the graph believes it; a tie is never told
+    std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< known, seen; empty: not known
+    std::size_t points = 0;
+  };
+  std::vector<Loop> loops() const;
+  /// Of every anchor as Marginals::variances has it; nothing without anchors.
+  std::map<AnchorId, Eigen::Vector4d> variances();
+  /// How many objects of the map were last seen from an anchor.
+  std::size_t objectsOf(AnchorId anchor) const;
+  /// The newest anchor of a session; of any session where that has none.
+  std::optional<AnchorId> newestAnchor(const WorldId& session) const;
+
   const PoseGraph& graph() const { return state_.graph(); }
   const std::map<AnchorId, Anchor>& anchors() const { return state_.anchors(); }
   std::uint64_t revision() const { return revision_; }
@@ -136,6 +156,8 @@ class Mapper {
   void settle();
   void orderMerges(const LoopClosure& loop);
   void withdraw(EdgeId loop);
+  void putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>>& pairs,
+                    std::size_t& points) const;
   void undo(ObjectId absorbed, const HungMerge& merge);
   bool hasMerges(EdgeId loop) const;
   void forgetMergesOf(EdgeId loop);

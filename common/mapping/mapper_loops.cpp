@@ -87,7 +87,9 @@ void Mapper::forgetMergesOf(EdgeId loop) {
 
 void Mapper::withdraw(EdgeId loop) {
   const Edge& edge = state_.graph().edges().at(loop);
-  change_.withdrawn.push_back({loop, edge.a, edge.b});
+  LoopWithdrawal withdrawal{loop, edge.a, edge.b, edge};
+  putWitnesses(loop, withdrawal.pairs, withdrawal.points);
+  change_.withdrawn.push_back(std::move(withdrawal));
   const auto merges = state_.merges();
   for (const auto& [absorbed, merge] : merges) {
     if (merge.loop != loop) continue;

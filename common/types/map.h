@@ -68,6 +68,7 @@ enum class MapQueryKind : std::uint8_t {
   kAll,
   kRestore,  ///< the newest working set of another filter, on `recalled`
   kRecall,   ///< what is near a place and in no working set, in full, on `recalled`
+  kGraph,    ///< anchors nearest to `low` first, within `radius` (0: all), and loops between them
 };
 
 struct MapQuery {
@@ -83,15 +84,63 @@ struct MapQuery {
   std::uint32_t limit = 1000;
 };
 
+using AnchorNumber = std::uint64_t;  ///< 0: none
+/// A place on the way to which what was seen there is tied: an anchor of the map's graph.
+struct MapAnchor {
+  AnchorNumber id = 0;
+  AnchorNumber previous = 0;                    ///< of the same session; 0: none
+  WorldId session;                              ///< the W of its way
+  WorldId map;                                  ///< M
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< in M
+  double yaw = 0.0;                             ///< rad
+  /// Standard deviations of [p, yaw] relative to the first anchor of M, m and rad.
+  Eigen::Vector4d sigma = Eigen::Vector4d::Zero();
+  std::uint32_t objects = 0;  ///< that were seen from here last
+};
+
+enum class MapLoopKind : std::uint8_t {
+  kLoop = 0,  ///< a place was found again
+  kTie,       ///< by objects that still had their ids
+};
+enum class MapLoopState : std::uint8_t {
+  kTentative = 0,  ///< the graph does not believe it, or not yet
+  kConfirmed,
+  kWithdrawn,  ///< it was told, and later ones contradict it: no part of the graph any more
+};
+
+/// Two objects that a loop found to be one: of the map, and of what was seen then.
+struct MapLoopPair {
+  ObjectId known = 0, seen = 0;
+};
+
+/// That anchors a and b lie to each other as was measured when a place was seen again.
+struct MapLoop {
+  std::uint64_t id = 0;
+  AnchorNumber a = 0, b = 0;  ///< b: where the body was
+  MapLoopKind kind = MapLoopKind::kLoop;
+  MapLoopState state = MapLoopState::kTentative;
+  /// Measured [p, yaw] of b minus where the graph has it, in axes of a; m and rad.
+  Eigen::Vector4d residual = Eigen::Vector4d::Zero();
+  Eigen::Vector4d sigma = Eigen::Vector4d::Zero();  ///< of the measurement; all 0: not known
+  double chi2 = 0.0;                                ///< of the residual
+  double weight = 0.0;                              ///< by which it counts in the graph, [0, 1]
+  std::vector<MapLoopPair> pairs;                   ///< empty: not known, or none
+  std::uint32_t landmarks = 0;                      ///< that look alike; 0: not known, or none
+};
+
 struct MapReply {
   InstanceId client = 0;
   std::uint64_t request = 0;
   InstanceId instance = 0;
   bool ok = true;
   std::string error;       ///< a sentence with the mend where !ok
-  bool truncated = false;  ///< more objects matched than `limit`
+  bool truncated = false;  ///< more objects or anchors matched than `limit`
   std::vector<MapObject> objects;
   std::vector<ObjectBelief> beliefs;  ///< the objects in full, where one was asked for by its id
+  std::vector<MapAnchor> anchors;     ///< of kGraph, by id: those of the newest session's M
+  std::vector<MapLoop> loops;         ///< of kGraph, by id: those between `anchors`
+  /// Of that M, also what is not told; 0: not known.
+  std::uint32_t anchor_count = 0, loop_count = 0;
 };
 
 /// Full beliefs that come back from the map into the filter's working set.

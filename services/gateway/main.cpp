@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/bus/discovery.h"
@@ -108,6 +109,62 @@ class BytesOnDemand : public OnDemand {
   std::unique_ptr<bus::CdrReader> reader_;
 };
 
+/// What is heard even while nobody looks, for who comes late: then seldom and, of what is told
+/// whole each time, the newest alone. It is one reader all along: nothing is lost where somebody
+/// begins to look.
+template <class T>
+class Overheard : public OnDemand {
+ public:
+  enum class Which { kAll, kNewest };
+
+  Overheard(service::Context& context, const bus::Topic<T>& topic, Which which,
+            gateway::Channels channels, Sink<T> handler)
+      : OnDemand(context, std::move(channels)),
+        which_(which),
+        handler_(std::move(handler)),
+        reader_(context.participant(), topic.name) {
+    context.countReasons([this](ReasonCounts& counts) {
+      reader_.report(counts);
+      for (const auto& [reason, n] : malformed_.all()) counts.add(reason, n);
+    });
+  }
+  /// What has come while nobody looks.
+  void hear() {
+    if (!looked_at_) take(which_);
+  }
+
+ private:
+  void take(Which which) {
+    std::vector<std::uint8_t> newest;
+    while (reader_.drainBatch([&](const bus::CdrMessage& message) {
+      if (which == Which::kAll) return hand(message.bytes);
+      newest.assign(message.bytes.begin(), message.bytes.end());
+    })) {
+    }
+    if (!newest.empty()) hand(newest);
+  }
+  void hand(std::span<const std::uint8_t> bytes) {
+    const auto value = wire::decodeCdr<T>(bytes, nullptr);
+    if (value) return handler_(*value);
+    malformed_.add(reader_.topic() + "_malformed_" + value.error().code);
+  }
+  void open() override {
+    looked_at_ = true;
+    take(which_);
+    context_.loop().on(reader_, [this](const bus::CdrMessage& m) { hand(m.bytes); });
+  }
+  void close() override {
+    context_.loop().off(reader_);
+    looked_at_ = false;
+  }
+
+  const Which which_;
+  const Sink<T> handler_;
+  bus::CdrReader reader_;
+  bool looked_at_ = false;
+  ReasonCounts malformed_;
+};
+
 /// Topics of @final types, which readers of CDR decode by their IDL.
 constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
 
@@ -134,16 +191,34 @@ std::vector<gateway::Figure> figuresOf(const web::Stats& stats, std::size_t obje
 void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
-  context.on(topics::kOdometry, [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); });
   context.on(topics::kEvents, [&](const Event& m) { node.onEvent(m); });
   context.on(topics::kHealth, [&](const Health& m) { node.onHealth(m, monotonicNs()); });
   context.on(topics::kMapFrame, [&](const MapFrame& m) { node.onMapFrame(m); });
   context.on(topics::kMapReply, [&](const MapReply& m) { node.onMapReply(m); });
-  context.on(topics::kObjects, [&](const Objects& m) {
-    context.health().frameIn();
-    node.onObjects(m, monotonicNs());
-    context.health().frameOut();
-  });
+}
+
+/// Objects and odometry: for histories, the way so far, and where events were.
+void overhear(service::Context& context, gateway::Node& node, const gateway::Config& config,
+              std::vector<std::unique_ptr<OnDemand>>& readers) {
+  gateway::Channels all;
+  for (const auto& channel : gateway::channelTable(config.cameras)) all.insert(channel.id);
+  auto odometry = std::make_unique<Overheard<Odometry>>(
+      context, topics::kOdometry, Overheard<Odometry>::Which::kAll, all,
+      [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); });
+  auto objects = std::make_unique<Overheard<Objects>>(
+      context, topics::kObjects, Overheard<Objects>::Which::kNewest, all, [&](const Objects& m) {
+        context.health().frameIn();
+        node.onObjects(m, monotonicNs());
+        context.health().frameOut();
+      });
+  // As often as the history of an object is sampled.
+  context.every(std::chrono::milliseconds(500),
+                [odometry = odometry.get(), objects = objects.get()] {
+                  odometry->hear();
+                  objects->hear();
+                });
+  readers.push_back(std::move(odometry));
+  readers.push_back(std::move(objects));
 }
 
 std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
@@ -245,6 +320,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                       .query = [&](const MapQuery& query) { (void)questions.write(query); }});
   listenAlways(context, node);
   auto readers = listenOnDemand(context, node, config);
+  overhear(context, node, config, readers);
   listenToRaw(context, server, readers);
   context.loop().onWake([&] {
     std::optional<gateway::Channels> wanted;

@@ -39,7 +39,7 @@ void Node::send(std::uint32_t channel, std::string payload) {
 void Node::newest(TimePoint time) {
   if (time <= time_ && time_ - time < kLongBack) return;
   time_ = time;  // a little late is late; much earlier is another drive
-  outputs_.time(time);
+  if (!wanted_.empty()) outputs_.time(time);
 }
 
 RigidTransform Node::pose() const {
@@ -53,7 +53,9 @@ WorldId Node::world() const {
 }
 
 void Node::setWanted(const Channels& wanted) {
+  const bool looked_at_graph = wantsGraph();
   const Channels before = std::exchange(wanted_, wanted);
+  lookAtGraph(looked_at_graph);
   if (!wantsTiles()) map_.clear();  // their reader is closed
   for (const std::uint32_t channel : wanted) {
     if (!before.contains(channel)) sendNow(channel);
@@ -77,6 +79,10 @@ void Node::sendNow(std::uint32_t channel) {
     case kMapScene:
       next_map_ns_ = 0;
       map_due_ = map_due_ || !map_.empty();  // else as soon as tiles come
+      return;
+    case kMapGraph:
+    case kMapGraphScene:
+      if (graph_) sendGraph(channel);
       return;
     case kPose:
       if (placed) send(kPose, poseInFrame(time_, pose()));
@@ -237,6 +243,10 @@ void Node::onEvent(const Event& event) {
   unplaced_ = unplaced_ || (event.object_id == 0 && !events_.back().place);
   if (events_.size() > kMostEvents) events_.pop_front();
   noteReturns(event);
+  if (event.kind == EventKind::kLoopClosed || event.kind == EventKind::kLoopWithdrawn ||
+      event.kind == EventKind::kRelocalised) {
+    graph_pace_.changed();
+  }
   if (wants(kEvents)) sendEvent(events_.back(), false);
   if (wants(kLog)) sendEvent(events_.back(), true);
 }
@@ -282,6 +292,7 @@ void Node::noteReturns(const Event& event) {
 
 void Node::onMapFrame(const MapFrame& frame) {
   map_.follow(frame);
+  graph_pace_.changed();
   for (const std::uint32_t channel : {kMapToOdom, kTransforms}) {
     if (wants(channel)) sendNow(channel);
   }
@@ -308,7 +319,9 @@ bool Node::hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const {
 }
 
 void Node::tick(std::int64_t now_ns) {
+  ticked_ns_ = now_ns;
   sendAwaited();
+  followGraph(now_ns);
   if (wants(kHealth) && now_ns >= next_health_ns_) {
     next_health_ns_ = now_ns + kSecond;
     send(kHealth, vital_signs_.json(now_ns, last_));

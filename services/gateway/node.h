@@ -16,6 +16,7 @@
 #include "services/gateway/config.h"
 #include "services/gateway/core/beliefs.h"
 #include "services/gateway/core/channels.h"
+#include "services/gateway/core/map_graph.h"
 #include "services/gateway/core/map_layer.h"
 #include "services/gateway/core/scene.h"
 #include "services/gateway/core/vital_signs.h"
@@ -53,6 +54,8 @@ class Node {
   void onMapTile(const MapTile& tile) { map_.put(tile); }
   void onMapTileGone(const MapTile& key) { map_.erase(key); }
   void onMapReply(const MapReply& reply);
+  /// The graph as map_store told it to whoever asked: of recordings.
+  void onMapGraph(const MapReply& reply);
   void onCall(const Call& call, std::int64_t now_ns);
   /// About ten times a second.
   void tick(std::int64_t now_ns);
@@ -94,6 +97,12 @@ class Node {
   void placeEvents();
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< how many objects it told
+  bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene); }
+  // In node_graph.cpp.
+  void lookAtGraph(bool looked_before);
+  void followGraph(std::int64_t now_ns);
+  void onNoGraph(const std::string& why);
+  void sendGraph(std::uint32_t channel);
   void noteReturns(const Event& event);
   void newest(TimePoint time);
   RigidTransform pose() const;
@@ -123,13 +132,16 @@ class Node {
   std::map<ObjectId, Event> returns_;
   MapLayer map_;
   bool map_due_ = false;
+  GraphPace graph_pace_;
+  std::optional<MapReply> graph_;
+  std::string why_no_graph_ = "It is asked for.";
   double latency_ms_ = -1.0;
   Scene scene_;
   Trajectory trajectory_;
   History history_;
   std::vector<Pace> image_pace_;
   Pace scene_pace_, pose_pace_, trajectory_pace_{2.0};
-  std::int64_t next_health_ns_ = 0, next_map_ns_ = 0;
+  std::int64_t next_health_ns_ = 0, next_map_ns_ = 0, ticked_ns_ = 0;
   std::map<std::uint64_t, Pending> pending_;
   std::uint64_t next_request_ = 1;
   ReasonCounts reasons_;

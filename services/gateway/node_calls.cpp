@@ -70,6 +70,10 @@ std::optional<MapQuery> queryOf(const Json& request) {
 }  // namespace
 
 void Node::fail(const Call& call, const std::string& sentence) {
+  if (call.service == kGraphOfTheMap) {
+    graph_pace_.refused(ticked_ns_);
+    return onNoGraph(sentence);
+  }
   outputs_.answer({call.client, call.service, call.call, false, sentence});
 }
 
@@ -130,6 +134,10 @@ void Node::onMapReply(const MapReply& reply) {
   const Call call = found->second.call;
   pending_.erase(found);
   if (!reply.ok) return fail(call, reply.error);
+  if (call.service == kGraphOfTheMap) {
+    graph_pace_.answered(reply, ticked_ns_);
+    return onMapGraph(reply);
+  }
   if (call.service == kMapQueryService) {
     outputs_.answer(
         {call.client, call.service, call.call, true, mapReplyJson(reply, map_.mapOf(world()))});

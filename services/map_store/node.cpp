@@ -11,12 +11,14 @@ StoreOptions storeOptions(const Config& c) {
   return {c.store_path, c.tile_size_m, c.max_size_mb, c.check_at_start, !c.fleet.url.empty()};
 }
 
-/// Nothing, or why the query cannot be answered.
+}  // namespace
+
 std::string faultOf(const MapQuery& query) {
   if (query.limit == 0) return "limit is 0; ask for at least one object";
   switch (query.kind) {
     case MapQueryKind::kByRadius:
     case MapQueryKind::kRecall:
+    case MapQueryKind::kGraph:
       if (!query.low.allFinite() || !std::isfinite(query.radius) || query.radius < 0.0) {
         return "a radius query needs a finite centre and a radius of at least 0 m";
       }
@@ -33,6 +35,8 @@ std::string faultOf(const MapQuery& query) {
       return {};
   }
 }
+
+namespace {
 
 std::string mendOf(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size";
@@ -186,6 +190,7 @@ void Node::commit() {
 void Node::onQuery(const MapQuery& query) {
   if (query.kind == MapQueryKind::kRestore) return restore(query);
   if (query.kind == MapQueryKind::kRecall && faultOf(query).empty()) return recall(query);
+  if (query.kind == MapQueryKind::kGraph) return answerGraph(query);
   if (const MapReply* again = replies_.find(query.client, query.request)) {
     reasons_.add("query_repeated");
     return outputs_.reply(*again);
@@ -196,11 +201,16 @@ void Node::onQuery(const MapQuery& query) {
   replies_.keep(std::move(reply));
 }
 
-MapReply Node::answer(const MapQuery& query) {
+MapReply Node::emptyReply(const MapQuery& query) const {
   MapReply reply;
   reply.client = query.client;
   reply.request = query.request;
   reply.instance = instance_;
+  return reply;
+}
+
+MapReply Node::answer(const MapQuery& query) {
+  MapReply reply = emptyReply(query);
   reply.error = faultOf(query);
   if (reply.error.empty()) {
     auto found = find(query);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -26,6 +27,9 @@ namespace perdure::map_store {
 
 /// Ids that a restored filter leaves out, because the last ones given may not have been written.
 inline constexpr ObjectId kIdReserve = 4096;
+
+/// Nothing, or why the query cannot be answered.
+std::string faultOf(const MapQuery& query);
 
 struct Outputs {
   Sink<MapTile> tile;
@@ -86,6 +90,8 @@ class Node {
   bool acceptable(const ObjectBelief& belief);
   void commit();
   MapReply answer(const MapQuery& query);
+  MapReply emptyReply(const MapQuery& query) const;
+  void answerGraph(const MapQuery& query);  ///< in node_graph.cpp
   // In node_view.cpp.
   bool loadView();
   void followView(const std::vector<ObjectId>& changed);
@@ -129,6 +135,7 @@ class Node {
     bool operator==(const ToldFrame&) const = default;
   };
   std::optional<ToldFrame> told_frame_;
+  std::deque<mapping::LoopWithdrawal> withdrawn_;  ///< the newest, for who asks for the graph
   ObjectId next_id_ = 1;
   InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk
   TimePoint kept_;          ///< of its newest frame there

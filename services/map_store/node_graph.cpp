@@ -6,12 +6,14 @@
 #include <utility>
 
 #include "common/mapping/frames/laid_belief.h"
+#include "services/map_store/core/graph/graph_answer.h"
 #include "services/map_store/node.h"
 
 namespace perdure::map_store {
 namespace {
 
 constexpr double kAroundALoop_m = 70.0;
+constexpr std::size_t kMostWithdrawn = 256;
 constexpr std::size_t kMostNamed = 8;  // objects, in the words of an event
 
 /// By what a loop was found, for people.
@@ -176,6 +178,8 @@ void Node::tellWithdrawals(const mapping::MapChange& change) {
         loop.id, split.empty() ? "none" : split, loop.a, loop.b);
     outputs_.event(event);
     reasons_.add("loops_withdrawn");
+    withdrawn_.push_back(loop);
+    if (withdrawn_.size() > kMostWithdrawn) withdrawn_.pop_front();
   }
 }
 
@@ -218,6 +222,23 @@ void Node::tellFrame() {
   frame.loops = whole->loops;
   frame.anchors = static_cast<std::uint32_t>(now.anchors);
   outputs_.frame(frame);
+}
+
+/// As it is now, however often the same is asked: it is not kept among the answers.
+void Node::answerGraph(const MapQuery& query) {
+  MapReply reply = emptyReply(query);
+  reply.error = faultOf(query);
+  if (reply.error.empty() && !graph_) {
+    reply.error = "the map has no graph; set graph.enabled of map_store, and look at its Health";
+  }
+  reply.ok = reply.error.empty();
+  if (reply.ok) {
+    putGraph(mapper_, {withdrawn_.begin(), withdrawn_.end()}, newest_ ? newest_->world : WorldId{},
+             query, reply);
+  } else {
+    reasons_.add("query_refused");
+  }
+  outputs_.reply(reply);
 }
 
 std::optional<ObjectBelief> Node::laidNow(const mapping::Recallable& there) {

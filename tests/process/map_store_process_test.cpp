@@ -113,6 +113,33 @@ TEST_F(MapStoreProcess, GivesBackWhatLeftTheWorkingSetAndSaysThatItHasIt) {
   EXPECT_EQ(answers[0].objects[1].best().mean, frame(1, 3).objects[2].best().mean);
 }
 
+TEST_F(MapStoreProcess, AnswersWithItsGraph) {
+  const auto child = start();
+  bus::Writer<Odometry> odometry(participant_, bus::topics::kOdometry);
+  ASSERT_TRUE(eventually(5s, [&] { return odometry.matched() > 0; }));
+  const Objects first = frame(1, 3);
+  for (std::uint64_t i = 1; i <= 40; ++i) {
+    Odometry pose;
+    pose.stamp = frame(i, 0).stamp;
+    pose.world = first.world;
+    pose.state = OdometryState::kTracking;
+    pose.T_WB.p.x() = static_cast<double>(i);
+    ASSERT_TRUE(odometry.write(pose).has_value());
+  }
+  MapQuery query;
+  query.kind = MapQueryKind::kGraph;
+  Result<MapReply> reply = fail("not_asked");
+  ASSERT_TRUE(eventually(10s, [&] {
+    reply = tools::askMapStore(participant_, query, 5.0);
+    return reply && reply->anchors.size() >= 4;
+  })) << child->log();
+  EXPECT_TRUE(reply->ok);
+  EXPECT_EQ(reply->anchors[0].map, first.world);
+  EXPECT_EQ(reply->anchors[1].previous, reply->anchors[0].id);
+  EXPECT_GT(reply->anchors[3].p.x(), reply->anchors[2].p.x());
+  EXPECT_EQ(reply->anchor_count, reply->anchors.size());
+}
+
 TEST_F(MapStoreProcess, SaysWhyOverDdsAndFromItsFileAlike) {
   const auto child = start();
   ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());

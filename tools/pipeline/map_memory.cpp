@@ -15,13 +15,14 @@ map_store::Config withFile(map_store::Config config, const std::filesystem::path
   return config;
 }
 
-map_store::Outputs toFilter(Sink<Recalled> recalled, Sink<Event> events) {
+map_store::Outputs outputsTo(MapMemory::Sinks sinks) {
   map_store::Outputs outputs;
   outputs.tile = outputs.emptied = [](const MapTile&) {};
   outputs.header = [](const MapHeader&) {};
-  outputs.reply = [](const MapReply&) {};
-  outputs.recalled = std::move(recalled);
-  outputs.event = std::move(events);
+  outputs.reply = std::move(sinks.replies);
+  outputs.recalled = std::move(sinks.recalled);
+  outputs.frame = std::move(sinks.frames);
+  outputs.event = std::move(sinks.events);
   return outputs;
 }
 
@@ -58,9 +59,8 @@ void MapMemory::copy(const std::filesystem::path& from, const std::filesystem::p
 }
 
 MapMemory::MapMemory(map_store::Config config, const std::filesystem::path& file,
-                     InstanceId instance, Sink<Recalled> recalled, Sink<Event> events)
-    : node_(withFile(std::move(config), file), instance,
-            toFilter(std::move(recalled), std::move(events))) {}
+                     InstanceId instance, Sinks sinks)
+    : node_(withFile(std::move(config), file), instance, outputsTo(std::move(sinks))) {}
 
 void MapMemory::giveIds(InstanceId filter, const WorldId& session) {
   MapQuery query;

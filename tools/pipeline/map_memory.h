@@ -19,10 +19,15 @@ class MapMemory {
   /// Begins `file` as a copy of a stored map. Throws StartupError.
   static void copy(const std::filesystem::path& from, const std::filesystem::path& file);
 
-  /// Opens the map, or begins an empty one. `recalled` gets the answers, `events` what the
-  /// map's graph has found. Throws StartupError.
+  struct Sinks {
+    Sink<Recalled> recalled;  ///< for the filter
+    Sink<Event> events;       ///< what the map's graph has found
+    Sink<MapFrame> frames;
+    Sink<MapReply> replies;
+  };
+  /// Opens the map, or begins an empty one. Throws StartupError.
   MapMemory(map_store::Config config, const std::filesystem::path& file, InstanceId instance,
-            Sink<Recalled> recalled, Sink<Event> events);
+            Sinks sinks);
 
   /// Tells a filter which ids are taken.
   void giveIds(InstanceId filter, const WorldId& session);

@@ -7,6 +7,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/class_aliases.h"
 #include "common/replay/ros_topics.h"
+#include "services/map_store/core/graph/graph_answer.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/outputs/pictures/overlay_video.h"
@@ -108,13 +109,42 @@ void Pipeline::openFilter() {
   options_.map.empty() ? MapMemory::clear(file) : MapMemory::copy(options_.map, file);
   map_ = std::make_unique<MapMemory>(
       configs_.map_store, file, instanceOf(kMapStore),
-      [this](const Recalled& m) { filter_->onRecalled(m); },
-      [this](const Event& event) {
-        keep("events", event, event.stamp.time);
-        outputs_->onEvent(event);
-      });
+      MapMemory::Sinks{.recalled = [this](const Recalled& m) { filter_->onRecalled(m); },
+                       .events =
+                           [this](const Event& event) {
+                             keep("events", event, event.stamp.time);
+                             outputs_->onEvent(event);
+                           },
+                       .frames = [this](const MapFrame& frame) { keepMap(frame); },
+                       .replies =
+                           [this](const MapReply& reply) {
+                             keep("map/reply", reply, fromNanoseconds(run_ns_));
+                           }});
   if (configs_.map_store.graph) in_map_.emplace(session_);
   if (!options_.map.empty()) map_->giveIds(instanceOf(kFilter), session_);
+}
+
+/// What people may look at later: how W lies in M, and the graph, which is asked for as a gateway
+/// asks that is looked at.
+void Pipeline::keepMap(const MapFrame& frame) {
+  if (!run_) return;
+  keep("map/frame", frame, frame.stamp.time);
+  constexpr double kEach_s = 3.0, kAnchorsASecond = 100.0;
+  const double wait_s = std::max(kEach_s, frame.anchors / kAnchorsASecond);
+  const bool due = !graph_kept_ || frame.stamp.time - *graph_kept_ >= durationFromSeconds(wait_s);
+  graph_waits_ = !due;
+  if (!due) return;
+  graph_kept_ = frame.stamp.time;
+  askForGraph();
+}
+
+void Pipeline::askForGraph() {
+  MapQuery query;
+  query.client = instanceOf(kMapStore);
+  query.request = ++graphs_asked_;
+  query.kind = MapQueryKind::kGraph;
+  query.limit = map_store::kMostAnchors;
+  map_->onQuery(query);
 }
 
 InstanceId Pipeline::instanceOf(InstanceId service) const {
@@ -374,6 +404,10 @@ void Pipeline::finish() {
     outputs_->setInMap(in_map_->finish(map_->mapper(), outputs_->history().lastBeliefs()));
   }
   outputs_->finish();
+  if (graph_waits_) {
+    askForGraph();
+    map_->work();
+  }
   if (run_) {
     if (const auto kept = run_->finish(); !kept) reasons_.add("run_" + kept.error().code);
   }

@@ -83,6 +83,8 @@ class Pipeline {
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
   void handleRecorded(const replay::RecordedMessage& message);
   void remember();
+  void keepMap(const MapFrame& frame);
+  void askForGraph();
   /// Into OUT/run.mcap, where that is asked for. Log times are those of the sensors.
   template <class T>
   void keep(const std::string& topic, const T& value, TimePoint time) {
@@ -110,6 +112,9 @@ class Pipeline {
   std::map<std::string, ShapePoints> shapes_;  ///< of the class priors
   std::unique_ptr<replay::RecordingWriter> run_;
   std::int64_t run_ns_ = 0;
+  std::optional<TimePoint> graph_kept_;  ///< in run.mcap, when last
+  std::uint64_t graphs_asked_ = 0;
+  bool graph_waits_ = false;                                           ///< it has changed since
   std::function<std::optional<Odometry>(const FrameStamp&)> pose_at_;  ///< none: vio's
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;

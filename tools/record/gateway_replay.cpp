@@ -15,7 +15,8 @@ constexpr double kBack = 3.0;  // s of the recording that are read before a plac
 bool isShown(const std::string& topic) {
   return topic == "calibration" || topic == "odometry" || topic == "landmarks" ||
          topic == "detections" || topic == "model" || topic == "objects" || topic == "events" ||
-         topic == "map/frame" || topic == "health" || topic.starts_with("frame/");
+         topic == "map/frame" || topic == "map/reply" || topic == "health" ||
+         topic.starts_with("frame/");
 }
 
 std::optional<TimePoint> sensorTimeOf(const replay::RecordedMessage& message) {
@@ -27,6 +28,10 @@ std::optional<TimePoint> sensorTimeOf(const replay::RecordedMessage& message) {
     if (objects) return objects->stamp.time;
   }
   return std::nullopt;
+}
+
+bool looksAtGraph(const gateway::Channels& wanted) {
+  return wanted.contains(gateway::kMapGraph) || wanted.contains(gateway::kMapGraphScene);
 }
 
 bool isTimed(const std::string& topic) { return topic == "odometry" || topic == "objects"; }
@@ -132,6 +137,7 @@ void GatewayReplay::seek(std::uint64_t log_ns) {
   node_ = freshNode();
   if (calibration_) node_->onCalibration(*calibration_);
   if (model_) node_->onModel(*model_);
+  recallGraph(log_ns);
   const auto back = static_cast<std::uint64_t>(1e9 * kBack);
   recording_.rewind(isShown, log_ns > back ? log_ns - back : 0);
   next_ = recording_.next();
@@ -141,6 +147,24 @@ void GatewayReplay::seek(std::uint64_t log_ns) {
   ended_ = false;
   setClock();
   if (!playing_) showFrame();
+}
+
+/// The newest graph of the map that was told before a place: what is read grows until there is one.
+void GatewayReplay::recallGraph(std::uint64_t log_ns) {
+  graph_.reset();
+  if (!recording_.topics().contains("map/reply")) return;
+  constexpr double kFirst = 15.0, kGrows = 4.0;
+  for (double back = kFirst; !graph_; back *= kGrows) {
+    const double since = static_cast<double>(log_ns - std::min(log_ns, recording_.startNs()));
+    const bool all = 1e9 * back >= since;
+    recording_.rewind([](const std::string& t) { return t == "map/reply" || t == "map/frame"; },
+                      all ? 0 : log_ns - static_cast<std::uint64_t>(1e9 * back));
+    while (const auto message = recording_.next()) {
+      if (message->log_ns >= log_ns) break;
+      feed(*message);
+    }
+    if (all) return;
+  }
 }
 
 /// On to the next objects, so that what is paused is seen.
@@ -197,6 +221,10 @@ void GatewayReplay::feed(const replay::RecordedMessage& message) {
     give.operator()<Detections>([&](const Detections& m) { node_->onDetections(m); });
   } else if (topic == "map/frame") {
     give.operator()<MapFrame>([&](const MapFrame& m) { node_->onMapFrame(m); });
+  } else if (topic == "map/reply") {
+    give.operator()<MapReply>([&](const MapReply& m) {
+      if (!m.anchors.empty()) graph_ = m, node_->onMapGraph(m);
+    });
   } else if (topic == "events") {
     give.operator()<Event>([&](const Event& m) { node_->onEvent(m); });
   } else if (topic == "health") {
@@ -246,6 +274,7 @@ GatewayReplay::Mail GatewayReplay::waitUntil(Clock::time_point due) {
 void GatewayReplay::handle(Mail mail) {
   stopped_ = stopped_ || mail.stop;
   if (mail.wanted) {
+    if (graph_ && looksAtGraph(*mail.wanted) && !looksAtGraph(wanted_)) node_->onMapGraph(*graph_);
     wanted_ = *mail.wanted;
     node_->setWanted(wanted_);
   }

@@ -52,6 +52,7 @@ class GatewayReplay {
   std::unique_ptr<gateway::Node> freshNode();
   void seek(std::uint64_t log_ns);
   void seekToNextEvent(const gateway::Call& call);
+  void recallGraph(std::uint64_t log_ns);
   void showFrame();
   bool pull();
   void feed(const replay::RecordedMessage& message);
@@ -70,6 +71,7 @@ class GatewayReplay {
   gateway::Channels wanted_;
   std::optional<Calibration> calibration_;
   std::optional<ModelInfo> model_;
+  std::optional<MapReply> graph_;  ///< of the map, as it was told last
   std::optional<replay::RecordedMessage> next_;
   std::uint64_t at_ns_ = 0;  ///< log time that is shown
   bool playing_ = true, stopped_ = false, ended_ = false;

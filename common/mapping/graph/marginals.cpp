@@ -1,5 +1,7 @@
 #include "common/mapping/graph/marginals.h"
 
+#include <algorithm>
+
 #include "common/mapping/graph/components.h"
 #include "common/mapping/graph/edge_cost.h"
 #include "common/math/gaussian.h"
@@ -91,6 +93,52 @@ std::optional<LevelGaussian> Marginals::to(AnchorId anchor) const {
   G.topLeftCorner<3, 3>() = T_Mf.R().transpose();
   result->covariance = G * P * G.transpose();
   makeSymmetric(result->covariance);
+  return result;
+}
+
+/// With H = L D Lᵀ: Z = H⁻¹ has Z_jj = 1/d_j − Σ_k L_kj Z_kj and, for i > j, Z_ij = −Σ_k L_kj Z_ki,
+/// over the k > j where L_kj is not zero. What is needed of Z lies where L is not zero.
+Eigen::VectorXd Marginals::diagonalOfInverse() const {
+  const auto& L = factor_.matrixL().nestedExpression();  // without its diagonal, which is 1
+  const int* starts = L.outerIndexPtr();
+  const int* rows = L.innerIndexPtr();
+  const double* l = L.valuePtr();
+  std::vector<double> z(static_cast<std::size_t>(starts[L.cols()]), 0.0);
+  Eigen::VectorXd diagonal(L.cols());
+  const auto at = [&](int i, int k) {
+    if (i == k) return diagonal[i];
+    const int column = std::min(i, k);
+    const int* end = rows + starts[column + 1];
+    const int* found = std::lower_bound(rows + starts[column], end, std::max(i, k));
+    return z[static_cast<std::size_t>(found - rows)];
+  };
+  for (int j = static_cast<int>(L.cols()) - 1; j >= 0; --j) {
+    double on_diagonal = 1.0 / factor_.vectorD()[j];
+    for (int i = starts[j + 1] - 1; i >= starts[j]; --i) {
+      double sum = 0.0;
+      for (int k = starts[j]; k < starts[j + 1]; ++k) sum += l[k] * at(rows[k], rows[i]);
+      z[static_cast<std::size_t>(i)] = -sum;
+    }
+    for (int k = starts[j]; k < starts[j + 1]; ++k) {
+      on_diagonal -= l[k] * z[static_cast<std::size_t>(k)];
+    }
+    diagonal[j] = on_diagonal;
+  }
+  return diagonal;
+}
+
+std::map<AnchorId, Eigen::Vector4d> Marginals::variances() const {
+  std::map<AnchorId, Eigen::Vector4d> result;
+  const Eigen::VectorXd diagonal = usable_ ? diagonalOfInverse() : Eigen::VectorXd();
+  for (const auto& [anchor, component] : components_) {
+    Eigen::Vector4d& variances = result[anchor];
+    const auto row = rows_.find(anchor);
+    variances.setZero();
+    if (!usable_ || row == rows_.end()) continue;
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      variances[i] = diagonal[factor_.permutationP().indices()[row->second + i]];
+    }
+  }
   return result;
 }
 

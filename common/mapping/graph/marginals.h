@@ -21,10 +21,15 @@ class Marginals {
   AnchorId first() const { return components_.at(from_); }
   /// T_from,anchor with its covariance; nothing where no way leads there.
   std::optional<LevelGaussian> to(AnchorId anchor) const;
+  /// Variances of [p, yaw] in M of every anchor, relative to the first one of its component; m² and
+  /// rad². All at the price of about one factorisation, by the recursion of Takahashi (Erisman and
+  /// Tinney 1975): the inverse is computed where the factor is not zero, and nowhere else.
+  std::map<AnchorId, Eigen::Vector4d> variances() const;
 
  private:
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
+  Eigen::VectorXd diagonalOfInverse() const;
   /// Columns of an anchor in the inverse; zero for one that is held fast.
   Eigen::MatrixXd columnsOf(AnchorId anchor) const;
   Eigen::Matrix4d blockOf(const Eigen::MatrixXd& columns, AnchorId anchor) const;

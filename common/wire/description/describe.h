@@ -244,7 +244,7 @@ template <class A, Is<MapQuery> D, class W>
 void describe(A& a, D& d, W& w) {
   a.value("client", d.client, w.client);
   a.value("request", d.request, w.request);
-  a.choice("kind", d.kind, w.kind, MapQueryKind::kRecall);
+  a.choice("kind", d.kind, w.kind, MapQueryKind::kGraph);
   a.value("object_id", d.object_id, w.object_id);
   a.text("class_name", d.class_name, w.class_name, kNameLength);
   a.matrix("low", d.low, w.low, kCoordinate);
@@ -252,6 +252,41 @@ void describe(A& a, D& d, W& w) {
   a.number("radius", d.radius, w.radius, kNotNegative);
   a.object("world", d.world, w.reference);
   a.value("limit", d.limit, w.limit);
+}
+
+template <class A, Is<MapAnchor> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("id", d.id, w.anchor_id);
+  a.ensure("id", "out_of_range", [&] { return d.id != 0; });
+  a.value("previous", d.previous, w.previous);
+  a.object("session", d.session, w.session);
+  a.object("map", d.map, w.reference);
+  a.matrix("p", d.p, w.position, kCoordinate);
+  a.number("yaw", d.yaw, w.yaw, kAngle);
+  a.matrix("sigma", d.sigma, w.sigma, kNotNegative);
+  a.value("objects", d.objects, w.object_count);
+}
+
+template <class A, Is<MapLoopPair> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("known", d.known, w.known);
+  a.value("seen", d.seen, w.seen);
+}
+
+template <class A, Is<MapLoop> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("id", d.id, w.loop_id);
+  a.value("a", d.a, w.a);
+  a.value("b", d.b, w.b);
+  a.ensure("id", "out_of_range", [&] { return d.id != 0 && d.a != 0 && d.b != 0; });
+  a.choice("kind", d.kind, w.kind, MapLoopKind::kTie);
+  a.choice("state", d.state, w.state, MapLoopState::kWithdrawn);
+  a.matrix("residual", d.residual, w.residual, kCoordinate);
+  a.matrix("sigma", d.sigma, w.sigma, kNotNegative);
+  a.number("chi2", d.chi2, w.chi2, kNotNegative);
+  a.probability("weight", d.weight, w.weight);
+  a.list("pairs", d.pairs, w.pairs, kObjects);
+  a.value("landmarks", d.landmarks, w.landmark_count);
 }
 
 template <class A, Is<MapReply> D, class W>
@@ -264,6 +299,10 @@ void describe(A& a, D& d, W& w) {
   a.value("truncated", d.truncated, w.truncated);
   a.list("objects", d.objects, w.items, kReplyObjects);
   a.list("beliefs", d.beliefs, w.beliefs, kObjects);
+  a.list("anchors", d.anchors, w.anchors, kReplyAnchors);
+  a.list("loops", d.loops, w.loops, kReplyAnchors);
+  a.value("anchor_count", d.anchor_count, w.anchor_count);
+  a.value("loop_count", d.loop_count, w.loop_count);
 }
 
 // --- health ---

@@ -42,6 +42,9 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras) {
       json(kMap, "/map", "perdure.Map", map(), Delivery::kLatched),
       json(kMapToOdom, "/map/frame", "perdure.MapFrame", mapFrame(), Delivery::kLatched),
       json(kMapScene, "/map/scene", "foxglove.SceneUpdate", sceneUpdate(), Delivery::kLatched),
+      json(kMapGraph, "/map/graph", "perdure.MapGraph", mapGraph(), Delivery::kLatched),
+      json(kMapGraphScene, "/map/graph/scene", "foxglove.SceneUpdate", sceneUpdate(),
+           Delivery::kLatched),
       json(kModel, "/model", "perdure.Model", model(), Delivery::kLatched)};
   for (std::size_t i = 0; i < cameras.size(); ++i) addCamera(i, cameras[i], table);
   return table;

@@ -29,6 +29,8 @@ enum Channel : std::uint32_t {
   kModel,
   kMapToOdom,  ///< /map/frame
   kMapScene,
+  kMapGraph,
+  kMapGraphScene,
   kRaw = 50,  ///< and on: topics of the bus as they are
   kCamera = 100,
 };
@@ -72,7 +74,12 @@ struct Encoded {
 };
 
 /// What clients may ask for (the protocol's services), with JSON both ways.
-enum Service : std::uint32_t { kObjectService = 1, kMapQueryService, kNextEventService };
+enum Service : std::uint32_t {
+  kGraphOfTheMap = 0,  ///< no service: the gateway asks for itself
+  kObjectService = 1,
+  kMapQueryService,
+  kNextEventService
+};
 struct ServiceInfo {
   std::uint32_t id = 0;
   std::string name, type, request_schema, response_schema;

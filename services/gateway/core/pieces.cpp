@@ -40,6 +40,28 @@ void putNumbers(JsonWriter& json, std::span<const double> values, int decimals) 
   json.end(']');
 }
 
+void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id) {
+  json.begin('{').key("timestamp");
+  putTime(json, time);
+  json.key("type").integer(static_cast<int>(type)).key("id").text(id).end('}');
+}
+
+void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id) {
+  json.begin('{').key("timestamp");
+  putTime(json, time);
+  json.key("frame_id").text(frame).key("id").text(id);
+  json.key("lifetime").raw(R"({"sec":0,"nsec":0})").key("frame_locked").boolean(true);
+}
+
+void endEntity(JsonWriter& json, std::initializer_list<const char*> without) {
+  for (const char* none : without) json.key(none).begin('[').end(']');
+  json.end('}');
+}
+
+void putPair(JsonWriter& json, const char* name, const std::string& value) {
+  json.begin('{').key("key").text(name).key("value").text(value).end('}');
+}
+
 Eigen::Quaterniond rotationOfYaw(double yaw) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
 }

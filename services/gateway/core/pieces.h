@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <initializer_list>
 #include <span>
 #include <string>
 
@@ -24,6 +25,17 @@ void putPose(JsonWriter& json, const RigidTransform& T);
 void putColour(JsonWriter& json, const Colour& colour);
 /// [1, 2, 3]
 void putNumbers(JsonWriter& json, std::span<const double> values, int decimals = 4);
+
+/// Of foxglove.SceneUpdate.
+enum class DeletionType { kMatching = 0, kAll = 1 };
+enum class LineType { kStrip = 0, kLoop = 1, kSegments = 2 };
+void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id);
+/// A scene entity up to its metadata.
+void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id);
+/// `without`: the lists of primitives that it does not have.
+void endEntity(JsonWriter& json, std::initializer_list<const char*> without);
+/// An item of metadata.
+void putPair(JsonWriter& json, const char* name, const std::string& value);
 
 /// About the vertical `up`, as the objects' yaw is.
 Eigen::Quaterniond rotationOfYaw(double yaw);

@@ -12,8 +12,6 @@ namespace {
 
 constexpr int kTold = 100;
 constexpr double kEllipsoidSigmas = 2.0;
-enum DeletionType { kMatching = 0, kAll = 1 };
-enum LineType { kSegments = 2 };
 
 double opacityOf(const ObjectBelief& object) {
   return isInSight(object) ? 0.9 : isHidden(object) ? 0.8 : 0.35;
@@ -40,7 +38,8 @@ struct EdgeLook {
 };
 
 void putEdges(JsonWriter& json, const Cuboid& cuboid, const EdgeLook& look) {
-  json.key("lines").begin('[').begin('{').key("type").integer(static_cast<int>(kSegments));
+  json.key("lines").begin('[').begin('{').key("type").integer(
+      static_cast<int>(LineType::kSegments));
   json.key("pose");
   putPose(json, {});
   json.key("thickness").number(look.thickness).key("scale_invariant").boolean(true);
@@ -81,10 +80,6 @@ void putLabel(JsonWriter& json, const Cuboid& cuboid, const std::string& text, d
   json.end('}').end(']');
 }
 
-void putPair(JsonWriter& json, const char* name, const std::string& value) {
-  json.begin('{').key("key").text(name).key("value").text(value).end('}');
-}
-
 std::string percent(double probability) {
   return std::to_string(static_cast<int>(std::lround(100 * probability))) + " %";
 }
@@ -98,19 +93,6 @@ void putMetadata(JsonWriter& json, const ObjectBelief& object) {
   putPair(json, "visibility", perdure::nameOf(object.visibility));
   if (object.blocked_by != 0) putPair(json, "hidden by", std::to_string(object.blocked_by));
   json.end(']');
-}
-
-/// Up to its metadata.
-void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id) {
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("frame_id").text(frame).key("id").text(id);
-  json.key("lifetime").raw(R"({"sec":0,"nsec":0})").key("frame_locked").boolean(true);
-}
-
-void endEntity(JsonWriter& json, std::initializer_list<const char*> without) {
-  for (const char* none : without) json.key(none).begin('[').end(']');
-  json.end('}');
 }
 
 void putEntity(JsonWriter& json, const Objects& objects, const ObjectBelief& object) {
@@ -150,12 +132,6 @@ void putEntity(JsonWriter& json, TimePoint time, const MapObject& object) {
   endEntity(json, {"spheres", "arrows", "cylinders", "triangles", "models"});
 }
 
-void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id) {
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("type").integer(static_cast<int>(type)).key("id").text(id).end('}');
-}
-
 }  // namespace
 
 std::string Scene::update(const Objects& objects) {
@@ -177,11 +153,11 @@ std::string Scene::update(const Objects& objects) {
   json.begin('{').key("deletions").begin('[');
   if (clear_ > 0) {
     --clear_;
-    putDeletion(json, objects.stamp.time, kAll, "");
+    putDeletion(json, objects.stamp.time, DeletionType::kAll, "");
   }
   for (Gone& one : gone_) {
     ++one.told;
-    putDeletion(json, objects.stamp.time, kMatching, std::to_string(one.id));
+    putDeletion(json, objects.stamp.time, DeletionType::kMatching, std::to_string(one.id));
   }
   json.end(']').key("entities").begin('[');
   for (const ObjectBelief& object : objects.objects) {
@@ -196,7 +172,7 @@ std::string mapScene(const std::vector<MapObject>& objects, const std::set<Objec
                      TimePoint time) {
   JsonWriter json(1024 + 2048 * objects.size());
   json.begin('{').key("deletions").begin('[');
-  putDeletion(json, time, kAll, "");
+  putDeletion(json, time, DeletionType::kAll, "");
   json.end(']').key("entities").begin('[');
   for (const MapObject& object : objects) {
     if (!working.contains(object.id)) putEntity(json, time, object);

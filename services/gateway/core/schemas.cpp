@@ -344,6 +344,41 @@ std::string mapFrame() {
       .dump();
 }
 
+std::string mapGraph() {
+  const Json anchor =
+      object({{"id", natural()},
+              {"previous", said(natural(), "of the same session; 0: none")},
+              {"session", said(text(), "the odom frame of its way, world/epoch")},
+              {"at", said(listOf(number()), "x y z in map, m")},
+              {"yaw", number()},
+              {"sigma", said(listOf(number()), "x y z m, yaw rad, relative to the first anchor")},
+              {"objects", said(natural(), "that were last seen from there")}});
+  const Json loop = object(
+      {{"id", natural()},
+       {"a", said(natural(), "the anchor that was known")},
+       {"b", said(natural(), "the anchor where the vehicle was")},
+       {"kind", said(text(), "loop, or tie: by objects with their ids")},
+       {"state", said(text(), "tentative, confirmed, withdrawn")},
+       {"residual", said(listOf(number()),
+                         "measured less as it lies: x y z m, yaw rad, in "
+                         "axes of a")},
+       {"sigma", said(listOf(number()), "of the measurement")},
+       {"chi2", said(number(), "of the residual, 4 degrees of freedom")},
+       {"weight", said(number(), "by which it counts, 0 to 1")},
+       {"pairs", said(listOf(listOf(natural())), "ids that it found to be one: known, seen")},
+       {"landmarks", said(natural(), "that look alike")}});
+  return object({{"timestamp", time()},
+                 {"frame_id", text()},
+                 {"why_none", said(text(), "a sentence, where there is no graph")},
+                 {"all_anchors", said(natural(), "of the map")},
+                 {"all_loops", natural()},
+                 {"truncated", said(boolean(), "these are the nearest to the vehicle")},
+                 {"anchors", listOf(anchor)},
+                 {"loops", said(listOf(loop), "between these anchors")}},
+                "perdure.MapGraph")
+      .dump();
+}
+
 std::string model() {
   return object({{"name", text()},
                  {"hash", text()},

@@ -22,6 +22,7 @@ std::string health();
 std::string detections();
 std::string map();
 std::string mapFrame();
+std::string mapGraph();
 std::string model();
 std::string objectRequest();
 std::string mapRequest();

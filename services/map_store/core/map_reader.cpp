@@ -107,9 +107,10 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
       return connection.prepare(from + "ORDER BY o.id");
     case MapQueryKind::kRestore:
     case MapQueryKind::kRecall:
+    case MapQueryKind::kGraph:
       break;
   }
-  return fail("query_invalid", "a restore or recall is not a question about the map");
+  return fail("query_invalid", "a restore, a recall or the graph is no question about objects");
 }
 
 /// The beliefs of the working set; confirmed ones are in `objects`.

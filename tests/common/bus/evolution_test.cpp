@@ -30,10 +30,12 @@ class Evolution : public testing::Test {
  protected:
   /// The topic as a program of the first version declares it.
   dds_entity_t firstTopic() const {
-    dds_topic_descriptor_t first = perdure_first_Recalled_desc;
-    first.m_typename = wire::Type<Recalled>::descriptor().m_typename;
-    return dds_create_topic(there.handle(), &first, there.wireName("recalled").c_str(), nullptr,
-                            nullptr);
+    return topicAs<Recalled>(perdure_first_Recalled_desc, "recalled");
+  }
+  template <class T>
+  dds_entity_t topicAs(dds_topic_descriptor_t first, const char* name) const {
+    first.m_typename = wire::Type<T>::descriptor().m_typename;
+    return dds_create_topic(there.handle(), &first, there.wireName(name).c_str(), nullptr, nullptr);
   }
   static QosPtr reliable() {
     QosPtr qos(dds_create_qos());
@@ -123,6 +125,61 @@ TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedger) {
     EXPECT_EQ(read.classes._length, sent.classes.size());
     EXPECT_STREQ(read.classes._buffer[0].name, sent.best().name.c_str());
   }
+  dds_return_loan(reader, &sample, 1);
+}
+
+TEST_F(Evolution, AnAnswerOfAMapStoreThatTellsNoGraphHasNone) {
+  Reader<MapReply> reader(here, topics::kMapReply);
+  std::vector<MapReply> got;
+  loop.on(reader, [&](const MapReply& m) { got.push_back(m); });
+  const dds_entity_t writer =
+      dds_create_writer(there.handle(), topicAs<MapReply>(perdure_first_MapReply_desc, "map/reply"),
+                        reliable().get(), nullptr);
+  ASSERT_GT(writer, 0);
+  ASSERT_TRUE(eventually(loop, [&] { return reader.matched() == 1; }));
+  perdure_first_MapReply message{};
+  std::string error = "no such kind";
+  message.request = 7;
+  message.error = error.data();
+  message.truncated = true;
+  ASSERT_EQ(dds_write(writer, &message), DDS_RETCODE_OK);
+  ASSERT_TRUE(eventually(loop, [&] { return !got.empty(); }));
+  const auto recorded =
+      wire::decodeCdr<MapReply>(wire::writeCdr(&message, perdure_first_MapReply_desc), nullptr);
+  ASSERT_TRUE(recorded) << recorded.error().detail;
+  got.push_back(*recorded);
+  for (const MapReply& read : got) {
+    EXPECT_EQ(read.request, 7u);
+    EXPECT_EQ(read.error, error);
+    EXPECT_TRUE(read.truncated);
+    EXPECT_TRUE(read.anchors.empty() && read.loops.empty());
+    EXPECT_EQ(read.anchor_count, 0u);
+  }
+}
+
+TEST_F(Evolution, AnAnswerWithAGraphIsReadByProgramsThatKnowNone) {
+  const dds_entity_t reader =
+      dds_create_reader(there.handle(), topicAs<MapReply>(perdure_first_MapReply_desc, "map/reply"),
+                        reliable().get(), nullptr);
+  ASSERT_GT(reader, 0);
+  Writer<MapReply> writer(here, topics::kMapReply);
+  ASSERT_TRUE(eventually(loop, [&] { return writer.matched() == 1; }));
+  wire::Examples examples(5);
+  MapReply message;
+  message.request = 8;
+  message.objects = {examples.mapObject(), examples.mapObject()};
+  message.anchors = {examples.mapAnchor(), examples.mapAnchor()};
+  message.loops = {examples.mapLoop()};
+  ASSERT_TRUE(writer.write(message));
+  void* sample = nullptr;
+  dds_sample_info_t info{};
+  ASSERT_TRUE(
+      eventually(loop, [&] { return sample || dds_take(reader, &sample, &info, 1, 1) > 0; }));
+  ASSERT_TRUE(info.valid_data);
+  const auto& got = *static_cast<const perdure_first_MapReply*>(sample);
+  EXPECT_EQ(got.request, 8u);
+  ASSERT_EQ(got.items._length, 2u);
+  EXPECT_EQ(got.items._buffer[1].object_id, message.objects[1].id);
   dds_return_loan(reader, &sample, 1);
 }
 

@@ -88,6 +88,21 @@ TEST_F(LoopBookTest, WhatAnEarlierProcessToldCountsAsToldAndWhatItHadWaitingIsGi
   EXPECT_TRUE(graph_.edges().contains(old));
 }
 
+TEST_F(LoopBookTest, SaysWhichLoopsAreToldAndHowTheyWereFound) {
+  EXPECT_TRUE(book_.isTold(3)) << "an earlier process told it";
+  EXPECT_EQ(book_.closureOf(3), nullptr);
+  const EdgeId sound = loop(0.0);
+  PlaceMatch match;
+  match.pairs = {{4, 9}};
+  book_.add({sound, 1, 30, match, false, 0.0}, {}, 10.0);
+  EXPECT_FALSE(book_.isTold(sound));
+  (void)graph_.optimise();
+  (void)book_.judge(graph_, 10.0);
+  EXPECT_TRUE(book_.isTold(sound));
+  ASSERT_NE(book_.closureOf(sound), nullptr);
+  EXPECT_EQ(book_.closureOf(sound)->match.pairs, match.pairs);
+}
+
 TEST_F(LoopBookTest, TiesHangOnTheLoopWhoseMergesTheyRestOn) {
   book_.hang(7, 3);
   book_.hang(8, 4);

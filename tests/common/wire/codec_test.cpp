@@ -116,6 +116,14 @@ TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
   MapTile tile;
   tile.objects = {examples.mapObject()};
   EXPECT_EQ(toJson(tile)["objects"][0].size(), members<MapObject>());
+  MapReply reply;
+  reply.anchors = {examples.mapAnchor()};
+  reply.loops = {examples.mapLoop()};
+  reply.loops[0].pairs = {{1, 2}};
+  const auto graph = toJson(reply);
+  EXPECT_EQ(graph["anchors"][0].size(), members<MapAnchor>());
+  EXPECT_EQ(graph["loops"][0].size(), members<MapLoop>());
+  EXPECT_EQ(graph["loops"][0]["pairs"][0].size(), members<MapLoopPair>());
 }
 
 TEST(CodecOfKeys, CarryTheKeyOfADisposedObject) {

@@ -203,8 +203,18 @@ class Examples {
   }
   void fill(ObjectState& m) { m = {stamp(), bits(), world(), belief()}; }
   void fill(Recalled& m) {
-    m = {bits(), world(), coin(), bits(), bits(), several([&] { return belief(); }),
-         bits(), time(),  coin(), coin(), coin(), several([&] { return mergeOrder(); }),
+    m = {bits(),
+         world(),
+         coin(),
+         bits(),
+         bits(),
+         several([&] { return belief(); }),
+         bits(),
+         time(),
+         coin(),
+         coin(),
+         coin(),
+         several([&] { return mergeOrder(); }),
          several([&] { return mergeOrder(); })};
   }
   void fill(Event& m) {
@@ -235,6 +245,31 @@ class Examples {
             coin() ? Memory::kWorking : Memory::kLongTerm,
             coin()};
   }
+  MapAnchor mapAnchor() {
+    return {1 + bits() / 2,
+            bits(),
+            world(),
+            world(),
+            matrix<Eigen::Vector3d>(),
+            uniform(-3, 3),
+            matrix<Eigen::Vector4d>().cwiseAbs(),
+            below(99)};
+  }
+  MapLoop mapLoop() {
+    return {1 + bits() / 2,
+            1 + bits() / 2,
+            1 + bits() / 2,
+            coin() ? MapLoopKind::kLoop : MapLoopKind::kTie,
+            static_cast<MapLoopState>(below(3)),
+            matrix<Eigen::Vector4d>(),
+            matrix<Eigen::Vector4d>().cwiseAbs(),
+            uniform(0, 99),
+            uniform(0, 1),
+            several([&] {
+              return MapLoopPair{bits(), bits()};
+            }),
+            below(99)};
+  }
   void fill(MapTile& m) {
     m = {bits(),
          static_cast<std::int32_t>(below(99)) - 50,
@@ -251,7 +286,7 @@ class Examples {
   void fill(MapQuery& m) {
     m = {bits(),
          bits(),
-         static_cast<MapQueryKind>(below(7)),
+         static_cast<MapQueryKind>(below(8)),
          bits(),
          word(),
          matrix<Eigen::Vector3d>(),
@@ -268,7 +303,11 @@ class Examples {
          word(),
          coin(),
          several([&] { return mapObject(); }),
-         several([&] { return belief(); })};
+         several([&] { return belief(); }),
+         several([&] { return mapAnchor(); }),
+         several([&] { return mapLoop(); }),
+         below(99),
+         below(99)};
   }
   void fill(SwapNotice& m) {
     m = {bits(), bits(), SwapStep::kRolledBack, uniform(0, 99), word(), word(), word()};

@@ -225,9 +225,24 @@ TEST(Refusals, OfTwoIdsInOneState) {
 
 TEST(Refusals, OfEnumsOutOfRange) {
   EXPECT_EQ(decodeRefusal(example<Event>(), [](auto& w) { w.kind = 200; }), "bad_enum kind");
-  EXPECT_EQ(decodeRefusal(example<MapQuery>(), [](auto& w) { w.kind = 7; }), "bad_enum kind");
+  EXPECT_EQ(decodeRefusal(example<MapQuery>(), [](auto& w) { w.kind = 8; }), "bad_enum kind");
   EXPECT_EQ(decodeRefusal(example<Odometry>(), [](auto& w) { w.state = 3; }), "bad_enum state");
   EXPECT_EQ(decodeRefusal(example<Health>(), [](auto& w) { w.state = 4; }), "bad_enum state");
+}
+
+TEST(Refusals, OfLoopsThatHangOnNothing) {
+  Examples examples(4);
+  MapReply reply;
+  reply.anchors = {examples.mapAnchor()};
+  reply.loops = {examples.mapLoop()};
+  EXPECT_EQ(refusal(reply), "");
+  EXPECT_EQ(decodeRefusal(reply, [](auto& w) { w.loops._buffer[0].state = 3; }),
+            "bad_enum loops[0].state");
+  reply.loops[0].b = 0;
+  EXPECT_EQ(refusal(reply), "out_of_range loops[0].id");
+  reply.loops.clear();
+  reply.anchors[0].sigma[3] = -1;
+  EXPECT_EQ(refusal(reply), "out_of_range anchors[0].sigma");
 }
 
 TEST(Refusals, OfTilesThatHoldTooMuch) {

@@ -33,6 +33,8 @@ class Drive {
         events_(participant, bus::topics::kEvents),
         tiles_(participant, bus::topics::kMap),
         map_frame_(participant, bus::topics::kMapFrame),
+        replies_(participant, bus::topics::kMapReply),
+        queries_(participant, bus::topics::kMapQuery),
         imu_(participant, bus::topics::kImu),
         speed_(participant, bus::topics::kSpeed),
         frames_(participant, bus::topics::frame("cam0")) {
@@ -100,6 +102,9 @@ class Drive {
     (void)frames_.write(frame);
     (void)objects_.write(objects);
     if (i % 10 == 1) tellMap(i, objects);
+    queries_.drain([&](const MapQuery& query) {
+      if (query.kind == MapQueryKind::kGraph) (void)replies_.write(test::graphFor(query, {70, 1}));
+    });
   }
 
   /// A bicycle 12 m ahead in W, of an earlier session; W lies 100 m to the left in M.
@@ -138,6 +143,8 @@ class Drive {
   bus::Writer<Event> events_;
   bus::Writer<MapTile> tiles_;
   bus::Writer<MapFrame> map_frame_;
+  bus::Writer<MapReply> replies_;
+  bus::Reader<MapQuery> queries_;
   bus::Writer<ImuSample> imu_;
   bus::Writer<SpeedSample> speed_;
   bus::Writer<Frame> frames_;
@@ -190,7 +197,7 @@ TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
     const json said = answer("foxglove.mjs", {protocol});
     ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("foxglove.mjs"));
     EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
-    EXPECT_EQ(said["channels"], 22);
+    EXPECT_EQ(said["channels"], 24);
     EXPECT_EQ(status_, 0);
   }
 }
@@ -209,6 +216,10 @@ TEST_F(Strangers, ABrowserShowsThePage) {
   EXPECT_EQ(said["page"]["remembered"], json({12, 0, 0})) << "the map lies over the working set";
   EXPECT_EQ(said["page"]["provisional"], 1);
   EXPECT_EQ(said["page"]["marks"], 1);
+  EXPECT_EQ(said["graph"]["anchors"], json({{0, 0, 0}, {10, 0, 0}, {20, 1, 0}}))
+      << "the graph lies over the working set";
+  EXPECT_EQ(said["graph"]["loops"],
+            json({{"1", "confirmed"}, {"2", "tentative"}, {"3", "withdrawn"}, {"4", "tie"}}));
   EXPECT_GT(said["page"]["images"], 0);
   EXPECT_EQ(status_, 0);
 }

@@ -312,6 +312,96 @@ TEST_F(GatewayNode, DrawsOfTheMapWhatTheWorkingSetDoesNotHave) {
   EXPECT_EQ(scene["deletions"][0]["type"], kAll);
 }
 
+TEST_F(GatewayNode, AsksForTheGraphWhileSomebodyLooksAndNotTooOften) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onMapFrame(frameOfMap());
+  node_.tick(kSecond);
+  EXPECT_TRUE(queries_.empty()) << "nobody looks";
+  node_.setWanted({kMapGraph});
+  node_.tick(2 * kSecond);
+  ASSERT_EQ(queries_.size(), 1u);
+  EXPECT_EQ(queries_[0].kind, MapQueryKind::kGraph);
+  EXPECT_EQ(queries_[0].low.x(), 100) << "around the body, in M";
+  node_.onMapReply(test::graphFor(queries_[0], {70, 1}));
+  ASSERT_EQ(on(kMapGraph).size(), 1u);
+  node_.tick(20 * kSecond);
+  EXPECT_EQ(queries_.size(), 1u) << "it has not changed";
+  node_.onMapFrame(frameOfMap());
+  node_.tick(21 * kSecond);
+  ASSERT_EQ(queries_.size(), 2u);
+  node_.onMapReply(test::graphFor(queries_[1], {70, 1}));
+  node_.onEvent(test::eventOf(EventKind::kLoopClosed, 0));
+  node_.tick(22 * kSecond);
+  EXPECT_EQ(queries_.size(), 2u) << "a second later";
+  node_.tick(24 * kSecond);
+  EXPECT_EQ(queries_.size(), 3u);
+  node_.onMapReply(test::graphFor(queries_[2], {70, 1}));
+  node_.setWanted({});
+  node_.onMapFrame(frameOfMap());
+  node_.tick(60 * kSecond);
+  EXPECT_EQ(queries_.size(), 3u) << "nobody looks any more";
+}
+
+TEST_F(GatewayNode, TellsTheGraphInTheFrameOfTheMapWithWhatEachPartIs) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onMapFrame(frameOfMap());
+  node_.setWanted({kMapGraph, kMapGraphScene});
+  node_.tick(2 * kSecond);
+  node_.onMapReply(test::graphFor(queries_.at(0), {70, 1}));
+  const json graph = on(kMapGraph).at(0);
+  EXPECT_EQ(graph["frame_id"], "map");
+  EXPECT_EQ(graph["why_none"], "");
+  ASSERT_EQ(graph["anchors"].size(), 3u);
+  EXPECT_EQ(graph["anchors"][1]["sigma"], json({0.2, 0.1, 0.05, 0.01}));
+  ASSERT_EQ(graph["loops"].size(), 4u);
+  EXPECT_EQ(graph["loops"][2]["state"], "withdrawn");
+  EXPECT_EQ(graph["loops"][3]["kind"], "tie");
+  EXPECT_EQ(graph["loops"][0]["pairs"], json({{1, 1}, {2, 77}}));
+  const json scene = on(kMapGraphScene).at(0);
+  ASSERT_EQ(scene["entities"].size(), 1u + 3u + 4u);
+  EXPECT_EQ(scene["entities"][0]["lines"][0]["points"].size(), 4u);
+  EXPECT_EQ(scene["entities"][2]["spheres"][0]["pose"]["position"]["y"], 100);
+  std::map<std::string, std::string> said;
+  for (const json& pair : scene["entities"][4]["metadata"]) said[pair["key"]] = pair["value"];
+  EXPECT_EQ(scene["entities"][4]["id"], "loop 1");
+  EXPECT_EQ(said["anchors"], "1 and 3");
+  EXPECT_EQ(said["sigma x y z, yaw"], "0.100 0.100 0.050 m, 0.23 deg");
+  EXPECT_EQ(said["by objects"], "1, 2 (seen as 77)");
+  std::set<std::string> colours;
+  for (std::size_t i = 4; i < 8; ++i) {
+    colours.insert(scene["entities"][i]["lines"][0]["color"].dump());
+    EXPECT_EQ(scene["entities"][i]["frame_id"], "map");
+  }
+  EXPECT_EQ(colours.size(), 4u) << "each state looks different";
+}
+
+TEST_F(GatewayNode, SaysWhyThereIsNoGraph) {
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.onMapFrame(frameOfMap());
+  node_.setWanted({kMapGraph});
+  node_.tick(2 * kSecond);
+  MapReply refusal;
+  refusal.client = 5;
+  refusal.request = queries_.at(0).request;
+  refusal.ok = false;
+  refusal.error = "the map has no graph";
+  node_.onMapReply(refusal);
+  EXPECT_EQ(on(kMapGraph).at(0)["why_none"], "the map has no graph");
+  EXPECT_TRUE(answers_.empty()) << "no client has asked";
+  node_.tick(4 * kSecond);
+  EXPECT_EQ(queries_.size(), 1u);
+  node_.tick(8 * kSecond);
+  ASSERT_EQ(queries_.size(), 2u) << "it may have one later";
+  node_.onMapReply(test::graphFor(queries_[1], {60, 1}));
+  EXPECT_TRUE(on(kMapGraph).at(1)["anchors"].empty()) << "its place in this map is not known";
+  EXPECT_THAT(on(kMapGraph)[1]["why_none"].get<std::string>(), HasSubstr("not found yet"));
+  node_.onMapFrame(frameOfMap());
+  node_.tick(20 * kSecond);
+  for (int i = 0; i < 40; ++i) node_.tick(20 * kSecond + i * kSecond / 10);
+  EXPECT_EQ(on(kMapGraph).size(), 2u) << "map_store is silent: what was told stays";
+  EXPECT_TRUE(answers_.empty());
+}
+
 TEST_F(GatewayNode, WhoAsksLaterIsToldWhereAnEventBeforeTheFirstPoseWas) {
   Objects frame = frameOf(1, {});
   frame.T_WB.p.x() = 3;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/types/map.h"
 #include "common/types/objects.h"
 #include "common/types/sensors.h"
 
@@ -78,6 +79,45 @@ inline Calibration forwardCamera() {
   Calibration calibration;
   calibration.cameras = {camera};
   return calibration;
+}
+
+/// Three anchors 100 m to the left of the way, with a loop of each look between them.
+inline MapReply graphFor(const MapQuery& query, const WorldId& map) {
+  MapReply reply;
+  reply.client = query.client;
+  reply.request = query.request;
+  for (AnchorNumber id = 1; id <= 3; ++id) {
+    MapAnchor anchor;
+    anchor.id = id;
+    anchor.previous = id - 1;
+    anchor.session = anchor.map = map;
+    anchor.p = {10.0 * static_cast<double>(id - 1), id == 3 ? 101.0 : 100.0, 0.0};
+    if (id > 1) anchor.sigma << 0.2, 0.1, 0.05, 0.01;
+    anchor.objects = 2;
+    reply.anchors.push_back(anchor);
+  }
+  const auto add = [&](std::uint64_t id, AnchorNumber a, AnchorNumber b, MapLoopState state) {
+    MapLoop loop;
+    loop.id = id;
+    loop.a = a;
+    loop.b = b;
+    loop.state = state;
+    loop.residual << 0.12, -0.03, 0.01, 0.002;
+    loop.sigma << 0.1, 0.1, 0.05, 0.004;
+    loop.chi2 = 1.75;
+    loop.weight = state == MapLoopState::kConfirmed ? 1.0 : 0.2;
+    loop.pairs = {{1, 1}, {2, 77}};
+    reply.loops.push_back(loop);
+  };
+  add(1, 1, 3, MapLoopState::kConfirmed);
+  add(2, 1, 2, MapLoopState::kTentative);
+  add(3, 2, 3, MapLoopState::kWithdrawn);
+  add(4, 1, 3, MapLoopState::kConfirmed);
+  reply.loops.back().kind = MapLoopKind::kTie;
+  reply.loops.back().pairs.clear();
+  reply.anchor_count = 3;
+  reply.loop_count = 4;
+  return reply;
 }
 
 }  // namespace perdure::gateway::test

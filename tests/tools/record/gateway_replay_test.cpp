@@ -19,6 +19,7 @@ namespace {
 
 using gateway::test::eventOf;
 using gateway::test::frameOf;
+using gateway::test::graphFor;
 using gateway::test::objectAt;
 using gateway::test::RawClient;
 using nlohmann::json;
@@ -32,10 +33,11 @@ class Replayed : public ::testing::Test {
     replay::RecordingWriter writer(folder_.file("run.mcap"));
     for (std::uint64_t i = 0; i < 200; ++i) {
       const std::uint64_t log = 5000 * kSecond + i * kSecond / 10;
-      mustBe(writer.add("objects",
-                           frameOf(i, {objectAt(1, {0.1 * static_cast<double>(i), 0, 0})}), log));
+      mustBe(writer.add("objects", frameOf(i, {objectAt(1, {0.1 * static_cast<double>(i), 0, 0})}),
+                        log));
       if (i == 70) mustBe(writer.add("events", eventOf(EventKind::kOccluded, 1), log));
       if (i == 120) mustBe(writer.add("events", eventOf(EventKind::kReappeared, 1), log));
+      if (i == 20) mustBe(writer.add("map/reply", graphFor({}, frameOf(i, {}).world), log));
       if (i % 10 == 9) mustBe(writer.cut());
     }
     mustBe(writer.finish());
@@ -125,6 +127,22 @@ TEST_F(Replayed, PlaysOnFromThereAndSaysWhenItHasEnded) {
   EXPECT_NEAR(now.second, 21.9, 0.05);
   control(true, 100);  // again from the beginning
   EXPECT_NEAR(state().second, 2.0, 0.2);
+}
+
+TEST_F(Replayed, HasTheGraphThatWasToldLastBeforeThePlace) {
+  startPaused();
+  client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":2,"channelId":15}]})");
+  control(false, 1, 18 * kSecond);
+  json graph = json::object();
+  for (int i = 0; i < 10 && graph.value("anchors", json::array()).empty(); ++i) {
+    graph = json::parse(client_->readMessage(2), nullptr, false);
+  }
+  EXPECT_EQ(graph["anchors"].size(), 3u);
+  EXPECT_EQ(graph["loops"].size(), 4u);
+  client_->sendFrame(R"({"op":"unsubscribe","subscriptionIds":[2]})");
+  client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":3,"channelId":16}]})");
+  const json scene = json::parse(client_->readMessage(3), nullptr, false);
+  EXPECT_EQ(scene["entities"].size(), 8u) << "who looks again sees it again";
 }
 
 TEST_F(Replayed, GoesOnToTheNextEvent) {

@@ -31,8 +31,13 @@ inline constexpr std::array<std::string_view, 2> kWords<BoxExtent>{"cuboid", "ou
 template <>
 inline constexpr std::array<std::string_view, 2> kWords<Memory>{"working", "long_term"};
 template <>
-inline constexpr std::array<std::string_view, 7> kWords<MapQueryKind>{
-    "by_id", "by_class", "by_radius", "by_box", "all", "restore", "recall"};
+inline constexpr std::array<std::string_view, 8> kWords<MapQueryKind>{
+    "by_id", "by_class", "by_radius", "by_box", "all", "restore", "recall", "graph"};
+template <>
+inline constexpr std::array<std::string_view, 2> kWords<MapLoopKind>{"loop", "tie"};
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<MapLoopState>{"tentative", "confirmed",
+                                                                      "withdrawn"};
 
 /// "visible", …; empty where there is no word.
 template <class E>

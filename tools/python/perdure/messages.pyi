@@ -388,7 +388,7 @@ class MapFrame(Message):
 class MapQuery(Message):
     client: int  # int
     request: int  # int
-    kind: Literal["by_id", "by_class", "by_radius", "by_box", "all", "restore", "recall"]  # by_id | by_class | by_radius | by_box | all | restore | recall
+    kind: Literal["by_id", "by_class", "by_radius", "by_box", "all", "restore", "recall", "graph"]  # by_id | by_class | by_radius | by_box | all | restore | recall | graph
     object_id: int  # int
     class_name: str  # str
     low: npt.NDArray[np.float64]  # (3,), m, corner, or centre of the sphere

@@ -2,10 +2,11 @@
 import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
 import { EventLog, ObjectList, renderServices } from './lists.js';
+import { wordsOfPart } from './graph_panel.js';
 import { Model, troubleOf } from './model.js';
 import { ObjectPanel } from './object_panel.js';
 import { PlaybackBar } from './playback.js';
-import { MARKS, escaped } from './words.js';
+import { MARKS, escaped, lookOfLoop } from './words.js';
 import { World } from './world.js';
 
 const $ = (id) => document.getElementById(id);
@@ -26,7 +27,7 @@ const connection = new Connection(addressOfGateway(), (state, sentence) => {
 
 let world = null;
 try {
-  world = new World($('canvas'), $('labels'), choose);
+  world = new World($('canvas'), $('labels'), choose, choosePart);
 } catch (error) {
   $('labels').innerHTML = `<p class="empty">This browser draws no WebGL, hence no map: ${escaped(error.message)}</p>`;
 }
@@ -39,6 +40,7 @@ const playback = new PlaybackBar($('playback'), connection, model);
 connection.onSeek = () => { model.jumped(); log.clear(); };
 
 function choose(id, { reveal = true } = {}) {
+  world?.choosePart(undefined);
   model.chosen = id;
   world?.choose(id);
   panel.show(id);
@@ -49,6 +51,18 @@ function choose(id, { reveal = true } = {}) {
     panel.ask();
   }
 }
+
+/** An anchor or a loop of the map's graph: {kind, id}. */
+function choosePart(part) {
+  choose(0);
+  world?.choosePart(part);
+  panel.showPart(() => wordsOfPart(part, model.graph));
+  openTab('object');
+}
+$('object').addEventListener('click', (e) => {
+  const link = e.target.closest('[data-part]');
+  if (link) choosePart({ kind: link.dataset.part, id: Number(link.dataset.id) });
+});
 
 function openTab(name) {
   for (const tab of document.querySelectorAll('[role=tab]')) tab.setAttribute('aria-selected', String(tab.dataset.tab === name));
@@ -82,6 +96,19 @@ connection.on('/map/frame', (message) => {
   model.mapFrame = message;
   world?.setMapFrame(model.T_MW());
 });
+function takeGraph(message) {
+  model.graph = message;
+  world?.setGraph(message);
+  showLegendOfGraph();
+}
+function showLegendOfGraph() {
+  const shown = Boolean(world?.shows.graph && model.graph?.anchors.length), looks = new Set(model.graph?.loops.map(lookOfLoop));
+  for (const item of document.querySelectorAll('#legend [data-graph]')) item.hidden = !shown || (item.dataset.graph !== 'anchor' && !looks.has(item.dataset.graph));
+  const none = model.graph && !model.graph.anchors.length ? ` ${model.graph.why_none}` : '';
+  const part = model.graph?.truncated ? ` The nearest ${model.graph.anchors.length} anchors of ${model.graph.all_anchors}.` : '';
+  document.querySelector('[data-key=g]').title = `Graph of the map: anchors and loops (G).${none}${part}`;
+}
+connection.on('/map/graph', takeGraph);
 connection.on('/events', (event) => {
   model.takeEvent(event);
   log.add(event);
@@ -134,6 +161,13 @@ const toggles = {
   e: () => world?.toggle('ellipsoids'),
   l: () => world?.toggle('points'),
   m: () => world?.toggle('map'),
+  g: () => {
+    const on = world?.toggle('graph');
+    if (on) connection.on('/map/graph', takeGraph);
+    else connection.off('/map/graph'); // nobody looks: nothing is asked
+    showLegendOfGraph();
+    return on;
+  },
   c: () => {
     showsCamera = !showsCamera;
     $('camera').hidden = !showsCamera;
@@ -229,7 +263,7 @@ function showState() {
 function refresh() {
   if (now4(4)) {
     if (!document.querySelector('[data-panel=objects]').hidden && performance.now() > noteHeldUntil) list.render();
-    if (!document.querySelector('[data-panel=object]').hidden && model.chosen) panel.render();
+    if (!document.querySelector('[data-panel=object]').hidden && (model.chosen || panel.part)) panel.part ? panel.renderPart() : panel.render();
     showState();
   }
   world?.draw();
@@ -245,5 +279,5 @@ function now4(rate) {
 }
 
 // For tests: what is there and what was drawn.
-window.perdure = { model, world, camera, connection, choose, opened: performance.now() };
+window.perdure = { model, world, camera, connection, choose, choosePart, opened: performance.now() };
 refresh();

@@ -5,6 +5,7 @@ export class Model {
     this.objects = new Map(); // id → object, of the working set
     this.remembered = new Map(); // id → object, on the map, in M
     this.mapFrame = null; // the newest perdure.MapFrame
+    this.graph = null; // the newest perdure.MapGraph
     this.history = new Map(); // id → [[time, r], …]
     this.events = [];
     this.chosen = 0;

@@ -9,6 +9,7 @@ export class ObjectPanel {
     this.model = model;
     this.connection = connection;
     this.id = 0;
+    this.part = this.told = null;
     element.addEventListener('click', (e) => {
       const link = e.target.closest('[data-object]');
       if (link) onLink(Number(link.dataset.object));
@@ -19,10 +20,26 @@ export class ObjectPanel {
 
   clear() {
     this.id = 0;
+    this.part = this.told = null;
     this.element.innerHTML = '<p class="empty">Click on an object in the map or in the list.</p>';
   }
 
+  /** A part of the map's graph, in the same place: `words` give HTML, anew at each render. */
+  showPart(words) {
+    this.clear();
+    this.part = words;
+    this.renderPart();
+  }
+
+  renderPart() {
+    const words = this.part();
+    if (words === this.told) return;
+    this.told = words;
+    this.element.innerHTML = words || '<p class="empty">The map has it no more.</p>';
+  }
+
   show(id) {
+    this.part = null;
     this.id = id;
     this.full = null;
     this.note = '';

@@ -71,5 +71,14 @@ export function visibilityWords(o) {
 /** Events of the whole map, which are marked in it. */
 export const MARKS = { loop_closed: '#c58cff', relocalised: '#9fe5bf', loop_withdrawn: '#ff8f88' };
 
+/** Loops of the map's graph by how they are drawn; the gateway has the same colours. */
+export const LOOPS = {
+  confirmed: { colour: '#c58cff', dashed: false, words: 'A place was found again, and the map believes it.' },
+  tie: { colour: '#40bfad', dashed: false, words: 'The place was tied to the map by objects that still had their ids.' },
+  tentative: { colour: '#f5bf40', dashed: true, words: 'A place may have been found again: the map does not believe it, or not yet.' },
+  withdrawn: { colour: '#ff8f88', dashed: true, words: 'Later loops contradict it: it was taken back, and what it had merged is two again.' },
+};
+export const lookOfLoop = (loop) => (loop.state !== 'confirmed' ? loop.state : loop.kind === 'tie' ? 'tie' : 'confirmed');
+
 /** A text node's worth of HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);

@@ -1,5 +1,6 @@
 // The map in three dimensions: ground, way, vehicle, points and things, with names over them.
 import * as THREE from './vendor/three.module.js';
+import { Graph } from './graph.js';
 import { Orbit } from './orbit.js';
 import { Thing } from './things.js';
 import { colourOf, looksLike } from './words.js';
@@ -7,10 +8,12 @@ import { colourOf, looksLike } from './words.js';
 const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120, ANSWERED_MS = 150;
 
 export class World {
-  constructor(canvas, labels, onPick) {
+  /** `onPick(id)` of an object, 0: nothing; `onPart({kind, id})` of the graph. */
+  constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
     this.onPick = onPick;
+    this.onPart = onPart;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.scene = new THREE.Scene();
@@ -21,7 +24,7 @@ export class World {
     this.things = new Map();
     this.remembered = new Map();
     this.names = new Map(); // id → element
-    this.shows = { ellipsoids: true, points: true, map: true };
+    this.shows = { ellipsoids: true, points: true, map: true, graph: true };
     this.follow = true;
     this.chosen = 0;
     this.dirty = true;
@@ -31,6 +34,7 @@ export class World {
     this.addVehicle();
     this.addLines();
     this.map = new THREE.Group(); // M in W
+    this.graph = new Graph(this.map);
     this.marks = new THREE.Group();
     this.scene.add(this.map, this.marks);
     this.orbit = new Orbit(this.camera, canvas, (shifted) => {
@@ -108,6 +112,7 @@ export class World {
 
   applyShows() {
     this.points.visible = this.shows.points;
+    this.graph.group.visible = this.shows.graph;
     for (const thing of this.things.values()) thing.ellipsoid.visible = this.shows.ellipsoids;
     for (const thing of this.remembered.values()) thing.group.visible = this.shows.map;
     this.dirty = true;
@@ -167,6 +172,16 @@ export class World {
     if (this.ground !== null) mark.position.z = this.ground;
     this.marks.add(mark);
     if (this.marks.children.length > MOST_MARKS) this.marks.remove(this.marks.children[0]);
+    this.dirty = true;
+  }
+
+  setGraph(message) {
+    this.graph.set(message);
+    this.dirty = true;
+  }
+
+  choosePart(part) {
+    this.graph.choose(part);
     this.dirty = true;
   }
 
@@ -301,7 +316,10 @@ export class World {
         if (distance < best.distance) best = { distance, id };
       }
     }
-    this.onPick(best.id);
+    const pixel = { x: e.clientX - box.left, y: e.clientY - box.top };
+    const part = this.shows.graph ? this.graph.pick(pixel, this.camera, box.width, box.height) : undefined;
+    if (part && part.distance < best.distance) this.onPart({ kind: part.kind, id: part.id });
+    else this.onPick(best.id);
   }
 
   /** Draws where something has changed; to be called each animation frame. */

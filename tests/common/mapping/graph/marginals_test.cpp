@@ -76,6 +76,31 @@ double relative(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
   return std::max(off.norm() / b.norm(), std::abs(off(3, 3)) / b(3, 3));
 }
 
+TEST(Marginals, VariancesOfAllAnchorsAreThoseOfEach) {
+  PoseGraph graph = chain(40);
+  for (const AnchorId a : {2, 5, 9, 11, 17}) graph.add(loopBetween(graph, a, 40 - a));
+  const LevelPose elsewhere{{500.0, 0.0, 0.0}, -1.0};
+  graph.addFirst(50, elsewhere);  // another component
+  graph.add(51, 50, kOnward);
+  graph.holdFirstAnchors();
+  const auto all = Marginals(graph, 7).variances();
+  ASSERT_EQ(all.size(), graph.poses().size());
+  for (const AnchorId first : {AnchorId(1), AnchorId(50)}) {
+    const Marginals from_first(graph, first);
+    for (const auto& [id, pose] : graph.poses()) {
+      const auto known = from_first.to(id);
+      if (!known) continue;
+      Eigen::Matrix4d G = Eigen::Matrix4d::Identity();
+      G.topLeftCorner<3, 3>() = graph.pose(first).R();
+      const Eigen::Vector4d expected = (G * known->covariance * G.transpose()).diagonal();
+      for (int i = 0; i < 4; ++i) {
+        EXPECT_NEAR(all.at(id)[i], expected[i], 1e-9 * expected[i] + 1e-15) << id << " " << i;
+      }
+    }
+  }
+  EXPECT_GT(all.at(51)[0], 0.005);
+}
+
 TEST(Marginals, AreTheDenseInverseOfTheSameNormalEquations) {
   PoseGraph graph = chain(14);
   graph.add(loopBetween(graph, 2, 9));

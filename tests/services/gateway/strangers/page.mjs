@@ -153,6 +153,78 @@ const poles = await page.evaluate(() => {
 });
 check(String(poles) === '1,1,0', `poles stay with their W (${poles})`);
 
+// The graph of the map: where it is drawn, what a click on a loop and on an anchor tells, G.
+await page.waitForFunction(() => window.perdure.world.graph.anchors.size > 0, { timeout: 20000, polling: 100 }).catch(() => {});
+figures.graph = await page.evaluate(() => {
+  const { graph } = window.perdure.world;
+  const look = (id) => Object.entries(graph.lines).find(([, line]) => {
+    const at = line.geometry.getAttribute('position'), top = graph.loops.get(id).points[4];
+    for (let i = 0; i < (at?.count ?? 0); ++i) if (Math.hypot(at.getX(i) - top.x, at.getY(i) - top.y, at.getZ(i) - top.z) < 1e-4) return true;
+    return false;
+  })?.[0];
+  const loops = Object.fromEntries([...graph.loops.keys()].map((id) => [id, id === 4 ? 'tie' : look(id)]));
+  return { anchors: [...graph.anchors.keys()].map((id) => graph.place({ kind: 'anchor', id }).toArray().map(Math.round)), loops, balls: graph.balls.count,
+    ties: graph.lines.tie.geometry.getAttribute('position').count, way: graph.way.geometry.getAttribute('position').count };
+});
+check(figures.graph.balls === 3 && figures.graph.way === 4, `three anchors and the way between them (${JSON.stringify(figures.graph)})`);
+check(figures.graph.ties === 16, `the tie is one line (${figures.graph.ties})`);
+/** Pixels of a colour, also where a thin line is blended with the dark behind it. */
+const pixelsOf = (...wanted) => page.evaluate((wanted) => {
+  const { world } = window.perdure;
+  world.renderer.render(world.scene, world.camera);
+  const gl = world.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight, pixels = new Uint8Array(4 * w * h);
+  gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  let n = 0;
+  const back = [0x0c, 0x11, 0x17], length = Math.hypot(...wanted.map((c, k) => c - back[k]));
+  for (let i = 0; i < pixels.length; i += 4) {
+    const seen = back.map((c, k) => pixels[i + k] - c), much = Math.hypot(...seen);
+    const along = seen.reduce((sum, c, k) => sum + c * (wanted[k] - back[k]), 0) / length;
+    if (along > 0.35 * length && along > 0.97 * much) ++n;
+  }
+  return n;
+}, wanted);
+const BALL = [0x8f, 0xb8, 0xde], AMBER = [0xf5, 0xbf, 0x40];
+const overTheLoop = (kind, id, side) => page.evaluate(([part, off]) => {
+  const { world } = window.perdure, at = world.graph.place(part).toArray();
+  world.lookAtPlace([at[0], at[1] + off, at[2]]);
+  world.orbit.polar = 0.02;
+  world.orbit.distance = 30;
+  world.orbit.azimuth = Math.PI;
+  world.orbit.apply();
+  world.camera.updateMatrixWorld();
+  const v = world.graph.place(part).project(world.camera), box = world.canvas.getBoundingClientRect();
+  return [box.left + ((v.x + 1) * box.width) / 2, box.top + ((1 - v.y) * box.height) / 2];
+}, [{ kind, id }, side]);
+let spot = await overTheLoop('loop', 2, 0);
+const lit_graph = [await pixelsOf(...BALL), await pixelsOf(...AMBER)];
+await pause(600);
+await page.screenshot({ path: join(out, 'graph.png') });
+await page.mouse.click(...spot);
+await pause(400);
+let told = await page.$eval('#object', (e) => e.innerText);
+for (const words of ['Loop 2', 'tentative', 'anchor 1', 'anchor 2', 'by', '2 objects', 'seen as 77', '0.120 m', '± 0.100 m', 'χ² of 4', '1.75', '0.200']) check(told.includes(words), `a click on the loop tells "${words}" (${told})`);
+await page.screenshot({ path: join(out, 'graph_loop.png') });
+spot = await overTheLoop('anchor', 2, 0);
+await page.mouse.click(...spot);
+await pause(400);
+told = await page.$eval('#object', (e) => e.innerText);
+for (const words of ['Anchor 2', '2 objects', '± 0.200 m', 'loop 2', 'loop 3', 'withdrawn']) check(told.includes(words), `a click on the anchor tells "${words}" (${told})`);
+check(await page.evaluate(() => window.perdure.world.graph.ring.visible), 'the anchor that is chosen has its 2σ around it');
+await page.evaluate(() => document.querySelector('#object [data-part=loop][data-id="3"]').click());
+check((await page.$eval('#object', (e) => e.innerText)).includes('Loop 3'), 'from an anchor to its loop');
+const legend = () => page.$$eval('#legend [data-graph]', (items) => items.filter((i) => !i.hidden).map((i) => i.dataset.graph).join());
+check(await legend() === 'anchor,confirmed,tie,tentative,withdrawn', `the legend (${await legend()})`);
+await page.keyboard.press('Escape');
+await page.keyboard.press('g');
+await pause(300);
+const dark_graph = [await pixelsOf(...BALL), await pixelsOf(...AMBER)];
+figures.graph.pixels = [lit_graph, dark_graph];
+check(lit_graph.every((n, i) => n > 15 + dark_graph[i]), `anchors and loops are drawn, and not after G (${JSON.stringify(figures.graph.pixels)})`);
+check(await legend() === '' && await page.$eval('[data-key=g]', (e) => e.getAttribute('aria-pressed')) === 'false', 'G: it is off');
+check(await page.evaluate(() => ![...window.perdure.connection.topics.values()].includes('/map/graph')), 'off: nothing is asked');
+await page.keyboard.press('g');
+await page.keyboard.press('f');
+
 // A phone.
 await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
 await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });

@@ -1,0 +1,55 @@
+// What people see of the graph.
+#include <algorithm>
+
+#include "common/mapping/mapper.h"
+
+namespace perdure::mapping {
+
+/// By what a loop was found; of one of an earlier process by the merges that still hang on it.
+void Mapper::putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>>& pairs,
+                          std::size_t& points) const {
+  if (const LoopClosure* closure = loop_book_.closureOf(loop)) {
+    pairs = closure->match.pairs;
+    points = closure->match.points;
+    return;
+  }
+  for (const auto& [absorbed, merge] : state_.merges()) {
+    if (merge.loop == loop) pairs.emplace_back(merge.survivor, absorbed);
+  }
+}
+
+std::vector<Mapper::Loop> Mapper::loops() const {
+  std::vector<Loop> result;
+  for (const auto& [id, edge] : state_.graph().edges()) {
+    if (edge.kind == EdgeKind::kOdometry) continue;
+    Loop loop{id, edge, state_.graph().weight(id)};
+    if (edge.kind == EdgeKind::kLoop) {
+      loop.told = loop_book_.isTold(id);
+      putWitnesses(id, loop.pairs, loop.points);
+    }
+    result.push_back(std::move(loop));
+  }
+  return result;
+}
+
+std::map<AnchorId, Eigen::Vector4d> Mapper::variances() {
+  if (builder_.last()) return marginals().variances();
+  if (state_.anchors().empty()) return {};
+  return Marginals(state_.graph(), state_.anchors().rbegin()->first).variances();
+}
+
+std::size_t Mapper::objectsOf(AnchorId anchor) const {
+  const std::set<ObjectId>& seen = state_.seenFrom(anchor);
+  return static_cast<std::size_t>(std::count_if(seen.begin(), seen.end(), [&](ObjectId id) {
+    const ObjectRecord& record = state_.records().at(id);
+    return record.confirmed && record.sighting.anchor == anchor;
+  }));
+}
+
+std::optional<AnchorId> Mapper::newestAnchor(const WorldId& session) const {
+  if (const auto newest = state_.newestOf(session)) return newest->id;
+  if (state_.anchors().empty()) return std::nullopt;
+  return state_.anchors().rbegin()->first;
+}
+
+}  // namespace perdure::mapping
