@@ -9,7 +9,8 @@ bool sameCamera(const CameraCalibration& a, const CameraCalibration& b) {
   return a.name == b.name && a.width == b.width && a.height == b.height && a.fx == b.fx &&
          a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion &&
          a.distortion_coefficients == b.distortion_coefficients &&
-         a.T_BC.matrix() == b.T_BC.matrix() && a.time_offset_s == b.time_offset_s;
+         a.T_BC.matrix() == b.T_BC.matrix() && a.time_offset_s == b.time_offset_s &&
+         a.readout_s == b.readout_s;
 }
 
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
@@ -18,11 +19,17 @@ std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
   return T_BC;
 }
 
+std::vector<double> readouts(const std::vector<CameraModel>& all) {
+  std::vector<double> readout_s;
+  for (const CameraModel& m : all) readout_s.push_back(m.calibration().readout_s);
+  return readout_s;
+}
+
 }  // namespace
 
 Cameras::Cameras(const Config& config, const Options& options, const std::vector<CameraModel>& all)
     : tracker(config.tracker, all),
-      estimator(options, extrinsics(all), all[0].calibration().time_offset_s),
+      estimator(options, extrinsics(all), all[0].calibration().time_offset_s, readouts(all)),
       models(all) {}
 
 bool sameCameras(const Calibration& a, const Calibration& b) {

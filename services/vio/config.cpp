@@ -66,6 +66,8 @@ void describeVision(Options& o, Fields& f) {
             {"camera-IMU extrinsics are part of the state"});
   f.boolean("calibration.estimate_time_offset", o.calibration.estimate_time_offset,
             {"the camera-IMU time offset is part of the state"});
+  f.boolean("calibration.estimate_readout", o.calibration.estimate_readout,
+            {"the read-out of a rolling shutter is part of the state; 0 in the rig stays 0"});
   f.number("calibration.extrinsic_rotation", o.calibration.extrinsic_rotation, positive(),
            {"deviation of the given extrinsics", "rad"});
   f.number("calibration.extrinsic_position", o.calibration.extrinsic_position_m, positive(),
@@ -74,6 +76,8 @@ void describeVision(Options& o, Fields& f) {
            {"on both, of the second camera relative to the first"});
   f.number("calibration.time_offset", o.calibration.time_offset_s, positive(),
            {"deviation of the given time offset", "s"});
+  f.number("calibration.readout", o.calibration.readout_s, positive(),
+           {"deviation of the given read-out of a rolling shutter", "s"});
 }
 
 void describeTracker(TrackerOptions& t, Config& c, Fields& f) {

@@ -144,6 +144,14 @@ TimePoint Node::imuTime(TimePoint image_time) const {
   return image_time + durationFromSeconds(offset);
 }
 
+double Node::longestReadout() const {
+  double longest = 0.0;
+  for (const CameraModel& m : cameras_->models) {
+    longest = std::max(longest, m.calibration().readout_s);
+  }
+  return longest;
+}
+
 bool Node::waitsForPair() const {
   if (cameras_->models.size() < 2 || !waiting_.frontMayBePaired()) return false;
   // Half a second of samples says that none will come.
@@ -154,6 +162,10 @@ bool Node::waitsForPair() const {
 bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
+  // To the last row: an image does not come before it has been read out.
+  if (const double readout_s = longestReadout(); readout_s > 0.0) {
+    now += durationFromSeconds(0.5 * readout_s);
+  }
   // The last sample may be held for a quarter of a period: a capture that waits for this frame's
   // answer sends no sample beyond the next frame.
   if (const auto period = imu_.period()) now -= *period / 4;
@@ -192,6 +204,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
       seconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
     R = cameras_->estimator.predictRotation(imu_, now);
   }
+  const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
   if (!started()) {
     // Traffic before a body at rest: with the rotation known it does not outvote what rests.
     const auto motion = cameras_->tracker.motionSince(1, 0.8);
@@ -200,14 +213,14 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
         imuIsEven(imu_, now, kEven, cameras_->estimator.options().imu)) {
       R = Eigen::Matrix3d::Identity();
     }
-    return cameras_->tracker.track(first, second, R);
+    return cameras_->tracker.track(first, second, R, {}, turn);
   }
   const State& state = cameras_->estimator.state();
   RigidTransform T_WB = state.nav.T_WB();
   T_WB.p += seconds(now - state.time) * state.nav.v_WB;
   if (R) T_WB.q = T_WB.q * Eigen::Quaterniond(R->transpose());
   const auto masked = moving_.boxes(cameras_->models[0], world_, T_WB, *last_image_);
-  return cameras_->tracker.track(first, second, R, masked);
+  return cameras_->tracker.track(first, second, R, masked, turn);
 }
 
 void Node::process(const FramePair& frames) {

@@ -77,6 +77,7 @@ class Node {
   void publishWaiting(const FrameStamp& stamp);
   void publishLandmarks(const FrameStamp& stamp, const cv::Mat& image);
   TimePoint imuTime(TimePoint image_time) const;
+  double longestReadout() const;
 
   Config config_;
   InstanceId instance_;

@@ -16,7 +16,7 @@ bool Node::resume(TimePoint now) {
     world_.epoch = saved.world.epoch + 1;
     return false;
   }
-  if (saved.T_BC.size() != cameras_->models.size()) {
+  if (!cameras_->estimator.fits(saved)) {
     reasons_.add("state_other_cameras");
     world_.epoch = saved.world.epoch + 1;
     return false;

@@ -124,7 +124,8 @@ std::vector<Bytes> vioStates() {
   vio::SavedState state;
   state.world = {17, 2};
   state.T_BC.resize(1);
-  const Eigen::Index size = vio::kNavSize + 6 + 1;
+  state.readout_s = {0.02};
+  const Eigen::Index size = vio::kNavSize + 6 + 1 + 1;
   state.covariance = 0.01 * Eigen::MatrixXd::Identity(size, size);
   return {bytesOf(vio::toText(state))};
 }

@@ -26,14 +26,16 @@ std::int64_t asInt(std::size_t n) { return static_cast<std::int64_t>(n); }
 }  // namespace
 
 Estimator::Estimator(const Options& options, const std::vector<RigidTransform>& T_BC,
-                     double time_offset_s)
-    : options_(options), T_BC_(T_BC), time_offset_s_(time_offset_s) {
+                     double time_offset_s, const std::vector<double>& readout_s)
+    : options_(options), T_BC_(T_BC), time_offset_s_(time_offset_s), readout_s_(readout_s) {
   check(!T_BC.empty() && T_BC.size() <= kMaxCameras, "one or two cameras");
+  readout_s_.resize(T_BC.size(), 0.0);
 }
 
 void Estimator::start(const Start& start) {
   state_.emplace(T_BC_, time_offset_s_, static_cast<int>(options_.window.clones),
-                 static_cast<int>(options_.window.slam_features));
+                 static_cast<int>(options_.window.slam_features), readout_s_,
+                 options_.calibration.estimate_readout);
   state_->nav = state_->nav_linear = start.nav;
   state_->time = start.time;
   auto P = state_->P();
@@ -65,6 +67,9 @@ void Estimator::start(const Start& start) {
   if (c.estimate_time_offset) {
     P(state_->timeOffsetAt(), state_->timeOffsetAt()) = c.time_offset_s * c.time_offset_s;
   }
+  for (std::size_t i = 0; i < T_BC_.size(); ++i) {
+    if (const auto at = state_->readoutAt(i)) P(*at, *at) = c.readout_s * c.readout_s;
+  }
   database_.clear();
   previous_frame_.reset();
   agreed_ = false;
@@ -72,11 +77,23 @@ void Estimator::start(const Start& start) {
   if (start.at_rest) standstill_.confirm(start.time, restExpectation(*state_, options_.gravity));
 }
 
+bool Estimator::fits(const SavedState& saved) const {
+  if (saved.T_BC.size() != T_BC_.size() || saved.readout_s.size() != T_BC_.size()) return false;
+  Eigen::Index size = kNavSize + 6 * static_cast<Eigen::Index>(T_BC_.size()) + 1;
+  for (std::size_t i = 0; i < T_BC_.size(); ++i) {
+    const bool rolls = readout_s_[i] != 0.0;
+    if (rolls != (saved.readout_s[i] != 0.0)) return false;
+    size += rolls && options_.calibration.estimate_readout;
+  }
+  return saved.covariance.rows() == size;
+}
+
 void Estimator::restore(const SavedState& saved) {
-  check(saved.T_BC.size() == T_BC_.size(), "as many cameras as were saved");
+  check(fits(saved), "the cameras that were saved");
   start({saved.time, saved.nav, saved.covariance.topLeftCorner<15, 15>()});
   state_->T_BC = saved.T_BC;
   state_->time_offset_s = saved.time_offset_s;
+  state_->readout_s = saved.readout_s;
   state_->P() = saved.covariance;
 }
 
@@ -87,7 +104,8 @@ SavedState Estimator::save() const {
   s.nav = state_->nav;
   s.T_BC = state_->T_BC;
   s.time_offset_s = state_->time_offset_s;
-  const int n = state_->timeOffsetAt() + 1;
+  s.readout_s = state_->readout_s;
+  const int n = state_->calibrationEnd();
   s.covariance = state_->P().topLeftCorner(n, n);
   return s;
 }
@@ -96,6 +114,23 @@ Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) {
   if (!state_ || to <= state_->time || imu.empty()) return Eigen::Matrix3d::Identity();
   imu.between(state_->time, to, readings_);
   return integrateRotation(readings_, state_->nav.gyro_bias).toRotationMatrix().transpose();
+}
+
+Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
+  const double readout_s = state_ ? state_->readout_s[0] : readout_s_[0];
+  if (readout_s == 0.0 || imu.empty()) return Eigen::Vector3d::Zero();
+  const Duration half = durationFromSeconds(0.5 * std::abs(readout_s));
+  const Nav nav = state_ ? state_->nav : Nav{};
+  return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_).rate;
+}
+
+/// What the newest clone's rows are seen from; again after an update, with its velocity and biases.
+void Estimator::measureRows(const ImuBuffer& imu) {
+  const double readout_s = state_->longestReadout();
+  if (readout_s == 0.0) return;
+  const Duration half = durationFromSeconds(0.5 * std::abs(readout_s));
+  state_->clones.back().rows =
+      rowMotion(state_->nav, imu, state_->time, half, options_.gravity, rows_);
 }
 
 Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& imu) {
@@ -114,6 +149,7 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
     return fail("frame_not_after_state");
   }
   state_->addClone(input.frame, input.image_time, rate, options_.window.first_estimates);
+  measureRows(imu);
   database_.add(input.frame, input.tracked);
   return {};
 }
@@ -336,6 +372,7 @@ Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffe
     stop();
     return tl::unexpected(fine.error());
   }
+  measureRows(imu);
   newest_ = input.tracked;
   report(input, out);
   marginalise(out.at_rest);

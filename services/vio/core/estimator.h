@@ -62,13 +62,16 @@ struct LandmarkEstimate {
 
 class Estimator {
  public:
-  /// One or two cameras.
-  Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s);
+  /// One or two cameras. readout_s: of each, 0 where all rows are exposed at once; none: all are.
+  Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s,
+            const std::vector<double>& readout_s = {});
 
   /// Begins (anew) at a start; the window is empty.
   void start(const Start& start);
-  /// Begins with a saved state of as many cameras.
+  /// Begins with a saved state of the same cameras.
   void restore(const SavedState& saved);
+  /// As many cameras, and the same shutters.
+  bool fits(const SavedState& saved) const;
   /// What restore takes; world and next_track are the caller's. Needs started().
   SavedState save() const;
   bool started() const { return state_.has_value(); }
@@ -83,6 +86,10 @@ class Estimator {
 
   /// The rotation R_B1_B0 of the body from the newest frame to an IMU time, by the gyroscope.
   Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
+
+  /// How far the body turns while the first camera reads out an image of an IMU time: a rotation
+  /// vector in B. Before a start by the raw rate. Zero where all rows are exposed at once.
+  Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
   /// Points seen in the newest image whose position is known.
   std::vector<LandmarkEstimate> landmarks() const;
@@ -105,6 +112,7 @@ class Estimator {
   void dropLostPoints(std::uint64_t frame);
   void report(const FrameInput& input, FrameEstimate& out);
   void marginalise(bool at_rest);
+  void measureRows(const ImuBuffer& imu);
   Result<void> sane() const;
   LandmarkEstimate ofState(const PointState& point, const ImagePoint& seen) const;
   std::optional<LandmarkEstimate> ofTrack(const Track& track, const ImagePoint& seen) const;
@@ -112,12 +120,14 @@ class Estimator {
   Options options_;
   std::vector<RigidTransform> T_BC_;
   double time_offset_s_;
+  std::vector<double> readout_s_;
   bool keeps_innovations_ = false;
   std::optional<State> state_;
   Standstill standstill_;
   FeatureDatabase database_;
   TrackedFrame newest_;
   std::vector<ImuReading> readings_;  ///< of one interval; kept for its memory
+  std::vector<ImuReading> rows_;      ///< the same about one image
   ReasonCounts reasons_;
   bool agreed_ = false;  ///< most points of the last image met their predictions
   std::optional<std::uint64_t> previous_frame_;

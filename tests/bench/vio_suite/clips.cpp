@@ -105,9 +105,11 @@ std::vector<Clip> allClips(const fs::path& data) {
   };
 }
 
-std::optional<fs::path> prepare(const Clip& clip, const fs::path& cache,
+std::optional<fs::path> prepare(const Clip& clip, const fs::path& cache, unsigned draw,
                                 const std::function<void(double)>& progress) {
-  const fs::path folder = cache / clip.name;
+  const fs::path folder =
+      cache /
+      (draw == 0 || !clip.real.empty() ? clip.name : clip.name + "_" + std::to_string(draw));
   if (!clip.real.empty()) {
     if (fs::exists(folder / kWhole)) return folder;
     if (!fs::exists(clip.real / "cam0.mkv")) return std::nullopt;
@@ -121,7 +123,7 @@ std::optional<fs::path> prepare(const Clip& clip, const fs::path& cache,
   options.world.mono8 = true;
   options.world.rolling_shutter = clip.rolling_shutter;
   options.threads = 1;
-  tools::simulate(clip.make(options.world), options, [&](const tools::SimulateProgress& p) {
+  tools::simulate(clip.make(options.world, draw), options, [&](const tools::SimulateProgress& p) {
     progress(static_cast<double>(p.frame) / static_cast<double>(p.frames));
   });
   return folder;

@@ -22,7 +22,7 @@ struct Clip {
   std::filesystem::path real = {};
   /// Of a real clip: the IMU is simulated along the truth, so that it agrees with the images.
   bool imu_fits = false;
-  std::function<sim::Scene(const sim::SceneOptions&)> make = {};
+  std::function<sim::Scene(const sim::SceneOptions&, unsigned draw)> make = {};
   bool rolling_shutter = false;
 };
 
@@ -30,8 +30,10 @@ struct Clip {
 std::vector<Clip> allClips(const std::filesystem::path& data);
 
 /// Makes the clip's folder under `cache` where it is not there yet: a EuRoC folder that
-/// replay::Dataset reads. Nothing where the data is absent. `progress`: a share of the work done.
+/// replay::Dataset reads. Nothing where the data is absent. `draw`: of a simulated clip, other than
+/// 0 for the same with other looks and sensors. `progress`: a share of the work done.
 std::optional<std::filesystem::path> prepare(const Clip& clip, const std::filesystem::path& cache,
+                                             unsigned draw,
                                              const std::function<void(double)>& progress);
 
 }  // namespace perdure::bench

@@ -23,7 +23,9 @@ struct CommandLine {
   std::string data = "../shared/data", cache = "build/vio_suite", csv, half;
   std::vector<std::string> only, variants, set;
   double from_s = 0.0, until_s = 1e9;
+  std::optional<double> readout_s;
   int jobs = 1, starts = 0;
+  unsigned draw = 0;
   bool no_klt = false, innovations = false, reasons = false, list = false;
 };
 
@@ -92,7 +94,7 @@ class Suite {
   }
   void take(const Clip& clip) {
     try {
-      const auto folder = prepare(clip, line_.cache, progress(clip, "is made,"));
+      const auto folder = prepare(clip, line_.cache, line_.draw, progress(clip, "is made,"));
       if (!folder) return say(clip.name + ": skipped, " + clip.real.string() + " is not there");
       if (line_.starts > 0) {
         const auto rows = startsOf(clip, *folder, variants_, line_.starts);
@@ -101,12 +103,17 @@ class Suite {
         return;
       }
       const auto outcomes =
-          play(*folder, variants_, {line_.from_s, line_.until_s, !line_.no_klt, line_.innovations},
+          play(*folder, variants_,
+               {line_.from_s, line_.until_s, !line_.no_klt, line_.innovations, line_.readout_s},
                progress(clip, "is played,"));
       const std::lock_guard lock(mutex_);
       for (std::size_t i = 0; i < outcomes.size(); ++i) {
         table.add(clip, variants_[i].name, outcomes[i]);
         if (!line_.reasons) continue;
+        if (outcomes[i].readout_s != 0.0) {
+          std::fprintf(stderr, "  %s %s read-out %.2f ms\n", clip.name.c_str(),
+                       variants_[i].name.c_str(), 1e3 * outcomes[i].readout_s);
+        }
         for (const NeesAt& n : outcomes[i].accuracy.nees) {
           std::fprintf(stderr, "  %s %s %3.0f s: %.3f m, %.2f deg; NEES %.2f %.2f %.2f\n",
                        clip.name.c_str(), variants_[i].name.c_str(), n.seconds, n.position_error,
@@ -170,6 +177,10 @@ int main(int argc, char** argv) {
   app.add_option("--starts", line.starts,
                  "Cut each clip at so many random places instead, and "
                  "judge how vio starts in motion");
+  app.add_option("--draw", line.draw,
+                 "Simulated clips with other looks, noise and sensors, for each number");
+  app.add_option("--readout", line.readout_s,
+                 "Seconds of a rolling shutter that vio is told, whatever the clip has");
   app.add_option("--jobs", line.jobs, "Clips at a time")->capture_default_str();
   app.add_option("--csv", line.csv, "The table goes there, too");
   app.add_flag("--no-klt", line.no_klt, "Without OpenCV's tracking beside it");

@@ -5,6 +5,7 @@
 
 #include "common/replay/dataset.h"
 #include "common/vision/image.h"
+#include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
 #include "tests/bench/plain_tracker.h"
 
@@ -49,6 +50,7 @@ class Player {
     out.ms_p99 = quantile(ms_, 0.99);
     out.innovations = innovations_;
     for (const auto& [code, n] : node_.reasons().all()) out.reasons[code] = n;
+    if (const auto state = vio::fromText(node_.saveState())) out.readout_s = state->readout_s[0];
     out.resets = out.reasons.count("reset") ? out.reasons["reset"] : 0;
     if (odometry_.empty()) return out;
     out.first_s = toSeconds(odometry_.front().stamp.time - *first_frame_);
@@ -93,7 +95,10 @@ std::vector<Outcome> play(const std::filesystem::path& folder, const std::vector
   open.path = folder;
   open.encoding = open.second_encoding = ImageEncoding::kMono8;
   const auto dataset = replay::Dataset::open(open);
-  const Calibration& calibration = dataset->calibration();
+  Calibration calibration = dataset->calibration();
+  for (CameraCalibration& camera : calibration.cameras) {
+    camera.readout_s = options.readout_s.value_or(camera.readout_s);
+  }
   std::vector<std::unique_ptr<Player>> players;
   for (const Variant& v : variants) {
     players.push_back(std::make_unique<Player>(v, calibration, options.innovations));

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,12 +26,14 @@ struct Outcome {
   double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not asked
   Innovations innovations;                ///< where asked for
   std::size_t frames = 0, resets = 0;
+  double readout_s = 0.0;  ///< of the first camera, as vio has it at the end
   std::map<std::string, std::uint64_t> reasons;
 };
 
 struct PlayOptions {
   double from_s = 0.0, until_s = 1e9;  ///< of the clip's time
   bool klt = true, innovations = false;
+  std::optional<double> readout_s = {};  ///< what vio is told of the cameras, whatever they have
 };
 
 /// In the order of `variants`. `progress`: the share of the clip that is done.

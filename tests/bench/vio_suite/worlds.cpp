@@ -91,6 +91,9 @@ void withoutSpeed(sim::Scene& scene) {
   scene.rig.calibration.has_speed = scene.rig.true_calibration.has_speed = false;
 }
 
+/// Those of the clips are neighbours; draws are further apart.
+unsigned seedOf(unsigned clip, unsigned draw) { return clip + 100 * draw; }
+
 /// Everything so many times as large.
 void enlarge(sim::Scene& scene, double factor) {
   for (sim::Prop& prop : scene.props) {
@@ -127,46 +130,46 @@ Flight inHall() {
 
 }  // namespace
 
-sim::Scene roomWalk(const sim::SceneOptions& options) {
+sim::Scene roomWalk(const sim::SceneOptions& options, unsigned draw) {
   sim::SceneOptions with = options;
   with.seconds = 30.0;
-  sim::Scene scene = sim::makeScene("room", 21, with);
+  sim::Scene scene = sim::makeScene("room", seedOf(21, draw), with);
   scene.name = "suite_room_walk";
-  setImu(scene, {}, 21);
+  setImu(scene, {}, seedOf(21, draw));
   return scene;
 }
 
-sim::Scene roomFly(const sim::SceneOptions& options) {
+sim::Scene roomFly(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.lap_s = 9.0;
-  return inRoom("room_fly", 22, options, 1.0, f);
+  return inRoom("room_fly", seedOf(22, draw), options, 1.0, f);
 }
 
-sim::Scene hallFly(const sim::SceneOptions& options) {
-  return inRoom("hall_fly", 23, options, 2.6, inHall());
+sim::Scene hallFly(const sim::SceneOptions& options, unsigned draw) {
+  return inRoom("hall_fly", seedOf(23, draw), options, 2.6, inHall());
 }
 
-sim::Scene hallEven(const sim::SceneOptions& options) {
+sim::Scene hallEven(const sim::SceneOptions& options, unsigned draw) {
   Flight f = inHall();
   f.lap_s = 40.0;
   f.gaze_s = 15.0;
   f.gaze = 0.5;
-  return inRoom("hall_even", 24, options, 2.6, f);
+  return inRoom("hall_even", seedOf(24, draw), options, 2.6, f);
 }
 
-sim::Scene shaky(const sim::SceneOptions& options) {
+sim::Scene shaky(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.lap_s = 7.0;
   f.gaze_s = 4.0;
   f.shake_m = 0.006;
   f.shake_rad = 0.02;
-  return inRoom("shaky", 25, options, 1.0, f);
+  return inRoom("shaky", seedOf(25, draw), options, 1.0, f);
 }
 
-sim::Scene dim(const sim::SceneOptions& options) {
+sim::Scene dim(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.lap_s = 12.0;
-  sim::Scene scene = inRoom("dim", 26, options, 1.0, f);
+  sim::Scene scene = inRoom("dim", seedOf(26, draw), options, 1.0, f);
   for (sim::CameraErrors& camera : scene.rig.cameras) {
     camera.exposure_s = 0.02;
     camera.full_well_electrons = 600.0;
@@ -174,10 +177,10 @@ sim::Scene dim(const sim::SceneOptions& options) {
   return scene;
 }
 
-sim::Scene plain(const sim::SceneOptions& options) {
+sim::Scene plain(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.lap_s = 12.0;
-  sim::Scene scene = inRoom("plain", 27, options, 1.0, f);
+  sim::Scene scene = inRoom("plain", seedOf(27, draw), options, 1.0, f);
   // One thing in four stays.
   std::size_t kept = 0;
   std::erase_if(scene.objects, [&](const auto&) { return kept++ % 4 != 0; });
@@ -187,43 +190,43 @@ sim::Scene plain(const sim::SceneOptions& options) {
   return scene;
 }
 
-sim::Scene street(const sim::SceneOptions& options) {
+sim::Scene street(const sim::SceneOptions& options, unsigned draw) {
   sim::SceneOptions with = options;
   with.seconds = 30.0;
-  sim::Scene scene = sim::makeScene("street", 28, with);
+  sim::Scene scene = sim::makeScene("street", seedOf(28, draw), with);
   scene.name = "suite_street";
   withoutSpeed(scene);
-  setImu(scene, {}, 28);
+  setImu(scene, {}, seedOf(28, draw));
   return scene;
 }
 
-sim::Scene far(const sim::SceneOptions& options) {
+sim::Scene far(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.radii = {40.0, 30.0, 3.0};
   f.height = 30.0;
   f.lap_s = 30.0;
   f.gaze = 0.4;
-  sim::Scene scene = sim::makeScene("town", 29, options);
+  sim::Scene scene = sim::makeScene("town", seedOf(29, draw), options);
   scene.name = "suite_far";
   scene.seconds = f.seconds;
   scene.body = flown(f);
   withoutSpeed(scene);
-  setImu(scene, {}, 29);
+  setImu(scene, {}, seedOf(29, draw));
   return scene;
 }
 
-sim::Scene coarseImu(const sim::SceneOptions& options) {
-  return inRoom("coarse_imu", 30, options, 2.6, inHall(), kPhone);
+sim::Scene coarseImu(const sim::SceneOptions& options, unsigned draw) {
+  return inRoom("coarse_imu", seedOf(30, draw), options, 2.6, inHall(), kPhone);
 }
 
-sim::Scene fineImu(const sim::SceneOptions& options) {
-  return inRoom("fine_imu", 31, options, 2.6, inHall(), kTactical);
+sim::Scene fineImu(const sim::SceneOptions& options, unsigned draw) {
+  return inRoom("fine_imu", seedOf(31, draw), options, 2.6, inHall(), kTactical);
 }
 
-sim::Scene rolling(const sim::SceneOptions& options) {
+sim::Scene rolling(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.lap_s = 10.0;
-  return inRoom("rolling", 32, options, 1.0, f);
+  return inRoom("rolling", seedOf(32, draw), options, 1.0, f);
 }
 
 }  // namespace perdure::bench

@@ -56,8 +56,11 @@ CameraCalibration testCamera(int index) {
 
 SimulatedDrive::SimulatedDrive(const DriveOptions& options)
     : options_(options), random_(options.seed) {
-  cameras_.emplace_back(testCamera(0));
-  if (options.stereo) cameras_.emplace_back(testCamera(1));
+  for (int c = 0; c < (options.stereo ? 2 : 1); ++c) {
+    CameraCalibration camera = testCamera(c);
+    camera.readout_s = options.readout_s;
+    cameras_.emplace_back(camera);
+  }
   options.place == DrivePlace::kRoom ? buildRoom() : buildStreet();
   ids_.assign(points_.size(), 0);
 }
@@ -180,13 +183,27 @@ RigidTransform SimulatedDrive::seenFrom(double t) const {
   return t >= options_.jump_from_s && t < options_.jump_until_s ? options_.jump * T_WB : T_WB;
 }
 
+std::optional<Eigen::Vector2d> SimulatedDrive::project(std::size_t c, const Vector3d& p_W,
+                                                       double t) const {
+  const CameraModel& camera = cameras_[c];
+  auto pixel = camera.project((seenFrom(t) * camera.T_BC()).inverse() * p_W);
+  if (options_.readout_s == 0.0) return pixel;
+  // The row says when the point is seen, and that says in which row: a hundredth is left each time.
+  for (int i = 0; i < 3 && pixel; ++i) {
+    const double row = pixel->y() / (camera.height() - 1) - 0.5;
+    const RigidTransform T_WB = seenFrom(t + row * options_.readout_s);
+    pixel = camera.project((T_WB * camera.T_BC()).inverse() * p_W);
+  }
+  return pixel;
+}
+
 TrackedFrame SimulatedDrive::see(double t) {
   const RigidTransform T_WB = seenFrom(t);
   std::vector<std::size_t> seen, fresh;
   std::vector<std::array<std::optional<ImagePoint>, kMaxCameras>> views(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
-      const auto pixel = cameras_[c].project((T_WB * cameras_[c].T_BC()).inverse() * points_[i]);
+      const auto pixel = project(c, points_[i], t);
       if (!pixel || !cameras_[c].inImage(*pixel, 5.0)) continue;
       if ((points_[i] - T_WB.p).norm() > kFarthest) continue;
       const Eigen::Vector2d noisy = *pixel + noise(options_.pixel_sigma).head<2>();

@@ -26,6 +26,7 @@ struct DriveOptions {
   bool stereo = false;
   bool walking_biases = false;  ///< by the noise's walks; imu() has to go before truth()
   double time_offset_s = 0.0;   ///< true t_imu − t_image
+  double readout_s = 0.0;       ///< true, of a rolling shutter: first to last row
   double rest_s = 0.0;          ///< stands still this long at the start
   int points = 600;             ///< of a street: for each 150 m
   int points_per_image = 100;
@@ -50,10 +51,13 @@ class SimulatedDrive {
   std::vector<ImuReading> imu(double until);
   /// Where the body is for the images: truth, but for the jump.
   RigidTransform seenFrom(double t) const;
+  /// Where camera `c` sees a point at image time `t`, each row at its own time.
+  std::optional<Eigen::Vector2d> project(std::size_t c, const Eigen::Vector3d& p_W, double t) const;
   /// What the cameras see at image time `t` (their clock).
   TrackedFrame see(double t);
   Eigen::Vector2d pixelOf(std::size_t point, double t) const;
 
+  /// Their calibration says the true read-out.
   const std::vector<CameraModel>& cameras() const { return cameras_; }
   std::vector<RigidTransform> T_BC() const;
   const std::vector<Eigen::Vector3d>& points() const { return points_; }

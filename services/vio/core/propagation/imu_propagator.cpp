@@ -127,6 +127,22 @@ Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
   return q;
 }
 
+RowMotion rowMotion(const Nav& nav, const ImuBuffer& imu, TimePoint time, Duration half,
+                    double gravity, std::vector<ImuReading>& readings) {
+  const double h = toSeconds(half);
+  imu.between(time - half, time, readings);
+  const Vector3d before = logSo3(integrateRotation(readings, nav.gyro_bias));
+  imu.between(time, time + half, readings);
+  const Vector3d after = logSo3(integrateRotation(readings, nav.gyro_bias));
+  const Eigen::Quaterniond q_BW = nav.q_WB.conjugate();
+  RowMotion m;
+  m.rate = (before + after) / (2.0 * h);
+  m.rate_change = (after - before) / (h * h);
+  m.velocity = q_BW * nav.v_WB;
+  m.acceleration = readings.front().accel - nav.accel_bias + q_BW * Vector3d(0, 0, -gravity);
+  return m;
+}
+
 Nav predict(const Nav& nav, const ImuIncrement& x, double gravity) {
   const Vector3d g(0, 0, -gravity);
   Nav to = nav;

@@ -35,6 +35,11 @@ ImuIncrement integrate(const std::vector<ImuReading>& readings, const Eigen::Vec
 Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
                                      const Eigen::Vector3d& gyro_bias);
 
+/// The body's motion from `half` before `time` until as long after it, where `nav` is at `time`.
+/// Samples are held where they do not reach. `readings`: memory that is used again.
+RowMotion rowMotion(const Nav& nav, const ImuBuffer& imu, TimePoint time, Duration half,
+                    double gravity, std::vector<ImuReading>& readings);
+
 /// The navigation state after the increment; gravity in m/s², along −z of W.
 Nav predict(const Nav& nav, const ImuIncrement& increment, double gravity);
 

@@ -38,6 +38,7 @@ struct Keyframe {
   Matrix3d R;      ///< R_B0_Bi
   Vector3d dp, dv;
   const TrackedFrame* tracked = nullptr;
+  Vector3d rate = Vector3d::Zero();  ///< of the body, where a shutter rolls
 };
 
 /// Smallest eigenvalue of Σ n nᵀ, n the epipolar normals: zero where R is right.
@@ -51,14 +52,15 @@ double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
   return Eigen::SelfAdjointEigenSolver<Matrix3d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
 
-struct View {
+struct LinearView {
   Matrix3d R_CB0;    ///< rotates B0 into this camera
   Vector3d p_BC_B0;  ///< the camera relative to the body, in B0
-  std::size_t keyframe;
+  double t;          ///< since the first keyframe
+  Vector3d dp;       ///< of the increment until then
   Eigen::Vector2d normalised;
   double scale;
 };
-using Views = std::map<std::uint64_t, std::vector<View>>;
+using Views = std::map<std::uint64_t, std::vector<LinearView>>;
 
 Views viewsOf(const std::vector<Keyframe>& keyframes, const std::vector<CameraModel>& cameras) {
   Views views;
@@ -67,9 +69,11 @@ Views viewsOf(const std::vector<Keyframe>& keyframes, const std::vector<CameraMo
       for (std::size_t c = 0; c < cameras.size(); ++c) {
         if (!p.seen[c]) continue;
         const RigidTransform& T_BC = cameras[c].T_BC();
-        views[p.id].push_back({T_BC.R().transpose() * keyframes[k].R.transpose(),
-                               keyframes[k].R * T_BC.p, k, p.seen[c]->normalised,
-                               p.seen[c]->scale});
+        const Keyframe& at = keyframes[k];
+        const double later_s = p.seen[c]->row * cameras[c].calibration().readout_s;
+        const Matrix3d R = later_s == 0.0 ? at.R : Matrix3d(at.R * expSo3(later_s * at.rate));
+        views[p.id].push_back({T_BC.R().transpose() * R.transpose(), R * T_BC.p, at.t + later_s,
+                               at.dp + later_s * at.dv, p.seen[c]->normalised, p.seen[c]->scale});
       }
     }
   }
@@ -78,13 +82,13 @@ Views viewsOf(const std::vector<Keyframe>& keyframes, const std::vector<CameraMo
 }
 
 /// Rows of one view: [A_f | A_x] [f; v0; g] = b, in pixels times depth.
-void rowsOf(const View& v, const Keyframe& k, Eigen::Matrix<double, 2, 3>& A_f,
-            Eigen::Matrix<double, 2, 6>& A_x, Eigen::Vector2d& b) {
+void rowsOf(const LinearView& v, Eigen::Matrix<double, 2, 3>& A_f, Eigen::Matrix<double, 2, 6>& A_x,
+            Eigen::Vector2d& b) {
   Eigen::Matrix<double, 2, 3> J;
   J << 1, 0, -v.normalised.x(), 0, 1, -v.normalised.y();
   A_f = v.scale * J * v.R_CB0;
-  A_x << -A_f * k.t, -A_f * (0.5 * k.t * k.t);
-  b = A_f * (k.dp + v.p_BC_B0);
+  A_x << -A_f * v.t, -A_f * (0.5 * v.t * v.t);
+  b = A_f * (v.dp + v.p_BC_B0);
 }
 
 struct Solution {
@@ -100,9 +104,8 @@ struct PointEstimate {
 };
 
 /// One weighted linear solution; depths of the last one weigh this one's rows.
-Solution solveOnce(const Views& views, const std::vector<Keyframe>& keyframes,
-                   std::map<std::uint64_t, PointEstimate>& points, const Vector6& x_before,
-                   double gravity) {
+Solution solveOnce(const Views& views, std::map<std::uint64_t, PointEstimate>& points,
+                   const Vector6& x_before, double gravity) {
   Matrix6 N = Matrix6::Zero();
   Vector6 y = Vector6::Zero();
   struct Eliminated {
@@ -111,9 +114,8 @@ Solution solveOnce(const Views& views, const std::vector<Keyframe>& keyframes,
     Vector3d F_b;
   };
   std::map<std::uint64_t, Eliminated> eliminated;
-  const auto depthOf = [&](const View& v, const PointEstimate& p, const Vector6& x) {
-    const Keyframe& k = keyframes[v.keyframe];
-    const Vector3d body = x.head<3>() * k.t + 0.5 * k.t * k.t * x.tail<3>() + k.dp;
+  const auto depthOf = [&](const LinearView& v, const PointEstimate& p, const Vector6& x) {
+    const Vector3d body = x.head<3>() * v.t + 0.5 * v.t * v.t * x.tail<3>() + v.dp;
     return (v.R_CB0 * (p.f - body - v.p_BC_B0)).z();
   };
   for (const auto& [id, list] : views) {
@@ -123,11 +125,11 @@ Solution solveOnce(const Views& views, const std::vector<Keyframe>& keyframes,
     Matrix6 X = Matrix6::Zero();
     Vector6 X_b = Vector6::Zero();
     const PointEstimate& p = points[id];
-    for (const View& v : list) {
+    for (const LinearView& v : list) {
       Eigen::Matrix<double, 2, 3> A_f;
       Eigen::Matrix<double, 2, 6> A_x;
       Eigen::Vector2d b;
-      rowsOf(v, keyframes[v.keyframe], A_f, A_x, b);
+      rowsOf(v, A_f, A_x, b);
       const double depth = p.known ? std::max(std::abs(depthOf(v, p, x_before)), 0.2) : 1.0;
       const double w = 1.0 / (depth * depth);
       F += w * A_f.transpose() * A_f;
@@ -157,9 +159,8 @@ Solution solveOnce(const Views& views, const std::vector<Keyframe>& keyframes,
     p.f = e.F_inverse * (e.F_b - e.F_x * s.x);
     p.known = true;
     bool in_front = true;
-    for (const View& v : views.at(id)) {
-      const Keyframe& k = keyframes[v.keyframe];
-      const Vector3d body = s.x.head<3>() * k.t + 0.5 * k.t * k.t * s.x.tail<3>() + k.dp;
+    for (const LinearView& v : views.at(id)) {
+      const Vector3d body = s.x.head<3>() * v.t + 0.5 * v.t * v.t * s.x.tail<3>() + v.dp;
       const Vector3d p_C = v.R_CB0 * (p.f - body - v.p_BC_B0);
       in_front = in_front && p_C.z() > 0.0;
       sum += std::min((p_C.hnormalized() - v.normalised).squaredNorm() * v.scale * v.scale, 400.0);
@@ -174,9 +175,40 @@ Solution solveOnce(const Views& views, const std::vector<Keyframe>& keyframes,
   return s;
 }
 
+/// The bearing from where the camera was at the middle row, by rotation alone: the way of the body
+/// between the rows lies in the epipolar plane. turn_C: of the camera, first to last row.
+Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
+  const Vector3d ray = seen.normalised.homogeneous().normalized();
+  return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
+}
+
+/// A keyframe's points, and how far the first camera turned while it was read out.
+struct Bearings {
+  const TrackedFrame* tracked = nullptr;
+  Vector3d turn_C = Vector3d::Zero();
+};
+
+/// Of the body while the rows of a rolling shutter were read out; zero where none rolls.
+std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuffer& imu,
+                              const std::vector<CameraModel>& cameras, const Vector3d& gyro_bias) {
+  std::vector<Vector3d> rates(times.size(), Vector3d::Zero());
+  double readout_s = 0.0;
+  for (const CameraModel& c : cameras) readout_s = std::max(readout_s, c.calibration().readout_s);
+  if (readout_s == 0.0) return rates;
+  Nav nav;
+  nav.gyro_bias = gyro_bias;
+  std::vector<ImuReading> readings;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const Duration half = durationFromSeconds(0.5 * readout_s);
+    rates[i] = rowMotion(nav, imu, times[i], half, 0.0, readings).rate;
+  }
+  return rates;
+}
+
 /// Matches of points seen in both frames; distances in pixels are added to `moved`.
-BearingPair pairOf(const TrackedFrame& first, const TrackedFrame& second, const ImuIncrement& x,
+BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement& x,
                    std::vector<double>& moved) {
+  const TrackedFrame &first = *from.tracked, &second = *to.tracked;
   BearingPair pair;
   pair.R_B0_B1 = x.dq.toRotationMatrix();
   pair.J_bias = x.F.block<3, 3>(kTheta, kGyroBias);
@@ -185,8 +217,7 @@ BearingPair pairOf(const TrackedFrame& first, const TrackedFrame& second, const 
     while (b != second.points.end() && b->id < a.id) ++b;
     if (b == second.points.end()) break;
     if (b->id != a.id) continue;
-    pair.bearings.emplace_back(a.seen[0]->normalised.homogeneous().normalized(),
-                               b->seen[0]->normalised.homogeneous().normalized());
+    pair.bearings.emplace_back(bearing(*a.seen[0], from.turn_C), bearing(*b->seen[0], to.turn_C));
     moved.push_back((a.seen[0]->pixel - b->seen[0]->pixel).norm());
   }
   return pair;
@@ -270,8 +301,9 @@ std::vector<WindowPoint> windowPoints(const MotionWindow& window,
       for (std::size_t c = 0; c < cameras.size(); ++c) {
         if (!p.seen[c]) continue;
         const RigidTransform& T_BC = cameras[c].T_BC();
-        tracks[p.id].views.push_back(
-            {k, T_BC.R(), T_BC.p, p.seen[c]->normalised, p.seen[c]->to_pixels});
+        tracks[p.id].views.push_back({k, T_BC.R(), T_BC.p, p.seen[c]->normalised,
+                                      p.seen[c]->to_pixels,
+                                      p.seen[c]->row * cameras[c].calibration().readout_s});
       }
     }
   }
@@ -373,13 +405,19 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
     tracked.push_back(&s.tracked);
     times.push_back(s.time);
   }
+  const std::vector<Vector3d> raw_rates = ratesAt(times, imu, cameras, Vector3d::Zero());
+  std::vector<Bearings> bearings;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double readout_s = cameras[0].calibration().readout_s;
+    bearings.push_back({tracked[i], readout_s * (cameras[0].T_BC().q.conjugate() * raw_rates[i])});
+  }
   std::vector<BearingPair> pairs;
   std::vector<double> moved;
   for (const std::size_t span : {1u, 3u, 6u}) {  // long ones weigh the bias, short ones are many
     for (std::size_t i = 0; i + span < count; ++i) {
       const ImuIncrement x = integrate(imu.between(times[i], times[i + span]), Vector3d::Zero(),
                                        Vector3d::Zero(), options_.imu);
-      BearingPair pair = pairOf(*tracked[i], *tracked[i + span], x, moved);
+      BearingPair pair = pairOf(bearings[i], bearings[i + span], x, moved);
       if (pair.bearings.size() >= kFewestTracks) pairs.push_back(std::move(pair));
     }
   }
@@ -388,13 +426,14 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   if (moved[moved.size() / 2] < kFewestParallaxPx) return fail("start_no_parallax");
   const Vector3d gyro_bias = gyroBiasFromPairs(pairs, cameras[0].T_BC().R());
 
+  const std::vector<Vector3d> rates = ratesAt(times, imu, cameras, gyro_bias);
   std::vector<Keyframe> keyframes;
   for (std::size_t i = 0; i < count; ++i) {
-    Keyframe k{0.0, Matrix3d::Identity(), Vector3d::Zero(), Vector3d::Zero(), tracked[i]};
+    Keyframe k{0.0, Matrix3d::Identity(), Vector3d::Zero(), Vector3d::Zero(), tracked[i], rates[i]};
     if (i > 0) {
       const ImuIncrement x =
           integrate(imu.between(times[0], times[i]), gyro_bias, Vector3d::Zero(), options_.imu);
-      k = {x.dt, x.dq.toRotationMatrix(), x.dp, x.dv, tracked[i]};
+      k = {x.dt, x.dq.toRotationMatrix(), x.dp, x.dv, tracked[i], rates[i]};
     }
     keyframes.push_back(k);
   }
@@ -403,7 +442,7 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   std::map<std::uint64_t, PointEstimate> estimates;
   Solution s;
   s.x.setZero();
-  for (int i = 0; i < 4; ++i) s = solveOnce(views, keyframes, estimates, s.x, options_.gravity);
+  for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
   if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
     return fail("start_inconsistent");
   }

@@ -97,8 +97,9 @@ std::optional<ViewTerm> viewTerm(const Estimate& e, std::size_t point, const Win
                                  const Inertial& inertial, double sigma_px) {
   const WindowPose& pose = e.window.poses[v.keyframe];
   const Vector3d& rate = inertial.rates[v.keyframe];
-  const Matrix3d R = pose.R_B0_B * expSo3(rate * e.window.time_offset_s);
-  const Vector3d p = pose.p_B0 + pose.v_B0 * e.window.time_offset_s;
+  const double later_s = e.window.time_offset_s + v.row_s;
+  const Matrix3d R = pose.R_B0_B * expSo3(rate * later_s);
+  const Vector3d p = pose.p_B0 + pose.v_B0 * later_s;
   const Ray& ray = e.rays[point];
   const double inverse = ray.abr[2];
   // The point relative to the body, and to the camera, times the inverse depth.

@@ -20,6 +20,7 @@ struct WindowView {
   Eigen::Vector3d p_BC;
   Eigen::Vector2d normalised;
   Eigen::Matrix2d to_pixels;  ///< ∂pixel / ∂normalised
+  double row_s = 0.0;         ///< of a rolling shutter: its row is later than the pose by so much
 };
 
 struct WindowPoint {

@@ -49,10 +49,12 @@ struct VisionOptions {
 /// Standard deviations of what the calibration says.
 struct CalibrationOptions {
   bool estimate_extrinsics = true, estimate_time_offset = true;
+  bool estimate_readout = true;       ///< of a rolling shutter
   double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
   double second_camera_factor = 0.1;  ///< a stereo pair is calibrated better among itself
   double time_offset_s = 0.005;
+  double readout_s = 0.005;  ///< of a rolling shutter
 };
 
 struct StartOptions {

@@ -7,7 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr const char* kMagic = "perdure-vio-state-1";
+constexpr const char* kMagic = "perdure-vio-state-2";
 // What a vehicle may do unobserved: turn, accelerate.
 constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
 // A restart loses the correlations with the window.
@@ -73,7 +73,8 @@ class Reader {
 std::string toText(const SavedState& s) {
   std::string body = std::to_string(s.world.world) + ' ' + std::to_string(s.world.epoch) + ' ' +
                      std::to_string(toNanoseconds(s.time)) + ' ' + std::to_string(s.next_track) +
-                     ' ' + std::to_string(s.T_BC.size()) + '\n';
+                     ' ' + std::to_string(s.T_BC.size()) + ' ' +
+                     std::to_string(s.covariance.rows()) + '\n';
   put(body, s.nav.q_WB.coeffs());
   for (const auto* v : {&s.nav.p_WB, &s.nav.v_WB, &s.nav.gyro_bias, &s.nav.accel_bias}) {
     put(body, *v);
@@ -83,6 +84,7 @@ std::string toText(const SavedState& s) {
     put(body, T.p);
   }
   put(body, s.time_offset_s);
+  for (const double readout : s.readout_s) put(body, readout);
   put(body, s.covariance);
   return std::string(kMagic) + ' ' + toHex(digest(body)) + '\n' + body;
 }
@@ -102,7 +104,12 @@ Result<SavedState> fromText(const std::string& text) {
   s.time = fromNanoseconds(in.integer<std::int64_t>());
   s.next_track = in.integer<std::uint64_t>();
   const auto cameras = in.integer<std::size_t>();
+  const auto n = in.integer<Eigen::Index>();
   if (!in.good() || cameras < 1 || cameras > 2) return malformed("its head");
+  const Eigen::Index without_readouts = kNavSize + 6 * static_cast<Eigen::Index>(cameras) + 1;
+  if (n < without_readouts || n > without_readouts + static_cast<Eigen::Index>(cameras)) {
+    return malformed("its head");
+  }
   s.nav.q_WB = in.rotation();
   for (auto* v : {&s.nav.p_WB, &s.nav.v_WB, &s.nav.gyro_bias, &s.nav.accel_bias}) {
     *v = in.vector();
@@ -112,7 +119,7 @@ Result<SavedState> fromText(const std::string& text) {
     s.T_BC.emplace_back(q, in.vector());
   }
   s.time_offset_s = in.number();
-  const Eigen::Index n = kNavSize + 6 * static_cast<Eigen::Index>(cameras) + 1;
+  for (std::size_t i = 0; i < cameras; ++i) s.readout_s.push_back(in.number());
   s.covariance.resize(n, n);
   for (Eigen::Index c = 0; c < n; ++c) {
     for (Eigen::Index r = 0; r < n; ++r) s.covariance(r, c) = in.number();

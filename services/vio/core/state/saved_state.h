@@ -17,7 +17,8 @@ struct SavedState {
   Nav nav;
   std::vector<RigidTransform> T_BC;
   double time_offset_s = 0.0;
-  Eigen::MatrixXd covariance;  ///< of [nav, extrinsics, time offset]
+  std::vector<double> readout_s;  ///< of each camera
+  Eigen::MatrixXd covariance;     ///< of [nav, extrinsics, time offset, estimated read-outs]
   std::uint64_t next_track = 1;
 };
 

@@ -26,18 +26,33 @@ Workspace::Matrix Workspace::take(Eigen::Index rows, Eigen::Index columns) {
 }
 
 State::State(const std::vector<RigidTransform>& cameras, double offset, int max_clones,
-             int max_points)
+             int max_points, const std::vector<double>& readouts, bool estimate_readout)
     : T_BC(cameras),
       time_offset_s(offset),
+      readout_s(readouts.empty() ? std::vector<double>(cameras.size(), 0.0) : readouts),
+      readout_at_(cameras.size(), -1),
       size_(kNavSize + 6 * static_cast<int>(cameras.size()) + 1) {
+  check(readout_s.size() == cameras.size(), "each camera has a read-out, or none");
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (estimate_readout && rolls(c)) readout_at_[c] = size_++;
+  }
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
   // The largest updates: of all points, and of compressed rows by calibration and clones.
   const int count = static_cast<int>(cameras.size());
-  workspace_.begin(
-      roomOfUpdate(capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2))));
+  workspace_.begin(roomOfUpdate(
+      capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2) + readoutCount())));
   clones.reserve(static_cast<std::size_t>(max_clones + 2));
   points.reserve(static_cast<std::size_t>(max_points));
+}
+
+std::optional<int> State::readoutAt(std::size_t camera) const {
+  return readout_at_[camera] < 0 ? std::nullopt : std::optional(readout_at_[camera]);
+}
+
+int State::readoutCount() const {
+  return static_cast<int>(
+      std::count_if(readout_at_.begin(), readout_at_.end(), [](int at) { return at >= 0; }));
 }
 
 const Clone* State::clone(std::uint64_t frame) const {
@@ -93,7 +108,7 @@ void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vec
   P_.block(0, at, n, 6) = P_.block(at, 0, 6, n).transpose();
   P_.block<6, 6>(at, at) =
       P_.block<6, 6>(at, 0) + P_.block<6, 1>(at, offset) * J_offset.transpose();
-  clones.push_back({frame, image_time, nav.T_WB(), there.T_WB(), at});
+  clones.push_back({frame, image_time, nav.T_WB(), there.T_WB(), at, {}});
 }
 
 void State::widenPose(double rotation, double position_m) {
@@ -147,6 +162,9 @@ void State::apply(const VectorView& dx) {
         boxPlus(T_BC[static_cast<std::size_t>(i)], dx.segment<6>(extrinsicsAt(i)));
   }
   time_offset_s += dx[timeOffsetAt()];
+  for (std::size_t c = 0; c < readout_s.size(); ++c) {
+    if (const auto at = readoutAt(c)) readout_s[c] += dx[*at];
+  }
   for (Clone& c : clones) c.T_WB = boxPlus(c.T_WB, dx.segment<6>(c.at));
   for (PointState& p : points) p.p_W += dx.segment<3>(p.at);
 }
@@ -226,6 +244,9 @@ Result<void> State::update(std::span<const Measurement> measurements) {
 bool State::healthy() const {
   if (!nav.T_WB().finite() || !nav.v_WB.allFinite() || !nav.gyro_bias.allFinite() ||
       !nav.accel_bias.allFinite() || !std::isfinite(time_offset_s)) {
+    return false;
+  }
+  if (!std::all_of(readout_s.begin(), readout_s.end(), [](double s) { return std::isfinite(s); })) {
     return false;
   }
   const auto active = P_.topLeftCorner(size_, size_);

@@ -1,13 +1,16 @@
 // The filter's state: navigation, camera-IMU calibration, a window of past poses and points, and
 // the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
-// Order of the error: nav [θ, p, v, b_g, b_a], per camera [θ_BC, p_BC], time offset, then clones
-// and points in the order in which they came. Rotations err on the right, R = R̂ Exp(θ).
+// Order of the error: nav [θ, p, v, b_g, b_a], per camera [θ_BC, p_BC], time offset, read-outs that
+// are estimated, then clones and points in the order in which they came. Rotations err on the
+// right, R = R̂ Exp(θ).
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,6 +18,7 @@
 #include "common/base/time.h"
 #include "common/math/gaussian.h"
 #include "common/math/rigid_transform.h"
+#include "services/vio/core/state/row_motion.h"
 
 namespace perdure::vio {
 
@@ -33,7 +37,8 @@ struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
   RigidTransform T_WB, linear;
-  int at = 0;  ///< where its error begins
+  int at = 0;      ///< where its error begins
+  RowMotion rows;  ///< of use where a shutter rolls
 };
 
 struct PointState {
@@ -88,20 +93,35 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
+  /// readout_s: of each camera, 0 where all rows are exposed at once; none given: all are. Those
+  /// that are not 0 are in the error where estimate_readout says so.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
-        int max_points);
+        int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false);
 
   /// nav_linear: q as predicted, p and v on a path that no update moves: where Jacobians are taken.
   Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
   std::vector<RigidTransform> T_BC;  ///< one for each camera
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
+  std::vector<double> readout_s;     ///< of each camera: first to last row; 0: all at once
   std::vector<Clone> clones;         ///< oldest first
   std::vector<PointState> points;
 
   int size() const { return size_; }
   int extrinsicsAt(int camera) const { return kNavSize + 6 * camera; }
   int timeOffsetAt() const { return kNavSize + 6 * static_cast<int>(T_BC.size()); }
+  /// Where the error of a camera's read-out is; nothing where that is not estimated.
+  std::optional<int> readoutAt(std::size_t camera) const;
+  int readoutCount() const;
+  /// What comes before clones and points.
+  int calibrationEnd() const { return timeOffsetAt() + 1 + readoutCount(); }
+  bool rolls(std::size_t camera) const { return readout_s[camera] != 0.0; }
+  /// Of all cameras; 0 where none rolls.
+  double longestReadout() const { return *std::max_element(readout_s.begin(), readout_s.end()); }
+  /// The camera when it saw a row. `row`: −½ … ½, first to last.
+  RowCamera rowCamera(const Clone& clone, std::size_t camera, double row) const {
+    return vio::rowCamera(clone.rows, T_BC[camera], row * readout_s[camera]);
+  }
   auto P() { return P_.topLeftCorner(size_, size_); }
   auto P() const { return P_.topLeftCorner(size_, size_); }
 
@@ -143,6 +163,7 @@ class State {
   int append(int size);
   void remove(int at, int size);
 
+  std::vector<int> readout_at_;  ///< of each camera; −1: not estimated
   int size_;
   Eigen::MatrixXd P_;  ///< capacity; the upper left size_ × size_ counts
   Workspace workspace_;

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "common/base/check.h"
+#include "common/math/so3.h"
 
 namespace perdure::vio {
 namespace {
@@ -66,6 +67,13 @@ std::vector<cv::Point2f> Tracker::seeds(const std::optional<Eigen::Matrix3d>& R)
   return result;
 }
 
+/// The way of the body between the rows leads along the epipolar line.
+Eigen::Vector2d Tracker::atMiddle(const ImagePoint& seen) const {
+  if (turn_.isZero(0.0)) return seen.normalised;
+  const Eigen::Vector3d ray = expQuaternion(seen.row * turn_) * seen.normalised.homogeneous();
+  return ray.z() > 0.0 ? ray.hnormalized() : seen.normalised;
+}
+
 std::vector<bool> Tracker::inliers(const std::vector<Match>& matches,
                                    const std::optional<Eigen::Matrix3d>& R) {
   std::vector<bool> two_point;
@@ -115,10 +123,12 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     if (!found || !(found->similarity >= options_.similarity)) continue;
     const auto seen = imagePoint(cameras_[0], toEigen(found->pixel));
     if (!seen) continue;
-    matches.push_back({p.normalised, seen->normalised, seen->scale});
+    const Eigen::Vector2d at_middle = atMiddle(*seen);
+    matches.push_back({p.at_middle, at_middle, seen->scale});
     p.second += found->pixel - p.pixel;  // the second camera's seed moves along
     p.pixel = found->pixel;
     p.normalised = seen->normalised;
+    p.at_middle = at_middle;
     if (cv::norm(p.pixel - p.place) <= kStill) {
       ++p.still;
     } else {
@@ -196,8 +206,8 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
     const auto seen = imagePoint(cameras_[0], toEigen(p));
     auto patch = Patch::cut(image, p);
     if (seen && patch) {
-      points_.push_back(
-          {next_id_++, p, p, false, seen->normalised, std::make_unique<Patch>(*patch)});
+      points_.push_back({next_id_++, p, p, false, seen->normalised, atMiddle(*seen),
+                         std::make_unique<Patch>(*patch)});
     }
   }
 }
@@ -254,7 +264,9 @@ TrackedFrame Tracker::result() const {
 
 TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
                             const std::optional<Eigen::Matrix3d>& R_now_before,
-                            const std::vector<cv::Rect2f>& masked) {
+                            const std::vector<cv::Rect2f>& masked,
+                            const Eigen::Vector3d& turn_of_readout) {
+  turn_ = cameras_[0].T_BC().q.conjugate() * turn_of_readout;
   const bool stereo = cameras_.size() == 2 && !second.empty();
   Images now;
   cv::Mat half;

@@ -42,10 +42,12 @@ class Tracker {
   Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras);
 
   /// Images CV_8UC1; `second` may be empty. R_now_before: rotation of the body, where it is known.
-  /// masked: boxes in the first image without points.
+  /// masked: boxes in the first image without points. turn_of_readout: of the body in its frame,
+  /// from the first row of the first image to the last; epipolar lines are between middle rows.
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
                      const std::optional<Eigen::Matrix3d>& R_now_before,
-                     const std::vector<cv::Rect2f>& masked = {});
+                     const std::vector<cv::Rect2f>& masked = {},
+                     const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
   /// Image motion in pixels from `frames` ago to now, of which the share `quantile` of the points
   /// has less; nothing where too little is known.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
@@ -65,6 +67,7 @@ class Tracker {
     cv::Point2f pixel, second;  ///< second: in the second camera, when has_second
     bool has_second = false;
     Eigen::Vector2d normalised;
+    Eigen::Vector2d at_middle;  ///< the same, turned to where the camera was at the middle row
     std::unique_ptr<Patch> patch;
     cv::Point2f place = pixel;  ///< where it has been to half a pixel, in the last images:
     std::size_t still = 0;
@@ -75,6 +78,7 @@ class Tracker {
     std::vector<cv::Mat> levels;  ///< the image itself first, each half the one before
   };
   void follow(const Images& now, const std::optional<Eigen::Matrix3d>& R);
+  Eigen::Vector2d atMiddle(const ImagePoint& seen) const;
   std::vector<cv::Point2f> seeds(const std::optional<Eigen::Matrix3d>& R) const;
   std::vector<bool> inliers(const std::vector<Match>& matches,
                             const std::optional<Eigen::Matrix3d>& R);
@@ -85,6 +89,7 @@ class Tracker {
   TrackerOptions options_;
   std::vector<CameraModel> cameras_;
   std::vector<Point> points_;
+  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< of the first camera in C, while read out
   std::vector<cv::Mat> previous_;
   std::deque<std::vector<std::pair<std::uint64_t, cv::Point2f>>> history_;  ///< newest last
   std::uint64_t next_id_ = 1;

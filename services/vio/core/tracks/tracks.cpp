@@ -10,7 +10,8 @@ std::optional<ImagePoint> imagePoint(const CameraModel& camera, const Eigen::Vec
   if (!normalised) return std::nullopt;
   Eigen::Matrix2d J;
   camera.distort(*normalised, &J);
-  return ImagePoint{pixel, *normalised, std::sqrt(std::abs(J.determinant())), J};
+  return ImagePoint{pixel, *normalised, std::sqrt(std::abs(J.determinant())), J,
+                    pixel.y() / (camera.height() - 1) - 0.5};
 }
 
 std::size_t Track::views() const {

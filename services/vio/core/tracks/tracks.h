@@ -20,6 +20,7 @@ struct ImagePoint {
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
   double scale = 1.0;  ///< pixels per unit of the normalised image, there, on average
   Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised, there
+  double row = 0.0;  ///< −½ … ½, first to last: the share of a read-out since the middle row
 };
 
 /// Undistorts; nothing where that is impossible.

@@ -118,8 +118,10 @@ std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px)
     if (!clone) continue;
     for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
       if (!o.seen[c]) continue;
-      rays.push_back(
-          {clone->T_WB * state.T_BC[c], o.seen[c]->normalised, o.seen[c]->scale / sigma_px});
+      const ImagePoint& seen = *o.seen[c];
+      const RigidTransform T_BC =
+          state.rolls(c) ? state.rowCamera(*clone, c, seen.row).T_BC : state.T_BC[c];
+      rays.push_back({clone->T_WB * T_BC, seen.normalised, seen.scale / sigma_px});
     }
   }
   return rays;

@@ -15,12 +15,12 @@ constexpr int kFailuresToLeave = 3;
 constexpr int kFewestJumped = 8;
 constexpr double kFarOff = 25.0;  ///< mean square of the rows, in variances of a pixel
 
-/// The newest clone's views of one point: rows × [extrinsics, clone, point].
+/// The newest clone's views of one point: rows × [extrinsics, read-outs, clone, point].
 struct PointRows {
-  static constexpr int kRows = 2 * kMaxCameras, kColumns = 6 * kMaxCameras + 9;
+  static constexpr int kRows = 2 * kMaxCameras, kColumns = 7 * kMaxCameras + 9;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kRows, 1> r;
-  std::array<Block, kMaxCameras + 2> block;
+  std::array<Block, 2 * kMaxCameras + 2> block;
   std::size_t blocks = 0;
 
   Measurement measurement() const { return {H, std::span(block.data(), blocks), r}; }
@@ -33,27 +33,29 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   const auto views = std::count_if(seen.seen.begin(), seen.seen.begin() + cameras,
                                    [](const auto& s) { return s.has_value(); });
   PointRows rows;
-  rows.H.setZero(2 * views, 6 * cameras + 9);
+  const Eigen::Index pose = 6 * cameras + state.readoutCount();
+  rows.H.setZero(2 * views, pose + 9);
   rows.r.resize(2 * views);
   for (int c = 0; c < static_cast<int>(cameras); ++c) {
     rows.block[rows.blocks++] = {state.extrinsicsAt(c), 6};
+  }
+  for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
+    if (const auto at = state.readoutAt(c)) rows.block[rows.blocks++] = {*at, 1};
   }
   rows.block[rows.blocks++] = {clone.at, 6};
   rows.block[rows.blocks++] = {point.at, 3};
   Eigen::Index row = 0;
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
     if (!seen.seen[c]) continue;
-    Eigen::Vector2d now, there;
-    ProjectionJacobians J;
-    if (!projectPoint(clone.T_WB, state.T_BC[c], point.p_W, now) ||
-        !projectPoint(clone.linear, state.T_BC[c], point.linear, there, &J)) {
-      return fail("slam_behind_camera");
+    const auto view = viewOf(state, clone, c, *seen.seen[c], point.p_W, point.linear, sigma_px);
+    if (!view) return fail("slam_behind_camera");
+    rows.H.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = view->J.extrinsic;
+    if (const auto at = state.readoutAt(c)) {
+      rows.H.block<2, 1>(row, 6 * cameras + *at - state.timeOffsetAt() - 1) = view->readout;
     }
-    const Eigen::Matrix2d weight = seen.seen[c]->to_pixels / sigma_px;
-    rows.H.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = weight * J.extrinsic;
-    rows.H.block<2, 6>(row, 6 * cameras) = weight * J.pose;
-    rows.H.block<2, 3>(row, 6 * cameras + 6) = weight * J.point;
-    rows.r.segment<2>(row) = weight * (seen.seen[c]->normalised - now);
+    rows.H.block<2, 6>(row, pose) = view->J.pose;
+    rows.H.block<2, 3>(row, pose + 6) = view->J.point;
+    rows.r.segment<2>(row) = view->r;
     row += 2;
   }
   return rows;

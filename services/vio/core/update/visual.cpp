@@ -45,11 +45,39 @@ bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
   return true;
 }
 
+std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t camera,
+                           const ImagePoint& seen, const Eigen::Vector3d& p_W,
+                           const Eigen::Vector3d& p_linear, double sigma_px) {
+  RowCamera row;
+  const bool rolls = state.rolls(camera);
+  if (rolls) row = state.rowCamera(clone, camera, seen.row);
+  const RigidTransform& T_BC = rolls ? row.T_BC : state.T_BC[camera];
+  View view;
+  Eigen::Vector2d now, there;
+  if (!projectPoint(clone.T_WB, T_BC, p_W, now) ||
+      !projectPoint(clone.linear, T_BC, p_linear, there, &view.J)) {
+    return std::nullopt;
+  }
+  const Eigen::Matrix2d weight = seen.to_pixels / sigma_px;
+  view.r = weight * (seen.normalised - now);
+  view.J.pose = (weight * view.J.pose).eval();
+  view.J.extrinsic = (weight * view.J.extrinsic).eval();
+  view.J.point = (weight * view.J.point).eval();
+  if (!rolls) return view;
+  view.readout = seen.row * (view.J.extrinsic.leftCols<3>() * row.theta_dot +
+                             view.J.extrinsic.rightCols<3>() * row.p_dot);
+  view.J.extrinsic.rightCols<3>() = (view.J.extrinsic.rightCols<3>() * row.R_BR).eval();
+  return view;
+}
+
 std::vector<Block> calibrationAndClones(const State& state) {
   std::vector<Block> blocks;
-  blocks.reserve(state.T_BC.size() + state.clones.size());
+  blocks.reserve(2 * state.T_BC.size() + state.clones.size());
   for (int c = 0; c < static_cast<int>(state.T_BC.size()); ++c) {
     blocks.push_back({state.extrinsicsAt(c), 6});
+  }
+  for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
+    if (const auto at = state.readoutAt(c)) blocks.push_back({*at, 1});
   }
   for (const Clone& clone : state.clones) blocks.push_back({clone.at, 6});
   return blocks;
@@ -65,7 +93,8 @@ Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px) {
   const Eigen::Index cameras = static_cast<Eigen::Index>(state.T_BC.size());
-  const Eigen::Index columns = 6 * (cameras + static_cast<Eigen::Index>(state.clones.size()));
+  const Eigen::Index first_clone = 6 * cameras + state.readoutCount();
+  const Eigen::Index columns = first_clone + 6 * static_cast<Eigen::Index>(state.clones.size());
   const Eigen::Index capacity = 2 * static_cast<Eigen::Index>(track.views());
   PointSystem s{Eigen::MatrixXd::Zero(capacity, columns), Eigen::MatrixXd(capacity, 3),
                 Eigen::VectorXd(capacity)};
@@ -73,24 +102,22 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
   std::size_t o = 0;
   const Eigen::Vector3d p_linear = linearisationPoint(state, track, p_W);
   for (const Clone& clone : state.clones) {
-    const Eigen::Index column = 6 * (cameras + k++);
+    const Eigen::Index column = first_clone + 6 * k++;
     while (o < track.observations.size() && track.observations[o].frame < clone.frame) ++o;
     if (o == track.observations.size()) break;
     if (track.observations[o].frame != clone.frame) continue;
     for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
       const auto& seen = track.observations[o].seen[c];
       if (!seen) continue;
-      Eigen::Vector2d now, there;
-      ProjectionJacobians J;
-      if (!projectPoint(clone.T_WB, state.T_BC[c], p_W, now) ||
-          !projectPoint(clone.linear, state.T_BC[c], p_linear, there, &J)) {
-        return {};
+      const auto view = viewOf(state, clone, c, *seen, p_W, p_linear, sigma_px);
+      if (!view) return {};
+      s.r.segment<2>(row) = view->r;
+      s.H_x.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = view->J.extrinsic;
+      if (const auto at = state.readoutAt(c)) {
+        s.H_x.block<2, 1>(row, 6 * cameras + *at - state.timeOffsetAt() - 1) = view->readout;
       }
-      const Eigen::Matrix2d weight = seen->to_pixels / sigma_px;
-      s.r.segment<2>(row) = weight * (seen->normalised - now);
-      s.H_x.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = weight * J.extrinsic;
-      s.H_x.block<2, 6>(row, column) = weight * J.pose;
-      s.H_f.middleRows<2>(row) = weight * J.point;
+      s.H_x.block<2, 6>(row, column) = view->J.pose;
+      s.H_f.middleRows<2>(row) = view->J.point;
       row += 2;
     }
   }

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "services/vio/core/state/options.h"
@@ -23,6 +24,20 @@ bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
                   const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised,
                   ProjectionJacobians* J = nullptr);
 
+/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + readout δt_r +
+/// point δp_W + n, n ~ N(0, I). The camera is where it was when it saw the point's row.
+struct View {
+  Eigen::Vector2d r;
+  ProjectionJacobians J;
+  Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< by the read-out, s
+};
+
+/// The residual is at the clone's estimate and p_W, the Jacobians at its `linear` and p_linear.
+/// Nothing where the point is behind the camera.
+std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t camera,
+                           const ImagePoint& seen, const Eigen::Vector3d& p_W,
+                           const Eigen::Vector3d& p_linear, double sigma_px);
+
 /// A point's measurements, whitened: r = H_x δx + H_f δf + n, n ~ N(0, I).
 struct PointSystem {
   Eigen::MatrixXd H_x;  ///< columns of `blocks`
@@ -30,7 +45,7 @@ struct PointSystem {
   Eigen::VectorXd r;
 };
 
-/// Blocks of all extrinsics and of the clones.
+/// Blocks of all extrinsics, of the estimated read-outs, and of the clones.
 std::vector<Block> calibrationAndClones(const State& state);
 
 /// Where a point of the estimates lies among the poses of linearisation: it moves along with the

@@ -21,7 +21,8 @@ SavedState someState() {
   s.nav.v_WB = {5, 6, 7};
   s.T_BC = {RigidTransform(expQuaternion(Eigen::Vector3d(1, 1, 0)), Eigen::Vector3d(0.1, 0, 0))};
   s.time_offset_s = 0.0071;
-  s.covariance = 0.01 * Eigen::MatrixXd::Identity(22, 22);
+  s.readout_s = {0.0213};
+  s.covariance = 0.01 * Eigen::MatrixXd::Identity(23, 23);
   s.next_track = 12345;
   return s;
 }
@@ -35,6 +36,7 @@ TEST(SavedState, ComesBackToTheLastBit) {
   EXPECT_EQ(back->nav.q_WB.coeffs(), s.nav.q_WB.coeffs());
   EXPECT_EQ(back->nav.p_WB, s.nav.p_WB);
   EXPECT_EQ(back->time_offset_s, s.time_offset_s);
+  EXPECT_EQ(back->readout_s, s.readout_s);
   EXPECT_EQ(back->covariance, s.covariance);
   EXPECT_EQ(back->next_track, s.next_track);
   EXPECT_EQ(toText(*back), toText(s));

@@ -79,21 +79,28 @@ TEST(Tracker, FollowsAShiftedImageToATenthOfAPixel) {
   EXPECT_FALSE(tracker.motionSince(2));
 }
 
-TEST(Tracker, TheRotationSeedsALargeMotion) {
-  const CameraModel camera(test::testCamera(0));
-  const Matrix3d R_C = expSo3(Vector3d(0, 0.15, 0));  // about 70 px
-  const cv::Mat image = texture();
-  cv::Mat map_x(image.size(), CV_32FC1), map_y(image.size(), CV_32FC1);
+/// What a camera sees that has turned by R_C(row) when it sees a row, −½ … ½.
+template <class Turn>
+cv::Mat turnedRowByRow(const cv::Mat& image, const CameraModel& camera, const Turn& R_C) {
+  cv::Mat map_x(image.size(), CV_32FC1), map_y(image.size(), CV_32FC1), turned;
   for (int y = 0; y < image.rows; ++y) {
+    const Matrix3d R = R_C(y / (image.rows - 1.0) - 0.5).transpose();
     for (int x = 0; x < image.cols; ++x) {
       const auto n = camera.unproject({x, y});
-      const auto from = n ? camera.project(R_C.transpose() * n->homogeneous()) : std::nullopt;
+      const auto from = n ? camera.project(R * n->homogeneous()) : std::nullopt;
       map_x.at<float>(y, x) = from ? static_cast<float>(from->x()) : -1.0f;
       map_y.at<float>(y, x) = from ? static_cast<float>(from->y()) : -1.0f;
     }
   }
-  cv::Mat turned;
   cv::remap(image, turned, map_x, map_y, cv::INTER_LINEAR);
+  return turned;
+}
+
+TEST(Tracker, TheRotationSeedsALargeMotion) {
+  const CameraModel camera(test::testCamera(0));
+  const Matrix3d R_C = expSo3(Vector3d(0, 0.15, 0));  // about 70 px
+  const cv::Mat image = texture();
+  const cv::Mat turned = turnedRowByRow(image, camera, [&](double) { return R_C; });
   Tracker tracker(TrackerOptions{}, {camera});
   const TrackedFrame before = tracker.track(image, {}, {});
   const Matrix3d R_BC = camera.T_BC().R();
@@ -106,6 +113,27 @@ TEST(Tracker, TheRotationSeedsALargeMotion) {
     }
   }
   EXPECT_GT(right, 60);
+}
+
+TEST(Tracker, ARollingShutterThatTurnsContradictsNoRotation) {
+  const CameraModel camera(test::testCamera(0));
+  const Vector3d turn_C(0.01, 0.0, 0.06);  // over the read-out
+  const cv::Mat image = texture();
+  const cv::Mat turned =
+      turnedRowByRow(image, camera, [&](double row) { return expSo3(-row * turn_C); });
+  const auto kept = [&](const Vector3d& turn_B) {
+    Tracker tracker(TrackerOptions{}, {camera});
+    const TrackedFrame before = tracker.track(image, {}, {});
+    const TrackedFrame after =
+        tracker.track(turned, {}, Matrix3d(Matrix3d::Identity()), {}, turn_B);
+    const auto last = before.points.back().id;
+    return std::count_if(after.points.begin(), after.points.end(),
+                         [&](const TrackedPoint& p) { return p.id <= last; });
+  };
+  const auto with = kept(camera.T_BC().R() * turn_C), without = kept(Vector3d::Zero());
+  std::printf("kept: %ld, where the turn is not known %ld\n", with, without);
+  EXPECT_GT(with, 90);
+  EXPECT_LT(without, 0.7 * with);
 }
 
 TEST(Tracker, FindsTheSecondCamerasPointsOnTheirEpipolarLines) {
