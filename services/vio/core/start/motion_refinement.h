@@ -57,7 +57,7 @@ struct RefinedWindow {
 };
 
 /// Fails with "start_inconsistent" where no minimum is found, "start_unobservable" where the
-/// information is singular.
+/// information is singular, and as the inertial samples do (motion_terms.h).
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
 
 }  // namespace perdure::vio
