@@ -56,5 +56,8 @@ from .messages import MapTile as MapTile
 from .messages import MapHeader as MapHeader
 from .messages import MapFrame as MapFrame
 from .messages import MapQuery as MapQuery
+from .messages import MapAnchor as MapAnchor
+from .messages import MapLoopPair as MapLoopPair
+from .messages import MapLoop as MapLoop
 from .messages import MapReply as MapReply
 from .messages import Health as Health

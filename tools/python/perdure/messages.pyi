@@ -397,6 +397,33 @@ class MapQuery(Message):
     world: WorldId  # WorldId
     limit: int  # int
 
+class MapAnchor(Message):
+    id: int  # int
+    previous: int  # of the same session; 0: none
+    session: WorldId  # WorldId
+    map: WorldId  # WorldId, M, the frame of p and yaw
+    p: npt.NDArray[np.float64]  # (3,), m
+    yaw: float  # rad
+    sigma: npt.NDArray[np.float64]  # (4,), m and rad, of [p, yaw] relative to the first anchor of M
+    objects: int  # int
+
+class MapLoopPair(Message):
+    known: int  # int
+    seen: int  # int
+
+class MapLoop(Message):
+    id: int  # int
+    a: int  # int
+    b: int  # int
+    kind: Literal["loop", "tie"]  # loop | tie
+    state: Literal["tentative", "confirmed", "withdrawn"]  # tentative | confirmed | withdrawn
+    residual: npt.NDArray[np.float64]  # (4,), m and rad, measured [p, yaw] of b minus where it lies, axes of a
+    sigma: npt.NDArray[np.float64]  # (4,), m and rad, of the measurement
+    chi2: float  # float
+    weight: float  # 0 to 1
+    pairs: List[MapLoopPair]  # list of MapLoopPair
+    landmarks: int  # int
+
 class MapReply(Message):
     client: int  # int
     request: int  # int
@@ -406,6 +433,10 @@ class MapReply(Message):
     truncated: bool  # bool
     objects: List[MapObject]  # list of MapObject
     beliefs: List[ObjectBelief]  # list of ObjectBelief
+    anchors: List[MapAnchor]  # list of MapAnchor, of the graph, by id
+    loops: List[MapLoop]  # list of MapLoop, between these
+    anchor_count: int  # of the same M, those not told too
+    loop_count: int  # of the same M, those not told too
 
 class Health(Message):
     process: str  # not empty
