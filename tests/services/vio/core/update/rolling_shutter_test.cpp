@@ -249,10 +249,10 @@ TEST(RollingShutter, AFilterThatDoesNotKnowOfItIsWorse) {
   double known = 0.0, unknown = 0.0, found = 0.0;
   Options fixed;
   fixed.calibration.estimate_readout = false;
-  for (unsigned seed = 1; seed <= 2; ++seed) {
-    known += roll(seed, kReadout, fixed, 12.0).position_rms / 2.0;
-    unknown += roll(seed, 0.0, fixed, 12.0).position_rms / 2.0;
-    found += roll(seed, kReadout, Options{}, 12.0).position_rms / 2.0;
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    known += roll(seed, kReadout, fixed, 12.0).position_rms / 3.0;
+    unknown += roll(seed, 0.0, fixed, 12.0).position_rms / 3.0;
+    found += roll(seed, kReadout, Options{}, 12.0).position_rms / 3.0;
   }
   std::printf("position: given %.3f m, given and estimated %.3f m, not known %.3f m\n", known,
               found, unknown);
