@@ -20,6 +20,7 @@ grep -q -- '--config /etc/perdure/gateway.yaml' "$unit" || fail "the unit reads 
 "$root$program" --config "$config" --check-config
 
 # Installed so, it finds its page, and ends when it is told to.
+: > "$folder/log"  # the shell may not have made it yet when it is first read
 PERDURE_DOMAIN=57 "$root$program" --config "$config" --port 0 > "$folder/log" 2>&1 &
 gateway=$!
 for ((i = 0; i < 200; ++i)); do
