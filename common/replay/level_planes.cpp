@@ -1,6 +1,6 @@
 #include "common/replay/level_planes.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,35 +14,34 @@ constexpr int kSpacing_px = 16;  // between patches
 constexpr int kHalf_px = 12;     // of a patch: 12 cm wide at 3 m
 constexpr int kStep_px = 3;      // between its points
 constexpr int kMost_mm = 10000;
-// Structured light measures 3 m to 1.3 cm, and worse with the square of the distance.
-constexpr double kNoise = 1.5e-3;
+constexpr double kNoise = 1.5e-3;  // of structured light's inverse depth, 1/m: 1.3 cm at 3 m
 constexpr double kAbout_deg = 50.0, kMode_deg = 8.0, kAgree_deg = 5.0, kOther_deg = 20.0;
 constexpr std::size_t kFewest = 100, kCandidates = 1000;
 
 /// The normal of the patch about a pixel, in the camera, towards it; nothing where depth is missing
-/// in more than a tenth of it, or where it is not flat.
+/// in more than a tenth of it, or where it is not flat. A plane's inverse depth is linear in the
+/// pixel, and its noise is the same at all distances; a fit in space would turn the normals of
+/// slanting patches towards the camera, by half a degree over a floor.
 std::optional<Eigen::Vector3d> patchNormal(const cv::Mat& depth, const CameraCalibration& K,
                                            int row, int column) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  double squares = 0.0;
   int points = 0, all = 0;
   for (int r = row - kHalf_px; r <= row + kHalf_px; r += kStep_px) {
     for (int c = column - kHalf_px; c <= column + kHalf_px; c += kStep_px, ++all) {
       const int mm = depth.at<std::uint16_t>(r, c);
       if (mm == 0 || mm > kMost_mm) continue;
-      const double z = 1e-3 * mm;
-      const Eigen::Vector3d point(z * (c - K.cx) / K.fx, z * (r - K.cy) / K.fy, z);
-      sum += point, squares += point * point.transpose(), ++points;
+      const Eigen::Vector3d ray((c - K.cx) / K.fx, (r - K.cy) / K.fy, 1.0);
+      const double inverse = 1e3 / mm;
+      A += ray * ray.transpose(), b += inverse * ray, squares += inverse * inverse, ++points;
     }
   }
   if (10 * points < 9 * all) return std::nullopt;
-  const Eigen::Vector3d mean = sum / points;
-  const Eigen::Matrix3d spread = squares / points - mean * mean.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
-  const double thickness = std::sqrt(std::max(0.0, axes.eigenvalues()[0]));
-  if (thickness > 2.0 * kNoise * mean.z() * mean.z()) return std::nullopt;
-  const Eigen::Vector3d normal = axes.eigenvectors().col(0);
-  return normal.dot(mean) < 0.0 ? normal : Eigen::Vector3d(-normal);
+  const Eigen::Vector3d plane = A.ldlt().solve(b);  // n / d of n · x = d
+  const double residual = std::sqrt(std::max(0.0, squares - plane.dot(b)) / points);
+  if (!(residual < 2.0 * kNoise) || !(plane.norm() > 1e-6)) return std::nullopt;
+  return Eigen::Vector3d(-plane.normalized());  // d > 0: n points away
 }
 
 std::size_t countWithin(const std::vector<Eigen::Vector3d>& normals, const Eigen::Vector3d& axis,

@@ -1,5 +1,6 @@
 // Which way is up, by the level planes of depth images: floors, table tops and seats that are seen
-// from above. Normals of small patches (least squares) are gathered over the images; up is where
+// from above. Normals of small patches (least squares in
+// inverse depth) are gathered over the images; up is where
 // most of them agree, near the mean of the camera's own up.
 #pragma once
 
