@@ -52,19 +52,22 @@ Recording readRecording(const DatasetOptions& options) {
     if (RosMessages::looksLikeOne(path)) return readRosDrive(options);
     if (recorded) return readRecordedDrive(options);
     throwMissing(path, "the dataset folder",
-                 "--data takes a folder in EuRoC, KITTI raw or KITTI tracking layout, or a "
-                 "recording (.mcap; of ROS also .db3 and .bag)");
+                 "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, or "
+                 "a recording (.mcap; of ROS also .db3 and .bag)");
   }
   if (looksLikeEuroc(path)) return readEuroc(options);
   if (looksLikeKittiTracking(path)) return readKittiTracking(options);
   if (looksLikeKittiRaw(path)) return readKittiRaw(options);
+  if (looksLikeSevenScenes(path)) return readSevenScenes(options);
   if (RosMessages::looksLikeOne(path)) return readRosDrive(options);
   if (recorded) return readRecordedDrive(options);
   throw StartupError(ExitCode::kUnavailable,
                      path.string() +
                          " is no dataset folder that is known: give a folder with "
                          "mav0 (EuRoC), with image_02 and oxts (KITTI raw, *_sync), "
-                         "with calib (KITTI tracking), or with recordings (.mcap, .db3, .bag)");
+                         "with calib (KITTI tracking), with color and pose or "
+                         "frame-000000.color.png and .pose.txt (7-Scenes), or with recordings "
+                         "(.mcap, .db3, .bag)");
 }
 
 }  // namespace

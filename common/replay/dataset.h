@@ -1,6 +1,6 @@
-// Dataset folders and recordings played as messages: EuRoC ASL, KITTI raw, KITTI tracking, what
-// perdure record left, and recordings of ROS, known by looking. Samples and frames are merged by
-// time, always in the same order; images are decoded when asked.
+// Dataset folders and recordings played as messages: EuRoC ASL, KITTI raw, KITTI tracking,
+// 7-Scenes, what perdure record left, and recordings of ROS, known by looking. Samples and frames
+// are merged by time, always in the same order; images are decoded when asked.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ using Message = std::variant<ImuSample, SpeedSample, Frame>;
 
 struct DatasetOptions {
   std::filesystem::path path = {};
-  std::string sequence = {};  ///< KITTI tracking only
+  std::string sequence = {};  ///< of KITTI tracking, and of a 7-Scenes folder with several
   /// Width and height, tracking without images.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size = {};
   std::optional<std::size_t> frame_count = {};  ///< tracking without images and labels: how many
@@ -37,7 +37,14 @@ struct DatasetOptions {
   std::map<std::string, std::string> topics = {};
 };
 
-enum class DatasetKind { kEuroc, kKittiRaw, kKittiTracking, kRecording, kRosRecording };
+enum class DatasetKind {
+  kEuroc,
+  kKittiRaw,
+  kKittiTracking,
+  kSevenScenes,
+  kRecording,
+  kRosRecording
+};
 
 /// What a reader found in a folder.
 struct Recording {

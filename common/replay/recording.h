@@ -20,6 +20,8 @@ void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all
 bool looksLikeEuroc(const std::filesystem::path& folder);
 bool looksLikeKittiRaw(const std::filesystem::path& folder);
 bool looksLikeKittiTracking(const std::filesystem::path& folder);
+/// Colour images with a pose file each, or a scene of such sequences (seq-01 …).
+bool looksLikeSevenScenes(const std::filesystem::path& folder);
 /// Frames are counted from 0 in the order of their times. A recording without images has the frames
 /// that its odometry is about, without pixels.
 Recording readRecordedDrive(const DatasetOptions& options);
@@ -28,6 +30,7 @@ Recording readRosDrive(const DatasetOptions& options);
 Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
+Recording readSevenScenes(const DatasetOptions& options);
 
 /// FOLDER/NAME.png, .jpg or .jpeg, the one that exists; else FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);

@@ -60,6 +60,23 @@ Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEnco
   return image;
 }
 
+Result<cv::Mat> decodeDepthFile(const std::string& path) {
+  if (!std::filesystem::is_regular_file(path)) {
+    return fail("image_missing", path + " cannot be read");
+  }
+  cv::Mat depth;
+  try {
+    depth = cv::imread(path, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception& error) {
+    return fail("image_corrupt", path + ": " + error.what());
+  }
+  if (depth.empty()) return fail("image_corrupt", path + ": not an image that OpenCV can decode");
+  if (depth.type() != CV_16UC1) {
+    return fail("image_depth", path + ": a depth image has one channel of 16 bits");
+  }
+  return depth;
+}
+
 int usedBits(const std::string& path) {
   cv::Mat image;
   try {

@@ -19,6 +19,9 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
 /// The same from a file; reason image_missing where it cannot be read.
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
                                 int bits = 16);
+/// A depth image (16 bits, one channel) as it is, CV_16UC1. Reasons as above, and image_depth
+/// (another kind of image).
+Result<cv::Mat> decodeDepthFile(const std::string& path);
 /// Of an image with 16 bits: 8, 10, 12, 14 or 16, the fewest that hold its brightest value. Of
 /// other images and of what is no image: 16.
 int usedBits(const std::string& path);

@@ -15,15 +15,15 @@ namespace {
 
 void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--data", options.data,
-                 "Dataset folder: EuRoC (simulated too), KITTI raw or tracking; or a recording: a "
-                 ".mcap file (of ROS too), .db3, .bag, or a folder of them")
+                 "Dataset folder: EuRoC (simulated too), KITTI raw or tracking, 7-Scenes; or a "
+                 "recording: a .mcap file (of ROS too), .db3, .bag, or a folder of them")
       ->required();
   app.add_option("--rig", options.rig,
                  "Rig file of perdure calibrate, instead of the drive's own calibration");
   app.add_option("--topic", options.topics,
                  "Of a recording of ROS where there are several: cam0=TOPIC, cam1=TOPIC, imu=TOPIC")
       ->take_all();
-  app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000");
+  app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example seq-01");
   app.add_option("--odometry", options.odometry,
                  "vio, truth, drifting (truth with a drift, --set drifting.KEY=VALUE), a pose file "
                  "(TUM or KITTI lines), or recorded")

@@ -2,11 +2,13 @@
 
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "common/base/errors.h"
 
@@ -180,6 +182,56 @@ fs::path tinyKittiTracking(const std::string& name) {
   writeText(root / "label_02" / "0001.txt",
             "0 3 Car 0 0 -1.5 10 20 60 70 1.5 1.6 4.0 1.0 1.65 10.0 -1.57\n"
             "4 -1 DontCare -1 -1 -10 1 2 3 4 -1000 -1000 -1000 -10 -1 -1 -1\n");
+  return root;
+}
+
+namespace {
+
+/// The first camera of tinySevenScenes in a world whose floor is z = 0, a wall at x = 3.
+Eigen::Matrix3d tinySceneCamera() {
+  Eigen::Matrix3d R_BC;
+  R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  constexpr double kDegree = 3.14159265358979 / 180.0;
+  return Eigen::AngleAxisd(25.0 * kDegree, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(10.0 * kDegree, Eigen::Vector3d::UnitX()) * R_BC;
+}
+
+cv::Mat tinySceneDepth(double x) {
+  const Eigen::Matrix3d R = tinySceneCamera();
+  cv::Mat depth(480, 640, CV_16UC1, cv::Scalar(0));
+  for (int r = 0; r < depth.rows; ++r) {
+    for (int c = 0; c < depth.cols; ++c) {
+      const Eigen::Vector3d ray = R * Eigen::Vector3d((c - 320) / 585.0, (r - 240) / 585.0, 1.0);
+      double z = (3.0 - x) / std::max(1e-6, ray.x());
+      if (ray.z() < 0.0) z = std::min(z, -1.4 / ray.z());
+      if (z < 8.0) depth.at<std::uint16_t>(r, c) = static_cast<std::uint16_t>(1000.0 * z + 0.5);
+    }
+  }
+  return depth;
+}
+
+}  // namespace
+
+Eigen::Vector3d tinySevenScenesUp() {
+  return tinySceneCamera().transpose() * Eigen::Vector3d::UnitZ();
+}
+
+fs::path tinySevenScenes(const std::string& name, bool folders) {
+  const fs::path root = freshFolder(name);
+  for (int i = 0; i < 3; ++i) {
+    const std::string number = "00000" + std::to_string(i);
+    const auto file = [&](const char* folder, const char* ending) {
+      return folders ? root / folder / (number + ending)
+                     : root / ("frame-" + number + "." + folder + ending);
+    };
+    const Eigen::Vector3d p = tinySceneCamera().transpose() * Eigen::Vector3d(0.1 * i, 0, 0);
+    std::ostringstream pose;
+    pose << "1 0 0 " << p.x() << "\n0 1 0 " << p.y() << "\n0 0 1 " << p.z() << "\n0 0 0 1\n";
+    writeImage(file("color", folders ? ".jpg" : ".png"), 640, 480, 3);
+    writeText(file("pose", ".txt"), pose.str());
+    fs::create_directories(file("depth", ".png").parent_path());
+    cv::imwrite(file("depth", ".png").string(), tinySceneDepth(0.1 * i));
+  }
   return root;
 }
 

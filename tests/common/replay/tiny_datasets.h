@@ -1,6 +1,7 @@
 // Dataset folders of a few frames, made for tests: each format with every part that a reader needs.
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -24,6 +25,13 @@ std::filesystem::path tinyEuroc(const std::string& name, bool stereo = false);
 std::filesystem::path tinyKittiRaw(const std::string& name);
 /// KITTI tracking: sequences 0000 (three frames, images) and 0001 (labels only, up to frame 4).
 std::filesystem::path tinyKittiTracking(const std::string& name);
+
+/// 7-Scenes: three 640×480 frames of a camera 1.4 m above a floor, with a wall ahead, that looks
+/// 25° down and is rolled by 10°. The poses' frame is that of the first camera. `folders`: as
+/// color/000000.jpg and so on, instead of frame-000000.color.png.
+std::filesystem::path tinySevenScenes(const std::string& name, bool folders = false);
+/// Of those: up in the poses' frame.
+Eigen::Vector3d tinySevenScenesUp();
 
 /// The message of the StartupError that `action` throws, or "" where it throws none.
 std::string startupErrorOf(const std::function<void()>& action);
