@@ -93,11 +93,18 @@ void describeVehicle(Config& c, config::Fields& fields) {
                "127.0.0.1:10110"});
   fields.number("gnss.most_sigma", c.gnss.most_sigma, config::positive(),
                 {"live: a fix that states more is not used", "m"});
+  fields.number("gnss.latency_s", c.gnss.latency_s, config::between(0, 5),
+                {"live: how old a fix is when it comes", "s"});
   fields.numbers("gnss.antenna", c.gnss.antenna, config::between(-100, 100),
                  {"live: place of the antenna in the body [x, y, z]; empty: its origin", "m"});
 }
 
 }  // namespace
+
+std::string addressOf(const GnssConfig& config) {
+  if (!config.address.empty()) return config.address;
+  return config.source == "gpsd" ? "127.0.0.1:2947" : "127.0.0.1:10110";
+}
 
 void describe(Config& c, config::Fields& fields) {
   fields.choice("source", c.source, {"dataset", "libcamera"},
@@ -157,7 +164,7 @@ void requireSource(const Config& config) {
                        "speed.source: gnss needs a receiver: set gnss.source to gpsd or nmea.");
   }
   if (live && config.speed.source == "udp" && config.gnss.source == "nmea" &&
-      config.speed.address == config.gnss.address) {
+      config.speed.address == addressOf(config.gnss)) {
     throw StartupError(ExitCode::kConfiguration,
                        "speed.address and gnss.address are the same, and one of them would hear "
                        "nothing; set speed.source: gnss, which takes both from one receiver.");

@@ -64,9 +64,12 @@ struct SpeedConfig {
 
 struct GnssConfig {
   std::string source = "none", address;
-  double most_sigma = 5.0;
+  double most_sigma = 5.0, latency_s = 0.0;
   std::vector<double> antenna;  ///< empty, or 3: in the body
 };
+
+/// As configured, or the usual one of the source.
+std::string addressOf(const GnssConfig& config);
 
 struct Config {
   std::string source = "dataset";

@@ -25,5 +25,11 @@ int main(int argc, char** argv) {
              }
              capture::Playback playback(context, config);
              context.run();
+           },
+       .verify =
+           [&] {
+             if (config.source != "libcamera") return;
+             capture::requireSource(config);
+             capture::checkVehicle(config.speed, config.gnss);
            }});
 }

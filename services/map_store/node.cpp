@@ -74,6 +74,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
   }
   if (next_id_ > 1) next_id_ += kIdReserve;
   if (config_.graph) loadGraph();
+  earth_stored_ = graph_ && !database_.reader().earthAnchor().value_or("").empty();
   (void)loadView();
 }
 
@@ -164,15 +165,17 @@ void Node::commit() {
     return;
   }
   const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
+  const NewEarth earth = newEarthAnchor();
   const auto written =
       database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr,
-                       unwritten_splits_, acknowledged_, newEarthAnchor()});
+                       unwritten_splits_, acknowledged_, earth.text});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
   }
   if (graph_) mapper_.markSaved();
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);
+  if (!earth.text.empty()) told_earth_ = earth.of;
   failure_.clear();
   dirty_ = false;
   acknowledged_ = 0;

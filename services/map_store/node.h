@@ -80,7 +80,11 @@ class Node {
   void split(const std::vector<MergeOrder>& splits);
   void renameSplit(Objects& objects);
   void resendOrders();
-  std::string newEarthAnchor();
+  struct NewEarth {
+    std::string text;  ///< empty: as it is stored
+    std::pair<std::uint64_t, TimePoint> of{};
+  };
+  NewEarth newEarthAnchor();
   /// Sends what the graph has laid near a place, with what else has changed.
   void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
                   const mapping::MapChange& change, bool lay_again);
@@ -110,6 +114,7 @@ class Node {
   MapDatabase database_;
   mapping::Mapper mapper_;
   EarthPlace earth_;
+  bool earth_stored_ = false;  ///< by another process: it stays
   std::optional<std::pair<std::uint64_t, TimePoint>>
       told_earth_;      ///< revision of the graph, known()
   bool graph_ = false;  ///< it is on, and what is stored of it was read

@@ -68,9 +68,9 @@ void Node::onOdometry(const Odometry& odometry) {
 }
 
 /// Where on Earth M lies, where that has changed since it was written last; else empty.
-std::string Node::newEarthAnchor() {
+Node::NewEarth Node::newEarthAnchor() {
   const auto known = earth_.known();
-  if (!known || told_earth_ == std::pair(mapper_.revision(), *known)) return {};
+  if (!known || earth_stored_ || told_earth_ == std::pair(mapper_.revision(), *known)) return {};
   const WorldId& world = newest_->world;
   const mapping::MapFrames frames(mapper_.graph(), mapper_.anchors());
   const auto place = earth_.ofMap(world, [&](TimePoint time) -> std::optional<RigidTransform> {
@@ -80,8 +80,7 @@ std::string Node::newEarthAnchor() {
     if (frame.provisional || (anchor == 0 && !alone)) return std::nullopt;
     return frame.T_MW;
   });
-  if (place) told_earth_ = std::pair(mapper_.revision(), *known);
-  return place.value_or("");
+  return {place.value_or(""), {mapper_.revision(), *known}};
 }
 
 void Node::onLandmarks(const Landmarks& landmarks) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/camera/same_camera.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
@@ -34,6 +35,7 @@ void Node::onCalibration(const Calibration& calibration) {
     reasons_.add("calibration_without_camera");
     return;
   }
+  if (camera_ && sameCamera(camera_->calibration(), calibration.cameras.front())) return;
   flush();
   camera_ = std::make_shared<const CameraModel>(calibration.cameras.front());
   camera_name_ = calibration.cameras.front().name;

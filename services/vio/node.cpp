@@ -40,7 +40,10 @@ const ReasonCounts& Node::reasons() const {
 
 void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) return reasons_.add("calibration_without_camera");
-  if (calibration_ && sameCameras(*calibration_, calibration)) return;
+  if (calibration_ && sameCameras(*calibration_, calibration)) {
+    calibration_->has_speed = calibration.has_speed;
+    return;
+  }
   if (calibration_) {
     if (started()) lose({"calibration_changed", ""});
     waiting_.clear();

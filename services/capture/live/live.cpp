@@ -49,8 +49,8 @@ Live::Live(service::Context& context, const Config& config)
       speed_(context.sink(bus::topics::kSpeed)),
       rig_(rigOf(config, context.instance())),
       vehicle_(config.speed, config.gnss,
-               {[this](const SpeedReading& reading) { offer(reading); },
-                [this](const EarthPlace& place) { offer(place); }}) {
+               {[this](const SpeedReading& reading) { offerOfVehicle(reading); },
+                [this](const EarthPlace& place) { offerOfVehicle(place); }}) {
   (void)calibrations_.write(rig_);
   context_.countReasons([this](ReasonCounts& counts) { report(counts); });
   context_.onHealth([this] { updateHealth(); });
@@ -102,11 +102,18 @@ void Live::offer(Message message) {
   context_.loop().wake();
 }
 
+void Live::offerOfVehicle(Message message) {
+  from_vehicle_.push(std::move(message));
+  context_.loop().wake();
+}
+
 void Live::pump() {
-  while (auto message = queue_.tryPop()) {
-    std::visit([this](auto& m) { publish(std::move(m)); }, *message);
+  for (auto* queue : {&queue_, &from_vehicle_}) {
+    while (auto message = queue->tryPop()) {
+      std::visit([this](auto& m) { publish(std::move(m)); }, *message);
+    }
   }
-  context_.health().setDropped(queue_.dropped());
+  context_.health().setDropped(queue_.dropped() + from_vehicle_.dropped());
 }
 
 void Live::publish(CameraImage image) {

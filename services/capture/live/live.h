@@ -31,6 +31,7 @@ class Live {
   void openImu(const ImuConfig& config);
   void scanned(const IioScan& scan);
   void offer(Message message);
+  void offerOfVehicle(Message message);
   void pump();
   void publish(CameraImage image);
   void publish(const InertialPair& sample);
@@ -49,6 +50,8 @@ class Live {
   Sink<SpeedSample> speed_;
   Calibration rig_;
   BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of an IMU
+  /// Apart: a sender in the network that says too much costs no images.
+  BoundedQueue<Message> from_vehicle_{256, Overflow::kDropOldest};
   std::uint64_t samples_ = 0;
   std::int64_t last_ns_ = 0;  ///< of the last inertial sample
   std::uint64_t speeds_ = 0;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
+#include <cmath>
 #include <regex>
 
 namespace perdure::capture {
@@ -32,6 +34,17 @@ Result<CanSignal> withId(CanSignal signal, const std::string& text) {
 
 }  // namespace
 
+std::optional<double> wholeNumber(std::string_view text) {
+  const auto first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
+  if (first == std::string_view::npos) return std::nullopt;
+  text = text.substr(first + (text[first] == '+' ? 1 : 0), last - first + 1);
+  if (text.back() == ' ') text.remove_suffix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
 Result<CanSignal> parseCanSignal(const std::string& text) {
   static const std::regex kLine(
       R"re(\s*(0[xX][0-9a-fA-F]{1,8}|\d{1,10})\s+(?:SG_\s+\w+\s*(M|m\d+M?)?\s*:\s*)?)re"
@@ -47,18 +60,20 @@ Result<CanSignal> parseCanSignal(const std::string& text) {
     return fail("can_signal", "it is multiplexed (" + m[2].str() + "), which is not read");
   }
   CanSignal signal;
-  try {
-    signal.start = static_cast<unsigned>(std::stoul(m[3]));
-    signal.length = static_cast<unsigned>(std::stoul(m[4]));
-    signal.little_endian = m[5] == "1";
-    signal.is_signed = m[6] == "-";
-    signal.factor = std::stod(m[7]);
-    signal.offset = std::stod(m[8]);
-    if (m[9].length() > 0) signal.low = std::stod(m[9]);
-    if (m[10].length() > 0) signal.high = std::stod(m[10]);
-  } catch (const std::exception&) {
-    return fail("can_signal", "one of its numbers is none");
-  }
+  const auto numberAt = [&m](std::size_t i) {
+    return m[i].length() > 0 ? wholeNumber(m[i].str()) : std::optional(0.0);
+  };
+  const auto factor = numberAt(7), offset = numberAt(8), low = numberAt(9), high = numberAt(10);
+  if (!factor || !offset || !low || !high) return fail("can_signal", "one of its numbers is none");
+  signal.start = static_cast<unsigned>(std::stoul(m[3]));
+  signal.length = static_cast<unsigned>(std::stoul(m[4]));
+  signal.little_endian = m[5] == "1";
+  signal.is_signed = m[6] == "-";
+  signal.factor = *factor;
+  signal.offset = *offset;
+  signal.low = *low;
+  signal.high = *high;
+  if (*low > *high) return fail("can_signal", "its range ends before it begins");
   signal.unit = m[11];
   if (signal.length < 1 || signal.length > 64) return fail("can_signal", "it has not 1 to 64 bits");
   if (signal.factor == 0.0) return fail("can_signal", "its factor is 0");

@@ -11,7 +11,8 @@ constexpr double kSlowest = 2.0;  // m/s: a course at .05 m/s of error is then r
 constexpr double kBend = 2.0 * std::numbers::pi / 180.0;
 constexpr std::int64_t kDrive_ns = 2'000'000'000, kGap_ns = 1'500'000'000;
 constexpr std::size_t kFewest = 3;
-constexpr double kBetter = 0.5;
+constexpr std::int64_t kAgain_ns = 30'000'000'000;
+constexpr double kBetter = 0.5, kAsGood = 1.2;
 
 double turnedBy(double from, double to) {
   return std::remainder(to - from, 2.0 * std::numbers::pi);
@@ -28,9 +29,13 @@ std::optional<EarthPlace> EarthAnchor::offer(const GnssFix& fix, bool backwards)
   if (!moves) return std::nullopt;
   drive_.push_back(fix);
   while (drive_.size() > 1 && fix.time_ns - drive_[1].time_ns >= kDrive_ns) drive_.pop_front();
-  const bool better = !given_sigma_m_ || fix.sigma_m <= kBetter * *given_sigma_m_;
+  // Who listens may not have had a pose at the time of the last one.
+  const bool again = given_sigma_m_ && fix.time_ns - given_ns_ >= kAgain_ns &&
+                     fix.sigma_m <= kAsGood * *given_sigma_m_;
+  const bool better = !given_sigma_m_ || fix.sigma_m <= kBetter * *given_sigma_m_ || again;
   if (!(fix.sigma_m <= settings_.most_sigma_m) || !better || !straight()) return std::nullopt;
-  given_sigma_m_ = fix.sigma_m;
+  given_sigma_m_ = std::min(fix.sigma_m, given_sigma_m_.value_or(fix.sigma_m));
+  given_ns_ = fix.time_ns;
   return placeOf(fix, *fix.course);
 }
 

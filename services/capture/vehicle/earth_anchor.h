@@ -20,7 +20,7 @@ struct EarthPlace {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;
   double yaw = 0;      ///< of the body's x axis: radians from east, counter-clockwise
-  double sigma_m = 0;  ///< horizontal, one deviation
+  double sigma_m = 0;  ///< one deviation of each horizontal axis
 };
 
 /// A place with a heading. Its heading is the course over ground of a drive that is straight: of
@@ -30,8 +30,8 @@ class EarthAnchor {
  public:
   explicit EarthAnchor(AnchorSettings settings) : settings_(settings) {}
 
-  /// A place where the fix gives the first one, or one at most half as uncertain as the last that
-  /// was given. `backwards`: as the wheels say.
+  /// A place where the fix gives the first one, one at most half as uncertain as the best that was
+  /// given, or after half a minute one that is about as good. `backwards`: as the wheels say.
   std::optional<EarthPlace> offer(const GnssFix& fix, bool backwards);
 
  private:
@@ -40,7 +40,8 @@ class EarthAnchor {
 
   const AnchorSettings settings_;
   std::deque<GnssFix> drive_;
-  std::optional<double> given_sigma_m_;
+  std::optional<double> given_sigma_m_;  ///< the least
+  std::int64_t given_ns_ = 0;            ///< the last
 };
 
 }  // namespace perdure::capture

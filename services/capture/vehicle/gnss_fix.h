@@ -9,8 +9,8 @@ namespace perdure::capture {
 struct GnssFix {
   std::int64_t time_ns = 0;                                  ///< CLOCK_BOOTTIME
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;  ///< WGS 84, over the ellipsoid
-  double sigma_m = 0;                                        ///< horizontal, one deviation
-  std::optional<double> speed;                               ///< m/s over ground
+  double sigma_m = 0;            ///< one deviation of each horizontal axis
+  std::optional<double> speed;   ///< m/s over ground
   std::optional<double> course;  ///< over ground: radians from east, counter-clockwise, (−π, π]
 };
 

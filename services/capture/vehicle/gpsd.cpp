@@ -42,7 +42,8 @@ Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time
   fix.latitude_deg = *latitude;
   fix.longitude_deg = *longitude;
   fix.height_m = *height;
-  fix.sigma_m = number(json, "eph").value_or(kUnstated_m * kSigmasOfEph) / kSigmasOfEph;
+  const double eph = number(json, "eph").value_or(0.0);
+  fix.sigma_m = eph > 0.0 ? eph / kSigmasOfEph : kUnstated_m;
   fix.speed = number(json, "speed");
   if (const auto track = number(json, "track")) fix.course = courseOf(*track);
   return fix;

@@ -9,6 +9,8 @@ namespace perdure::capture {
 namespace {
 
 constexpr double kKnot = 1852.0 / 3600.0;
+constexpr double kUnstatedHdop = 10.0;
+constexpr std::int64_t kRmcLasts_ns = 2'000'000'000;
 constexpr std::size_t kLongest = 256;  // 82 by the standard, which many exceed
 
 /// Field i of a sentence, 0 being its name; empty where there is none.
@@ -88,7 +90,7 @@ Result<NmeaReader::Said> NmeaReader::read(std::string_view line, std::int64_t ti
   if (name.size() != 5) return Said{};
   const std::string_view kind = name.substr(2);
   if (kind == "RMC") return readRmc(*sentence, time_ns);
-  if (kind == "VTG") return readVtg(*sentence);
+  if (kind == "VTG") return readVtg(*sentence, time_ns);
   if (kind == "GGA") return readGga(*sentence, time_ns);
   if (kind == "GST") readGst(*sentence);
   return Said{};
@@ -96,6 +98,7 @@ Result<NmeaReader::Said> NmeaReader::read(std::string_view line, std::int64_t ti
 
 Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int64_t time_ns) {
   rmc_utc_.clear();
+  rmc_ns_ = time_ns;
   if (field(sentence, 2) != "A") return noFix();
   const auto knots = number(field(sentence, 7));
   speed_ = knots ? std::optional(*knots * kKnot) : std::nullopt;
@@ -107,7 +110,9 @@ Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int
   return said;
 }
 
-Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence) {
+/// Beside RMC, which is of the same moment, it says nothing new.
+Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence, std::int64_t time_ns) {
+  if (time_ns - rmc_ns_ < kRmcLasts_ns) return Said{};
   if (field(sentence, 9) == "N") return noFix();
   Said said;
   if (const auto kmh = number(field(sentence, 7))) {
@@ -131,8 +136,9 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
   place_.latitude_deg = *latitude;
   place_.longitude_deg = *longitude;
   place_.height_m = *above_sea + number(field(sentence, 11)).value_or(0.0);
-  place_.sigma_m =
-      stated_sigma_m_.value_or(number(field(sentence, 8)).value_or(1.0) * rangeSigma(quality));
+  const double hdop = number(field(sentence, 8)).value_or(0.0);
+  place_.sigma_m = stated_sigma_m_.value_or((hdop > 0.0 ? hdop : kUnstatedHdop) *
+                                            rangeSigma(quality) / std::numbers::sqrt2);
   gga_utc_ = field(sentence, 1);
   return whole(time_ns);
 }
@@ -140,7 +146,8 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
 /// Deviations of latitude and longitude, as the receiver computes them.
 void NmeaReader::readGst(std::string_view sentence) {
   const auto north = number(field(sentence, 6)), east = number(field(sentence, 7));
-  stated_sigma_m_ = north && east ? std::optional(std::hypot(*north, *east)) : std::nullopt;
+  stated_sigma_m_ =
+      north && east ? std::optional(std::hypot(*north, *east) / std::numbers::sqrt2) : std::nullopt;
 }
 
 NmeaReader::Said NmeaReader::whole(std::int64_t time_ns) {

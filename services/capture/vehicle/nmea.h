@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,7 +17,7 @@ namespace perdure::capture {
 class NmeaReader {
  public:
   struct Said {
-    std::optional<double> speed;  ///< m/s over ground, of RMC or VTG
+    std::optional<double> speed;  ///< m/s over ground, of RMC, or of VTG where there is no RMC
     std::optional<GnssFix> fix;   ///< once RMC and GGA of one second's fraction have come
   };
   /// One line without or with its end. Sentences of other kinds say nothing. Reasons:
@@ -26,12 +27,13 @@ class NmeaReader {
 
  private:
   Result<Said> readRmc(std::string_view sentence, std::int64_t time_ns);
-  Result<Said> readVtg(std::string_view sentence);
+  Result<Said> readVtg(std::string_view sentence, std::int64_t time_ns);
   Result<Said> readGga(std::string_view sentence, std::int64_t time_ns);
   void readGst(std::string_view sentence);
   Said whole(std::int64_t time_ns);
 
   std::string rmc_utc_, gga_utc_;
+  std::int64_t rmc_ns_ = std::numeric_limits<std::int64_t>::min() / 2;  ///< of the last RMC
   std::optional<double> speed_, course_;
   GnssFix place_;
   std::optional<double> stated_sigma_m_;  ///< of the last GST

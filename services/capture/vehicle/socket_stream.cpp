@@ -15,7 +15,6 @@
 namespace perdure::capture {
 namespace {
 
-constexpr std::int64_t kSilence_ns = 1'500'000'000;
 constexpr int kPoll_ms = 100;  // how long a stop waits at most
 constexpr std::size_t kLongestLine = 4096;
 
@@ -47,10 +46,11 @@ bool isStream(int socket) {
 
 }  // namespace
 
-SocketStream::SocketStream(std::string kind, std::string name, OpenSocket open,
-                           std::function<void(const Packet&)> give)
+SocketStream::SocketStream(std::string kind, std::string name, std::chrono::nanoseconds silence,
+                           OpenSocket open, std::function<void(const Packet&)> give)
     : kind_(std::move(kind)),
       name_(std::move(name)),
+      silence_(silence),
       open_(std::move(open)),
       give_(std::move(give)),
       state_(name_ + " has not been opened yet"),
@@ -78,10 +78,11 @@ void SocketStream::flow() {
     pollfd wait{socket.number, POLLIN, 0};
     const int ready = ::poll(&wait, 1, kPoll_ms);
     if (ready > 0 && !readOne(socket.number)) return;
-    const bool now_silent = HostClock::nowNs() - heard_ns_ > kSilence_ns;
+    const bool now_silent = HostClock::nowNs() - heard_ns_ > silence_.count();
     if (now_silent && !silent) {
       fails("silent",
             fmt::format("{} is open and says nothing; is the sender on, and set to it?", name_));
+      if (isStream(socket.number)) return;  // the other side may be gone without a word
     }
     silent = now_silent;
   }

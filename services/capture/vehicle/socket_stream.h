@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -32,10 +33,10 @@ OpenSocket tcpSocket(std::string address, std::string greeting);
 class SocketStream {
  public:
   /// `kind`: begins its reasons, as "speed": "speed_absent" (a try to open it), "speed_lost" (it
-  /// could be read, and no longer), "speed_silent" (open, and nothing for 1.5 seconds). `name`: for
-  /// people. `give` is called on the stream's thread.
-  SocketStream(std::string kind, std::string name, OpenSocket open,
-               std::function<void(const Packet&)> give);
+  /// could be read, and no longer), "speed_silent" (open, and nothing for `silence`; a connection
+  /// is then opened anew). `name`: for people. `give` is called on the stream's thread.
+  SocketStream(std::string kind, std::string name, std::chrono::nanoseconds silence,
+               OpenSocket open, std::function<void(const Packet&)> give);
   ~SocketStream();
   SocketStream(const SocketStream&) = delete;
   SocketStream& operator=(const SocketStream&) = delete;
@@ -49,6 +50,7 @@ class SocketStream {
   bool fails(const char* what, const std::string& why);
 
   const std::string kind_, name_;
+  const std::chrono::nanoseconds silence_;
   const OpenSocket open_;
   const std::function<void(const Packet&)> give_;
   std::atomic<bool> stopping_{false};

@@ -14,7 +14,20 @@
 namespace perdure::capture {
 namespace {
 
-constexpr const char *kGpsd = "127.0.0.1:2947", *kNmea = "127.0.0.1:10110";
+constexpr std::chrono::milliseconds kSpeedSilence{1500}, kGnssSilence{5000};
+
+bool isAddress(const std::string& text) {
+  const auto colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return false;
+  const auto port = wholeNumber(std::string_view(text).substr(colon + 1));
+  return port && *port >= 1.0 && *port <= 65535.0 && *port == std::floor(*port);
+}
+
+void requireAddress(const char* key, const std::string& text) {
+  if (isAddress(text)) return;
+  throw StartupError(ExitCode::kConfiguration,
+                     fmt::format("{}: \"{}\" is not HOST:PORT.", key, text));
+}
 
 std::uint32_t kernelId(const CanSignal& signal) {
   return signal.extended ? signal.id | CAN_EFF_FLAG : signal.id;
@@ -28,11 +41,6 @@ OpenSocket socketOf(const SpeedConfig& config) {
   for (const CanSignal& signal : settings.wheels) ids.push_back(kernelId(signal));
   if (settings.reverse) ids.push_back(kernelId(*settings.reverse));
   return canSocket(config.can_interface, std::move(ids));
-}
-
-std::string addressOf(const GnssConfig& config) {
-  if (!config.address.empty()) return config.address;
-  return config.source == "gpsd" ? kGpsd : kNmea;
 }
 
 OpenSocket socketOf(const GnssConfig& config) {
@@ -75,30 +83,46 @@ Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int
               "a line of speed is not \"SPEED\" or \"SPEED SIGMA\" in m/s, nor a sentence of NMEA");
 }
 
+void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss) {
+  if (speed.source == "can") {
+    (void)wheelSettings(speed.can_signals, speed.can_reverse, speed.sigma);
+  }
+  if (speed.source == "udp") requireAddress("speed.address", speed.address);
+  if (gnss.source != "none") requireAddress("gnss.address", addressOf(gnss));
+}
+
 Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs)
     : Vehicle(speed, gnss, std::move(outputs), socketOf(speed), socketOf(gnss)) {}
 
 Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs,
                  OpenSocket speed_socket, OpenSocket gnss_socket)
-    : speed_(speed), gnss_(gnss), outputs_(std::move(outputs)), anchor_(anchorSettings(gnss)) {
+    : speed_(speed),
+      gnss_(gnss),
+      outputs_(std::move(outputs)),
+      anchor_(anchorSettings(gnss)),
+      speed_ns_(HostClock::nowNs()),
+      fix_ns_(HostClock::nowNs()) {
   if (speed.source == "can") {
     wheels_.emplace(wheelSettings(speed.can_signals, speed.can_reverse, speed.sigma));
   }
   if (speed_socket) {
     const bool can = speed.source == "can";
     const auto lines = [this](std::string_view line, std::int64_t t) { onSpeedLine(line, t); };
-    speed_stream_ = std::make_unique<SocketStream>("speed", nameOf(speed), std::move(speed_socket),
-                                                   [this, can, lines](const Packet& packet) {
-                                                     if (can) return onCan(packet);
-                                                     speed_lines_.add(packet, lines);
-                                                     speed_lines_.end(packet.time_ns, lines);
-                                                   });
+    speed_stream_ = std::make_unique<SocketStream>(
+        "speed", nameOf(speed), kSpeedSilence, std::move(speed_socket),
+        [this, can, lines](const Packet& packet) {
+          if (can) return onCan(packet);
+          said_.reset();
+          speed_lines_.add(packet, lines);
+          speed_lines_.end(packet.time_ns, lines);
+          if (said_) give(*said_);  // lines of one datagram are of one moment
+        });
   }
   if (gnss_socket) {
     const bool datagrams = gnss.source == "nmea";
     const auto lines = [this](std::string_view line, std::int64_t t) { onGnssLine(line, t); };
     gnss_stream_ = std::make_unique<SocketStream>("gnss", gnss.source + " at " + addressOf(gnss),
-                                                  std::move(gnss_socket),
+                                                  kGnssSilence, std::move(gnss_socket),
                                                   [this, datagrams, lines](const Packet& packet) {
                                                     gnss_lines_.add(packet, lines);
                                                     if (datagrams)
@@ -111,7 +135,7 @@ void Vehicle::onCan(const Packet& packet) {
   // A classic frame begins like one of CAN FD: id, length, data from byte 8 on.
   canfd_frame frame{};
   if (packet.bytes.size() != CAN_MTU && packet.bytes.size() != CANFD_MTU) {
-    return count({"speed_malformed", "what came of the CAN bus is no frame"});
+    return count(Of::kSpeed, {"speed_malformed", "what came of the CAN bus is no frame"});
   }
   std::memcpy(&frame, packet.bytes.data(), packet.bytes.size());
   const bool extended = (frame.can_id & CAN_EFF_FLAG) != 0;
@@ -129,36 +153,46 @@ void Vehicle::onCan(const Packet& packet) {
 void Vehicle::onSpeedLine(std::string_view line, std::int64_t time_ns) {
   if (line.front() == '$') {
     const auto said = speed_nmea_.read(line, time_ns);
-    if (!said) return count(said.error());
-    if (said->speed) give({time_ns, *said->speed, speed_.sigma});
+    if (!said) return count(Of::kSpeed, said.error());
+    if (said->speed) said_ = SpeedReading{time_ns, *said->speed, speed_.sigma};
     return;
   }
   const auto reading = readSpeedLine(line, speed_.sigma, time_ns);
-  reading ? give(*reading) : count(reading.error());
+  if (!reading) return count(Of::kSpeed, reading.error());
+  said_ = *reading;
 }
 
 void Vehicle::onGnssLine(std::string_view line, std::int64_t time_ns) {
   if (gnss_.source == "gpsd") {
     const auto fix = readGpsd(line, time_ns);
-    if (!fix) return count(fix.error());
+    if (!fix) return count(Of::kPlace, fix.error());
     if (*fix) take(**fix);
     return;
   }
   const auto said = gnss_nmea_.read(line, time_ns);
-  if (!said) return count(said.error());
+  if (!said) return count(Of::kPlace, said.error());
   if (said->fix) take(*said->fix);
 }
 
-void Vehicle::take(const GnssFix& fix) {
+void Vehicle::take(GnssFix fix) {
+  fix_ns_ = HostClock::nowNs();
   {
     const std::lock_guard lock(mutex_);
     gnss_trouble_.clear();
   }
   if (speed_.source == "gnss" && fix.speed) give({fix.time_ns, *fix.speed, speed_.sigma});
+  if (!(fix.sigma_m <= gnss_.most_sigma)) {
+    count(Of::kPlace,
+          {"gnss_uncertain", fmt::format("the receiver of satellites states ±{:.1f} m, more than "
+                                         "gnss.most_sigma: the map's place on Earth waits for less",
+                                         fix.sigma_m)});
+  }
+  fix.time_ns -= std::llround(1e9 * gnss_.latency_s);
   if (const auto place = anchor_.offer(fix, backwards_)) outputs_.place(*place);
 }
 
 void Vehicle::give(SpeedReading reading) {
+  speed_ns_ = HostClock::nowNs();
   {
     const std::lock_guard lock(mutex_);
     speed_trouble_.clear();
@@ -168,11 +202,28 @@ void Vehicle::give(SpeedReading reading) {
   outputs_.speed(reading);
 }
 
-void Vehicle::count(const Reason& reason) {
+void Vehicle::count(Of what, const Reason& reason) {
   const std::lock_guard lock(mutex_);
   reasons_.add(reason);
-  const bool of_speed = reason.code.starts_with("speed_") || gnss_.source == "none";
-  (of_speed ? speed_trouble_ : gnss_trouble_) = reason.detail;
+  (what == Of::kSpeed ? speed_trouble_ : gnss_trouble_) = reason.detail;
+}
+
+/// Where something comes, and nothing comes of it.
+std::string Vehicle::silence() const {
+  const std::int64_t now_ns = HostClock::nowNs();
+  const auto flows = [](const std::unique_ptr<SocketStream>& stream) {
+    return stream && stream->state().problem().empty();
+  };
+  std::string all;
+  if (flows(gnss_stream_) && now_ns - fix_ns_ > std::chrono::nanoseconds(kGnssSilence).count()) {
+    all = "What " + gnss_stream_->state().name() +
+          " says makes no fix: of NMEA, RMC and GGA of one time are needed.";
+  }
+  const auto& of_speed = speed_.source == "gnss" ? gnss_stream_ : speed_stream_;
+  if (flows(of_speed) && now_ns - speed_ns_ > std::chrono::nanoseconds(kGnssSilence).count()) {
+    all = joined(all, "What " + of_speed->state().name() + " says holds no speed.");
+  }
+  return all;
 }
 
 std::string Vehicle::problem() const {
@@ -184,6 +235,7 @@ std::string Vehicle::problem() const {
   for (const auto* stream : {speed_stream_.get(), gnss_stream_.get()}) {
     if (stream) add(stream->state().problem());
   }
+  add(silence());
   const std::lock_guard lock(mutex_);
   add(wheels_ ? wheels_->trouble() : speed_trouble_);
   add(gnss_trouble_);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -21,6 +22,9 @@ namespace perdure::capture {
 /// A line of UDP: "SPEED" or "SPEED SIGMA" in m/s, apart by blanks or a comma. Reason
 /// "speed_malformed".
 Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int64_t time_ns);
+
+/// Throws StartupError where a signal or an address of the configuration is none.
+void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss);
 
 class Vehicle {
  public:
@@ -45,17 +49,21 @@ class Vehicle {
   void onSpeedLine(std::string_view line, std::int64_t time_ns);
   void onGnssLine(std::string_view line, std::int64_t time_ns);
   void give(SpeedReading reading);
-  void take(const GnssFix& fix);
-  void count(const Reason& reason);
+  void take(GnssFix fix);
+  enum class Of : std::uint8_t { kSpeed, kPlace };
+  void count(Of what, const Reason& reason);
+  std::string silence() const;
 
   const SpeedConfig speed_;
   const GnssConfig gnss_;
   const Outputs outputs_;
   Lines speed_lines_, gnss_lines_;
   NmeaReader speed_nmea_, gnss_nmea_;
+  std::optional<SpeedReading> said_;  ///< the last of a datagram's lines
   EarthAnchor anchor_;
   std::atomic<bool> backwards_{false};
-  mutable std::mutex mutex_;  // of what follows
+  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< when there was one last, or the beginning
+  mutable std::mutex mutex_;                     // of what follows
   std::optional<WheelSpeed> wheels_;
   ReasonCounts reasons_;
   std::string speed_trouble_, gnss_trouble_;

@@ -11,6 +11,8 @@
 namespace perdure::capture {
 namespace {
 
+constexpr std::int64_t kReverseSilence_ns = 3'000'000'000;
+
 [[noreturn]] void refuse(const char* key, const std::string& text, const std::string& why) {
   throw StartupError(ExitCode::kConfiguration,
                      fmt::format("{}: \"{}\" cannot be used: {}.", key, text, why));
@@ -64,11 +66,9 @@ WheelSettings wheelSettings(const std::vector<std::string>& signals, const std::
     refuse("speed.can.reverse", reverse, "it does not end in == VALUE");
   }
   settings.reverse = signalOf("speed.can.reverse", reverse.substr(0, equals));
-  try {
-    settings.reverse_value = std::stod(reverse.substr(equals + 2));
-  } catch (const std::exception&) {
-    refuse("speed.can.reverse", reverse, "what is behind == is no number");
-  }
+  const auto value = wholeNumber(std::string_view(reverse).substr(equals + 2));
+  if (!value) refuse("speed.can.reverse", reverse, "what is behind == is no number");
+  settings.reverse_value = *value;
   return settings;
 }
 
@@ -81,7 +81,7 @@ WheelSpeed::WheelSpeed(WheelSettings settings) : settings_(std::move(settings)) 
 std::optional<SpeedReading> WheelSpeed::frame(std::uint32_t id, bool extended,
                                               std::span<const std::uint8_t> data,
                                               std::int64_t time_ns) {
-  hearReverse(id, extended, data);
+  hearReverse(id, extended, data, time_ns);
   std::optional<SpeedReading> early;
   const bool again = std::any_of(wheels_.begin(), wheels_.end(), [&](const Wheel& w) {
     return isOf(w.signal, id, extended) && w.speed;
@@ -96,7 +96,15 @@ std::optional<SpeedReading> WheelSpeed::frame(std::uint32_t id, bool extended,
   }
   const bool all = std::all_of(wheels_.begin(), wheels_.end(),
                                [](const Wheel& wheel) { return wheel.speed.has_value(); });
-  return early || !taken || !all ? early : reading();
+  if (!early && taken && all) early = reading();
+  if (early && settings_.reverse && time_ns - reverse_ns_ > kReverseSilence_ns) {
+    reasons_.add("speed_can_no_reverse");
+    trouble_ = fmt::format(
+        "CAN id {:#x} of speed.can.reverse says nothing: the speed is taken for "
+        "forwards",
+        settings_.reverse->id);
+  }
+  return early;
 }
 
 bool WheelSpeed::take(Wheel& wheel, std::span<const std::uint8_t> data, std::int64_t time_ns) {
@@ -111,10 +119,12 @@ bool WheelSpeed::take(Wheel& wheel, std::span<const std::uint8_t> data, std::int
   return true;
 }
 
-void WheelSpeed::hearReverse(std::uint32_t id, bool extended, std::span<const std::uint8_t> data) {
+void WheelSpeed::hearReverse(std::uint32_t id, bool extended, std::span<const std::uint8_t> data,
+                             std::int64_t time_ns) {
   if (!settings_.reverse || !isOf(*settings_.reverse, id, extended)) return;
   const auto raw = rawValueOf(*settings_.reverse, data);
   if (!raw) return reasons_.add(raw.error());
+  reverse_ns_ = time_ns;
   const double value =
       static_cast<double>(*raw) * settings_.reverse->factor + settings_.reverse->offset;
   backwards_ =

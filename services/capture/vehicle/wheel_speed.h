@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -33,7 +34,8 @@ class WheelSpeed {
   /// A frame of the bus. A reading comes once each wheel has spoken since the last one, at the mean
   /// of their times; of those that did, where one is heard twice before another
   /// ("speed_can_partial"). Its variance is that of the mean: of `sigma` and the resolution, and as
-  /// the wheels differ.
+  /// the wheels differ. Where `reverse` has said nothing for three seconds it is counted,
+  /// "speed_can_no_reverse".
   std::optional<SpeedReading> frame(std::uint32_t id, bool extended,
                                     std::span<const std::uint8_t> data, std::int64_t time_ns);
   const ReasonCounts& reasons() const { return reasons_; }
@@ -48,12 +50,14 @@ class WheelSpeed {
     std::int64_t time_ns = 0;
   };
   bool take(Wheel& wheel, std::span<const std::uint8_t> data, std::int64_t time_ns);
-  void hearReverse(std::uint32_t id, bool extended, std::span<const std::uint8_t> data);
+  void hearReverse(std::uint32_t id, bool extended, std::span<const std::uint8_t> data,
+                   std::int64_t time_ns);
   std::optional<SpeedReading> reading();
 
   const WheelSettings settings_;
   std::vector<Wheel> wheels_;
   bool backwards_ = false;
+  std::int64_t reverse_ns_ = std::numeric_limits<std::int64_t>::min() / 2;  ///< heard last
   ReasonCounts reasons_;
   std::string trouble_;
 };

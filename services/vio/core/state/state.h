@@ -117,7 +117,11 @@ class State {
   int calibrationEnd() const { return timeOffsetAt() + 1 + readoutCount(); }
   bool rolls(std::size_t camera) const { return readout_s[camera] != 0.0; }
   /// Of all cameras; 0 where none rolls.
-  double longestReadout() const { return *std::max_element(readout_s.begin(), readout_s.end()); }
+  double longestReadout() const {
+    double longest = 0.0;  // an estimate may be below 0
+    for (const double s : readout_s) longest = std::max(longest, std::abs(s));
+    return longest;
+  }
   /// The camera when it saw a row. `row`: −½ … ½, first to last.
   RowCamera rowCamera(const Clone& clone, std::size_t camera, double row) const {
     return vio::rowCamera(clone.rows, T_BC[camera], row * readout_s[camera]);

@@ -116,6 +116,8 @@ TEST(CanSignal, SaysWhatIsWrongInALine) {
   EXPECT_THAT(why("0x1a0 0|0@1+ (1,0)"), HasSubstr("64 bits"));
   EXPECT_THAT(why("0x1a0 0|8@1+ (0,0)"), HasSubstr("factor"));
   EXPECT_THAT(why("0x1a0 0|8@1+ (-,0)"), HasSubstr("number"));
+  EXPECT_THAT(why("0x1a0 0|8@1+ (0.0.1,0)"), HasSubstr("number"));
+  EXPECT_THAT(why("0x1a0 0|8@1+ (1,0) [300|0]"), HasSubstr("range"));
   EXPECT_THAT(why("0x1a0 505|8@1+ (1,0)"), HasSubstr("64 bytes"));
   EXPECT_THAT(why("0x1a0 504|9@0+ (1,0)"), HasSubstr("64 bytes"));
   EXPECT_THAT(why("416 SG_ Speed m2 : 0|8@1+ (1,0)"), HasSubstr("multiplexed"));

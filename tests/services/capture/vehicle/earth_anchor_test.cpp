@@ -40,6 +40,10 @@ TEST(EarthAnchor, IsTakenOnAStraightDriveAndOnce) {
   EXPECT_EQ(drive.until(anchor, 40), 0);
   drive.fix.sigma_m = 0.9;
   EXPECT_EQ(drive.until(anchor, 1), 1) << "less than half as uncertain";
+  drive.fix.sigma_m = 1.0;
+  EXPECT_EQ(drive.until(anchor, 300), 150) << "after half a minute, for who had no pose before";
+  drive.fix.sigma_m = 1.2;
+  EXPECT_EQ(drive.until(anchor, 300), 0) << "but no worse one";
 }
 
 TEST(EarthAnchor, IsNotTakenWhereItsHeadingIsNotKnown) {

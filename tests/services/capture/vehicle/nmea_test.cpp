@@ -35,7 +35,7 @@ TEST(Nmea, RmcAndGgaOfOneTimeAreAFix) {
   EXPECT_NEAR(said->fix->latitude_deg, 47.0 + 17.11399 / 60.0, 1e-12);
   EXPECT_NEAR(said->fix->longitude_deg, 8.0 + 33.91590 / 60.0, 1e-12);
   EXPECT_NEAR(said->fix->height_m, 547.6, 1e-9);
-  EXPECT_NEAR(said->fix->sigma_m, 3.03, 1e-9);
+  EXPECT_NEAR(said->fix->sigma_m, 3.03 / std::numbers::sqrt2, 1e-9);
   EXPECT_NEAR(said->fix->course.value(), (90.0 - 77.52) * std::numbers::pi / 180.0, 1e-12);
   // Each once; and of one time alone.
   EXPECT_FALSE(
@@ -47,7 +47,7 @@ TEST(Nmea, RmcAndGgaOfOneTimeAreAFix) {
   ASSERT_TRUE(south->fix);
   EXPECT_LT(south->fix->latitude_deg, 0.0);
   EXPECT_LT(south->fix->longitude_deg, 0.0);
-  EXPECT_NEAR(south->fix->sigma_m, 0.012, 1e-9) << "RTK";
+  EXPECT_NEAR(south->fix->sigma_m, 0.012 / std::numbers::sqrt2, 1e-9) << "RTK";
 }
 
 TEST(Nmea, TheReceiversOwnDeviationGoesFirst) {
@@ -57,7 +57,7 @@ TEST(Nmea, TheReceiversOwnDeviationGoesFirst) {
   const auto said =
       reader.read(sentence("GPGGA,082356.00,4717.1,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,"), 3);
   ASSERT_TRUE(said->fix);
-  EXPECT_NEAR(said->fix->sigma_m, std::hypot(1.7, 1.3), 1e-12);
+  EXPECT_NEAR(said->fix->sigma_m, std::hypot(1.7, 1.3) / std::numbers::sqrt2, 1e-12);
 }
 
 TEST(Nmea, VtgHasASpeed) {
@@ -67,6 +67,11 @@ TEST(Nmea, VtgHasASpeed) {
   EXPECT_NEAR(reader.read(sentence("GPVTG,77.52,T,,M,36.0,N,,K,A"), 1)->speed.value(),
               36.0 * 1852.0 / 3600.0, 1e-12);
   EXPECT_FALSE(reader.read(sentence("GPVTG,,T,,M,,N,,K,A"), 1)->speed);
+  // Of the same moment as an RMC it says nothing new.
+  ASSERT_TRUE(reader.read(sentence("GPRMC,083559.00,A,4717.1,N,00833.9,E,1,90,091202,,,A"), 2));
+  const std::string vtg = sentence("GPVTG,77.52,T,,M,0.004,N,36.0,K,A");
+  EXPECT_FALSE(reader.read(vtg, 1'000'000'000)->speed);
+  EXPECT_TRUE(reader.read(vtg, 3'000'000'000)->speed) << "there is no RMC any more";
 }
 
 TEST(Nmea, SaysWhatIsNone) {
@@ -82,7 +87,7 @@ TEST(Nmea, SaysWhatIsNone) {
   EXPECT_EQ(code("$GPRMC,083559.00,A*G7"), "nmea_checksum");
   EXPECT_EQ(code(sentence("GPRMC,083559.00,V,,,,,,,091202,,,N")), "nmea_no_fix");
   EXPECT_EQ(code(sentence("GPGGA,083559.00,,,,,0,00,99.99,,,,,,")), "nmea_no_fix");
-  EXPECT_EQ(code(sentence("GPVTG,,,,,,,,,N")), "nmea_no_fix");
+  EXPECT_EQ(NmeaReader().read(sentence("GPVTG,,,,,,,,,N"), 1).error().code, "nmea_no_fix");
   EXPECT_EQ(code(sentence("GPGGA,083559.00,9917.1,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,")),
             "nmea_malformed");
   EXPECT_EQ(code(sentence("GPGGA,083559.00,4760.0,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,")),

@@ -55,7 +55,7 @@ TEST(SocketStream, GivesDatagramsWithTheTimeOfTheirArrival) {
   std::mutex mutex;
   std::vector<std::string> heard;
   std::int64_t time_ns = 0;
-  SocketStream stream("speed", "speed at test", udpSocket(sender.address()),
+  SocketStream stream("speed", "speed at test", 1500ms, udpSocket(sender.address()),
                       [&](const Packet& packet) {
                         const std::lock_guard lock(mutex);
                         heard.emplace_back(packet.bytes.begin(), packet.bytes.end());
@@ -86,7 +86,7 @@ TEST(SocketStream, GivesDatagramsWithTheTimeOfTheirArrival) {
 TEST(SocketStream, OpensAgainWhatWasClosed) {
   std::atomic<int> opened{0}, other{-1};
   SocketStream stream(
-      "gnss", "gpsd at test",
+      "gnss", "gpsd at test", 5000ms,
       [&]() -> Result<int> {
         if (++opened == 2) return fail("socket", "nobody is there");
         int pair[2];

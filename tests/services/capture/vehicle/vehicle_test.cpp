@@ -10,6 +10,9 @@
 #include <chrono>
 #include <vector>
 
+#include "common/base/errors.h"
+#include "services/capture/live/clocks.h"
+
 namespace perdure::capture {
 namespace {
 
@@ -94,7 +97,7 @@ TEST(Vehicle, HearsItsSpeedInLines) {
   Vehicle vehicle(speed, {}, heard.outputs(), lines.open(), {});
   lines.send("2.5");
   lines.send("-1.5, 0.3\n");
-  lines.send("$GPVTG,77.52,T,,M,0.004,N,0.008,K,A*06\r\n");
+  lines.send("7\n8\n$GPVTG,77.52,T,,M,0.004,N,0.008,K,A*06\r\n");  // of one moment: the last
   lines.send("fast");
   ASSERT_TRUE(heard.wait([](const Heard& h) { return h.speeds.size() == 3; }));
   EXPECT_DOUBLE_EQ(heard.speeds[0].speed, 2.5);
@@ -114,6 +117,41 @@ TEST(Vehicle, LinesOfSpeedAreReadToTheirEnd) {
   for (const char* line : {"1.5", " 1.5 ", "1.5,0.2", "1.5\t0.2", "1.5 , 0.2 "}) {
     EXPECT_TRUE(readSpeedLine(line, 0.1, 0)) << line;
   }
+}
+
+TEST(Vehicle, SaysThatAFixIsTooUncertainForTheMap) {
+  const Wire gpsd(SOCK_STREAM);
+  Heard heard;
+  GnssConfig gnss;
+  gnss.source = "gpsd";
+  Vehicle vehicle({}, gnss, heard.outputs(), {}, gpsd.open());
+  gpsd.send(R"({"class":"TPV","mode":3,"lat":49.0,"lon":8.4,"altHAE":110,"speed":5,"track":90})"
+            "\n");
+  ASSERT_TRUE(heard.wait([&](const Heard&) {
+    return vehicle.problem().find("gnss.most_sigma") != std::string::npos;
+  })) << vehicle.problem();
+  ReasonCounts counts;
+  vehicle.report(counts);
+  EXPECT_EQ(counts.of("gnss_uncertain"), 1U) << "an error that is not stated is not small";
+}
+
+TEST(Vehicle, RefusesAddressesThatAreNone) {
+  const auto refuses = [](const std::string& address) {
+    SpeedConfig speed;
+    speed.source = "udp";
+    speed.address = address;
+    try {
+      checkVehicle(speed, {});
+    } catch (const StartupError& error) {
+      return std::string(error.what()).find("HOST:PORT") != std::string::npos;
+    }
+    return false;
+  };
+  for (const char* wrong : {"foo", "", ":5600", "host:", "host:x", "host:0", "host:70000"}) {
+    EXPECT_TRUE(refuses(wrong)) << wrong;
+  }
+  EXPECT_FALSE(refuses("127.0.0.1:5600"));
+  EXPECT_FALSE(refuses("[::1]:5600"));
 }
 
 TEST(Vehicle, KnowsItsPlaceAndSpeedByGpsd) {

@@ -68,6 +68,10 @@ TEST(WheelSpeed, GoesBackwardsWhileTheGearSaysSo) {
   EXPECT_NEAR(speed(), -1.0, 1e-12);
   EXPECT_FALSE(wheels.frame(0x3e9, false, words(0x0600), 1500));
   EXPECT_NEAR(speed(), 1.0, 1e-12);
+  EXPECT_EQ(wheels.trouble(), "");
+  EXPECT_TRUE(wheels.frame(0x1a0, false, words(360), 4'000'000'000));
+  EXPECT_THAT(wheels.trouble(), HasSubstr("0x3e9")) << "it has said nothing for long";
+  EXPECT_GE(wheels.reasons().of("speed_can_no_reverse"), 1U);
 }
 
 TEST(WheelSpeed, KnowsUnits) {
@@ -93,7 +97,10 @@ TEST(WheelSpeed, RefusesAConfigurationWithTheMend) {
   EXPECT_THAT(why({"0x1a0 0|16@1+ (0.01,0) \"furlong\""}), HasSubstr("furlong"));
   EXPECT_THAT(why({"hello"}), HasSubstr("speed.can.signals: \"hello\""));
   EXPECT_THAT(why({kLeft}, "0x3e9 8|4@1+ (1,0)"), HasSubstr("== VALUE"));
-  EXPECT_THAT(why({kLeft}, "0x3e9 8|4@1+ (1,0) == R"), HasSubstr("no number"));
+  for (const char* value : {"R", "7abc", "nan", "", "1e999"}) {
+    EXPECT_THAT(why({kLeft}, std::string("0x3e9 8|4@1+ (1,0) == ") + value), HasSubstr("no number"))
+        << value;
+  }
 }
 
 }  // namespace
