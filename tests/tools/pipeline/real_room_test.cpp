@@ -87,6 +87,7 @@ class RealRoom : public ::testing::Test {
       options.data = thinned().string();
       options.odometry = "truth", options.detections = "model";
       options.model = network().string();
+      options.assignments = {"inference.detection.classes=[chair, dining table, tv, cup]"};
       options.out = replay::freshFolder("red_kitchen_out").string();
       Pipeline pipeline(options);
       pipeline.run([](const PipelineCounts&) {});
@@ -121,7 +122,7 @@ class RealRoom : public ::testing::Test {
   static inline std::vector<ObjectBelief> objects_;
 };
 
-TEST_F(RealRoom, EveryChairAndTheTableIsOneObjectOfItsClassButForKnownFailures) {
+TEST_F(RealRoom, WhatStandsThereIsOneObjectOfItsClassButForKnownFailures) {
   std::size_t judged = 0;
   for (const auto& thing : readRoom()) {
     if (!thing.judged) continue;
@@ -132,7 +133,7 @@ TEST_F(RealRoom, EveryChairAndTheTableIsOneObjectOfItsClassButForKnownFailures) 
         << "\non the map:\n"
         << list();
   }
-  EXPECT_EQ(judged, 7U);
+  EXPECT_EQ(judged, 11U);
 }
 
 TEST_F(RealRoom, TheChairsBehindTheTableArePlacedWhateverTheyAreCalled) {
