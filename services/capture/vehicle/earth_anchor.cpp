@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/earth/geodesy.h"
+
 namespace perdure::capture {
 namespace {
 
@@ -49,24 +51,11 @@ bool EarthAnchor::straight() const {
   });
 }
 
-/// The origin of the body, by the ellipsoid's radii of curvature at the antenna.
 EarthPlace EarthAnchor::placeOf(const GnssFix& fix, double yaw) const {
-  constexpr double kA = 6378137.0, kE2 = 6.69437999014e-3, kDegree = std::numbers::pi / 180.0;
-  const double latitude = fix.latitude_deg * kDegree, s = std::sin(latitude);
-  const double w = std::sqrt(1.0 - kE2 * s * s);
-  const double meridian = kA * (1.0 - kE2) / (w * w * w), normal = kA / w;
-  const Eigen::Vector3d& a = settings_.antenna;
-  const double east = std::cos(yaw) * a.x() - std::sin(yaw) * a.y();
-  const double north = std::sin(yaw) * a.x() + std::cos(yaw) * a.y();
-  EarthPlace place;
-  place.time_ns = fix.time_ns;
-  place.latitude_deg = fix.latitude_deg - north / (meridian + fix.height_m) / kDegree;
-  place.longitude_deg =
-      fix.longitude_deg - east / ((normal + fix.height_m) * std::cos(latitude)) / kDegree;
-  place.height_m = fix.height_m - a.z();
-  place.yaw = yaw;
-  place.sigma_m = fix.sigma_m;
-  return place;
+  const GeoAnchor antenna{{}, fix.latitude_deg, fix.longitude_deg, fix.height_m, yaw};
+  const RigidTransform at(Eigen::Quaterniond::Identity(), settings_.antenna);
+  const Geodetic body = GeoReference(antenna, at)(Eigen::Vector3d::Zero());
+  return {fix.time_ns, body.latitude_deg, body.longitude_deg, body.height_m, yaw, fix.sigma_m};
 }
 
 }  // namespace perdure::capture

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "services/capture/vehicle/can_signal.h"
+
 namespace perdure::capture {
 namespace {
 
@@ -23,18 +25,9 @@ std::string_view field(std::string_view sentence, std::size_t i) {
   return sentence.substr(0, sentence.find(','));
 }
 
-std::optional<double> number(std::string_view text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    return std::nullopt;
-  }
-  return value;
-}
-
 /// ddmm.mmmm or dddmm.mmmm with its hemisphere, in degrees.
 std::optional<double> angle(std::string_view text, std::string_view hemisphere, double most) {
-  const auto value = number(text);
+  const auto value = wholeNumber(text);
   if (!value || *value < 0.0 || hemisphere.size() != 1) return std::nullopt;
   const double whole = std::floor(*value / 100.0), minutes = *value - 100.0 * whole;
   const double degrees = whole + minutes / 60.0;
@@ -100,9 +93,9 @@ Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int
   rmc_utc_.clear();
   rmc_ns_ = time_ns;
   if (field(sentence, 2) != "A") return noFix();
-  const auto knots = number(field(sentence, 7));
+  const auto knots = wholeNumber(field(sentence, 7));
   speed_ = knots ? std::optional(*knots * kKnot) : std::nullopt;
-  const auto course = number(field(sentence, 8));
+  const auto course = wholeNumber(field(sentence, 8));
   course_ = course ? std::optional(courseOf(*course)) : std::nullopt;
   rmc_utc_ = field(sentence, 1);
   Said said = whole(time_ns);
@@ -115,9 +108,9 @@ Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence, std::int
   if (time_ns - rmc_ns_ < kRmcLasts_ns) return Said{};
   if (field(sentence, 9) == "N") return noFix();
   Said said;
-  if (const auto kmh = number(field(sentence, 7))) {
+  if (const auto kmh = wholeNumber(field(sentence, 7))) {
     said.speed = *kmh / 3.6;
-  } else if (const auto knots = number(field(sentence, 5))) {
+  } else if (const auto knots = wholeNumber(field(sentence, 5))) {
     said.speed = *knots * kKnot;
   }
   return said;
@@ -125,18 +118,18 @@ Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence, std::int
 
 Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int64_t time_ns) {
   gga_utc_.clear();
-  const double quality = number(field(sentence, 6)).value_or(0.0);
+  const double quality = wholeNumber(field(sentence, 6)).value_or(0.0);
   if (quality < 1.0) return noFix();
   const auto latitude = angle(field(sentence, 2), field(sentence, 3), 90.0);
   const auto longitude = angle(field(sentence, 4), field(sentence, 5), 180.0);
-  const auto above_sea = number(field(sentence, 9));
+  const auto above_sea = wholeNumber(field(sentence, 9));
   if (!latitude || !longitude || !above_sea) {
     return fail("nmea_malformed", "GGA says that there is a fix, and has no place or height");
   }
   place_.latitude_deg = *latitude;
   place_.longitude_deg = *longitude;
-  place_.height_m = *above_sea + number(field(sentence, 11)).value_or(0.0);
-  const double hdop = number(field(sentence, 8)).value_or(0.0);
+  place_.height_m = *above_sea + wholeNumber(field(sentence, 11)).value_or(0.0);
+  const double hdop = wholeNumber(field(sentence, 8)).value_or(0.0);
   place_.sigma_m = stated_sigma_m_.value_or((hdop > 0.0 ? hdop : kUnstatedHdop) *
                                             rangeSigma(quality) / std::numbers::sqrt2);
   gga_utc_ = field(sentence, 1);
@@ -145,7 +138,7 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
 
 /// Deviations of latitude and longitude, as the receiver computes them.
 void NmeaReader::readGst(std::string_view sentence) {
-  const auto north = number(field(sentence, 6)), east = number(field(sentence, 7));
+  const auto north = wholeNumber(field(sentence, 6)), east = wholeNumber(field(sentence, 7));
   stated_sigma_m_ =
       north && east ? std::optional(std::hypot(*north, *east) / std::numbers::sqrt2) : std::nullopt;
 }

@@ -179,9 +179,9 @@ TEST_F(LiveProcess, GivesTheSpeedAndTheVehiclesPlaceOnEarth) {
   EXPECT_DOUBLE_EQ(speeds.back().speed, 10.0);
   EXPECT_DOUBLE_EQ(speeds.back().sigma, 0.05);
   EXPECT_GT(speeds.back().time, speeds.front().time);
-  EXPECT_DOUBLE_EQ(calibration_.anchor->latitude_deg, 49.0);
-  EXPECT_DOUBLE_EQ(calibration_.anchor->longitude_deg, 8.4);
-  EXPECT_NEAR(calibration_.anchor->height_m, 110.0, 1e-9);
+  EXPECT_NEAR(calibration_.anchor->latitude_deg, 49.0, 1e-12);
+  EXPECT_NEAR(calibration_.anchor->longitude_deg, 8.4, 1e-12);
+  EXPECT_NEAR(calibration_.anchor->height_m, 110.0, 1e-5);
   EXPECT_NEAR(calibration_.anchor->yaw, 0.0, 1e-12) << "to the east";
   EXPECT_NEAR(toSeconds(calibration_.anchor->time - speeds.back().time), 0.0, 5.0);
 }

@@ -34,7 +34,7 @@ TEST(EarthAnchor, IsTakenOnAStraightDriveAndOnce) {
   std::optional<EarthPlace> place;
   EXPECT_EQ(drive.until(anchor, 40, &place), 11) << "two seconds";
   ASSERT_TRUE(place);
-  EXPECT_DOUBLE_EQ(place->latitude_deg, 49.0);
+  EXPECT_NEAR(place->latitude_deg, 49.0, 1e-12);
   EXPECT_DOUBLE_EQ(place->yaw, 0.5);
   EXPECT_EQ(place->time_ns, drive.fix.time_ns);
   EXPECT_EQ(drive.until(anchor, 40), 0);
@@ -84,7 +84,7 @@ TEST(EarthAnchor, TellsWhereTheBodyIsByItsAntenna) {
   // A degree of latitude is 111 200.8 m at 49°, one of longitude 73 172.8 m (WGS 84).
   EXPECT_NEAR((place->latitude_deg - 49.0) * 111200.8, -2.0, 1e-3);
   EXPECT_NEAR((place->longitude_deg - 8.4) * 73172.8, 1.0, 1e-3);
-  EXPECT_DOUBLE_EQ(place->height_m, 108.5);
+  EXPECT_NEAR(place->height_m, 108.5, 1e-5);
 }
 
 }  // namespace

@@ -172,7 +172,7 @@ TEST(Vehicle, KnowsItsPlaceAndSpeedByGpsd) {
     std::this_thread::sleep_for(220ms);
   }
   ASSERT_TRUE(heard.wait([](const Heard& h) { return h.places.size() == 1; }));
-  EXPECT_DOUBLE_EQ(heard.places[0].latitude_deg, 49.0);
+  EXPECT_NEAR(heard.places[0].latitude_deg, 49.0, 1e-12);
   EXPECT_NEAR(heard.places[0].yaw, 0.0, 1e-12);
   EXPECT_EQ(heard.speeds.size(), 12U);
   EXPECT_EQ(vehicle.problem(), "");
