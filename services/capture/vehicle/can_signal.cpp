@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <regex>
+
+#include "services/capture/vehicle/whole_number.h"
 
 namespace perdure::capture {
 namespace {
@@ -33,17 +33,6 @@ Result<CanSignal> withId(CanSignal signal, const std::string& text) {
 }
 
 }  // namespace
-
-std::optional<double> wholeNumber(std::string_view text) {
-  const auto first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
-  if (first == std::string_view::npos) return std::nullopt;
-  text = text.substr(first + (text[first] == '+' ? 1 : 0), last - first + 1);
-  if (text.back() == ' ') text.remove_suffix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = error == std::errc() && end == text.data() + text.size();
-  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
-}
 
 Result<CanSignal> parseCanSignal(const std::string& text) {
   static const std::regex kLine(

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 
 #include "common/base/result.h"
 
@@ -27,8 +25,6 @@ struct CanSignal {
 /// `0x1a0 7|16@0+ (0.01,0) [0|655.35] "km/h"`. Range, unit and receivers may be missing.
 /// Reason "can_signal": a sentence that says what is wrong in it.
 Result<CanSignal> parseCanSignal(const std::string& text);
-/// A finite number and nothing else but blanks around it; nothing where it is none.
-std::optional<double> wholeNumber(std::string_view text);
 
 /// The raw bits, sign extended. Reason "speed_can_short": the frame has too few bytes.
 Result<std::int64_t> rawValueOf(const CanSignal& signal, std::span<const std::uint8_t> data);

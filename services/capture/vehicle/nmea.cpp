@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "services/capture/vehicle/can_signal.h"
+#include "services/capture/vehicle/whole_number.h"
 
 namespace perdure::capture {
 namespace {

@@ -10,6 +10,7 @@
 
 #include "common/base/errors.h"
 #include "services/capture/vehicle/gpsd.h"
+#include "services/capture/vehicle/whole_number.h"
 
 namespace perdure::capture {
 namespace {

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "common/base/errors.h"
+#include "services/capture/vehicle/whole_number.h"
 
 namespace perdure::capture {
 namespace {

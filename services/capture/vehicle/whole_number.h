@@ -1,0 +1,23 @@
+// Numbers of configurations and of lines that a socket brings: read to their end, or not at all.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+namespace perdure::capture {
+
+/// A finite number and nothing else but blanks around it; nothing where it is none.
+inline std::optional<double> wholeNumber(std::string_view text) {
+  const auto first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
+  if (first == std::string_view::npos) return std::nullopt;
+  text = text.substr(first + (text[first] == '+' ? 1 : 0), last - first + 1);
+  if (text.back() == ' ') text.remove_suffix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace perdure::capture
