@@ -131,7 +131,7 @@ class Trial {
   static std::optional<Box> imageOf(const ObjectBelief& o, const View& view) {
     State x = State::Zero();
     x.head<7>() = o.best().mean;
-    const auto p = projectCuboid(x, view);
+    const auto p = projectObserved(x, view, BoxStyle());
     if (!p) return std::nullopt;
     const double W = view.camera->width(), H = view.camera->height();
     return Box{std::clamp(p->sides[0], 0.0, W), std::clamp(p->sides[1], 0.0, H),

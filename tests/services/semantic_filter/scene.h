@@ -70,7 +70,7 @@ template <class Random>
 std::optional<Detection> detect(const TrueObject& object, const View& view,
                                 const BoxParameters& box, double noise, double log_ratio,
                                 Random& random) {
-  const auto p = projectCuboid(object.x, view);
+  const auto p = projectObserved(object.x, view, BoxStyle());
   if (!p) return std::nullopt;
   const double w = view.camera->width(), h = view.camera->height();
   Eigen::Vector4d s = p->sides;

@@ -45,7 +45,9 @@ struct BoxStyle {
 };
 
 /// Returns the box that the network should report: the box of the shape, with b of the hypothesis
-/// and the offset of the style added to its sides.
+/// and the offset of the style added to its sides. A detector sees what is in the image: where the
+/// border cuts the shape, the other two sides are those of the part inside. A side beyond the
+/// border stays where it is.
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
                                             const BoxStyle& style, double heading = 0.0);
 

@@ -180,7 +180,7 @@ Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimut
     Keyframe k = *look;
     const FrameView& v = *look->from;
     k.from = std::make_shared<const FrameView>(v.view, v.error, v.time, styles, v.noise_scale);
-    k.z.sides = projectCuboid(truth, v.projector, styles->rest.shape, 1.0)->sides;
+    k.z.sides = projectObserved(truth, v.projector, styles->rest, 1.0)->sides;
     if (with_azimuths) {
       k.azimuth = wrapAngle(yawFromAzimuth(0.0, truth.head<3>(), v.view) - truth[kYaw]);
     }

@@ -61,7 +61,7 @@ class Passing {
     State x = truth_;
     x.head<3>() += t * truth_.tail<3>();
     const View seen{&camera_, true_pose, Eigen::Vector3d::UnitZ()};
-    const auto box = projectCuboid(x, seen);
+    const auto box = projectObserved(x, seen, BoxStyle());
     if (!box) return;
     const double width = box->sides[2] - box->sides[0], height = box->sides[3] - box->sides[1];
     Keyframe keyframe;

@@ -1,0 +1,101 @@
+// The corners of an object's shape before the camera, and their images: what cuboid_projection and
+// image_border are made of. Derivation: tools/docs/maths/cuboid_projection.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "common/camera/camera_model.h"
+#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/measurement/cuboid_projection.h"
+
+namespace perdure::semantic_filter {
+
+inline constexpr double kNear = 0.2;  ///< depth of the near plane, m
+
+/// One number for each corner.
+using PerCorner = std::array<double, Shape::kMostCorners>;
+
+/// The corners of a shape, relative to the camera.
+struct Corners {
+  Eigen::Matrix3d R_WO;
+  Eigen::Vector3d half;  ///< of length, width, height
+  const Shape* shape = nullptr;
+  double heading = 0.0;
+  PerCorner x, y, z;       ///< in C
+  bool all_before = true;  ///< all corners are before the near plane
+
+  /// Returns corner i from the centre, along the axes of the cuboid.
+  Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, heading)); }
+  Eigen::Vector3d p_C(int i) const {
+    const auto k = static_cast<std::size_t>(i);
+    return {x[k], y[k], z[k]};
+  }
+};
+
+inline constexpr int kCut = -1;
+
+/// Pixels of corners, and of cuts of edges by the near plane.
+struct ImagePoints {
+  using Coordinates = std::array<double, kMostOutline>;
+  Coordinates u, v;
+  /// corner index or kCut; not set if all points are corners in order
+  std::array<int, kMostOutline> corner;
+  bool in_order = false;
+  std::size_t size = 0;
+  Eigen::Vector4d sides;
+
+  /// Returns the corner whose u or v has this value, or kCut.
+  int at(const Coordinates& values, double value) const {
+    for (std::size_t i = 0; i < size; ++i) {
+      if (values[i] == value) return in_order ? static_cast<int>(i) : corner[i];
+    }
+    return kCut;
+  }
+  void add(const Eigen::Vector2d& pixel, int of) {
+    corner[size] = of;
+    u[size] = pixel.x();
+    v[size] = pixel.y();
+    ++size;
+  }
+  void bound() {
+    const auto [u_least, u_most] = std::minmax_element(u.begin(), u.begin() + size);
+    const auto [v_least, v_most] = std::minmax_element(v.begin(), v.begin() + size);
+    sides = {*u_least, *v_least, *u_most, *v_most};
+  }
+};
+
+/// Returns false if the whole object is behind the near plane. An object that reaches the near
+/// plane is treated as its cuboid, whose edges are cut there.
+bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double heading,
+                         Corners& corners);
+
+/// Computes the pixels of all corners, and of the cuts of the edges by the near plane.
+void projectCorners(const Corners& corners, const CameraModel& camera, ImagePoints& points);
+
+/// Returns the pixel of a point in front of the camera. Where the distortion is not defined, it
+/// lies far outside the image.
+Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C);
+
+/// Derivative of one image coordinate of a point in front of the camera. Returns false where there
+/// is none.
+bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, int axis,
+                       Eigen::RowVector3d& by_C);
+
+/// A point of the body that makes a side of its box.
+struct SidePoint {
+  Eigen::Vector3d p_C;
+  Eigen::Vector3d local;    ///< from the centre, along the axes of the cuboid
+  Eigen::RowVector3d by_C;  ///< of the side's coordinate
+};
+
+/// Sets the derivatives of a side.
+void setSide(ProjectedBox& box, int side, const SidePoint& point, const Projector& from,
+             const Corners& corners);
+/// The same of a side that is the image of a corner. With kCut the side is not exact.
+void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
+             const Corners& corners);
+
+}  // namespace perdure::semantic_filter
