@@ -72,14 +72,15 @@ GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway:
                             gateway::channelTable(config.cameras), std::move(services),
                             gateway::web::Files(folder), range()},
       gateway::web::Hub::Told{
-          .wanted = [post](const gateway::Channels& w) { post([&](Mail& m) { m.wanted = w; }); },
+          .wanted =
+              [post](const gateway::Channels& w) { post([&](Mail& m) { m.wanted.push_back(w); }); },
           .call =
               [post](gateway::Call c) { post([&](Mail& m) { m.calls.push_back(std::move(c)); }); },
           .playback =
               [post](gateway::PlaybackRequest r) {
                 post([&](Mail& m) { m.requests.push_back(std::move(r)); });
               }});
-  seek(logTime(start.seek.value_or(first_.time + durationFromSeconds(start_s))));
+  seek(logTime(first_.time + durationFromSeconds(start_s)));
 }
 
 GatewayReplay::~GatewayReplay() = default;
@@ -313,14 +314,16 @@ GatewayReplay::Mail GatewayReplay::waitUntil(Clock::time_point due) {
   return std::exchange(mail_, {});
 }
 
+void GatewayReplay::look(const gateway::Channels& wanted) {
+  if (graph_ && looksAtGraph(wanted) && !looksAtGraph(wanted_)) node_->onMapGraph(*graph_);
+  const gateway::Channels before = std::exchange(wanted_, wanted);
+  node_->setWanted(wanted_);
+  repeatFrames(before);
+}
+
 void GatewayReplay::handle(Mail mail) {
   stopped_ = stopped_ || mail.stop;
-  if (mail.wanted) {
-    if (graph_ && looksAtGraph(*mail.wanted) && !looksAtGraph(wanted_)) node_->onMapGraph(*graph_);
-    const gateway::Channels before = std::exchange(wanted_, *mail.wanted);
-    node_->setWanted(wanted_);
-    repeatFrames(before);
-  }
+  for (const gateway::Channels& wanted : mail.wanted) look(wanted);
   for (const gateway::PlaybackRequest& request : mail.requests) obey(request);
   for (const gateway::Call& call : mail.calls) {
     if (call.service == gateway::kNextEventService) {

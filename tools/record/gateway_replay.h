@@ -40,11 +40,11 @@ class GatewayReplay {
     TimePoint time;
   };
   struct Mail {
-    std::optional<gateway::Channels> wanted;
+    std::vector<gateway::Channels> wanted;  ///< each: who leaves and comes again is told anew
     std::deque<gateway::Call> calls;
     std::deque<gateway::PlaybackRequest> requests;
     bool stop = false;
-    bool empty() const { return !wanted && calls.empty() && requests.empty() && !stop; }
+    bool empty() const { return wanted.empty() && calls.empty() && requests.empty() && !stop; }
   };
 
   void measure();
@@ -62,6 +62,7 @@ class GatewayReplay {
   void end();
   void feed(const replay::RecordedMessage& message);
   void obey(const gateway::PlaybackRequest& request);
+  void look(const gateway::Channels& wanted);
   Mail waitUntil(Clock::time_point due);
   void handle(Mail mail);
   void setClock();

@@ -52,6 +52,10 @@ void runPlay(const Options& options) {
   bus::WaitLoop loop(participant);
   const service::SignalThread signals(blocked, [&] { loop.stop(); });
   Player player(participant, loop, recording, options.play);
+  for (const std::string& what : player.leftOut()) {
+    fmt::print("left out, for it is written by who listens: {}\n", what);
+  }
+  std::fflush(stdout);
   do {
     player.play();
   } while (options.play.loop && !loop.stopped());

@@ -76,12 +76,13 @@ class Replayed : public ::testing::Test {
     how.play = false;
     start(how);
   }
-  void start(const gateway::PlaybackRequest& how, const std::string& name = "run.mcap") {
+  void start(const gateway::PlaybackRequest& how, const std::string& name = "run.mcap",
+             double start_s = 0.0) {
     recording_ = std::make_unique<replay::RecordedMessages>(folder_.file(name));
     gateway::Config config;
     config.web.port = 0;
     config.cameras = {"cam0"};
-    replay_ = std::make_unique<GatewayReplay>(*recording_, config, how);
+    replay_ = std::make_unique<GatewayReplay>(*recording_, config, how, start_s);
     thread_ = std::thread([this] { replay_->run(); });
     client_ = std::make_unique<RawClient>(replay_->port());
     ASSERT_THAT(client_->upgrade(), HasSubstr("101"));
@@ -196,8 +197,7 @@ TEST_F(Replayed, TellsTheLastStateToWhoComesAfterTheEnd) {
   using ::testing::Pair;
   gateway::PlaybackRequest how;
   how.speed = 100;
-  how.seek = fromNanoseconds(20 * kSecond);
-  start(how);
+  start(how, "run.mcap", 18.0);
   while (state().first != 3) {
   }
   client_.reset();  // the second is the first one who looks at images, the third the next one
@@ -234,8 +234,7 @@ TEST_F(Replayed, EndsWhereItIsPlayedOnFromTheLastFrame) {
 TEST_F(Replayed, BeginsWhereItIsToldToWithTheCameraOfBefore) {
   gateway::PlaybackRequest how;
   how.play = false;
-  how.seek = fromNanoseconds(15 * kSecond);
-  start(how);
+  start(how, "run.mcap", 13.0);
   EXPECT_EQ(shown(), 130u);
   client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":101}]})");
   EXPECT_EQ(json::parse(client_->readMessage(5), nullptr, false).value("width", 0), 640);
@@ -303,6 +302,13 @@ TEST_F(Replayed, AnswersAboutAnObjectAndSaysThatThereIsNoStore) {
     ASSERT_NE(frame.opcode, 0xff);
     answer = frame.payload;
   }
+}
+
+TEST_F(Replayed, RefusesToBeginAfterTheEnd) {
+  replay::RecordedMessages recording(folder_.file("run.mcap"));
+  gateway::Config config;
+  config.web.port = 0;
+  EXPECT_THROW(GatewayReplay(recording, config, {}, 20.5), StartupError);
 }
 
 TEST(Replay, RefusesARecordingWithNothingToShow) {
