@@ -176,8 +176,9 @@ TEST_F(Gateway, TellsTheLastStateToWhoLeavesAndComesAtOnce) {
   publish(++sequence_);
   EXPECT_THAT(client->readMessage(1), HasSubstr("\"objects\""));
   for (std::uint32_t id = 2; id < 12; ++id) {
-    client->sendFrame(json{{"op", "unsubscribe"}, {"subscriptionIds", {id - 1}}}.dump());
-    client->sendFrame(subscribe(id, channels_["/objects"]));
+    const std::string leaves = json{{"op", "unsubscribe"}, {"subscriptionIds", {id - 1}}}.dump();
+    client->send(RawClient::masked(leaves) +
+                 RawClient::masked(subscribe(id, channels_["/objects"])));
     ASSERT_THAT(client->readMessage(id), HasSubstr("\"objects\"")) << id;
   }
 }

@@ -218,6 +218,7 @@ for (const words of ['Anchor 3', 'not known']) check(told.includes(words), `a cl
 const balls = await page.evaluate(() => [...window.perdure.world.graph.balls.instanceColor.array].map((x) => x.toFixed(3)));
 check(String(balls.slice(0, 3)) === String(balls.slice(3, 6)) && new Set(balls.slice(6, 9)).size === 1, `an anchor without σ is grey (${balls})`);
 await page.screenshot({ path: join(out, 'graph_unknown.png') });
+await overTheLoop('anchor', 2, 0); // pixels below are compared from there
 await page.evaluate(() => document.querySelector('#object [data-part=loop][data-id="3"]').click());
 check((await page.$eval('#object', (e) => e.innerText)).includes('Loop 3'), 'from an anchor to its loop');
 const legend = () => page.$$eval('#legend [data-graph]', (items) => items.filter((i) => !i.hidden).map((i) => i.dataset.graph).join());
