@@ -243,7 +243,8 @@ function figures(now) {
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
 }
 
-function noImage() {
+function noImage(state) {
+  if (state === 'stale') return 'no image comes';
   if (!connection.range) return 'no image yet: is the camera in image.cameras?';
   return cameraTopic ? 'no image yet' : 'the recording has no images: perdure record --images keeps them';
 }
@@ -265,7 +266,7 @@ function showState() {
   $('figures').innerHTML = figures(now);
   if (!cameraTopic) lookThroughCamera();
   if (camera.figure.classList.contains('has-image') && state === 'lost') camera.caption.textContent = 'the last image';
-  if (!camera.figure.classList.contains('has-image')) camera.caption.textContent = noImage();
+  if (!camera.figure.classList.contains('has-image')) camera.caption.textContent = noImage(state);
 }
 
 function refresh() {
