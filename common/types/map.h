@@ -93,7 +93,8 @@ struct MapAnchor {
   WorldId map;                                  ///< M
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< in M
   double yaw = 0.0;                             ///< rad
-  /// Standard deviations of [p, yaw] relative to the first anchor of M, m and rad.
+  /// Standard deviations of [p, yaw] relative to the first anchor of M, m and rad; all 0 of another
+  /// one: not known (map_graph.h).
   Eigen::Vector4d sigma = Eigen::Vector4d::Zero();
   std::uint32_t objects = 0;  ///< that were seen from here last
 };

@@ -171,7 +171,7 @@ constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
 /// What the server's thread tells the loop's.
 struct Mail {
   std::mutex mutex;
-  std::optional<gateway::Channels> wanted;
+  std::vector<gateway::Channels> wanted;  ///< each: who leaves and comes again is told anew
   std::vector<gateway::Call> calls;
 };
 
@@ -303,7 +303,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                      {.wanted =
                           [&](const gateway::Channels& wanted) {
                             const std::lock_guard lock(mail.mutex);
-                            mail.wanted = wanted;
+                            mail.wanted.push_back(wanted);
                             context.loop().wake();
                           },
                       .call =
@@ -323,16 +323,16 @@ void serve(service::Context& context, const gateway::Config& config, const std::
   overhear(context, node, config, readers);
   listenToRaw(context, server, readers);
   context.loop().onWake([&] {
-    std::optional<gateway::Channels> wanted;
+    std::vector<gateway::Channels> changes;
     std::vector<gateway::Call> calls;
     {
       const std::lock_guard lock(mail.mutex);
-      wanted.swap(mail.wanted);
+      changes.swap(mail.wanted);
       calls.swap(mail.calls);
     }
-    if (wanted) {
-      node.setWanted(*wanted);
-      for (const auto& reader : readers) reader->follow(*wanted);
+    for (const gateway::Channels& wanted : changes) {
+      node.setWanted(wanted);
+      for (const auto& reader : readers) reader->follow(wanted);
     }
     for (const gateway::Call& call : calls) node.onCall(call, monotonicNs());
   });

@@ -56,6 +56,7 @@ void Node::setWanted(const Channels& wanted) {
   const bool looked_at_graph = wantsGraph();
   const Channels before = std::exchange(wanted_, wanted);
   lookAtGraph(looked_at_graph);
+  if (before.empty() && !wanted.empty() && time_ != TimePoint{}) outputs_.time(time_);
   if (!wantsTiles()) map_.clear();  // their reader is closed
   for (const std::uint32_t channel : wanted) {
     if (!before.contains(channel)) sendNow(channel);
@@ -109,11 +110,17 @@ void Node::sendNow(std::uint32_t channel) {
     default:
       break;
   }
-  for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
-    if (channel != cameraChannel(i, kCalibration) || !calibration_) continue;
-    const CameraCalibration* camera = calibration_->camera(config_.cameras[i]);
-    if (camera != nullptr) send(channel, cameraCalibration(*camera, time_));
-  }
+  for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendNow(i, channel);
+}
+
+void Node::sendNow(std::size_t camera, std::uint32_t channel) {
+  if (channel == cameraChannel(camera, kImage)) image_pace_[camera].last.reset();
+  const bool drawn = channel == cameraChannel(camera, kAnnotations) ||
+                     channel == cameraChannel(camera, kLikelihood);
+  if (drawn && objects_) sendAnnotations(camera, true);
+  if (channel != cameraChannel(camera, kCalibration) || !calibration_) return;
+  const CameraCalibration* its = calibration_->camera(config_.cameras[camera]);
+  if (its != nullptr) send(channel, cameraCalibration(*its, time_));
 }
 
 void Node::onCalibration(const Calibration& calibration) {

@@ -85,6 +85,7 @@ class Node {
   bool wants(std::uint32_t channel) const { return wanted_.contains(channel); }
   void send(std::uint32_t channel, std::string payload);
   void sendNow(std::uint32_t channel);
+  void sendNow(std::size_t camera, std::uint32_t channel);
   void sendObjects();
   void sendAnnotations(std::size_t camera, bool now);
   void sendAwaited();

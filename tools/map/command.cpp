@@ -11,9 +11,11 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "services/map_store/core/graph/graph_answer.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "tools/bus_tools/common.h"
 #include "tools/map/fuse.h"
+#include "tools/map/graph_view.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -145,6 +147,17 @@ std::optional<GeoAnchor> anchorOf(const Request& request) {
   return GeoAnchor{{}, a[0], a[1], a[2], a[3] * std::numbers::pi / 180.0};
 }
 
+void showGraph(const Request& request) {
+  MapReply graph;
+  if (request.db.empty()) {
+    graph = askOverDds(request);
+    if (!graph.ok) throw StartupError(ExitCode::kUsage, graph.error);
+  } else {
+    graph = askGraphOfFile(request.db, request.query);
+  }
+  std::cout << (request.json ? toGraphJson(graph).dump(1) + "\n" : toGraphText(graph));
+}
+
 void exportMap(const Request& request) {
   const MapReply reply = ask(request);
   const auto json =
@@ -216,18 +229,22 @@ void addServerCommands(CLI::App& map) {
   }
 }
 
-void addSource(CLI::App& command, Request& request) {
+void addPlace(CLI::App& command, Request& request) {
   command.add_option("--db", request.db, "read this file instead of asking the running map_store")
       ->type_name("FILE");
+  addBusOptions(command, request.bus);
+  command.add_option("--wait", request.patience_s, "seconds until giving up")
+      ->check(CLI::PositiveNumber);
+}
+
+void addSource(CLI::App& command, Request& request) {
+  addPlace(command, request);
   command
       .add_option(
           "--frame", request.frame,
           "M: as the graph lays what --db holds; W: as stored, each object in the odometry's "
           "frame of its own session")
       ->check(CLI::IsMember({"M", "W"}));
-  addBusOptions(command, request.bus);
-  command.add_option("--wait", request.patience_s, "seconds until giving up")
-      ->check(CLI::PositiveNumber);
   command.add_option("--limit", request.query.limit, "at most so many objects")
       ->check(CLI::PositiveNumber);
 }
@@ -270,6 +287,16 @@ void addMapCommand(CLI::App& app) {
     chooseKind(*request);
     list(*request);
   });
+
+  CLI::App* graph = map->add_subcommand(
+      "graph", "How well the map's places are known, and on what its loops rest");
+  graph->add_flag("--json", request->json, "anchors and loops as JSON");
+  graph->callback([request] {
+    request->query.kind = MapQueryKind::kGraph;
+    request->query.limit = map_store::kMostAnchors;
+    showGraph(*request);
+  });
+  addPlace(*graph, *request);
 
   CLI::App* exporting = map->add_subcommand("export", "The map as JSON or GeoJSON");
   exporting->add_flag("--geojson", request->geojson, "GeoJSON (RFC 7946)");

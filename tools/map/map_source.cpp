@@ -8,6 +8,7 @@
 #include "common/base/errors.h"
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
+#include "services/map_store/core/graph/graph_answer.h"
 #include "services/map_store/core/map_places.h"
 
 namespace perdure::tools {
@@ -88,6 +89,19 @@ MapReply askMapFile(const std::string& path, const MapQuery& query, MapFrameChoi
   reply.truncated = found->truncated;
   reply.objects = std::move(found->objects);
   reply.beliefs = std::move(found->beliefs);
+  return reply;
+}
+
+MapReply askGraphOfFile(const std::string& path, const MapQuery& query) {
+  const auto connection = openAtOneState(path);
+  const map_store::MapReader reader(&connection);
+  auto graph = reader.graph();
+  if (!graph) cannotRead(path, graph.error());
+  const auto working = reader.working();
+  mapping::Mapper mapper({}, std::move(graph->map));
+  MapReply reply;
+  map_store::putGraph(mapper, {}, working && *working ? (*working)->world : WorldId{}, query,
+                      reply);
   return reply;
 }
 

@@ -28,6 +28,8 @@ enum class MapFrameChoice { kM, kW };
 /// where it names none in the newest session's M, or its W.
 MapReply askMapFile(const std::string& path, const MapQuery& query,
                     MapFrameChoice frame = MapFrameChoice::kM);
+/// The graph of a map's file, as a running map_store would tell it. Throws StartupError.
+MapReply askGraphOfFile(const std::string& path, const MapQuery& query);
 /// Where on Earth the origin of the newest session's M lies, and its yaw; nothing where the file
 /// does not know it. Throws StartupError.
 std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);

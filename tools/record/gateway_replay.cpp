@@ -1,5 +1,7 @@
 #include "tools/record/gateway_replay.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -34,14 +36,26 @@ bool looksAtGraph(const gateway::Channels& wanted) {
   return wanted.contains(gateway::kMapGraph) || wanted.contains(gateway::kMapGraphScene);
 }
 
+/// The channel that shows each message of such a topic, as it comes; else none.
+std::optional<std::uint32_t> channelOf(const std::string& topic,
+                                       const std::vector<std::string>& cameras) {
+  if (topic == "landmarks") return gateway::kLandmarks;
+  if (topic == "detections") return gateway::kDetections;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (topic == "frame/" + cameras[i]) return gateway::cameraChannel(i, gateway::kImage);
+  }
+  return std::nullopt;
+}
+
 bool isTimed(const std::string& topic) { return topic == "odometry" || topic == "objects"; }
 
 }  // namespace
 
 GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
-                             const gateway::PlaybackRequest& start)
+                             const gateway::PlaybackRequest& start, double start_s)
     : recording_(recording), config_(config), playing_(start.play), speed_(start.speed) {
   measure();
+  refuseAfterTheEnd(start_s);
   const auto folder = config.page_folder.empty() ? gateway::web::usualPageFolder()
                                                  : std::filesystem::path(config.page_folder);
   auto services = gateway::serviceTable();
@@ -58,14 +72,15 @@ GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway:
                             gateway::channelTable(config.cameras), std::move(services),
                             gateway::web::Files(folder), range()},
       gateway::web::Hub::Told{
-          .wanted = [post](const gateway::Channels& w) { post([&](Mail& m) { m.wanted = w; }); },
+          .wanted =
+              [post](const gateway::Channels& w) { post([&](Mail& m) { m.wanted.push_back(w); }); },
           .call =
               [post](gateway::Call c) { post([&](Mail& m) { m.calls.push_back(std::move(c)); }); },
           .playback =
               [post](gateway::PlaybackRequest r) {
                 post([&](Mail& m) { m.requests.push_back(std::move(r)); });
               }});
-  seek(start.seek ? logTime(*start.seek) : begin_ns_);
+  seek(logTime(first_.time + durationFromSeconds(start_s)));
 }
 
 GatewayReplay::~GatewayReplay() = default;
@@ -76,25 +91,31 @@ void GatewayReplay::measure() {
   begin_ns_ = recording_.startNs();
   end_ns_ = recording_.endNs();
   recording_.rewind(isTimed);
-  while (const auto message = recording_.next()) {
-    const auto time = sensorTimeOf(*message);
-    if (!time) continue;
-    first_ = last_ = {message->log_ns, *time};
-    break;
+  std::optional<Instant> first;
+  while (const auto message = first ? std::nullopt : recording_.next()) {
+    if (const auto time = sensorTimeOf(*message)) first = {message->log_ns, *time};
   }
+  if (!first) {
+    throw StartupError(ExitCode::kUsage,
+                       "the recording has neither odometry nor objects, so there is nothing to "
+                       "show; `perdure record info` tells what it has");
+  }
+  first_ = last_ = *first;
   constexpr std::uint64_t kTail = 5'000'000'000;
   recording_.rewind(isTimed, end_ns_ > kTail ? end_ns_ - kTail : 0);
   while (const auto message = recording_.next()) {
     const auto time = sensorTimeOf(*message);
     if (time && *time > last_.time) last_ = {message->log_ns, *time};
   }
-  if (first_.log_ns == 0) {
-    throw StartupError(ExitCode::kUsage,
-                       "the recording has neither odometry nor objects, so there is nothing to "
-                       "show; `perdure record info` tells what it has");
-  }
   begin_ns_ = first_.log_ns;
   end_ns_ = last_.log_ns;
+}
+
+void GatewayReplay::refuseAfterTheEnd(double start_s) const {
+  const double all = toSeconds(last_.time - first_.time);
+  if (start_s <= all) return;
+  throw StartupError(ExitCode::kUsage,
+                     fmt::format("--start {:g}: the recording has {:.1f} s", start_s, all));
 }
 
 TimePoint GatewayReplay::sensorTime(std::uint64_t log_ns) const {
@@ -135,18 +156,39 @@ std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
 /// What was known before that place is known again: the last seconds are gone through.
 void GatewayReplay::seek(std::uint64_t log_ns) {
   node_ = freshNode();
-  if (calibration_) node_->onCalibration(*calibration_);
-  if (model_) node_->onModel(*model_);
+  newest_.clear();
+  recallRig(log_ns);
   recallGraph(log_ns);
   const auto back = static_cast<std::uint64_t>(1e9 * kBack);
   recording_.rewind(isShown, log_ns > back ? log_ns - back : 0);
   next_ = recording_.next();
   while (next_ && next_->log_ns < log_ns) (void)pull();
   node_->setWanted(wanted_);
+  repeatFrames({});
   at_ns_ = log_ns;
   ended_ = false;
   setClock();
   if (!playing_) showFrame();
+}
+
+/// Camera and network, as they were told last before a place; before they were told at all: as they
+/// are known.
+void GatewayReplay::recallRig(std::uint64_t log_ns) {
+  if (calibration_) node_->onCalibration(*calibration_);
+  if (model_) node_->onModel(*model_);
+  recording_.rewind([](const std::string& t) { return t == "calibration" || t == "model"; });
+  while (const auto message = recording_.next()) {
+    if (message->log_ns > log_ns) break;
+    feed(*message);
+  }
+}
+
+/// To who begins to look: what he would have seen.
+void GatewayReplay::repeatFrames(const gateway::Channels& before) {
+  for (const auto& [topic, message] : newest_) {
+    const auto channel = channelOf(topic, config_.cameras);
+    if (channel && wanted_.contains(*channel) && !before.contains(*channel)) feed(message);
+  }
 }
 
 /// The newest graph of the map that was told before a place: what is read grows until there is one.
@@ -201,6 +243,7 @@ bool GatewayReplay::pull() {
   if (!next_) return false;
   at_ns_ = std::max(at_ns_, next_->log_ns);
   feed(*next_);
+  if (channelOf(next_->topic, config_.cameras)) newest_[next_->topic] = std::move(*next_);
   next_ = recording_.next();
   return true;
 }
@@ -271,13 +314,16 @@ GatewayReplay::Mail GatewayReplay::waitUntil(Clock::time_point due) {
   return std::exchange(mail_, {});
 }
 
+void GatewayReplay::look(const gateway::Channels& wanted) {
+  if (graph_ && looksAtGraph(wanted) && !looksAtGraph(wanted_)) node_->onMapGraph(*graph_);
+  const gateway::Channels before = std::exchange(wanted_, wanted);
+  node_->setWanted(wanted_);
+  repeatFrames(before);
+}
+
 void GatewayReplay::handle(Mail mail) {
   stopped_ = stopped_ || mail.stop;
-  if (mail.wanted) {
-    if (graph_ && looksAtGraph(*mail.wanted) && !looksAtGraph(wanted_)) node_->onMapGraph(*graph_);
-    wanted_ = *mail.wanted;
-    node_->setWanted(wanted_);
-  }
+  for (const gateway::Channels& wanted : mail.wanted) look(wanted);
   for (const gateway::PlaybackRequest& request : mail.requests) obey(request);
   for (const gateway::Call& call : mail.calls) {
     if (call.service == gateway::kNextEventService) {
@@ -289,13 +335,20 @@ void GatewayReplay::handle(Mail mail) {
   for (const MapReply& refusal : std::exchange(refusals_, {})) node_->onMapReply(refusal);
 }
 
+void GatewayReplay::end() {
+  ended_ = true;
+  playing_ = false;
+  tellState(false, "");
+}
+
 void GatewayReplay::run() {
   constexpr auto kTick = 100ms;
   Clock::time_point next_tick = Clock::now();
   tellState(false, "");
   while (!stopped_) {
     Clock::time_point due = next_tick;
-    if (playing_ && next_) {
+    if (playing_ && !next_) end();
+    if (playing_) {
       const double later =
           static_cast<double>(next_->log_ns - std::min(next_->log_ns, clock_log_ns_));
       const auto play =
@@ -303,7 +356,6 @@ void GatewayReplay::run() {
       if (play <= Clock::now()) {
         (void)pull();
         handle(waitUntil(Clock::time_point{}));
-        if (!next_) ended_ = true, playing_ = false, tellState(false, "");
         continue;
       }
       due = std::min(due, play);

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,10 +20,10 @@ namespace perdure::tools {
 
 class GatewayReplay {
  public:
-  /// Finds out what the recording covers. Throws StartupError: it holds nothing to be shown, or the
-  /// port cannot be had.
+  /// Finds out what the recording covers, and begins `start_s` after its first frame. Throws
+  /// StartupError: it holds nothing to be shown, ends before, or the port cannot be had.
   GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
-                const gateway::PlaybackRequest& start);
+                const gateway::PlaybackRequest& start, double start_s = 0.0);
   ~GatewayReplay();
 
   std::uint16_t port() const { return server_->port(); }
@@ -39,24 +40,29 @@ class GatewayReplay {
     TimePoint time;
   };
   struct Mail {
-    std::optional<gateway::Channels> wanted;
+    std::vector<gateway::Channels> wanted;  ///< each: who leaves and comes again is told anew
     std::deque<gateway::Call> calls;
     std::deque<gateway::PlaybackRequest> requests;
     bool stop = false;
-    bool empty() const { return !wanted && calls.empty() && requests.empty() && !stop; }
+    bool empty() const { return wanted.empty() && calls.empty() && requests.empty() && !stop; }
   };
 
   void measure();
+  void refuseAfterTheEnd(double start_s) const;
   TimePoint sensorTime(std::uint64_t log_ns) const;
   std::uint64_t logTime(TimePoint time) const;
   std::unique_ptr<gateway::Node> freshNode();
   void seek(std::uint64_t log_ns);
   void seekToNextEvent(const gateway::Call& call);
+  void recallRig(std::uint64_t log_ns);
   void recallGraph(std::uint64_t log_ns);
+  void repeatFrames(const gateway::Channels& before);
   void showFrame();
   bool pull();
+  void end();
   void feed(const replay::RecordedMessage& message);
   void obey(const gateway::PlaybackRequest& request);
+  void look(const gateway::Channels& wanted);
   Mail waitUntil(Clock::time_point due);
   void handle(Mail mail);
   void setClock();
@@ -73,6 +79,8 @@ class GatewayReplay {
   std::optional<ModelInfo> model_;
   std::optional<MapReply> graph_;  ///< of the map, as it was told last
   std::optional<replay::RecordedMessage> next_;
+  /// Of topics that are only shown as they come, for who begins to look.
+  std::map<std::string, replay::RecordedMessage> newest_;
   std::uint64_t at_ns_ = 0;  ///< log time that is shown
   bool playing_ = true, stopped_ = false, ended_ = false;
   double speed_ = 1.0;

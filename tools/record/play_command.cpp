@@ -35,7 +35,7 @@ void runGateway(const Options& options) {
   gateway::PlaybackRequest start;
   start.play = !options.paused;
   start.speed = options.play.rate;
-  GatewayReplay replay(recording, config, start);
+  GatewayReplay replay(recording, config, start, options.play.start_s);
   const service::SignalThread signals(blocked, [&] { replay.stop(); });
   const auto range = replay.range();
   fmt::print("{:.1f} s of {} at http://127.0.0.1:{}/\n", toSeconds(range.last - range.first),
@@ -52,6 +52,10 @@ void runPlay(const Options& options) {
   bus::WaitLoop loop(participant);
   const service::SignalThread signals(blocked, [&] { loop.stop(); });
   Player player(participant, loop, recording, options.play);
+  for (const std::string& what : player.leftOut()) {
+    fmt::print("left out, for it is written by who listens: {}\n", what);
+  }
+  std::fflush(stdout);
   do {
     player.play();
   } while (options.play.loop && !loop.stopped());
@@ -86,8 +90,12 @@ void addPlayCommand(CLI::App& app) {
   command->add_flag("--loop", play.loop, "again and again, with the same stamps");
   command->add_flag("--force", play.force, "also onto topics that others write now");
   addBusOptions(*command, options->bus);
-  command->add_flag("--gateway", options->gateway,
-                    "to a browser or Foxglove instead of the bus; they play, pause and seek");
+  CLI::Option* gateway =
+      command->add_flag("--gateway", options->gateway,
+                        "to a browser or Foxglove instead of the bus; they play, pause and seek");
+  for (const char* of_the_bus : {"--topics", "--for", "--seconds", "--wait", "--loop", "--force"}) {
+    gateway->excludes(command->get_option(of_the_bus));
+  }
   command->add_flag("--paused", options->paused, "with --gateway: begin with a pause")
       ->needs("--gateway");
   command->add_option("--port", options->port, "with --gateway; 0: any that is free")

@@ -1,6 +1,7 @@
 #include "tools/record/player.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "common/base/errors.h"
 #include "common/bus/discovery.h"
@@ -14,13 +15,14 @@ using namespace std::chrono_literals;
 /// What is said by one process to another one that is not there any more, and who was how.
 const std::set<std::string> kNotByItself{"health", "map/query", "map/reply", "recalled"};
 
+const std::map<std::string, std::set<std::string>> kInputs{
+    {"vio", {"calibration", "imu", "speed", "frame/"}},
+    {"inference", {"calibration", "frame/", "predictions"}},
+    {"semantic_filter",
+     {"calibration", "odometry", "landmarks", "detections", "model", "inference/swap"}},
+    {"map_store", {"odometry", "landmarks", "objects", "events"}}};
+
 bool isHeardBy(const std::string& service, const std::string& topic) {
-  static const std::map<std::string, std::set<std::string>> kInputs{
-      {"vio", {"calibration", "imu", "speed", "frame/"}},
-      {"inference", {"calibration", "frame/", "predictions"}},
-      {"semantic_filter",
-       {"calibration", "odometry", "landmarks", "detections", "model", "inference/swap"}},
-      {"map_store", {"odometry", "landmarks", "objects", "events"}}};
   const auto inputs = kInputs.find(service);
   if (inputs == kInputs.end()) {
     throw StartupError(ExitCode::kUsage, "--for " + service +
@@ -28,6 +30,13 @@ bool isHeardBy(const std::string& service, const std::string& topic) {
                                              "map_store");
   }
   return inputs->second.contains(topic.starts_with("frame/") ? "frame/" : topic);
+}
+
+/// The service that tells of such a thing.
+const char* writerOf(EventKind kind) {
+  const bool of_the_map = kind == EventKind::kLoopClosed || kind == EventKind::kLoopWithdrawn ||
+                          kind == EventKind::kRelocalised;
+  return of_the_map ? "map_store" : "semantic_filter";
 }
 
 std::string listOf(const std::set<std::string>& names) {
@@ -68,22 +77,66 @@ void Player::chooseTopics() {
   }
 }
 
-/// Two writers of one topic make nonsense of both.
-void Player::refuseContested() {
+Player::Writers Player::otherWriters() {
   bus::Discovery discovery(participant_);
   const auto until = std::chrono::steady_clock::now() + 1s;
   while (!loop_.stopped() && std::chrono::steady_clock::now() < until) loop_.runOnce(100ms);
-  std::set<std::string> contested;
+  Writers others;
   for (const bus::RemoteEndpoint& endpoint : discovery.endpoints()) {
     const std::string topic = replay::topicOf(endpoint.wire_name);
     if (!endpoint.writer || participant_.wireName(topic) != endpoint.wire_name) continue;
-    const std::string by = endpoint.process.empty() ? "somebody" : endpoint.process;
-    if (topics_.contains(topic)) contested.insert(topic + " (" + by + ")");
+    if (!topics_.contains(topic)) continue;
+    others[topic].insert(endpoint.process.empty() ? "somebody" : endpoint.process);
   }
-  if (contested.empty() || options_.force) return;
+  return others;
+}
+
+/// Events have two services that write them: those of the other one are played.
+void Player::settleEvents(Writers& others) {
+  const auto events = others.find("events");
+  if (events == others.end()) return;
+  for (const char* service : {"semantic_filter", "map_store"}) {
+    if (events->second.erase(service) == 0) continue;
+    event_writers_.insert(service);
+    left_out_.insert(std::string("those of ") + service + " among events");
+  }
+  if (events->second.empty()) others.erase(events);
+}
+
+/// What a service writes that hears this recording: it writes it anew.
+void Player::leaveToListeners(Writers& others) {
+  const auto hears = [&](const std::string& process) {
+    return kInputs.contains(process) &&
+           std::any_of(topics_.begin(), topics_.end(), [&](const std::string& topic) {
+             return !others.contains(topic) && isHeardBy(process, topic);
+           });
+  };
+  const Writers all = others;
+  for (const auto& [topic, processes] : all) {
+    if (!std::all_of(processes.begin(), processes.end(), hears)) continue;
+    left_out_.insert(topic + " (" + listOf(processes) + ")");
+    topics_.erase(topic);
+    others.erase(topic);
+  }
+}
+
+void Player::refuse(const Writers& others) {
+  std::set<std::string> contested;
+  for (const auto& [topic, processes] : others) {
+    contested.insert(topic + " (" + listOf(processes) + ")");
+  }
   throw StartupError(ExitCode::kUnavailable,
                      "others write these topics now: " + listOf(contested) +
                          "; stop them, choose by --topics or --for, or play over them by --force");
+}
+
+/// Two writers of one topic make nonsense of both.
+void Player::refuseContested() {
+  Writers others = otherWriters();
+  if (options_.force) return;
+  settleEvents(others);
+  if (options_.topics.empty() && options_.for_service.empty()) leaveToListeners(others);
+  if (!others.empty()) refuse(others);
 }
 
 void Player::addVoice(const std::string& topic) {
@@ -91,9 +144,14 @@ void Player::addVoice(const std::string& topic) {
     auto writer = std::make_shared<bus::Writer<T>>(participant_, typed);
     const bus::Qos& qos = bus::findTopic(topic)->qos;
     voices_[topic] = {writer,
-                      [writer](const replay::RecordedMessage& message) -> Result<void> {
+                      [this, writer](const replay::RecordedMessage& message) -> Result<void> {
                         const auto value = replay::valueOf<T>(message);
                         if (!value) return tl::unexpected(value.error());
+                        if constexpr (std::is_same_v<T, Event>) {
+                          if (event_writers_.contains(writerOf(value->kind))) {
+                            return fail("left_out");
+                          }
+                        }
                         return writer->write(*value);
                       },
                       qos.latched&& qos.depth == 1};

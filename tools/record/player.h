@@ -24,8 +24,9 @@ struct PlayOptions {
 
 class Player {
  public:
-  /// Takes about a second to see who is on the bus. Throws StartupError: a topic that there is not,
-  /// or that is not in the recording, or that another process writes (unless `force`).
+  /// Takes about a second to see who is on the bus. What the services that listen to this write
+  /// themselves is left out where topics were not named. Throws StartupError: a topic that there is
+  /// not, or that is not in the recording, or that another process writes (unless `force`).
   Player(const bus::Participant& participant, bus::WaitLoop& loop,
          replay::RecordedMessages& recording, const PlayOptions& options);
 
@@ -35,6 +36,8 @@ class Player {
   /// What could not be played, by topic and reason.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::set<std::string>& topics() const { return topics_; }
+  /// "map/frame (map_store)": what is not played, and who writes it.
+  const std::set<std::string>& leftOut() const { return left_out_; }
 
  private:
   struct Voice {
@@ -42,7 +45,12 @@ class Player {
     std::function<Result<void>(const replay::RecordedMessage&)> say;
     bool latched = false;
   };
+  using Writers = std::map<std::string, std::set<std::string>>;  ///< processes, by topic
   void chooseTopics();
+  Writers otherWriters();
+  void settleEvents(Writers& others);
+  void leaveToListeners(Writers& others);
+  static void refuse(const Writers& others);
   void refuseContested();
   void addVoice(const std::string& topic);
   void waitForReaders();
@@ -54,7 +62,8 @@ class Player {
   bus::WaitLoop& loop_;
   replay::RecordedMessages& recording_;
   const PlayOptions options_;
-  std::set<std::string> topics_;
+  std::set<std::string> topics_, left_out_;
+  std::set<std::string> event_writers_;  ///< services whose events are left to them
   std::map<std::string, Voice> voices_;
   std::uint64_t first_ns_ = 0;  ///< log time that was due when playing began, gaps left out
   std::uint64_t last_ns_ = 0, played_ = 0;

@@ -77,7 +77,8 @@ std::optional<LevelGaussian> Marginals::to(AnchorId anchor) const {
   }
   const LevelPose T_Mf = graph_->pose(from_), T_Ma = graph_->pose(anchor);
   result = LevelGaussian{T_Mf.inverse() * T_Ma, Eigen::Matrix4d::Zero()};
-  if (anchor == from_ || !usable_) return result;
+  if (anchor == from_) return result;
+  if (!usable_) return result = std::nullopt;
   const Eigen::MatrixXd columns = columnsOf(anchor);
   // δ(T_fa) = T_f⁻¹ turned: position R_fᵀ (δp_a − δp_f − δyaw_f up × (p_a − p_f)), yaw δyaw_a −
   // δyaw_f.
@@ -131,10 +132,13 @@ std::map<AnchorId, Eigen::Vector4d> Marginals::variances() const {
   std::map<AnchorId, Eigen::Vector4d> result;
   const Eigen::VectorXd diagonal = usable_ ? diagonalOfInverse() : Eigen::VectorXd();
   for (const auto& [anchor, component] : components_) {
-    Eigen::Vector4d& variances = result[anchor];
     const auto row = rows_.find(anchor);
-    variances.setZero();
-    if (!usable_ || row == rows_.end()) continue;
+    if (row == rows_.end()) {
+      result[anchor].setZero();
+      continue;
+    }
+    if (!usable_) continue;
+    Eigen::Vector4d& variances = result[anchor];
     for (Eigen::Index i = 0; i < 4; ++i) {
       variances[i] = diagonal[factor_.permutationP().indices()[row->second + i]];
     }

@@ -19,11 +19,13 @@ class Marginals {
 
   /// The first anchor of the component of `from`.
   AnchorId first() const { return components_.at(from_); }
-  /// T_from,anchor with its covariance; nothing where no way leads there.
+  /// T_from,anchor with its covariance; nothing where no way leads there, or where the normal
+  /// equations cannot be solved.
   std::optional<LevelGaussian> to(AnchorId anchor) const;
   /// Variances of [p, yaw] in M of every anchor, relative to the first one of its component; m² and
-  /// rad². All at the price of about one factorisation, by the recursion of Takahashi (Erisman and
-  /// Tinney 1975): the inverse is computed where the factor is not zero, and nowhere else.
+  /// rad². Without those of which they cannot be computed. All at the price of about one
+  /// factorisation, by the recursion of Takahashi (Erisman and Tinney 1975): the inverse is
+  /// computed where the factor is not zero, and nowhere else.
   std::map<AnchorId, Eigen::Vector4d> variances() const;
 
  private:

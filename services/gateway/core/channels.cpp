@@ -16,8 +16,7 @@ void addCamera(std::size_t index, const std::string& camera, std::vector<Channel
                    "foxglove::CompressedImage", "omgidl", schemas::compressedImageIdl(),
                    Delivery::kNewest});
   table.push_back(json(cameraChannel(index, kCalibration), (prefix + "/calibration").c_str(),
-                       "foxglove.CameraCalibration", schemas::cameraCalibration(),
-                       Delivery::kLatched));
+                       "foxglove.CameraCalibration", schemas::cameraCalibration()));
   table.push_back(json(cameraChannel(index, kAnnotations), (prefix + "/annotations").c_str(),
                        "foxglove.ImageAnnotations", schemas::imageAnnotations()));
   table.push_back(json(cameraChannel(index, kLikelihood), (prefix + "/likelihood").c_str(),
@@ -29,23 +28,22 @@ void addCamera(std::size_t index, const std::string& camera, std::vector<Channel
 std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras) {
   using namespace schemas;
   std::vector<ChannelInfo> table = {
-      json(kTransforms, "/tf", "foxglove.FrameTransforms", frameTransforms(), Delivery::kLatched),
-      json(kScene, "/scene", "foxglove.SceneUpdate", sceneUpdate(), Delivery::kLatched),
-      json(kPose, "/pose", "foxglove.PoseInFrame", poseInFrame(), Delivery::kLatched),
-      json(kTrajectory, "/trajectory", "foxglove.PosesInFrame", posesInFrame(), Delivery::kLatched),
+      json(kTransforms, "/tf", "foxglove.FrameTransforms", frameTransforms()),
+      json(kScene, "/scene", "foxglove.SceneUpdate", sceneUpdate()),
+      json(kPose, "/pose", "foxglove.PoseInFrame", poseInFrame()),
+      json(kTrajectory, "/trajectory", "foxglove.PosesInFrame", posesInFrame()),
       json(kLandmarks, "/landmarks", "foxglove.PointCloud", pointCloud()),
       json(kLog, "/log", "foxglove.Log", log(), Delivery::kEach),
-      json(kHealth, "/health", "perdure.Health", health(), Delivery::kLatched),
-      json(kObjects, "/objects", "perdure.Objects", objects(), Delivery::kLatched),
+      json(kHealth, "/health", "perdure.Health", health()),
+      json(kObjects, "/objects", "perdure.Objects", objects()),
       json(kEvents, "/events", "perdure.Event", event(), Delivery::kEach),
       json(kDetections, "/detections", "perdure.Detections", detections()),
-      json(kMap, "/map", "perdure.Map", map(), Delivery::kLatched),
-      json(kMapToOdom, "/map/frame", "perdure.MapFrame", mapFrame(), Delivery::kLatched),
-      json(kMapScene, "/map/scene", "foxglove.SceneUpdate", sceneUpdate(), Delivery::kLatched),
-      json(kMapGraph, "/map/graph", "perdure.MapGraph", mapGraph(), Delivery::kLatched),
-      json(kMapGraphScene, "/map/graph/scene", "foxglove.SceneUpdate", sceneUpdate(),
-           Delivery::kLatched),
-      json(kModel, "/model", "perdure.Model", model(), Delivery::kLatched)};
+      json(kMap, "/map", "perdure.Map", map()),
+      json(kMapToOdom, "/map/frame", "perdure.MapFrame", mapFrame()),
+      json(kMapScene, "/map/scene", "foxglove.SceneUpdate", sceneUpdate()),
+      json(kMapGraph, "/map/graph", "perdure.MapGraph", mapGraph()),
+      json(kMapGraphScene, "/map/graph/scene", "foxglove.SceneUpdate", sceneUpdate()),
+      json(kModel, "/model", "perdure.Model", model())};
   for (std::size_t i = 0; i < cameras.size(); ++i) addCamera(i, cameras[i], table);
   return table;
 }

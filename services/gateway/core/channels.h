@@ -48,9 +48,8 @@ constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
 
 /// What a client that is slow loses, and what one gets that comes late.
 enum class Delivery {
-  kNewest,   ///< the newest replaces what has not been sent
-  kEach,     ///< a queue; the oldest are lost, counted and told
-  kLatched,  ///< the newest, also to who comes late
+  kNewest,  ///< the newest replaces what has not been sent; who comes late gets it
+  kEach,    ///< a queue; the oldest are lost, counted and told; who comes late gets the last ones
 };
 
 struct ChannelInfo {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "common/base/ids.h"
+#include "common/types/map_graph.h"
 #include "services/gateway/core/pieces.h"
 
 namespace perdure::gateway {
@@ -42,12 +43,18 @@ std::string sessionOf(const MapAnchor& anchor) {
   return fmt::format("{}/{}", toHex(anchor.session.world), anchor.session.epoch);
 }
 
+/// Empty where it is not known.
+void putSigma(JsonWriter& json, const Eigen::Vector4d& sigma, bool known) {
+  json.key("sigma");
+  putNumbers(json, {sigma.data(), known ? 4U : 0U}, 4);
+}
+
 void putAnchor(JsonWriter& json, const MapAnchor& anchor) {
   json.begin('{').key("id").integer(anchor.id).key("previous").integer(anchor.previous);
   json.key("session").text(sessionOf(anchor)).key("at");
   putNumbers(json, {anchor.p.data(), 3}, 3);
-  json.key("yaw").number(anchor.yaw, 4).key("sigma");
-  putNumbers(json, {anchor.sigma.data(), 4}, 4);
+  json.key("yaw").number(anchor.yaw, 4);
+  putSigma(json, anchor.sigma, hasSigma(anchor));
   json.key("objects").integer(anchor.objects).end('}');
 }
 
@@ -56,8 +63,7 @@ void putLoop(JsonWriter& json, const MapLoop& loop) {
   json.key("kind").text(wordOf(loop.kind)).key("state").text(wordOf(loop.state));
   json.key("residual");
   putNumbers(json, {loop.residual.data(), 4}, 4);
-  json.key("sigma");
-  putNumbers(json, {loop.sigma.data(), 4}, 4);
+  putSigma(json, loop.sigma, hasSigma(loop));
   json.key("chi2").number(loop.chi2, 3).key("weight").number(loop.weight, 3);
   json.key("pairs").begin('[');
   for (const MapLoopPair& pair : loop.pairs) {
@@ -70,6 +76,10 @@ void putLoop(JsonWriter& json, const MapLoop& loop) {
 std::string metresAndDegrees(const Eigen::Vector4d& v) {
   return fmt::format("{:.3f} {:.3f} {:.3f} m, {:.2f} deg", v[0], v[1], v[2],
                      v[3] * 180.0 / std::numbers::pi);
+}
+
+std::string sigmaInWords(const Eigen::Vector4d& sigma, bool known) {
+  return known ? metresAndDegrees(sigma) : "not known";
 }
 
 std::string witnessesOf(const MapLoop& loop) {
@@ -89,14 +99,14 @@ void putSphere(JsonWriter& json, TimePoint time, const MapAnchor& anchor) {
   json.key("metadata").begin('[');
   putPair(json, "anchor", std::to_string(anchor.id));
   putPair(json, "session", sessionOf(anchor));
-  putPair(json, "sigma x y z, yaw", metresAndDegrees(anchor.sigma));
+  putPair(json, "sigma x y z, yaw", sigmaInWords(anchor.sigma, hasSigma(anchor)));
   putPair(json, "objects", std::to_string(anchor.objects));
   json.end(']').key("spheres").begin('[').begin('{').key("pose");
   putPose(json, {rotationOfYaw(anchor.yaw), anchor.p});
   json.key("size");
   putVector(json, Eigen::Vector3d::Constant(kSize_m));
   json.key("color");
-  putColour(json, {0.56, 0.72, 0.87, 0.9});
+  putColour(json, hasSigma(anchor) ? Colour{0.56, 0.72, 0.87, 0.9} : Colour{0.55, 0.55, 0.55, 0.9});
   json.end('}').end(']');
   endEntity(json, {"arrows", "cubes", "cylinders", "lines", "triangles", "texts", "models"});
 }
@@ -146,7 +156,7 @@ void putArch(JsonWriter& json, TimePoint time, const MapLoop& loop, const Eigen:
   putPair(json, "state", wordOf(loop.state));
   putPair(json, "anchors", fmt::format("{} and {}", loop.a, loop.b));
   putPair(json, "residual x y z, yaw", metresAndDegrees(loop.residual));
-  putPair(json, "sigma x y z, yaw", metresAndDegrees(loop.sigma));
+  putPair(json, "sigma x y z, yaw", sigmaInWords(loop.sigma, hasSigma(loop)));
   putPair(json, "chi2 of 4", fmt::format("{:.2f}", loop.chi2));
   putPair(json, "weight", fmt::format("{:.3f}", loop.weight));
   putPair(json, "by objects", witnessesOf(loop));

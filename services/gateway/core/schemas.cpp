@@ -362,7 +362,7 @@ std::string mapGraph() {
        {"residual", said(listOf(number()),
                          "measured less as it lies: x y z m, yaw rad, in "
                          "axes of a")},
-       {"sigma", said(listOf(number()), "of the measurement")},
+       {"sigma", said(listOf(number()), "of the measurement; empty: not known")},
        {"chi2", said(number(), "of the residual, 4 degrees of freedom")},
        {"weight", said(number(), "by which it counts, 0 to 1")},
        {"pairs", said(listOf(listOf(natural())), "ids that it found to be one: known, seen")},

@@ -129,6 +129,7 @@ void Hub::subscribe(Viewer& viewer, const protocol::Subscription& wanted) {
     complain(viewer, "the subscription " + std::to_string(wanted.id) + " is there already");
     return;
   }
+  if (viewer.channel_of_.size() == 1 && time_) viewer.outbox_.putTime(protocol::time(*time_));
   Kept& kept = channel->second;
   ++kept.subscriptions;
   for (const Encoded& message : kept.messages) {
@@ -161,6 +162,7 @@ void Hub::tellWanted() {
   }
   if (now == wanted_) return;
   wanted_ = std::move(now);
+  if (wanted_.empty()) time_.reset();
   told_.wanted(wanted_);
 }
 
@@ -205,11 +207,9 @@ void Hub::publish(const Encoded& message) {
   if (channel == channels_.end() || channel->second.subscriptions == 0) return;
   Kept& kept = channel->second;
   ++published_;
-  if (kept.info.delivery != Delivery::kNewest) {
-    kept.messages.push_back(message);
-    const std::size_t most = kept.info.delivery == Delivery::kLatched ? 1 : most_events_;
-    if (kept.messages.size() > most) kept.messages.pop_front();
-  }
+  kept.messages.push_back(message);
+  const std::size_t most = kept.info.delivery == Delivery::kEach ? most_events_ : 1;
+  if (kept.messages.size() > most) kept.messages.pop_front();
   for (const auto& [id, viewer] : viewers_) {
     bool any = false;
     for (const auto& [subscription, its] : viewer->channel_of_) {
@@ -230,6 +230,7 @@ void Hub::tellPlayback(const PlaybackState& state) {
 }
 
 void Hub::tellTime(TimePoint time) {
+  if (!wanted_.empty()) time_ = time;
   for (const auto& [id, viewer] : viewers_) {
     if (viewer->channel_of_.empty()) continue;
     viewer->outbox_.putTime(protocol::time(time));

@@ -75,7 +75,7 @@ class Hub {
  private:
   struct Kept {
     ChannelInfo info;
-    std::deque<Encoded> messages;  ///< for who comes late
+    std::deque<Encoded> messages;  ///< for who comes late: the last events, else the newest one
     std::size_t subscriptions = 0;
   };
   void handle(Viewer& viewer, const protocol::ClientMessage& message);
@@ -94,7 +94,8 @@ class Hub {
   std::map<std::uint32_t, Kept> channels_;
   std::vector<ServiceInfo> services_;
   std::optional<TimeRange> range_;
-  std::string playback_;  ///< the newest state, for who comes late
+  std::string playback_;           ///< the newest state, for who comes late
+  std::optional<TimePoint> time_;  ///< the newest one, while somebody looks
   std::map<std::uint64_t, Viewer*> viewers_;
   std::uint64_t next_id_ = 1, published_ = 0, dropped_by_gone_ = 0;
   Channels wanted_;

@@ -1,6 +1,5 @@
 // What waits to be sent to one client: bounded whatever the client does. Of a channel with
-// Delivery::kNewest or kLatched the newest message replaces the one that waits; of kEach the oldest
-// are lost.
+// Delivery::kNewest the newest message replaces the one that waits; of kEach the oldest are lost.
 #pragma once
 
 #include <cstdint>

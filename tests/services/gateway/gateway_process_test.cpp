@@ -169,6 +169,20 @@ TEST_F(Gateway, HasTheImagesSentToItOnlyWhileSomebodyLooks) {
   EXPECT_TRUE(eventually(10s, [&] { return frames.matched() == 1; }));
 }
 
+/// As a page that is loaded again does, when nothing new comes.
+TEST_F(Gateway, TellsTheLastStateToWhoLeavesAndComesAtOnce) {
+  start();
+  const auto client = lookingAt("/objects");
+  publish(++sequence_);
+  EXPECT_THAT(client->readMessage(1), HasSubstr("\"objects\""));
+  for (std::uint32_t id = 2; id < 12; ++id) {
+    const std::string leaves = json{{"op", "unsubscribe"}, {"subscriptionIds", {id - 1}}}.dump();
+    client->send(RawClient::masked(leaves) +
+                 RawClient::masked(subscribe(id, channels_["/objects"])));
+    ASSERT_THAT(client->readMessage(id), HasSubstr("\"objects\"")) << id;
+  }
+}
+
 TEST_F(Gateway, LosesNothingOfOneClientThroughAnotherThatDoesNotRead) {
   start();
   const auto stopped = lookingAt("/scene");

@@ -352,7 +352,11 @@ TEST_F(GatewayNode, TellsTheGraphInTheFrameOfTheMapWithWhatEachPartIs) {
   EXPECT_EQ(graph["frame_id"], "map");
   EXPECT_EQ(graph["why_none"], "");
   ASSERT_EQ(graph["anchors"].size(), 3u);
+  EXPECT_EQ(graph["anchors"][0]["sigma"], json({0, 0, 0, 0})) << "all others are relative to it";
   EXPECT_EQ(graph["anchors"][1]["sigma"], json({0.2, 0.1, 0.05, 0.01}));
+  EXPECT_EQ(graph["anchors"][2]["sigma"], json::array()) << "not known";
+  EXPECT_EQ(graph["loops"][0]["sigma"].size(), 4u);
+  EXPECT_EQ(graph["loops"][3]["sigma"], json::array());
   ASSERT_EQ(graph["loops"].size(), 4u);
   EXPECT_EQ(graph["loops"][2]["state"], "withdrawn");
   EXPECT_EQ(graph["loops"][3]["kind"], "tie");
@@ -367,6 +371,9 @@ TEST_F(GatewayNode, TellsTheGraphInTheFrameOfTheMapWithWhatEachPartIs) {
   EXPECT_EQ(said["anchors"], "1 and 3");
   EXPECT_EQ(said["sigma x y z, yaw"], "0.100 0.100 0.050 m, 0.23 deg");
   EXPECT_EQ(said["by objects"], "1, 2 (seen as 77)");
+  EXPECT_EQ(scene["entities"][3]["metadata"][2]["value"], "not known");
+  EXPECT_NE(scene["entities"][3]["spheres"][0]["color"],
+            scene["entities"][2]["spheres"][0]["color"]);
   std::set<std::string> colours;
   for (std::size_t i = 4; i < 8; ++i) {
     colours.insert(scene["entities"][i]["lines"][0]["color"].dump());

@@ -92,7 +92,7 @@ inline MapReply graphFor(const MapQuery& query, const WorldId& map) {
     anchor.previous = id - 1;
     anchor.session = anchor.map = map;
     anchor.p = {10.0 * static_cast<double>(id - 1), id == 3 ? 101.0 : 100.0, 0.0};
-    if (id > 1) anchor.sigma << 0.2, 0.1, 0.05, 0.01;
+    if (id == 2) anchor.sigma << 0.2, 0.1, 0.05, 0.01;  // of the third it is not known
     anchor.objects = 2;
     reply.anchors.push_back(anchor);
   }
@@ -115,6 +115,7 @@ inline MapReply graphFor(const MapQuery& query, const WorldId& map) {
   add(4, 1, 3, MapLoopState::kConfirmed);
   reply.loops.back().kind = MapLoopKind::kTie;
   reply.loops.back().pairs.clear();
+  reply.loops.back().sigma.setZero();
   reply.anchor_count = 3;
   reply.loop_count = 4;
   return reply;

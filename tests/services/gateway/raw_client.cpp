@@ -43,7 +43,7 @@ void RawClient::send(std::string_view bytes) const {
   }
 }
 
-void RawClient::sendFrame(std::string_view payload, std::uint8_t opcode) const {
+std::string RawClient::masked(std::string_view payload, std::uint8_t opcode) {
   std::string frame(1, static_cast<char>(0x80 | opcode));
   const std::size_t n = payload.size();
   if (n < 126) {
@@ -57,7 +57,11 @@ void RawClient::sendFrame(std::string_view payload, std::uint8_t opcode) const {
     for (int shift = 56; shift >= 0; shift -= 8) frame += static_cast<char>((n >> shift) & 0xff);
   }
   frame.append(4, '\0');  // a mask of zeros is one
-  send(frame.append(payload));
+  return frame.append(payload);
+}
+
+void RawClient::sendFrame(std::string_view payload, std::uint8_t opcode) const {
+  send(masked(payload, opcode));
 }
 
 bool RawClient::fill(int seconds) {

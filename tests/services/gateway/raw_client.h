@@ -18,6 +18,7 @@ class RawClient {
 
   void send(std::string_view bytes) const;
   /// A frame as a client has to mask it. `opcode`: 1 text, 2 binary, 8 close, 9 ping.
+  static std::string masked(std::string_view payload, std::uint8_t opcode = 1);
   void sendFrame(std::string_view payload, std::uint8_t opcode = 1) const;
   /// Up to and with the empty line; empty where the other side closes before, or is silent.
   std::string readHead();

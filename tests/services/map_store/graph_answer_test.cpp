@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/types/map_graph.h"
 #include "services/map_store/core/map_database.h"
 #include "services/map_store/core/schema.h"
 #include "tests/services/map_store/lap_drive.h"
@@ -160,6 +161,31 @@ TEST_F(GraphAnswer, ShowsWithdrawnLoopsWithWhatTheySaid) {
   ASSERT_THAT(reply.loops[0].pairs, SizeIs(1));
   EXPECT_EQ(reply.loops[0].pairs[0].seen, 70u);
   EXPECT_EQ(reply.loops[0].landmarks, 3u);
+}
+
+/// What a damaged file may hold, and is finite.
+TEST_F(GraphAnswer, SaysWhereHowWellAPlaceIsKnownCannotBeTold) {
+  start();
+  driveTo(0.8 * kLap_m);
+  node_->flush();
+  node_.reset();
+  const auto file = openStoreForReading(config_.store_path);
+  mapping::SavedMap map = MapReader(&file).graph()->map;
+  const AnchorNumber cut = map.anchors.rbegin()->first / 2;
+  map.anchors.at(cut).anchor.from_previous.covariance.setConstant(0.0);
+  map.anchors.at(cut).anchor.from_previous.covariance.diagonal().setConstant(1e30);
+  mapping::Edge edge{1, cut, {}, mapping::EdgeKind::kLoop};
+  edge.T_ab.covariance = -Eigen::Matrix4d::Identity();
+  MapReply reply;
+  mapping::Mapper mapper(config_.mapping, std::move(map));
+  putGraph(mapper, {{9, 1, cut, edge, {}, 3}}, kHere, {}, reply);
+  ASSERT_GT(reply.anchors.size(), 4u);
+  for (const MapAnchor& anchor : reply.anchors) {
+    EXPECT_TRUE(anchor.sigma.allFinite());
+    EXPECT_TRUE(anchor.id < cut || !hasSigma(anchor)) << anchor.sigma.transpose();
+  }
+  ASSERT_THAT(reply.loops, SizeIs(1));
+  EXPECT_FALSE(hasSigma(reply.loops[0]));
 }
 
 TEST_F(GraphAnswer, WithoutAGraphOrOfNoPlaceIsRefusedInASentence) {

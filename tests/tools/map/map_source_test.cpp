@@ -92,6 +92,21 @@ class MapSource : public ::testing::Test {
   std::string path_ = folder_.file("map.sqlite");
 };
 
+TEST_F(MapSource, TellsTheGraphAsTheRunningServiceWould) {
+  MapQuery query;
+  query.limit = 1000;
+  const MapReply graph = askGraphOfFile(path_, query);
+  ASSERT_THAT(graph.anchors, SizeIs(3));
+  EXPECT_EQ(graph.anchor_count, 3u);
+  EXPECT_DOUBLE_EQ(graph.anchors[2].p.y(), kShift_m);
+  EXPECT_EQ(graph.anchors[0].sigma, Eigen::Vector4d::Zero());
+  EXPECT_GT(graph.anchors[1].sigma.maxCoeff(), 0.5) << "an odometry of a metre";
+  ASSERT_THAT(graph.loops, SizeIs(2));
+  EXPECT_EQ(graph.loops[0].id, 5u);
+  EXPECT_EQ(graph.loops[1].kind, MapLoopKind::kTie);
+  EXPECT_EQ(graph.loops[1].state, MapLoopState::kTentative) << "its weight is .1";
+}
+
 TEST_F(MapSource, AFileIsReadInMAndOnRequestAsItIsStored) {
   const MapObject in_W = objectOf(20, MapFrameChoice::kW), in_M = objectOf(20, MapFrameChoice::kM);
   EXPECT_EQ(Eigen::Vector3d(in_W.mean.head<3>()), Eigen::Vector3d(203, 0, 0));

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -28,11 +29,17 @@ constexpr std::uint64_t kSecond = 1'000'000'000;
 
 class Replayed : public ::testing::Test {
  protected:
+  Replayed() { record("run.mcap", 5000 * kSecond); }
   /// Twenty seconds at 10 Hz, recorded at a time of its own; events at 7 and 12 s.
-  Replayed() {
-    replay::RecordingWriter writer(folder_.file("run.mcap"));
+  void record(const std::string& name, std::uint64_t begin_ns) {
+    replay::RecordingWriter writer(folder_.file(name));
+    Calibration calibration = gateway::test::forwardCamera();
+    calibration.source = 42;
+    mustBe(writer.add("calibration", calibration, begin_ns));
     for (std::uint64_t i = 0; i < 200; ++i) {
-      const std::uint64_t log = 5000 * kSecond + i * kSecond / 10;
+      const std::uint64_t log = begin_ns + i * kSecond / 10;
+      mustBe(writer.add("frame/cam0", imageOf(i), log));
+      mustBe(writer.add("landmarks", landmarksOf(i), log));
       mustBe(writer.add("objects", frameOf(i, {objectAt(1, {0.1 * static_cast<double>(i), 0, 0})}),
                         log));
       if (i == 70) mustBe(writer.add("events", eventOf(EventKind::kOccluded, 1), log));
@@ -42,6 +49,23 @@ class Replayed : public ::testing::Test {
     }
     mustBe(writer.finish());
   }
+  static Frame imageOf(std::uint64_t i) {
+    Frame frame;
+    frame.stamp = frameOf(i, {}).stamp;
+    frame.camera = "cam0";
+    frame.width = frame.height = 16;
+    frame.data = std::make_shared<const std::vector<std::uint8_t>>(256, std::uint8_t{70});
+    return frame;
+  }
+  static Landmarks landmarksOf(std::uint64_t i) {
+    Landmarks landmarks;
+    landmarks.stamp = frameOf(i, {}).stamp;
+    landmarks.world = frameOf(i, {}).world;
+    landmarks.camera = "cam0";
+    landmarks.landmarks.resize(1);
+    landmarks.landmarks[0].covariance.setIdentity();
+    return landmarks;
+  }
   template <class R>
   static void mustBe(const R& result) {
     if (!result) throw std::runtime_error(result.error().detail);
@@ -50,10 +74,15 @@ class Replayed : public ::testing::Test {
   void startPaused() {
     gateway::PlaybackRequest how;
     how.play = false;
-    recording_ = std::make_unique<replay::RecordedMessages>(folder_.file("run.mcap"));
+    start(how);
+  }
+  void start(const gateway::PlaybackRequest& how, const std::string& name = "run.mcap",
+             double start_s = 0.0) {
+    recording_ = std::make_unique<replay::RecordedMessages>(folder_.file(name));
     gateway::Config config;
     config.web.port = 0;
-    replay_ = std::make_unique<GatewayReplay>(*recording_, config, how);
+    config.cameras = {"cam0"};
+    replay_ = std::make_unique<GatewayReplay>(*recording_, config, how, start_s);
     thread_ = std::thread([this] { replay_->run(); });
     client_ = std::make_unique<RawClient>(replay_->port());
     ASSERT_THAT(client_->upgrade(), HasSubstr("101"));
@@ -129,6 +158,96 @@ TEST_F(Replayed, PlaysOnFromThereAndSaysWhenItHasEnded) {
   EXPECT_NEAR(state().second, 2.0, 0.2);
 }
 
+/// Times of what a client is told that begins to look at everything.
+class LateClient {
+ public:
+  explicit LateClient(std::uint16_t port) : client_(port) {
+    (void)client_.upgrade();
+    client_.sendFrame(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":1},
+        {"id":2,"channelId":2},{"id":5,"channelId":5},{"id":8,"channelId":8},
+        {"id":100,"channelId":100},{"id":101,"channelId":101},{"id":102,"channelId":102}]})");
+  }
+  /// By subscription, until all have come; 0: the time; -1: the playback's.
+  std::map<int, double> hear() {
+    std::map<int, double> told;
+    while (told.size() < 9) {
+      const auto frame = client_.readFrame();
+      if (frame.opcode == 0xff) break;
+      if (frame.opcode != 2) continue;
+      std::uint32_t subscription = 0;
+      std::uint64_t time = 0;
+      const std::uint8_t kind = static_cast<std::uint8_t>(frame.payload[0]);
+      std::memcpy(&subscription, &frame.payload[1], 4);
+      std::memcpy(&time, &frame.payload[kind == 1 ? 5 : kind == 2 ? 1 : 2], 8);
+      const int who = kind == 1 ? static_cast<int>(subscription) : kind == 2 ? 0 : -1;
+      told[who] = 1e-9 * static_cast<double>(time);
+      if (kind == 5) status_ = frame.payload[1];
+    }
+    return told;
+  }
+  int status_ = -1;
+
+ private:
+  RawClient client_;
+};
+
+TEST_F(Replayed, TellsTheLastStateToWhoComesAfterTheEnd) {
+  using ::testing::DoubleNear;
+  using ::testing::Each;
+  using ::testing::Pair;
+  gateway::PlaybackRequest how;
+  how.speed = 100;
+  start(how, "run.mcap", 18.0);
+  while (state().first != 3) {
+  }
+  client_.reset();  // the second is the first one who looks at images, the third the next one
+  for (int i = 0; i < 2; ++i) {
+    LateClient late(replay_->port());
+    const auto told = late.hear();
+    EXPECT_EQ(told.size(), 9u);
+    EXPECT_THAT(told, Each(Pair(::testing::_, DoubleNear(21.9, 1e-6))));
+    EXPECT_EQ(late.status_, 3);
+    LateClient beside(replay_->port());
+    EXPECT_EQ(beside.hear(), told);
+  }
+}
+
+TEST_F(Replayed, ShowsTheImageOfAPlaceThatIsSoughtWhilePaused) {
+  startPaused();
+  client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":100}]})");
+  EXPECT_FALSE(client_->readMessage(5).empty());
+  control(false, 1, 21'900'000'000);
+  EXPECT_FALSE(client_->readMessage(5).empty());
+}
+
+TEST_F(Replayed, EndsWhereItIsPlayedOnFromTheLastFrame) {
+  startPaused();
+  control(false, 1, 21'900'000'000);
+  while (state().second < 21.8) {
+  }
+  control(true, 1);
+  std::pair<int, double> now;
+  for (int i = 0; i < 5 && now.first != 3; ++i) now = state();
+  EXPECT_EQ(now.first, 3);
+}
+
+TEST_F(Replayed, BeginsWhereItIsToldToWithTheCameraOfBefore) {
+  gateway::PlaybackRequest how;
+  how.play = false;
+  start(how, "run.mcap", 13.0);
+  EXPECT_EQ(shown(), 130u);
+  client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":101}]})");
+  EXPECT_EQ(json::parse(client_->readMessage(5), nullptr, false).value("width", 0), 640);
+}
+
+TEST_F(Replayed, TakesARecordingWhoseClockBeganAtZero) {
+  record("zero.mcap", 0);
+  gateway::PlaybackRequest how;
+  how.play = false;
+  start(how, "zero.mcap");
+  EXPECT_EQ(info_["dataStartTime"], (json{{"sec", 2}, {"nsec", 0}}));
+}
+
 TEST_F(Replayed, HasTheGraphThatWasToldLastBeforeThePlace) {
   startPaused();
   client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":2,"channelId":15}]})");
@@ -183,6 +302,13 @@ TEST_F(Replayed, AnswersAboutAnObjectAndSaysThatThereIsNoStore) {
     ASSERT_NE(frame.opcode, 0xff);
     answer = frame.payload;
   }
+}
+
+TEST_F(Replayed, RefusesToBeginAfterTheEnd) {
+  replay::RecordedMessages recording(folder_.file("run.mcap"));
+  gateway::Config config;
+  config.web.port = 0;
+  EXPECT_THROW(GatewayReplay(recording, config, {}, 20.5), StartupError);
 }
 
 TEST(Replay, RefusesARecordingWithNothingToShow) {

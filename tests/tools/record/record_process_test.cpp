@@ -9,7 +9,9 @@
 #include "common/bus/wait_loop.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
+#include "common/types/map.h"
 #include "tests/process/support.h"
+#include "tests/services/gateway/objects.h"
 #include "tests/services/semantic_filter/scene.h"
 #include "tools/pipeline/pipeline.h"
 
@@ -190,6 +192,37 @@ TEST(PlayProcess, RefusesTopicsThatOthersWriteUnlessItIsForced) {
                      place.file("forced.log"));
   EXPECT_EQ(forced.wait(20s), 0);
   EXPECT_THAT(forced.log(), HasSubstr("1 messages of 1 topics were played"));
+}
+
+/// What map_store writes itself is left to it; events of the filter are played.
+TEST(PlayProcess, PlaysBesideAMapStoreAndSaysWhatIsLeftOut) {
+  const test::Folder place;
+  replay::RecordingWriter recording(place.file("run.mcap"));
+  constexpr std::uint64_t kEach = 100'000'000;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    recording.add("objects", gateway::test::frameOf(i, {}), i * kEach);
+    MapFrame frame;
+    frame.world = frame.map = {77, 1};
+    recording.add("map/frame", frame, i * kEach);
+  }
+  recording.add("events", gateway::test::eventOf(EventKind::kBorn, 1), 10 * kEach);
+  recording.add("events", gateway::test::eventOf(EventKind::kLoopClosed, 0), 10 * kEach);
+  recording.finish();
+  (void)test::ownNetwork();
+  test::Child store({(test::programs() / "perdure-map-store").string(), "--set",
+                     "store.path=" + place.file("map.sqlite")},
+                    place.file("store.log"));
+  test::Child player({perdure(), "play", place.file("run.mcap")}, place.file("play.log"));
+  EXPECT_EQ(player.wait(30s), 0);
+  const std::string said = player.log();
+  EXPECT_THAT(said, HasSubstr("11 messages of 2 topics were played"));
+  EXPECT_THAT(said, HasSubstr("who listens: map/frame (map_store)"));
+  EXPECT_THAT(said, HasSubstr("who listens: those of map_store among events"));
+  EXPECT_THAT(said, HasSubstr("events_left_out: 1"));
+  test::Child named({perdure(), "play", place.file("run.mcap"), "--topics", "map/frame"},
+                    place.file("named.log"));
+  EXPECT_EQ(named.wait(20s), 69);
+  EXPECT_THAT(named.log(), HasSubstr("map/frame (map_store)"));
 }
 
 TEST(PlayProcess, SaysWhatTheRecordingHasNot) {

@@ -2,7 +2,7 @@
 import * as THREE from './vendor/three.module.js';
 import { LOOPS, lookOfLoop } from './words.js';
 
-const ANCHOR = '#8fb8de', WAY = '#7094b8', NEAR_PX = 8, STEPS = 8;
+const ANCHOR = '#8fb8de', UNKNOWN = '#8c8c8c', WAY = '#7094b8', NEAR_PX = 8, STEPS = 8;
 
 /** From a to b, raised between them: both may lie on the way. */
 function arch(a, b) {
@@ -37,7 +37,7 @@ export class Graph {
     this.chosenLine.renderOrder = 6; // over the line of its loop
     this.chosenLine.material.depthTest = false;
     this.ball = new THREE.SphereGeometry(0.3, 12, 8);
-    this.ballMaterial = new THREE.MeshBasicMaterial({ color: ANCHOR, fog: false });
+    this.ballMaterial = new THREE.MeshBasicMaterial({ fog: false });
     this.balls = null;
     this.ring = new THREE.Mesh(new THREE.RingGeometry(0.96, 1, 48), new THREE.MeshBasicMaterial({ color: '#ffffff', side: THREE.DoubleSide, fog: false }));
     this.ring.visible = false;
@@ -89,13 +89,16 @@ export class Graph {
     this.balls = new THREE.InstancedMesh(this.ball, this.ballMaterial, Math.max(1, this.anchors.size));
     this.balls.frustumCulled = false;
     this.balls.count = this.anchors.size;
-    const at = new THREE.Matrix4();
+    const at = new THREE.Matrix4(), known = new THREE.Color(ANCHOR), unknown = new THREE.Color(UNKNOWN);
     let i = 0;
-    for (const anchor of this.anchors.values()) this.balls.setMatrixAt(i++, at.makeTranslation(anchor.place));
+    for (const anchor of this.anchors.values()) {
+      this.balls.setColorAt(i, anchor.sigma.length ? known : unknown);
+      this.balls.setMatrixAt(i++, at.makeTranslation(anchor.place));
+    }
     this.group.add(this.balls);
   }
 
-  /** {kind: "anchor" | "loop", id}, or nothing. Around an anchor its 2σ: the larger of x and y. */
+  /** {kind: "anchor" | "loop", id}, or nothing. Around an anchor its 2σ: the larger of x and y; grey where that is not known. */
   choose(part) {
     const anchor = part?.kind === 'anchor' ? this.anchors.get(part.id) : undefined;
     const loop = part?.kind === 'loop' ? this.loops.get(part.id) : undefined;
@@ -103,7 +106,9 @@ export class Graph {
     this.ring.visible = Boolean(anchor);
     if (anchor) {
       this.ring.position.copy(anchor.place);
-      this.ring.scale.setScalar(Math.max(0.6, 2 * Math.max(anchor.sigma[0], anchor.sigma[1])));
+      const [x = 0, y = 0] = anchor.sigma;
+      this.ring.scale.setScalar(Math.max(0.6, 2 * Math.max(x, y)));
+      this.ring.material.color.set(anchor.sigma.length ? '#ffffff' : UNKNOWN);
     }
     Graph.put(this.chosenLine, loop ? segmentsOf(loop.points) : []);
   }

@@ -7,9 +7,15 @@ const table = (rows) => `<table>${rows.map(([k, v]) => `<tr><td class="dim">${k}
 const anchorLink = (id) => `<a data-part="anchor" data-id="${id}">anchor ${id}</a>`;
 const object = (id) => `<a data-object="${id}">${id}</a>`;
 
+function sigmaWords(sigma) {
+  if (!sigma.length) return 'not known: how far the way to here may err cannot be told';
+  if (sigma.every((s) => s === 0)) return 'the map begins here: all other places are relative to it';
+  return `± ${metres(sigma[0])}, ${metres(sigma[1])}, ${metres(sigma[2])}; ± ${degrees(sigma[3])}`;
+}
+
 function anchorWords(a, graph) {
   const loops = graph.loops.filter((l) => l.a === a.id || l.b === a.id);
-  const sigma = a.sigma.every((s) => s === 0) ? 'the map begins here: all other places are relative to it' : `± ${metres(a.sigma[0])}, ${metres(a.sigma[1])}, ${metres(a.sigma[2])}; ± ${degrees(a.sigma[3])}`;
+  const sigma = sigmaWords(a.sigma);
   const links = loops.map((l) => `<a data-part="loop" data-id="${l.id}">${l.kind} ${l.id}</a> <span class="dim">${l.state}</span>`);
   return `<h2 style="--c:#8fb8de"><i></i>Anchor ${a.id}</h2>
     <p>A place on the vehicle's way. ${a.objects} object${a.objects === 1 ? '' : 's'} of the map belong${a.objects === 1 ? 's' : ''} to it, and move${a.objects === 1 ? 's' : ''} with it.</p>
@@ -22,7 +28,7 @@ function loopWords(l) {
   const seen = l.pairs.map(([known, seen]) => (known === seen ? object(known) : `${object(known)} <span class="dim">(seen as ${seen})</span>`));
   const by = seen.length ? `${seen.length} object${seen.length === 1 ? '' : 's'}: ${seen.join(', ')}`
     : l.landmarks ? `${l.landmarks} landmarks that look alike` : l.kind === 'tie' ? 'objects that still had their ids' : 'not known any more: it was found before the last start';
-  const r = l.residual, s = l.sigma, known = s.some((x) => x > 0);
+  const r = l.residual, s = l.sigma, known = s.length > 0;
   const row = (name, k, say) => [name, `${say(r[k])}${known ? ` <span class="dim">± ${say(s[k])}</span>` : ''}`];
   return `<h2 style="--c:${LOOPS[lookOfLoop(l)].colour}"><i></i>${l.kind === 'tie' ? 'Tie' : 'Loop'} ${l.id}</h2>
     <span class="tag ${{ confirmed: 'seen', tentative: 'hidden' }[l.state] ?? ''}">${l.state}</span>
@@ -30,7 +36,7 @@ function loopWords(l) {
     ${table([['between', `${anchorLink(l.a)} and ${anchorLink(l.b)}`], ['by', by]])}
     <h3>Residual: what was measured less what the map has</h3>
     ${table([row('x', 0, metres), row('y', 1, metres), row('z', 2, metres), row('heading', 3, degrees), ['χ² of 4', l.chi2.toFixed(2)], ['weight', l.weight.toFixed(3)]])}
-    <p class="dim">in axes of anchor ${l.a}; ± standard deviation of the measurement</p>`;
+    <p class="dim">in axes of anchor ${l.a}; ${known ? '± standard deviation of the measurement' : 'how well it was measured is not known'}</p>`;
 }
 
 /** HTML of a part {kind, id}; "" where the graph has it no more. */

@@ -103,6 +103,7 @@ function takeGraph(message) {
 }
 function showLegendOfGraph() {
   const shown = Boolean(world?.shows.graph && model.graph?.anchors.length), looks = new Set(model.graph?.loops.map(lookOfLoop));
+  if (model.graph?.anchors.some((a) => !a.sigma.length)) looks.add('unknown');
   for (const item of document.querySelectorAll('#legend [data-graph]')) item.hidden = !shown || (item.dataset.graph !== 'anchor' && !looks.has(item.dataset.graph));
   const none = model.graph && !model.graph.anchors.length ? ` ${model.graph.why_none}` : '';
   const part = model.graph?.truncated ? ` The nearest ${model.graph.anchors.length} anchors of ${model.graph.all_anchors}.` : '';
@@ -233,11 +234,19 @@ document.addEventListener('keydown', (e) => {
 // What is shown, as often as eyes want it.
 function figures(now) {
   const frame = model.frame, items = [];
-  if (frame) items.push(['time', `${Math.max(0, model.time - model.firstTime).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
+  const stands = connection.range && connection.playback?.status !== 'playing';
+  const since = connection.range?.first ?? model.firstTime; // the bar of a recording says the same
+  if (frame) items.push(['time', `${Math.max(0, model.time - since).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor']);
-  if (frame) items.push(['rate', `${model.rate(now).toFixed(0)} Hz`, ''], ['latency', frame.latency_ms >= 0 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
+  if (frame) items.push(['rate', stands ? '–' : `${model.rate(now).toFixed(0)} Hz`, 'minor'], ['latency', frame.latency_ms >= 0 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
+}
+
+function noImage(state) {
+  if (state === 'stale') return 'no image comes';
+  if (!connection.range) return 'no image yet: is the camera in image.cameras?';
+  return cameraTopic ? 'no image yet' : 'the recording has no images: perdure record --images keeps them';
 }
 
 let stateAt = 0;
@@ -257,7 +266,7 @@ function showState() {
   $('figures').innerHTML = figures(now);
   if (!cameraTopic) lookThroughCamera();
   if (camera.figure.classList.contains('has-image') && state === 'lost') camera.caption.textContent = 'the last image';
-  if (!camera.figure.classList.contains('has-image')) camera.caption.textContent = 'no image yet: is the camera in image.cameras?';
+  if (!camera.figure.classList.contains('has-image')) camera.caption.textContent = noImage(state);
 }
 
 function refresh() {

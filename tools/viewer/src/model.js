@@ -133,8 +133,10 @@ export function troubleOf(model, connection, now) {
   if (heard.length === 0 && silent > 2) {
     return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
+  // Who comes later is told the last objects once.
+  const last = silent > 2 || model.intervals.length === 0;
+  if (last && capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
   if (silent > 2) {
-    if (capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
     const bad = services.filter((s) => s.age_s >= 2.5).map((s) => `${s.process} has been silent for ${Math.round(s.age_s)} s`);
     const said = heard.filter((s) => s.state !== 'ok' && s.message).map((s) => `${s.process}: ${s.message}`);
     const why = [...bad, ...said].slice(0, 3).join('; ');
@@ -145,6 +147,9 @@ export function troubleOf(model, connection, now) {
   const gone = services.filter((s) => s.age_s >= 2.5);
   if (gone.length > 0) return ['degraded', `${gone.map((s) => s.process).join(', ')}: silent for ${Math.round(Math.max(...gone.map((s) => s.age_s)))} s; it is stopped, hangs, or is gone.`];
   const degraded = heard.filter((s) => s.state !== 'ok' && s.message);
-  if (degraded.length > 0) return ['degraded', degraded.map((s) => `${s.process} is ${s.state}: ${s.message}`).join('; ')];
+  if (degraded.length > 0) {
+    const more = degraded.length > 2 ? `; ${degraded.length - 2} more: see Services` : '';
+    return ['degraded', degraded.slice(0, 2).map((s) => `${s.process} is ${s.state}: ${s.message}`).join('; ') + more];
+  }
   return ['live', ''];
 }

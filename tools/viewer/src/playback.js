@@ -30,6 +30,16 @@ export class PlaybackBar {
     this.control(this.plays, first + share * (last - first));
   }
 
+  /** One that is not in the list, such as that of `play --rate 20`, comes into it. */
+  showSpeed(speed) {
+    const rounded = Number(speed.toPrecision(3)), options = [...this.speed.options];
+    if (!options.some((o) => Number(o.value) === rounded)) {
+      const next = options.find((o) => Number(o.value) > rounded) ?? null;
+      this.speed.insertBefore(new Option(`${rounded} ×`, String(rounded)), next);
+    }
+    if (this.speed.value !== String(rounded)) this.speed.value = String(rounded);
+  }
+
   /** While the handle is dragged: a few times a second. */
   seekSoon() {
     this.timer ??= setTimeout(() => {
@@ -56,7 +66,7 @@ export class PlaybackBar {
     const time = this.plays ? this.model.time ?? range.first : playback?.time ?? range.first;
     const share = (time - range.first) / Math.max(0.1, range.last - range.first);
     if (this.dragged === undefined) this.slider.value = String(Math.round(1000 * share));
-    if (playback && document.activeElement !== this.speed) this.speed.value = String(SPEEDS.reduce((a, b) => (Math.abs(b - playback.speed) < Math.abs(a - playback.speed) ? b : a)));
+    if (playback && document.activeElement !== this.speed) this.showSpeed(playback.speed);
     const at = (this.dragged ?? Math.min(1, Math.max(0, share))) * (range.last - range.first);
     this.output.textContent = this.said || `${at.toFixed(1)} of ${(range.last - range.first).toFixed(1)} s`;
   }

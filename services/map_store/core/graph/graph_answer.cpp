@@ -28,6 +28,13 @@ std::vector<AnchorId> nearestAnchors(const mapping::PoseGraph& graph,
   return ids;
 }
 
+/// All 0, which is not known, where variances are none, or say as good as nothing.
+Eigen::Vector4d sigmaOf(const Eigen::Vector4d& variances) {
+  constexpr double kNothing = 1e8;  // 10 km
+  const bool known = (variances.array() >= 0.0).all() && (variances.array() < kNothing).all();
+  return known ? variances.cwiseSqrt().eval() : Eigen::Vector4d::Zero().eval();
+}
+
 MapLoop loopOf(const mapping::PoseGraph& graph, std::uint64_t id, const mapping::Edge& edge) {
   MapLoop loop;
   loop.id = id;
@@ -36,7 +43,7 @@ MapLoop loopOf(const mapping::PoseGraph& graph, std::uint64_t id, const mapping:
   loop.kind = edge.kind == mapping::EdgeKind::kTracking ? MapLoopKind::kTie : MapLoopKind::kLoop;
   loop.residual =
       mapping::difference(edge.T_ab.mean, graph.pose(edge.a).inverse() * graph.pose(edge.b));
-  loop.sigma = edge.T_ab.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  loop.sigma = sigmaOf(edge.T_ab.covariance.diagonal());
   loop.chi2 = graph.chi2(edge);
   return loop;
 }
@@ -99,9 +106,11 @@ void putGraph(mapping::Mapper& mapper, const std::vector<mapping::LoopWithdrawal
   for (const AnchorId id : told) {
     const mapping::Anchor& anchor = mapper.anchors().at(id);
     const mapping::LevelPose& pose = mapper.graph().pose(id);
-    reply.anchors.push_back({id, anchor.previous, anchor.session, map, pose.p, pose.yaw,
-                             variances.at(id).cwiseMax(0.0).cwiseSqrt(),
-                             static_cast<std::uint32_t>(mapper.objectsOf(id))});
+    const auto known = variances.find(id);
+    reply.anchors.push_back(
+        {id, anchor.previous, anchor.session, map, pose.p, pose.yaw,
+         known == variances.end() ? Eigen::Vector4d::Zero().eval() : sigmaOf(known->second),
+         static_cast<std::uint32_t>(mapper.objectsOf(id))});
   }
   auto loops = loopsOf(mapper, withdrawn, components, first);
   reply.anchor_count = static_cast<std::uint32_t>(all.size());

@@ -213,5 +213,22 @@ TEST(Marginals, OfOneAnchorAlone) {
   EXPECT_FALSE(marginals.to(2));
 }
 
+/// Two sessions of which the loop was taken out: until the graph is optimised nothing holds the
+/// second one.
+TEST(Marginals, TellNothingWhereTheyCannotBeComputed) {
+  PoseGraph graph = chain(3);
+  graph.addFirst(10, {{50.0, 0.0, 0.0}, 0.0});
+  const EdgeId loop = graph.add(loopBetween(graph, 2, 10));
+  (void)graph.optimise();
+  EXPECT_EQ(Marginals(graph, 3).variances().size(), 4u);
+  graph.remove(loop);
+  const Marginals marginals(graph, 3);
+  const auto variances = marginals.variances();
+  ASSERT_EQ(variances.size(), 1u);
+  EXPECT_EQ(variances.at(1), Eigen::Vector4d::Zero()) << "it is held fast";
+  EXPECT_FALSE(marginals.to(1).has_value());
+  EXPECT_EQ(marginals.to(3)->covariance, Eigen::Matrix4d::Zero()) << "relative to itself";
+}
+
 }  // namespace
 }  // namespace perdure::mapping

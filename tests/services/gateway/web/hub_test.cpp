@@ -46,7 +46,7 @@ class HubTest : public ::testing::Test {
   HubTest() {
     hub_.offer({{1, "/newest", "json", "A", "jsonschema", "{}", Delivery::kNewest},
                 {2, "/each", "json", "A", "jsonschema", "{}", Delivery::kEach},
-                {3, "/latched", "json", "A", "jsonschema", "{}", Delivery::kLatched}},
+                {3, "/newest too", "json", "A", "jsonschema", "{}", Delivery::kNewest}},
                {{1, "/ask", "Ask", "{}", "{}"}});
   }
   void join(TestViewer& viewer) {
@@ -109,7 +109,7 @@ TEST_F(HubTest, KeepsABoundedQueueOfEventsAndTellsTheLoss) {
   EXPECT_THAT(viewer.read(), ElementsAre("6", "7", "8", "9"));
 }
 
-TEST_F(HubTest, GivesWhoComesLateWhatIsLatchedAndTheLastEvents) {
+TEST_F(HubTest, GivesWhoComesLateTheNewestAndTheLastEventsAndTheTime) {
   TestViewer first(4), late(4);
   join(first), join(late);
   say(first, subscribe(1, 2));
@@ -118,11 +118,25 @@ TEST_F(HubTest, GivesWhoComesLateWhatIsLatchedAndTheLastEvents) {
   for (int i = 0; i < 9; ++i) {
     for (const std::uint32_t channel : {1U, 2U, 3U})
       hub_.publish(message(channel, std::to_string(i)));
+    hub_.tellTime(fromNanoseconds(i));
   }
   say(late, subscribe(1, 2));
   say(late, subscribe(2, 3));
   say(late, subscribe(3, 1));
-  EXPECT_THAT(late.read(), ElementsAre("5", "6", "7", "8", "8"));
+  EXPECT_THAT(late.read(),
+              ElementsAre(protocol::time(fromNanoseconds(8)), "5", "6", "7", "8", "8", "8"));
+}
+
+TEST_F(HubTest, TellsNoTimeOfBeforeAnybodyLooked) {
+  TestViewer viewer(4);
+  join(viewer);
+  say(viewer, subscribe(1, 3));
+  hub_.tellTime(fromNanoseconds(5));
+  say(viewer, R"({"op":"unsubscribe","subscriptionIds":[1]})");
+  hub_.tellTime(fromNanoseconds(6));
+  (void)viewer.read();
+  say(viewer, subscribe(2, 3));
+  EXPECT_THAT(viewer.read(), ElementsAre());
 }
 
 TEST_F(HubTest, ForgetsWhatNobodyLooksAtAnyMore) {
