@@ -39,7 +39,7 @@ start_camera() {
 run_guest() { # LIMIT
   timeout "$1" qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m 1024 -nographic -no-reboot -nic none \
     -kernel "$cache/vmlinuz" -initrd "$cache/initrd" \
-    -append "root=/dev/vda rw console=ttyS0 quiet init=/sbin/guest-init mitigations=off systemd.show_status=no" \
+    -append "root=/dev/vda rw console=ttyS0 quiet init=/sbin/guest-init mitigations=off systemd.show_status=no systemd.mask=getty@tty1.service systemd.mask=serial-getty@ttyS0.service systemd.mask=e2scrub_reap.service" \
     -drive "file=$cache/root.img,format=raw,if=virtio,snapshot=on" -drive "file=$run/disk.img,format=raw,if=virtio,snapshot=on" \
     -virtfs "local,path=$run/share,mount_tag=share,security_model=none" \
     -chardev "socket,id=camera,path=$run/camera.socket,reconnect=1" -device qemu-xhci,id=usb -device usb-redir,chardev=camera,bus=usb.0 \

@@ -125,6 +125,8 @@ class Camera(RedirectedDevice):
             while self.asked and self.pending:
                 self.give(self.asked.pop(0), self.pending.pop(0))
             words = command(commands)
+            if words:
+                print(f'told {" ".join(words)}\nsent {Camera.sent}', flush=True)
             if words[:1] == ['unplug']:
                 self.stop()
                 return float(words[1])
@@ -142,7 +144,6 @@ def command(path):
         words = file.read().split()
     if len(words) == 2:  # else it is still being written
         os.unlink(path)
-        print('told', *words, flush=True)
         return words
     return []
 

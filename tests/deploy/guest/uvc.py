@@ -1,4 +1,4 @@
-"""Descriptors and controls of a USB Video Class 1.1 camera: YUYV over a bulk endpoint, exposure and gain."""
+"""Descriptors and controls of a USB Video Class 1.0 camera: YUYV over a bulk endpoint, exposure and gain."""
 import struct
 
 SIZES = [(320, 240), (160, 120)]
@@ -34,7 +34,7 @@ def control_interface():
     units = (descriptor(0x24, 2, CAMERA, word(0x201), 0, 0, word(0), word(0), word(0), 3, 0x0a, 0, 0) +
              descriptor(0x24, 5, PROCESSING, CAMERA, word(0), 2, word(0x201), 0) +
              descriptor(0x24, 3, OUT, word(0x101), 0, PROCESSING, 0))
-    return descriptor(0x24, 1, word(0x110), word(13 + len(units)), double_word(48_000_000), 1, 1) + units
+    return descriptor(0x24, 1, word(0x100), word(13 + len(units)), double_word(48_000_000), 1, 1) + units
 
 
 def streaming_interface():

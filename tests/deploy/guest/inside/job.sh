@@ -34,7 +34,7 @@ mark booted
   ls -l /dev/video* /dev/media* /dev/iio*
   id perdure
   echo "mount $(cat /sys/bus/iio/devices/iio:device0/in_mount_matrix)"
-  systemd-analyze time
+  systemd-analyze time; systemd-analyze blame | head -12
 } > /share/facts 2>&1
 
 # When the kernel sees a plug, gives an image, and asks for a sample; on CLOCK_MONOTONIC.
