@@ -2,7 +2,8 @@
 import struct
 
 SIZES = [(320, 240), (160, 120)]
-INTERVALS = [666666, 333333]  # of 100 ns; the first is the default
+INTERVALS = [333333, 666666]  # of 100 ns, the shortest first
+DEFAULT_INTERVAL = 666666
 PAYLOAD = 16384
 YUY2 = bytes.fromhex('5955593200001000800000aa00389b71')
 CAMERA, PROCESSING, OUT = 1, 2, 3
@@ -27,7 +28,7 @@ def frame_descriptor(index, width, height):
     size = width * height * 2
     rates = [size * 8 * 10_000_000 // interval for interval in (max(INTERVALS), min(INTERVALS))]
     return descriptor(0x24, 5, index, 0, word(width), word(height), *map(double_word, rates), double_word(size),
-                      double_word(INTERVALS[0]), len(INTERVALS), *map(double_word, INTERVALS))
+                      double_word(DEFAULT_INTERVAL), len(INTERVALS), *map(double_word, INTERVALS))
 
 
 def control_interface():
@@ -84,5 +85,5 @@ def stream_settings(frame, interval):
     """What the camera makes of a probe."""
     frame = frame if 1 <= frame <= len(SIZES) else 1
     width, height = SIZES[frame - 1]
-    best = min(INTERVALS, key=lambda have: abs(have - interval)) if interval else INTERVALS[0]
+    best = min(INTERVALS, key=lambda have: abs(have - interval)) if interval else DEFAULT_INTERVAL
     return struct.pack('<HBBIHHHHHII', 1, 1, frame, best, 0, 0, 0, 0, 0, width * height * 2, PAYLOAD)
