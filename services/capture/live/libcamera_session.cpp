@@ -337,7 +337,8 @@ std::int64_t Session::timeOf(Request& request, const libcamera::FrameMetadata& m
                                    : static_cast<std::int64_t>(metadata.timestamp) -
                                          1000 * std::int64_t{exposure_us} -
                                          static_cast<std::int64_t>(1e9 * settings_.readout_s);
-  const std::int64_t boot = cameraStampToBoot(begun, HostClock::monotonicNs(), HostClock::nowNs());
+  const std::int64_t now = HostClock::monotonicNs();
+  const std::int64_t boot = cameraStampToBoot(begun, now, now + HostClock::monotonicToBootNs());
   return middleOfExposure(boot, exposure_us, settings_.readout_s);
 }
 

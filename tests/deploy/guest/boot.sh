@@ -13,7 +13,7 @@ stage() {
   rm -rf "$tree/usr/local" "$tree/usr/share/perdure/models" "$tree/usr/share/perdure/config"
   ln -s /etc/perdure "$tree/usr/share/perdure/config"
   sed -i 's|/usr/local/var|/var|' "$tree"/etc/perdure/*.yaml
-  sed -i -e 's|^source: dataset|source: libcamera|' -e 's|^rig: ""|rig: /etc/perdure/rig.yaml|' -e 's|rate_hz: 20.0|rate_hz: 15|' \
+  sed -i -e 's|^source: dataset|source: libcamera|' -e 's|^rig: ""|rig: /etc/perdure/rig.yaml|' -e 's|rate_hz: 20.0|rate_hz: 10|' -e 's|rate_hz: 200.0|rate_hz: 125|' \
     -e 's|exposure_ms: 0 |exposure_ms: 10 |' -e 's|gain: 0 |gain: 2 |' -e 's|trigger: ""|trigger: timer|' "$tree/etc/perdure/capture.yaml"
   cp "$guest/inside/rig.yaml" "$tree/etc/perdure/"
   cp "$guest"/inside/*.sh "$PERDURE_BUILD/tests/guest_listener" "$tree/guest/"
@@ -23,7 +23,7 @@ stage() {
   cp "$guest/inside/guest-test.service" "$tree/etc/systemd/system/"
   ln -s ../guest-test.service "$tree/etc/systemd/system/multi-user.target.wants/"
   mkdir -p "$tree/etc/systemd/system/perdure-capture.service.d"
-  printf '[Service]\nLimitCORE=infinity\n' > "$tree/etc/systemd/system/perdure-capture.service.d/core.conf"
+  printf '[Service]\nLimitCORE=infinity\nTimeoutStopFailureMode=abort\nTimeoutAbortSec=60\n' > "$tree/etc/systemd/system/perdure-capture.service.d/core.conf"
 }
 
 # make_disk TREE IMAGE: of root's, whoever made it.
@@ -39,7 +39,7 @@ start_camera() {
 run_guest() { # LIMIT
   timeout "$1" qemu-system-x86_64 -accel tcg,thread=multi -cpu max -smp 2 -m 1024 -nographic -no-reboot -nic none \
     -kernel "$cache/vmlinuz" -initrd "$cache/initrd" \
-    -append "root=/dev/vda rw console=ttyS0 quiet init=/sbin/guest-init mitigations=off systemd.show_status=no systemd.mask=getty@tty1.service systemd.mask=serial-getty@ttyS0.service systemd.mask=e2scrub_reap.service" \
+    -append "root=/dev/vda rw console=ttyS0 quiet init=/sbin/guest-init mitigations=off systemd.show_status=no systemd.mask=getty@tty1.service systemd.mask=serial-getty@ttyS0.service systemd.mask=e2scrub_reap.service systemd.mask=getty-static.service systemd.mask=systemd-update-utmp-runlevel.service" \
     -drive "file=$cache/root.img,format=raw,if=virtio,snapshot=on" -drive "file=$run/disk.img,format=raw,if=virtio,snapshot=on" \
     -virtfs "local,path=$run/share,mount_tag=share,security_model=none" \
     -chardev "socket,id=camera,path=$run/camera.socket,reconnect=1" -device qemu-xhci,id=usb -device usb-redir,chardev=camera,bus=usb.0 \

@@ -69,9 +69,11 @@ def offsets_to(stamps, kernel):
 
 def stamps_are_the_kernels(run, report):
     frames, samples = run.between(run.frames, 'flow', 'flow_ends'), run.between(run.samples, 'flow', 'flow_ends')
-    walls = [real - mono for mono, _, real in run.clocks]
+    if len(frames) < 2 or len(samples) < 2:
+        return report.claim(False, 'there are no stamps')
+    walls = [ahead for _, ahead in run.clocks]
     wall = int(statistics.median(walls))
-    report.claim(max(walls) - min(walls) < 50 * MS, f'the wall clock of the guest stands still on its own within {ms(max(walls) - min(walls))}')
+    report.claim(max(walls) - min(walls) < MS, f'the guest\'s wall clock goes with its monotonic one, within {ms(max(walls) - min(walls))}')
     for name, things in (('images', frames), ('samples', samples)):
         steps = [b.stamp - a.stamp for a, b in zip(things, things[1:])]
         report.claim(min(steps) > 0, f'stamps of {name} grow, by {ms(min(steps))} to {ms(max(steps))}, mostly {ms(statistics.median(steps))}')
@@ -87,11 +89,13 @@ def stamps_are_the_kernels(run, report):
     report.claim(-MS < after[0] and share < 2 * MS, f'samples are stamped {ms(after[0])} after the trigger at the earliest, 95 of 100 by {ms(share)}')
     triggers = run.between(run.triggers, 'flow', 'flow_ends', at=lambda t: t)
     report.claim(len(triggers) >= len(samples) - 10, f'{len(samples)} samples of {len(triggers)} triggers')
-    report.claim(near(statistics.median(b.stamp - a.stamp for a, b in zip(samples, samples[1:])), 5 * MS, MS / 2),
+    report.claim(near(statistics.median(b.stamp - a.stamp for a, b in zip(samples, samples[1:])), 8 * MS, MS / 2),
                  'the trigger has the rate of imu.rate_hz')
 
 
 def samples_are_mounted(run, report):
+    if not run.samples:
+        return report.claim(False, 'there are no samples')
     last = run.samples[-1]
     g, unit = 9.80665 / 16384, 0.0010642
     gyro, accel = (20 * unit, 10 * unit, 0), (0, 512 * g, 16384 * g)

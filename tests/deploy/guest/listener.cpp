@@ -6,6 +6,8 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#include <limits>
+
 #include "common/bus/wait_loop.h"
 #include "common/service/signals.h"
 
@@ -18,6 +20,19 @@ std::int64_t read(clockid_t clock) {
   timespec t{};
   clock_gettime(clock, &t);
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+/// How far CLOCK_REALTIME is ahead, read where the least time went by in between.
+std::int64_t wallAhead() {
+  std::int64_t ahead = 0, least = std::numeric_limits<std::int64_t>::max();
+  for (int i = 0; i < 20; ++i) {
+    const std::int64_t before = read(CLOCK_MONOTONIC), wall = read(CLOCK_REALTIME);
+    const std::int64_t took = read(CLOCK_MONOTONIC) - before;
+    if (took >= least) continue;
+    least = took;
+    ahead = wall - before - took / 2;
+  }
+  return ahead;
 }
 
 /// The number that the camera drew: 32 squares in the first rows, the lowest bit first.
@@ -66,8 +81,7 @@ class Notes {
                h.message);
   }
   void clocks() {
-    out_.print("clocks {} {} {}\n", read(CLOCK_MONOTONIC), read(CLOCK_BOOTTIME),
-               read(CLOCK_REALTIME));
+    out_.print("clocks {} {}\n", read(CLOCK_MONOTONIC), wallAhead());
     out_.flush();
   }
 
