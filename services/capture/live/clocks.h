@@ -27,8 +27,8 @@ class HostClock {
   std::int64_t to_wall_ns_;
 };
 
-/// to − from, by the reading of both in which the least time went by: a thread may be interrupted for
-/// milliseconds between two clocks.
+/// to − from, by the reading of both in which the least time went by: a thread may be interrupted
+/// for milliseconds between two clocks.
 std::int64_t clockDifference(const std::function<std::int64_t()>& from,
                              const std::function<std::int64_t()>& to);
 

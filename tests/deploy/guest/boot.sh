@@ -13,7 +13,7 @@ stage() {
   rm -rf "$tree/usr/local" "$tree/usr/share/perdure/models" "$tree/usr/share/perdure/config"
   ln -s /etc/perdure "$tree/usr/share/perdure/config"
   sed -i 's|/usr/local/var|/var|' "$tree"/etc/perdure/*.yaml
-  sed -i -e 's|^source: dataset|source: libcamera|' -e 's|^rig: ""|rig: /etc/perdure/rig.yaml|' -e 's|rate_hz: 20.0|rate_hz: 10|' -e 's|rate_hz: 200.0|rate_hz: 125|' \
+  sed -i -e 's|^source: dataset|source: libcamera|' -e 's|^rig: ""|rig: /etc/perdure/rig.yaml|' -e 's|rate_hz: 20.0|rate_hz: 10|' -e 's|rate_hz: 200.0|rate_hz: 50|' \
     -e 's|exposure_ms: 0 |exposure_ms: 10 |' -e 's|gain: 0 |gain: 2 |' -e 's|trigger: ""|trigger: timer|' "$tree/etc/perdure/capture.yaml"
   cp "$guest/inside/rig.yaml" "$tree/etc/perdure/"
   cp "$guest"/inside/*.sh "$PERDURE_BUILD/tests/guest_listener" "$tree/guest/"

@@ -47,9 +47,9 @@ def flow_is_well(run, report):
     span = (run.marks['flow_ends'] - run.marks['flow']) / SECOND
     frames, samples = run.between(run.frames, 'flow', 'flow_ends'), run.between(run.samples, 'flow', 'flow_ends')
     report.claim(len(frames) > 5 * span, f'{len(frames)} images in {span:.1f} s of the guest, {len(frames) / span:.1f} a second')
-    report.claim(len(samples) > 50 * span,
+    report.claim(len(samples) > 25 * span,
                  f'{len(samples)} inertial samples, {len(samples) / span:.1f} a second')
-    for process in ('capture', 'vio'):
+    for process in ('capture',):
         of = run.health_of(process, 'flow', 'flow_ends')
         bad = [h.message for h in of if h.state != 1]
         more = {k: v - of[0].reasons.get(k, 0) for k, v in of[-1].reasons.items() if v > of[0].reasons.get(k, 0)} if of else {}
@@ -89,7 +89,7 @@ def stamps_are_the_kernels(run, report):
     report.claim(-MS < after[0] and share < 2 * MS, f'samples are stamped {ms(after[0])} after the trigger at the earliest, 95 of 100 by {ms(share)}')
     triggers = run.between(run.triggers, 'flow', 'flow_ends', at=lambda t: t)
     report.claim(len(triggers) >= len(samples) - 10, f'{len(samples)} samples of {len(triggers)} triggers')
-    report.claim(near(statistics.median(b.stamp - a.stamp for a, b in zip(samples, samples[1:])), 8 * MS, MS / 2),
+    report.claim(near(statistics.median(b.stamp - a.stamp for a, b in zip(samples, samples[1:])), 20 * MS, MS / 2),
                  'the trigger has the rate of imu.rate_hz')
 
 
@@ -106,7 +106,7 @@ def samples_are_mounted(run, report):
 def capture_lives(run, report, wanted):
     unplugged = [int(m[10:]) for m in run.marks if m.startswith('unplugged_')]
     report.claim(unplugged == [wanted] and 'end' in run.marks, f'{unplugged} of {wanted} unplugs')
-    report.claim(run.read('restarts').split() == ['0', '0'], f'capture and vio were not started again ({run.read("restarts").split()})')
+    report.claim(run.read('restarts').strip() == '0', f'capture was started again {run.read("restarts").strip()} times')
     report.claim(run.read('status').strip() == '0', f'capture ends with {run.read("status").strip()}')
     cores = sorted(p.name for p in (run.folder / 'share').glob('core.*'))
     report.claim(not cores and 'segfault' not in run.read('dmesg'), f'nothing crashed {cores}')
@@ -135,12 +135,12 @@ def images_come_back(run, report):
 
 
 def odometry_goes_on(run, report):
-    if not run.odometry or 'end' not in run.marks:
-        return report.claim(False, 'there is no odometry')
+    frames = run.between(run.frames, 'vio', 'vio_ends')
     usable = {o[0] for o in run.odometry if o[2] in (1, 2)}
-    frames = run.between(run.frames, 'flow', 'end')
-    share = sum(f.sequence in usable for f in frames) / len(frames)
-    report.claim(share > .5, f'{100 * share:.1f} of 100 images have odometry that may be used')
-    last = [f for f in frames if f.heard > run.marks['end'] - 9 * SECOND]
-    report.claim(last and sum(f.sequence in usable for f in last) > len(last) / 2,
-                 f'after the last plug {sum(f.sequence in usable for f in last)} of {len(last)}; epoch {run.odometry[-1][3]}')
+    starts = [frames[0]] + [b for a, b in zip(frames, frames[1:]) if b.heard - a.heard > SECOND] if frames else []
+    ends = [b.heard for b in starts[1:]] + [run.marks.get('vio_ends', 0)]
+    for begin, end in zip(starts, ends):
+        of = [f for f in frames if begin.heard <= f.heard < end]
+        good = [f for f in of if f.sequence in usable]
+        report.claim(good, f'{len(good)} of {len(of)} images since an opening have odometry that may be used')
+    report.claim(run.read('restarts_of_vio').strip() == '0', f'vio was started again {run.read("restarts_of_vio").strip()} times')

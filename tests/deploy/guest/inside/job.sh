@@ -1,5 +1,6 @@
 #!/bin/bash
-# What is done in the guest; the host judges what is left in /share. /share/options: SECONDS, UNPLUGS, SEED.
+# What is done in the guest; the host judges what is left in /share. /share/options: SECONDS_OF_FLOW, UNPLUGS,
+# UNPLUGS_WITH_VIO, SEED.
 set -u
 export PATH=/guest:/usr/sbin:/usr/bin LC_ALL=C.UTF-8
 modprobe -a 9p 9pnet_virtio
@@ -49,7 +50,7 @@ cd /
 
 guest_listener "$notes" /run/frame & listener=$!
 touch /run/told
-systemctl start perdure-vio perdure-capture
+systemctl start perdure-capture
 first=$(pid)
 until_frames 60 || mark no_frames
 sleep 10
@@ -87,20 +88,37 @@ for ((n = 1; n <= UNPLUGS; ++n)); do
   while [ -e /share/command ]; do sleep .1; done
   sleep .5                                      # what was on its way comes
   touch /run/told
+  [ $((n % 10)) -ne 0 ] || { mark "reached_$n"; keep; }
   case $((n % 8)) in
     6) sleep 1.$((RANDOM % 10)) ;;              # soon again: while it is opened, or before
     *) until_frames 40 || mark "no_frames_after_$n"; sleep "0.$((RANDOM % 10))" ;;
   esac
 done
 mark "unplugged_$((n - 1))"
-touch /run/told
-sleep 8
-tell silent 3
-sleep 2
+keep
+
+# Odometry goes on after the camera was opened again.
+if [ "$UNPLUGS_WITH_VIO" -gt 0 ]; then
+  systemctl start perdure-vio
+  sleep 20
+  mark vio
+  for ((n = 1; n <= UNPLUGS_WITH_VIO; ++n)); do
+    tell unplug 1.5
+    sleep 2
+    touch /run/told
+    until_frames 40
+    sleep 6
+  done
+  sleep 5
+  mark vio_ends
+  systemctl show -P NRestarts perdure-vio > /share/restarts_of_vio
+  systemctl stop perdure-vio
+fi
 mark end
-systemctl show -P NRestarts perdure-capture perdure-vio > /share/restarts
-systemctl stop perdure-capture perdure-vio
+systemctl show -P NRestarts perdure-capture > /share/restarts
+systemctl stop perdure-capture
 systemctl show -P ExecMainStatus perdure-capture > /share/status
+mark stopped
 kill "$listener"
 wait "$listener"
 keep
