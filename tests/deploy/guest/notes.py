@@ -3,6 +3,7 @@ import re
 
 MS = 1_000_000
 SECOND = 1000 * MS
+FOREVER = 1 << 62
 
 
 class Frame:
@@ -79,7 +80,7 @@ class Run:
         return [int(t) for t in re.findall(r'v4l2_dqbuf: .*?timestamp = (\d+)', self.read('trace'))]
 
     def between(self, things, start, end, at=lambda t: t.heard):
-        return [t for t in things if self.marks.get(start, 0) <= at(t) <= self.marks.get(end, 0)]
+        return [t for t in things if self.marks.get(start, 0) <= at(t) <= self.marks.get(end, FOREVER)]
 
     def health_of(self, process, start='booted', end='done'):
         return [h for h in self.between(self.health, start, end) if h.process == process]

@@ -10,7 +10,6 @@ mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144 share /share || powero
 notes=/run/notes
 mark() { echo "$1 $(cut -d' ' -f1 /proc/uptime)" | tee -a /share/marks; }
 tell() { echo "$@" > /share/command; }
-pid() { systemctl show -P MainPID perdure-capture; }
 keep() {
   cp -f /run/job.log "$notes" /share/ 2> /dev/null
   cp /sys/kernel/tracing/trace /share/trace
@@ -21,7 +20,7 @@ keep() {
 until_frames() {
   for ((i = 0; i < 10 * $1; ++i)); do
     [ ! /run/frame -nt /run/told ] || return 0
-    [ "$(pid)" = "$first" ] || return 1
+    [ -d "/proc/$first" ] || return 1
     sleep .1
   done
   return 1
@@ -51,7 +50,7 @@ cd /
 guest_listener "$notes" /run/frame & listener=$!
 touch /run/told
 systemctl start perdure-capture
-first=$(pid)
+first=$(systemctl show -P MainPID perdure-capture)
 until_frames 60 || mark no_frames
 sleep 10
 od -c /sys/bus/iio/devices/iio:device0/current_timestamp_clock > /share/clock
@@ -79,7 +78,7 @@ echo 0 > /sys/kernel/tracing/events/kprobes/triggered/enable
 RANDOM=$SEED
 sleep 3
 for ((n = 1; n <= UNPLUGS; ++n)); do
-  [ "$(pid)" = "$first" ] || break
+  [ -d "/proc/$first" ] || break
   case $((n % 8)) in
     3) tell silent 2; sleep 1.5 ;;              # capture has begun to open it again
     5) tell silent 2; sleep 1.$((RANDOM % 10)) ;;
