@@ -129,7 +129,7 @@ class Session final : public CameraSession, public libcamera::Object {
   std::deque<Request*> in_hand_;  ///< taken out of done_, in the driver's order
   SequenceWatch watch_;
   std::atomic<bool> gone_{false}, refused_{false};
-  bool acquired_ = false, ending_ = false;
+  bool acquired_ = false, running_ = false, ending_ = false;
   int tries_to_end_ = 0;
   libcamera::Thread* home_ = nullptr;
   const Request* asking_ = nullptr;  ///< the one that carries the controls, until it is back
@@ -147,17 +147,19 @@ Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<Cameras> ca
 
 Session::~Session() {
   if (!camera_) return;
+  const bool vanished = openVideoNodeVanished();
   while (!invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking)) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  if (gone_) cameras_->renew();
+  if (gone_ || vanished) cameras_->renew();
 }
 
 /// False where the kernel has removed the camera and libcamera does not know that yet: stopping it
 /// would end the process, over requests that are not given back. udev tells it sooner or later.
 bool Session::end() {
   constexpr int kMostTries = 600;
-  if (!gone_ && ++tries_to_end_ < kMostTries && openVideoNodeVanished()) return false;
+  const bool told = gone_ || !running_;  // who was gone before it ran is not told here
+  if (!told && ++tries_to_end_ < kMostTries && openVideoNodeVanished()) return false;
   ending_ = true;
   camera_->stop();
   camera_->requestCompleted.disconnect(this);
@@ -268,6 +270,7 @@ bool Session::begin() {
   camera_->requestCompleted.connect(this, &Session::completed);
   camera_->disconnected.connect(this, &Session::disconnected);
   if (requests_.empty() || camera_->start(&asked_.list) != 0) return false;
+  running_ = true;
   asking_ = requests_.front().get();
   requests_.front()->controls().merge(asked_.list);
   return std::all_of(requests_.begin(), requests_.end(), [&](const auto& request) {
