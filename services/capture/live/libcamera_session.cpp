@@ -45,8 +45,8 @@ class Cameras {
   explicit Cameras(std::function<void(const std::string&)> log) : log_(std::move(log)) {}
 
   Result<CameraManager*> manager();
-  /// A camera was unplugged: the next manager is another one. libcamera 0.0.3 looks for cameras
-  /// twice as often at each device that is plugged in, 2^n times at the nth.
+  /// A camera was unplugged, or there is none: the next manager is another one. libcamera 0.0.3
+  /// looks for cameras twice as often at each device that is plugged in, 2^n times at the nth.
   void renew() { stale_ = true; }
 
  private:
@@ -180,6 +180,8 @@ Result<void> Session::choose() {
     if (!camera_ && camera->id().find(settings_.id) != std::string::npos) camera_ = camera;
   }
   if (!camera_) {
+    // One that came before udev had let this user have its nodes is left out by libcamera for good.
+    cameras_->renew();
     return fail("camera_absent",
                 fmt::format("libcamera sees no camera{} (there are: {}); is it plugged in, and may "
                             "this user read /dev/video* and /dev/media*?",

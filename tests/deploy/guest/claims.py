@@ -116,12 +116,14 @@ def capture_lives(run, report, wanted):
 
 def images_come_back(run, report):
     took, at = [], 0
+    wall = int(statistics.median(ahead for _, ahead in run.clocks))
     heard = [f.heard for f in run.frames]
+    taken = [f.stamp - wall for f in run.frames]  # what is heard late was not taken late
     for plug in run.plugs:
         if plug < run.marks.get('all_counted', 0):
             continue
         next_unplug = min((u for u in run.unplugs if u > plug), default=None)
-        while at < len(heard) and heard[at] < plug:
+        while at < len(heard) and taken[at] < plug:
             at += 1
         if at < len(heard) and (next_unplug is None or heard[at] < next_unplug):
             took.append(heard[at] - plug)
