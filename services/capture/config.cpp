@@ -42,6 +42,13 @@ void describeLive(Config& c, config::Fields& fields) {
                 {"live: of an image; 0: automatic", "ms"});
   fields.number("camera.gain", c.camera.gain, config::between(0, 100),
                 {"live: analogue gain; 0: automatic"});
+  fields.choice("camera.focus", c.camera.focus, {"as_is", "auto", "manual"},
+                {"live: as_is: the camera's own; auto: it follows the scene, and the lens of the "
+                 "rig changes with it; manual: at camera.lens_dioptres. A camera that has not got "
+                 "it is refused"});
+  fields.number(
+      "camera.lens_dioptres", c.camera.lens_dioptres, config::between(0, 50),
+      {"live: place of the lens where camera.focus is manual, 1 / distance; 0: far away", "1/m"});
   fields.choice("camera.flip", c.camera.flip, {"none", "horizontal", "vertical", "both"},
                 {"live: images are mirrored by the camera, where it can; the rig is of the images "
                  "as they come"});

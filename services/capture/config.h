@@ -44,7 +44,9 @@ struct CameraConfig {
   std::string id, format = "auto";
   double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
   std::string flip = "none";
-  std::vector<double> crop;  ///< empty, or 4: x, y, width, height on the sensor
+  std::string focus = "as_is";
+  double lens_dioptres = 0.0;  ///< of camera.focus: manual
+  std::vector<double> crop;    ///< empty, or 4: x, y, width, height on the sensor
 };
 
 struct ImuConfig {

@@ -29,6 +29,7 @@ void addControls(const libcamera::ControlInfoMap& offered, SeenCamera& camera) {
       {has(controls::FrameDurationLimits), "camera.rate_hz"},
       {has(controls::ExposureTime), "camera.exposure_ms"},
       {has(controls::AnalogueGain), "camera.gain"},
+      {has(controls::AfMode), "camera.focus"},
       {has(controls::ScalerCrop), "camera.crop"}};
   for (const auto& [there, key] : keys) {
     if (there) camera.settable.emplace_back(key);

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The systemd units are sound: systemd-analyze verify, with programs that exist here; and closed:
-# systemd-analyze security, 2.5 at most.
+# systemd-analyze security, 2.5 at most. What a unit says is not said otherwise by the drop-in for all,
+# which is read after it.
 set -euo pipefail
 command -v systemd-analyze > /dev/null || { echo "no systemd-analyze here: skipped"; exit 77; }
 folder=$(mktemp -d)
@@ -22,3 +23,13 @@ for unit in "$folder"/*.service; do
     exit 1
   fi
 done
+
+# keys FILE: what it sets, but lists, which grow.
+keys() { sed -n 's/^\([A-Z][A-Za-z]*\)=.*/\1/p' "$1" | grep -vE '^(Documentation|After|RestrictAddressFamilies)$' | sort -u; }
+common=$folder/perdure-.service.d/common.conf
+for unit in "$folder"/perdure-*.service; do
+  twice=$(comm -12 <(keys "$unit") <(keys "$common"))
+  [ -z "$twice" ] || { echo "$(basename "$unit") sets $twice in vain: common.conf, read after it, sets it too"; exit 1; }
+done
+grep -q '^ProtectKernelTunables=false' "$folder"/perdure-capture.service.d/*.conf ||
+  { echo "capture may not write /sys, where IIO has its rates, triggers and buffers"; exit 1; }

@@ -20,6 +20,8 @@ struct CameraSettings {
   std::string format = "auto";          ///< libcamera's name, as "YUYV"; auto: the best it has
   double rate_hz = 20.0;
   double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
+  std::string focus = "as_is";           ///< as_is, auto, manual: at lens_dioptres
+  double lens_dioptres = 0.0;            ///< 1/m; 0: far away
   std::string flip = "none";             ///< none, horizontal, vertical, both
   std::vector<double> crop = {};         ///< x, y, width, height, pixels of the sensor; empty: all
   double readout_s = 0.0;                ///< first to last row

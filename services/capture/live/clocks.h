@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 
 #include "common/base/time.h"
@@ -25,6 +26,11 @@ class HostClock {
  private:
   std::int64_t to_wall_ns_;
 };
+
+/// to − from, by the reading of both in which the least time went by: a thread may be interrupted
+/// for milliseconds between two clocks.
+std::int64_t clockDifference(const std::function<std::int64_t()>& from,
+                             const std::function<std::int64_t()>& to);
 
 /// Middle of the middle row's exposure. `start_ns`: when that of the first row began.
 std::int64_t middleOfExposure(std::int64_t start_ns, std::int64_t exposure_us, double readout_s);

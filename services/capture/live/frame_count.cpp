@@ -16,6 +16,14 @@ std::uint64_t FrameNumbers::of(std::uint32_t sequence) {
   return next_++;
 }
 
+bool isEarlier(std::uint32_t a, std::uint32_t b) {
+  return b - a - 1 < std::numeric_limits<std::uint32_t>::max() / 2;
+}
+
+bool SequenceWatch::skips(std::uint32_t sequence) const {
+  return last_ ? sequence != *last_ + 1 : sequence != 0;
+}
+
 void RateWatch::reopened() {
   since_ns_.reset();
   known_ = false;

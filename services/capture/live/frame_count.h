@@ -22,6 +22,19 @@ class FrameNumbers {
   std::uint64_t next_ = 0, lost_ = 0;
 };
 
+/// Of numbers in 32 bits that go round.
+bool isEarlier(std::uint32_t a, std::uint32_t b);
+
+/// Whether images of one opening seem to be missing before the one that has come.
+class SequenceWatch {
+ public:
+  bool skips(std::uint32_t sequence) const;
+  void seen(std::uint32_t sequence) { last_ = sequence; }
+
+ private:
+  std::optional<std::uint32_t> last_;
+};
+
 /// Whether a camera gives the rate that it is asked for: over five seconds, once after each
 /// opening.
 class RateWatch {

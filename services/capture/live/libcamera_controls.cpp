@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <libcamera/control_ids.h>
+#include <libcamera/formats.h>
 
 #include <array>
 #include <cmath>
@@ -10,6 +11,23 @@ namespace perdure::capture {
 namespace {
 
 namespace controls = libcamera::controls;
+namespace formats = libcamera::formats;
+
+/// The best first: the least to convert, and all the colour there is. libcamera names the bytes of
+/// a pixel from the last one in memory on.
+const std::array<KnownFormat, 11> kFormats = {{
+    {formats::RGB888, PixelLayout::kBgr},
+    {formats::BGR888, PixelLayout::kRgb},
+    {formats::XRGB8888, PixelLayout::kBgrx},
+    {formats::XBGR8888, PixelLayout::kRgbx},
+    {formats::NV12, PixelLayout::kNv12},
+    {formats::NV21, PixelLayout::kNv21},
+    {formats::YUV420, PixelLayout::kYuv420},
+    {formats::YUYV, PixelLayout::kYuyv},
+    {formats::UYVY, PixelLayout::kUyvy},
+    {formats::MJPEG, PixelLayout::kJpeg},
+    {formats::R8, PixelLayout::kGrey},
+}};
 
 class Asking {
  public:
@@ -29,15 +47,40 @@ class Asking {
     if (!missing_.empty()) {
       missing_ = fmt::format("The camera offers no {}, and keeps its own.", missing_);
     }
-    return {std::move(list_), std::move(missing_)};
+    return {std::move(list_), std::move(missing_), std::move(refused_)};
   }
   libcamera::ControlList& list() { return list_; }
+  const libcamera::ControlInfo& limits(const libcamera::ControlId& control) const {
+    return offered_.at(control.id());
+  }
+  void refuse(std::string why) { refused_ = std::move(why); }
 
  private:
   const libcamera::ControlInfoMap& offered_;
   libcamera::ControlList list_{controls::controls};
-  std::string missing_;
+  std::string missing_, refused_;
 };
+
+/// Without it the images would be of another lens than the rig's, and nobody would see why.
+void askFocus(const CameraSettings& settings, Asking& asking) {
+  const bool manual = settings.focus == "manual";
+  if (settings.focus == "as_is") return;
+  if (!asking.offers(controls::AfMode) || (manual && !asking.offers(controls::LensPosition))) {
+    return asking.refuse("has no focus to set; set camera.focus to as_is.");
+  }
+  const auto mode = manual ? controls::AfModeManual : controls::AfModeContinuous;
+  asking.list().set(controls::AfMode, static_cast<std::int32_t>(mode));
+  if (!manual) return;
+  const auto& limits = asking.limits(controls::LensPosition);
+  const float least = limits.min().get<float>(), most = limits.max().get<float>();
+  const auto place = static_cast<float>(settings.lens_dioptres);
+  if (place < least || place > most) {
+    return asking.refuse(
+        fmt::format("focuses from {:g} to {:g} dioptres; set camera.lens_dioptres to one of these.",
+                    least, most));
+  }
+  asking.list().set(controls::LensPosition, place);
+}
 
 }  // namespace
 
@@ -65,7 +108,16 @@ AskedControls controlsFor(const CameraSettings& settings,
                                     static_cast<unsigned>(c[2]), static_cast<unsigned>(c[3])),
                "camera.crop");
   }
+  askFocus(settings, asking);
   return std::move(asking).asked();
+}
+
+std::span<const KnownFormat> knownFormats() { return kFormats; }
+
+libcamera::Transform transformOf(const std::string& flip) {
+  if (flip == "horizontal") return libcamera::Transform::HFlip;
+  if (flip == "vertical") return libcamera::Transform::VFlip;
+  return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
 }
 
 }  // namespace perdure::capture

@@ -2,19 +2,32 @@
 #pragma once
 
 #include <libcamera/controls.h>
+#include <libcamera/pixel_format.h>
+#include <libcamera/transform.h>
 
+#include <span>
 #include <string>
+#include <utility>
 
 #include "services/capture/live/camera_session.h"
+#include "services/capture/live/pixels.h"
 
 namespace perdure::capture {
 
 struct AskedControls {
   libcamera::ControlList list;
   std::string missing;  ///< a sentence of what is configured and not offered; empty where all is
+  std::string refused;  ///< why it is not to be used at all, with the mend; empty where it may be
 };
 
 /// The rate is asked for where there is a control of it; what comes of it is seen in the frames.
 AskedControls controlsFor(const CameraSettings& settings, const libcamera::ControlInfoMap& offered);
+
+using KnownFormat = std::pair<libcamera::PixelFormat, PixelLayout>;
+/// The best first.
+std::span<const KnownFormat> knownFormats();
+
+/// Of `camera.flip`.
+libcamera::Transform transformOf(const std::string& flip);
 
 }  // namespace perdure::capture

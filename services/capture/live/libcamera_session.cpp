@@ -2,18 +2,25 @@
 
 #include <fmt/format.h>
 #include <libcamera/libcamera.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <map>
+#include <thread>
 #include <utility>
 
 #include "common/base/bounded_queue.h"
 #include "common/vision/jpeg.h"
 #include "services/capture/live/camera_memory.h"
 #include "services/capture/live/clocks.h"
+#include "services/capture/live/frame_count.h"
 #include "services/capture/live/libcamera_controls.h"
 #include "services/capture/live/libcamera_log.h"
 #include "services/capture/live/pixels.h"
@@ -23,33 +30,13 @@ namespace {
 
 using libcamera::CameraManager;
 using libcamera::FrameBuffer;
-using libcamera::PixelFormat;
 using libcamera::Request;
-namespace formats = libcamera::formats;
 namespace controls = libcamera::controls;
 
 constexpr std::size_t kBuffers = 4;
 
-/// The best first: the least to convert, and all the colour there is. libcamera names the bytes of
-/// a pixel from the last one in memory on.
-const std::array<std::pair<PixelFormat, PixelLayout>, 11> kFormats = {{
-    {formats::RGB888, PixelLayout::kBgr},
-    {formats::BGR888, PixelLayout::kRgb},
-    {formats::XRGB8888, PixelLayout::kBgrx},
-    {formats::XBGR8888, PixelLayout::kRgbx},
-    {formats::NV12, PixelLayout::kNv12},
-    {formats::NV21, PixelLayout::kNv21},
-    {formats::YUV420, PixelLayout::kYuv420},
-    {formats::YUYV, PixelLayout::kYuyv},
-    {formats::UYVY, PixelLayout::kUyvy},
-    {formats::MJPEG, PixelLayout::kJpeg},
-    {formats::R8, PixelLayout::kGrey},
-}};
-
-libcamera::Transform transformOf(const std::string& flip) {
-  if (flip == "horizontal") return libcamera::Transform::HFlip;
-  if (flip == "vertical") return libcamera::Transform::VFlip;
-  return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
+std::uint32_t sequenceOf(const Request& request) {
+  return request.buffers().begin()->second->metadata().sequence;
 }
 
 /// libcamera's manager: one at a time in a process. Used by one thread.
@@ -58,8 +45,8 @@ class Cameras {
   explicit Cameras(std::function<void(const std::string&)> log) : log_(std::move(log)) {}
 
   Result<CameraManager*> manager();
-  /// A camera was unplugged: the next manager is another one. libcamera 0.0.3 looks for cameras
-  /// twice as often at each device that is plugged in, 2^n times at the nth.
+  /// A camera was unplugged, or there is none: the next manager is another one. libcamera 0.0.3
+  /// looks for cameras twice as often at each device that is plugged in, 2^n times at the nth.
   void renew() { stale_ = true; }
 
  private:
@@ -110,12 +97,13 @@ class Session final : public CameraSession, public libcamera::Object {
 
   const libcamera::StreamConfiguration& stream() const { return configuration_->at(0); }
 
-  void waitToBeTold();
   Result<void> choose();
   Result<void> configure();
   void chooseFormat(libcamera::StreamConfiguration& wanted) const;
   Result<void> allocate();
   Result<void> start();
+  Request* nextRequest(std::chrono::milliseconds longest);
+  void takeTheRest();
   CameraShot shotOf(Request& request);
   Result<Frame> frameOf(const FrameBuffer& buffer);
   std::int64_t timeOf(Request& request, const libcamera::FrameMetadata& metadata) const;
@@ -123,9 +111,10 @@ class Session final : public CameraSession, public libcamera::Object {
   // On libcamera's thread:
   bool begin();
   void queue(Request* request);
+  void settle() {}
   void completed(Request* request);
   void disconnected();
-  void end();
+  bool end();
 
   const std::shared_ptr<Cameras> cameras_;
   const CameraSettings settings_;
@@ -137,8 +126,11 @@ class Session final : public CameraSession, public libcamera::Object {
   std::vector<std::unique_ptr<Request>> requests_;
   std::map<const FrameBuffer*, MappedBuffer> memory_;
   BoundedQueue<Request*> done_{2 * kBuffers, Overflow::kDropOldest};  // never full: kBuffers exist
+  std::deque<Request*> in_hand_;  ///< taken out of done_, in the driver's order
+  SequenceWatch watch_;
   std::atomic<bool> gone_{false}, refused_{false};
-  bool acquired_ = false, ending_ = false;
+  bool acquired_ = false, running_ = false, ending_ = false;
+  int tries_to_end_ = 0;
   libcamera::Thread* home_ = nullptr;
   const Request* asking_ = nullptr;  ///< the one that carries the controls, until it is back
 };
@@ -155,19 +147,19 @@ Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<Cameras> ca
 
 Session::~Session() {
   if (!camera_) return;
-  waitToBeTold();
-  if (gone_) cameras_->renew();
-  invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking);
+  const bool vanished = openVideoNodeVanished();
+  while (!invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  if (gone_ || vanished) cameras_->renew();
 }
 
-/// Where the kernel has removed the camera and libcamera does not know that yet, stopping it ends
-/// the process: over requests that the kernel does not give back. udev tells it within a second.
-void Session::waitToBeTold() {
-  constexpr std::chrono::milliseconds kStep{50};
-  for (int i = 0; i < 20 && !gone_ && openVideoNodeVanished(); ++i) (void)done_.popWithin(kStep);
-}
-
-void Session::end() {
+/// False where the kernel has removed the camera and libcamera does not know that yet: stopping it
+/// would end the process, over requests that are not given back. udev tells it sooner or later.
+bool Session::end() {
+  constexpr int kMostTries = 600;
+  const bool told = gone_ || !running_;  // who was gone before it ran is not told here
+  if (!told && ++tries_to_end_ < kMostTries && openVideoNodeVanished()) return false;
   ending_ = true;
   camera_->stop();
   camera_->requestCompleted.disconnect(this);
@@ -176,6 +168,7 @@ void Session::end() {
   allocator_.reset();
   if (acquired_) camera_->release();
   moveToThread(home_);
+  return true;
 }
 
 Result<void> Session::choose() {
@@ -187,6 +180,8 @@ Result<void> Session::choose() {
     if (!camera_ && camera->id().find(settings_.id) != std::string::npos) camera_ = camera;
   }
   if (!camera_) {
+    // One that came before udev had let this user have its nodes is left out by libcamera for good.
+    cameras_->renew();
     return fail("camera_absent",
                 fmt::format("libcamera sees no camera{} (there are: {}); is it plugged in, and may "
                             "this user read /dev/video* and /dev/media*?",
@@ -203,7 +198,7 @@ Result<void> Session::choose() {
 
 void Session::chooseFormat(libcamera::StreamConfiguration& wanted) const {
   const auto offered = wanted.formats().pixelformats();
-  for (const auto& [format, layout] : kFormats) {
+  for (const auto& [format, layout] : knownFormats()) {
     const bool named = settings_.format == "auto" || settings_.format == format.toString();
     if (!named || std::find(offered.begin(), offered.end(), format) == offered.end()) continue;
     wanted.pixelFormat = format;
@@ -223,11 +218,12 @@ Result<void> Session::configure() {
   const libcamera::Transform turned = transformOf(settings_.flip);
   configuration_->transform = turned;
   const bool valid = configuration_->validate() != libcamera::CameraConfiguration::Invalid;
-  const auto known = std::find_if(kFormats.begin(), kFormats.end(), [&](const auto& entry) {
+  const auto formats = knownFormats();
+  const auto known = std::find_if(formats.begin(), formats.end(), [&](const auto& entry) {
     return entry.first == wanted.pixelFormat;
   });
   const bool sized = wanted.size.width == settings_.width && wanted.size.height == settings_.height;
-  if (!valid || known == kFormats.end() || !sized || camera_->configure(configuration_.get()) < 0) {
+  if (!valid || known == formats.end() || !sized || camera_->configure(configuration_.get()) < 0) {
     return fail(
         "camera_absent",
         fmt::format("the camera {} gives {} of {}x{} where {} of {}x{} is wanted; set "
@@ -264,6 +260,9 @@ Result<void> Session::allocate() {
 
 Result<void> Session::start() {
   asked_ = controlsFor(settings_, camera_->controls());
+  if (!asked_.refused.empty()) {
+    return fail("camera_absent", fmt::format("the camera {} {}", camera_->id(), asked_.refused));
+  }
   if (invokeMethod(&Session::begin, libcamera::ConnectionTypeBlocking)) return {};
   return fail("camera_absent", fmt::format("the camera {} does not start.", camera_->id()));
 }
@@ -273,6 +272,7 @@ bool Session::begin() {
   camera_->requestCompleted.connect(this, &Session::completed);
   camera_->disconnected.connect(this, &Session::disconnected);
   if (requests_.empty() || camera_->start(&asked_.list) != 0) return false;
+  running_ = true;
   asking_ = requests_.front().get();
   requests_.front()->controls().merge(asked_.list);
   return std::all_of(requests_.begin(), requests_.end(), [&](const auto& request) {
@@ -304,11 +304,35 @@ void Session::disconnected() {
 }
 
 std::optional<CameraShot> Session::next(std::chrono::milliseconds longest) {
-  const auto request = done_.popWithin(longest);
+  Request* request = nextRequest(longest);
   if (!request) return std::nullopt;
-  CameraShot shot = shotOf(**request);
-  invokeMethod(&Session::queue, libcamera::ConnectionTypeQueued, *request);
+  CameraShot shot = shotOf(*request);
+  watch_.seen(shot.sequence);
+  invokeMethod(&Session::queue, libcamera::ConnectionTypeQueued, request);
   return shot;
+}
+
+Request* Session::nextRequest(std::chrono::milliseconds longest) {
+  if (in_hand_.empty()) {
+    const auto request = done_.popWithin(longest);
+    if (!request) return nullptr;
+    in_hand_ = {*request};
+    if (watch_.skips(sequenceOf(**request))) takeTheRest();
+  }
+  Request* first = in_hand_.front();
+  in_hand_.pop_front();
+  return first;
+}
+
+/// libcamera completes requests in the order in which they were queued. The driver of UVC uses the
+/// buffer of a broken image again, behind the others: their images are held back until that one has
+/// its own, which is the newest and comes first. All of them come in one go on libcamera's thread.
+void Session::takeTheRest() {
+  invokeMethod(&Session::settle, libcamera::ConnectionTypeBlocking);
+  while (const auto more = done_.tryPop()) in_hand_.push_back(*more);
+  std::sort(in_hand_.begin(), in_hand_.end(), [](const Request* a, const Request* b) {
+    return isEarlier(sequenceOf(*a), sequenceOf(*b));
+  });
 }
 
 CameraShot Session::shotOf(Request& request) {
@@ -337,7 +361,8 @@ std::int64_t Session::timeOf(Request& request, const libcamera::FrameMetadata& m
                                    : static_cast<std::int64_t>(metadata.timestamp) -
                                          1000 * std::int64_t{exposure_us} -
                                          static_cast<std::int64_t>(1e9 * settings_.readout_s);
-  const std::int64_t boot = cameraStampToBoot(begun, HostClock::monotonicNs(), HostClock::nowNs());
+  const std::int64_t now = HostClock::monotonicNs();
+  const std::int64_t boot = cameraStampToBoot(begun, now, now + HostClock::monotonicToBootNs());
   return middleOfExposure(boot, exposure_us, settings_.readout_s);
 }
 
@@ -353,7 +378,11 @@ bool openVideoNodeVanished(const std::filesystem::path& descriptors) {
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator(descriptors, none)) {
     const std::string target = std::filesystem::read_symlink(entry.path(), none).string();
-    if (target.starts_with("/dev/video") && target.ends_with(" (deleted)")) return true;
+    if (!target.starts_with("/dev/video")) continue;
+    v4l2_capability unused{};
+    const int node = std::atoi(entry.path().filename().c_str());
+    if (target.ends_with(" (deleted)")) return true;
+    if (ioctl(node, VIDIOC_QUERYCAP, &unused) != 0 && errno == ENODEV) return true;
   }
   return false;
 }

@@ -30,6 +30,8 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
   settings.rate_hz = config.camera.rate_hz;
   settings.exposure_ms = config.camera.exposure_ms;
   settings.gain = config.camera.gain;
+  settings.focus = config.camera.focus;
+  settings.lens_dioptres = config.camera.lens_dioptres;
   settings.flip = config.camera.flip;
   settings.crop = config.camera.crop;
   settings.readout_s = camera.readout_s;

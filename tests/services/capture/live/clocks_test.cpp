@@ -21,6 +21,22 @@ TEST(HostClock, GoesAsTheSystemsClocksDo) {
   EXPECT_GE(HostClock::monotonicToBootNs(), -kMs);
 }
 
+TEST(ClockDifference, IsNotThatOfAThreadInterruptedBetweenTheClocks) {
+  std::int64_t time = 0;
+  int readings = 0;
+  const auto ours = [&] { return time += ++readings < 8 ? 3 * kMs : 300; };
+  const auto theirs = [&] { return kSecond + (time += 300); };
+  EXPECT_NEAR(static_cast<double>(clockDifference(ours, theirs)), 1e9, 300.0);
+}
+
+TEST(ClockDifference, TakesTheBestWhereNoneIsGood) {
+  std::int64_t time = 0;
+  int readings = 0;
+  const auto ours = [&] { return time += ++readings == 4 ? 20'000 : 3 * kMs; };
+  const auto theirs = [&] { return kSecond + time; };
+  EXPECT_NEAR(static_cast<double>(clockDifference(ours, theirs)), 1e9, 20'000.0);
+}
+
 TEST(CameraStamp, IsOnBootTimeWhicheverOfTheClocksTheDriverStampsBy) {
   const std::int64_t monotonic = 5000 * kSecond, boot = monotonic + 1000 * kSecond;
   EXPECT_EQ(cameraStampToBoot(monotonic - 40 * kMs, monotonic, boot), boot - 40 * kMs);

@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "tests/services/capture/live/times.h"
 
 namespace perdure::capture {
@@ -44,6 +47,24 @@ void run(RateWatch& watch, double hz, double seconds) {
   for (int i = 0; i <= static_cast<int>(seconds * hz); ++i) {
     watch.frame(static_cast<std::uint64_t>(i), static_cast<std::int64_t>(kSecond / hz * i));
   }
+}
+
+TEST(SequenceWatch, SeesThatImagesAreMissingBeforeOne) {
+  SequenceWatch watch;
+  EXPECT_FALSE(watch.skips(0));
+  EXPECT_TRUE(watch.skips(3)) << "the first ones of an opening";
+  watch.seen(827);
+  EXPECT_FALSE(watch.skips(828));
+  EXPECT_TRUE(watch.skips(836));
+  watch.seen(0xffffffff);
+  EXPECT_FALSE(watch.skips(0));
+}
+
+TEST(SequenceWatch, OrdersNumbersThatGoRound) {
+  std::vector<std::uint32_t> held = {2, 0xfffffffe, 1, 0xffffffff, 0};
+  std::sort(held.begin(), held.end(), isEarlier);
+  EXPECT_EQ(held, (std::vector<std::uint32_t>{0xfffffffe, 0xffffffff, 0, 1, 2}));
+  EXPECT_FALSE(isEarlier(7, 7));
 }
 
 TEST(RateWatch, SaysWhatTheCameraGivesWhereThatIsNotWhatIsAsked) {

@@ -67,6 +67,41 @@ TEST(LibcameraControls, AskForTheRateWhereThereIsAControlOfIt) {
               ElementsAre(40'000, 40'000));
 }
 
+libcamera::ControlInfoMap withFocus() {
+  return {{{&controls::AfMode, libcamera::ControlInfo(controls::AfModeValues)},
+           {&controls::LensPosition, libcamera::ControlInfo(0.0F, 10.0F, 1.0F)}},
+          controls::controls};
+}
+
+CameraSettings focused(const std::string& focus, double dioptres = 0.0) {
+  CameraSettings settings;
+  settings.focus = focus;
+  settings.lens_dioptres = dioptres;
+  return settings;
+}
+
+TEST(LibcameraControls, FocusIsAskedForAsConfigured) {
+  const auto offered = withFocus();
+  EXPECT_TRUE(controlsFor({}, offered).list.empty()) << "as it is";
+  const auto automatic = controlsFor(focused("auto"), offered);
+  EXPECT_EQ(automatic.list.get(controls::AfMode), controls::AfModeContinuous);
+  EXPECT_FALSE(automatic.list.contains(controls::LENS_POSITION));
+  const auto fixed = controlsFor(focused("manual", 2.5), offered);
+  EXPECT_EQ(fixed.list.get(controls::AfMode), controls::AfModeManual);
+  EXPECT_EQ(fixed.list.get(controls::LensPosition), 2.5F);
+  EXPECT_EQ(fixed.refused, "");
+}
+
+TEST(LibcameraControls, ACameraThatCannotFocusAsConfiguredIsRefused) {
+  const auto fixed = webcam();
+  EXPECT_EQ(controlsFor({}, fixed).refused, "");
+  for (const char* focus : {"auto", "manual"}) {
+    EXPECT_THAT(controlsFor(focused(focus), fixed).refused, HasSubstr("set camera.focus to as_is"));
+  }
+  EXPECT_THAT(controlsFor(focused("manual", 12.0), withFocus()).refused,
+              HasSubstr("from 0 to 10 dioptres; set camera.lens_dioptres"));
+}
+
 TEST(LibcameraControls, ARegionOfInterestIsAskedForOrMissed) {
   const libcamera::ControlId& id = controls::ScalerCrop;
   const libcamera::ControlInfoMap offered(

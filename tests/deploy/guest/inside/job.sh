@@ -1,0 +1,126 @@
+#!/bin/bash
+# What is done in the guest; the host judges what is left in /share. /share/options: SECONDS_OF_FLOW, UNPLUGS,
+# UNPLUGS_WITH_VIO, SEED.
+set -u
+export PATH=/guest:/usr/sbin:/usr/bin LC_ALL=C.UTF-8
+modprobe -a 9p 9pnet_virtio
+mkdir -p /share
+mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144 share /share || poweroff -f
+. /share/options
+notes=/run/notes
+mark() { echo "$1 $(cut -d' ' -f1 /proc/uptime)" | tee -a /share/marks; }
+tell() { echo "$@" > /share/command; }
+keep() {
+  cp -f /run/job.log "$notes" /share/ 2> /dev/null
+  cp /sys/kernel/tracing/trace /share/trace
+  journalctl -o short-monotonic --no-pager -u 'perdure-*' > /share/journal
+  dmesg > /share/dmesg
+}
+# until_frames SECONDS: one that is newer than /run/told.
+until_frames() {
+  for ((i = 0; i < 10 * $1; ++i)); do
+    [ ! /run/frame -nt /run/told ] || return 0
+    [ -d "/proc/$first" ] || return 1
+    sleep .1
+  done
+  return 1
+}
+
+echo '|/guest/keep_core.sh %P %e' > /proc/sys/kernel/core_pattern
+bash /guest/sensors.sh || mark sensors_failed
+mark booted
+{
+  uname -r
+  ls -l /dev/video* /dev/media* /dev/iio*
+  id perdure
+  echo "mount $(cat /sys/bus/iio/devices/iio:device0/in_mount_matrix)"
+  systemd-analyze time; systemd-analyze blame | head -12
+} > /share/facts 2>&1
+
+# When the kernel sees a plug, gives an image, and asks for a sample; on CLOCK_MONOTONIC.
+cd /sys/kernel/tracing || exit
+echo mono > trace_clock
+echo 16384 > buffer_size_kb
+echo 'p:plugged usb_new_device' > kprobe_events
+echo 'p:unplugged usb_disconnect' >> kprobe_events
+echo 'p:triggered iio_trigger_poll' >> kprobe_events
+for event in kprobes/plugged kprobes/unplugged kprobes/triggered v4l2/v4l2_dqbuf; do echo 1 > events/$event/enable; done
+cd /
+
+guest_listener "$notes" /run/frame & listener=$!
+touch /run/told
+systemctl start perdure-capture
+first=$(systemctl show -P MainPID perdure-capture)
+until_frames 60 || mark no_frames
+sleep 10
+od -c /sys/bus/iio/devices/iio:device0/current_timestamp_clock > /share/clock
+v4l2-ctl -d /dev/video0 -C auto_exposure,exposure_time_absolute,gain > /share/controls 2>&1
+ps -o user= -p "$first" > /share/user
+mark flow
+sleep "$SECONDS_OF_FLOW"
+mark flow_ends
+keep
+
+# The driver loses images while capture stands still; and it calls half images broken.
+kill -STOP "$first"
+sleep .9
+kill -CONT "$first"
+sleep 3
+tell truncate 5
+sleep 4
+mark losses_end
+tell silent 3
+sleep 2
+mark all_counted
+keep
+echo 0 > /sys/kernel/tracing/events/kprobes/triggered/enable
+
+RANDOM=$SEED
+sleep 3
+for ((n = 1; n <= UNPLUGS; ++n)); do
+  [ -d "/proc/$first" ] || break
+  case $((n % 8)) in
+    3) tell silent 2; sleep 1.5 ;;              # capture has begun to open it again
+    5) tell silent 2; sleep 1.$((RANDOM % 10)) ;;
+  esac
+  tell unplug 1.$((RANDOM % 10))
+  while [ -e /share/command ]; do sleep .1; done
+  sleep .5                                      # what was on its way comes
+  touch /run/told
+  [ $((n % 10)) -ne 0 ] || { mark "reached_$n"; cp -f "$notes" /share/; }
+  case $((n % 8)) in
+    6) sleep 1.$((RANDOM % 10)) ;;              # soon again: while it is opened, or before
+    *) until_frames 40 || mark "no_frames_after_$n"; sleep "0.$((RANDOM % 10))" ;;
+  esac
+done
+mark "unplugged_$((n - 1))"
+keep
+
+# Odometry goes on after the camera was opened again.
+if [ "$UNPLUGS_WITH_VIO" -gt 0 ]; then
+  systemctl start perdure-vio
+  sleep 20
+  mark vio
+  for ((n = 1; n <= UNPLUGS_WITH_VIO; ++n)); do
+    tell unplug 1.5
+    sleep 2
+    touch /run/told
+    until_frames 40
+    sleep 6
+  done
+  sleep 5
+  mark vio_ends
+  systemctl show -P NRestarts perdure-vio > /share/restarts_of_vio
+  systemctl stop perdure-vio
+fi
+mark end
+systemctl show -P NRestarts perdure-capture > /share/restarts
+systemctl stop perdure-capture
+systemctl show -P ExecMainStatus perdure-capture > /share/status
+mark stopped
+kill "$listener"
+wait "$listener"
+keep
+mark done
+sync
+systemctl poweroff

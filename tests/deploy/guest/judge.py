@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+"""Judges what a guest left in its folder: usage: judge.py RUN --unplugs N. A line for each claim; 1 where one fails."""
+import argparse
+import pathlib
+import sys
+
+import claims
+from notes import Run
+
+
+class Report:
+    def __init__(self):
+        self.failed = False
+
+    def claim(self, holds, text):
+        print('ok:    ' if holds else 'FAILED:', text)
+        self.failed |= not holds
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('run', type=pathlib.Path)
+    parser.add_argument('--unplugs', type=int, required=True)
+    parser.add_argument('--unplugs-with-vio', type=int, required=True)
+    options = parser.parse_args()
+    run, report = Run(options.run), Report()
+    claims.the_guest_is_as_meant(run, report)
+    if report.failed:
+        return 1
+    claims.controls_are_told(run, report)
+    claims.flow_is_well(run, report)
+    claims.stamps_are_the_kernels(run, report)
+    claims.samples_are_mounted(run, report)
+    claims.images_are_counted(run, report)
+    claims.capture_lives(run, report, options.unplugs)
+    claims.images_come_back(run, report)
+    if options.unplugs_with_vio:
+        claims.odometry_goes_on(run, report)
+    return int(report.failed)
+
+
+sys.exit(main())

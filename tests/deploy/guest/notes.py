@@ -1,0 +1,91 @@
+"""What a guest left in its folder, read."""
+import re
+
+MS = 1_000_000
+SECOND = 1000 * MS
+FOREVER = 1 << 62
+
+
+class Frame:
+    def __init__(self, words):
+        self.source, self.sequence, self.stamp, self.given, self.number, self.heard = map(int, words)
+
+
+class Sample:
+    def __init__(self, words):
+        self.source, self.sequence, self.stamp, self.heard = map(int, words[:4])
+        self.gyro, self.accel = [float(w) for w in words[4:7]], [float(w) for w in words[7:]]
+
+
+class Health:
+    def __init__(self, line):
+        head, self.message = line.split('|', 1)
+        words = head.split()
+        self.process = words[0]
+        self.state, self.frames_in, self.frames_out, self.dropped, self.heard = map(int, words[1:6])
+        self.reasons = {k: int(v) for k, v in (w.split('=') for w in words[6:])}
+
+    def count(self, *reasons):
+        return sum(self.reasons.get(r, 0) for r in reasons)
+
+
+class Run:
+    """Times in nanoseconds of the guest's CLOCK_MONOTONIC, but stamps, which are on the wall clock of capture's start."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.camera_log = (folder / 'camera.log').read_text()
+        self.frames, self.samples, self.odometry, self.health, self.clocks = [], [], [], [], []
+        for line in self.read('notes').splitlines():
+            kind, _, rest = line.partition(' ')
+            words = rest.split()
+            try:
+                if kind == 'frame':
+                    self.frames.append(Frame(words))
+                elif kind == 'imu':
+                    self.samples.append(Sample(words))
+                elif kind == 'odometry':
+                    self.odometry.append([int(w) for w in words])
+                elif kind == 'health':
+                    self.health.append(Health(rest))
+                elif kind == 'clocks':
+                    self.clocks.append([int(w) for w in words])
+            except ValueError:
+                continue  # the last line, cut off
+        self.marks = {}
+        for line in self.read('marks').splitlines():
+            name, at = line.split()
+            self.marks[name] = int(float(at) * SECOND)
+        self.plugs, self.unplugs, self.triggers, self.images = [], [], [], []
+        for line in self.read('trace').splitlines():
+            found = re.match(r'.*\s(\d+)\.(\d{6}): (\w+): (.*)', line)
+            if not found:
+                continue
+            at = int(found[1]) * SECOND + int(found[2]) * 1000
+            if found[3] == 'v4l2_dqbuf':
+                self.images.append(at)
+            else:
+                self.of_event(found[3]).append(at)
+        self.image_stamps = self.stamps_of_the_kernel()
+
+    def of_event(self, name):
+        return {'plugged': self.plugs, 'unplugged': self.unplugs, 'triggered': self.triggers}.get(name, [])
+
+    def read(self, name):
+        path = self.folder / 'share' / name
+        return path.read_text(errors='replace') if path.exists() else ''
+
+    def stamps_of_the_kernel(self):
+        """Of v4l2_dqbuf: `timestamp` in microseconds or nanoseconds, with its unit left open by the kernel."""
+        return [int(t) for t in re.findall(r'v4l2_dqbuf: .*?timestamp = (\d+)', self.read('trace'))]
+
+    def between(self, things, start, end, at=lambda t: t.heard):
+        return [t for t in things if self.marks.get(start, 0) <= at(t) <= self.marks.get(end, FOREVER)]
+
+    def health_of(self, process, start='booted', end='done'):
+        return [h for h in self.between(self.health, start, end) if h.process == process]
+
+    def sent_before(self, command):
+        """Images that the camera had sent when it was first told so."""
+        found = re.search(rf'^told {command}.*\nsent (\d+)$', self.camera_log, re.M)
+        return int(found[1]) if found else None
