@@ -9,7 +9,6 @@
 #include "common/base/errors.h"
 #include "common/math/chi2.h"
 #include "common/math/so3.h"
-#include "common/sim/inside_image.h"
 
 namespace perdure::sim {
 namespace {
@@ -121,7 +120,7 @@ SimulatedDetector::SimulatedDetector(DetectorModel model, Truth truth,
       truth_(std::move(truth)),
       width_(camera.width),
       height_(camera.height),
-      camera_(camera) {
+      T_BC_(camera.T_BC) {
   checkModel(model_);
   means_ = classDirections(model_);
   info_.name = "simulated";
@@ -155,11 +154,11 @@ std::vector<SimulatedDetector::Sight> SimulatedDetector::sights(std::uint64_t fr
     Sight sight;
     sight.view = view;
     sight.looks_like = static_cast<std::size_t>(like - model_.classes.begin());
-    const TruthKey key = object->at(time);
-    sight.inside = partInsideImage(view, *object, key, T_WC.inverse(), camera_);
+    sight.inside = view.boxInside(width_, height_);
     const double share_inside = sight.inside.area() / view.box.area();
     if (share_inside <= 0.0) continue;
     sight.visible = std::min(1.0, view.visible_fraction / share_inside);
+    const TruthKey key = object->at(time);
     const Eigen::Vector3d back = T_WC.p - key.centre_W;
     sight.centre_W = key.centre_W;
     sight.distance = back.norm();
@@ -177,7 +176,7 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
   found.camera = "cam0";
   found.instance = info_.instance;
   found.model_hash = info_.hash;
-  const std::vector<Sight> all = sights(frame, stamp.time, T_WB * camera_.T_BC());
+  const std::vector<Sight> all = sights(frame, stamp.time, T_WB * T_BC_);
   for (const Sight& sight : all) {
     if (sight.looks_like == model_.classes.size()) continue;  // nothing that it knows
     if (auto detection = look(sight, all, frame)) found.detections.push_back(std::move(*detection));

@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "common/camera/camera_model.h"
 #include "common/sim/dice.h"
 #include "common/sim/truth.h"
 #include "common/types/detections.h"
@@ -92,7 +91,7 @@ class SimulatedDetector {
   DetectorModel model_;
   Truth truth_;
   double width_, height_;
-  CameraModel camera_;
+  RigidTransform T_BC_;
   ModelInfo info_;
   Eigen::MatrixXd means_;  ///< a row for each class, of unit length
 };

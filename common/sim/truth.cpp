@@ -91,6 +91,12 @@ TruthKey TruthObject::at(TimePoint t) const {
           wrapAngle(before.yaw + s * wrapAngle(after->yaw - before.yaw))};
 }
 
+Box TruthView::boxInside(double width, double height) const {
+  const Box& b = inside ? *inside : box;
+  return {std::clamp(b.x1, 0.0, width), std::clamp(b.y1, 0.0, height), std::clamp(b.x2, 0.0, width),
+          std::clamp(b.y2, 0.0, height)};
+}
+
 std::vector<TruthObject> truthOf(const Scene& scene, TimePoint epoch) {
   std::vector<TruthObject> objects;
   for (const SceneObject& object : scene.objects) {

@@ -1,10 +1,12 @@
-// The truth of a simulated folder: objects_truth.json and visibility_truth.csv, written and read.
+// The truth of a simulated folder: objects_truth.json, visibility_truth.csv and inside_truth.csv,
+// written and read. A folder without inside_truth.csv is read as one where it is empty.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +42,11 @@ struct TruthView {
   /// border included.
   double visible_fraction = 0.0;
   Box box;  ///< of its whole outline as if nothing hid it, not clipped to the image
+  /// Of the part of that outline within the image; set where the border cuts it.
+  std::optional<Box> inside = {};
+
+  /// Returns the box within an image of this size: `inside`, or the common part of box and image.
+  Box boxInside(double width, double height) const;
 };
 
 struct Truth {

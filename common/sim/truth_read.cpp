@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -141,33 +143,39 @@ std::optional<Number> parse(std::string_view text) {
   return value;
 }
 
-/// A row's frame and view; nothing where it is malformed.
-std::optional<std::pair<std::uint64_t, TruthView>> parseRow(std::string_view line) {
+/// A row that begins with a frame and an object.
+template <std::size_t N>
+struct Row {
+  std::uint64_t frame = 0, object = 0;
+  std::array<double, N> numbers{};
+};
+
+/// Nothing where the row is malformed.
+template <std::size_t N>
+std::optional<Row<N>> parseRow(std::string_view line) {
   std::vector<std::string_view> fields;
   for (std::size_t begin = 0; begin <= line.size();) {
     const std::size_t end = std::min(line.find(',', begin), line.size());
     fields.push_back(line.substr(begin, end - begin));
     begin = end + 1;
   }
-  if (fields.size() != 7) return std::nullopt;
+  if (fields.size() != N + 2) return std::nullopt;
   const auto frame = parse<std::uint64_t>(fields[0]), id = parse<std::uint64_t>(fields[1]);
-  std::array<double, 5> numbers{};
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
+  if (!frame || !id) return std::nullopt;
+  Row<N> row{*frame, *id, {}};
+  for (std::size_t i = 0; i < N; ++i) {
     const auto number = parse<double>(fields[i + 2]);
     if (!number || !std::isfinite(*number)) return std::nullopt;
-    numbers[i] = *number;
+    row.numbers[i] = *number;
   }
-  if (!frame || !id) return std::nullopt;
-  return {{*frame, {*id, numbers[0], Box{numbers[1], numbers[2], numbers[3], numbers[4]}}}};
+  return row;
 }
 
-std::map<std::uint64_t, std::vector<TruthView>> readViews(const fs::path& file,
-                                                          const std::vector<TruthObject>& objects) {
-  std::set<std::uint64_t> ids;
-  for (const TruthObject& object : objects) ids.insert(object.id);
+/// Gives each row of a file with this header to `use`, with the file and line for complaints.
+template <std::size_t N>
+void readRows(const fs::path& file, const char* header, const char* numbers,
+              const std::function<void(const std::string&, const Row<N>&)>& use) {
   std::ifstream stream = open(file);
-  std::map<std::uint64_t, std::vector<TruthView>> views;
-  std::set<std::pair<std::uint64_t, std::uint64_t>> seen;
   std::string line;
   std::size_t number = 1;
   for (; std::getline(stream, line); ++number) {
@@ -175,25 +183,47 @@ std::map<std::uint64_t, std::vector<TruthView>> readViews(const fs::path& file,
     if (stream.eof()) refuse(where, "the file was cut within this line");
     if (line.ends_with('\r')) line.pop_back();
     if (number == 1) {
-      if (line != kVisibilityHeader) {
-        refuse(where, std::string("the header is not ") + kVisibilityHeader);
-      }
+      if (line != header) refuse(where, std::string("the header is not ") + header);
       continue;
     }
-    const auto row = parseRow(line);
-    if (!row) refuse(where, "is not a row of seven finite numbers");
-    const auto& [frame, view] = *row;
-    if (!ids.contains(view.object_id)) refuse(where, "its object is not in objects_truth.json");
-    if (view.visible_fraction < 0 || view.visible_fraction > 1) {
-      refuse(where, "visible_fraction is not within 0 and 1");
-    }
-    if (view.box.x1 >= view.box.x2 || view.box.y1 >= view.box.y2) refuse(where, "its box is empty");
-    if (!seen.insert({frame, view.object_id}).second)
-      refuse(where, "the object was in this frame before");
-    views[frame].push_back(view);
+    const auto row = parseRow<N>(line);
+    if (!row) refuse(where, std::string("is not a row of ") + numbers + " finite numbers");
+    use(where, *row);
   }
   if (number == 1) refuse(file.string(), "is empty");
+}
+
+std::map<std::uint64_t, std::vector<TruthView>> readViews(const fs::path& file,
+                                                          const std::vector<TruthObject>& objects) {
+  std::set<std::uint64_t> ids;
+  for (const TruthObject& object : objects) ids.insert(object.id);
+  std::map<std::uint64_t, std::vector<TruthView>> views;
+  std::set<std::pair<std::uint64_t, std::uint64_t>> seen;
+  readRows<5>(file, kVisibilityHeader, "seven", [&](const std::string& where, const Row<5>& row) {
+    const auto& [share, x1, y1, x2, y2] = row.numbers;
+    if (!ids.contains(row.object)) refuse(where, "its object is not in objects_truth.json");
+    if (share < 0 || share > 1) refuse(where, "visible_fraction is not within 0 and 1");
+    if (x1 >= x2 || y1 >= y2) refuse(where, "its box is empty");
+    if (!seen.insert({row.frame, row.object}).second)
+      refuse(where, "the object was in this frame before");
+    views[row.frame].push_back({row.object, share, Box{x1, y1, x2, y2}, std::nullopt});
+  });
   return views;
+}
+
+/// Enters what lies inside the image. Folders of earlier versions have no such file.
+void readInside(const fs::path& file, std::map<std::uint64_t, std::vector<TruthView>>& views) {
+  if (!fs::exists(file)) return;
+  readRows<4>(file, kInsideHeader, "six", [&](const std::string& where, const Row<4>& row) {
+    const auto& [x1, y1, x2, y2] = row.numbers;
+    const auto frame = views.find(row.frame);
+    if (frame == views.end()) refuse(where, "its frame is not in visibility_truth.csv");
+    const auto view = std::find_if(frame->second.begin(), frame->second.end(),
+                                   [&](const auto& v) { return v.object_id == row.object; });
+    if (view == frame->second.end()) refuse(where, "its object is not in visibility_truth.csv");
+    if (x1 > x2 || y1 > y2) refuse(where, "its box is inside out");
+    view->inside = Box{x1, y1, x2, y2};
+  });
 }
 
 }  // namespace
@@ -204,6 +234,7 @@ Truth readTruth(const fs::path& folder) {
   Truth truth;
   truth.objects = readObjects(folder / kObjectsTruthFile);
   truth.views = readViews(folder / kVisibilityTruthFile, truth.objects);
+  readInside(folder / kInsideTruthFile, truth.views);
   return truth;
 }
 

@@ -7,7 +7,6 @@
 #include "common/base/errors.h"
 #include "common/math/so3.h"
 #include "common/replay/files/kitti_labels.h"
-#include "common/sim/inside_image.h"
 #include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
@@ -36,7 +35,9 @@ std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& k
 }
 
 /// A view of a simulated object as a label; nothing where too little of it is seen.
-std::optional<TrueBox> labelOf(const sim::TruthView& view, const Box& box, double least_px) {
+std::optional<TrueBox> labelOf(const sim::TruthView& view, const CameraModel& camera,
+                               double least_px) {
+  const Box box = view.boxInside(camera.width(), camera.height());
   if (box.width() < 1.0 || box.height() < 1.0 || view.visible_fraction < 0.01) return std::nullopt;
   const double seen = std::min(1.0, view.visible_fraction * view.box.area() / box.area());
   if (seen < kNothingSeen) return std::nullopt;
@@ -63,14 +64,12 @@ LabelledData readSimulated(const LabelRequest& request, const replay::ClassAlias
       const auto& all = truth.truth.objects;
       const auto object = std::find_if(all.begin(), all.end(),
                                        [&](const auto& o) { return o.id == view.object_id; });
-      if (object == all.end() || !body) continue;
-      const RigidTransform T_CW = (*body * truth.camera.T_BC()).inverse();
-      const auto key = object->at(truth.frames[i]);
-      auto label = labelOf(view, partInsideImage(view, *object, key, T_CW, truth.camera), least_px);
-      if (!label) continue;
+      auto label = labelOf(view, truth.camera, least_px);
+      if (object == all.end() || !label) continue;
       label->class_name = aliases.canonical(object->looks_like);
-      if (view.visible_fraction >= kWhollySeen) {
-        label->hull = hullOf(*object, key, T_CW, truth.camera);
+      if (body && view.visible_fraction >= kWhollySeen) {
+        label->hull = hullOf(*object, object->at(truth.frames[i]),
+                             (*body * truth.camera.T_BC()).inverse(), truth.camera);
       }
       frame.boxes.push_back(*std::move(label));
     }

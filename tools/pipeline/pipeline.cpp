@@ -65,7 +65,7 @@ void Pipeline::openRun() {
   run_ = std::make_unique<replay::RecordingWriter>(file);
   // What is known before the first frame is logged at its time.
   run_ns_ = toNanoseconds(dataset_->frameTime(first_index_).value_or(TimePoint()));
-  keep("calibration", dataset_->calibration(), TimePoint());
+  if (!recorded_) keep("calibration", dataset_->calibration(), TimePoint());
 }
 
 void Pipeline::learn(const ModelInfo& model) {

@@ -14,6 +14,13 @@ bool isFiltersInput(const std::string& topic) {
          topic == "odometry" || topic == "landmarks" || topic == "detections";
 }
 
+/// Returns the time of a message; the least one where it has none.
+template <class T>
+TimePoint timeOf(const T& message) {
+  if constexpr (requires { message.stamp.time; }) return message.stamp.time;
+  return TimePoint();
+}
+
 }  // namespace
 
 void Pipeline::checkRecorded() {
@@ -59,6 +66,7 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
   const auto give = [&]<class T>(const T&, auto use) {
     const auto value = replay::valueOf<T>(message);
     if (!value) return reasons_.add(message.topic + "_" + value.error().code);
+    keep(message.topic, *value, timeOf(*value));
     use(*value);
   };
   const auto filter = [&](auto work) { timer_.timeTowardsNext("semantic_filter", work); };

@@ -12,6 +12,10 @@
 namespace perdure::tools {
 namespace {
 
+std::string textOf(const Box& box) {
+  return fmt::format(" {:a} {:a} {:a} {:a}", box.x1, box.y1, box.x2, box.y2);
+}
+
 std::string lineOf(const JournalEntry& entry) {
   std::string line;
   for (const auto& sensor : entry.sensors) {
@@ -19,8 +23,8 @@ std::string lineOf(const JournalEntry& entry) {
   }
   line += fmt::format("{}", entry.views.size());
   for (const auto& view : entry.views) {
-    line += fmt::format(" {} {:a} {:a} {:a} {:a} {:a}", view.object_id, view.visible_fraction,
-                        view.box.x1, view.box.y1, view.box.x2, view.box.y2);
+    line += fmt::format(" {} {:a}", view.object_id, view.visible_fraction) + textOf(view.box);
+    line += view.inside ? " in" + textOf(*view.inside) : " whole";
   }
   return line + " .";
 }
@@ -32,6 +36,19 @@ bool take(std::istringstream& line, double& value) {
   char* end = nullptr;
   value = std::strtod(word.c_str(), &end);
   return *end == '\0';
+}
+
+bool take(std::istringstream& line, Box& box) {
+  return take(line, box.x1) && take(line, box.y1) && take(line, box.x2) && take(line, box.y2);
+}
+
+bool take(std::istringstream& line, sim::TruthView& view) {
+  std::string word;
+  if (!(line >> view.object_id) || !take(line, view.visible_fraction) || !take(line, view.box) ||
+      !(line >> word)) {
+    return false;
+  }
+  return word == "whole" || (word == "in" && take(line, view.inside.emplace()));
 }
 
 std::optional<JournalEntry> entryOf(const std::string& text, std::size_t cameras) {
@@ -46,10 +63,7 @@ std::optional<JournalEntry> entryOf(const std::string& text, std::size_t cameras
   if (!good || !(line >> count)) return std::nullopt;
   for (std::size_t i = 0; i < count; ++i) {
     sim::TruthView v;
-    if (!(line >> v.object_id && take(line, v.visible_fraction) && take(line, v.box.x1) &&
-          take(line, v.box.y1) && take(line, v.box.x2) && take(line, v.box.y2))) {
-      return std::nullopt;
-    }
+    if (!take(line, v)) return std::nullopt;
     entry.views.push_back(v);
   }
   std::string end;

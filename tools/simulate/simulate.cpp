@@ -192,6 +192,7 @@ void require(const SimulateOptions& options) {
 void finishFolder(const fs::path& out, const Journal& journal) {
   std::vector<std::vector<sim::TruthView>> views;
   for (const auto& entry : journal.entries()) views.push_back(entry.views);
+  writeWhole(out / sim::kInsideTruthFile, insideCsv(views));
   writeWhole(out / sim::kVisibilityTruthFile, visibilityCsv(views));
   fs::remove(out / kJournalFile);
 }

@@ -55,6 +55,19 @@ std::string visibilityCsv(const std::vector<std::vector<sim::TruthView>>& views_
   return text;
 }
 
+std::string insideCsv(const std::vector<std::vector<sim::TruthView>>& views_by_frame) {
+  std::string text = std::string(sim::kInsideHeader) + "\n";
+  for (std::size_t frame = 0; frame < views_by_frame.size(); ++frame) {
+    for (const auto& view : views_by_frame[frame]) {
+      if (!view.inside) continue;
+      const Box& b = *view.inside;
+      text += fmt::format("{},{},{:.2f},{:.2f},{:.2f},{:.2f}\n", frame, view.object_id, b.x1, b.y1,
+                          b.x2, b.y2);
+    }
+  }
+  return text;
+}
+
 std::string extensionOf(ImageFormat format) {
   return format == ImageFormat::kPng ? ".png" : ".jpg";
 }

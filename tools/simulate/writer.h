@@ -26,6 +26,8 @@ std::string groundTruthYaml();
 /// "#timestamp [ns],filename" and a line for each name, which begins with its stamp.
 std::string imageListCsv(const std::vector<TimePoint>& stamps, const std::string& extension);
 std::string visibilityCsv(const std::vector<std::vector<sim::TruthView>>& views_by_frame);
+/// Of the views that the border cuts.
+std::string insideCsv(const std::vector<std::vector<sim::TruthView>>& views_by_frame);
 
 /// Inertial samples, speed and states over [0, scene.seconds], with their sensor.yaml, and
 /// objects_truth.json.

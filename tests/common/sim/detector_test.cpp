@@ -108,29 +108,14 @@ TEST(SimulatedDetector, CutsItsBoxesAtTheBorder) {
 TEST(SimulatedDetector, OfAThingThatTheBorderCutsItSeesThePartInside) {
   DetectorModel model = independent();
   model.box_share = model.box_floor_px = 0.0;
-  const TruthObject car = thing(1, "car", {4.0, 3.0, 0.0}, 0.0);
-  const CameraModel lens(camera());
-  const auto pixel = [&](double x, double y, double z) {
-    return *lens.project(camera().T_BC.inverse() * Eigen::Vector3d(x, y, z));
-  };
-  // Its front corners are outside on the left; of its right side the part from there on is seen.
-  Truth truth;
-  truth.objects = {car};
-  const double left = pixel(6.0, 3.9, 0.0).x(), right = pixel(6.0, 2.1, 0.0).x();
-  const double top = pixel(2.0, 2.1, 0.75).y(), bottom = pixel(2.0, 2.1, -0.75).y();
-  ASSERT_LT(pixel(2.0, 2.1, 0.0).x(), 0.0);
-  ASSERT_GT(right, 0.0);
-  for (std::uint64_t frame = 0; frame < 50; ++frame) {
-    truth.views[frame] = {{1, 0.5, {std::min(left, pixel(2.0, 3.9, 0.0).x()), top, right, bottom}}};
-  }
-  // The right side crosses the border at this distance, where it is as high as this.
-  const double x = 2.1 * camera().fx / (camera().width / 2.0);
+  Truth truth = sameView({-80, 150, 100, 300}, 0.5);
+  for (auto& [frame, views] : truth.views) views[0].inside = Box{-0.5, 160, 100, 250};
   const auto found = collect(SimulatedDetector(model, truth, camera()), 50);
   ASSERT_FALSE(found.empty());
   for (const Detection& d : found) {
     EXPECT_EQ(d.box.x1, 0.0);
-    EXPECT_NEAR(d.box.x2, right, 1e-6);
-    EXPECT_NEAR(d.box.height(), 1.5 * camera().fy / x, 0.02 * d.box.height());
+    EXPECT_NEAR(d.box.y1, 160.0, 1e-9);
+    EXPECT_NEAR(d.box.y2, 250.0, 1e-9);
   }
 }
 

@@ -179,6 +179,29 @@ TEST_F(TruthFolder, WhoseObjectsAreWrongSaysWhichAndWhat) {
   EXPECT_THAT(complaint(), HasSubstr("no list named objects"));
 }
 
+TEST_F(TruthFolder, HasTheBoxInsideWhereTheBorderCuts) {
+  writeOneChair();
+  write("visibility_truth.csv", std::string(kHeader) + "0,4,0.5,-3.25,1,20,30\n7,4,0,1,2,3,4\n");
+  EXPECT_EQ(readTruth(folder_).views.at(0)[0].boxInside(15.0, 30.0).x2, 15.0) << "of before";
+  const std::string header = "frame,object_id,x1,y1,x2,y2\n";
+  write("inside_truth.csv", header + "0,4,-0.5,3,20,28\n");
+  const Truth truth = readTruth(folder_);
+  const Box cut = truth.views.at(0)[0].boxInside(640.0, 480.0);
+  EXPECT_EQ(cut.x1, 0.0);
+  EXPECT_EQ(cut.y1, 3.0);
+  EXPECT_EQ(cut.y2, 28.0);
+  EXPECT_FALSE(truth.views.at(7)[0].inside);
+  const auto complaintOf = [&](const std::string& text) {
+    write("inside_truth.csv", text);
+    return complaint();
+  };
+  EXPECT_THAT(complaintOf("frame\n"), HasSubstr("inside_truth.csv:1: the header is not frame"));
+  EXPECT_THAT(complaintOf(header + "0,4,1,2,3\n"), HasSubstr("csv:2: is not a row of six"));
+  EXPECT_THAT(complaintOf(header + "1,4,1,2,3,4\n"), HasSubstr("its frame is not in visibility"));
+  EXPECT_THAT(complaintOf(header + "0,5,1,2,3,4\n"), HasSubstr("its object is not in visibility"));
+  EXPECT_THAT(complaintOf(header + "0,4,3,2,1,4\n"), HasSubstr("its box is inside out"));
+}
+
 TEST_F(TruthFolder, WhoseViewsAreWrongSaysTheLine) {
   writeOneChair();
   const auto complaintOf = [&](const std::string& text) {

@@ -127,6 +127,33 @@ Projected projectSurface(const Surface& surface, const RigidTransform& T_CO, con
   return result;
 }
 
+/// Keeps the part of a polygon where sign · (coordinate − border) >= 0.
+void cutBorder(std::vector<Eigen::Vector2d>& polygon, int axis, double border, double sign) {
+  std::vector<Eigen::Vector2d> kept;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double from = sign * (a[axis] - border), to = sign * (b[axis] - border);
+    if (from >= 0.0) kept.push_back(a);
+    if ((from >= 0.0) != (to >= 0.0)) kept.push_back(a + (b - a) * (from / (from - to)));
+  }
+  polygon.swap(kept);
+}
+
+/// Box of the triangles' parts within the image; nothing where no part is.
+std::optional<Box> boxInside(const Projected& projected, const Box& image) {
+  Box box{1e9, 1e9, -1e9, -1e9};
+  std::vector<Eigen::Vector2d> part;
+  for (const auto& [i, j, k] : projected.triangles) {
+    part = {projected.pixels[i], projected.pixels[j], projected.pixels[k]};
+    cutBorder(part, 0, image.x1, 1.0);
+    cutBorder(part, 0, image.x2, -1.0);
+    cutBorder(part, 1, image.y1, 1.0);
+    cutBorder(part, 1, image.y2, -1.0);
+    for (const auto& pixel : part) include(box, pixel);
+  }
+  return box.x1 > box.x2 ? std::nullopt : std::optional(box);
+}
+
 /// Angle between the optical axis and the outermost ray of the image.
 double widestAngle(const Lens& lens) {
   double widest = 0.0;
@@ -159,6 +186,10 @@ Outline outlineOf(const Surface& surface, const RigidTransform& T_CO, const Lens
   box = {std::max(box.x1, plane.x1), std::max(box.y1, plane.y1), std::min(box.x2, plane.x2),
          std::min(box.y2, plane.y2)};
   if (box.width() <= 0.0 || box.height() <= 0.0) return outline;
+  const Box image{-0.5, -0.5, lens.width() - 0.5, lens.height() - 0.5};
+  if (box.x1 < image.x1 || box.y1 < image.y1 || box.x2 > image.x2 || box.y2 > image.y2) {
+    outline.inside = boxInside(projected, image);
+  }
   const double longer = std::max(box.width(), box.height());
   Raster raster(box, longer / std::clamp(4.0 * longer, kMinCells, kMaxCells));
   for (auto& pixel : projected.pixels) pixel = raster.cellOf(pixel);
@@ -192,7 +223,8 @@ std::vector<sim::TruthView> viewsOf(const World& world, const Lens& lens, const 
       return;
     }
     const double visible = static_cast<double>(pixels[i + 1]) * step * step;
-    found[i] = sim::TruthView{objects[i].id, std::min(1.0, visible / outline.area), box};
+    found[i] =
+        sim::TruthView{objects[i].id, std::min(1.0, visible / outline.area), box, outline.inside};
   });
   std::vector<sim::TruthView> views;
   for (const auto& view : found) {

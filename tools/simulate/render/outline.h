@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/sim/truth.h"
@@ -18,6 +19,8 @@ namespace perdure::tools {
 struct Outline {
   double area = 0.0;  ///< pixels² of the enlarged plane
   Box box;            ///< of its corners, within the enlarged plane
+  /// Of the part within the image; set where the border cuts it.
+  std::optional<Box> inside;
 };
 /// area 0 where the object is behind the camera or beside the enlarged plane.
 Outline outlineOf(const Surface& surface, const RigidTransform& T_CO, const Lens& lens);

@@ -74,7 +74,6 @@ BoxMeasurement measure(const Box& box, double width, double height, const BoxPar
     z.variance[i] = whole * whole - z.lasting[i];
   }
   const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
-  z.borders << 0.0, 0.0, width, height;
   z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,
                 z.sides[3] < height - my};
   return z;
@@ -124,19 +123,10 @@ bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Mat
   return true;
 }
 
-bool cutByBorder(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
-  if (!z.measured[side]) return true;
-  const double beyond = predicted.sides[side] - z.borders[side];
-  const double inside = z.sides[side] - z.borders[side];
-  return (side < 2 ? beyond < 0.0 : beyond > 0.0) && inside * inside < 9.0 * z.varianceOf(side);
-}
-
 std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                     const std::array<bool, 4>& hidden) {
   std::array<bool, 4> use;
-  for (int i = 0; i < 4; ++i) {
-    use[i] = !cutByBorder(z, predicted, i) && !hidden[i] && predicted.exact[i];
-  }
+  for (int i = 0; i < 4; ++i) use[i] = z.measured[i] && !hidden[i] && predicted.exact[i];
   return use;
 }
 
@@ -156,12 +146,6 @@ bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predict
                const Eigen::Matrix4d& covariance, int side) {
   const double nu = z.sides[side] - predicted.sides[side];
   return nu * nu > gate * (covariance(side, side) + z.variance[side]);
-}
-
-/// Log density of a side of an object that the border cuts there.
-double logAtBorder(const BoxMeasurement& z, int side) {
-  const double off = z.sides[side] - z.borders[side], variance = z.varianceOf(side);
-  return -0.5 * (off * off / variance + std::log(2.0 * M_PI * variance));
 }
 
 /// Scores the sides in use. Each other side counts with the probability that the true side lies
@@ -193,9 +177,7 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
   score.nis = nu.squaredNorm();
   if (score.nis > gate) return std::nullopt;
   for (int i = 0; i < 4; ++i) {
-    if (use[i]) continue;
-    if (z.measured[i] && cutByBorder(z, predicted, i)) score.log_density += logAtBorder(z, i);
-    if (!predicted.exact[i]) continue;
+    if (use[i] || !predicted.exact[i]) continue;
     const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
     score.log_density += logBelowZero(within(z, predicted, i), variance);
   }
@@ -245,7 +227,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
   Sides use = comparableSides(z, predicted, hidden), whole = use, ignored{};
   double log_shown = 0.0;
   for (int i = 0; i < 4; ++i) {
-    if (cutByBorder(z, predicted, i) || use[i]) continue;
+    if (!z.measured[i] || use[i]) continue;
     if (predicted.exact[i]) {
       whole[i] = true;
       log_shown += logAnywhere(predicted, i);

@@ -20,13 +20,9 @@ struct BoxMeasurement {
   Eigen::Vector4d sides = Eigen::Vector4d::Zero();     ///< x1, y1, x2, y2, px
   Eigen::Vector4d variance = Eigen::Vector4d::Ones();  ///< px², noise of each side without b
   Eigen::Vector4d lasting = Eigen::Vector4d::Zero();  ///< px², variance that b causes at each side
-  std::array<bool, 4> measured{true, true, true, true};  ///< false: censored by the border
-  /// Borders of the image, px, as the sides are ordered.
-  Eigen::Vector4d borders{-1e9, -1e9, 1e9, 1e9};
+  std::array<bool, 4> measured{true, true, true, true};
 
   int count() const;
-  /// Returns the variance of a side, px².
-  double varianceOf(int side) const { return variance[side] + lasting[side]; }
   double width() const { return sides[2] - sides[0]; }
   double height() const { return sides[3] - sides[1]; }
   Box box() const { return {sides[0], sides[1], sides[2], sides[3]}; }
@@ -92,12 +88,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
                                  const std::array<bool, 4>& hidden,
                                  const BoxParameters& parameters);
 
-/// Whether the border cuts the object at a side: the side is censored, or the object should reach
-/// beyond the border and the side is within three deviations of it.
-bool cutByBorder(const BoxMeasurement& z, const ProjectedBox& predicted, int side);
-
-/// Returns the sides that can be compared: not cut by the border, not hidden, and exact in the
-/// projection.
+/// Returns the sides that can be compared: measured, not hidden, and exact in the projection.
 std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                     const std::array<bool, 4>& hidden);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
@@ -16,10 +15,6 @@ namespace {
 /// Residuals of a state without a projection. The solver reads the residuals of a step even if its
 /// cost could not be computed, and must not take such a step.
 constexpr double kNoStep = 1e100;
-
-/// Share of the width or height that shows, of an object that is cut both ways by the border, and
-/// its standard deviation: uniform from 0.4 to 1, for of less a detector says nothing.
-constexpr double kShown = 0.7, kShownSigma = 0.17;
 
 /// Residuals, whitened: four of sides, three of position (weak), one of yaw, three of size, one of
 /// range, four of bias.
@@ -79,7 +74,7 @@ class CuboidCost {
   void sides(const ProjectedBox& box, Eigen::Map<Residuals>& r, Jacobian& J) const {
     for (int i = 0; i < 4; ++i) {
       const double inside = i < 2 ? box.sides[i] - z_.sides[i] : z_.sides[i] - box.sides[i];
-      if (!box.exact[i] || (cutByBorder(z_, box, i) && inside <= 0.0)) continue;
+      if (!box.exact[i] || (!z_.measured[i] && inside <= 0.0)) continue;
       const double weight = 1.0 / std::sqrt(z_.variance[i]);
       r[i] = weight * (box.sides[i] - z_.sides[i]);
       J.row(i) = weight * box.H.row(i).head<kFree>();
@@ -98,7 +93,7 @@ class CuboidCost {
 };
 
 /// Returns the depth, m, at which an object of the prior's size has the height of the box, or else
-/// its width. Returns nothing if the border cuts both.
+/// its width.
 std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& prior,
                                     const CameraModel& camera) {
   if (z.measured[1] && z.measured[3]) return camera.fy() * std::exp(prior.log_size[2]) / z.height();
@@ -106,25 +101,6 @@ std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& p
     return camera.fx() * std::exp(0.5 * (prior.log_size[0] + prior.log_size[1])) / z.width();
   }
   return std::nullopt;
-}
-
-/// Returns the range of an object of the prior's size whose width and height the border cuts. It is
-/// nowhere smaller in the image than the box, which bounds its range from above; how much of it
-/// shows is a matter of chance.
-RangeHint rangeOfCut(const BoxMeasurement& z, const ClassPrior& prior, double yaw,
-                     const Eigen::Vector3d& ray, const FrameContext& frame) {
-  State x = State::Zero();
-  x.segment<4>(kYaw) << yaw, prior.log_size;
-  double depth = frame.view.camera->fy() * std::exp(prior.log_size[2]) / z.height();
-  for (int i = 0; i < 3; ++i) {
-    x.head<3>() = frame.view.T_WC().p + depth * ray;
-    const auto box = projectObserved(x, frame.projector(), frame.styleOf(prior.name));
-    const bool whole = box && std::all_of(box->exact.begin(), box->exact.end(), std::identity());
-    depth *= !whole ? 2.0
-                    : std::min((box->sides[2] - box->sides[0]) / z.width(),
-                               (box->sides[3] - box->sides[1]) / z.height());
-  }
-  return {kShown * depth * ray.norm(), kShownSigma * depth * ray.norm()};
 }
 
 }  // namespace
@@ -164,15 +140,13 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
                                    double yaw, double yaw_sigma,
                                    const std::optional<RangeHint>& range,
                                    const FrameContext& frame) {
-  const auto ray = centreRay(detection.z, frame.view);
-  if (!ray) return std::nullopt;
   const auto depth = depthFromSize(detection.z, prior, *frame.view.camera);
-  std::optional<RangeHint> along = range;
-  if (!depth && !range) along = rangeOfCut(detection.z, prior, yaw, *ray, frame);
+  const auto ray = centreRay(detection.z, frame.view);
+  if (!depth || !ray) return std::nullopt;
   const double minimum = frame.parameters->initiation.min_distance_m;
-  const double start_depth = along ? along->distance_m / ray->norm() : *depth;
+  const double start_depth = range ? range->distance_m / ray->norm() : *depth;
   const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
-  const CuboidCost cost(detection, prior, yaw, yaw_sigma, along, frame, start);
+  const CuboidCost cost(detection, prior, yaw, yaw_sigma, range, frame, start);
   VectorFit x = VectorFit::Zero();
   x.head<7>() << start, yaw, prior.log_size;
   CuboidCost::Residuals r;

@@ -107,6 +107,23 @@ TEST(Outline, CountsThePartBeyondTheImagesBorder) {
   EXPECT_NEAR(views[0].visible_fraction, 0.5, 0.1);
 }
 
+TEST(Outline, OfAThingThatTheBorderCutsHasTheBoxOfWhatIsDrawn) {
+  sim::Scene scene = emptyWorld(320, 240);
+  scene.objects = {thing(1, "couch", {2.0, 0.9, 0.9}, {2.2, 2.0, 1.0})};
+  Drawn drawn(scene);
+  const auto views = drawn.views();
+  ASSERT_EQ(views.size(), 1U);
+  ASSERT_TRUE(views[0].inside);
+  const Box seen = drawn.boxOf(1), inside = *views[0].inside;
+  EXPECT_NEAR(inside.x1, seen.x1, 1.1);
+  EXPECT_NEAR(inside.y1, seen.y1, 1.1);
+  EXPECT_NEAR(inside.x2, seen.x2, 1.1);
+  EXPECT_NEAR(inside.y2, seen.y2, 1.1);
+  EXPECT_GT(views[0].box.y2 - inside.y2, 5.0) << "its near end is outside";
+  scene.objects = {thing(1, "couch", {0.9, 2.0, 0.9}, {4.0, 0.5, 1.0})};
+  EXPECT_FALSE(Drawn(scene).views()[0].inside);
+}
+
 TEST(Renderer, IdentifiesAtAReducedResolutionWhatItDraws) {
   sim::Scene scene = emptyWorld();
   scene.objects = {thing(1, "couch", {0.9, 2.0, 0.9}, {4.0, 0.0, 0.45})};

@@ -37,24 +37,6 @@ TEST(BoxLikelihood, ABoxThatLeavesTheImageIsCutThere) {
   EXPECT_EQ(z.count(), 2);
 }
 
-TEST(BoxLikelihood, ASideNearTheBorderIsACutOfWhatShouldReachBeyondIt) {
-  const BoxNoise noise = {0.05, 0.0, {}, 0.0};
-  const auto z = measure({100, 100, 400, 350}, kWidth, kHeight, {}, noise);  // y sides: 12.5 px
-  ASSERT_TRUE(z.measured[3]);
-  EXPECT_TRUE(cutByBorder(z, predictedBox(100, 100, 400, 500), 3));
-  EXPECT_FALSE(cutByBorder(z, predictedBox(100, 100, 400, 370), 3));  // it ends within the image
-  EXPECT_FALSE(cutByBorder(z, predictedBox(-50, 100, 400, 500), 0));  // far from that border
-  const auto within = [&](double y2) {
-    return scoreBox(z, predictedBox(100, 100, 400, y2), Eigen::Matrix4d::Identity(), {},
-                    gatedAt(0.9997));
-  };
-  ASSERT_TRUE(within(374) && within(376));
-  EXPECT_EQ(within(374)->dof, 4);
-  EXPECT_EQ(within(376)->dof, 3);
-  EXPECT_NEAR(within(374)->log_density, within(376)->log_density, 1.0);  // no jump
-  EXPECT_NEAR(within(376)->log_density, within(700)->log_density, 0.7);
-}
-
 TEST(BoxLikelihood, WithAThinTailTheDensityOfAllSidesIsTheGaussian) {
   const auto z = measure({100, 100, 200, 180}, kWidth, kHeight, {});
   const auto score = scoreBox(z, predictedBox(102, 100, 200, 180), Eigen::Matrix4d::Zero(), {},
