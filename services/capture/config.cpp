@@ -30,6 +30,9 @@ void describeDataset(Config& c, config::Fields& fields) {
 void describeLive(Config& c, config::Fields& fields) {
   fields.text("camera.id", c.camera.id,
               {"live: libcamera's id of the camera, or a part of it; empty: the first there is"});
+  fields.text("camera.second", c.camera.second,
+              {"live: the same of a second camera, cam1 of the rig, for stereo; what else is said "
+               "of the camera is of both; empty: one camera"});
   fields.text(
       "camera.format", c.camera.format,
       {"live: libcamera's name of a pixel format, as YUYV or MJPEG; auto: the best it has"});
@@ -144,6 +147,21 @@ void describe(Config& c, config::Fields& fields) {
                  "without end, as one that ends how it began"});
 }
 
+/// Each by its own id: left and right must not change places.
+void requireTwoIds(const CameraConfig& camera) {
+  if (camera.second.empty()) return;
+  if (camera.id.empty()) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "camera.second is given and camera.id is empty; with two cameras name both, "
+                       "as `perdure-capture --list` does.");
+  }
+  if (camera.id == camera.second) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "camera.id and camera.second are the same; name two cameras, as "
+                       "`perdure-capture --list` does, or leave camera.second empty.");
+  }
+}
+
 void requireSource(const Config& config) {
   const bool live = config.source == "libcamera";
   if (live && config.rig.empty()) {
@@ -151,6 +169,7 @@ void requireSource(const Config& config) {
                        "source: libcamera needs rig: a file with the lens of the camera, its place "
                        "on the IMU and the IMU's noise; `perdure calibrate` writes it.");
   }
+  if (live) requireTwoIds(config.camera);
   const auto& crop = config.camera.crop;
   if (live && !crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1)) {
     throw StartupError(ExitCode::kConfiguration,

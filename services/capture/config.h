@@ -41,7 +41,8 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  std::string id, format = "auto";
+  std::string id, second;  ///< of cam0 and cam1; no second: one camera
+  std::string format = "auto";
   double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
   std::string flip = "none";
   std::string focus = "as_is";

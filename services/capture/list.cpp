@@ -171,16 +171,33 @@ std::string textOf(const SeenImu& imu) {
   return text;
 }
 
-/// The largest size of at most a megapixel: what vio needs no more than.
-std::string sizeFor(const SeenCamera& camera) {
+bool hasSize(const SeenCamera& camera, const std::pair<std::uint32_t, std::uint32_t>& size) {
+  return std::any_of(camera.modes.begin(), camera.modes.end(), [&](const auto& mode) {
+    return std::find(mode.sizes.begin(), mode.sizes.end(), size) != mode.sizes.end();
+  });
+}
+
+/// The largest size of at most a megapixel that both have: what vio needs no more than.
+std::string sizeFor(const SeenCamera& camera, const SeenCamera& other) {
   std::pair<std::uint32_t, std::uint32_t> best{0, 0};
   for (const auto& mode : camera.modes) {
     for (const auto& size : mode.sizes) {
       const std::uint64_t pixels = std::uint64_t{size.first} * size.second;
-      if (pixels <= 1'000'000 && pixels > std::uint64_t{best.first} * best.second) best = size;
+      const bool better = pixels <= 1'000'000 && pixels > std::uint64_t{best.first} * best.second;
+      if (better && hasSize(other, size)) best = size;
     }
   }
   return best.first > 0 ? fmt::format("{}x{}", best.first, best.second) : "its size";
+}
+
+/// That both have; of a camera without a control of it, the usual one.
+double rateFor(const SeenCamera& camera, const SeenCamera& other) {
+  double rate = 20.0;
+  for (const SeenCamera* of : {&camera, &other}) {
+    if (of->fastest_hz <= 0) return 30.0;
+    rate = std::min(rate, of->fastest_hz);
+  }
+  return rate;
 }
 
 std::string nameOf(const SeenImu& imu) { return imu.name.empty() ? imu.id : imu.name; }
@@ -198,11 +215,15 @@ std::string configurationFor(const Seen& seen, const std::string& uri) {
     text += "rig: rig.yaml  # perdure calibrate writes it\n# no camera was found\n";
   } else {
     const SeenCamera& camera = seen.cameras.front();
-    const double rate = camera.fastest_hz > 0 ? std::min(20.0, camera.fastest_hz) : 30.0;
+    const SeenCamera& other = seen.cameras.size() > 1 ? seen.cameras[1] : camera;
     text += fmt::format(
-        "rig: rig.yaml  # of images of {}; perdure calibrate writes it\ncamera:\n  id: {}\n"
-        "  rate_hz: {:.4g}\n",
-        sizeFor(camera), quoted(camera.id), rate);
+        "rig: rig.yaml  # of images of {}; perdure calibrate writes it\ncamera:\n  id: {}\n",
+        sizeFor(camera, other), quoted(camera.id));
+    if (&other != &camera) {
+      text += fmt::format("  second: {}  # cam1 of the rig; leave it out for one camera\n",
+                          quoted(other.id));
+    }
+    text += fmt::format("  rate_hz: {:.4g}\n", rateFor(camera, other));
   }
   const auto gyro = std::find_if(seen.imus.begin(), seen.imus.end(),
                                  [](const SeenImu& imu) { return imu.gyro && imu.accel; });

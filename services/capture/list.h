@@ -37,7 +37,7 @@ struct Seen {
 Seen lookAround(const std::string& uri);
 
 /// For people: what is there, or what was looked for and is not; and a configuration of the first
-/// camera and the first unit that has both.
+/// camera, or the first two, and the first unit that has both.
 std::string describe(const Seen& seen, const std::string& uri);
 
 /// The whole of `perdure-capture --list [URI]`; 69 where there is nothing. Prints.

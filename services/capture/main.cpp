@@ -2,6 +2,7 @@
 #include <string_view>
 
 #include "services/capture/list.h"
+#include "services/capture/live/libcamera_session.h"
 #include "services/capture/live/live.h"
 #include "services/capture/playback.h"
 
@@ -20,7 +21,7 @@ int main(int argc, char** argv) {
        .body =
            [&](service::Context& context) {
              if (config.source == "libcamera") {
-               capture::Live live(context, config);
+               capture::Live live(context, config, capture::libcameraOpeners);
                return context.run();
              }
              capture::Playback playback(context, config);

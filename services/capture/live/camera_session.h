@@ -16,6 +16,7 @@ namespace perdure::capture {
 
 struct CameraSettings {
   std::string id;                       ///< of libcamera, or a part of it; empty: the first one
+  bool id_alone = false;                ///< no other camera may have it in its id
   std::uint32_t width = 0, height = 0;  ///< pixels, as the rig was calibrated for
   std::string format = "auto";          ///< libcamera's name, as "YUYV"; auto: the best it has
   double rate_hz = 20.0;
@@ -36,6 +37,13 @@ struct CameraShot {
   Result<Frame> frame;         ///< pixels alone; "camera_frame_error" and the reasons of packed()
 };
 
+/// An image as it is given on.
+struct CameraImage {
+  std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME, middle of the middle row's exposure
+  std::uint64_t number = 0;  ///< goes on over openings; frames that were lost leave a gap
+  Frame frame;               ///< pixels, and the camera's name
+};
+
 class CameraSession {
  public:
   virtual ~CameraSession() = default;
@@ -45,6 +53,8 @@ class CameraSession {
   virtual std::string note() const = 0;
   /// Unplugged.
   virtual bool gone() const = 0;
+  /// It is well, and is to be closed and opened again for the sake of another camera.
+  virtual bool stepsAside() const { return false; }
   /// The next one; nothing where none came within so long, or it is gone.
   virtual std::optional<CameraShot> next(std::chrono::milliseconds longest) = 0;
 };

@@ -19,16 +19,16 @@
 #include "common/base/bounded_queue.h"
 #include "common/vision/jpeg.h"
 #include "services/capture/live/camera_memory.h"
+#include "services/capture/live/cameras/camera_choice.h"
+#include "services/capture/live/cameras/shared_manager.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/frame_count.h"
 #include "services/capture/live/libcamera_controls.h"
-#include "services/capture/live/libcamera_log.h"
 #include "services/capture/live/pixels.h"
 
 namespace perdure::capture {
 namespace {
 
-using libcamera::CameraManager;
 using libcamera::FrameBuffer;
 using libcamera::Request;
 namespace controls = libcamera::controls;
@@ -39,41 +39,12 @@ std::uint32_t sequenceOf(const Request& request) {
   return request.buffers().begin()->second->metadata().sequence;
 }
 
-/// libcamera's manager: one at a time in a process. Used by one thread.
-class Cameras {
- public:
-  explicit Cameras(std::function<void(const std::string&)> log) : log_(std::move(log)) {}
-
-  Result<CameraManager*> manager();
-  /// A camera was unplugged, or there is none: the next manager is another one. libcamera 0.0.3
-  /// looks for cameras twice as often at each device that is plugged in, 2^n times at the nth.
-  void renew() { stale_ = true; }
-
- private:
-  const LibcameraLog log_;  // goes after the manager, whose thread writes to it
-  std::unique_ptr<CameraManager> manager_;
-  bool stale_ = false;
-};
-
-Result<CameraManager*> Cameras::manager() {
-  if (stale_) manager_.reset();
-  stale_ = false;
-  if (manager_) return manager_.get();
-  auto manager = std::make_unique<CameraManager>();
-  if (const int code = manager->start(); code < 0) {
-    return fail("camera_absent",
-                fmt::format("libcamera does not start: {}.", std::strerror(-code)));
-  }
-  manager_ = std::move(manager);
-  return manager_.get();
-}
-
 /// libcamera's thread calls slots and looks at requests by bare pointers, and a call of
 /// queueRequest() only reaches it some time later. So all that touches requests and signals is done
 /// on that thread: nothing can be unplugged in between, and after end() it knows of none of them.
 class Session final : public CameraSession, public libcamera::Object {
  public:
-  static Result<std::unique_ptr<CameraSession>> open(std::shared_ptr<Cameras> cameras,
+  static Result<std::unique_ptr<CameraSession>> open(std::shared_ptr<SharedManager> shared,
                                                      const CameraSettings& settings);
   ~Session() override;
   Session(const Session&) = delete;
@@ -89,11 +60,12 @@ class Session final : public CameraSession, public libcamera::Object {
                     : asked_.missing;
   }
   bool gone() const override { return gone_; }
+  bool stepsAside() const override { return shared_->restarts() != opened_at_; }
   std::optional<CameraShot> next(std::chrono::milliseconds longest) override;
 
  private:
-  Session(std::shared_ptr<Cameras> cameras, const CameraSettings& settings)
-      : cameras_(std::move(cameras)), settings_(settings) {}
+  Session(std::shared_ptr<SharedManager> shared, const CameraSettings& settings)
+      : shared_(std::move(shared)), opened_at_(shared_->restarts()), settings_(settings) {}
 
   const libcamera::StreamConfiguration& stream() const { return configuration_->at(0); }
 
@@ -116,7 +88,9 @@ class Session final : public CameraSession, public libcamera::Object {
   void disconnected();
   bool end();
 
-  const std::shared_ptr<Cameras> cameras_;
+  const std::shared_ptr<SharedManager> shared_;
+  const unsigned opened_at_;
+  std::shared_ptr<libcamera::CameraManager> manager_;  // goes after its camera
   const CameraSettings settings_;
   std::shared_ptr<libcamera::Camera> camera_;
   std::unique_ptr<libcamera::CameraConfiguration> configuration_;
@@ -135,9 +109,10 @@ class Session final : public CameraSession, public libcamera::Object {
   const Request* asking_ = nullptr;  ///< the one that carries the controls, until it is back
 };
 
-Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<Cameras> cameras,
+Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<SharedManager> shared,
                                                      const CameraSettings& settings) {
-  auto session = std::unique_ptr<Session>(new Session(std::move(cameras), settings));
+  const auto one_by_one = shared->opening();
+  auto session = std::unique_ptr<Session>(new Session(shared, settings));
   for (const auto& step :
        {&Session::choose, &Session::configure, &Session::allocate, &Session::start}) {
     if (const auto done = (session.get()->*step)(); !done) return tl::unexpected(done.error());
@@ -151,7 +126,7 @@ Session::~Session() {
   while (!invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking)) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  if (gone_ || vanished) cameras_->renew();
+  if (gone_ || vanished) shared_->unplugged();
 }
 
 /// False where the kernel has removed the camera and libcamera does not know that yet: stopping it
@@ -172,22 +147,19 @@ bool Session::end() {
 }
 
 Result<void> Session::choose() {
-  const auto manager = cameras_->manager();
+  auto manager = shared_->manager();
   if (!manager) return tl::unexpected(manager.error());
-  std::string there;
-  for (const auto& camera : (*manager)->cameras()) {
-    there += (there.empty() ? "" : ", ") + camera->id();
-    if (!camera_ && camera->id().find(settings_.id) != std::string::npos) camera_ = camera;
-  }
-  if (!camera_) {
+  manager_ = *std::move(manager);
+  const auto there = manager_->cameras();
+  std::vector<std::string> ids;
+  for (const auto& camera : there) ids.push_back(camera->id());
+  const auto chosen = chooseCamera(ids, settings_.id, settings_.id_alone);
+  if (!chosen) {
     // One that came before udev had let this user have its nodes is left out by libcamera for good.
-    cameras_->renew();
-    return fail("camera_absent",
-                fmt::format("libcamera sees no camera{} (there are: {}); is it plugged in, and may "
-                            "this user read /dev/video* and /dev/media*?",
-                            settings_.id.empty() ? "" : " with " + settings_.id + " in its id",
-                            there.empty() ? "none" : there));
+    shared_->missing();
+    return tl::unexpected(chosen.error());
   }
+  camera_ = there[*chosen];
   home_ = thread();
   moveToThread(camera_->thread());
   acquired_ = camera_->acquire() == 0;
@@ -368,10 +340,14 @@ std::int64_t Session::timeOf(Request& request, const libcamera::FrameMetadata& m
 
 }  // namespace
 
-OpenCamera libcameraOpener(CameraSettings settings, std::function<void(const std::string&)> log) {
-  return [settings = std::move(settings), cameras = std::make_shared<Cameras>(std::move(log))] {
-    return Session::open(cameras, settings);
-  };
+std::vector<OpenCamera> libcameraOpeners(const std::vector<CameraSettings>& cameras,
+                                         std::function<void(const std::string&)> log) {
+  const auto shared = std::make_shared<SharedManager>(std::move(log));
+  std::vector<OpenCamera> openers;
+  for (const CameraSettings& settings : cameras) {
+    openers.push_back([shared, settings] { return Session::open(shared, settings); });
+  }
+  return openers;
 }
 
 bool openVideoNodeVanished(const std::filesystem::path& descriptors) {

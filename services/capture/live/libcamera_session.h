@@ -4,14 +4,16 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "services/capture/live/camera_session.h"
 
 namespace perdure::capture {
 
-/// Opens the camera of these settings. `log` gets libcamera's lines, on any thread, as long as the
-/// result or one of its sessions lives. One for the process.
-OpenCamera libcameraOpener(CameraSettings settings, std::function<void(const std::string&)> log);
+/// Opens the cameras of these settings, one opener for each. `log` gets libcamera's lines, on any
+/// thread, as long as one of the results or of their sessions lives. Once for the process.
+std::vector<OpenCamera> libcameraOpeners(const std::vector<CameraSettings>& cameras,
+                                         std::function<void(const std::string&)> log);
 
 /// Whether a video node that this process has open is there no more. `descriptors`: links to what
 /// is open.

@@ -3,27 +3,43 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
-#include "services/capture/live/libcamera_session.h"
 
 namespace perdure::capture {
 namespace {
 
-constexpr const char* kCamera = "cam0";
+std::size_t camerasOf(const Config& config) { return config.camera.second.empty() ? 1 : 2; }
 
-Calibration rigOf(const Config& config, InstanceId source) {
+bool isUsed(const CameraCalibration& camera, const Config& config) {
+  return camera.name == cameraName(0) || (camera.name == cameraName(1) && camerasOf(config) > 1);
+}
+
+/// `unused` gets a sentence where the rig has a camera that is not used.
+Calibration rigOf(const Config& config, InstanceId source, std::string& unused) {
   requireSource(config);
   Calibration rig = replay::readRig(config.rig);
   rig.source = source;
-  std::erase_if(rig.cameras, [](const CameraCalibration& c) { return c.name != kCamera; });
-  rig.cameras.front().rate_hz = config.camera.rate_hz;
+  const auto rest = std::erase_if(rig.cameras, [&](const auto& c) { return !isUsed(c, config); });
+  if (rig.cameras.size() < camerasOf(config)) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "camera.second is given, and " + config.rig +
+                           " has no cam1: `perdure calibrate` writes it with both cameras; or "
+                           "leave camera.second empty.");
+  }
+  if (rest > 0) {
+    unused = "The rig has cam1, and camera.second names no camera for it: it is not used.";
+  }
+  for (auto& camera : rig.cameras) camera.rate_hz = config.camera.rate_hz;
   rig.has_speed = config.speed.source != "none";
   return rig;
 }
 
 CameraSettings cameraSettings(const Config& config, const CameraCalibration& camera) {
   CameraSettings settings;
-  settings.id = config.camera.id;
+  const bool second = camera.name == cameraName(1);
+  settings.id = second ? config.camera.second : config.camera.id;
+  settings.id_alone = camerasOf(config) > 1;
   settings.width = camera.width;
   settings.height = camera.height;
   settings.format = config.camera.format;
@@ -35,7 +51,7 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
   settings.flip = config.camera.flip;
   settings.crop = config.camera.crop;
   settings.readout_s = camera.readout_s;
-  settings.encoding = config.image.cam0;
+  settings.encoding = second ? config.image.cam1 : config.image.cam0;
   if (config.image.compress == "jpeg")
     settings.jpeg_quality = static_cast<int>(config.image.quality);
   return settings;
@@ -43,13 +59,12 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
 
 }  // namespace
 
-Live::Live(service::Context& context, const Config& config)
+Live::Live(service::Context& context, const Config& config, const CameraOpeners& openers)
     : context_(context),
-      frames_(context.writer(bus::topics::frame(kCamera))),
       calibrations_(context.writer(bus::topics::kCalibration)),
       imu_(context.sink(bus::topics::kImu)),
       speed_(context.sink(bus::topics::kSpeed)),
-      rig_(rigOf(config, context.instance())),
+      rig_(rigOf(config, context.instance(), unused_)),
       vehicle_(config.speed, config.gnss,
                {[this](const SpeedReading& reading) { offerOfVehicle(reading); },
                 [this](const EarthPlace& place) { offerOfVehicle(place); }}) {
@@ -58,11 +73,22 @@ Live::Live(service::Context& context, const Config& config)
   context_.onHealth([this] { updateHealth(); });
   context_.loop().onWake([this] { pump(); });
   if (rig_.imu) openImu(config.imu);
-  camera_ = std::make_unique<LiveCamera>(
-      libcameraOpener(
-          cameraSettings(config, rig_.cameras.front()),
-          [this](const std::string& line) { context_.log().warn("libcamera: {}", line); }),
+  openCameras(config, openers);
+}
+
+void Live::openCameras(const Config& config, const CameraOpeners& openers) {
+  constexpr std::chrono::milliseconds kLookForDue{2};
+  std::vector<CameraSettings> settings;
+  for (const CameraCalibration& camera : rig_.cameras) {
+    frames_[camera.name] = &context_.writer(bus::topics::frame(camera.name));
+    settings.push_back(cameraSettings(config, camera));
+  }
+  cameras_ = std::make_unique<LiveCameras>(
+      openers(settings,
+              [this](const std::string& line) { context_.log().warn("libcamera: {}", line); }),
       config.camera.rate_hz, [this](CameraImage image) { offer(Message(std::move(image))); });
+  if (settings.size() < 2) return;
+  context_.every(kLookForDue, [this] { write(cameras_->due(HostClock::nowNs())); });
 }
 
 void Live::openImu(const ImuConfig& config) {
@@ -99,7 +125,8 @@ void Live::scanned(const IioScan& scan) {
 }
 
 void Live::offer(Message message) {
-  if (std::holds_alternative<CameraImage>(message)) context_.health().frameIn();
+  const auto* image = std::get_if<CameraImage>(&message);
+  if (image && image->frame.camera == cameraName(0)) context_.health().frameIn();
   queue_.push(std::move(message));
   context_.loop().wake();
 }
@@ -119,13 +146,19 @@ void Live::pump() {
 }
 
 void Live::publish(CameraImage image) {
-  Frame& frame = image.frame;
-  frame.stamp.source = context_.instance();
-  frame.stamp.sequence = image.number;
-  frame.stamp.time = clock_.at(image.time_ns);
-  frame.stamp.captured_ns = std::chrono::steady_clock::now().time_since_epoch().count();
-  frame.camera = kCamera;
-  if (frames_.write(frame)) context_.health().frameOut();
+  write(cameras_->pair(std::move(image), HostClock::nowNs()));
+}
+
+void Live::write(std::vector<CameraImage> images) {
+  for (CameraImage& image : images) {
+    Frame& frame = image.frame;
+    frame.stamp.source = context_.instance();
+    frame.stamp.sequence = image.number;
+    frame.stamp.time = clock_.at(image.time_ns);
+    frame.stamp.captured_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+    const bool written = frames_.at(frame.camera)->write(frame).has_value();
+    if (written && frame.camera == cameraName(0)) context_.health().frameOut();
+  }
 }
 
 void Live::publish(const InertialPair& sample) {
@@ -168,8 +201,8 @@ std::string Live::imuYield() {
 }
 
 void Live::updateHealth() {
-  const std::string note = camera_->state().note();
-  std::string problem = camera_->state().problem(), names = camera_->state().name();
+  const std::string note = joined(cameras_->note(), unused_);
+  std::string problem = cameras_->problem(), names = cameras_->name();
   for (const auto& imu : imus_) {
     problem = joined(problem, imu->state().problem());
     names = joined(names, imu->state().name(), "; ");
@@ -189,7 +222,7 @@ void Live::report(ReasonCounts& counts) const {
     for (const auto& [reason, n] : more.all()) counts.add(reason, n);
   };
   add(reasons_);
-  add(camera_->state().reasons());
+  cameras_->report(counts);
   vehicle_.report(counts);
   for (const auto& imu : imus_) add(imu->state().reasons());
   const std::lock_guard lock(pairing_mutex_);

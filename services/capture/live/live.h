@@ -1,6 +1,9 @@
-// Live sensors on the bus: a camera, an IMU, the vehicle's speed, and the rig's calibration.
+// Live sensors on the bus: one camera or two, an IMU, the vehicle's speed, and the rig's
+// calibration.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -10,30 +13,36 @@
 #include "common/base/bounded_queue.h"
 #include "common/service/service.h"
 #include "services/capture/config.h"
+#include "services/capture/live/cameras/live_cameras.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/iio_stream.h"
 #include "services/capture/live/imu_pairing.h"
 #include "services/capture/live/imu_yield.h"
-#include "services/capture/live/live_camera.h"
 #include "services/capture/vehicle/vehicle.h"
 
 namespace perdure::capture {
 
+/// Those that open the cameras of these settings, and what their lines go to.
+using CameraOpeners = std::function<std::vector<OpenCamera>(
+    const std::vector<CameraSettings>& cameras, std::function<void(const std::string&)> log)>;
+
 class Live {
  public:
   /// Reads the rig and publishes it; opens the sensors beside, and again whenever they are gone.
-  /// Throws StartupError where the rig is not given or cannot be read.
-  Live(service::Context& context, const Config& config);
+  /// Throws StartupError where the rig is not given, cannot be read, or lacks a camera.
+  Live(service::Context& context, const Config& config, const CameraOpeners& openers);
 
  private:
   using Message = std::variant<CameraImage, InertialPair, SpeedReading, EarthPlace>;
 
+  void openCameras(const Config& config, const CameraOpeners& openers);
   void openImu(const ImuConfig& config);
   void scanned(const IioScan& scan);
   void offer(Message message);
   void offerOfVehicle(Message message);
   void pump();
   void publish(CameraImage image);
+  void write(std::vector<CameraImage> images);
   void publish(const InertialPair& sample);
   void publish(const SpeedReading& reading);
   /// The calibration again, with where on Earth the body stood.
@@ -44,10 +53,11 @@ class Live {
 
   service::Context& context_;
   const HostClock clock_;
-  bus::Writer<Frame>& frames_;
+  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< by camera
   bus::Writer<Calibration>& calibrations_;
   Sink<ImuSample> imu_;
   Sink<SpeedSample> speed_;
+  std::string unused_;  ///< what the rig has and the configuration does not use
   Calibration rig_;
   BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of an IMU
   /// Apart: a sender in the network that says too much costs no images.
@@ -58,14 +68,14 @@ class Live {
   std::int64_t last_speed_ns_ = 0;
   ReasonCounts reasons_;
   std::string said_;   ///< names of the sensors, as logged last
-  std::string noted_;  ///< what the camera does not do as asked, as logged last
+  std::string noted_;  ///< what the cameras do not do as asked, as logged last
   ImuYield yield_;
   mutable std::mutex pairing_mutex_;
   ImuPairing pairing_;
   std::uint64_t readings_ = 0;  ///< of the gyroscope
   // The threads of these use all of the above: they go first.
   std::vector<std::unique_ptr<IioStream>> imus_;
-  std::unique_ptr<LiveCamera> camera_;
+  std::unique_ptr<LiveCameras> cameras_;
   Vehicle vehicle_;
 };
 

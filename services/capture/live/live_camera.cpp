@@ -34,7 +34,7 @@ void LiveCamera::flow(CameraSession& session) {
   numbers_.reopened();
   rate_.reopened();
   int silent = 0;
-  while (!stopping_ && !session.gone() && silent < kSilence) {
+  while (!stopping_ && !session.gone() && !session.stepsAside() && silent < kSilence) {
     auto shot = session.next(kWait);
     silent = shot ? 0 : silent + 1;
     if (!shot) continue;
@@ -44,6 +44,8 @@ void LiveCamera::flow(CameraSession& session) {
   if (stopping_) return;
   if (session.gone()) {
     state_.fails({"camera_lost", "the camera was unplugged; plug it in again, and it goes on."});
+  } else if (session.stepsAside()) {
+    state_.count("camera_reopened");
   } else {
     state_.fails({"camera_silent", "the camera " + session.name() +
                                        " gives no images; it is opened again. Is its cable "

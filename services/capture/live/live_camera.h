@@ -12,12 +12,6 @@
 
 namespace perdure::capture {
 
-struct CameraImage {
-  std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  std::uint64_t number = 0;  ///< goes on over openings; frames that were lost leave a gap
-  Frame frame;               ///< pixels alone
-};
-
 class LiveCamera {
  public:
   /// Both are called on the camera's thread. `rate_hz`: what is asked for.
@@ -27,7 +21,8 @@ class LiveCamera {
   LiveCamera& operator=(const LiveCamera&) = delete;
 
   /// Counts "camera_absent" (a try to open it), "camera_lost", "camera_silent" (it flowed),
-  /// "camera_frame_lost", "camera_frame_error", and the reasons of packed().
+  /// "camera_frame_lost", "camera_frame_error", "camera_reopened" (for another one), and the
+  /// reasons of packed().
   const DeviceState& state() const { return state_; }
 
  private:

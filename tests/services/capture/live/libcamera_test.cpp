@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
+#include "services/capture/live/cameras/shared_manager.h"
 #include "services/capture/live/libcamera_controls.h"
 #include "services/capture/live/libcamera_log.h"
 #include "services/capture/live/libcamera_session.h"
@@ -146,13 +148,49 @@ TEST(LibcameraLog, GetsLibcamerasLinesWithoutColours) {
 TEST(LibcameraSession, SaysThatThereIsNoCameraEachTimeItIsAsked) {
   CameraSettings settings;
   settings.id = "that nobody has";
-  const OpenCamera open = libcameraOpener(settings, [](const std::string&) {});
+  const OpenCamera open = libcameraOpeners({settings}, [](const std::string&) {}).front();
   for (int i = 0; i < 3; ++i) {
     const auto session = open();
     ASSERT_FALSE(session);
     EXPECT_EQ(session.error().code, "camera_absent");
     EXPECT_THAT(session.error().detail, HasSubstr("that nobody has in its id"));
   }
+}
+
+TEST(SharedManager, IsAnotherOneAsSoonAsNobodyUsesIt) {
+  SharedManager shared([](const std::string&) {});
+  auto user = *shared.manager();
+  const std::weak_ptr<libcamera::CameraManager> first = user;
+  shared.unplugged();
+  EXPECT_EQ(*shared.manager(), user) << "another camera uses it";
+  user.reset();
+  user = *shared.manager();
+  EXPECT_TRUE(first.expired());
+  const std::weak_ptr<libcamera::CameraManager> second = user;
+  user.reset();
+  EXPECT_EQ(*shared.manager(), second.lock()) << "nothing was unplugged";
+}
+
+TEST(SharedManager, AsksTheCamerasThatRunAsideForOneThatCameAndIsNotFound) {
+  const std::filesystem::path folder =
+      ::testing::TempDir() + "/perdure_manager_" + std::to_string(getpid());
+  std::filesystem::create_directories(folder);
+  SharedManager shared([](const std::string&) {}, folder);
+  auto running = *shared.manager();
+  const auto miss = [&] {
+    const auto looking = *shared.manager();
+    shared.missing();
+  };
+  for (int i = 0; i < 10; ++i) miss();
+  EXPECT_EQ(shared.restarts(), 0U) << "it is not there";
+  std::ofstream(folder / "video0") << "x";
+  for (int i = 0; i < 10; ++i) miss();
+  EXPECT_EQ(shared.restarts(), 1U);
+  running.reset();
+  std::ofstream(folder / "video1") << "x";
+  for (int i = 0; i < 10; ++i) miss();
+  EXPECT_EQ(shared.restarts(), 1U) << "nobody is to be disturbed";
+  std::filesystem::remove_all(folder);
 }
 
 TEST(LibcameraSession, SeesThatAVideoNodeThatIsOpenIsThereNoMore) {

@@ -44,6 +44,22 @@ TEST(ListOfSensors, NamesModesAndRatesAndAConfigurationThatCanBeRead) {
   EXPECT_THAT(text, HasSubstr("of images of 1280x720"));
 }
 
+TEST(ListOfSensors, TwoCamerasAreBothPastedWithWhatBothHave) {
+  Seen seen = cameraAndImu();
+  EXPECT_THAT(describe(seen, "local:"), Not(HasSubstr("second:")));
+  SeenCamera other = seen.cameras.front();
+  other.id = "imx219 10-0010";
+  other.modes = {{"YUYV", {{640, 480}}}};
+  other.fastest_hz = 15;
+  seen.cameras.push_back(other);
+  const std::string text = describe(seen, "local:");
+  const YAML::Node camera = pasted(text)["camera"];
+  EXPECT_EQ(camera["id"].as<std::string>(), "\\_SB_.PCI0: it's-1.0-046d:0825");
+  EXPECT_EQ(camera["second"].as<std::string>(), "imx219 10-0010");
+  EXPECT_EQ(camera["rate_hz"].as<double>(), 15.0);
+  EXPECT_THAT(text, HasSubstr("of images of 640x480"));
+}
+
 TEST(ListOfSensors, TwoDevicesOfAnImuAreBothNamed) {
   Seen seen = cameraAndImu();
   seen.cameras.clear();

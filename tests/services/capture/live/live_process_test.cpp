@@ -111,6 +111,26 @@ TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
   })) << last_health_.message;
 }
 
+/// Through libcamera itself, with one manager for both.
+TEST_F(LiveProcess, NamesBothCamerasThatAreMissing) {
+  Calibration both = rig();
+  both.cameras.push_back(both.cameras.front());
+  both.cameras.back().name = "cam1";
+  both.imu.reset();
+  const Child capture(command({"camera.id=nobodys left", "camera.second=nobodys right"}, both),
+                      folder_.file("log"));
+  ASSERT_TRUE(runUntil(loop_,
+                       [&] {
+                         return last_health_.reasons["camera_absent_cam0"] > 3 &&
+                                last_health_.reasons["camera_absent_cam1"] > 3;
+                       }))
+      << last_health_.message << capture.log();
+  EXPECT_EQ(last_health_.state, HealthState::kDegraded);
+  EXPECT_THAT(last_health_.message, HasSubstr("cam0: libcamera sees no camera with nobodys left"));
+  EXPECT_THAT(last_health_.message, HasSubstr("cam1: libcamera sees no camera with nobodys right"));
+  EXPECT_EQ(calibration_.cameras.size(), 2U);
+}
+
 TEST_F(LiveProcess, SaysThatAnImuWithAFrozenClockGivesNoSamples) {
   const FakeIiod iiod(address_, {{.rate_hz = 400.0, .frozen_clock = true}});
   const Child capture(command({"imu.uri=ip:" + address_, "imu.rate_hz=400"}), folder_.file("log"));
@@ -195,6 +215,9 @@ TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
   EXPECT_THAT(messageOf(command({}, rig(false)), 69), HasSubstr("cam0 is missing"));
   EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0]"}), 78),
               HasSubstr("imu.mount has 3 numbers"));
+  EXPECT_THAT(messageOf(command({"camera.second=right"}), 78), HasSubstr("camera.id is empty"));
+  EXPECT_THAT(messageOf(command({"camera.id=left", "camera.second=right"}), 78),
+              HasSubstr("has no cam1"));
   EXPECT_THAT(messageOf(command({"speed.source=can"}), 78), HasSubstr("speed.can.signals"));
   EXPECT_THAT(messageOf(command({"speed.source=gnss"}), 78), HasSubstr("set gnss.source"));
   auto without = command({});
