@@ -4,6 +4,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
+#include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
 #include "common/replay/recordings/recorded_messages.h"
@@ -20,7 +21,7 @@ Duration usualInterval(const std::vector<ImuSample>& samples) {
   if (samples.size() < 3) return Duration{0};
   std::vector<Duration> intervals;
   for (std::size_t i = 1; i < samples.size(); ++i) {
-    intervals.push_back(samples[i].time - samples[i - 1].time);
+    intervals.push_back(between(samples[i].time, samples[i - 1].time));
   }
   const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
   std::nth_element(intervals.begin(), middle, intervals.end());
@@ -126,8 +127,8 @@ ImuSample Dataset::takeImu() {
   ImuSample sample = recording_.imu[next_imu_];
   sample.source = options_.source;
   if (next_imu_ > 0 && usual_interval_ > Duration{0}) {
-    const Duration gap = sample.time - recording_.imu[next_imu_ - 1].time;
-    if (2 * gap > 7 * usual_interval_) {
+    const Duration gap = between(sample.time, recording_.imu[next_imu_ - 1].time);
+    if (multipleOf(2, gap) > multipleOf(7, usual_interval_)) {
       count({"imu_gap", "no inertial samples for " + std::to_string(toSeconds(gap)) + " s"});
     }
   }
@@ -203,7 +204,7 @@ std::optional<std::uint64_t> Dataset::skip(Duration after) {
   for (const auto& frame : recording_.frames) {
     if (frame.camera != 0) continue;
     if (!first) first = frame.time;
-    if (frame.time - *first < after) continue;
+    if (between(frame.time, *first) < after) continue;
     seek(frame.index);
     return frame.index;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "common/replay/files/stamps.h"
 #include "common/vision/decode.h"
 
 namespace perdure::replay {
@@ -59,11 +60,11 @@ void sortFrames(Recording& recording) {
 }
 
 const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
-  constexpr Duration kSame = std::chrono::milliseconds(5);
-  const auto at =
-      std::lower_bound(first.begin(), first.end(), time - kSame,
-                       [](const auto& frame, TimePoint begin) { return frame.time < begin; });
-  return at != first.end() && at->time - time <= kSame ? &*at : nullptr;
+  static constexpr Duration kSame = std::chrono::milliseconds(5);
+  const auto at = std::lower_bound(
+      first.begin(), first.end(), time,
+      [](const auto& frame, TimePoint of) { return between(of, frame.time) > kSame; });
+  return at != first.end() && between(at->time, time) <= kSame ? &*at : nullptr;
 }
 
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera) {

@@ -30,6 +30,7 @@ constexpr std::uint32_t kWidth = 640, kHeight = 480;
 // camera; a Kinect's are 25 mm apart.
 constexpr double kDepthFocal_px = 585.0, kFocal_px = 525.0, kBaseline_m = 0.025;
 constexpr std::size_t kDepthImages = 25;
+constexpr double kFarthest_m = 1e6;
 
 TimePoint timeOf(std::size_t index) {
   return TimePoint(durationFromSeconds(static_cast<double>(index) / kRate_hz));
@@ -207,7 +208,11 @@ std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong)
   if (!T.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-6)) {
     return complain("the last row of a pose is 0 0 0 1");
   }
-  return RigidTransform(R, Eigen::Vector3d(T.topRightCorner<3, 1>()));
+  const Eigen::Vector3d p = T.topRightCorner<3, 1>();
+  if (!(p.cwiseAbs().maxCoeff() <= kFarthest_m)) {
+    return complain("the camera is more than 1000 km away; poses are in metres");
+  }
+  return RigidTransform(R, p);
 }
 
 /// T_PC by frame. Wrong files are refused, the first ten by name.
@@ -280,8 +285,8 @@ Eigen::Vector3d upOf(const fs::path& folder, const std::optional<SensorFile>& se
   if (sensor && sensor->has("up")) {
     const auto v = sensor->numbers("up", 3);
     const Eigen::Vector3d up(v[0], v[1], v[2]);
-    if (!(up.norm() > 1e-6)) sensor->wrong("up", "is no direction");
-    return up.normalized();
+    if (!(up.stableNorm() > 1e-6)) sensor->wrong("up", "is no direction");
+    return up.stableNormalized();
   }
   const UpEstimate estimate = estimateUp(folder, files, poses);
   char text[200];

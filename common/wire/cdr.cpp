@@ -42,16 +42,19 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
   if (version == 0) {
     return fail("bad_encapsulation", std::string("not how ") + type.m_typename + " is encoded");
   }
-  // Cyclone checks and turns bytes in place, and wants them aligned.
+  // Cyclone checks and turns bytes in place, and wants them aligned. In XCDR2 it asks for four
+  // bytes where a number of an array has eight: what it turns may be twice as long as what there
+  // is, and then ends behind it.
   const auto payload = message.subspan(kHeader);
-  std::vector<std::uint64_t> aligned(payload.size() / sizeof(std::uint64_t) + 1);
+  std::vector<std::uint64_t> aligned(2 * payload.size() / sizeof(std::uint64_t) + 1);
   if (!payload.empty()) std::memcpy(aligned.data(), payload.data(), payload.size());
   auto* const bytes = reinterpret_cast<char*>(aligned.data());
   const auto size = static_cast<std::uint32_t>(payload.size());
   std::uint32_t offset = 0;
   const bool turned = (message[1] & 1u) != kNative;
   if (payload.size() > UINT32_MAX / 2 ||
-      !dds_stream_normalize_data(bytes, &offset, size, turned, version, type.m_ops)) {
+      !dds_stream_normalize_data(bytes, &offset, size, turned, version, type.m_ops) ||
+      offset > size) {
     return fail("malformed_cdr", std::string("no ") + type.m_typename);
   }
   if (version == kVersion2 &&

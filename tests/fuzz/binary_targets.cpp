@@ -1,4 +1,4 @@
-// Messages of the bus, recordings of them, compressed images and the map's blobs.
+// Messages of the bus, recordings of them, and compressed images.
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -11,12 +11,9 @@
 #include "common/vision/jpeg.h"
 #include "common/wire/cdr.h"
 #include "common/wire/json.h"
-#include "services/map_store/core/belief_codec.h"
-#include "services/map_store/core/graph/graph_codec.h"
 #include "tests/common/wire/examples.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/target.h"
-#include "tests/services/map_store/graphs.h"
 
 namespace perdure::fuzz {
 namespace {
@@ -115,6 +112,43 @@ Bytes recording(bool finished) {
   return contentsOf(file);
 }
 
+template <class T>
+void putChannel(Bytes& file, std::uint16_t id, const std::string& topic) {
+  replay::mcap::putSchema(file, {id, wire::Type<T>::descriptor().m_typename, "omgidl", ""});
+  replay::mcap::putChannel(file, {id, id, topic, "cdr", {}});
+}
+template <class T>
+void putAlone(Bytes& file, std::uint16_t channel, const T& message, std::uint64_t log_ns) {
+  const Bytes data = wire::encodeCdr(message).value();
+  replay::mcap::putMessage(file, {channel, 1, log_ns, log_ns, data});
+}
+
+/// The same as small writers leave it: each message in the file itself. Without an end it was cut.
+Bytes withoutChunks(bool ended) {
+  Bytes file(replay::mcap::kMagic.begin(), replay::mcap::kMagic.end());
+  putChannel<Calibration>(file, 1, "perdure/ego/calibration");
+  putChannel<ImuSample>(file, 2, "perdure/ego/imu");
+  putChannel<Frame>(file, 3, "perdure/ego/frame/cam0");
+  wire::Examples examples(7);
+  Calibration calibration;
+  Frame frame;
+  examples.fill(calibration), examples.fill(frame);
+  putAlone(file, 1, calibration, 1000);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    ImuSample imu;
+    examples.fill(imu);
+    imu.time = fromNanoseconds(static_cast<std::int64_t>(5'000'000 * i));
+    putAlone(file, 2, imu, 1000 + i);
+    putAlone(file, 3, frame, 1000 + i);
+  }
+  if (!ended) return file;
+  replay::mcap::Put put(file);
+  put.record(replay::mcap::Op::kDataEnd, Bytes(4));
+  put.record(replay::mcap::Op::kFooter, Bytes(replay::mcap::kFooterContent));
+  file.insert(file.end(), replay::mcap::kMagic.begin(), replay::mcap::kMagic.end());
+  return file;
+}
+
 /// Every chunk and message, and then a finished file of it.
 bool readContainer(const fs::path& file) {
   auto reader = replay::mcap::Reader::open(file);
@@ -205,83 +239,18 @@ std::vector<Bytes> jpegs() {
   return {Bytes(packed.data->begin(), packed.data->end())};
 }
 
-bool takeBelief(View bytes) {
-  const auto belief = map_store::decodeBelief(bytes);
-  if (!belief) return false;
-  require(map_store::decodeBelief(map_store::encodeBelief(*belief)).has_value(),
-          "a belief reads back");
-  return true;
-}
-
-bool takeHeader(View bytes) {
-  const auto header = map_store::decodeHeader(bytes);
-  if (!header) return false;
-  require(map_store::decodeHeader(map_store::encodeHeader(*header)).has_value(),
-          "a header reads back");
-  return true;
-}
-
-std::vector<Bytes> beliefs() {
-  std::vector<Bytes> seeds;
-  for (const unsigned seed : {1U, 2U, 3U}) {
-    seeds.push_back(map_store::encodeBelief(wire::Examples(seed).belief()));
-  }
-  return seeds;
-}
-
-std::vector<Bytes> headers() {
-  Objects objects;
-  wire::Examples(4).fill(objects);
-  return {map_store::encodeHeader(objects)};
-}
-
-/// The first byte says whether it is an anchor, an edge or a sighting.
-bool takeGraph(View bytes) {
-  if (bytes.empty()) return false;
-  const View blob = bytes.subspan(1);
-  const auto isTaken = [&](auto decode, auto encode) {
-    const auto value = decode(blob);
-    if (!value) return false;
-    require(map_store::isSound(*value), "what was taken is sound");
-    require(decode(encode(*value)).has_value(), "a part of the graph reads back");
-    return true;
-  };
-  switch (bytes[0] % 3) {
-    case 0:
-      return isTaken(map_store::decodeAnchor, map_store::encodeAnchor);
-    case 1:
-      return isTaken(map_store::decodeEdge, map_store::encodeEdge);
-    default:
-      return isTaken(map_store::decodeRecord, map_store::encodeRecord);
-  }
-}
-
-std::vector<Bytes> graphs() {
-  const auto map = map_store::test::RandomGraph(1).map({});
-  std::vector<Bytes> seeds;
-  for (const std::uint64_t id : {1U, 2U, 3U}) {
-    seeds.push_back(map_store::encodeAnchor(map.anchors.at(id).anchor));
-    seeds.push_back(map_store::encodeEdge(map.edges.at(id).edge));
-    seeds.push_back(map_store::encodeRecord(map.records.at(id)));
-  }
-  for (std::size_t i = 0; i < seeds.size(); ++i) {
-    seeds[i].insert(seeds[i].begin(), static_cast<std::uint8_t>(i % 3));
-  }
-  return seeds;
-}
-
 }  // namespace
 
 std::vector<Target> binaryTargets() {
-  const auto recordings = [] { return std::vector<Bytes>{recording(true), recording(false)}; };
+  const auto recordings = [] {
+    return std::vector<Bytes>{recording(true), recording(false), withoutChunks(true),
+                              withoutChunks(false)};
+  };
   return {{"wire", 48000, wireSeeds, takeWire},
           {"mcap", 9000, recordings, takeContainer},
           {"recording", 4200, recordings, takeRecording},
           {"mcap_records", 18000, recordSeeds, takeRecords},
-          {"jpeg", 9000, jpegs, takeJpeg},
-          {"map_belief", 18000, beliefs, takeBelief},
-          {"map_header", 9000, headers, takeHeader},
-          {"map_graph", 18000, graphs, takeGraph}};
+          {"jpeg", 9000, jpegs, takeJpeg}};
 }
 
 }  // namespace perdure::fuzz

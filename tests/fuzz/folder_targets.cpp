@@ -1,5 +1,6 @@
 // Dataset folders: what stands in their files is damaged, and what is missing is removed; images
 // stay as they are.
+#include <cmath>
 #include <fstream>
 
 #include "common/replay/dataset.h"
@@ -33,6 +34,7 @@ const Names kRawFiles{"calib_cam_to_cam.txt",
                       "2011_09_26_drive_9999_sync/oxts/data/0000000000.txt",
                       "2011_09_26_drive_9999_sync/oxts/data/0000000001.txt"};
 const Names kTrackingFiles{"calib/0000.txt", "calib/0001.txt", "label_02/0001.txt"};
+const Names kSceneFiles{"sensor.yaml", "frame-000000.pose.txt", "frame-000001.pose.txt"};
 const Names kTruthFiles{sim::kObjectsTruthFile, sim::kVisibilityTruthFile};
 
 /// In scratch(), each once; what was made for the seeds is where damaged ones go.
@@ -53,6 +55,25 @@ const fs::path& rawFolder() {
 }
 const fs::path& trackingFolder() {
   static const fs::path folder = (scratch(), replay::tinyKittiTracking("fuzz_tracking"));
+  return folder;
+}
+
+/// Images of a lens of their own, for those of 640 × 480 pixels take long.
+const fs::path& sceneFolder() {
+  static const fs::path folder = [] {
+    scratch();
+    const fs::path made = replay::freshFolder("fuzz_scene");
+    for (const char* number : {"0", "1"}) {
+      const std::string frame = "frame-00000" + std::string(number);
+      replay::writeImage(made / (frame + ".color.png"), 8, 6, 3);
+      replay::writeDeepImage(made / (frame + ".depth.png"), 8, 6, 12);
+      replay::writeText(made / (frame + ".pose.txt"),
+                        "1 0 0 0." + std::string(number) + "\n0 1 0 2\n0 0 1 -3\n0 0 0 1\n");
+    }
+    replay::writeText(made / "sensor.yaml",
+                      "up: [0.1, -0.9, -0.4]\nresolution: [8, 6]\nintrinsics: [7, 7, 4, 3]\n");
+    return made;
+  }();
   return folder;
 }
 
@@ -91,6 +112,20 @@ bool takeTracking(View bytes) {
   const bool labels =
       unlessRefused([] { playThrough({.path = trackingFolder(), .sequence = "0001"}); });
   return images && labels;
+}
+
+bool takeScene(View bytes) {
+  unpack(bytes, sceneFolder(), kSceneFiles);
+  return unlessRefused([] {
+    const replay::DatasetOptions options{.path = sceneFolder()};
+    const auto dataset = replay::Dataset::open(options);
+    require(dataset->truth().has_value(), "a scene has poses");
+    for (const auto& pose : dataset->truth()->poses()) {
+      require(pose.T_WB.p.allFinite() && std::abs(pose.T_WB.q.norm() - 1.0) < 1e-6,
+              "a pose that was read is one");
+    }
+    playThrough(options);
+  });
 }
 
 constexpr char kTruth[] =
@@ -133,6 +168,7 @@ std::vector<Target> folderTargets() {
   return {{"euroc", 2400, whole(eurocFolder, kEurocFiles), euroc},
           {"kitti_raw", 2400, whole(rawFolder, kRawFiles), raw},
           {"kitti_tracking", 2400, whole(trackingFolder, kTrackingFiles), takeTracking},
+          {"seven_scenes", 2400, whole(sceneFolder, kSceneFiles), takeScene},
           {"simulated_truth", 4200, [] { return std::vector<Bytes>{bytesOf(kTruth)}; }, takeTruth}};
 }
 

@@ -2,10 +2,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/wire/cdr.h"
 #include "services/gateway/node.h"
 #include "services/gateway/protocol/client_message.h"
 #include "services/gateway/web/guard.h"
 #include "services/gateway/web/hub.h"
+#include "tests/common/wire/examples.h"
 #include "tests/fuzz/target.h"
 
 namespace perdure::fuzz {
@@ -24,6 +26,12 @@ std::vector<Bytes> saidSeeds() {
   Bytes call{'b', 2, 1, 0, 0, 0, 9, 0, 0, 0, 4, 0, 0, 0, 'j', 's', 'o', 'n'};
   for (const char c : std::string(R"({"id":12})")) call.push_back(static_cast<std::uint8_t>(c));
   seeds.push_back(call);
+  // Play at twice the speed from 5 ns on; pause.
+  for (const char first : {'b', 'p'}) {
+    const auto opcode = static_cast<std::uint8_t>(first);
+    seeds.push_back({opcode, 3, 0, 0, 0, 0, 64, 1, 5, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 'r'});
+    seeds.push_back({opcode, 3, 1, 0, 0, 128, 63, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  }
   return seeds;
 }
 
@@ -44,24 +52,36 @@ bool isJson(const std::string& text) {
   return true;
 }
 
-/// The first byte says whether it is text: all but 'b' do. What is taken goes through a hub with
-/// one client.
+/// What a client wants of a recording, and the answer to it.
+void obey(web::Hub& hub, const PlaybackRequest& request) {
+  require(request.speed >= 0.01 && request.speed <= 100.0, "a speed is bounded");
+  require(!request.seek || toNanoseconds(*request.seek) >= 0, "a time to seek is one");
+  require(request.id.size() <= 128, "an id is bounded");
+  hub.tellPlayback({PlaybackState::Status::kPlaying, request.seek.value_or(TimePoint()),
+                    request.speed, request.seek.has_value(), request.id});
+}
+
+/// The first byte says whether it is text: all but 'b' and 'p' do; 'p': to a recording that is
+/// played. What is taken goes through a hub with one client.
 bool takeSaid(View bytes) {
   if (bytes.empty()) return false;
-  const bool text = bytes[0] != 'b';
+  const bool text = bytes[0] != 'b' && bytes[0] != 'p';
   const View said = bytes.subspan(1);
   const std::string_view chars(reinterpret_cast<const char*>(said.data()), said.size());
   const auto message = text ? protocol::parseText(chars) : protocol::parseBinary(said);
   if (!message) require(!message.error().code.empty(), "a refusal has a reason");
   Channels wanted;
-  web::Hub hub("perdure", "s", 8,
-               {.wanted = [&](const Channels& c) { wanted = c; }, .call = [](Call) {}});
+  std::optional<PlaybackRequest> request;
+  web::Hub::Told told{.wanted = [&](const Channels& c) { wanted = c; }, .call = [](Call) {}};
+  if (bytes[0] == 'p') told.playback = [&](const PlaybackRequest& r) { request = r; };
+  web::Hub hub("perdure", "s", 8, told);
   static const auto channels = channelTable({"cam0"});
   static const auto services = serviceTable();
   hub.offer(channels, services);
   Silent viewer;
   hub.join(viewer);
   hub.hear(viewer, chars, text, {});
+  if (request) obey(hub, *request);
   require(viewer.outbox().size() <= 3 + 512, "what waits is bounded");
   while (const auto one = viewer.outbox().take()) {
     if (one->text) require(isJson(*one->payload), "what is said as text is JSON");
@@ -105,6 +125,49 @@ std::vector<Bytes> questionSeeds() {
   return seeds;
 }
 
+/// What map_store says of the graph to a gateway at which somebody looks at it.
+bool takeGraphReply(View bytes) {
+  const auto keeper = std::make_shared<Bytes>(bytes.begin(), bytes.end());
+  auto reply = wire::decodeCdr<MapReply>(*keeper, keeper);
+  if (!reply) return false;
+  int told = 0;
+  Node node({}, "ego", 1,
+            {.message =
+                 [&](const Encoded& message) {
+                   require(nlohmann::json::accept(*message.payload), "what is told is JSON");
+                   ++told;
+                 },
+             .time = [](const TimePoint&) {},
+             .answer = [](const Answer&) { require(false, "nobody asked"); },
+             .query =
+                 [&](const MapQuery& query) {
+                   require(query.kind == MapQueryKind::kGraph && query.limit > 0,
+                           "the graph is asked for");
+                   reply->client = query.client, reply->request = query.request;
+                 }});
+  node.setWanted({kMapGraph, kMapGraphScene});
+  node.tick(1);
+  for (MapAnchor& anchor : reply->anchors) anchor.map = {};  // that which is looked at
+  node.onMapReply(*reply);
+  require(!reply->ok || told == 2, "who looks is told");
+  return reply->ok && !reply->anchors.empty();
+}
+
+std::vector<Bytes> graphReplySeeds() {
+  std::vector<Bytes> seeds;
+  for (unsigned seed = 1; seeds.size() < 3; ++seed) {
+    MapReply reply;
+    wire::Examples(seed).fill(reply);
+    reply.ok = true;
+    if (reply.anchors.size() < 2 || reply.loops.empty()) continue;
+    reply.loops[0].a = reply.anchors[0].id, reply.loops[0].b = reply.anchors[1].id;
+    reply.anchors[1].previous = reply.anchors[0].id;
+    reply.objects.clear(), reply.beliefs.clear();
+    seeds.push_back(wire::encodeCdr(reply).value());
+  }
+  return seeds;
+}
+
 /// A Host and an Origin, in two lines: what is let in is a name of ours.
 bool takeHeaders(View bytes) {
   const std::string text = textOf(bytes);
@@ -128,6 +191,7 @@ std::vector<Bytes> headerSeeds() {
 std::vector<Target> gatewayTargets() {
   return {{"gateway_said", 9000, saidSeeds, takeSaid},
           {"gateway_question", 6000, questionSeeds, takeQuestion},
+          {"gateway_graph", 4200, graphReplySeeds, takeGraphReply},
           {"gateway_headers", 18000, headerSeeds, takeHeaders}};
 }
 

@@ -1,7 +1,12 @@
-// Bags of ROS 1, and the messages of both ROS.
+// Bags of ROS 1, SQLite recordings of ROS 2, and the messages of both.
 #include <bzlib.h>
+#include <sqlite3.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
 
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
@@ -99,13 +104,81 @@ Bytes bag(bool compressed) {
   return file;
 }
 
-bool takeBag(View bytes) {
-  const auto file = asFile("drive.bag", bytes);
+/// Sends SQL to a database.
+class Db3 {
+ public:
+  explicit Db3(const std::filesystem::path& file) {
+    std::filesystem::remove(file);
+    require(sqlite3_open(file.c_str(), &database_) == SQLITE_OK, "there is a database");
+  }
+  ~Db3() { sqlite3_close(database_); }
+  Db3(const Db3&) = delete;
+  Db3& operator=(const Db3&) = delete;
+
+  void run(const std::string& sql, const Bytes& blob = {}) {
+    sqlite3_stmt* statement = nullptr;
+    require(sqlite3_prepare_v2(database_, sql.c_str(), -1, &statement, nullptr) == SQLITE_OK, sql);
+    sqlite3_bind_blob(statement, 1, blob.data(), static_cast<int>(blob.size()), SQLITE_TRANSIENT);
+    while (sqlite3_step(statement) == SQLITE_ROW) {
+    }
+    require(sqlite3_finalize(statement) == SQLITE_OK, sql);
+  }
+
+ private:
+  sqlite3* database_ = nullptr;
+};
+
+Bytes imageCdr(std::int32_t second) {
+  ros::Image image;
+  image.header = {{second, 0}, "cam0"};
+  image.height = 2, image.width = image.step = 4;
+  image.encoding = "mono8";
+  image.data = std::make_shared<Bytes>(Bytes{1, 2, 3, 4, 5, 6, 7, 8});
+  return ros::cdrOf(image);
+}
+
+Bytes infoCdr() {
+  ros::CameraInfo info;
+  info.header.frame_id = "cam0";
+  info.height = 2, info.width = 4;
+  info.distortion_model = "plumb_bob";
+  info.d = {0, 0, 0, 0, 0};
+  info.k = {3, 0, 2, 0, 3, 1, 0, 0, 1};
+  return ros::cdrOf(info);
+}
+
+/// Two images and what their camera is; `views`: under names that are none of tables.
+Bytes db3(bool views) {
+  const auto file = scratch() / "seed.db3";
+  {
+    Db3 made(file);
+    made.run("PRAGMA page_size = 512");
+    const std::string put = views ? "_" : "";
+    made.run("CREATE TABLE topics" + put +
+             "(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)");
+    made.run("CREATE TABLE messages" + put +
+             "(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)");
+    made.run("CREATE INDEX timestamp_idx ON messages" + put + "(timestamp ASC)");
+    if (views) made.run("CREATE VIEW topics AS SELECT * FROM topics_");
+    if (views) made.run("CREATE VIEW messages AS SELECT * FROM messages_");
+    made.run("INSERT INTO topics" + put +
+             " VALUES(1, '/cam0/image_raw', 'sensor_msgs/msg/Image', 'cdr'), "
+             "(2, '/cam0/camera_info', 'sensor_msgs/msg/CameraInfo', 'cdr')");
+    made.run("INSERT INTO messages" + put + " VALUES(1, 2, 1000000000, ?1)", infoCdr());
+    made.run("INSERT INTO messages" + put + " VALUES(2, 1, 1000000001, ?1)", imageCdr(1));
+    made.run("INSERT INTO messages" + put + " VALUES(3, 1, 2000000000, ?1)", imageCdr(2));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+bool takeRecording(const char* name, View bytes) {
+  const auto file = asFile(name, bytes);
   std::uint64_t messages = 0;
   const bool read = unlessRefused([&] {
     replay::RosMessages recorded(file);
     std::set<std::string> all;
-    for (const auto& [name, topic] : recorded.topics()) all.insert(name);
+    for (const auto& [topic, what] : recorded.topics()) all.insert(topic);
     recorded.rewind(all);
     std::uint64_t last = 0;
     while (const auto message = recorded.next()) {
@@ -127,8 +200,9 @@ template <class M>
 bool isMessage(View bytes) {
   const auto cdr = ros::messageOf<M>(bytes, ros::Encoding::kCdr, nullptr);
   if (cdr) {
-    const auto again = ros::messageOf<M>(ros::cdrOf(*cdr), ros::Encoding::kCdr, nullptr);
-    require(again && ros::cdrOf(*again) == ros::cdrOf(*cdr), "what is read is written the same");
+    const Bytes written = ros::cdrOf(*cdr);  // in which the images of `again` lie
+    const auto again = ros::messageOf<M>(written, ros::Encoding::kCdr, nullptr);
+    require(again && ros::cdrOf(*again) == written, "what is read is written the same");
   }
   return ros::messageOf<M>(bytes, ros::Encoding::kRos1, nullptr) || cdr;
 }
@@ -180,7 +254,12 @@ std::vector<Target> rosTargets() {
            [] {
              return std::vector<Bytes>{bag(false), bag(true)};
            },
-           takeBag},
+           [](View bytes) { return takeRecording("drive.bag", bytes); }},
+          {"ros_db3", 4200,
+           [] {
+             return std::vector<Bytes>{db3(false), db3(true)};
+           },
+           [](View bytes) { return takeRecording("drive.db3", bytes); }},
           {"ros_messages", 18000, messages, takeMessage}};
 }
 

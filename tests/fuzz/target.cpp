@@ -8,7 +8,7 @@ const std::vector<Target>& targets() {
   static const std::vector<Target> all = [] {
     std::vector<Target> list;
     for (const auto& group : {textTargets(), folderTargets(), settingTargets(), binaryTargets(),
-                              gatewayTargets(), rosTargets()}) {
+                              gatewayTargets(), mapTargets(), rosTargets(), vehicleTargets()}) {
       list.insert(list.end(), group.begin(), group.end());
     }
     return list;

@@ -38,7 +38,9 @@ std::vector<Target> folderTargets();
 std::vector<Target> settingTargets();
 std::vector<Target> binaryTargets();
 std::vector<Target> gatewayTargets();
+std::vector<Target> mapTargets();
 std::vector<Target> rosTargets();
+std::vector<Target> vehicleTargets();
 
 inline Bytes bytesOf(std::string_view text) { return {text.begin(), text.end()}; }
 inline std::string textOf(View bytes) { return {bytes.begin(), bytes.end()}; }

@@ -113,9 +113,26 @@ constexpr char kRig[] =
     "  rate_hz: 200\n  gyroscope_noise_density: 1.7e-04\n  gyroscope_random_walk: 1.9e-05\n"
     "  accelerometer_noise_density: 2.0e-3\n  accelerometer_random_walk: 3.0e-3\n";
 
+constexpr char kCamchain[] =
+    "cam0:\n  T_cam_imu:\n  - [0, -1, 0, 0.1]\n  - [0, 0, -1, 0]\n  - [1, 0, 0, 0]\n"
+    "  - [0, 0, 0, 1]\n  camera_model: omni\n  distortion_model: radtan\n"
+    "  distortion_coeffs: [-0.1, 0.01, 0.0001, 0.0002]\n  intrinsics: [1.2, 25, 25, 16, 12]\n"
+    "  resolution: [32, 24]\n  rostopic: /cam0/image_raw\n  timeshift_cam_imu: 0.01\n"
+    "cam1:\n  T_cn_cnm1:\n  - [1, 0, 0, -0.1]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n"
+    "  - [0, 0, 0, 1]\n  camera_model: ds\n  distortion_model: none\n"
+    "  intrinsics: [-0.2, 0.6, 20, 20, 16, 12]\n  resolution: [32, 24]\n";
+constexpr char kEucm[] =
+    "cam0:\n  T_BS: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n  camera_model: eucm\n"
+    "  intrinsics: [0.6, 1.1, 20, 20, 16, 12]\n  resolution: [32, 24]\n";
+
 bool takeRig(View bytes) {
   return unlessRefused([&] {
     const Calibration rig = replay::readRig(asFile("rig.yaml", bytes));
+    for (const auto& camera : rig.cameras) {
+      require(camera.T_BC.p.allFinite() && std::abs(camera.T_BC.q.norm() - 1.0) < 1e-6,
+              "a camera stands somewhere");
+      require(std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy), "a lens is finite");
+    }
     const std::string text = replay::rigText(rig, "again");
     const Calibration again = replay::readRig(asFile("rig_again.yaml", bytesOf(text)));
     require(again.cameras.size() == rig.cameras.size(), "a rig reads back what it wrote");
@@ -155,7 +172,7 @@ std::vector<Target> textTargets() {
           {"kitti_labels", 6000, alone({kLabels}), takeLabels},
           {"kitti_calibration", 6000, alone({kCalibration}), takeCalibration},
           {"object_rows", 6000, alone({kRows}), takeRows},
-          {"rig", 4200, alone({kRig}), takeRig},
+          {"rig", 4200, alone({kRig, kCamchain, kEucm}), takeRig},
           {"class_aliases", 6000, alone({kAliases}), takeAliases}};
 }
 

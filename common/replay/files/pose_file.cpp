@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/errors.h"
+#include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
@@ -121,12 +122,13 @@ std::optional<RigidTransform> PoseFile::atTime(TimePoint time, Duration max_gap)
   constexpr Duration kSame = std::chrono::milliseconds(1);
   const auto after = std::lower_bound(poses_.begin(), poses_.end(), time,
                                       [](const StampedPose& p, TimePoint t) { return p.time < t; });
-  if (after != poses_.end() && after->time - time <= kSame) return after->T_WB;
+  if (after != poses_.end() && between(after->time, time) <= kSame) return after->T_WB;
   if (after == poses_.begin()) return std::nullopt;
   const auto before = after - 1;
-  if (time - before->time <= kSame) return before->T_WB;
-  if (after == poses_.end() || after->time - before->time > max_gap) return std::nullopt;
-  const double s = toSeconds(time - before->time) / toSeconds(after->time - before->time);
+  if (between(time, before->time) <= kSame) return before->T_WB;
+  if (after == poses_.end() || between(after->time, before->time) > max_gap) return std::nullopt;
+  const double s =
+      toSeconds(between(time, before->time)) / toSeconds(between(after->time, before->time));
   return interpolate(before->T_WB, after->T_WB, s);
 }
 

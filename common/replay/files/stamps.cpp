@@ -61,7 +61,9 @@ std::vector<std::size_t> longestInOrder(const std::vector<TimePoint>& stamps) {
 
 Duration medianInterval(const std::vector<TimePoint>& sorted) {
   std::vector<Duration> intervals;
-  for (std::size_t i = 1; i < sorted.size(); ++i) intervals.push_back(sorted[i] - sorted[i - 1]);
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    intervals.push_back(between(sorted[i], sorted[i - 1]));
+  }
   if (intervals.empty()) return Duration{0};
   const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
   std::nth_element(intervals.begin(), middle, intervals.end());
@@ -87,16 +89,18 @@ class Line {
     const auto next = std::lower_bound(indices_.begin(), indices_.end(), index);
     const TimePoint stamp = stamps_[index];
     Duration outside{0};
-    if (next != indices_.end()) outside = std::max(outside, stamp - stamps_[*next]);
-    if (next != indices_.begin()) outside = std::max(outside, stamps_[*(next - 1)] - stamp);
-    return outside > kFarIntervals * usual_ && !fillsHole(stamp);
+    if (next != indices_.end()) outside = std::max(outside, between(stamp, stamps_[*next]));
+    if (next != indices_.begin()) {
+      outside = std::max(outside, between(stamps_[*(next - 1)], stamp));
+    }
+    return outside > multipleOf(kFarIntervals, usual_) && !fillsHole(stamp);
   }
 
  private:
   bool fillsHole(TimePoint stamp) const {
     const auto behind = std::upper_bound(sorted_.begin(), sorted_.end(), stamp);
     if (behind == sorted_.begin() || behind == sorted_.end()) return false;
-    return 2 * (*behind - *(behind - 1)) > 3 * usual_;
+    return multipleOf(2, between(*behind, *(behind - 1))) > multipleOf(3, usual_);
   }
 
   const std::vector<TimePoint>& stamps_;
@@ -112,9 +116,9 @@ void cutEnds(const std::vector<TimePoint>& stamps, StampOrder& order) {
   std::vector<TimePoint> sorted;
   for (const std::size_t i : kept) sorted.push_back(stamps[i]);
   const Duration pause =
-      std::max<Duration>(std::chrono::seconds(10), 1000 * medianInterval(sorted));
+      std::max<Duration>(std::chrono::seconds(10), multipleOf(1000, medianInterval(sorted)));
   for (std::size_t few = kFew; few > 0; --few) {
-    if (sorted[few] - sorted[few - 1] > pause) {
+    if (between(sorted[few], sorted[few - 1]) > pause) {
       kept.erase(kept.begin(), kept.begin() + static_cast<std::ptrdiff_t>(few));
       order.strays += few;
       break;
@@ -122,7 +126,7 @@ void cutEnds(const std::vector<TimePoint>& stamps, StampOrder& order) {
   }
   for (std::size_t few = kFew; few > 0; --few) {
     const std::size_t first = sorted.size() - few;
-    if (sorted[first] - sorted[first - 1] > pause) {
+    if (between(sorted[first], sorted[first - 1]) > pause) {
       kept.resize(kept.size() - few);
       order.strays += few;
       break;
@@ -172,6 +176,18 @@ std::string whyNoStamp(std::string_view text) {
   }
   return why + "; it looks like " + unit + ": multiply the column by " + factor +
          ", or let perdure doctor --data DRIVE --fix COPY do it";
+}
+
+Duration between(TimePoint a, TimePoint b) {
+  std::int64_t ns = 0;
+  if (!__builtin_sub_overflow(toNanoseconds(a), toNanoseconds(b), &ns)) return Duration(ns);
+  return a < b ? Duration::min() : Duration::max();
+}
+
+Duration multipleOf(std::int64_t n, Duration d) {
+  std::int64_t ns = 0;
+  if (!__builtin_mul_overflow(n, d.count(), &ns)) return Duration(ns);
+  return (n < 0) != (d.count() < 0) ? Duration::min() : Duration::max();
 }
 
 StampOrder orderOf(const std::vector<TimePoint>& stamps) {

@@ -20,6 +20,11 @@ std::optional<TimePoint> parseNanoseconds(std::string_view text);
 /// Why parseNanoseconds() gave nothing, and the mend; "" where it gave something.
 std::string whyNoStamp(std::string_view text);
 
+/// a − b. A file may state any stamps: where they are farther apart than 292 years, that.
+Duration between(TimePoint a, TimePoint b);
+/// n · d, at most that, too.
+Duration multipleOf(std::int64_t n, Duration d);
+
 /// Which stamps are kept, as indices, so that they increase.
 struct StampOrder {
   std::vector<std::size_t> kept;

@@ -40,28 +40,46 @@ class Db3 : public RosSource {
         "topic_id IN (" +
         ids + ") ORDER BY timestamp, id");
     sqlite3_bind_int64(rows_.get(), 1, static_cast<sqlite3_int64>(from_ns));
+    last_ns_ = 0;
   }
 
   std::optional<RosMessage> next() override {
-    if (!rows_) return std::nullopt;
-    const int got = sqlite3_step(rows_.get());
-    if (got != SQLITE_ROW) {
-      if (got != SQLITE_DONE) {
-        count({"database_damaged", path_.string() + ": " + sqlite3_errmsg(database_.get()) +
-                                       "; what comes before is read"});
+    while (step()) {
+      const auto log_ns = sqlite3_column_int64(rows_.get(), 1);
+      if (sqlite3_column_type(rows_.get(), 1) == SQLITE_INTEGER && log_ns >= last_ns_) {
+        last_ns_ = log_ns;
+        return message();
       }
-      rows_.reset();
-      return std::nullopt;
+      // Text sorts behind all numbers; an index that is damaged, anyhow.
+      count({"stamp_malformed", path_.string() +
+                                    ": a message whose time is no whole number, or goes "
+                                    "back; it is left out"});
     }
-    const auto* bytes = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows_.get(), 2));
-    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows_.get(), 2));
-    const auto data = std::make_shared<const std::vector<std::uint8_t>>(bytes, bytes + size);
-    return RosMessage{names_.at(sqlite3_column_int64(rows_.get(), 0)),
-                      static_cast<std::uint64_t>(sqlite3_column_int64(rows_.get(), 1)), *data,
-                      data};
+    return std::nullopt;
   }
 
  private:
+  /// False at the end.
+  bool step() {
+    if (!rows_) return false;
+    const int got = sqlite3_step(rows_.get());
+    if (got == SQLITE_ROW) return true;
+    if (got != SQLITE_DONE) {
+      count({"database_damaged", path_.string() + ": " + sqlite3_errmsg(database_.get()) +
+                                     "; what comes before is read"});
+    }
+    rows_.reset();
+    return false;
+  }
+
+  RosMessage message() {
+    const auto* bytes = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows_.get(), 2));
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows_.get(), 2));
+    const auto data = std::make_shared<const std::vector<std::uint8_t>>(bytes, bytes + size);
+    return {names_.at(sqlite3_column_int64(rows_.get(), 0)), static_cast<std::uint64_t>(last_ns_),
+            *data, data};
+  }
+
   [[noreturn]] void refuse(const std::string& why) const {
     throw StartupError(ExitCode::kUnavailable,
                        path_.string() + " is no recording of rosbag2 (" + why +
@@ -96,6 +114,7 @@ class Db3 : public RosSource {
   std::unique_ptr<sqlite3, Close> database_;
   std::map<sqlite3_int64, std::string> names_;
   Statement rows_;
+  sqlite3_int64 last_ns_ = 0;
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <regex>
 
 #include "services/capture/vehicle/whole_number.h"
@@ -11,7 +12,9 @@ namespace {
 
 constexpr std::uint32_t kExtendedFlag = 0x80000000U, kStandardMask = 0x7ffU,
                         kExtendedMask = 0x1fffffffU;
-constexpr unsigned kMostBits = 64 * 8;  // of a CAN FD frame
+constexpr unsigned kMostBits = 64 * 8;         // of a CAN FD frame
+constexpr std::size_t kLongestDbcLine = 1000;  // a longer one would need too much of the stack
+constexpr double kLargest = 1e30;              // physical: its square is still a number
 
 /// Bit k of a signal, 0 the lowest, in DBC's numbers: byte · 8 + bit.
 unsigned positionOf(const CanSignal& s, unsigned k) {
@@ -39,6 +42,11 @@ Result<CanSignal> parseCanSignal(const std::string& text) {
       R"re(\s*(0[xX][0-9a-fA-F]{1,8}|\d{1,10})\s+(?:SG_\s+\w+\s*(M|m\d+M?)?\s*:\s*)?)re"
       R"re((\d{1,3})\|(\d{1,3})@([01])([+-])\s*\(\s*([-+.\deE]+)\s*,\s*([-+.\deE]+)\s*\))re"
       R"re(\s*(?:\[\s*([-+.\deE]+)\s*\|\s*([-+.\deE]+)\s*\])?\s*(?:"([^"]*)")?.*)re");
+  if (text.size() > kLongestDbcLine) {
+    return fail(
+        "can_signal",
+        fmt::format("it is longer than {} characters; leave out its receivers", kLongestDbcLine));
+  }
   std::smatch m;
   if (!std::regex_match(text, m, kLine)) {
     return fail("can_signal",
@@ -66,6 +74,10 @@ Result<CanSignal> parseCanSignal(const std::string& text) {
   signal.unit = m[11];
   if (signal.length < 1 || signal.length > 64) return fail("can_signal", "it has not 1 to 64 bits");
   if (signal.factor == 0.0) return fail("can_signal", "its factor is 0");
+  if (std::ldexp(std::abs(signal.factor), static_cast<int>(signal.length)) > kLargest ||
+      std::abs(signal.offset) > kLargest) {
+    return fail("can_signal", "its factor or offset is too large");
+  }
   if (signal.start >= kMostBits || positionOf(signal, signal.length - 1) >= kMostBits ||
       positionOf(signal, 0) >= kMostBits) {
     return fail("can_signal", "it ends behind the 64 bytes that a frame can have");

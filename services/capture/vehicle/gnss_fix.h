@@ -1,6 +1,7 @@
 // Where a receiver of satellites says that its antenna is.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -13,6 +14,11 @@ struct GnssFix {
   std::optional<double> speed;   ///< m/s over ground
   std::optional<double> course;  ///< over ground: radians from east, counter-clockwise, (−π, π]
 };
+
+/// Whether a receiver can mean it: also in the air, and below the sea.
+inline bool isHeight(double metres) { return std::abs(metres) <= 1e5; }
+/// Degrees clockwise from north.
+inline bool isCourse(double degrees) { return degrees >= 0.0 && degrees <= 360.0; }
 
 /// From degrees clockwise from north to radians counter-clockwise from east, (−π, π].
 double courseOf(double degrees_from_north);

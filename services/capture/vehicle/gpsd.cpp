@@ -34,7 +34,7 @@ Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time
   if (number(json, "mode").value_or(0) < 3 || !latitude || !longitude || !height) {
     return fail("gpsd_no_fix", "gpsd has no fix in three dimensions");
   }
-  if (std::abs(*latitude) > 90.0 || std::abs(*longitude) > 180.0) {
+  if (std::abs(*latitude) > 90.0 || std::abs(*longitude) > 180.0 || !isHeight(*height)) {
     return fail("gpsd_malformed", "gpsd said a place that is not on Earth");
   }
   GnssFix fix;
@@ -45,7 +45,8 @@ Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time
   const double eph = number(json, "eph").value_or(0.0);
   fix.sigma_m = eph > 0.0 ? eph / kSigmasOfEph : kUnstated_m;
   fix.speed = number(json, "speed");
-  if (const auto track = number(json, "track")) fix.course = courseOf(*track);
+  const auto track = number(json, "track");
+  if (track && isCourse(*track)) fix.course = courseOf(*track);
   return fix;
 }
 

@@ -96,7 +96,7 @@ Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int
   const auto knots = wholeNumber(field(sentence, 7));
   speed_ = knots ? std::optional(*knots * kKnot) : std::nullopt;
   const auto course = wholeNumber(field(sentence, 8));
-  course_ = course ? std::optional(courseOf(*course)) : std::nullopt;
+  course_ = course && isCourse(*course) ? std::optional(courseOf(*course)) : std::nullopt;
   rmc_utc_ = field(sentence, 1);
   Said said = whole(time_ns);
   said.speed = speed_;
@@ -126,9 +126,11 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
   if (!latitude || !longitude || !above_sea) {
     return fail("nmea_malformed", "GGA says that there is a fix, and has no place or height");
   }
+  const double height = *above_sea + wholeNumber(field(sentence, 11)).value_or(0.0);
+  if (!isHeight(height)) return fail("nmea_malformed", "GGA says a height that is not on Earth");
   place_.latitude_deg = *latitude;
   place_.longitude_deg = *longitude;
-  place_.height_m = *above_sea + wholeNumber(field(sentence, 11)).value_or(0.0);
+  place_.height_m = height;
   const double hdop = wholeNumber(field(sentence, 8)).value_or(0.0);
   place_.sigma_m = stated_sigma_m_.value_or((hdop > 0.0 ? hdop : kUnstatedHdop) *
                                             rangeSigma(quality) / std::numbers::sqrt2);
@@ -139,8 +141,8 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
 /// Deviations of latitude and longitude, as the receiver computes them.
 void NmeaReader::readGst(std::string_view sentence) {
   const auto north = wholeNumber(field(sentence, 6)), east = wholeNumber(field(sentence, 7));
-  stated_sigma_m_ =
-      north && east ? std::optional(std::hypot(*north, *east) / std::numbers::sqrt2) : std::nullopt;
+  const double sigma_m = north && east ? std::hypot(*north, *east) / std::numbers::sqrt2 : 0.0;
+  stated_sigma_m_ = sigma_m > 0.0 ? std::optional(sigma_m) : std::nullopt;
 }
 
 NmeaReader::Said NmeaReader::whole(std::int64_t time_ns) {

@@ -155,7 +155,6 @@ void makeFolderOf(const std::string& path) {
 }  // namespace
 
 Result<Identity> identityOf(const Connection& connection) {
-  Identity identity;
   const auto application = connection.integer("PRAGMA application_id");
   const auto version = connection.integer("PRAGMA user_version");
   const auto tables = connection.integer("SELECT count(*) FROM sqlite_master");

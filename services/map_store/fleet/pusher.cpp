@@ -1,10 +1,10 @@
 #include "services/map_store/fleet/pusher.h"
 
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "services/map_store/core/belief_codec.h"
+#include "services/map_store/core/earth_anchor.h"
 #include "services/map_store/core/map_database.h"
 #include "services/map_store/fleet/tables.h"
 
@@ -69,10 +69,7 @@ class Snapshot {
 
 /// As the file knows it; empty where it does not.
 std::vector<double> earthAnchorOf(const Connection& connection) {
-  std::vector<double> numbers;
-  std::istringstream text(MapReader(&connection).earthAnchor().value_or(""));
-  for (double number = 0.0; text >> number;) numbers.push_back(number);
-  return numbers.size() == 4 ? numbers : std::vector<double>();
+  return earthAnchorFrom(MapReader(&connection).earthAnchor().value_or(""));
 }
 
 }  // namespace

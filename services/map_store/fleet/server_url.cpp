@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #ifdef PERDURE_HAS_LIBPQ
 #include <libpq-fe.h>
@@ -15,6 +14,7 @@
 #endif
 
 #include "common/base/errors.h"
+#include "services/map_store/core/earth_anchor.h"
 
 namespace perdure::map_store::fleet {
 namespace {
@@ -81,10 +81,7 @@ void checkName(const std::string& name, const std::string& key) {
 
 void checkEarthAnchor(const std::vector<double>& anchor, const std::string& key) {
   if (anchor.empty()) return;
-  const bool good = anchor.size() == 4 && std::abs(anchor[0]) <= 90.0 &&
-                    std::abs(anchor[1]) <= 180.0 && std::abs(anchor[2]) <= 1e5 &&
-                    std::abs(anchor[3]) <= 360.0;
-  if (!good) {
+  if (!isEarthAnchor(anchor)) {
     refuse(key +
            " is not a place on Earth; give latitude, longitude, height, yaw in degrees and metres, "
            "or nothing where it is not known.");

@@ -59,6 +59,22 @@ TEST(Dataset, AnImageOfAnotherSizeThanTheCalibrationsIsCounted) {
   EXPECT_EQ(dataset->reasons().of("image_size"), 1U);
 }
 
+TEST(Dataset, SamplesThatAreDecadesApartAreNoGap) {
+  const auto root = tinyEuroc("decades");
+  std::string text = "#timestamp [ns],w,w,w,a,a,a\n";
+  for (const char* stamp : {"0", "2000000000000000000", "4000000000000000000",
+                            "6000000000000000000", "8000000000000000000"}) {
+    text += std::string(stamp) + ",0,0,0,0,0,9.81\n";
+  }
+  writeText(root / "mav0/imu0/data.csv", text);
+  const auto dataset = Dataset::open({.path = root});
+  int samples = 0;
+  while (const auto message = dataset->next())
+    samples += std::holds_alternative<ImuSample>(*message);
+  EXPECT_EQ(samples, 5);
+  EXPECT_EQ(dataset->reasons().of("imu_gap"), 0U);
+}
+
 TEST(Dataset, AGapOfTheInertialSamplesIsCountedWhenItIsOver) {
   const auto root = tinyEuroc("gap");
   const auto file = root / "mav0/imu0/data.csv";

@@ -2,10 +2,12 @@
 // rosbag2's SQLite, which is written here; tests/interop/ros has the files of strangers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <random>
 
 #include "common/replay/dataset.h"
+#include "common/replay/recordings/ros_messages.h"
 #include "common/replay/ros_topics.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tests/interop/ros/drive_plan.h"
@@ -167,6 +169,28 @@ TEST(RosDrive, AnyBytesAreReadOrRefused) {
   }
   EXPECT_GT(read, 5);
   EXPECT_GT(refused, 5);
+}
+
+// SQLite's columns take any type; text sorts behind all numbers, and reads as 0.
+TEST(RosDrive, AMessageWhoseTimeIsNoNumberIsLeftOutAndCounted) {
+  const Twin twin = twinOf("ros_text_stamps");
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(twin.file.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database, "UPDATE messages SET timestamp = 'noon' WHERE id IN (3, 7)",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(database);
+  RosMessages recorded(twin.file);
+  std::set<std::string> all;
+  std::uint64_t stated = 0, read = 0, last = 0;
+  for (const auto& [name, topic] : recorded.topics()) all.insert(name), stated += topic.messages;
+  recorded.rewind(all);
+  for (; const auto message = recorded.next(); ++read) {
+    EXPECT_GE(message->log_ns, last);
+    last = message->log_ns;
+  }
+  EXPECT_EQ(read + 2, stated);
+  EXPECT_EQ(recorded.reasons().of("stamp_malformed"), 2U);
 }
 
 TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheMend) {

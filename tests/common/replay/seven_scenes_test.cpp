@@ -67,6 +67,8 @@ TEST(SevenScenes, GravityOfSensorYamlGoesBeforeThePlanes) {
   EXPECT_EQ(dataset->calibration().cameras.front().fx, 525.0);
   writeText(folder / "sensor.yaml", "up: [0, 0, 0]\n");
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("is no direction"));
+  writeText(folder / "sensor.yaml", "up: [0, -1e200, 0]\n");  // its square is no number
+  EXPECT_NEAR(Dataset::open({.path = folder})->truth()->poses().front().T_WB.q.norm(), 1.0, 1e-9);
   writeText(folder / "sensor.yaml",
             text + "resolution: [640, 480]\nintrinsics: [500, 501, 310, 230]\n");
   EXPECT_EQ(Dataset::open({.path = folder})->calibration().cameras.front().fy, 501.0);
@@ -102,6 +104,8 @@ TEST(SevenScenes, WrongPosesAndMissingPartsAreNamed) {
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("12 numbers, where a pose has 16"));
   writeText(pose, "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n");
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("the last row"));
+  writeText(pose, "1 0 0 0\n0 1 0 -1e308\n0 0 1 0\n0 0 0 1\n");
+  EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("more than 1000 km away"));
   writeText(pose, "1 0 0 0\n0 1 0 x\n0 0 1 0\n0 0 0 1\n");
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("line 2 is not of numbers"));
   for (const char* name : {"0", "1", "2"}) {

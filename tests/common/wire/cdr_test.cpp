@@ -80,6 +80,19 @@ TEST(CdrLengths, RefusesAMessageThatEndsBeforeAStructThatMayGrow) {
   }
 }
 
+// Cyclone turns eight bytes where it has asked for four: behind the message, if that is cut there.
+TEST(CdrLengths, RefusesACutMessageOfTheOtherByteOrderAndWritesNowhereElse) {
+  ImuSample sample;
+  Examples(3).fill(sample);
+  auto bytes = encodeCdr(sample).value();
+  constexpr std::uint8_t kBigEndianXcdr2 = 6;
+  bytes[1] = kBigEndianXcdr2;
+  for (std::size_t size = bytes.size(); size-- > 4;) {
+    bytes.resize(size);
+    EXPECT_FALSE(decoded<ImuSample>(bytes)) << size;
+  }
+}
+
 TEST(CdrLengths, ReadsAMessageThatEndsBeforeMembersThatMayBeAbsent) {
   const auto header = decoded<MapHeader>(shortened<MapHeader>(24));
   ASSERT_TRUE(header) << header.error().detail;

@@ -9,6 +9,7 @@
 
 #include "common/earth/geodesy.h"
 #include "common/math/so3.h"
+#include "services/map_store/core/earth_anchor.h"
 #include "services/map_store/node.h"
 
 namespace perdure::map_store {
@@ -43,6 +44,15 @@ std::vector<double> numbersOf(const std::string& text) {
 }
 
 std::optional<RigidTransform> itself(TimePoint) { return RigidTransform(); }
+
+TEST(EarthAnchor, ATextOfTheFileThatIsNoPlaceIsNone) {
+  EXPECT_EQ(earthAnchorFrom("47.28 8.56 547.6 -30"),
+            (std::vector<double>{47.28, 8.56, 547.6, -30}));
+  for (const char* text : {"", "47.28 8.56 547.6", "47.28 8.56 547.6 0 1", "91 8 0 0", "1 181 0 0",
+                           "1 2 1e300 0", "1 2 3 1e9", "1 2 x 3", "1e999 2 3 4", "nan 2 3 4"}) {
+    EXPECT_TRUE(earthAnchorFrom(text).empty()) << text;
+  }
+}
 
 /// The anchor of the map puts the body where the receiver saw it.
 TEST(EarthPlace, TheMapsOriginAndAxisLeadBackToTheBody) {

@@ -271,6 +271,19 @@ TEST_F(GraphTables, LeaveOutObjectsOfClassesWhoseNameIsMissing) {
   EXPECT_LT(graph.map.records.size(), map.records.size());
 }
 
+TEST_F(GraphTables, AClassOfANumberBelowZeroIsLeftOutAndSwept) {
+  const auto map = writeSome();
+  change("INSERT INTO graph_classes VALUES(-1, 'ghost')");
+  EXPECT_EQ(read().malformed, 1u);
+  MapDatabase database({path()});
+  (void)database.takeGraph();
+  Unsaved more;
+  more.changed.classes = map.classes;
+  ASSERT_TRUE(write(database, more).has_value());
+  EXPECT_EQ(read().malformed, 0u);
+  EXPECT_EQ(read().map.classes, map.classes);
+}
+
 TEST_F(GraphTables, HoldOneAnchorOfEachComponentFast) {
   writeSome();
   change("UPDATE edges SET edge = x'00' WHERE kind <> 0 OR (a = 5 AND b = 6)");

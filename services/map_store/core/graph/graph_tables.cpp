@@ -214,7 +214,7 @@ Result<void> sweepGraph(const Connection& connection) {
   const mapping::SavedMap& map = whole->map;
   mapping::Unsaved shortened;
   for (const ObjectId id : whole->shortened) shortened.changed.records[id] = map.records.at(id);
-  auto done = connection.execute("DELETE FROM graph_classes WHERE number >= " +
+  auto done = connection.execute("DELETE FROM graph_classes WHERE number < 0 OR number >= " +
                                  std::to_string(map.classes.size()));
   if (done) done = deleteOthers(connection, "anchors", map.anchors);
   if (done) done = deleteOthers(connection, "anchor_poses", map.anchors);

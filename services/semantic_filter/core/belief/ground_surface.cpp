@@ -25,8 +25,8 @@ constexpr double kSurelyStands = 0.9;  // of a class whose objects contribute
 }  // namespace
 
 double GroundRoughness::ratio(double assumed) const {
-  constexpr double kLeast = 0.01, kMost = 9.0;
-  return std::clamp((assumed + squares_) / (assumed + things_), kLeast, kMost);
+  constexpr double kLeastRatio = 0.01, kMostRatio = 9.0;
+  return std::clamp((assumed + squares_) / (assumed + things_), kLeastRatio, kMostRatio);
 }
 
 void GroundRoughness::learn(double above, const GroundHeight& others, double own_variance,

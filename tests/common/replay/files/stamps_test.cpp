@@ -55,6 +55,22 @@ TEST(StampOrder, KeepsAllThatIncreases) {
   EXPECT_TRUE(orderOf({}).kept.empty());
 }
 
+// 32 times an interval of 31 years is no number of nanoseconds any more.
+TEST(StampOrder, HoldsAnyStamps) {
+  std::vector<TimePoint> stamps;
+  for (const double years : {0.0, 31.7, 63.4, 95.1, 126.8, 79.2}) {
+    stamps.push_back(fromNanoseconds(static_cast<std::int64_t>(years * 3.15576e16)));
+  }
+  const auto order = orderOf(stamps);
+  EXPECT_EQ(order.strays, 0U) << "half an interval is not far";
+  EXPECT_EQ(order.moved, 1U);
+  EXPECT_EQ(between(TimePoint::max(), TimePoint::min()), Duration::max());
+  EXPECT_EQ(between(TimePoint::min(), TimePoint::max()), Duration::min());
+  EXPECT_EQ(multipleOf(32, Duration::max()), Duration::max());
+  EXPECT_EQ(multipleOf(2, Duration::min()), Duration::min());
+  EXPECT_EQ(multipleOf(3, Duration(-7)), Duration(-21));
+}
+
 TEST(StampOrder, LeavesOutTheOneThatIsFarAndNotAllBehindIt) {
   for (const std::int64_t by : {3600ll * 1'000'000'000, -3600ll * 1'000'000'000, 2'000'000'000ll}) {
     for (const std::size_t at : {std::size_t{0}, std::size_t{40}, std::size_t{119}}) {

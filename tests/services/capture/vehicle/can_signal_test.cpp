@@ -121,6 +121,16 @@ TEST(CanSignal, SaysWhatIsWrongInALine) {
   EXPECT_THAT(why("0x1a0 505|8@1+ (1,0)"), HasSubstr("64 bytes"));
   EXPECT_THAT(why("0x1a0 504|9@0+ (1,0)"), HasSubstr("64 bytes"));
   EXPECT_THAT(why("416 SG_ Speed m2 : 0|8@1+ (1,0)"), HasSubstr("multiplexed"));
+  EXPECT_THAT(why("0x1a0 0|8@1+ (1e300,0)"), HasSubstr("too large"));
+  EXPECT_THAT(why("0x1a0 0|64@1- (-1e12,0)"), HasSubstr("too large")) << "by its bits";
+  EXPECT_THAT(why("0x1a0 0|8@1+ (1,-1e300)"), HasSubstr("too large"));
+}
+
+// A regular expression takes stack for each character.
+TEST(CanSignal, ALineOfAnyLengthIsReadOrRefused) {
+  const std::string line = "0x1a0 0|8@1+ (1,0) ";
+  EXPECT_TRUE(parseCanSignal(line + std::string(900, 'R')));
+  EXPECT_FALSE(parseCanSignal(line + std::string(4'000'000, 'R')));
 }
 
 }  // namespace

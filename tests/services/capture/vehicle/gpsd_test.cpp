@@ -43,6 +43,13 @@ TEST(Gpsd, SaysWhatIsNone) {
   EXPECT_EQ(code(R"({"class":"TPV","mode":2,"lat":1,"lon":2,"alt":3})"), "gpsd_no_fix");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":"1","lon":2,"alt":3})"), "gpsd_no_fix");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":91,"lon":2,"alt":3})"), "gpsd_malformed");
+  EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":1e300})"), "gpsd_malformed");
+}
+
+TEST(Gpsd, ATrackThatIsNoneIsLeftOut) {
+  const auto fix = readGpsd(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":3,"track":1e300})", 1);
+  ASSERT_TRUE(fix && *fix);
+  EXPECT_FALSE((*fix)->course);
 }
 
 }  // namespace

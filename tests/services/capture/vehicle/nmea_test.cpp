@@ -96,6 +96,41 @@ TEST(Nmea, SaysWhatIsNone) {
   EXPECT_EQ(code("$" + std::string(400, 'x') + "*00"), "nmea_malformed");
 }
 
+TEST(Nmea, AHeightThatIsNotOnEarthIsNoFix) {
+  const auto code = [](const std::string& heights) {
+    NmeaReader reader;
+    const auto said =
+        reader.read(sentence("GPGGA,083559.00,4717.1,N,00833.9,E,1,08,1.0," + heights + ",M,,"), 1);
+    return said ? std::string("read") : said.error().code;
+  };
+  EXPECT_EQ(code("99000,M,48"), "read");
+  EXPECT_EQ(code("1e6,M,48"), "nmea_malformed");
+  EXPECT_EQ(code("1.7e308,M,1.7e308"), "nmea_malformed") << "their sum is infinite";
+}
+
+TEST(Nmea, ACourseThatIsNoneIsLeftOut) {
+  const auto courseIn = [](const std::string& course) {
+    NmeaReader reader;
+    (void)reader.read(sentence("GPRMC,1,A,4717.1,N,00833.9,E,1," + course + ",091202,,,A"), 1);
+    const auto said =
+        reader.read(sentence("GPGGA,1,4717.1,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,"), 2);
+    return said.value().fix.value().course;
+  };
+  EXPECT_TRUE(courseIn("360"));
+  EXPECT_FALSE(courseIn("361"));
+  EXPECT_FALSE(courseIn("-1"));
+  EXPECT_FALSE(courseIn("1e300"));
+}
+
+TEST(Nmea, ADeviationOfZeroIsNotKnown) {
+  NmeaReader reader;
+  ASSERT_TRUE(reader.read(sentence("GPGST,1,0,,,,0.0,0.0,0"), 1));
+  ASSERT_TRUE(reader.read(sentence("GPRMC,1,A,4717.1,N,00833.9,E,1,90,091202,,,A"), 2));
+  const auto said =
+      reader.read(sentence("GPGGA,1,4717.1,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,"), 3);
+  EXPECT_NEAR(said.value().fix.value().sigma_m, 3.0 / std::numbers::sqrt2, 1e-9) << "by HDOP";
+}
+
 TEST(Nmea, CoursesAreFromEastCounterClockwise) {
   constexpr double kPi = std::numbers::pi;
   EXPECT_NEAR(courseOf(0.0), kPi / 2, 1e-12);
