@@ -35,7 +35,7 @@ const Names kRawFiles{"calib_cam_to_cam.txt",
                       "2011_09_26_drive_9999_sync/oxts/data/0000000001.txt"};
 const Names kTrackingFiles{"calib/0000.txt", "calib/0001.txt", "label_02/0001.txt"};
 const Names kSceneFiles{"sensor.yaml", "frame-000000.pose.txt", "frame-000001.pose.txt"};
-const Names kTruthFiles{sim::kObjectsTruthFile, sim::kVisibilityTruthFile};
+const Names kTruthFiles{sim::kObjectsTruthFile, sim::kVisibilityTruthFile, sim::kInsideTruthFile};
 
 /// In scratch(), each once; what was made for the seeds is where damaged ones go.
 const fs::path& eurocFolder() {
@@ -135,7 +135,8 @@ constexpr char kTruth[] =
   "keys": [{"time_ns": 1000, "centre": [2, 0.3, 0.45], "yaw": 0.5},
            {"time_ns": 5000, "centre": [3, 0.3, 0.45], "yaw": -3.1}]}]})"
     "\n=== visibility_truth.csv\nframe,object_id,visible_fraction,x1,y1,x2,y2\n"
-    "0,4,0.5,1,2,30,40\n1,4,1,1,2,31,40\n";
+    "0,4,0.5,1,2,30,40\n1,4,1,1,2,31,40\n"
+    "=== inside_truth.csv\nframe,object_id,x1,y1,x2,y2\n0,4,1,2,30,35\n";
 
 bool takeTruth(View bytes) {
   const fs::path folder = scratch() / "truth";
