@@ -1,4 +1,4 @@
-// What the σ of anchors and loops of the map's graph say: all 0 is "not known".
+// What anchors and loops of the map's graph say: all σ 0 is "not known"; states in words.
 #pragma once
 
 #include "common/types/map.h"
@@ -14,5 +14,17 @@ inline bool hasSigma(const MapAnchor& anchor) {
   return isFirstOfMap(anchor) || anchor.sigma.maxCoeff() > 0.0;
 }
 inline bool hasSigma(const MapLoop& loop) { return loop.sigma.maxCoeff() > 0.0; }
+
+inline const char* nameOf(MapLoopState state) {
+  switch (state) {
+    case MapLoopState::kTentative:
+      return "tentative";
+    case MapLoopState::kConfirmed:
+      return "confirmed";
+    case MapLoopState::kWithdrawn:
+      return "withdrawn";
+  }
+  return "";
+}
 
 }  // namespace perdure

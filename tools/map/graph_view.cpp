@@ -16,18 +16,6 @@ using Json = nlohmann::ordered_json;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr std::size_t kMostNamed = 6;  // objects of a loop
 
-const char* nameOf(MapLoopState state) {
-  switch (state) {
-    case MapLoopState::kTentative:
-      return "tentative";
-    case MapLoopState::kConfirmed:
-      return "confirmed";
-    case MapLoopState::kWithdrawn:
-      return "withdrawn";
-  }
-  return "";
-}
-
 struct Figures {
   std::set<WorldId> sessions;
   double way_m = 0.0;

@@ -17,18 +17,6 @@ namespace {
 constexpr std::int64_t kGraphEach_ns = 3'000'000'000;
 constexpr std::int64_t kRefused_ns = 5'000'000'000;
 
-const char* wordOf(MapLoopState state) {
-  switch (state) {
-    case MapLoopState::kTentative:
-      return "tentative";
-    case MapLoopState::kConfirmed:
-      return "confirmed";
-    case MapLoopState::kWithdrawn:
-      return "withdrawn";
-  }
-  return "";
-}
-
 const char* wordOf(MapLoopKind kind) { return kind == MapLoopKind::kTie ? "tie" : "loop"; }
 
 /// The page has the same in words.js.
@@ -60,7 +48,7 @@ void putAnchor(JsonWriter& json, const MapAnchor& anchor) {
 
 void putLoop(JsonWriter& json, const MapLoop& loop) {
   json.begin('{').key("id").integer(loop.id).key("a").integer(loop.a).key("b").integer(loop.b);
-  json.key("kind").text(wordOf(loop.kind)).key("state").text(wordOf(loop.state));
+  json.key("kind").text(wordOf(loop.kind)).key("state").text(nameOf(loop.state));
   json.key("residual");
   putNumbers(json, {loop.residual.data(), 4}, 4);
   putSigma(json, loop.sigma, hasSigma(loop));
@@ -153,7 +141,7 @@ void putArch(JsonWriter& json, TimePoint time, const MapLoop& loop, const Eigen:
   beginEntity(json, time, kMapFrame, fmt::format("loop {}", loop.id));
   json.key("metadata").begin('[');
   putPair(json, wordOf(loop.kind), std::to_string(loop.id));
-  putPair(json, "state", wordOf(loop.state));
+  putPair(json, "state", nameOf(loop.state));
   putPair(json, "anchors", fmt::format("{} and {}", loop.a, loop.b));
   putPair(json, "residual x y z, yaw", metresAndDegrees(loop.residual));
   putPair(json, "sigma x y z, yaw", sigmaInWords(loop.sigma, hasSigma(loop)));
