@@ -51,7 +51,8 @@ Table makeTable() {
       row(kCalibration, latched(1), 0, kRecorded, kCapture | kRos2Driver,
           kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: its place on Earth
       row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio | kRos2Driver,
-          kSemanticFilter | kCapture | kMapStore | kSubscriber),  // capture follows it (pace.mode)
+          // capture follows it (pace.mode); vio only where another program gives it
+          kSemanticFilter | kCapture | kMapStore | kVio | kSubscriber),
       row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio,
           kSemanticFilter | kMapStore | kSubscriber),
       row(kDetections, exclusive(32, kCameraHz), kCameraHz, kRecorded, kInference | kRos2Driver,

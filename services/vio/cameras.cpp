@@ -5,7 +5,6 @@
 #include "common/camera/same_camera.h"
 
 namespace perdure::vio {
-namespace {
 
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
   std::vector<RigidTransform> T_BC;
@@ -18,8 +17,6 @@ std::vector<double> readouts(const std::vector<CameraModel>& all) {
   for (const CameraModel& m : all) readout_s.push_back(m.calibration().readout_s);
   return readout_s;
 }
-
-}  // namespace
 
 Cameras::Cameras(const Config& config, const Options& options, const std::vector<CameraModel>& all)
     : tracker(config.tracker, all),

@@ -20,6 +20,10 @@ struct Cameras {
   std::vector<CameraModel> models;
 };
 
+/// What the estimators know of cameras: where on the body, and how long an image is read out, s.
+std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all);
+std::vector<double> readouts(const std::vector<CameraModel>& all);
+
 /// The same cameras in the same order, to the last digit.
 bool sameCameras(const Calibration& a, const Calibration& b);
 

@@ -166,8 +166,11 @@ void describe(Config& c, Fields& f) {
   describeStart(c.core, f);
   describeAids(c.core, c, f);
   f.texts("input.cameras", c.cameras, {"whose frames are read; the first one leads"});
+  f.choice("input.odometry", c.odometry, {"estimated", "given"},
+           {"given: another program publishes `odometry` for the frames; landmarks alone come from "
+            "here"});
   f.integer("input.max_pending", c.max_pending, between(2, 1000),
-            {"frames that may wait for their inertial samples"});
+            {"frames that may wait for their inertial samples, or for their poses"});
   f.boolean("input.moving_mask", c.moving_mask.enabled,
             {"reads `objects`, and puts no points on what moves"});
   f.number("input.moving_mask_from", c.moving_mask.probability, between(0.05, 1),

@@ -16,6 +16,7 @@ struct Config {
   TrackerOptions tracker;
   MovingMaskOptions moving_mask;
   std::vector<std::string> cameras{"cam0", "cam1"};  ///< main: whose frames are read
+  std::string odometry = "estimated";                ///< or "given": by another program
   bool stereo = true;                                ///< use the second camera where there is one
   bool prefer_calibration = true;   ///< the IMU noise that comes with the calibration
   double imu_inflation = 3.0;       ///< on the densities of the inertial noise, in motion

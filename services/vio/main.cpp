@@ -1,11 +1,13 @@
 // perdure-vio: where the body is, from camera, IMU and speed.
 #include <chrono>
+#include <functional>
 #include <opencv2/core/utility.hpp>
 
 #include "common/bus/gaps.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"
+#include "services/vio/known_pose_node.h"
 #include "services/vio/node.h"
 #include "services/vio/state_file.h"
 
@@ -14,8 +16,48 @@ namespace {
 using namespace perdure;
 namespace topics = bus::topics;
 
-void serve(service::Context& context, const vio::Config& config) {
-  cv::setNumThreads(1);  // images of this size are not worth the threads
+/// Frames of the configured cameras, decoded, each once.
+class FrameInput {
+ public:
+  FrameInput(service::Context& context, const vio::Config& config, ReasonCounts& reasons,
+             std::function<void(const Frame&)> onFrame)
+      : onFrame_(std::move(onFrame)),
+        reasons_(reasons),
+        once_(config.cameras.size()),
+        gaps_(config.cameras.size()) {
+    auto& frames = context.needs("frames", "mend the camera, or start capture");
+    for (std::size_t i = 0; i < config.cameras.size(); ++i) {
+      context.on(topics::frame(config.cameras[i]), [this, &context, &frames, i](const Frame& m) {
+        if (!once_[i].first(m.stamp.source, m.stamp.sequence)) {
+          return reasons_.add("frames_repeated");
+        }
+        const auto missed = gaps_[i].before(m.stamp.source, m.stamp.sequence);
+        if (missed > 0) reasons_.add("frames_missed", missed);
+        if (i == 0) {
+          frames.heard();
+          context.health().frameIn();
+        }
+        hand(m);
+      });
+    }
+  }
+
+ private:
+  void hand(const Frame& frame) {
+    if (const auto pixels = vision::decompressed(frame, ImageEncoding::kMono8)) {
+      onFrame_(*pixels);
+    } else {
+      reasons_.add(pixels.error());
+    }
+  }
+
+  std::function<void(const Frame&)> onFrame_;
+  ReasonCounts& reasons_;
+  std::vector<bus::Once> once_;
+  std::vector<bus::Gaps> gaps_;
+};
+
+void estimate(service::Context& context, const vio::Config& config) {
   const vio::StateFile file(config.state_directory);
   const auto odometry = context.sink(topics::kOdometry);
   vio::Node node(config, context.instance(),
@@ -44,30 +86,40 @@ void serve(service::Context& context, const vio::Config& config) {
   if (config.moving_mask.enabled) {
     context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
   }
-  auto& frames = context.needs("frames", "mend the camera, or start capture");
-  std::vector<bus::Once> once(config.cameras.size());
-  std::vector<bus::Gaps> gaps(config.cameras.size());
-  for (std::size_t i = 0; i < config.cameras.size(); ++i) {
-    context.on(topics::frame(config.cameras[i]), [&, i](const Frame& m) {
-      if (!once[i].first(m.stamp.source, m.stamp.sequence)) return own.add("frames_repeated");
-      const auto missed = gaps[i].before(m.stamp.source, m.stamp.sequence);
-      if (missed > 0) own.add("frames_missed", missed);
-      if (i == 0) {
-        frames.heard();
-        context.health().frameIn();
-      }
-      if (const auto pixels = vision::decompressed(m, ImageEncoding::kMono8)) {
-        node.onFrame(*pixels);
-      } else {
-        own.add(pixels.error());
-      }
-    });
-  }
+  const FrameInput frames(context, config, own, [&](const Frame& m) { node.onFrame(m); });
   context.every(std::chrono::seconds(1), [&] {
     if (const auto kept = file.write(node.saveState()); !kept) own.add(kept.error());
   });
   context.onHealth([&] { context.health().state(node.health(), node.status()); });
   context.run();
+}
+
+void followGivenPoses(service::Context& context, const vio::Config& config) {
+  const auto landmarks = context.sink(topics::kLandmarks);
+  vio::KnownPoseNode node(config, context.instance(), [&](const Landmarks& m) {
+    landmarks(m);
+    context.health().frameOut();
+  });
+  ReasonCounts own;
+  context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
+  context.countReasons([&]() -> const ReasonCounts& { return own; });
+  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  auto& poses = context.needs("odometry", "start the program that gives the poses");
+  context.on(topics::kOdometry, [&](const Odometry& m) {
+    poses.heard();
+    node.onOdometry(m);
+  });
+  if (config.moving_mask.enabled) {
+    context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
+  }
+  const FrameInput frames(context, config, own, [&](const Frame& m) { node.onFrame(m); });
+  context.onHealth([&] { context.health().state(node.health(), node.status()); });
+  context.run();
+}
+
+void serve(service::Context& context, const vio::Config& config) {
+  cv::setNumThreads(1);  // images of this size are not worth the threads
+  config.odometry == "given" ? followGivenPoses(context, config) : estimate(context, config);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/vision/image.h"
+#include "services/vio/landmarks_message.h"
 
 namespace perdure::vio {
 namespace {
@@ -325,23 +326,9 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
 
 void Node::publishLandmarks(const FrameStamp& stamp, const cv::Mat& image) {
   if (!outputs_.landmarks) return;
-  Landmarks out;
-  out.stamp = stamp;
-  out.instance = instance_;
-  out.world = world_;
-  out.camera = cameras_->models[0].calibration().name;
-  for (const LandmarkEstimate& e : cameras_->estimator.landmarks()) {
-    if (!e.p_W.allFinite() || !e.covariance.allFinite() || !e.cross_pose.allFinite()) continue;
-    Landmark l;
-    l.id = e.id;
-    l.p_W = e.p_W;
-    l.covariance = e.covariance;
-    l.cross_pose = e.cross_pose;
-    l.pixel = e.pixel;
-    l.descriptor = descriptorAt(image, e.pixel).value_or(Descriptor{});
-    out.landmarks.push_back(l);
-  }
-  outputs_.landmarks(out);
+  outputs_.landmarks(landmarksMessage(stamp, instance_, world_,
+                                      cameras_->models[0].calibration().name,
+                                      cameras_->estimator.landmarks(), image));
 }
 
 std::string Node::saveState() const {

@@ -18,7 +18,6 @@
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
-#include "services/vio/core/tracks/descriptor.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {

@@ -23,11 +23,15 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--topic", options.topics,
                  "Of a recording of ROS where there are several: cam0=TOPIC, cam1=TOPIC, imu=TOPIC")
       ->take_all();
-  app.add_option("--sequence", options.sequence, "Of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example seq-01");
+  app.add_option(
+      "--sequence", options.sequence,
+      "Of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example seq-01");
   app.add_option("--odometry", options.odometry,
                  "vio, truth, drifting (truth with a drift, --set drifting.KEY=VALUE), a pose file "
                  "(TUM or KITTI lines), or recorded")
       ->required();
+  app.add_flag("--landmarks", options.landmarks,
+               "Where the poses are given: points from the images too, as vio has them");
   app.add_option("--detections", options.detections, "model, none, simulated, a CSV, or recorded")
       ->required();
   app.add_option("--model", options.model, "Network for --detections model (.onnx, .cfg)");

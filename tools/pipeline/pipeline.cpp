@@ -171,7 +171,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
   }
   data.source = instanceOf(kCapture);
   data.second_encoding = ImageEncoding::kMono8;
-  data.decode = options.odometry == "vio" || options.detections == "model";
+  data.decode = options.odometry == "vio" || options.detections == "model" || options.landmarks;
   return data;
 }
 
@@ -188,6 +188,12 @@ void Pipeline::openData() {
 }
 
 void Pipeline::openOdometry(const PipelineOptions& options) {
+  if (options.landmarks && (recorded_ || options.odometry == "vio")) {
+    throw StartupError(ExitCode::kUsage,
+                       "--landmarks is for given poses (a file, truth, drifting); "
+                       "--odometry " +
+                           options.odometry + " has its own; leave it away");
+  }
   if (recorded_) return;
   PoseAccuracy accuracy;
   if (usesTruth(options)) {
@@ -207,7 +213,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
       serve(DriftingOdometry(*pose_file_, instanceOf(kVio), session_, accuracy, configs_.drifting));
     else
       serve(PoseOdometry(*pose_file_, instanceOf(kVio), session_, accuracy));
-    return;
+    return openKnownPoses();
   }
   uses_vio_ = true;
   if (!dataset_->calibration().imu) {
@@ -224,6 +230,23 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   vio_ = std::make_unique<vio::Node>(configs_.vio, instanceOf(kVio), std::move(sinks));
   vio_->setWorld(session_);
   vio_->onCalibration(dataset_->calibration());
+}
+
+void Pipeline::openKnownPoses() {
+  if (!options_.landmarks) return;
+  const auto& frames = dataset_->recording().frames;
+  if (frames.empty() || (frames.front().path.empty() && !frames.front().load)) {
+    throw StartupError(ExitCode::kUnavailable, options_.data +
+                                                   " has no images, which --landmarks "
+                                                   "needs; leave it away");
+  }
+  known_poses_ = std::make_unique<vio::KnownPoseNode>(
+      configs_.vio, instanceOf(kVio), [this](const Landmarks& landmarks) {
+        landmarks_[landmarks.stamp.sequence] = landmarks;
+        outputs_->onLandmarks(landmarks);
+        releasePoses(landmarks.stamp.sequence);
+      });
+  known_poses_->onCalibration(dataset_->calibration());
 }
 
 void Pipeline::openDetections(const PipelineOptions& options) {
@@ -274,6 +297,10 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
     if (first_camera) progress(counts_);
   }
   if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
+  if (known_poses_) {
+    timer_.timeTowardsNext("vio", [&] { known_poses_->flush(); });
+    releasePoses(std::numeric_limits<std::uint64_t>::max());
+  }
   if (simulated_) offerDue(TimePoint::max());
   deliver();
   timer_.timeTowardsNext("semantic_filter", [&] { filter_->flush(); });
@@ -296,25 +323,37 @@ void Pipeline::handleFrame(const Frame& frame) {
     ++counts_.frames;
     started_ms_[frame.stamp.sequence] = wallMs();
   }
-  if (vio_) {
-    const auto work = [&] { vio_->onFrame(frame); };
+  if (first_camera && pose_at_) givePose(frame);
+  if (vio_ || known_poses_) {
+    const auto work = [&] { vio_ ? vio_->onFrame(frame) : known_poses_->onFrame(frame); };
     if (first_camera)
       timer_.time("vio", work);
     else
       timer_.timeTowardsNext("vio", work);
   }
   if (!first_camera) return deliver();
-  if (pose_at_) {
-    if (const auto odometry = pose_at_(frame.stamp))
-      new_odometry_.push_back(*odometry);
-    else
-      reasons_.add("frame_without_pose");
-  }
   detect(frame);
   deliver();
   timer_.time("semantic_filter", [] {});
   timer_.time("map_store", [] {});
   timer_.time("outputs", [] {});
+}
+
+/// A pose waits for its landmarks, which wait for the second camera; for the next frame at most.
+void Pipeline::givePose(const Frame& frame) {
+  const auto odometry = pose_at_(frame.stamp);
+  if (!odometry) return reasons_.add("frame_without_pose");
+  if (!known_poses_) return new_odometry_.push_back(*odometry);
+  if (!held_.empty()) releasePoses(held_.back().stamp.sequence);
+  held_.push_back(*odometry);
+  timer_.timeTowardsNext("vio", [&] { known_poses_->onOdometry(*odometry); });
+}
+
+void Pipeline::releasePoses(std::uint64_t up_to) {
+  const auto released = std::find_if(held_.begin(), held_.end(),
+                                     [&](const Odometry& o) { return o.stamp.sequence > up_to; });
+  new_odometry_.insert(new_odometry_.end(), held_.begin(), released);
+  held_.erase(held_.begin(), released);
 }
 
 void Pipeline::detect(const Frame& frame) {
@@ -428,6 +467,7 @@ std::map<std::string, ReasonCounts> Pipeline::reasons() const {
                                           {"map_store", map_->reasons()},
                                           {"pipeline", reasons_}};
   if (vio_) all["vio"] = vio_->reasons();
+  if (known_poses_) all["vio"] = known_poses_->reasons();
   return all;
 }
 

@@ -17,6 +17,7 @@
 #include "common/replay/recordings/recording_writer.h"
 #include "services/inference/node.h"
 #include "services/semantic_filter/node.h"
+#include "services/vio/known_pose_node.h"
 #include "services/vio/node.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
@@ -67,6 +68,7 @@ class Pipeline {
 
  private:
   void openOdometry(const PipelineOptions& options);
+  void openKnownPoses();
   void openDetections(const PipelineOptions& options);
   void openData();
   InstanceId instanceOf(InstanceId service) const;
@@ -96,6 +98,8 @@ class Pipeline {
   replay::DatasetOptions dataOptions() const;
   void handle(const replay::Message& message);
   void handleFrame(const Frame& frame);
+  void givePose(const Frame& frame);
+  void releasePoses(std::uint64_t up_to);
   void detect(const Frame& frame);
   void offer(Detections detections);
   void offerDue(TimePoint now);
@@ -121,6 +125,7 @@ class Pipeline {
   std::unique_ptr<inference::Node> inference_;
   std::unique_ptr<SimulatedDetections> simulated_;
   std::unique_ptr<vio::Node> vio_;
+  std::unique_ptr<vio::KnownPoseNode> known_poses_;  ///< landmarks where the poses are given
   std::unique_ptr<semantic_filter::Node> filter_;
   std::unique_ptr<MapMemory> map_;
   std::optional<MapFollower> in_map_;  ///< where the map has a graph
@@ -132,6 +137,7 @@ class Pipeline {
   std::uint64_t first_index_ = 0;                 ///< in the data, by --from
   double frames_seconds_ = 0.0;                   // of the recording, since its first frame
   std::vector<Odometry> new_odometry_;            // of vio, not yet handed on
+  std::vector<Odometry> held_;                    // given, until their landmarks are there
   std::map<std::uint64_t, Landmarks> landmarks_;  // by frame, waiting for the filter
   std::map<std::uint64_t, Detections> waiting_;   // detections whose odometry has not come
   std::set<std::uint64_t> waits_for_detections_;  // frames whose odometry has come

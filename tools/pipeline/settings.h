@@ -26,7 +26,8 @@ struct PipelineOptions {
   std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
   double box_origin = 0.0;
   bool outline_boxes = false;
-  double from = 0.0;  ///< seconds after the first frame at which to begin
+  bool landmarks = false;  ///< with poses that are given: points from the images too
+  double from = 0.0;       ///< seconds after the first frame at which to begin
   std::optional<double> seconds;
   std::optional<std::int64_t> seed;      ///< of --detections simulated and --odometry drifting
   std::vector<std::string> configs;      ///< service=FILE

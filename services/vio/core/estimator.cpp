@@ -399,17 +399,13 @@ std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
                                                    const ImagePoint& seen) const {
   const auto point = triangulate(raysOf(track, *state_, options_.vision.sigma_px), options_.vision);
   if (!point || point->rms > 2.0) return std::nullopt;
-  const RigidTransform T_WB = state_->nav.T_WB();
   LandmarkEstimate l;
   l.id = track.id;
   l.p_W = point->p_W;
   l.pixel = seen.pixel;
   l.covariance = point->covariance;
-  // The point moves rigidly with the body's pose: δp_W = −R [p_B]× θ + δp + R δp_B.
-  Eigen::Matrix<double, 3, 6> J;
-  J << -T_WB.R() * skew(T_WB.inverse() * point->p_W), Eigen::Matrix3d::Identity();
   const int pose = state_->clones.back().at;
-  l.cross_pose = J * state_->P().block<6, 6>(pose, pose);
+  l.cross_pose = crossOfRigid(point->p_W, state_->nav.T_WB(), state_->P().block<6, 6>(pose, pose));
   return l;
 }
 

@@ -14,6 +14,7 @@
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/core/state/state.h"
 #include "services/vio/core/tracks/tracks.h"
+#include "services/vio/core/update/landmark.h"
 #include "services/vio/core/update/standstill.h"
 #include "services/vio/core/update/updater_slam.h"
 
@@ -50,14 +51,6 @@ struct FrameEstimate {
   bool at_rest = false;
   int points_used = 0;                  ///< of this image, by all updates
   std::vector<Innovation> innovations;  ///< where they are kept
-};
-
-struct LandmarkEstimate {
-  std::uint64_t id = 0;
-  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< given the pose
-  Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
 class Estimator {

@@ -6,34 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <opencv2/imgproc.hpp>
 
 #include "common/math/gaussian.h"
 #include "common/vision/image.h"
+#include "services/vio/core/tracks/descriptor.h"
+#include "tests/services/vio/drawn_drive.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {
 namespace {
-
-/// The simulated drive's points as discs of different greys.
-Frame draw(const test::SimulatedDrive& drive, double t, std::uint64_t sequence) {
-  constexpr int kShift = 4;
-  cv::Mat image(480, 752, CV_8UC1, cv::Scalar(90));
-  for (std::size_t i = 0; i < drive.points().size(); ++i) {
-    const Eigen::Vector2d p = drive.pixelOf(i, t);
-    if (p.x() < -20 || p.y() < -20 || p.x() > 772 || p.y() > 500) continue;
-    const cv::Point at(static_cast<int>(p.x() * (1 << kShift)),
-                       static_cast<int>(p.y() * (1 << kShift)));
-    const int radius = (4 + static_cast<int>(i % 4)) << kShift;
-    cv::circle(image, at, radius, static_cast<double>(i % 2 ? 130 + i * 37 % 120 : i * 53 % 60),
-               cv::FILLED, cv::LINE_AA, kShift);
-  }
-  Frame frame;
-  frame.stamp = {1, sequence, drive.time(t), 0};
-  frame.camera = "cam0";
-  EXPECT_TRUE(vision::setPixels(frame, image));
-  return frame;
-}
 
 struct Recorder {
   std::vector<Odometry> odometry;
@@ -76,7 +57,7 @@ class Player {
       if (t > until) break;
       const double t_frame = 0.05 * static_cast<double>(next_frame);
       if (t >= t_frame) {
-        Frame f = draw(drive_, t_frame, next_frame++);
+        Frame f = test::drawn(drive_, t_frame, next_frame++);
         if (!frame || frame(f, t_frame)) node.onFrame(f);
       }
       ImuSample s{1, i, readings_[i].time, readings_[i].gyro, readings_[i].accel};

@@ -6,11 +6,14 @@
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/text_file.h"
+#include "common/replay/recordings/recorded_messages.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tools/evaluate/object_rows.h"
 #include "tools/pipeline/report.h"
@@ -258,6 +261,57 @@ TEST(Pipeline, ANetworkFileThatIsNoneIsRefusedWithASentence) {
   options.model = (root / "net.onnx").string();
   options.out = (root / "out").string();
   EXPECT_THAT(errorOf(options), HasSubstr("net.onnx"));
+}
+
+/// Images for the street: discs of different greys on both sides of the way.
+void drawStreet(const fs::path& street) {
+  auto calibration = replay::readTrackingCalibration(street / "calib/0000.txt");
+  calibration.width = 1242, calibration.height = 375;
+  const CameraModel camera(calibration.camera("cam0"));
+  fs::create_directories(street / "image_02/0000");
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const RigidTransform T_CW = (poseOf(frame) * camera.T_BC()).inverse();
+    cv::Mat image(375, 1242, CV_8UC1, cv::Scalar(90));
+    for (int i = 0; i < 400; ++i) {
+      const Eigen::Vector3d point(0.15 * i, (i % 2 ? 1.0 : -1.0) * (4.0 + i * 7 % 5),
+                                  -1.0 + 0.5 * (i * 13 % 9));
+      const auto pixel = camera.project(T_CW * point);
+      if (!pixel || !camera.inImage(*pixel, 12.0)) continue;
+      cv::circle(image, cv::Point(cvRound(16 * pixel->x()), cvRound(16 * pixel->y())),
+                 (4 + i % 4) * 16, cv::Scalar(i % 2 ? 130 + i * 37 % 120 : i * 53 % 60), cv::FILLED,
+                 cv::LINE_AA, 4);
+    }
+    char name[16];
+    std::snprintf(name, sizeof name, "%06d.png", frame);
+    cv::imwrite((street / "image_02/0000" / name).string(), image);
+  }
+}
+
+TEST(Pipeline, GivenPosesHaveLandmarksToo) {
+  const fs::path street = makeStreet("landmarks");
+  PipelineOptions options = streetOptions(street, "out");
+  options.landmarks = true;
+  EXPECT_THAT(errorOf(options), HasSubstr("has no images"));
+  drawStreet(street);
+  options.odometry = "vio";
+  EXPECT_THAT(errorOf(options), HasSubstr("--landmarks is for given poses"));
+  options.odometry = (street / "poses.txt").string();
+  options.record = true;
+  runPipeline(options);
+  std::size_t frames = 0, points = 0;
+  replay::RecordedMessages recorded(street / "out/run.mcap");
+  recorded.rewind([](const std::string& topic) { return topic == "landmarks"; });
+  while (const auto message = recorded.next()) {
+    const auto landmarks = replay::valueOf<Landmarks>(*message);
+    ASSERT_TRUE(landmarks.has_value());
+    ++frames;
+    points = landmarks->landmarks.size();
+    for (const Landmark& l : landmarks->landmarks) {
+      EXPECT_LT(std::abs(std::abs(l.p_W.y()) - 6.0), 4.0) << l.p_W.transpose();
+    }
+  }
+  EXPECT_EQ(frames, static_cast<std::size_t>(kFrames));
+  EXPECT_GT(points, 10u);
 }
 
 TEST(Pipeline, ATruncatedImageCostsOneFrame) {

@@ -1,0 +1,130 @@
+#include "services/vio/core/known_poses/point_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace perdure::vio {
+namespace {
+
+std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(track.views()); }
+
+constexpr std::size_t kViews = 20;          // poses that are kept
+constexpr std::size_t kFewestToLearn = 10;  // points that say how well tracks agree with poses
+constexpr double kForget = 0.05;            // of that, with each image
+constexpr double kGate = 3.0;               // residuals of a point, in those of the others
+
+double lackOfFit(const Triangulated& point, std::size_t rays) {
+  // rms² is of 2n residuals, and three of their degrees of freedom went into the point.
+  const auto n = static_cast<double>(rays);
+  return point.rms * point.rms * 2.0 * n / (2.0 * n - 3.0);
+}
+
+}  // namespace
+
+PointMapper::PointMapper(const VisionOptions& options, const WindowOptions& window,
+                         std::vector<RigidTransform> T_BC, std::vector<double> readout_s)
+    : options_(options), window_(window), T_BC_(std::move(T_BC)), readout_s_(std::move(readout_s)) {
+  readout_s_.resize(T_BC_.size(), 0.0);
+}
+
+void PointMapper::clear() {
+  views_.clear();
+  database_.clear();
+  landmarks_.clear();
+}
+
+/// Tracks that have ended go, and the poses from before the first view of all others.
+void PointMapper::forgetEnded() {
+  std::vector<std::uint64_t> ended;
+  std::uint64_t oldest = frame_;
+  for (const auto& [id, track] : database_.tracks()) {
+    if (track.seenAt(frame_)) {
+      oldest = std::min(oldest, track.observations.front().frame);
+    } else {
+      ended.push_back(id);
+    }
+  }
+  for (const std::uint64_t id : ended) database_.erase(id);
+  std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
+}
+
+/// Of the poses between the oldest and the newest, that which adds least baseline goes.
+void PointMapper::forgetOne() {
+  std::size_t least = 1;
+  double shortest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i + 1 < views_.size(); ++i) {
+    const double way = (views_[i + 1].pose.T_WB.p - views_[i - 1].pose.T_WB.p).norm();
+    if (way < shortest) shortest = way, least = i;
+  }
+  database_.removeFrame(views_[least].frame);
+  views_.erase(views_.begin() + static_cast<long>(least));
+}
+
+RigidTransform PointMapper::cameraOf(const View& view, std::size_t camera, double row) const {
+  const double s = row * readout_s_[camera];
+  if (s == 0.0) return view.pose.T_WB * T_BC_[camera];
+  RowMotion motion;
+  motion.rate = view.pose.rate_B;
+  motion.velocity = view.pose.T_WB.q.conjugate() * view.pose.velocity_W;
+  return view.pose.T_WB * rowCamera(motion, T_BC_[camera], s).T_BC;
+}
+
+std::vector<Ray> PointMapper::raysOf(const Track& track) const {
+  std::vector<Ray> rays;
+  rays.reserve(track.views());
+  auto view = views_.begin();
+  for (const Observation& o : track.observations) {
+    while (view != views_.end() && view->frame < o.frame) ++view;
+    if (view == views_.end() || view->frame != o.frame) continue;
+    for (std::size_t c = 0; c < T_BC_.size(); ++c) {
+      if (!o.seen[c]) continue;
+      rays.push_back({cameraOf(*view, c, o.seen[c]->row), o.seen[c]->normalised,
+                      o.seen[c]->scale / noisePx()});
+    }
+  }
+  return rays;
+}
+
+void PointMapper::learnScale(const std::vector<Candidate>& candidates) {
+  if (candidates.size() < kFewestToLearn) return;
+  std::vector<double> fits;
+  for (const Candidate& c : candidates) fits.push_back(c.point.rms);
+  const auto middle = fits.begin() + static_cast<long>(fits.size() / 2);
+  std::nth_element(fits.begin(), middle, fits.end());
+  // Residuals are in units of the scale that was assumed.
+  const double seen = scale_ * *middle;
+  scale_ = std::max(1.0, scale_ + kForget * (seen - scale_));
+}
+
+void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
+  ++frame_;
+  views_.push_back({frame_, pose});
+  database_.add(frame_, tracked);
+  forgetEnded();
+  if (views_.size() > kViews) forgetOne();
+  std::vector<Candidate> candidates;
+  for (const TrackedPoint& seen : tracked.points) {
+    const Track* track = database_.find(seen.id);
+    if (!track || viewsOf(*track) < window_.min_observations) continue;
+    const auto rays = raysOf(*track);
+    auto point = triangulate(rays, options_);
+    if (!point) continue;
+    point->rms = std::sqrt(lackOfFit(*point, rays.size()));
+    candidates.push_back({&seen, *point});
+  }
+  landmarks_.clear();
+  for (const Candidate& c : candidates) {
+    if (c.point.rms > kGate) continue;
+    LandmarkEstimate l;
+    l.id = c.seen->id;
+    l.p_W = c.point.p_W;
+    l.covariance = c.point.covariance;
+    l.cross_pose = crossOfRigid(l.p_W, pose.T_WB, pose.covariance);
+    l.pixel = c.seen->seen[0]->pixel;
+    landmarks_.push_back(l);
+  }
+  learnScale(candidates);
+}
+
+}  // namespace perdure::vio

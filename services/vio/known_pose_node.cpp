@@ -1,0 +1,177 @@
+#include "services/vio/known_pose_node.h"
+
+#include <algorithm>
+
+#include "common/camera/camera_model.h"
+#include "common/math/so3.h"
+#include "common/vision/image.h"
+#include "services/vio/cameras.h"
+#include "services/vio/core/tracks/tracker.h"
+#include "services/vio/landmarks_message.h"
+
+namespace perdure::vio {
+namespace {
+
+constexpr std::size_t kPoses = 256;  // that wait for their frames
+constexpr int kWithoutPose = 10;     // frames in a row, until that is worth a word
+
+}  // namespace
+
+struct KnownPoseNode::Cameras {
+  Cameras(const Config& config, std::vector<CameraModel> all)
+      : models(std::move(all)),
+        tracker(config.tracker, models),
+        mapper(config.core.vision, config.core.window, extrinsics(models), readouts(models)) {}
+
+  std::vector<CameraModel> models;
+  Tracker tracker;
+  PointMapper mapper;
+};
+
+KnownPoseNode::KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks)
+    : config_(config),
+      instance_(instance),
+      landmarks_(std::move(landmarks)),
+      moving_(config.moving_mask),
+      waiting_(config.pair_tolerance_s) {}
+
+KnownPoseNode::~KnownPoseNode() = default;
+
+const ReasonCounts& KnownPoseNode::reasons() const {
+  all_reasons_ = reasons_;
+  if (!cameras_) return all_reasons_;
+  for (const auto& [code, count] : cameras_->tracker.reasons().all()) {
+    all_reasons_.add(code, count);
+  }
+  return all_reasons_;
+}
+
+void KnownPoseNode::onCalibration(const Calibration& calibration) {
+  if (calibration.cameras.empty()) return reasons_.add("calibration_without_camera");
+  if (calibration_ && sameCameras(*calibration_, calibration)) return;
+  waiting_.clear();
+  last_.reset();
+  calibration_ = calibration;
+  std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
+  if (config_.stereo && calibration.cameras.size() > 1) models.emplace_back(calibration.cameras[1]);
+  cameras_ = std::make_unique<Cameras>(config_, std::move(models));
+}
+
+HealthState KnownPoseNode::health() const {
+  if (!last_) return HealthState::kStarting;
+  return status().empty() ? HealthState::kOk : HealthState::kDegraded;
+}
+
+std::string KnownPoseNode::status() const {
+  if (!cameras_) return "waits for the calibration; start capture";
+  if (!last_image_ && waiting_.empty())
+    return "waits for frames; start capture, or mend the camera";
+  if (!last_) return "waits for poses of its frames; start what publishes odometry";
+  if (without_pose_ > kWithoutPose) {
+    return "frames have no pose; start what publishes odometry, with the stamps of the frames";
+  }
+  return {};
+}
+
+void KnownPoseNode::onOdometry(const Odometry& odometry) {
+  if (!odometry.T_WB.finite() || !odometry.covariance.allFinite() || !odometry.v_WB.allFinite()) {
+    return reasons_.add("odometry_not_finite");
+  }
+  if ((last_image_ && odometry.stamp.time <= *last_image_) ||
+      (!poses_.empty() && odometry.stamp.time < poses_.back().stamp.time)) {
+    return reasons_.add("odometry_late");
+  }
+  poses_.push_back(odometry);
+  if (poses_.size() > kPoses) poses_.pop_front();
+  drain(false);
+}
+
+void KnownPoseNode::onFrame(const Frame& frame) {
+  if (!cameras_) return reasons_.add("frame_before_calibration");
+  const auto& models = cameras_->models;
+  const bool second = models.size() == 2 && frame.camera == models[1].calibration().name;
+  if (!second && frame.camera != models[0].calibration().name) {
+    if (!calibration_->camera(frame.camera)) reasons_.add("frame_of_unknown_camera");
+    return;
+  }
+  const CameraModel& model = models[second ? 1 : 0];
+  if (frame.width != static_cast<std::uint32_t>(model.width()) ||
+      frame.height != static_cast<std::uint32_t>(model.height())) {
+    return reasons_.add("frame_size_differs");
+  }
+  if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
+  const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
+  if (!added) reasons_.add(added.error());
+  if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {
+    waiting_.take();
+    reasons_.add("frame_without_pose");
+    ++without_pose_;
+  }
+  drain(false);
+}
+
+const Odometry* KnownPoseNode::poseOf(const Frame& frame) const {
+  const auto found = std::find_if(poses_.begin(), poses_.end(), [&](const Odometry& o) {
+    return o.stamp.sameFrame(frame.stamp);
+  });
+  return found == poses_.end() ? nullptr : &*found;
+}
+
+void KnownPoseNode::drain(bool all) {
+  while (cameras_ && !waiting_.empty()) {
+    const FramePair& front = waiting_.front();
+    const Odometry* pose = poseOf(front.first);
+    // Poses come in order: a later one says that this frame has none.
+    if (!pose && (poses_.empty() || poses_.back().stamp.time <= front.first.stamp.time)) return;
+    if (pose && !all && cameras_->models.size() == 2 && waiting_.frontMayBePaired()) return;
+    const FramePair frames = waiting_.take();
+    last_image_ = frames.first.stamp.time;
+    if (pose && pose->state != OdometryState::kInitialising) {
+      without_pose_ = 0;
+      process(frames, *pose);
+    } else {
+      reasons_.add("frame_without_pose");
+      ++without_pose_;
+    }
+    std::erase_if(poses_, [&](const Odometry& o) { return o.stamp.time <= *last_image_; });
+  }
+}
+
+void KnownPoseNode::begin(const WorldId& world) {
+  if (last_ && last_->world == world) return;
+  cameras_->mapper.clear();
+  last_.reset();
+}
+
+void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
+  const auto first = vision::monoOf(frames.first);
+  if (!first) return reasons_.add(first.error());
+  cv::Mat second;
+  if (frames.second) {
+    const auto image = vision::monoOf(*frames.second);
+    if (image) second = *image;
+    if (!image) reasons_.add(image.error());
+  } else if (cameras_->models.size() == 2) {
+    reasons_.add("stereo_unpaired");
+  }
+  begin(odometry.world);
+  std::optional<Eigen::Matrix3d> R;
+  KnownPose pose{odometry.T_WB, odometry.covariance.topLeftCorner<6, 6>(), odometry.v_WB, {}};
+  pose.rate_B.setZero();
+  if (last_) {
+    R = (odometry.T_WB.q.conjugate() * last_->T_WB.q).toRotationMatrix();
+    const double s = toSeconds(odometry.stamp.time - last_->stamp.time);
+    if (s > 0.0) pose.rate_B = logSo3(last_->T_WB.q.conjugate() * odometry.T_WB.q) / s;
+  }
+  const auto masked =
+      moving_.boxes(cameras_->models[0], odometry.world, odometry.T_WB, odometry.stamp.time);
+  const Eigen::Vector3d turn = cameras_->models[0].calibration().readout_s * pose.rate_B;
+  cameras_->mapper.add(pose, cameras_->tracker.track(*first, second, R, masked, turn));
+  last_ = odometry;
+  points_ = cameras_->mapper.landmarks().size();
+  landmarks_(landmarksMessage(odometry.stamp, instance_, odometry.world,
+                              cameras_->models[0].calibration().name, cameras_->mapper.landmarks(),
+                              *first));
+}
+
+}  // namespace perdure::vio

@@ -1,0 +1,63 @@
+// vio where another program gives the poses (`input.odometry: given`): its odometry and the frames
+// in, landmarks out. Waits until a frame has its pose; pairs stereo frames.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/base/sink.h"
+#include "common/types/health.h"
+#include "common/types/odometry.h"
+#include "common/types/sensors.h"
+#include "services/vio/config.h"
+#include "services/vio/core/known_poses/point_mapper.h"
+#include "services/vio/moving_mask.h"
+#include "services/vio/waiting_frames.h"
+
+namespace perdure::vio {
+
+class KnownPoseNode {
+ public:
+  /// landmarks: one for each frame of the first camera that has a pose, in order.
+  KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks);
+  ~KnownPoseNode();
+
+  void onCalibration(const Calibration& calibration);
+  /// In order of their stamps. Poses of other frames than those of the first camera are of no use.
+  void onOdometry(const Odometry& odometry);
+  void onFrame(const Frame& frame);
+  void onObjects(const Objects& objects) { moving_.onObjects(objects); }
+  /// End of data: what waits for a second image is taken without.
+  void flush() { drain(true); }
+
+  const ReasonCounts& reasons() const;
+  HealthState health() const;
+  /// One sentence: what it waits for, or what is wrong; empty when all is well.
+  std::string status() const;
+
+ private:
+  struct Cameras;
+  void drain(bool all);
+  const Odometry* poseOf(const Frame& frame) const;
+  void process(const FramePair& frames, const Odometry& odometry);
+  void begin(const WorldId& world);
+
+  Config config_;
+  InstanceId instance_;
+  Sink<Landmarks> landmarks_;
+  MovingMask moving_;
+  std::optional<Calibration> calibration_;
+  std::unique_ptr<Cameras> cameras_;
+  WaitingFrames waiting_;
+  std::deque<Odometry> poses_;    ///< oldest first, of frames that may still come
+  std::optional<Odometry> last_;  ///< of the last image that was used
+  std::optional<TimePoint> last_image_;
+  std::size_t points_ = 0;  ///< in the last landmarks
+  int without_pose_ = 0;    ///< frames in a row
+  mutable ReasonCounts all_reasons_;
+  ReasonCounts reasons_;
+};
+
+}  // namespace perdure::vio

@@ -1,0 +1,12 @@
+// Images of the simulated drive.
+#pragma once
+
+#include "common/types/sensors.h"
+#include "tests/services/vio/simulated_drive.h"
+
+namespace perdure::vio::test {
+
+/// The drive's points as discs of different greys, as camera `camera` sees them.
+Frame drawn(const SimulatedDrive& drive, double t, std::uint64_t sequence, std::size_t camera = 0);
+
+}  // namespace perdure::vio::test

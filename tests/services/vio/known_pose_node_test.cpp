@@ -1,0 +1,201 @@
+// The node where another program gives the poses: its inputs, their faults, what it says.
+#include "services/vio/known_pose_node.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "tests/services/vio/drawn_drive.h"
+#include "tests/services/vio/simulated_drive.h"
+
+namespace perdure::vio {
+namespace {
+
+constexpr double kStep = 0.05;
+
+test::DriveOptions driveOf(bool stereo) {
+  test::DriveOptions options;
+  options.points = 400;
+  options.stereo = stereo;
+  return options;
+}
+
+Calibration calibrationOf(const test::SimulatedDrive& drive) {
+  Calibration c;
+  for (const CameraModel& model : drive.cameras()) c.cameras.push_back(model.calibration());
+  return c;
+}
+
+class KnownPoses : public ::testing::Test {
+ protected:
+  explicit KnownPoses(bool stereo = false)
+      : drive_(driveOf(stereo)),
+        node_({}, 5, [this](const Landmarks& l) { landmarks_[l.stamp.sequence] = l; }) {
+    node_.onCalibration(calibrationOf(drive_));
+  }
+
+  Odometry poseOf(std::uint64_t frame) const {
+    const double t = timeOf(frame);
+    Odometry o;
+    o.stamp = {1, frame, drive_.time(t), 0};
+    o.world = {9, 0};
+    o.state = OdometryState::kTracking;
+    o.T_WB = drive_.truth(t).T_WB();
+    o.v_WB = drive_.truth(t).v_WB;
+    o.covariance = 1e-6 * Matrix9d::Identity();
+    return o;
+  }
+  Frame imageOf(std::uint64_t frame, std::size_t camera = 0) const {
+    return test::drawn(drive_, timeOf(frame), frame, camera);
+  }
+  void play(std::uint64_t from, std::uint64_t until) {
+    for (std::uint64_t i = from; i < until; ++i) {
+      node_.onFrame(imageOf(i));
+      node_.onOdometry(poseOf(i));
+    }
+  }
+  /// Median distance of the landmarks of a frame from the nearest point of the drive, over their
+  /// distance from the body.
+  double errorAt(std::uint64_t frame) const {
+    std::vector<double> errors;
+    for (const Landmark& l : landmarks_.at(frame).landmarks) {
+      double nearest = 1e9;
+      for (const auto& p : drive_.points()) nearest = std::min(nearest, (p - l.p_W).norm());
+      errors.push_back(nearest / (l.p_W - drive_.truth(timeOf(frame)).p_WB).norm());
+    }
+    if (errors.empty()) return 1.0;
+    std::sort(errors.begin(), errors.end());
+    return errors[errors.size() / 2];
+  }
+  static double timeOf(std::uint64_t frame) { return kStep * static_cast<double>(frame); }
+
+  test::SimulatedDrive drive_;
+  std::map<std::uint64_t, Landmarks> landmarks_;
+  KnownPoseNode node_;
+};
+
+class KnownPosesInStereo : public KnownPoses {
+ protected:
+  KnownPosesInStereo() : KnownPoses(true) {}
+};
+
+TEST_F(KnownPoses, EachFrameWithAPoseGivesItsLandmarks) {
+  play(0, 40);
+  ASSERT_EQ(landmarks_.size(), 40u);
+  EXPECT_GT(landmarks_.at(39).landmarks.size(), 20u);
+  EXPECT_LT(errorAt(39), 0.03);
+  const Landmarks& last = landmarks_.at(39);
+  EXPECT_EQ(last.camera, "cam0");
+  EXPECT_EQ(last.instance, 5u);
+  EXPECT_EQ(last.world, (WorldId{9, 0}));
+  EXPECT_TRUE(std::any_of(last.landmarks.begin(), last.landmarks.end(), [](const Landmark& l) {
+    return l.descriptor != std::array<std::uint8_t, 32>{};
+  }));
+  EXPECT_EQ(node_.health(), HealthState::kOk);
+  EXPECT_EQ(node_.status(), "");
+  EXPECT_TRUE(node_.reasons().all().empty());
+}
+
+TEST_F(KnownPoses, PosesMayComeBeforeOrLongAfterTheirFrames) {
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onOdometry(poseOf(i));
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(imageOf(i));
+  EXPECT_EQ(landmarks_.size(), 20u);
+  for (std::uint64_t i = 20; i < 40; ++i) node_.onFrame(imageOf(i));
+  EXPECT_EQ(landmarks_.size(), 20u);
+  for (std::uint64_t i = 20; i < 40; ++i) node_.onOdometry(poseOf(i));
+  EXPECT_EQ(landmarks_.size(), 40u);
+  EXPECT_LT(errorAt(39), 0.03);
+}
+
+TEST_F(KnownPoses, AFrameWithoutAPoseIsCountedAndTheNextOneGoesOn) {
+  play(0, 20);
+  node_.onFrame(imageOf(20));
+  play(21, 30);
+  EXPECT_EQ(node_.reasons().of("frame_without_pose"), 1u);
+  EXPECT_EQ(landmarks_.count(20), 0u);
+  EXPECT_LT(errorAt(29), 0.03);
+}
+
+TEST_F(KnownPoses, WherePosesStopHealthSaysSo) {
+  play(0, 20);
+  for (std::uint64_t i = 20; i < 90; ++i) node_.onFrame(imageOf(i));
+  EXPECT_EQ(node_.health(), HealthState::kDegraded);
+  EXPECT_NE(node_.status().find("odometry"), std::string::npos);
+  EXPECT_EQ(node_.reasons().of("frame_without_pose"), 30u) << "40 may still get theirs";
+  node_.onOdometry(poseOf(89));
+  EXPECT_EQ(landmarks_.count(89), 1u);
+  EXPECT_EQ(node_.health(), HealthState::kOk);
+}
+
+TEST_F(KnownPoses, PosesThatAreNoneAreNotUsed) {
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    Odometry o = poseOf(i);
+    o.state = OdometryState::kInitialising;
+    node_.onOdometry(o);
+    node_.onFrame(imageOf(i));
+  }
+  Odometry broken = poseOf(5);
+  broken.T_WB.p.x() = std::nan("");
+  node_.onOdometry(broken);
+  node_.onFrame(imageOf(5));
+  EXPECT_TRUE(landmarks_.empty());
+  EXPECT_EQ(node_.reasons().of("odometry_not_finite"), 1u);
+  EXPECT_EQ(node_.health(), HealthState::kStarting);
+  play(6, 20);
+  EXPECT_LT(errorAt(19), 0.03);
+}
+
+TEST_F(KnownPoses, AnotherFrameOfReferenceBeginsAnew) {
+  play(0, 20);
+  ASSERT_GT(landmarks_.at(19).landmarks.size(), 20u);
+  const RigidTransform moved(Eigen::Matrix3d::Identity(), Eigen::Vector3d(50.0, 0.0, 0.0));
+  for (std::uint64_t i = 20; i < 40; ++i) {
+    Odometry o = poseOf(i);
+    o.world.epoch = 1;
+    o.T_WB = moved * o.T_WB;
+    node_.onOdometry(o);
+    node_.onFrame(imageOf(i));
+  }
+  EXPECT_TRUE(landmarks_.at(20).landmarks.empty());
+  ASSERT_GT(landmarks_.at(39).landmarks.size(), 20u);
+  for (const Landmark& l : landmarks_.at(39).landmarks) EXPECT_GT(l.p_W.x(), 40.0);
+}
+
+TEST_F(KnownPoses, WhatDoesNotFitIsCounted) {
+  KnownPoseNode early({}, 5, [](const Landmarks&) {});
+  early.onFrame(imageOf(0));
+  EXPECT_EQ(early.reasons().of("frame_before_calibration"), 1u);
+  EXPECT_NE(early.status().find("calibration"), std::string::npos);
+  Frame small = imageOf(0);
+  small.width = 100;
+  node_.onFrame(small);
+  EXPECT_EQ(node_.reasons().of("frame_size_differs"), 1u);
+  play(0, 3);
+  node_.onFrame(imageOf(1));
+  EXPECT_EQ(node_.reasons().of("frame_late"), 1u);
+  node_.onOdometry(poseOf(1));
+  EXPECT_EQ(node_.reasons().of("odometry_late"), 1u);
+}
+
+TEST_F(KnownPosesInStereo, ABodyThatStandsKnowsDistances) {
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    Odometry o = poseOf(0);
+    o.stamp = {1, i, drive_.time(timeOf(i)), 0};
+    node_.onOdometry(o);
+    for (std::size_t camera : {0u, 1u}) {
+      Frame frame = imageOf(0, camera);
+      frame.stamp = o.stamp;
+      node_.onFrame(frame);
+    }
+  }
+  ASSERT_EQ(landmarks_.size(), 6u);
+  EXPECT_GT(landmarks_.at(5).landmarks.size(), 10u);
+  EXPECT_LT(errorAt(5), 0.1);
+  EXPECT_EQ(node_.reasons().of("stereo_unpaired"), 0u);
+}
+
+}  // namespace
+}  // namespace perdure::vio
