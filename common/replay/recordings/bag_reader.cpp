@@ -1,7 +1,6 @@
 // Bags of ROS 1 (format 2.0): records of named fields and data, messages in chunks, an index behind
 // each. The file is gone through by the heads of its records, so that a bag that was never closed
 // (`.bag.active`, or renamed) is read as far as it goes.
-#include <bzlib.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -16,6 +15,7 @@
 #include "common/base/errors.h"
 #include "common/replay/recordings/mcap_format.h"
 #include "common/replay/recordings/ros_messages.h"
+#include "common/replay/recordings/unpack.h"
 
 namespace perdure::replay {
 namespace {
@@ -65,28 +65,6 @@ std::optional<Op> opOf(const HeadFields& fields) {
 std::string valueOf(const HeadFields& fields, const std::string& name) {
   const auto found = fields.find(name);
   return found == fields.end() ? "" : found->second;
-}
-
-/// What there is of it; in steps, so that memory is asked for by what comes.
-std::vector<std::uint8_t> unpackedBz2(std::vector<std::uint8_t>& packed) {
-  constexpr std::size_t kStep = 1u << 20;
-  std::vector<std::uint8_t> bytes;
-  bz_stream stream{};
-  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return bytes;
-  stream.next_in = reinterpret_cast<char*>(packed.data());
-  stream.avail_in = static_cast<unsigned int>(packed.size());
-  int state = BZ_OK;
-  while (state == BZ_OK && bytes.size() < kMostChunk) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + kStep);
-    stream.next_out = reinterpret_cast<char*>(bytes.data() + before);
-    stream.avail_out = kStep;
-    state = BZ2_bzDecompress(&stream);
-    bytes.resize(before + kStep - stream.avail_out);
-    if (bytes.size() == before) break;  // nothing more comes
-  }
-  BZ2_bzDecompressEnd(&stream);
-  return bytes;
 }
 
 struct ChunkPlace {
@@ -269,12 +247,16 @@ class Bag : public RosSource {
     if (packed.size() != chunk.packed) return fail("file", path_.string() + " cannot be read");
     if (chunk.compression.empty() || chunk.compression == "none")
       return std::make_shared<const std::vector<std::uint8_t>>(std::move(packed));
-    if (chunk.compression != "bz2") {
-      return fail("chunk_" + chunk.compression,
+    std::vector<std::uint8_t> records;
+    if (chunk.compression == "bz2") {
+      records = unpackedBz2(packed, kMostChunk);
+    } else if (chunk.compression == "lz4") {
+      records = unpackedLz4(packed, kMostChunk);
+    } else {
+      return fail("chunk_of_other_compression",
                   path_.string() + ": chunks packed by " + chunk.compression +
                       " are not read; `rosbag decompress` unpacks them");
     }
-    auto records = unpackedBz2(packed);
     if (records.size() != chunk.unpacked) {
       return fail("chunk_damaged", path_.string() + ": a chunk does not unpack");
     }

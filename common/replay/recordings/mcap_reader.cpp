@@ -3,10 +3,11 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cerrno>
+
+#include "common/replay/recordings/unpack.h"
 
 namespace perdure::replay::mcap {
 namespace {
@@ -41,22 +42,19 @@ Result<std::vector<std::uint8_t>> unpacked(const ChunkHead& head, Bytes packed) 
   if (place.compression.empty()) {
     records.assign(packed.begin(), packed.end());
   } else if (place.compression == "zstd") {
-    // What the frame says goes before memory is asked for by what the record says.
-    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != place.unpacked) {
-      return fail("chunk_damaged", "a chunk whose sizes differ");
-    }
-    records.resize(place.unpacked);
-    const std::size_t n =
-        ZSTD_decompress(records.data(), records.size(), packed.data(), packed.size());
-    if (ZSTD_isError(n) != 0) return fail("chunk_damaged", ZSTD_getErrorName(n));
+    records = unpackedZstd(packed, place.unpacked);
+  } else if (place.compression == "lz4") {
+    records = unpackedLz4(packed, place.unpacked);
   } else {
-    return fail("chunk_" + place.compression,
+    return fail("chunk_of_other_compression",
                 "chunks packed by " + place.compression +
                     " are not read; `mcap compress --compression zstd` packs them anew");
   }
-  const bool right =
-      records.size() == place.unpacked && (head.crc == 0 || crc(records) == head.crc);
-  if (!right) return fail("chunk_damaged", "a chunk with a wrong checksum");
+  if (records.size() != place.unpacked) {
+    return fail("chunk_damaged", "a chunk that does not unpack to its size");
+  }
+  if (head.crc != 0 && crc(records) != head.crc)
+    return fail("chunk_damaged", "a chunk with a wrong checksum");
   return records;
 }
 

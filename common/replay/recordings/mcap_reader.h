@@ -40,7 +40,8 @@ class Reader {
   std::uint64_t damagedChunks() const { return damaged_; }
   const Reason& problem() const { return problem_; }
 
-  /// The chunk's records. Reasons: "chunk_damaged", "chunk_lz4", "chunk_too_large", "file".
+  /// The chunk's records. Reasons: "chunk_damaged", "chunk_of_other_compression",
+  /// "chunk_too_large", "file".
   Result<Records> unpack(const ChunkIndex& chunk) const;
 
   /// Keeps no file open from now on; unpack() opens it each time.

@@ -1,6 +1,7 @@
 #include "tests/interop/ros2/bridge_rig.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -36,7 +37,10 @@ void BridgeRig::listen(const std::vector<std::string>& topics, const std::string
   std::vector<std::string> command{std::getenv("PERDURE_ROS_LISTENER"),
                                    at.empty() ? domainId() : at};
   command.insert(command.end(), topics.begin(), topics.end());
-  listener_.reset();
+  if (listener_) {
+    listener_->signal(SIGTERM);
+    EXPECT_EQ(listener_->wait(std::chrono::seconds(5)), 0) << listener_->log();
+  }
   listener_ =
       std::make_unique<Child>(command, folder.file("listener" + std::to_string(++listeners_)));
 }

@@ -1,6 +1,7 @@
 // Subscribes to what perdure-ros2 writes, as nodes of ROS 2 do, and prints each message as a line
 // of JSON. ros_listener DOMAIN [TOPIC…]: those topics alone.
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -166,6 +167,8 @@ json linesOf(const autoware_perception_msgs::msg::dds_::TrackedObjects_& m) {
   return {{"header", of(m.header())}, {"objects", all}};
 }
 
+volatile std::sig_atomic_t g_ends = 0;
+
 class Listener {
  public:
   explicit Listener(std::uint32_t domain, std::set<std::string> wanted)
@@ -187,8 +190,10 @@ class Listener {
       }
     });
   }
-  [[noreturn]] void run() {
-    while (true) {
+  /// Until SIGTERM: then it leaves as a node does that is shut down, and is not missed for a lease.
+  void run() {
+    std::signal(SIGTERM, [](int) { g_ends = 1; });
+    while (g_ends == 0) {
       for (const auto& poll : polls_) poll();
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }

@@ -32,6 +32,14 @@ class RosNode {
     publisher_ = participant_->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
     subscriber_ = participant_->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
   }
+  /// Takes its leave of those who heard of it.
+  ~RosNode() {
+    if (participant_ == nullptr) return;
+    participant_->delete_contained_entities();
+    fast::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+  }
+  RosNode(const RosNode&) = delete;
+  RosNode& operator=(const RosNode&) = delete;
 
   template <class PubSubType>
   fast::DataReader* reader(const std::string& topic, Quality quality) {

@@ -365,14 +365,14 @@ INSTANTIATE_TEST_SUITE_P(Contents, McapConformance,
                          [](const auto& one) { return std::string(one.param.name); });
 
 TEST(McapOfOthers, AChunkThatCannotBeReadSaysWhy) {
-  const fs::path file = fs::path(testing::TempDir()) / "conformance-lz4.mcap";
+  const fs::path file = fs::path(testing::TempDir()) / "conformance-packed.mcap";
   Buffer bytes(kMagic.begin(), kMagic.end()), chunk;
   Put put(chunk);
   put.number(std::uint64_t{1});
   put.number(std::uint64_t{1});
   put.number(std::uint64_t{3});
   put.number(std::uint32_t{0});
-  put.text("lz4");
+  put.text("xz");
   put.number(std::uint64_t{2});
   put.bytes(Buffer{1, 2});
   Put(bytes).record(Op::kChunk, chunk);
