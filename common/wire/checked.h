@@ -40,6 +40,10 @@ class Checked {
     return false;
   }
 
+  void checkTime(const char* name, std::int64_t ns) {
+    if (!isTime(ns)) refuse(name, "out_of_range");
+  }
+
   void checkUnit(const char* name, double norm) {
     if (!std::isfinite(norm)) return refuse(name, "not_finite");
     if (std::abs(norm - 1.0) > kUnitTolerance) refuse(name, "bad_rotation");

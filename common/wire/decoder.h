@@ -19,7 +19,10 @@ class Decoder : public Checked {
     d = w;
   }
   void value(const char*, bool& d, const bool& w) { d = w; }
-  void time(const char*, TimePoint& d, const std::int64_t& w) { d = fromNanoseconds(w); }
+  void time(const char* name, TimePoint& d, const std::int64_t& w) {
+    checkTime(name, w);
+    d = fromNanoseconds(w);
+  }
   void number(const char* name, double& d, const double& w, const Limits& limits) {
     checkNumber(name, w, limits);
     d = w;

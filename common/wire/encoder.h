@@ -17,7 +17,10 @@ class Encoder : public Checked {
   void value(const char*, const X& d, X& w) {
     w = d;
   }
-  void time(const char*, const TimePoint& d, std::int64_t& w) { w = toNanoseconds(d); }
+  void time(const char* name, const TimePoint& d, std::int64_t& w) {
+    w = toNanoseconds(d);
+    checkTime(name, w);
+  }
   void number(const char* name, const double& d, double& w, const Limits& limits) {
     checkNumber(name, d, limits);
     w = d;

@@ -17,6 +17,7 @@ void describe(A& a, D& d, W& w) {
   a.value("sequence", d.sequence, w.seq);
   a.time("time_ns", d.time, w.time_ns);
   a.value("captured_ns", d.captured_ns, w.captured_ns);
+  a.ensure("captured_ns", "out_of_range", [&] { return isTime(d.captured_ns); });
 }
 
 template <class A, Is<WorldId> D, class W>

@@ -41,7 +41,7 @@ class Examples {
   RigidTransform pose() {
     return {Eigen::Quaterniond(matrix<Eigen::Vector4d>().normalized()), matrix<Eigen::Vector3d>()};
   }
-  FrameStamp stamp() { return {bits(), bits(), time(), static_cast<std::int64_t>(bits() >> 1)}; }
+  FrameStamp stamp() { return {bits(), bits(), time(), static_cast<std::int64_t>(bits() >> 2)}; }
   WorldId world() { return {bits(), below(9)}; }
   Box box() {
     const double x = uniform(-50, 500), y = uniform(-50, 500);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 
 #include "common/wire/codec.h"
 #include "common/wire/description/bounds.h"
@@ -66,6 +67,17 @@ TEST(Refusals, OfInsetsThatAreNotFourAClass) {
   EXPECT_EQ(refusal(message), "out_of_range side_insets");
   message.side_insets.clear();
   EXPECT_EQ(refusal(message), "");
+}
+
+TEST(Refusals, OfTimesWhoseDifferencesWouldOverflow) {
+  const auto of = [](auto change) { return decodeRefusal(twoDetections(), change); };
+  EXPECT_EQ(of([](auto& w) { w.stamp.time_ns = (INT64_MAX >> 1) - 1; }), "");
+  EXPECT_EQ(of([](auto& w) { w.stamp.time_ns = INT64_MAX; }), "out_of_range stamp.time_ns");
+  EXPECT_EQ(of([](auto& w) { w.stamp.time_ns = INT64_MIN; }), "out_of_range stamp.time_ns");
+  EXPECT_EQ(of([](auto& w) { w.stamp.captured_ns = INT64_MIN; }), "out_of_range stamp.captured_ns");
+  Detections message = twoDetections();
+  message.stamp.time = TimePoint::max();
+  EXPECT_EQ(refusal(message), "out_of_range stamp.time_ns");
 }
 
 TEST(Refusals, OfMalformedDetectionsFromOutside) {
