@@ -1,4 +1,7 @@
 // Messages of the bus, recordings of them, and compressed images.
+#include <lz4frame.h>
+#include <zstd.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -149,6 +152,35 @@ Bytes withoutChunks(bool ended) {
   return file;
 }
 
+/// The same in one chunk by LZ4, or by zstd that does not tell its size.
+Bytes packedByOthers(const std::string& compression) {
+  const Bytes records = withoutChunks(false);
+  const View content = View(records).subspan(replay::mcap::kMagic.size());
+  Bytes packed(LZ4F_compressFrameBound(content.size(), nullptr) +
+               ZSTD_compressBound(content.size()));
+  if (compression == "lz4") {
+    packed.resize(
+        LZ4F_compressFrame(packed.data(), packed.size(), content.data(), content.size(), nullptr));
+  } else {
+    ZSTD_CCtx* context = ZSTD_createCCtx();
+    ZSTD_CCtx_setParameter(context, ZSTD_c_contentSizeFlag, 0);
+    packed.resize(
+        ZSTD_compress2(context, packed.data(), packed.size(), content.data(), content.size()));
+    ZSTD_freeCCtx(context);
+  }
+  Bytes file(replay::mcap::kMagic.begin(), replay::mcap::kMagic.end()), chunk;
+  replay::mcap::Put put(chunk);
+  put.number(std::uint64_t{1000});
+  put.number(std::uint64_t{1003});
+  put.number(std::uint64_t{content.size()});
+  put.number(std::uint32_t{0});
+  put.text(compression);
+  put.number(std::uint64_t{packed.size()});
+  put.bytes(packed);
+  replay::mcap::Put(file).record(replay::mcap::Op::kChunk, chunk);
+  return file;
+}
+
 /// Every chunk and message, and then a finished file of it.
 bool readContainer(const fs::path& file) {
   auto reader = replay::mcap::Reader::open(file);
@@ -243,8 +275,8 @@ std::vector<Bytes> jpegs() {
 
 std::vector<Target> binaryTargets() {
   const auto recordings = [] {
-    return std::vector<Bytes>{recording(true), recording(false), withoutChunks(true),
-                              withoutChunks(false)};
+    return std::vector<Bytes>{recording(true),      recording(false),      withoutChunks(true),
+                              withoutChunks(false), packedByOthers("lz4"), packedByOthers("zstd")};
   };
   return {{"wire", 48000, wireSeeds, takeWire},
           {"mcap", 9000, recordings, takeContainer},
