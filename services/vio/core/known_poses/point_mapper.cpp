@@ -9,7 +9,8 @@ namespace {
 
 std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(track.views()); }
 
-constexpr std::size_t kViews = 20;          // poses that are kept
+constexpr std::size_t kViews = 24;          // poses that are kept
+constexpr std::size_t kRecent = 12;         // of which the newest, in any case
 constexpr std::size_t kFewestToLearn = 10;  // points that say how well tracks agree with poses
 constexpr double kForget = 0.05;            // of that, with each image
 constexpr double kGate = 3.0;               // residuals of a point, in those of the others
@@ -49,11 +50,12 @@ void PointMapper::forgetEnded() {
   std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
 }
 
-/// Of the poses between the oldest and the newest, that which adds least baseline goes.
+/// The newest poses stay: most tracks are young. Of those between them and the oldest, that which
+/// adds least baseline goes.
 void PointMapper::forgetOne() {
   std::size_t least = 1;
   double shortest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i + 1 < views_.size(); ++i) {
+  for (std::size_t i = 1; i + kRecent < views_.size(); ++i) {
     const double way = (views_[i + 1].pose.T_WB.p - views_[i - 1].pose.T_WB.p).norm();
     if (way < shortest) shortest = way, least = i;
   }

@@ -147,7 +147,31 @@ TEST(PointMapper, ABodyAtRestKeepsTheBaselineItHad) {
   const std::size_t before = mapper.landmarks().size();
   ASSERT_GT(before, 30u);
   for (int i = 0; i < 100; ++i) mapper.add(given.poseAt(2.95), given.drive().see(2.95));
-  EXPECT_GE(mapper.landmarks().size(), before);
+  EXPECT_GE(10 * mapper.landmarks().size(), 9 * before);
+}
+
+TEST(PointMapper, ALongTrackDoesNotTakeTheViewsOfYoungOnes) {
+  test::DriveOptions options = seeded(11);
+  options.place = test::DrivePlace::kStreet;
+  GivenDrive given(options);
+  PointMapper mapper = given.mapper();
+  // Far ahead on the way: seen all the time.
+  constexpr std::uint64_t kFar = 1'000'000'000, kLife = 6;
+  const Vector3d far(2000.0, 30.0, 10.0);
+  const CameraModel& camera = given.drive().cameras()[0];
+  std::size_t sum = 0;
+  std::uint64_t frame = 0;
+  for (double t = 0.0; t < 12.0; t += kStep, ++frame) {
+    TrackedFrame tracked = given.drive().see(t);
+    // All others end after six images, and begin anew.
+    for (TrackedPoint& p : tracked.points) p.id = 1000 * p.id + (frame + p.id) / kLife;
+    TrackedPoint long_track{kFar, {}};
+    long_track.seen[0] = imagePoint(camera, given.drive().project(0, far, t).value());
+    tracked.points.push_back(long_track);
+    mapper.add(given.poseAt(t), tracked);
+    sum += mapper.landmarks().size();
+  }
+  EXPECT_GT(sum / frame, 8u) << "on average";
 }
 
 TEST(PointMapper, WhatMovesIsLeftOut) {
