@@ -23,6 +23,7 @@
 #include "services/capture/live/cameras/shared_manager.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/frame_count.h"
+#include "services/capture/live/last_of_all.h"
 #include "services/capture/live/libcamera_controls.h"
 #include "services/capture/live/pixels.h"
 
@@ -86,6 +87,7 @@ class Session final : public CameraSession, public libcamera::Object {
   void settle() {}
   void completed(Request* request);
   void disconnected();
+  void leave() { ending_ = true; }
   bool end();
 
   const std::shared_ptr<SharedManager> shared_;
@@ -123,7 +125,7 @@ Result<std::unique_ptr<CameraSession>> Session::open(std::shared_ptr<SharedManag
 Session::~Session() {
   if (!camera_) return;
   const bool vanished = openVideoNodeVanished();
-  while (!invokeMethod(&Session::end, libcamera::ConnectionTypeBlocking)) {
+  while (!lastOfAll(*this, &Session::leave, &Session::end)) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   if (gone_ || vanished) shared_->unplugged();
@@ -135,7 +137,6 @@ bool Session::end() {
   constexpr int kMostTries = 600;
   const bool told = gone_ || !running_;  // who was gone before it ran is not told here
   if (!told && ++tries_to_end_ < kMostTries && openVideoNodeVanished()) return false;
-  ending_ = true;
   camera_->stop();
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
@@ -254,7 +255,7 @@ bool Session::begin() {
 
 void Session::queue(Request* request) {
   request->reuse(Request::ReuseBuffers);
-  if (!gone_) camera_->queueRequest(request);
+  if (!gone_ && !ending_) camera_->queueRequest(request);
 }
 
 /// No work here. A request that is cancelled before the end found the camera gone, or controls that
