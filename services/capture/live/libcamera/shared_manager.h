@@ -11,8 +11,8 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "services/capture/live/cameras/restart_rule.h"
-#include "services/capture/live/libcamera_log.h"
+#include "services/capture/live/libcamera/log.h"
+#include "services/capture/live/libcamera/restart_rule.h"
 
 namespace perdure::capture {
 

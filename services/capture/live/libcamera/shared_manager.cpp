@@ -1,4 +1,4 @@
-#include "services/capture/live/cameras/shared_manager.h"
+#include "services/capture/live/libcamera/shared_manager.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // The last call to an object of libcamera's thread, with a thread of libcamera's and no camera.
-#include "services/capture/live/last_of_all.h"
+#include "services/capture/live/libcamera/last_of_all.h"
 
 #include <gmock/gmock.h>
 #define LIBCAMERA_BASE_PRIVATE  // a thread of its own, which libcamera otherwise keeps to itself

@@ -1,4 +1,4 @@
-#include "services/capture/live/libcamera_session.h"
+#include "services/capture/live/libcamera/session.h"
 
 #include <fmt/format.h>
 #include <libcamera/libcamera.h>
@@ -18,13 +18,13 @@
 
 #include "common/base/bounded_queue.h"
 #include "common/vision/jpeg.h"
-#include "services/capture/live/camera_memory.h"
-#include "services/capture/live/cameras/camera_choice.h"
-#include "services/capture/live/cameras/shared_manager.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/frame_count.h"
-#include "services/capture/live/last_of_all.h"
-#include "services/capture/live/libcamera_controls.h"
+#include "services/capture/live/libcamera/camera_choice.h"
+#include "services/capture/live/libcamera/camera_memory.h"
+#include "services/capture/live/libcamera/controls.h"
+#include "services/capture/live/libcamera/last_of_all.h"
+#include "services/capture/live/libcamera/shared_manager.h"
 #include "services/capture/live/pixels.h"
 
 namespace perdure::capture {

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/capture/live/cameras/shared_manager.h"
-#include "services/capture/live/libcamera_controls.h"
-#include "services/capture/live/libcamera_log.h"
-#include "services/capture/live/libcamera_session.h"
+#include "services/capture/live/libcamera/controls.h"
+#include "services/capture/live/libcamera/log.h"
+#include "services/capture/live/libcamera/session.h"
+#include "services/capture/live/libcamera/shared_manager.h"
 
 namespace perdure::capture {
 namespace {
