@@ -143,13 +143,16 @@ def stops_are_quick(run, report, wanted):
     report.claim(len(stops) >= wanted, f'{len(stops)} of {wanted} stops')
 
 
-def odometry_goes_on(run, report):
+def odometry_goes_on(run, report, wanted):
+    """Judged as images are: from when udev has told of the nodes, to odometry that may be used, of an image since the plug."""
+    usable = [o for o in run.odometry if o[2] in (1, 2)]
+    plugs = [c for c in spans.comebacks(run) if run.marks.get('vio', 0) <= c.plug < run.marks.get('vio_ends', 0)]
+    firsts = [next((o[4] for o in usable if o[1] - run.wall >= c.plug and o[4] < c.until), None) for c in plugs]
+    own = [first - c.told for c, first in zip(plugs, firsts) if first is not None and c.told is not None]
+    report.claim(len(own) == wanted and max(own) <= spans.LIMIT, f'odometry that may be used is back after {len(own)} of {wanted} plugs, '
+                 f'{", ".join(f"{o / SECOND:.2f}" for o in own)} s after udev')
     frames = run.between(run.frames, 'vio', 'vio_ends')
-    usable = {o[0] for o in run.odometry if o[2] in (1, 2)}
-    starts = [frames[0]] + [b for a, b in zip(frames, frames[1:]) if b.heard - a.heard > SECOND] if frames else []
-    ends = [b.heard for b in starts[1:]] + [run.marks.get('vio_ends', 0)]
-    for begin, end in zip(starts, ends):
-        of = [f for f in frames if begin.heard <= f.heard < end]
-        good = [f for f in of if f.sequence in usable]
-        report.claim(good, f'{len(good)} of {len(of)} images since an opening have odometry that may be used')
+    good = {o[0] for o in usable}
+    report.claim(sum(f.sequence in good for f in frames) > .9 * len(frames),
+                 f'{sum(f.sequence in good for f in frames)} of {len(frames)} images have it, in {len({o[3] for o in usable})} frames of reference')
     report.claim(run.read('restarts_of_vio').strip() == '0', f'vio was started again {run.read("restarts_of_vio").strip()} times')

@@ -36,7 +36,7 @@ def main():
     claims.capture_lives(run, report, options.unplugs)
     claims.images_come_back(run, report)
     if options.unplugs_with_vio:
-        claims.odometry_goes_on(run, report)
+        claims.odometry_goes_on(run, report, options.unplugs_with_vio)
     if options.stops:
         claims.stops_are_quick(run, report, options.stops)
     return int(report.failed)

@@ -63,7 +63,7 @@ class Run:
         self.plugs, self.unplugs, self.triggers, self.opened, self.streamed = [], [], [], [], []
         self.read_trace()
         self.image_stamps = self.stamps_of_the_kernel()
-        self.udev_added, self.udev_removed = [], []
+        self.kernel_added, self.kernel_removed, self.udev_added, self.udev_removed = [], [], [], []
         self.read_udev()
         self.nodes = len(re.findall(r'/dev/(?:video|media)\d+$', self.read('facts'), re.M))
 
@@ -76,16 +76,15 @@ class Run:
                 of_event[found[4]].append(int(found[2]) * SECOND + int(found[3]) * 1000)
 
     def read_udev(self):
-        """When udev told those who listen, as libcamera does, of a node: its permissions are set by then."""
+        """When the kernel made or removed a node, and when udev told those who listen for that, as libcamera does: its
+        permissions are set by then. Of what is removed the media device says enough: libcamera listens for that one."""
         for line in self.read('udev_events').splitlines():
-            found = re.match(r'UDEV +\[(\d+)\.(\d{6})\] (add|remove) .*\((media|video4linux)\)', line)
-            if not found:
+            found = re.match(r'(KERNEL|UDEV) *\[(\d+)\.(\d{6})\] (add|remove) .*\((media|video4linux)\)', line)
+            if not found or (found[4] == 'remove' and found[5] != 'media'):
                 continue
-            at = int(found[1]) * SECOND + int(found[2]) * 1000
-            if found[3] == 'add':
-                self.udev_added.append(at)
-            elif found[4] == 'media':
-                self.udev_removed.append(at)
+            events = {'KERNEL add': self.kernel_added, 'KERNEL remove': self.kernel_removed, 'UDEV add': self.udev_added,
+                      'UDEV remove': self.udev_removed}[f'{found[1]} {found[4]}']
+            events.append(int(found[2]) * SECOND + int(found[3]) * 1000)
 
     def read(self, name):
         path = self.folder / 'share' / name

@@ -13,10 +13,12 @@ class Comeback:
         def first(times, after):
             return next((t for t in times if after is not None and after <= t < self.until), None)
         self.plug, self.until, self.unplugged_again = plug, following or run.end, following is not None
-        told = [t for t in run.udev_added if plug <= t < self.until]
+        def all_nodes(times):
+            of = [t for t in times if plug <= t < self.until]
+            return of[-1] if len(of) == run.nodes else None
         # The first image after a plug is later than all that udev says of its nodes.
         image = next((f for f in run.frames if plug <= f.stamp - run.wall and f.heard < self.until), None)
-        self.told = told[-1] if len(told) == run.nodes else None
+        self.made, self.told = all_nodes(run.kernel_added), all_nodes(run.udev_added)
         self.opened = first(run.opened, self.told)
         self.streams = first(run.streamed, plug)
         self.taken, self.heard = (image.stamp - run.wall, image.heard) if image else (None, None)
@@ -31,7 +33,8 @@ class Comeback:
         return vain if vain > LIMIT or not self.unplugged_again else None
 
 
-STEPS = [('plug → udev has told of all nodes', 'plug', 'told'),
+STEPS = [('plug → the kernel has made all nodes', 'plug', 'made'),
+         ('kernel → udev has told of all nodes', 'made', 'told'),
          ('udev → capture opens a node', 'told', 'opened'),
          ('opens → the stream starts', 'opened', 'streams'),
          ('stream → the driver has an image', 'streams', 'taken'),
@@ -48,17 +51,19 @@ def comebacks(run):
 
 def row(name, spans):
     if not spans:
-        return f'{name:36} none'
+        return f'{name:38} none'
     spans = sorted(s / SECOND for s in spans)
     figures = [spans[0], statistics.median(spans), spans[int(.95 * (len(spans) - 1))], spans[-1]]
-    return f'{name:36} {len(spans):4} ' + ' '.join(f'{figure:7.2f}' for figure in figures)
+    return f'{name:38} {len(spans):4} ' + ' '.join(f'{figure:7.2f}' for figure in figures)
 
 
 def table(run, of):
     """Lines: each step with how often it was seen, and seconds: least, middle, 95 of 100, most."""
-    lines = [f'{"step":36} {"n":>4} ' + ' '.join(f'{head:>7}' for head in ('least', 'middle', '95 %', 'most'))]
-    gone = [min((t - u for t in run.udev_removed if t >= u), default=None) for u in run.unplugs]
-    lines.append(row('unplug → udev has told', [g for g in gone if g is not None]))
+    lines = [f'{"step":38} {"n":>4} ' + ' '.join(f'{head:>7}' for head in ('least', 'middle', '95 %', 'most'))]
+    for name, befores, afters in (('unplug → the kernel removes the nodes', run.unplugs, run.kernel_removed),
+                                  ('kernel → udev has told of that', run.kernel_removed, run.udev_removed)):
+        pairs = [(u, min((t for t in afters if t >= u), default=None)) for u in befores if u >= run.marks.get('all_counted', 0)]
+        lines.append(row(name, [t - u for u, t in pairs if t is not None and t < run.end]))
     for name, begin, end in STEPS:
         pairs = [(getattr(c, begin), getattr(c, end)) for c in of]
         lines.append(row(name, [b - a for a, b in pairs if a is not None and b is not None]))

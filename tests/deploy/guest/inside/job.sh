@@ -50,7 +50,7 @@ echo 'p:streamed uvcvideo:uvc_start_streaming' >> kprobe_events
 for event in kprobes/{plugged,unplugged,triggered,opened,streamed} v4l2/v4l2_dqbuf; do echo 1 > events/$event/enable; done
 cd /
 
-udevadm monitor --udev > /run/udev_events &
+udevadm monitor > /run/udev_events &
 # It is to be late no more than capture is: both before all that the test itself does.
 chrt --rr 5 guest_listener "$notes" /run/frame & listener=$!
 touch /run/told
@@ -80,6 +80,8 @@ mark all_counted
 keep
 echo 0 > /sys/kernel/tracing/events/kprobes/triggered/enable
 
+udev=$(systemctl show -P MainPID systemd-udevd)
+udev_stands_still() { kill -STOP "$udev"; (sleep "$1"; kill -CONT "$udev") & } # SECONDS
 RANDOM=$SEED
 sleep 3
 for ((n = 1; n <= UNPLUGS; ++n)); do
@@ -87,6 +89,7 @@ for ((n = 1; n <= UNPLUGS; ++n)); do
   case $((n % 8)) in
     3) tell silent 2; sleep 1.5 ;;              # capture has begun to open it again
     5) tell silent 2; sleep 1.$((RANDOM % 10)) ;;
+    1) udev_stands_still 4 ;;                   # capture has given it up by then
   esac
   tell unplug 1.$((RANDOM % 10))
   while [ -e /share/command ]; do sleep .1; done
@@ -136,16 +139,18 @@ for ((n = 1; n < STOPS; ++n)); do
   systemctl start perdure-capture
   first=$(systemctl show -P MainPID perdure-capture)
   until_frames 30 || mark "no_frames_before_stop_$n"
-  kind=(while_it_flows as_it_is_unplugged while_it_is_away as_it_comes_back while_it_is_silent)
-  kind=${kind[n % 5]}
+  kind=(while_it_flows as_it_is_unplugged while_it_is_away as_it_comes_back while_it_is_silent while_udev_is_late)
+  kind=${kind[n % 6]}
   case $kind in
     while_it_flows) sleep "0.$((RANDOM % 10))" ;;
     while_it_is_silent) tell silent 3; sleep "1.$((RANDOM % 10))" ;;
     as_it_is_unplugged) tell unplug 3; while [ -e /share/command ]; do :; done; sleep "0.0$((RANDOM % 10))" ;;
     while_it_is_away) tell unplug 3; sleep "1.$((RANDOM % 5))" ;;
+    while_udev_is_late) udev_stands_still 10; tell unplug 3; sleep "$((RANDOM % 3)).$((RANDOM % 10))" ;;
     as_it_comes_back) tell unplug 1; sleep "1.$((RANDOM % 10))"; sleep "0.$((RANDOM % 10))" ;;
   esac
   stop_capture "$kind"
+  kill -CONT "$udev"
   sleep 3
 done
 kill "$listener"
