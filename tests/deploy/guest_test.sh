@@ -35,5 +35,5 @@ make_disk "$run/tree" "$run/disk.img"
 printf 'SECONDS_OF_FLOW=%s\nUNPLUGS=%s\nUNPLUGS_WITH_VIO=%s\nSTOPS=%s\nSEED=%s\n' "$seconds" "$unplugs" "$with_vio" "$stops" "$seed" > "$run/share/options"
 start_camera
 trap 'kill "$camera" 2> /dev/null || true' EXIT
-run_guest $((600 + seconds + 40 * unplugs + 40 * stops)) || fail "the guest did not end: $(tail -n 5 "$run/serial.log")"
+run_guest $((600 + seconds + 30 * unplugs + 30 * stops)) || fail "the guest did not end: $(tail -n 5 "$run/serial.log")"
 python3 "$guest/judge.py" "$run" --unplugs "$unplugs" --unplugs-with-vio "$with_vio" --stops "$stops"

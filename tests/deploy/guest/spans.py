@@ -60,10 +60,9 @@ def row(name, spans):
 def table(run, of):
     """Lines: each step with how often it was seen, and seconds: least, middle, 95 of 100, most."""
     lines = [f'{"step":38} {"n":>4} ' + ' '.join(f'{head:>7}' for head in ('least', 'middle', '95 %', 'most'))]
-    for name, befores, afters in (('unplug → the kernel removes the nodes', run.unplugs, run.kernel_removed),
-                                  ('kernel → udev has told of that', run.kernel_removed, run.udev_removed)):
-        pairs = [(u, min((t for t in afters if t >= u), default=None)) for u in befores if u >= run.marks.get('all_counted', 0)]
-        lines.append(row(name, [t - u for u, t in pairs if t is not None and t < run.end]))
+    removed = [t for t in run.kernel_removed if run.marks.get('all_counted', 0) <= t < run.end]
+    lines.append(row('unplug → the kernel removes the nodes', [t - max(u for u in run.unplugs if u <= t) for t in removed]))
+    lines.append(row('kernel → udev has told of that', [told - t for t, told in zip(run.kernel_removed, run.udev_removed) if t in removed]))
     for name, begin, end in STEPS:
         pairs = [(getattr(c, begin), getattr(c, end)) for c in of]
         lines.append(row(name, [b - a for a, b in pairs if a is not None and b is not None]))
