@@ -6,7 +6,6 @@
 #include <libcamera/base/thread.h>
 
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace perdure::capture {

@@ -238,7 +238,7 @@ TEST(SharedManager, LeavesACameraAloneThatIsNotOverInTime) {
     shared.keepUntilOver(std::move(camera));
     shared.keepUntilOver(std::make_unique<Lingering>(late, 3, nullptr));
   }
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
   EXPECT_FALSE(never.destroyed) << "libcamera's thread knows it";
   EXPECT_GT(never.tries, 10);
   EXPECT_TRUE(late.destroyed);
