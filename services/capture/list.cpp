@@ -15,7 +15,7 @@
 
 #include "common/base/errors.h"
 #include "services/capture/live/iio_text.h"
-#include "services/capture/live/libcamera_log.h"
+#include "services/capture/live/libcamera/log.h"
 
 namespace perdure::capture {
 namespace {

@@ -2,8 +2,8 @@
 #include <string_view>
 
 #include "services/capture/list.h"
-#include "services/capture/live/libcamera_session.h"
-#include "services/capture/live/live.h"
+#include "services/capture/live.h"
+#include "services/capture/live/libcamera/session.h"
 #include "services/capture/playback.h"
 
 int main(int argc, char** argv) {

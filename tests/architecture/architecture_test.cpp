@@ -43,6 +43,12 @@ TEST(IncludeRules, ForbidWhatCrossesLayers) {
               ElementsAre(HasSubstr("a layer of a folder")));
   EXPECT_THAT(including("services/vio/core/estimator.h", "services/vio/core/start/a.h"),
               ElementsAre(HasSubstr("a layer of a folder")));
+  EXPECT_THAT(including("services/capture/live/libcamera/session.cpp",
+                        "services/capture/live/cameras/live_cameras.h"),
+              ElementsAre(HasSubstr("a layer of a folder")));
+  EXPECT_THAT(
+      including("services/capture/live/live_camera.h", "services/capture/live/libcamera/session.h"),
+      ElementsAre(HasSubstr("a layer of a folder")));
   EXPECT_THAT(including("services/semantic_filter/core/belief/track.h",
                         "services/semantic_filter/core/measurement/frame.h"),
               ElementsAre(HasSubstr("a layer of a folder")));

@@ -23,6 +23,7 @@ const std::vector<Layers> kLayers{
     {"common/mapping/", {"frames", "graph", "places", "appearance", "", "fusion"}},
     {"common/replay/", {"files", "recordings", ""}},
     {"common/sim/scenes/", {"parts", ""}},
+    {"services/capture/live/", {"", "libcamera", "cameras"}},
     {"services/semantic_filter/core/",
      {"belief", "measurement", "visibility", "association", "update", "smoothing", "tracks",
       "memory", ""}},

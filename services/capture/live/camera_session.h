@@ -51,7 +51,7 @@ class CameraSession {
   virtual std::string name() const = 0;
   /// What it does not do as asked, and why; empty where it does.
   virtual std::string note() const = 0;
-  /// Unplugged.
+  /// Unplugged; next() may still have images of before, and does not wait for more.
   virtual bool gone() const = 0;
   /// It is well, and is to be closed and opened again for the sake of another camera.
   virtual bool stepsAside() const { return false; }

@@ -34,9 +34,10 @@ void LiveCamera::flow(CameraSession& session) {
   numbers_.reopened();
   rate_.reopened();
   int silent = 0;
-  while (!stopping_ && !session.gone() && !session.stepsAside() && silent < kSilence) {
+  while (!stopping_ && !session.stepsAside() && silent < kSilence) {
     auto shot = session.next(kWait);
     silent = shot ? 0 : silent + 1;
+    if (!shot && session.gone()) break;  // what it gave before it went was given on
     if (!shot) continue;
     take(*std::move(shot));
     state_.flows(session.name(), joined(session.note(), rate_.note()));

@@ -24,7 +24,9 @@ stage() {
   ln -s ../guest-test.service "$tree/etc/systemd/system/multi-user.target.wants/"
   mkdir -p "$tree/etc/systemd/system/perdure-capture.service.d"
   # The emulator stands still for seconds where the machine is busy: the watchdog would take that for capture's.
-  printf '[Service]\nWatchdogSec=30\nLimitCORE=infinity\nTimeoutStopFailureMode=abort\nTimeoutAbortSec=60\n' > "$tree/etc/systemd/system/perdure-capture.service.d/core.conf"
+  # What is freed is overwritten, so that nobody uses it unnoticed.
+  printf '[Service]\nWatchdogSec=30\nLimitCORE=infinity\nTimeoutStopFailureMode=abort\nTimeoutAbortSec=60\nEnvironment=MALLOC_PERTURB_=165\n' \
+    > "$tree/etc/systemd/system/perdure-capture.service.d/core.conf"
 }
 
 # make_disk TREE IMAGE: of root's, whoever made it.

@@ -2,6 +2,7 @@
 import re
 import statistics
 
+import spans
 from notes import MS, SECOND
 
 
@@ -74,7 +75,7 @@ def stamps_are_the_kernels(run, report):
     if len(frames) < 2 or len(samples) < 2:
         return report.claim(False, 'there are no stamps')
     walls = [ahead for _, ahead in run.clocks]
-    wall = int(statistics.median(walls))
+    wall = run.wall
     report.claim(max(walls) - min(walls) < MS, f'the guest\'s wall clock goes with its monotonic one, within {ms(max(walls) - min(walls))}')
     for name, things in (('images', frames), ('samples', samples)):
         steps = [b.stamp - a.stamp for a, b in zip(things, things[1:])]
@@ -115,36 +116,43 @@ def capture_lives(run, report, wanted):
 
 
 def images_come_back(run, report):
-    took, at = [], 0
-    wall = int(statistics.median(ahead for _, ahead in run.clocks))
-    heard = [f.heard for f in run.frames]
-    taken = [f.stamp - wall for f in run.frames]  # what is heard late was not taken late
-    for plug in run.plugs:
-        if plug < run.marks.get('all_counted', 0):
-            continue
-        next_unplug = min((u for u in run.unplugs if u > plug), default=None)
-        while at < len(heard) and taken[at] < plug:
-            at += 1
-        if at < len(heard) and (next_unplug is None or heard[at] < next_unplug):
-            took.append(heard[at] - plug)
-        elif next_unplug is None or next_unplug - plug > 3 * SECOND:
-            took.append((next_unplug or run.marks.get('end', run.clocks[-1][0])) - plug)
-    if not took:
+    """From when udev has told of the nodes, which is when they may be opened: what was before that is the emulator's."""
+    of = spans.comebacks(run)
+    if not of:
         return
-    report.claim(max(took) <= 3 * SECOND, f'images are back {min(took) / SECOND:.2f} to {max(took) / SECOND:.2f} s after {len(took)} plugs, '
-                 f'mostly after {statistics.median(took) / SECOND:.2f} s')
-    sequences = [f.sequence for f in run.frames]
-    report.claim(all(b > a for a, b in zip(sequences, sequences[1:])) and len({f.source for f in run.frames}) == 1,
+    own = [c.own() for c in of if c.own() is not None]
+    whole = [c.heard - c.plug for c in of if c.heard is not None]
+    print('\n'.join('       ' + line for line in spans.table(run, of)))
+    early = sum(c.told is None for c in of)
+    report.claim(own and max(own) <= spans.LIMIT, f'images are back within {max(own, default=0) / SECOND:.2f} s of udev, after {len(own)} of {len(of)} '
+                 f'plugs; of the others {early} ended before udev had told, {len(of) - len(own) - early} soon after')
+    print(f'       of the plug itself {sum(w <= spans.LIMIT for w in whole)} of {len(whole)} are within {spans.LIMIT / SECOND:.0f} s')
+    frames = run.between(run.frames, 'booted', 'end')
+    sequences = [f.sequence for f in frames]
+    report.claim(all(b > a for a, b in zip(sequences, sequences[1:])) and len({f.source for f in frames}) == 1,
                  'numbers of images grow over all openings')
 
 
-def odometry_goes_on(run, report):
+def stops_are_quick(run, report, wanted):
+    """systemd's own times: from its SIGTERM to the end of the process."""
+    stops = [line.split() for line in run.read('stops').splitlines()]
+    for kind in sorted({s[0] for s in stops}):
+        took = [(int(s[2]) - int(s[1])) / 1e6 for s in stops if s[0] == kind]
+        bad = [s[3:] for s in stops if s[0] == kind and s[3:] != ['success', '0']]
+        report.claim(not bad and max(took) <= 5, f'capture is stopped {len(took)} times {kind}, in {min(took):.2f} to {max(took):.2f} s ({bad[:3]})')
+    report.claim(len(stops) >= wanted, f'{len(stops)} of {wanted} stops')
+
+
+def odometry_goes_on(run, report, wanted):
+    """Judged as images are: from when udev has told of the nodes, to odometry that may be used, of an image since the plug."""
+    usable = [o for o in run.odometry if o[2] in (1, 2)]
+    plugs = [c for c in spans.comebacks(run) if run.marks.get('vio', 0) <= c.plug < run.marks.get('vio_ends', 0)]
+    firsts = [next((o[4] for o in usable if o[1] - run.wall >= c.plug and o[4] < c.until), None) for c in plugs]
+    own = [first - c.told for c, first in zip(plugs, firsts) if first is not None and c.told is not None]
+    report.claim(len(own) == wanted and max(own) <= spans.LIMIT, f'odometry that may be used is back after {len(own)} of {wanted} plugs, '
+                 f'{", ".join(f"{o / SECOND:.2f}" for o in own)} s after udev')
     frames = run.between(run.frames, 'vio', 'vio_ends')
-    usable = {o[0] for o in run.odometry if o[2] in (1, 2)}
-    starts = [frames[0]] + [b for a, b in zip(frames, frames[1:]) if b.heard - a.heard > SECOND] if frames else []
-    ends = [b.heard for b in starts[1:]] + [run.marks.get('vio_ends', 0)]
-    for begin, end in zip(starts, ends):
-        of = [f for f in frames if begin.heard <= f.heard < end]
-        good = [f for f in of if f.sequence in usable]
-        report.claim(good, f'{len(good)} of {len(of)} images since an opening have odometry that may be used')
+    good = {o[0] for o in usable}
+    report.claim(sum(f.sequence in good for f in frames) > .9 * len(frames),
+                 f'{sum(f.sequence in good for f in frames)} of {len(frames)} images have it, in {len({o[3] for o in usable})} frames of reference')
     report.claim(run.read('restarts_of_vio').strip() == '0', f'vio was started again {run.read("restarts_of_vio").strip()} times')

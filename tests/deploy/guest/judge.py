@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Judges what a guest left in its folder: usage: judge.py RUN --unplugs N. A line for each claim; 1 where one fails."""
+"""Judges what a guest left in its folder: usage: judge.py RUN --unplugs N --unplugs-with-vio N --stops N. A line for each claim; 1 where one fails."""
 import argparse
 import pathlib
 import sys
@@ -22,6 +22,7 @@ def main():
     parser.add_argument('run', type=pathlib.Path)
     parser.add_argument('--unplugs', type=int, required=True)
     parser.add_argument('--unplugs-with-vio', type=int, required=True)
+    parser.add_argument('--stops', type=int, required=True)
     options = parser.parse_args()
     run, report = Run(options.run), Report()
     claims.the_guest_is_as_meant(run, report)
@@ -35,7 +36,9 @@ def main():
     claims.capture_lives(run, report, options.unplugs)
     claims.images_come_back(run, report)
     if options.unplugs_with_vio:
-        claims.odometry_goes_on(run, report)
+        claims.odometry_goes_on(run, report, options.unplugs_with_vio)
+    if options.stops:
+        claims.stops_are_quick(run, report, options.stops)
     return int(report.failed)
 
 

@@ -1,9 +1,11 @@
 """What a guest left in its folder, read."""
 import re
+import statistics
 
 MS = 1_000_000
 SECOND = 1000 * MS
 FOREVER = 1 << 62
+NOT_CAPTURE = ('v4l_id', 'v4l2-ctl', '(udev-worker)')  # who else opens a video node
 
 
 class Frame:
@@ -56,20 +58,33 @@ class Run:
         for line in self.read('marks').splitlines():
             name, at = line.split()
             self.marks[name] = int(float(at) * SECOND)
-        self.plugs, self.unplugs, self.triggers, self.images = [], [], [], []
-        for line in self.read('trace').splitlines():
-            found = re.match(r'.*\s(\d+)\.(\d{6}): (\w+): (.*)', line)
-            if not found:
-                continue
-            at = int(found[1]) * SECOND + int(found[2]) * 1000
-            if found[3] == 'v4l2_dqbuf':
-                self.images.append(at)
-            else:
-                self.of_event(found[3]).append(at)
+        self.end = self.marks.get('end', self.clocks[-1][0] if self.clocks else 0)
+        self.wall = int(statistics.median(ahead for _, ahead in self.clocks)) if self.clocks else 0
+        self.plugs, self.unplugs, self.triggers, self.opened, self.streamed = [], [], [], [], []
+        self.read_trace()
         self.image_stamps = self.stamps_of_the_kernel()
+        self.kernel_added, self.kernel_removed, self.udev_added, self.udev_removed = [], [], [], []
+        self.read_udev()
+        self.nodes = len(re.findall(r'/dev/(?:video|media)\d+$', self.read('facts'), re.M))
 
-    def of_event(self, name):
-        return {'plugged': self.plugs, 'unplugged': self.unplugs, 'triggered': self.triggers}.get(name, [])
+    def read_trace(self):
+        of_event = {'plugged': self.plugs, 'unplugged': self.unplugs, 'triggered': self.triggers, 'opened': self.opened,
+                    'streamed': self.streamed}
+        for line in self.read('trace').splitlines():
+            found = re.match(r'\s*(.*)-\d+\s.*\s(\d+)\.(\d{6}): (\w+): ', line)
+            if found and found[4] in of_event and not (found[4] == 'opened' and found[1] in NOT_CAPTURE):
+                of_event[found[4]].append(int(found[2]) * SECOND + int(found[3]) * 1000)
+
+    def read_udev(self):
+        """When the kernel made or removed a node, and when udev told those who listen for that, as libcamera does: its
+        permissions are set by then. Of what is removed the media device says enough: libcamera listens for that one."""
+        for line in self.read('udev_events').splitlines():
+            found = re.match(r'(KERNEL|UDEV) *\[(\d+)\.(\d{6})\] (add|remove) .*\((media|video4linux)\)', line)
+            if not found or (found[4] == 'remove' and found[5] != 'media'):
+                continue
+            events = {'KERNEL add': self.kernel_added, 'KERNEL remove': self.kernel_removed, 'UDEV add': self.udev_added,
+                      'UDEV remove': self.udev_removed}[f'{found[1]} {found[4]}']
+            events.append(int(found[2]) * SECOND + int(found[3]) * 1000)
 
     def read(self, name):
         path = self.folder / 'share' / name

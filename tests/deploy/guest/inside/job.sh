@@ -1,6 +1,6 @@
 #!/bin/bash
 # What is done in the guest; the host judges what is left in /share. /share/options: SECONDS_OF_FLOW, UNPLUGS,
-# UNPLUGS_WITH_VIO, SEED.
+# UNPLUGS_WITH_VIO, STOPS, SEED.
 set -u
 export PATH=/guest:/usr/sbin:/usr/bin LC_ALL=C.UTF-8
 modprobe -a 9p 9pnet_virtio
@@ -11,8 +11,8 @@ notes=/run/notes
 mark() { echo "$1 $(cut -d' ' -f1 /proc/uptime)" | tee -a /share/marks; }
 tell() { echo "$@" > /share/command; }
 keep() {
-  cp -f /run/job.log "$notes" /share/ 2> /dev/null
-  cp /sys/kernel/tracing/trace /share/trace
+  cp -f /run/job.log "$notes" /run/udev_events /share/ 2> /dev/null
+  cat /sys/kernel/tracing/trace > /share/trace
   journalctl -o short-monotonic --no-pager -u 'perdure-*' > /share/journal
   dmesg > /share/dmesg
 }
@@ -37,17 +37,22 @@ mark booted
   systemd-analyze time; systemd-analyze blame | head -12
 } > /share/facts 2>&1
 
-# When the kernel sees a plug, gives an image, and asks for a sample; on CLOCK_MONOTONIC.
+# When the kernel sees a plug, capture opens the camera and starts it, the kernel gives an image, and asks for a
+# sample; when udev has told of a node, as those hear it who wait for that. On CLOCK_MONOTONIC.
 cd /sys/kernel/tracing || exit
 echo mono > trace_clock
 echo 16384 > buffer_size_kb
 echo 'p:plugged usb_new_device' > kprobe_events
 echo 'p:unplugged usb_disconnect' >> kprobe_events
 echo 'p:triggered iio_trigger_poll' >> kprobe_events
-for event in kprobes/plugged kprobes/unplugged kprobes/triggered v4l2/v4l2_dqbuf; do echo 1 > events/$event/enable; done
+echo 'p:opened uvcvideo:uvc_v4l2_open' >> kprobe_events
+echo 'p:streamed uvcvideo:uvc_start_streaming' >> kprobe_events
+for event in kprobes/{plugged,unplugged,triggered,opened,streamed} v4l2/v4l2_dqbuf; do echo 1 > events/$event/enable; done
 cd /
 
-guest_listener "$notes" /run/frame & listener=$!
+udevadm monitor > /run/udev_events &
+# It is to be late no more than capture is: both before all that the test itself does.
+chrt --rr 5 guest_listener "$notes" /run/frame & listener=$!
 touch /run/told
 systemctl start perdure-capture
 first=$(systemctl show -P MainPID perdure-capture)
@@ -75,6 +80,8 @@ mark all_counted
 keep
 echo 0 > /sys/kernel/tracing/events/kprobes/triggered/enable
 
+udev=$(systemctl show -P MainPID systemd-udevd)
+udev_stands_still() { kill -STOP "$udev"; (sleep "$1"; kill -CONT "$udev") & } # SECONDS
 RANDOM=$SEED
 sleep 3
 for ((n = 1; n <= UNPLUGS; ++n)); do
@@ -82,6 +89,7 @@ for ((n = 1; n <= UNPLUGS; ++n)); do
   case $((n % 8)) in
     3) tell silent 2; sleep 1.5 ;;              # capture has begun to open it again
     5) tell silent 2; sleep 1.$((RANDOM % 10)) ;;
+    1) udev_stands_still 4 ;;                   # capture has given it up by then
   esac
   tell unplug 1.$((RANDOM % 10))
   while [ -e /share/command ]; do sleep .1; done
@@ -115,9 +123,36 @@ if [ "$UNPLUGS_WITH_VIO" -gt 0 ]; then
 fi
 mark end
 systemctl show -P NRestarts perdure-capture > /share/restarts
-systemctl stop perdure-capture
+# stop_capture KIND: how long it took by systemd, and what came of it.
+stop_capture() {
+  systemctl stop perdure-capture
+  # shellcheck disable=SC2046 # words
+  echo "$1" $(for what in ActiveExitTimestampMonotonic InactiveEnterTimestampMonotonic Result ExecMainStatus; do
+    systemctl show -P "$what" perdure-capture
+  done) >> /share/stops
+}
+stop_capture while_it_flows
 systemctl show -P ExecMainStatus perdure-capture > /share/status
 mark stopped
+for ((n = 1; n < STOPS; ++n)); do
+  touch /run/told
+  systemctl start perdure-capture
+  first=$(systemctl show -P MainPID perdure-capture)
+  until_frames 30 || mark "no_frames_before_stop_$n"
+  kind=(while_it_flows as_it_is_unplugged while_it_is_away as_it_comes_back while_it_is_silent while_udev_is_late)
+  kind=${kind[n % 6]}
+  case $kind in
+    while_it_flows) sleep "0.$((RANDOM % 10))" ;;
+    while_it_is_silent) tell silent 3; sleep "1.$((RANDOM % 10))" ;;
+    as_it_is_unplugged) tell unplug 3; while [ -e /share/command ]; do :; done; sleep "0.0$((RANDOM % 10))" ;;
+    while_it_is_away) tell unplug 3; sleep "1.$((RANDOM % 5))" ;;
+    while_udev_is_late) udev_stands_still 10; tell unplug 3; sleep "$((RANDOM % 3)).$((RANDOM % 10))" ;;
+    as_it_comes_back) tell unplug 1; sleep "1.$((RANDOM % 10))"; sleep "0.$((RANDOM % 10))" ;;
+  esac
+  stop_capture "$kind"
+  kill -CONT "$udev"
+  sleep 3
+done
 kill "$listener"
 wait "$listener"
 keep

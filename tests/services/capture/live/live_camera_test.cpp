@@ -17,10 +17,12 @@ CameraShot shot(std::uint32_t sequence, std::int64_t time_ns = 0) {
 }
 
 /// What a session answers, call by call: a shot, or nothing; after all of it, it is unplugged or
-/// silent.
+/// silent. `gone_after` so many answers it says that it is unplugged, and has the rest
+/// nevertheless.
 struct Script {
   std::vector<std::optional<CameraShot>> answers;
   bool unplugged = false;
+  std::optional<std::size_t> gone_after = {};
   std::string note = {};
 };
 
@@ -30,7 +32,9 @@ class ScriptedSession : public CameraSession {
 
   std::string name() const override { return "scripted"; }
   std::string note() const override { return script_.note; }
-  bool gone() const override { return script_.unplugged && next_ == script_.answers.size(); }
+  bool gone() const override {
+    return script_.unplugged && next_ >= script_.gone_after.value_or(script_.answers.size());
+  }
   std::optional<CameraShot> next(std::chrono::milliseconds longest) override {
     if (next_ < script_.answers.size()) return std::move(script_.answers[next_++]);
     std::this_thread::sleep_for(longest / 10);
@@ -85,6 +89,12 @@ TEST_F(Camera, CountsALossOnce) {
   play({{.answers = {shot(0)}, .unplugged = true}});
   EXPECT_EQ(counted("camera_lost"), 1U);
   EXPECT_EQ(counted("camera_silent"), 0U);
+}
+
+TEST_F(Camera, GivesWhatTheCameraHadGivenWhenItWasUnplugged) {
+  play({{.answers = {shot(0), shot(1), shot(2)}, .unplugged = true, .gone_after = 1}});
+  EXPECT_THAT(numbers_, ElementsAre(0, 1, 2));
+  EXPECT_EQ(counted("camera_lost"), 1U);
 }
 
 TEST_F(Camera, CountsFramesThatTheDriverLost) {

@@ -21,8 +21,9 @@ class FakeCamera {
       return std::make_unique<Session>(state);
     };
   }
-  /// An image of an empty scene; `sequence` as the driver counts.
+  /// An image of an empty scene; `sequence` as the driver counts. None where it is not plugged in.
   void shoot(std::uint32_t sequence, std::int64_t time_ns) const {
+    if (!state_->plugged) return;
     Frame frame;
     frame.width = frame.height = 8;
     frame.data = std::make_shared<std::vector<std::uint8_t>>(64);
@@ -55,7 +56,7 @@ class FakeCamera {
     bool gone() const override { return !state_->plugged; }
     bool stepsAside() const override { return state_->aside; }
     std::optional<CameraShot> next(std::chrono::milliseconds longest) override {
-      return state_->shots.popWithin(longest);
+      return gone() ? state_->shots.tryPop() : state_->shots.popWithin(longest);
     }
 
    private:

@@ -10,7 +10,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
-#include "services/capture/live/live.h"
+#include "services/capture/live.h"
 #include "tests/process/support.h"
 #include "tests/services/capture/live/cameras/fake_camera.h"
 #include "tests/services/capture/live/times.h"

@@ -3,13 +3,15 @@
 #include <libcamera/libcamera.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
-#include "services/capture/live/cameras/shared_manager.h"
-#include "services/capture/live/libcamera_controls.h"
-#include "services/capture/live/libcamera_log.h"
-#include "services/capture/live/libcamera_session.h"
+#include "services/capture/live/libcamera/controls.h"
+#include "services/capture/live/libcamera/log.h"
+#include "services/capture/live/libcamera/running_camera.h"
+#include "services/capture/live/libcamera/session.h"
+#include "services/capture/live/libcamera/shared_manager.h"
 
 namespace perdure::capture {
 namespace {
@@ -193,7 +195,57 @@ TEST(SharedManager, AsksTheCamerasThatRunAsideForOneThatCameAndIsNotFound) {
   std::filesystem::remove_all(folder);
 }
 
-TEST(LibcameraSession, SeesThatAVideoNodeThatIsOpenIsThereNoMore) {
+/// It is over at a try, or never.
+class Lingering : public Unended {
+ public:
+  struct Story {
+    int tries = 0;
+    bool destroyed = false;
+  };
+  Lingering(Story& story, int over_at, std::shared_ptr<libcamera::CameraManager> manager)
+      : story_(story), over_at_(over_at), manager_(std::move(manager)) {}
+  ~Lingering() override { story_.destroyed = true; }
+  bool over() override { return ++story_.tries == over_at_; }
+
+ private:
+  Story& story_;
+  const int over_at_;
+  const std::shared_ptr<libcamera::CameraManager> manager_;
+};
+
+TEST(SharedManager, KeepsACameraUntilUdevToldOfItAndIsThenAnotherOne) {
+  SharedManager shared([](const std::string&) {});
+  Lingering::Story story;
+  const std::weak_ptr<libcamera::CameraManager> first = *shared.manager();
+  shared.keepUntilOver(std::make_unique<Lingering>(story, 2, first.lock()));
+  shared.unplugged();
+  EXPECT_EQ(*shared.manager(), first.lock()) << "the camera still uses it";
+  EXPECT_TRUE(shared.keeps());
+  EXPECT_FALSE(story.destroyed);
+  EXPECT_NE(*shared.manager(), nullptr);
+  EXPECT_TRUE(first.expired());
+  EXPECT_FALSE(shared.keeps());
+  EXPECT_TRUE(story.destroyed);
+}
+
+TEST(SharedManager, LeavesACameraAloneThatIsNotOverInTime) {
+  Lingering::Story never, late;
+  auto camera = std::make_unique<Lingering>(never, 0, nullptr);
+  const Unended* left = camera.get();
+  const auto begin = std::chrono::steady_clock::now();
+  {
+    SharedManager shared([](const std::string&) {});
+    shared.keepUntilOver(std::move(camera));
+    shared.keepUntilOver(std::make_unique<Lingering>(late, 3, nullptr));
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+  EXPECT_FALSE(never.destroyed) << "libcamera's thread knows it";
+  EXPECT_GT(never.tries, 10);
+  EXPECT_TRUE(late.destroyed);
+  delete left;
+}
+
+TEST(RunningCamera, SeesThatAVideoNodeThatIsOpenIsThereNoMore) {
   const std::filesystem::path folder =
       ::testing::TempDir() + "/perdure_descriptors_" + std::to_string(getpid());
   std::filesystem::create_directories(folder);

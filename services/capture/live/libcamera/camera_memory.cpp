@@ -1,4 +1,4 @@
-#include "services/capture/live/camera_memory.h"
+#include "services/capture/live/libcamera/camera_memory.h"
 
 #include <linux/dma-buf.h>
 #include <sys/ioctl.h>

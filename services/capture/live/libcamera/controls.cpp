@@ -1,4 +1,4 @@
-#include "services/capture/live/libcamera_controls.h"
+#include "services/capture/live/libcamera/controls.h"
 
 #include <fmt/format.h>
 #include <libcamera/control_ids.h>

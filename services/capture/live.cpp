@@ -1,4 +1,4 @@
-#include "services/capture/live/live.h"
+#include "services/capture/live.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,7 +1,6 @@
 // Cameras of libcamera.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -14,9 +13,5 @@ namespace perdure::capture {
 /// thread, as long as one of the results or of their sessions lives. Once for the process.
 std::vector<OpenCamera> libcameraOpeners(const std::vector<CameraSettings>& cameras,
                                          std::function<void(const std::string&)> log);
-
-/// Whether a video node that this process has open is there no more. `descriptors`: links to what
-/// is open.
-bool openVideoNodeVanished(const std::filesystem::path& descriptors = "/proc/self/fd");
 
 }  // namespace perdure::capture

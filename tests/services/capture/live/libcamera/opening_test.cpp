@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/capture/live/cameras/camera_choice.h"
-#include "services/capture/live/cameras/restart_rule.h"
+#include "services/capture/live/libcamera/camera_choice.h"
+#include "services/capture/live/libcamera/restart_rule.h"
 
 namespace perdure::capture {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/capture/live/cameras/restart_rule.h"
+#include "services/capture/live/libcamera/restart_rule.h"
 
 #include <sys/stat.h>
 #include <unistd.h>

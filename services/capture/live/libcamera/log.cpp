@@ -1,4 +1,4 @@
-#include "services/capture/live/libcamera_log.h"
+#include "services/capture/live/libcamera/log.h"
 
 #include <libcamera/logging.h>
 

@@ -1,4 +1,4 @@
-#include "services/capture/live/cameras/camera_choice.h"
+#include "services/capture/live/libcamera/camera_choice.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,12 +1,41 @@
-#include "services/capture/live/cameras/shared_manager.h"
+#include "services/capture/live/libcamera/shared_manager.h"
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstring>
+#include <thread>
+#include <utility>
 
 namespace perdure::capture {
 
+/// What is not over then is left as it is: libcamera's thread still knows it.
+SharedManager::~SharedManager() {
+  constexpr std::chrono::milliseconds kLongest{2000}, kPause{50};
+  for (auto left = kLongest; keeps() && left.count() > 0; left -= kPause) {
+    endKept();
+    if (keeps()) std::this_thread::sleep_for(kPause);
+  }
+  for (auto& camera : kept_) (void)camera.release();
+}
+
+void SharedManager::keepUntilOver(std::unique_ptr<Unended> camera) {
+  const std::lock_guard lock(kept_mutex_);
+  kept_.push_back(std::move(camera));
+}
+
+bool SharedManager::keeps() const {
+  const std::lock_guard lock(kept_mutex_);
+  return !kept_.empty();
+}
+
+void SharedManager::endKept() {
+  const std::lock_guard lock(kept_mutex_);
+  std::erase_if(kept_, [](const auto& camera) { return camera->over(); });
+}
+
 Result<std::shared_ptr<libcamera::CameraManager>> SharedManager::manager() {
+  endKept();
   if (manager_.use_count() == 1 && stale_.exchange(false)) manager_.reset();
   if (manager_) return manager_;
   auto manager = std::make_shared<libcamera::CameraManager>();
