@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/math/so3.h"
+#include "services/vio/core/start/linear_start.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "tests/services/vio/simulated_drive.h"
 
