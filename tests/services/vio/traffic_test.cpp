@@ -75,13 +75,14 @@ TEST_P(StandingInTraffic, StaysWhereItIs) {
     }
     EXPECT_LT(d.farthest_m, 0.05) << "seed " << seed;
     EXPECT_LT(d.largest_deviation, 3.0) << "seed " << seed;
-    // Where too little of a background is left from the start, it may wait.
-    if (cover > 0.7 && begins_s < 0.5 && d.poses == 0) {
+    // Where too little of a background is left from the start, it may wait, and says so.
+    const bool may_wait = cover > 0.7 && begins_s < 0.5;
+    if (may_wait && d.poses == 0) {
       EXPECT_NE(d.status.find("traffic"), std::string::npos) << d.status;
       continue;
     }
     ASSERT_TRUE(d.started_s) << d.status;
-    EXPECT_LT(*d.started_s, 3.0);
+    if (!may_wait) EXPECT_LT(*d.started_s, 3.0);
   }
 }
 
