@@ -1,6 +1,7 @@
 #include "services/vio/known_pose_node.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
@@ -13,7 +14,13 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kPoses = 256;  // that wait for their frames
-constexpr int kWithoutPose = 10;     // frames in a row, until that is worth a word
+constexpr int kInVain = 10;          // frames in a row, until that is worth a word
+
+constexpr char kNoPose[] =
+    "frames have no pose; start what publishes odometry, with the stamps of the frames";
+constexpr char kNoStart[] = "the poses may not be used yet: their program has no start";
+constexpr char kOtherSize[] = "frames differ in size from their calibration; mend one of them";
+constexpr char kNoImage[] = "images cannot be read; mend the camera";
 
 }  // namespace
 
@@ -64,19 +71,49 @@ HealthState KnownPoseNode::health() const {
 
 std::string KnownPoseNode::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
+  if (in_vain_ > kInVain) return why_;
   if (!last_image_ && waiting_.empty())
     return "waits for frames; start capture, or mend the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
-  if (without_pose_ > kWithoutPose) {
-    return "frames have no pose; start what publishes odometry, with the stamps of the frames";
-  }
   return {};
+}
+
+std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
+  if (waiting_.empty()) return std::nullopt;
+  return waiting_.front().first.stamp.sequence;
+}
+
+/// By more than any transport reorders.
+bool KnownPoseNode::isBefore(TimePoint time, const std::optional<TimePoint>& newest) const {
+  return newest && time < *newest - std::chrono::milliseconds(300);
+}
+
+/// A new run of the same clock, or a stamp that was far ahead: nothing that came before helps.
+void KnownPoseNode::clockJumpedBack() {
+  reasons_.add("clock_jumped_back");
+  waiting_.clear();
+  poses_.clear();
+  newest_frame_.reset();
+  last_image_.reset();
+  last_.reset();
+  if (!cameras_) return;
+  cameras_->tracker.reset();
+  cameras_->mapper.clear();
+}
+
+void KnownPoseNode::giveUp(const Reason& reason, const char* why) {
+  reasons_.add(reason);
+  ++in_vain_;
+  why_ = why;
 }
 
 void KnownPoseNode::onOdometry(const Odometry& odometry) {
   if (!odometry.T_WB.finite() || !odometry.covariance.allFinite() || !odometry.v_WB.allFinite()) {
     return reasons_.add("odometry_not_finite");
   }
+  const TimePoint time = odometry.stamp.time;
+  if (isBefore(time, last_image_) || (!poses_.empty() && isBefore(time, poses_.back().stamp.time)))
+    clockJumpedBack();
   if ((last_image_ && odometry.stamp.time <= *last_image_) ||
       (!poses_.empty() && odometry.stamp.time < poses_.back().stamp.time)) {
     return reasons_.add("odometry_late");
@@ -97,15 +134,19 @@ void KnownPoseNode::onFrame(const Frame& frame) {
   const CameraModel& model = models[second ? 1 : 0];
   if (frame.width != static_cast<std::uint32_t>(model.width()) ||
       frame.height != static_cast<std::uint32_t>(model.height())) {
-    return reasons_.add("frame_size_differs");
+    return second ? reasons_.add("frame_size_differs")
+                  : giveUp({"frame_size_differs", ""}, kOtherSize);
+  }
+  if (!second) {
+    if (isBefore(frame.stamp.time, newest_frame_)) clockJumpedBack();
+    newest_frame_ = std::max(newest_frame_.value_or(frame.stamp.time), frame.stamp.time);
   }
   if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
   const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
   if (!added) reasons_.add(added.error());
   if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {
     waiting_.take();
-    reasons_.add("frame_without_pose");
-    ++without_pose_;
+    giveUp({"frame_without_pose", ""}, kNoPose);
   }
   drain(false);
 }
@@ -127,11 +168,9 @@ void KnownPoseNode::drain(bool all) {
     const FramePair frames = waiting_.take();
     last_image_ = frames.first.stamp.time;
     if (pose && pose->state != OdometryState::kInitialising) {
-      without_pose_ = 0;
       process(frames, *pose);
     } else {
-      reasons_.add("frame_without_pose");
-      ++without_pose_;
+      giveUp({"frame_without_pose", ""}, pose ? kNoStart : kNoPose);
     }
     std::erase_if(poses_, [&](const Odometry& o) { return o.stamp.time <= *last_image_; });
   }
@@ -145,7 +184,7 @@ void KnownPoseNode::begin(const WorldId& world) {
 
 void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
   const auto first = vision::monoOf(frames.first);
-  if (!first) return reasons_.add(first.error());
+  if (!first) return giveUp(first.error(), kNoImage);
   cv::Mat second;
   if (frames.second) {
     const auto image = vision::monoOf(*frames.second);
@@ -168,7 +207,7 @@ void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
   const Eigen::Vector3d turn = cameras_->models[0].calibration().readout_s * pose.rate_B;
   cameras_->mapper.add(pose, cameras_->tracker.track(*first, second, R, masked, turn));
   last_ = odometry;
-  points_ = cameras_->mapper.landmarks().size();
+  in_vain_ = 0;
   landmarks_(landmarksMessage(odometry.stamp, instance_, odometry.world,
                               cameras_->models[0].calibration().name, cameras_->mapper.landmarks(),
                               *first));

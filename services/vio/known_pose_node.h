@@ -32,6 +32,9 @@ class KnownPoseNode {
   /// End of data: what waits for a second image is taken without.
   void flush() { drain(true); }
 
+  /// The oldest frame whose landmarks may still come.
+  std::optional<std::uint64_t> waitsFor() const;
+
   const ReasonCounts& reasons() const;
   HealthState health() const;
   /// One sentence: what it waits for, or what is wrong; empty when all is well.
@@ -40,6 +43,9 @@ class KnownPoseNode {
  private:
   struct Cameras;
   void drain(bool all);
+  bool isBefore(TimePoint time, const std::optional<TimePoint>& newest) const;
+  void clockJumpedBack();
+  void giveUp(const Reason& reason, const char* why);
   const Odometry* poseOf(const Frame& frame) const;
   void process(const FramePair& frames, const Odometry& odometry);
   void begin(const WorldId& world);
@@ -54,8 +60,9 @@ class KnownPoseNode {
   std::deque<Odometry> poses_;    ///< oldest first, of frames that may still come
   std::optional<Odometry> last_;  ///< of the last image that was used
   std::optional<TimePoint> last_image_;
-  std::size_t points_ = 0;  ///< in the last landmarks
-  int without_pose_ = 0;    ///< frames in a row
+  std::optional<TimePoint> newest_frame_;  ///< that has been heard
+  int in_vain_ = 0;                        ///< frames in a row that gave no landmarks
+  const char* why_ = "";                   ///< of the last of those, with the mend
   mutable ReasonCounts all_reasons_;
   ReasonCounts reasons_;
 };

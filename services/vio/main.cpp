@@ -33,22 +33,19 @@ class FrameInput {
         }
         const auto missed = gaps_[i].before(m.stamp.source, m.stamp.sequence);
         if (missed > 0) reasons_.add("frames_missed", missed);
-        if (i == 0) {
-          frames.heard();
-          context.health().frameIn();
-        }
-        hand(m);
+        if (i == 0) context.health().frameIn();
+        // An image that cannot be decoded is none: nothing goes out for it.
+        if (hand(m) && i == 0) frames.heard();
       });
     }
   }
 
  private:
-  void hand(const Frame& frame) {
-    if (const auto pixels = vision::decompressed(frame, ImageEncoding::kMono8)) {
-      onFrame_(*pixels);
-    } else {
-      reasons_.add(pixels.error());
-    }
+  bool hand(const Frame& frame) {
+    const auto pixels = vision::decompressed(frame, ImageEncoding::kMono8);
+    if (pixels) onFrame_(*pixels);
+    if (!pixels) reasons_.add(pixels.error());
+    return pixels.has_value();
   }
 
   std::function<void(const Frame&)> onFrame_;

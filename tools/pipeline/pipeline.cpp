@@ -244,7 +244,6 @@ void Pipeline::openKnownPoses() {
       configs_.vio, instanceOf(kVio), [this](const Landmarks& landmarks) {
         landmarks_[landmarks.stamp.sequence] = landmarks;
         outputs_->onLandmarks(landmarks);
-        releasePoses(landmarks.stamp.sequence);
       });
   known_poses_->onCalibration(dataset_->calibration());
 }
@@ -299,7 +298,7 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
   if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
   if (known_poses_) {
     timer_.timeTowardsNext("vio", [&] { known_poses_->flush(); });
-    releasePoses(std::numeric_limits<std::uint64_t>::max());
+    releasePoses();
   }
   if (simulated_) offerDue(TimePoint::max());
   deliver();
@@ -331,6 +330,7 @@ void Pipeline::handleFrame(const Frame& frame) {
     else
       timer_.timeTowardsNext("vio", work);
   }
+  releasePoses();
   if (!first_camera) return deliver();
   detect(frame);
   deliver();
@@ -339,19 +339,22 @@ void Pipeline::handleFrame(const Frame& frame) {
   timer_.time("outputs", [] {});
 }
 
-/// A pose waits for its landmarks, which wait for the second camera; for the next frame at most.
+/// A pose waits for its landmarks, which wait for the second camera.
 void Pipeline::givePose(const Frame& frame) {
   const auto odometry = pose_at_(frame.stamp);
   if (!odometry) return reasons_.add("frame_without_pose");
   if (!known_poses_) return new_odometry_.push_back(*odometry);
-  if (!held_.empty()) releasePoses(held_.back().stamp.sequence);
   held_.push_back(*odometry);
   timer_.timeTowardsNext("vio", [&] { known_poses_->onOdometry(*odometry); });
 }
 
-void Pipeline::releasePoses(std::uint64_t up_to) {
-  const auto released = std::find_if(held_.begin(), held_.end(),
-                                     [&](const Odometry& o) { return o.stamp.sequence > up_to; });
+/// Those for whose frames nothing more comes.
+void Pipeline::releasePoses() {
+  if (!known_poses_) return;
+  const auto waits_for = known_poses_->waitsFor();
+  const auto released = std::find_if(held_.begin(), held_.end(), [&](const Odometry& o) {
+    return waits_for && o.stamp.sequence >= *waits_for;
+  });
   new_odometry_.insert(new_odometry_.end(), held_.begin(), released);
   held_.erase(held_.begin(), released);
 }

@@ -99,7 +99,7 @@ class Pipeline {
   void handle(const replay::Message& message);
   void handleFrame(const Frame& frame);
   void givePose(const Frame& frame);
-  void releasePoses(std::uint64_t up_to);
+  void releasePoses();
   void detect(const Frame& frame);
   void offer(Detections detections);
   void offerDue(TimePoint now);

@@ -9,68 +9,87 @@
 namespace perdure::replay {
 namespace {
 
-constexpr std::size_t kStep = 1u << 20;
+/// What comes, in steps. The room behind it stays from call to call: a stream of empty frames must
+/// not cost a step each.
+class Unpacked {
+ public:
+  explicit Unpacked(std::uint64_t most) : most_(most) {}
+  /// Beyond what was asked for, so that a stream that has more is not taken for whole.
+  bool wantsMore() const { return used_ <= most_; }
+  std::uint8_t* room() {
+    if (used_ == bytes_.size()) bytes_.resize(used_ + kStep);
+    return bytes_.data() + used_;
+  }
+  std::size_t roomSize() const { return bytes_.size() - used_; }
+  void came(std::size_t n) { used_ += n; }
+  std::vector<std::uint8_t> take() {
+    bytes_.resize(used_);
+    return std::move(bytes_);
+  }
+
+ private:
+  static constexpr std::size_t kStep = 1u << 20;
+  std::uint64_t most_;
+  std::size_t used_ = 0;
+  std::vector<std::uint8_t> bytes_;
+};
 
 }  // namespace
 
 std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std::uint64_t most) {
-  std::vector<std::uint8_t> bytes;
+  Unpacked unpacked(most);
   bz_stream stream{};
-  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return bytes;
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return {};
   // The library does not write there; its interface is older than const.
   stream.next_in = reinterpret_cast<char*>(const_cast<std::uint8_t*>(packed.data()));
   stream.avail_in = static_cast<unsigned int>(packed.size());
   int state = BZ_OK;
-  while (state == BZ_OK && bytes.size() < most) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + kStep);
-    stream.next_out = reinterpret_cast<char*>(bytes.data() + before);
-    stream.avail_out = kStep;
+  while (state == BZ_OK && unpacked.wantsMore()) {
+    stream.next_out = reinterpret_cast<char*>(unpacked.room());
+    const std::size_t room = unpacked.roomSize();
+    stream.avail_out = static_cast<unsigned int>(room);
     state = BZ2_bzDecompress(&stream);
-    bytes.resize(before + kStep - stream.avail_out);
-    if (bytes.size() == before) break;  // nothing more comes
+    const std::size_t written = room - stream.avail_out;
+    unpacked.came(written);
+    if (written == 0) break;  // nothing more comes
   }
   BZ2_bzDecompressEnd(&stream);
-  return bytes;
+  return unpacked.take();
 }
 
 std::vector<std::uint8_t> unpackedLz4(std::span<const std::uint8_t> packed, std::uint64_t most) {
-  std::vector<std::uint8_t> bytes;
+  Unpacked unpacked(most);
   LZ4F_dctx* context = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return bytes;
-  while (!packed.empty() && bytes.size() < most) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + kStep);
-    std::size_t written = kStep, read = packed.size();
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return {};
+  while (!packed.empty() && unpacked.wantsMore()) {
+    std::uint8_t* room = unpacked.room();
+    std::size_t written = unpacked.roomSize(), read = packed.size();
     const std::size_t state =
-        LZ4F_decompress(context, bytes.data() + before, &written, packed.data(), &read, nullptr);
-    const bool damaged = LZ4F_isError(state) != 0;
-    bytes.resize(before + (damaged ? 0 : written));
-    if (damaged || (written == 0 && read == 0)) break;
+        LZ4F_decompress(context, room, &written, packed.data(), &read, nullptr);
+    if (LZ4F_isError(state) != 0 || (written == 0 && read == 0)) break;
+    unpacked.came(written);
     packed = packed.subspan(read);
   }
   LZ4F_freeDecompressionContext(context);
-  return bytes;
+  return unpacked.take();
 }
 
 std::vector<std::uint8_t> unpackedZstd(std::span<const std::uint8_t> packed, std::uint64_t most) {
   static thread_local const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(
       ZSTD_createDCtx(), &ZSTD_freeDCtx);
   ZSTD_DCtx_reset(context.get(), ZSTD_reset_session_only);
-  std::vector<std::uint8_t> bytes;
+  Unpacked unpacked(most);
   ZSTD_inBuffer in{packed.data(), packed.size(), 0};
-  while (bytes.size() < most) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + kStep);
-    ZSTD_outBuffer out{bytes.data() + before, kStep, 0};
+  while (unpacked.wantsMore()) {
+    std::uint8_t* room = unpacked.room();
+    ZSTD_outBuffer out{room, unpacked.roomSize(), 0};
     const std::size_t read = in.pos;
     const std::size_t state = ZSTD_decompressStream(context.get(), &out, &in);
-    const bool damaged = ZSTD_isError(state) != 0;
-    bytes.resize(before + (damaged ? 0 : out.pos));
-    if (damaged || (out.pos == 0 && in.pos == read)) break;
+    if (ZSTD_isError(state) != 0 || (out.pos == 0 && in.pos == read)) break;
+    unpacked.came(out.pos);
     if (state == 0 && in.pos == in.size) break;
   }
-  return bytes;
+  return unpacked.take();
 }
 
 }  // namespace perdure::replay

@@ -1,10 +1,12 @@
 // The node where another program gives the poses: its inputs, their faults, what it says.
 #include "services/vio/known_pose_node.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <map>
 
@@ -178,6 +180,84 @@ TEST_F(KnownPoses, WhatDoesNotFitIsCounted) {
   EXPECT_EQ(node_.reasons().of("frame_late"), 1u);
   node_.onOdometry(poseOf(1));
   EXPECT_EQ(node_.reasons().of("odometry_late"), 1u);
+}
+
+TEST_F(KnownPoses, AClockThatJumpsBackBeginsAnew) {
+  play(0, 20);
+  // The same drive again, by numbers that go on; first the frame comes first, then the pose.
+  for (const std::uint64_t lap : {1, 2}) {
+    for (std::uint64_t i = 0; i < 20; ++i) {
+      Frame frame = imageOf(i);
+      Odometry pose = poseOf(i);
+      frame.stamp.sequence = pose.stamp.sequence = 100 * lap + i;
+      if (lap == 1) node_.onFrame(frame);
+      node_.onOdometry(pose);
+      if (lap == 2) node_.onFrame(frame);
+    }
+    EXPECT_EQ(node_.reasons().of("clock_jumped_back"), lap);
+    EXPECT_EQ(landmarks_.size(), 20 * (lap + 1));
+    EXPECT_GT(landmarks_.at(100 * lap + 19).landmarks.size(), 20u);
+  }
+  EXPECT_EQ(node_.health(), HealthState::kOk);
+}
+
+TEST_F(KnownPoses, AStampFarAheadDoesNotStopIt) {
+  play(0, 10);
+  Odometry ahead = poseOf(10);
+  ahead.stamp.time += std::chrono::hours(1);
+  node_.onOdometry(ahead);
+  play(11, 20);
+  Frame frame = imageOf(20);
+  frame.stamp.time += std::chrono::hours(1);
+  node_.onFrame(frame);
+  play(21, 40);
+  EXPECT_GE(landmarks_.size(), 36u) << "a frame or two are lost";
+  EXPECT_LT(errorAt(39), 0.03);
+}
+
+TEST_F(KnownPoses, FramesThatWaitFromAnEarlierRunDoNotTakeTheRoom) {
+  for (std::uint64_t i = 60; i < 140; ++i) node_.onFrame(imageOf(i));
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(imageOf(i));
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onOdometry(poseOf(i));
+  EXPECT_EQ(landmarks_.size(), 20u);
+}
+
+TEST_F(KnownPoses, HealthIsNotOkWhereNothingGoesOut) {
+  const auto playBroken = [&](std::uint64_t from, auto change) {
+    play(from, from + 10);
+    EXPECT_EQ(node_.health(), HealthState::kOk);
+    for (std::uint64_t i = from + 10; i < from + 30; ++i) {
+      Frame frame = imageOf(i);
+      Odometry pose = poseOf(i);
+      change(frame, pose);
+      node_.onOdometry(pose);
+      node_.onFrame(frame);
+    }
+    EXPECT_EQ(node_.health(), HealthState::kDegraded);
+    return node_.status();
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(playBroken(0, [](Frame& f, Odometry&) { f.data = nullptr; }), HasSubstr("images"));
+  EXPECT_THAT(playBroken(30, [](Frame& f, Odometry&) { f.width /= 2; }), HasSubstr("size"));
+  EXPECT_THAT(playBroken(60, [](Frame&, Odometry& o) { o.state = OdometryState::kInitialising; }),
+              HasSubstr("no start"));
+  EXPECT_THAT(playBroken(90, [](Frame&, Odometry& o) { o.stamp.sequence += 1000; }),
+              HasSubstr("no pose"));
+}
+
+TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
+  EXPECT_FALSE(node_.waitsFor());
+  // The second camera is gone; its images may still come, until some frames say that they do not.
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    node_.onOdometry(poseOf(i));
+    node_.onFrame(imageOf(i));
+    ASSERT_TRUE(node_.waitsFor());
+    EXPECT_EQ(*node_.waitsFor(), landmarks_.size());
+    EXPECT_LE(i - *node_.waitsFor(), 3u);
+  }
+  node_.flush();
+  EXPECT_FALSE(node_.waitsFor());
+  EXPECT_EQ(landmarks_.size(), 10u);
 }
 
 TEST_F(KnownPosesInStereo, ABodyThatStandsKnowsDistances) {

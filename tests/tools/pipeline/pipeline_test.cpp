@@ -314,6 +314,29 @@ TEST(Pipeline, GivenPosesHaveLandmarksToo) {
   EXPECT_GT(points, 10u);
 }
 
+TEST(Pipeline, ASecondCameraThatStopsTakesNoLandmarks) {
+  const auto root = replay::tinyEuroc("pipeline_second_stops", true);
+  replay::writeText(root / "mav0/state_groundtruth_estimate0/data.csv",
+                    "#timestamp, p, q w x y z, v, b_w, b_a\n"
+                    "990000000,1,2,3,1,0,0,0,0,0,0,0,0,0,0,0,0\n"
+                    "1290000000,2,2,3,1,0,0,0,0,0,0,0,0,0,0,0,0\n");
+  for (const char* image : {"1050000000", "1100000000", "1150000000", "1200000000"}) {
+    fs::remove(root / "mav0/cam1/data" / (std::string(image) + ".png"));
+  }
+  PipelineOptions options;
+  options.data = root.string();
+  options.odometry = "truth";
+  options.detections = "none";
+  options.landmarks = options.record = true;
+  options.out = (root / "out").string();
+  runPipeline(options);
+  std::size_t landmarks = 0;
+  replay::RecordedMessages recorded(root / "out/run.mcap");
+  recorded.rewind([](const std::string& topic) { return topic == "landmarks"; });
+  while (recorded.next()) ++landmarks;
+  EXPECT_EQ(landmarks, 5u);
+}
+
 TEST(Pipeline, ATruncatedImageCostsOneFrame) {
   const auto root = replay::tinyEuroc("pipeline_truncated");
   replay::truncate(root / "mav0/cam0/data/1050000000.png", 0.5);

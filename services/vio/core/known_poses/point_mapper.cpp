@@ -9,11 +9,11 @@ namespace {
 
 std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(track.views()); }
 
-constexpr std::size_t kViews = 24;          // poses that are kept
-constexpr std::size_t kRecent = 12;         // of which the newest, in any case
-constexpr std::size_t kFewestToLearn = 10;  // points that say how well tracks agree with poses
-constexpr double kForget = 0.05;            // of that, with each image
-constexpr double kGate = 3.0;               // residuals of a point, in those of the others
+constexpr std::size_t kViews = 24;   // poses that are kept
+constexpr std::size_t kRecent = 12;  // of which the newest, in any case
+constexpr double kMany = 10.0;       // points whose median counts in full
+constexpr double kForget = 0.05;     // of that, with each image
+constexpr double kGate = 3.0;        // residuals of a point, in those of the others
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
   // rms² is of 2n residuals, and three of their degrees of freedom went into the point.
@@ -82,21 +82,26 @@ std::vector<Ray> PointMapper::raysOf(const Track& track) const {
     for (std::size_t c = 0; c < T_BC_.size(); ++c) {
       if (!o.seen[c]) continue;
       rays.push_back({cameraOf(*view, c, o.seen[c]->row), o.seen[c]->normalised,
-                      o.seen[c]->scale / noisePx()});
+                      o.seen[c]->scale / options_.sigma_px});
     }
   }
   return rays;
 }
 
+/// Points are found, and the scale is learnt, without it: a scale that some bad poses have raised
+/// would leave too few points to learn that they have become good.
+bool PointMapper::isSure(const Triangulated& point) const {
+  return point.rms <= kGate * scale_ && point.relative_sigma * scale_ < options_.max_relative_sigma;
+}
+
 void PointMapper::learnScale(const std::vector<Candidate>& candidates) {
-  if (candidates.size() < kFewestToLearn) return;
+  if (candidates.empty()) return;
   std::vector<double> fits;
   for (const Candidate& c : candidates) fits.push_back(c.point.rms);
   const auto middle = fits.begin() + static_cast<long>(fits.size() / 2);
   std::nth_element(fits.begin(), middle, fits.end());
-  // Residuals are in units of the scale that was assumed.
-  const double seen = scale_ * *middle;
-  scale_ = std::max(1.0, scale_ + kForget * (seen - scale_));
+  const double weight = std::min(1.0, static_cast<double>(fits.size()) / kMany);
+  scale_ = std::max(1.0, scale_ + weight * kForget * (*middle - scale_));
 }
 
 void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
@@ -117,11 +122,11 @@ void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
   }
   landmarks_.clear();
   for (const Candidate& c : candidates) {
-    if (c.point.rms > kGate) continue;
+    if (!isSure(c.point)) continue;
     LandmarkEstimate l;
     l.id = c.seen->id;
     l.p_W = c.point.p_W;
-    l.covariance = c.point.covariance;
+    l.covariance = scale_ * scale_ * c.point.covariance;
     l.cross_pose = crossOfRigid(l.p_W, pose.T_WB, pose.covariance);
     l.pixel = c.seen->seen[0]->pixel;
     landmarks_.push_back(l);

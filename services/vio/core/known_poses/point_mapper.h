@@ -53,6 +53,7 @@ class PointMapper {
   void forgetOne();
   std::vector<Ray> raysOf(const Track& track) const;
   RigidTransform cameraOf(const View& view, std::size_t camera, double row) const;
+  bool isSure(const Triangulated& point) const;
   void learnScale(const std::vector<Candidate>& candidates);
 
   VisionOptions options_;

@@ -5,6 +5,7 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
@@ -157,6 +158,28 @@ INSTANTIATE_TEST_SUITE_P(Ways, PackedChunks,
                                          Packing{"ZstdInTwoFrames", "zstd", zstdInTwoFrames},
                                          Packing{"Lz4", "lz4", lz4}),
                          [](const auto& one) { return std::string(one.param.name); });
+
+TEST(Unpacking, ManyEmptyFramesCostLittle) {
+  const auto often = [](const Buffer& frame) {
+    Buffer frames;
+    for (int i = 0; i < 300'000; ++i) frames.insert(frames.end(), frame.begin(), frame.end());
+    return frames;
+  };
+  const Buffer zstd = often(zstdInOneGo({})), lz4s = often(lz4({}));
+  const auto before = std::chrono::steady_clock::now();
+  EXPECT_TRUE(unpackedZstd(zstd, 1u << 20).empty());
+  EXPECT_TRUE(unpackedLz4(lz4s, 1u << 20).empty());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - before;
+  EXPECT_LT(took.count(), 3.0) << "a megabyte for each frame";
+}
+
+TEST(Unpacking, AStreamWithMoreThanWasAskedForIsNotTakenForWhole) {
+  const Buffer bytes(5u << 20, 7);
+  for (const Buffer& unpacked :
+       {unpackedZstd(zstdInOneGo(bytes), 2u << 20), unpackedLz4(lz4(bytes), 2u << 20)}) {
+    EXPECT_EQ(unpacked.size(), 3u << 20);
+  }
+}
 
 TEST(Unpacking, StopsAtWhatIsAskedFor) {
   const Buffer bytes(100u << 20, 7);

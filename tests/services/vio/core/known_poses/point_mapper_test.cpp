@@ -219,6 +219,40 @@ TEST(PointMapper, AnotherFrameOfReferenceBeginsWithNothing) {
   EXPECT_TRUE(mapper.landmarks().empty());
 }
 
+TEST(PointMapper, AWhileOfBadPosesIsForgotten) {
+  test::DriveOptions options = seeded(12);
+  options.place = test::DrivePlace::kStreet;
+  GivenDrive good(options), bad(options, {.rotation = 0.13, .position = 0.4});
+  PointMapper mapper = good.mapper();
+  // Short tracks and images close together, as of a slow robot: few pixels of parallax.
+  constexpr std::uint64_t kLife = 6;
+  std::uint64_t frame = 0;
+  const auto play = [&](GivenDrive& poses, double from, double until) {
+    for (double t = from; t < until; t += 0.03, ++frame) {
+      TrackedFrame tracked = good.drive().see(t);
+      for (TrackedPoint& p : tracked.points) p.id = 1000 * p.id + (frame + p.id) / kLife;
+      mapper.add(poses.poseAt(t), tracked);
+    }
+  };
+  const auto pointsOf = [&](double from, double until) {
+    std::size_t sum = 0;
+    const std::uint64_t before = frame;
+    for (double t = from; t < until; t += 0.03) {
+      play(good, t, t + 0.02);
+      sum += mapper.landmarks().size();
+    }
+    return static_cast<double>(sum) / static_cast<double>(frame - before);
+  };
+  play(good, 0.0, 2.0);
+  const double before = pointsOf(2.0, 3.0);
+  ASSERT_GT(before, 2.0);
+  play(bad, 3.0, 7.0);
+  ASSERT_GT(mapper.noisePx(), 10.0 * VisionOptions{}.sigma_px);
+  play(good, 7.0, 19.0);
+  EXPECT_LT(mapper.noisePx(), 2.0 * VisionOptions{}.sigma_px);
+  EXPECT_GT(pointsOf(19.0, 20.0), 0.7 * before);
+}
+
 TEST(PointMapper, TheErrorOfThePoseIsThatOfThePoint) {
   GivenDrive given(seeded(10));
   PointMapper mapper = given.mapper();
