@@ -18,7 +18,7 @@ class Decoder : public Checked {
   void value(const char*, X& d, const X& w) {
     d = w;
   }
-  void value(const char*, bool& d, const bool& w) { d = w; }
+  void value(const char* name, bool& d, const bool& w) { d = isTrue(name, w); }
   void time(const char* name, TimePoint& d, const std::int64_t& w) {
     checkTime(name, w);
     d = fromNanoseconds(w);
@@ -77,11 +77,11 @@ class Decoder : public Checked {
   }
   template <class D, class W>
   void optional(const char* name, std::optional<D>& d, const bool& has, const W& w) {
-    if (has) object(name, d.emplace(), w);
+    if (isTrue(name, has)) object(name, d.emplace(), w);
   }
   void optionalNumber(const char* name, std::optional<double>& d, const bool& has, const double& w,
                       const Limits& limits) {
-    if (has) number(name, d.emplace(), w, limits);
+    if (isTrue(name, has)) number(name, d.emplace(), w, limits);
   }
   template <class D, class S>
   void list(const char* name, std::vector<D>& d, const S& w, std::size_t most) {
@@ -135,6 +135,13 @@ class Decoder : public Checked {
   }
 
  private:
+  /// A byte from outside may be neither 0 nor 1: it must not be read as a bool.
+  bool isTrue(const char* name, const bool& w) {
+    std::uint8_t byte = 0;
+    std::memcpy(&byte, &w, sizeof byte);
+    if (byte > 1) refuse(name, "out_of_range");
+    return byte == 1;
+  }
   template <class S>
   bool checkBuffer(const char* name, const S& w, std::size_t most) {
     if (!checkCount(name, w._length, most)) return false;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #include "common/wire/codec.h"
 #include "common/wire/description/bounds.h"
@@ -67,6 +68,15 @@ TEST(Refusals, OfInsetsThatAreNotFourAClass) {
   EXPECT_EQ(refusal(message), "out_of_range side_insets");
   message.side_insets.clear();
   EXPECT_EQ(refusal(message), "");
+}
+
+TEST(Refusals, OfBytesThatAreNeitherTrueNorFalse) {
+  const auto of = [](auto change) { return decodeRefusal(example<Odometry>(), change); };
+  EXPECT_EQ(of([](auto& w) { std::memset(&w.has_increment, 1, 1); }), "");
+  EXPECT_EQ(of([](auto& w) { std::memset(&w.has_increment, 255, 1); }),
+            "out_of_range has_increment");
+  EXPECT_EQ(decodeRefusal(example<Calibration>(), [](auto& w) { std::memset(&w.has_imu, 2, 1); }),
+            "out_of_range imu");
 }
 
 TEST(Refusals, OfTimesWhoseDifferencesWouldOverflow) {
