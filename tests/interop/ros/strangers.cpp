@@ -14,10 +14,11 @@ fs::path scriptOf(const std::string& name) { return sources() / "tests/interop/r
 
 }  // namespace
 
+/// Called by `env`, which is everywhere: where npm is not, it says so and ends.
 Npm::Npm() {
   for (const char* name : {"package.json", "write_mcap.mjs", "read_ros2.mjs"})
     fs::copy_file(scriptOf(name), place_.file(name));
-  Child npm({"npm", "install", "--prefix", place_.file(""), "--no-audit", "--no-fund",
+  Child npm({"env", "npm", "install", "--prefix", place_.file(""), "--no-audit", "--no-fund",
              "--ignore-scripts", "--prefer-offline", "--fetch-retries=0", "--fetch-timeout=10000"},
             place_.file("npm.log"));
   if (npm.wait(60s) != 0) why_not_ = "npm or its registry is absent: " + npm.log();

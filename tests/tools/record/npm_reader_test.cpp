@@ -63,7 +63,7 @@ class NpmReader : public testing::Test {
     for (const char* name : {"package.json", "read.mjs"}) {
       std::filesystem::copy_file(here / name, place.file(name));
     }
-    test::Child npm({"npm", "install", "--prefix", place.file(""), "--no-audit", "--no-fund",
+    test::Child npm({"env", "npm", "install", "--prefix", place.file(""), "--no-audit", "--no-fund",
                      "--ignore-scripts", "--fetch-retries=0", "--fetch-timeout=10000"},
                     place.file("npm.log"));
     return npm.wait(60s) == 0 ? "" : "npm or its registry is absent: " + npm.log();
