@@ -2,7 +2,8 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
+
+#include "common/base/time_bounds.h"
 
 namespace perdure::wire {
 
@@ -27,12 +28,6 @@ inline constexpr Limits kPositive{1e-12, 1e12};
 inline constexpr Limits kLatitudeDeg{-90.0, 90.0};
 inline constexpr Limits kLongitudeDeg{-360.0, 360.0};
 inline constexpr Limits kOffset{-1e3, 1e3};  ///< seconds
-
-/// Nanoseconds within 146 years of the clock's zero: the difference of two fits 64 bits.
-constexpr bool isTime(std::int64_t ns) {
-  constexpr std::int64_t kLast = std::int64_t{1} << 62;
-  return ns > -kLast && ns < kLast;
-}
 
 inline constexpr std::size_t kNameLength = 256;    ///< bytes: cameras, classes, processes, reasons
 inline constexpr std::size_t kTextLength = 16384;  ///< bytes: messages, details

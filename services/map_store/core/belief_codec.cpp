@@ -167,7 +167,7 @@ Result<Objects> decodeHeader(std::span<const std::uint8_t> bytes) {
   objects.stamp.source = in.take<std::uint64_t>();
   objects.stamp.sequence = in.take<std::uint64_t>();
   objects.stamp.time = in.takeTime();
-  objects.stamp.captured_ns = in.takeSigned();
+  objects.stamp.captured_ns = in.takeNanoseconds();
   objects.instance = in.take<std::uint64_t>();
   objects.world.world = in.take<std::uint64_t>();
   objects.world.epoch = in.take<std::uint32_t>();

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/base/time.h"
+#include "common/base/time_bounds.h"
 
 namespace perdure::map_store {
 
@@ -62,10 +63,15 @@ class ByteReader {
     at_ += sizeof(T);
     return static_cast<T>(value);
   }
-  std::int64_t takeSigned() { return static_cast<std::int64_t>(take<std::uint64_t>()); }
   double takeReal() { return std::bit_cast<double>(take<std::uint64_t>()); }
   bool takeFlag() { return take<std::uint8_t>() != 0; }
-  TimePoint takeTime() { return fromNanoseconds(takeSigned()); }
+  /// Of a time; not ok() where a message could not carry it.
+  std::int64_t takeNanoseconds() {
+    const auto ns = static_cast<std::int64_t>(take<std::uint64_t>());
+    if (!isTime(ns)) ok_ = false;
+    return ok_ ? ns : 0;
+  }
+  TimePoint takeTime() { return fromNanoseconds(takeNanoseconds()); }
   std::string takeText() {
     const std::size_t size = take<std::uint32_t>();
     if (size > kLongestText || !has(size)) {

@@ -104,6 +104,14 @@ TEST(BeliefCodec, RefusesLeftOverBytesOtherVersionsAndNoClass) {
   EXPECT_FALSE(decodeBelief(encodeBelief(nothing)).has_value());
 }
 
+TEST(BeliefCodec, RefusesATimeThatNoMessageCanCarry) {
+  ObjectBelief belief = carAt(3, {1, 2, 3});
+  belief.last_seen = TimePoint::max();
+  const auto back = decodeBelief(encodeBelief(belief));
+  ASSERT_FALSE(back.has_value());
+  EXPECT_EQ(back.error().code, "belief_malformed");
+}
+
 TEST(BeliefCodec, SurvivesRandomBytes) {
   std::mt19937 random(1);
   const Bytes sound = encodeBelief(carAt(3, {1, 2, 3}));

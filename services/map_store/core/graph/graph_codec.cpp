@@ -60,7 +60,7 @@ void take(ByteReader& in, FrameStamp& stamp) {
   stamp.source = in.take<std::uint64_t>();
   stamp.sequence = in.take<std::uint64_t>();
   stamp.time = in.takeTime();
-  stamp.captured_ns = in.takeSigned();
+  stamp.captured_ns = in.takeNanoseconds();
 }
 
 void put(ByteWriter& out, const Sighting& sighting) {
