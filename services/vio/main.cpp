@@ -54,6 +54,19 @@ class FrameInput {
   std::vector<bus::Gaps> gaps_;
 };
 
+/// What both nodes hear and say alike. `own`: reasons of the process.
+template <class Node>
+void connect(service::Context& context, const vio::Config& config, Node& node,
+             const ReasonCounts& own) {
+  context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
+  context.countReasons([&]() -> const ReasonCounts& { return own; });
+  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  if (config.moving_mask.enabled) {
+    context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
+  }
+  context.onHealth([&] { context.health().state(node.health(), node.status()); });
+}
+
 void estimate(service::Context& context, const vio::Config& config) {
   const vio::StateFile file(config.state_directory);
   const auto odometry = context.sink(topics::kOdometry);
@@ -71,23 +84,17 @@ void estimate(service::Context& context, const vio::Config& config) {
       own.add(restored.error());
     }
   }
-  context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
-  context.countReasons([&]() -> const ReasonCounts& { return own; });
-  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  connect(context, config, node, own);
   auto& samples = context.needs("inertial samples", "mend the IMU, or start capture");
   context.on(topics::kImu, [&](const ImuSample& m) {
     samples.heard();
     node.onImu(m);
   });
   context.on(topics::kSpeed, [&](const SpeedSample& m) { node.onSpeed(m); });
-  if (config.moving_mask.enabled) {
-    context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
-  }
   const FrameInput frames(context, config, own, [&](const Frame& m) { node.onFrame(m); });
   context.every(std::chrono::seconds(1), [&] {
     if (const auto kept = file.write(node.saveState()); !kept) own.add(kept.error());
   });
-  context.onHealth([&] { context.health().state(node.health(), node.status()); });
   context.run();
 }
 
@@ -98,19 +105,13 @@ void followGivenPoses(service::Context& context, const vio::Config& config) {
     context.health().frameOut();
   });
   ReasonCounts own;
-  context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
-  context.countReasons([&]() -> const ReasonCounts& { return own; });
-  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  connect(context, config, node, own);
   auto& poses = context.needs("odometry", "start the program that gives the poses");
   context.on(topics::kOdometry, [&](const Odometry& m) {
     poses.heard();
     node.onOdometry(m);
   });
-  if (config.moving_mask.enabled) {
-    context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
-  }
   const FrameInput frames(context, config, own, [&](const Frame& m) { node.onFrame(m); });
-  context.onHealth([&] { context.health().state(node.health(), node.status()); });
   context.run();
 }
 

@@ -11,8 +11,8 @@ std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(trac
 
 constexpr std::size_t kViews = 24;   // poses that are kept
 constexpr std::size_t kRecent = 12;  // of which the newest, in any case
-constexpr double kMany = 10.0;       // points whose median counts in full
-constexpr double kForget = 0.05;     // of that, with each image
+constexpr double kForget = 0.05;     // of the scale that was, with each image of
+constexpr double kMany = 10.0;       // points or more; with fewer it is less
 constexpr double kGate = 3.0;        // residuals of a point, in those of the others
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
