@@ -67,6 +67,7 @@ class Pipeline {
   std::map<std::string, ReasonCounts> reasons() const;
 
  private:
+  // In pipeline_open.cpp.
   void openOdometry(const PipelineOptions& options);
   void openKnownPoses();
   void openDetections(const PipelineOptions& options);
@@ -74,8 +75,13 @@ class Pipeline {
   InstanceId instanceOf(InstanceId service) const;
   void openFilter();
   void openRun();
+  replay::DatasetOptions dataOptions() const;
+  // In pipeline.cpp.
   void learn(const ModelInfo& model);
   void hear(const ModelInfo& model);
+  void remember();
+  void keepMap(const MapFrame& frame);
+  void askForGraph();
   // In pipeline_checks.cpp.
   void checkData();
   void checkDetectionFile() const;
@@ -84,9 +90,6 @@ class Pipeline {
   void checkRecorded();
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
   void handleRecorded(const replay::RecordedMessage& message);
-  void remember();
-  void keepMap(const MapFrame& frame);
-  void askForGraph();
   /// Into OUT/run.mcap, where that is asked for. Log times are those of the sensors.
   template <class T>
   void keep(const std::string& topic, const T& value, TimePoint time) {
@@ -95,11 +98,11 @@ class Pipeline {
     const auto kept = run_->add(topic, value, static_cast<std::uint64_t>(run_ns_));
     if (!kept) reasons_.add("run_" + topic + "_" + kept.error().code);
   }
-  replay::DatasetOptions dataOptions() const;
   void handle(const replay::Message& message);
   void handleFrame(const Frame& frame);
   void givePose(const Frame& frame);
   void releasePoses();
+  void noteLatency(const FrameStamp& stamp);
   void detect(const Frame& frame);
   void offer(Detections detections);
   void offerDue(TimePoint now);
