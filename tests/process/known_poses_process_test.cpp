@@ -78,9 +78,10 @@ TEST_F(KnownPosesProcess, GivesLandmarksAndSaysWhenPosesStop) {
   };
   // What is given before all have found each other is lost.
   std::uint64_t first = 0;
-  ASSERT_TRUE(eventually(10s, [&] {
-    give(first, true);
-    return heard(first++);
+  ASSERT_TRUE(eventually(20s, [&] {
+    give(first++, true);
+    heard(first);
+    return !points.empty();
   })) << vio_.log();
   for (std::uint64_t frame = first; frame < first + 40; ++frame) {
     give(frame, true);
