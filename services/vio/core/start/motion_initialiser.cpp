@@ -9,7 +9,7 @@
 #include "services/vio/core/start/epipolar_bias.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/linear_start.h"
-#include "services/vio/core/start/motion_refinement.h"
+#include "services/vio/core/start/motion_search.h"
 
 namespace perdure::vio {
 namespace {
@@ -17,17 +17,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 40;
-constexpr double kShortestWindow = 0.25;  // s
-constexpr double kGrowth = 0.2;           // of a window before it is searched again
-constexpr double kMostNoise = 1.25;       // of the residuals, relative to what they should be
-constexpr double kFewestInFront = 0.8;    // share of the points, of the linear solution
-constexpr double kMostLinearPx = 3.0;     // its residual
-// A start is used as soon as its velocity is known to this share of the largest in the window. With
-// a larger one, windows are taken whose noise looks like motion.
-constexpr double kVelocityShare = 0.12;
-constexpr double kUsualDepth = 3.0;  // m
-constexpr double kAsLikely = 9.0;    // of the cost
+constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 120;
+constexpr double kShortestWindow = 0.2;  // s
+constexpr double kGrowth = 0.1;          // of a window before it is searched again
+constexpr double kMostNoise = 1.25;      // of the residuals, relative to what they should be
+constexpr double kFewestInFront = 0.8;   // share of the points, of the linear solution
+constexpr double kMostLinearPx = 3.0;    // its residual
 constexpr double kFewestParallaxPx = 2.0;
 
 /// The bearing from where the camera was at the middle row, by rotation alone: the way of the body
@@ -128,20 +123,16 @@ std::vector<WindowPoint> windowPoints(const MotionWindow& window,
   return points;
 }
 
-/// Where a point would be `depth` m from the camera that saw it first.
-Vector3d alongFirstView(const WindowPoint& point, const MotionWindow& window, double depth) {
-  const WindowView& v = point.views.front();
-  const WindowPose& pose = window.poses[v.keyframe];
-  return pose.p_B0 + pose.R_B0_B * (v.p_BC + depth * (v.R_BC * v.normalised.homogeneous()));
-}
-
-/// The state at the newest pose, with yaw 0, from the error [θ, v, gravity, b_g, b_a] of a window.
-Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error) {
+/// The state at the newest pose from the error [θ, v, gravity, b_g, b_a] of a window, in the W that
+/// is turned the least against a level one. Not in one of yaw 0: that leaps where x points up.
+Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error,
+          const Eigen::Quaterniond& level) {
   const WindowPose& last = w.poses.back();
   const Matrix3d R_B0_B = last.R_B0_B * expSo3(error.head<3>());
   const Vector3d gravity = w.gravity_B0 + acrossGravity(w.gravity_B0) * error.segment<2>(6);
   Nav nav;
-  nav.q_WB = levelAttitude(-R_B0_B.transpose() * gravity);
+  const Vector3d up_W = level * (-R_B0_B.transpose() * gravity);
+  nav.q_WB = Eigen::Quaterniond::FromTwoVectors(up_W, Vector3d::UnitZ()) * level;
   nav.v_WB = nav.q_WB * (R_B0_B.transpose() * (last.v_B0 + error.segment<3>(3)));
   nav.gyro_bias = w.gyro_bias + error.segment<3>(8);
   nav.accel_bias = w.accel_bias + error.segment<3>(11);
@@ -152,12 +143,15 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
   using Error = Eigen::Matrix<double, kWindowError, 1>;
   Start start;
   start.time = refined.window.poses.back().time;
-  start.nav = navOf(refined.window, Error::Zero());
+  const MotionWindow& window = refined.window;
+  const Eigen::Quaterniond level =
+      levelAttitude(-window.poses.back().R_B0_B.transpose() * window.gravity_B0);
+  start.nav = navOf(window, Error::Zero(), level);
   Eigen::Matrix<double, 15, kWindowError> J;
   constexpr double kStep = 1e-5;
   for (int i = 0; i < kWindowError; ++i) {
-    const Nav a = navOf(refined.window, kStep * Error::Unit(i));
-    const Nav b = navOf(refined.window, -kStep * Error::Unit(i));
+    const Nav a = navOf(window, kStep * Error::Unit(i), level);
+    const Nav b = navOf(window, -kStep * Error::Unit(i), level);
     J.col(i) << logSo3(b.q_WB.conjugate() * a.q_WB), Vector3d::Zero(), a.v_WB - b.v_WB,
         a.gyro_bias - b.gyro_bias, a.accel_bias - b.accel_bias;
   }
@@ -254,25 +248,7 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
                             s.x.head<3>() + k.t * s.x.tail<3>() + k.dv});
   }
   window.points = windowPoints(window, tracked, cameras);
-  // The linear solution may be near nothing at all: no motion, no depth. Another search begins
-  // where all points are as far as things usually are.
-  std::vector<RefinedWindow> minima;
-  Result<RefinedWindow> refined = refine(window, imu, options_);
-  if (refined) minima.push_back(*refined);
-  for (WindowPoint& point : window.points) point.p_B0 = alongFirstView(point, window, kUsualDepth);
-  if (const auto other = refine(std::move(window), imu, options_)) {
-    minima.push_back(*other);
-    if (!refined || other->cost < refined->cost) refined = other;
-  }
-  // Another minimum that fits about as well: the window does not say which is right.
-  for (const RefinedWindow& other : minima) {
-    const double apart =
-        (other.window.poses.back().v_B0 - refined->window.poses.back().v_B0).norm();
-    if (other.cost < refined->cost + kAsLikely &&
-        apart > kVelocityShare * refined->window.poses.back().v_B0.norm()) {
-      return fail("start_unobservable");
-    }
-  }
+  const auto refined = searchMinimum(std::move(window), imu, options_);
   if (!refined) return tl::unexpected(refined.error());
   if (refined->noise_ratio > kMostNoise) return fail("start_inconsistent");
   Start start = startOf(*refined, options_);

@@ -21,7 +21,8 @@ using Eigen::VectorXd;
 constexpr double kGyroBiasPrior = 0.3;  // rad/s: what a bias may be before anything is known
 constexpr int kIterations = 50;
 constexpr double kLittleDamping = 1e-3;
-constexpr double kLeastGain = 0.1;  // of the cost, below which no step is taken
+constexpr double kLargestStretch = 1.0;  // of a step, natural logarithm
+constexpr double kLeastGain = 0.1;       // of the cost, below which no step is taken
 
 double huber(double deviations) {
   return deviations <= kHuber ? deviations * deviations : kHuber * (2.0 * deviations - kHuber);
@@ -57,8 +58,9 @@ double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
 
 /// The normal equations, points eliminated, and what a step needs to find their part again.
 struct Normal {
-  MatrixXd H;
+  MatrixXd H;  ///< its lower half counts
   VectorXd b;
+  MatrixXd eliminated;  ///< three rows for each point: H is less by their square
   struct Point {
     Matrix3d F_inverse;
     Eigen::Matrix<double, 3, Eigen::Dynamic> F_x;
@@ -101,15 +103,17 @@ void addPoint(Normal& n, const Estimate& e, std::size_t j, const Inertial& inert
     n.b.segment<6>(at) -= t->weight * t->by_pose.transpose() * t->r;
   }
   F.diagonal() *= 1.0 + damping;
-  point.F_inverse = F.inverse();
-  n.H -= point.F_x.transpose() * point.F_inverse * point.F_x;
+  const Eigen::LLT<Matrix3d> llt(F);
+  point.F_inverse = llt.solve(Matrix3d::Identity());
+  n.eliminated.middleRows<3>(3 * static_cast<Index>(j)) = llt.matrixL().solve(point.F_x);
   n.b -= point.F_x.transpose() * (point.F_inverse * point.F_b);
   n.points.push_back(std::move(point));
 }
 
 Normal normalOf(const Estimate& e, const Inertial& inertial, const Options& o, double damping) {
   const Index size = poseAt(e.window.poses.size());
-  Normal n{MatrixXd::Zero(size, size), VectorXd::Zero(size), {}};
+  const auto rows = 3 * static_cast<Index>(e.rays.size());
+  Normal n{MatrixXd::Zero(size, size), VectorXd::Zero(size), MatrixXd(rows, size), {}};
   for (std::size_t i = 0; i < inertial.increments.size(); ++i) {
     addInertial(n, e.window, i, inertial.increments[i], inertial.information[i]);
   }
@@ -123,15 +127,39 @@ Normal normalOf(const Estimate& e, const Inertial& inertial, const Options& o, d
   n.H(kOffset, kOffset) += offset;
   n.b[kOffset] -= offset * e.window.time_offset_s;
   for (std::size_t j = 0; j < e.rays.size(); ++j) addPoint(n, e, j, inertial, o, damping);
+  n.H.selfadjointView<Eigen::Lower>().rankUpdate(n.eliminated.transpose(), -1.0);
   n.H.diagonal() *= 1.0 + damping;
   return n;
 }
 
+/// The share of a step that makes the whole window larger: of positions, of points, of velocities.
+double stretchOf(const MotionWindow& w, const VectorXd& dx) {
+  double along = 0.0, square = 1e-12;
+  for (std::size_t k = 1; k < w.poses.size(); ++k) {
+    along += w.poses[k].p_B0.dot(dx.segment<3>(poseAt(k) + 3));
+    square += w.poses[k].p_B0.squaredNorm();
+  }
+  return std::clamp(along / square, -kLargestStretch, kLargestStretch);
+}
+
+/// Adds a step. Scale is what images leave open, and the cost is even along it: its part of the
+/// step is a factor, so that images fit after it as before. To first order it is the same step.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
-  add(e.window, dx);
+  const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
+  VectorXd rest = dx;
+  rest.segment<3>(kV0) += (factor - 1.0 - stretch) * e.window.poses[0].v_B0;
+  for (std::size_t k = 1; k < e.window.poses.size(); ++k) {
+    const Index at = poseAt(k);
+    rest.segment<3>(at + 3) += (factor - 1.0 - stretch) * e.window.poses[k].p_B0;
+    rest.segment<3>(at + 6) += (factor - 1.0 - stretch) * e.window.poses[k].v_B0;
+  }
+  add(e.window, rest);
   for (std::size_t j = 0; j < e.rays.size(); ++j) {
     const Normal::Point& p = n.points[j];
+    double& inverse_depth = e.rays[j].abr[2];
+    const double straight = (1.0 / factor - 1.0 + stretch) * inverse_depth;
     e.rays[j].abr += p.F_inverse * (p.F_b - p.F_x * dx);
+    inverse_depth += straight;
   }
 }
 
@@ -190,6 +218,21 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
   return Minimum{std::move(e), std::move(*inertial), cost};
 }
 
+/// Root mean square of what views are off, in deviations; for each degree of freedom that they have
+/// beside the poses and points.
+double imageNoise(const Minimum& m, double sigma_px) {
+  double sum = 0.0, freedom = -6.0 * static_cast<double>(m.estimate.window.poses.size());
+  for (std::size_t j = 0; j < m.estimate.rays.size(); ++j) {
+    for (const WindowView& v : m.estimate.window.points[j].views) {
+      const auto term = viewTerm(m.estimate, j, v, m.inertial, sigma_px);
+      sum += term ? huber(term->r.norm()) : huber(1000.0);
+      freedom += 2.0;
+    }
+    freedom -= 3.0;
+  }
+  return std::sqrt(sum / std::max(1.0, freedom));
+}
+
 /// With the covariance there.
 Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   const Estimate& e = m.estimate;
@@ -209,7 +252,8 @@ Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   }
   const double scale = std::max(1.0, result.noise_ratio * result.noise_ratio);
   result.covariance = scale * marginal(covariance, e.window.poses.size() - 1);
-  result.window = std::move(m.estimate.window);
+  result.image_noise = imageNoise(m, options.vision.sigma_px);
+  result.window = windowOf(std::move(m.estimate));
   return result;
 }
 

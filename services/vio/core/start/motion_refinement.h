@@ -53,6 +53,7 @@ struct RefinedWindow {
   MotionWindow window;
   WindowCovariance covariance;  ///< scaled up where the residuals are larger than they should be
   double cost = 0.0;            ///< twice the negative logarithm of the posterior, robust
+  double image_noise = 1.0;     ///< of the views, in deviations; 1 where they are as expected
   double noise_ratio = 1.0;     ///< root of the cost for each degree of freedom; 1 where all fits
 };
 

@@ -1,7 +1,10 @@
 #include "services/vio/core/start/motion_terms.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/math/so3.h"
 
@@ -12,7 +15,8 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kLeastDepth = 0.1;  // m, of a point at the beginning
+constexpr double kLeastDepth = 0.1;     // m, of a point at the beginning
+constexpr double kGreatestDepth = 1e4;  // m, of a point that is left at infinity
 
 }  // namespace
 
@@ -37,12 +41,26 @@ std::vector<Ray> raysOf(const MotionWindow& window) {
   for (const WindowPoint& point : window.points) {
     const WindowView& v = point.views.front();
     const WindowPose& pose = window.poses[v.keyframe];
-    Ray ray{pose.p_B0 + pose.R_B0_B * v.p_BC, pose.R_B0_B * v.R_BC, {}};
+    Ray ray{v.p_BC, pose.R_B0_B * v.R_BC, {}};
     const Vector3d p_C = ray.R_B0_C.transpose() * (point.p_B0 - ray.origin);
-    ray.abr << v.normalised, p_C.z() > kLeastDepth ? 1.0 / p_C.z() : 0.0;
+    if (p_C.z() > kLeastDepth) {
+      ray.abr << p_C.hnormalized(), 1.0 / p_C.z();
+    } else {
+      ray.abr << v.normalised, 0.0;
+    }
     rays.push_back(ray);
   }
   return rays;
+}
+
+MotionWindow windowOf(Estimate e) {
+  for (std::size_t j = 0; j < e.rays.size(); ++j) {
+    const Ray& ray = e.rays[j];
+    const double depth = 1.0 / std::max(ray.abr[2], 1.0 / kGreatestDepth);
+    const Vector3d bearing(ray.abr[0], ray.abr[1], 1.0);
+    e.window.points[j].p_B0 = ray.origin + depth * (ray.R_B0_C * bearing);
+  }
+  return std::move(e.window);
 }
 
 Result<Inertial> inertialOf(const MotionWindow& w, const ImuBuffer& imu, const ImuNoise& noise) {

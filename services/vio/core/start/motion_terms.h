@@ -28,8 +28,10 @@ constexpr Eigen::Index poseAt(std::size_t k) {
 /// The window with this error added; points stay.
 void add(MotionWindow& window, const Eigen::VectorXd& error);
 
-/// A point by bearing and inverse depth from where it was seen first. Far points stay linear, and
-/// one that noise puts beyond infinity (inverse depth below 0) is nothing special.
+/// A point by bearing and inverse depth from where the camera was at the first pose, in axes of its
+/// first view. Far points stay linear, and one that noise puts beyond infinity (inverse depth below
+/// 0) is nothing special. All begin at the first pose, so that a window of another scale has the
+/// same bearings.
 struct Ray {
   Eigen::Vector3d origin;  // in B0, fixed
   Eigen::Matrix3d R_B0_C;  // fixed
@@ -41,8 +43,10 @@ struct Estimate {
   std::vector<Ray> rays;
 };
 
-/// One for each point of the window, from its first view.
+/// One for each point of the window.
 std::vector<Ray> raysOf(const MotionWindow& window);
+/// The window with its points where the rays have them.
+MotionWindow windowOf(Estimate estimate);
 
 /// What follows from the biases: the increments between neighbours, and the rate at each pose.
 struct Inertial {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "common/math/gaussian.h"
@@ -95,6 +96,74 @@ TEST(MotionRefinement, GivesNoStartAtConstantVelocity) {
     // The search found no minimum along the scale, or one that is too wide.
     EXPECT_THAT(a.start.error().code, testing::AnyOf("start_unobservable", "start_inconsistent"))
         << seed;
+  }
+}
+
+/// A window of eight keyframes in the room, with true poses and points.
+struct TrueWindow {
+  MotionWindow window;
+  ImuBuffer imu;
+};
+
+TrueWindow trueWindow() {
+  test::DriveOptions o;
+  o.place = test::DrivePlace::kRoom;
+  test::SimulatedDrive drive(o);
+  TrueWindow w;
+  for (const ImuReading& r : drive.imu(3.0)) EXPECT_TRUE(w.imu.add(r));
+  const CameraModel& camera = drive.cameras()[0];
+  const Nav first = drive.truth(1.0);
+  const Eigen::Quaterniond to_B0 = first.q_WB.conjugate();
+  std::map<std::uint64_t, WindowPoint> points;
+  for (std::size_t k = 0; k < 8; ++k) {
+    const double t = 1.0 + 0.1 * static_cast<double>(k);
+    const Nav nav = drive.truth(t);
+    w.window.poses.push_back({drive.time(t), (to_B0 * nav.q_WB).toRotationMatrix(),
+                              to_B0 * (nav.p_WB - first.p_WB), to_B0 * nav.v_WB});
+    for (const TrackedPoint& p : drive.see(t).points) {
+      if (!p.seen[0]) continue;
+      points[p.id].views.push_back({k, camera.T_BC().R(), camera.T_BC().p, p.seen[0]->normalised,
+                                    p.seen[0]->to_pixels, 0.0});
+    }
+  }
+  w.window.gravity_B0 = to_B0 * Vector3d(0, 0, -Options{}.gravity);
+  w.window.gyro_bias = first.gyro_bias;
+  for (auto& [id, point] : points) {
+    const WindowView& v = point.views.front();
+    const WindowPose& pose = w.window.poses[v.keyframe];
+    point.p_B0 = pose.p_B0 + pose.R_B0_B * (v.p_BC + 2.0 * (v.R_BC * v.normalised.homogeneous()));
+    if (point.views.size() >= 3) w.window.points.push_back(point);
+  }
+  return w;
+}
+
+TEST(MotionRefinement, FindsTheScaleFromFarOff) {
+  const TrueWindow w = trueWindow();
+  const auto best = refine(w.window, w.imu, Options{});
+  ASSERT_TRUE(best) << best.error().code;
+  for (const double scale : {0.2, 5.0}) {
+    MotionWindow window = w.window;
+    for (WindowPose& pose : window.poses) {
+      pose.p_B0 *= scale;
+      pose.v_B0 *= scale;
+    }
+    for (WindowPoint& point : window.points) point.p_B0 *= scale;
+    const auto minimum = refine(std::move(window), w.imu, Options{});
+    ASSERT_TRUE(minimum) << scale << ": " << minimum.error().code;
+    EXPECT_NEAR(minimum->cost, best->cost, 1.0) << scale;
+  }
+}
+
+// Yaw of a body whose x points up is undefined, and must not be what W is turned by.
+TEST(MotionRefinement, WIsNotTurnedByAnErrorOfTilt) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    const Attempt a = startIn(test::DrivePlace::kRoom, seed, 1.0 + 0.4 * seed);
+    ASSERT_TRUE(a.start);
+    const Eigen::Matrix3d R = a.start->nav.q_WB.toRotationMatrix();
+    const Eigen::Matrix3d in_W =
+        R * a.start->covariance.block<3, 3>(kTheta, kTheta) * R.transpose();
+    EXPECT_LT(std::sqrt(in_W(2, 2)), 2e-4) << seed;
+    EXPECT_GT(std::sqrt(in_W(0, 0)), 1e-3) << seed;
   }
 }
 
