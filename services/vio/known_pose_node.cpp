@@ -14,12 +14,11 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kPoses = 256;  // that wait for their frames
-constexpr int kInVain = 10;          // frames in a row, until that is worth a word
+constexpr int kInVain = 10;          // frames in a row, from which on that is worth a word
 
 constexpr char kNoPose[] =
     "frames have no pose; start what publishes odometry, with the stamps of the frames";
 constexpr char kNoStart[] = "the poses may not be used yet: their program has no start";
-constexpr char kOtherSize[] = "frames differ in size from their calibration; mend one of them";
 constexpr char kNoImage[] = "images cannot be read; mend the camera";
 
 }  // namespace
@@ -65,13 +64,15 @@ void KnownPoseNode::onCalibration(const Calibration& calibration) {
 }
 
 HealthState KnownPoseNode::health() const {
+  if (!other_size_.sentence().empty()) return HealthState::kDegraded;
   if (!last_) return HealthState::kStarting;
   return status().empty() ? HealthState::kOk : HealthState::kDegraded;
 }
 
 std::string KnownPoseNode::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
-  if (in_vain_ > kInVain) return why_;
+  if (!other_size_.sentence().empty()) return other_size_.sentence();
+  if (!in_vain_.sentence().empty()) return in_vain_.sentence();
   if (!last_image_ && waiting_.empty())
     return "waits for frames; start capture, or mend the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
@@ -103,8 +104,7 @@ void KnownPoseNode::clockJumpedBack() {
 
 void KnownPoseNode::giveUp(const Reason& reason, const char* why) {
   reasons_.add(reason);
-  ++in_vain_;
-  why_ = why;
+  in_vain_.add(why, kInVain);
 }
 
 void KnownPoseNode::onOdometry(const Odometry& odometry) {
@@ -132,11 +132,11 @@ void KnownPoseNode::onFrame(const Frame& frame) {
     return;
   }
   const CameraModel& model = models[second ? 1 : 0];
-  if (frame.width != static_cast<std::uint32_t>(model.width()) ||
-      frame.height != static_cast<std::uint32_t>(model.height())) {
-    return second ? reasons_.add("frame_size_differs")
-                  : giveUp({"frame_size_differs", ""}, kOtherSize);
+  if (auto why = otherSize(frame, model); !why.empty()) {
+    if (!second) other_size_.add(std::move(why), kOtherSizes);
+    return reasons_.add("frame_size_differs");
   }
+  if (!second) other_size_.clear();
   if (!second) {
     if (isBefore(frame.stamp.time, newest_frame_)) clockJumpedBack();
     newest_frame_ = std::max(newest_frame_.value_or(frame.stamp.time), frame.stamp.time);
@@ -207,7 +207,7 @@ void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
   const Eigen::Vector3d turn = cameras_->models[0].calibration().readout_s * pose.rate_B;
   cameras_->mapper.add(pose, cameras_->tracker.track(*first, second, R, masked, turn));
   last_ = odometry;
-  in_vain_ = 0;
+  in_vain_.clear();
   landmarks_(landmarksMessage(odometry.stamp, instance_, odometry.world,
                               cameras_->models[0].calibration().name, cameras_->mapper.landmarks(),
                               *first));

@@ -13,6 +13,7 @@
 #include "common/types/sensors.h"
 #include "services/vio/config.h"
 #include "services/vio/core/known_poses/point_mapper.h"
+#include "services/vio/in_vain.h"
 #include "services/vio/moving_mask.h"
 #include "services/vio/waiting_frames.h"
 
@@ -61,8 +62,8 @@ class KnownPoseNode {
   std::optional<Odometry> last_;  ///< of the last image that was used
   std::optional<TimePoint> last_image_;
   std::optional<TimePoint> newest_frame_;  ///< that has been heard
-  int in_vain_ = 0;                        ///< frames in a row that gave no landmarks
-  const char* why_ = "";                   ///< of the last of those, with the mend
+  InVain other_size_;
+  InVain in_vain_;  ///< frames that gave no landmarks
   mutable ReasonCounts all_reasons_;
   ReasonCounts reasons_;
 };

@@ -67,12 +67,14 @@ void Node::onCalibration(const Calibration& calibration) {
 }
 
 HealthState Node::health() const {
+  if (!in_vain_.sentence().empty()) return HealthState::kDegraded;
   if (last_state_ == OdometryState::kTracking) return HealthState::kOk;
   return last_state_ == OdometryState::kDegraded ? HealthState::kDegraded : HealthState::kStarting;
 }
 
 std::string Node::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
+  if (!in_vain_.sentence().empty()) return in_vain_.sentence();
   if (imu_.empty()) return "waits for inertial samples; start capture, or mend the IMU";
   if (!last_image_) return "waits for frames; start capture, or mend the camera";
   if (!started() && last_start_reason_ == "start_picture_moves_imu_does_not") {
@@ -128,8 +130,8 @@ void Node::onFrame(const Frame& frame) {
     return;
   }
   const CameraModel& model = cameras_->models[second ? 1 : 0];
-  if (frame.width != static_cast<std::uint32_t>(model.width()) ||
-      frame.height != static_cast<std::uint32_t>(model.height())) {
+  if (auto why = otherSize(frame, model); !why.empty()) {
+    if (!second) in_vain_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
   if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
@@ -230,6 +232,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
 void Node::process(const FramePair& frames) {
   const FrameStamp& stamp = frames.first.stamp;
   last_image_ = stamp.time;
+  in_vain_.clear();
   const auto first = vision::monoOf(frames.first);
   if (!first) {
     reasons_.add(first.error());

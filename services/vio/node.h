@@ -18,6 +18,7 @@
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
+#include "services/vio/in_vain.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {
@@ -88,6 +89,7 @@ class Node {
   SpeedHistory speeds_;
   WaitingFrames waiting_;
   MovingMask moving_;
+  InVain in_vain_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;

@@ -245,6 +245,16 @@ TEST_F(KnownPoses, HealthIsNotOkWhereNothingGoesOut) {
               HasSubstr("no pose"));
 }
 
+TEST_F(KnownPoses, SaysFromTheStartThatFramesHaveAnotherSize) {
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    Frame small = imageOf(i);
+    small.width = 640;
+    node_.onFrame(small);
+  }
+  EXPECT_EQ(node_.health(), HealthState::kDegraded);
+  EXPECT_THAT(node_.status(), ::testing::HasSubstr("frames of cam0 are 640×480"));
+}
+
 TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
   EXPECT_FALSE(node_.waitsFor());
   // The second camera is gone; its images may still come, until some frames say that they do not.

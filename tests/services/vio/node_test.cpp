@@ -1,6 +1,7 @@
 // The node with images: starts, faults of its inputs, restarts.
 #include "services/vio/node.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +16,8 @@
 
 namespace perdure::vio {
 namespace {
+
+using ::testing::HasSubstr;
 
 struct Recorder {
   std::vector<Odometry> odometry;
@@ -356,6 +359,29 @@ TEST(VioNode, AnOldStateIsLeftAsideAndTheEpochGoesUp) {
   player.play(second, 0.0, 2.0);  // before it: another run
   EXPECT_EQ(second.reasons().of("state_too_old"), 1u);
   EXPECT_EQ(after.odometry.back().world, (WorldId{77, 3}));
+}
+
+TEST(VioNode, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(4.0);
+  player.play(node, 0.0, 2.0);
+  ASSERT_EQ(node.health(), HealthState::kOk);
+  const auto small = [](Frame& f, double) { return (f.width = 640) > 0; };
+  player.play(node, 2.05, 2.5, {}, small);
+  EXPECT_EQ(node.health(), HealthState::kDegraded);
+  EXPECT_THAT(node.status(), HasSubstr("frames of cam0 are 640×480"));
+  EXPECT_THAT(node.status(), HasSubstr("752×480"));
+  EXPECT_GT(node.reasons().of("frame_size_differs"), 5u);
+  player.play(node, 2.55, 4.0);
+  EXPECT_EQ(node.status(), "") << "well again";
+
+  Node never(Config{}, 5, {});
+  never.onCalibration(calibration());
+  player.play(never, 0.0, 1.0, {}, small);
+  EXPECT_EQ(never.health(), HealthState::kDegraded);
+  EXPECT_THAT(never.status(), HasSubstr("640×480"));
 }
 
 TEST(VioNode, SaysWhatItWaitsFor) {
