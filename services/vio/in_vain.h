@@ -25,8 +25,11 @@ class InVain {
   std::string why_;
 };
 
-/// Health speaks of frames of another size from here on: one may be left from an earlier setting.
+/// From which frame on Health speaks of it, in general; and of frames of another size, of which one
+/// may be left from an earlier setting.
+inline constexpr int kInVain = 10;
 inline constexpr int kOtherSizes = 2;
+inline constexpr char kNoImage[] = "images cannot be read; mend the camera";
 
 /// A sentence with both sizes where the frame has not that of its calibration; else empty.
 std::string otherSize(const Frame& frame, const CameraModel& model);

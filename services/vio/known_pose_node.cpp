@@ -14,12 +14,10 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kPoses = 256;  // that wait for their frames
-constexpr int kInVain = 10;          // frames in a row, from which on that is worth a word
 
 constexpr char kNoPose[] =
     "frames have no pose; start what publishes odometry, with the stamps of the frames";
 constexpr char kNoStart[] = "the poses may not be used yet: their program has no start";
-constexpr char kNoImage[] = "images cannot be read; mend the camera";
 
 }  // namespace
 

@@ -11,6 +11,12 @@ namespace {
 
 constexpr int kUnaidedFrames = 5;  // without an image's help
 
+constexpr char kLate[] =
+    "frames are older than those before them; the camera's clock jumped back and the IMU's did "
+    "not: give both one clock";
+constexpr char kNoSamples[] =
+    "frames have no inertial samples of their time; start the IMU, or give both one clock";
+
 double seconds(Duration d) { return toSeconds(d); }
 
 }  // namespace
@@ -134,11 +140,15 @@ void Node::onFrame(const Frame& frame) {
     if (!second) in_vain_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
-  if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
+  if (last_image_ && frame.stamp.time <= *last_image_) {
+    if (!second) in_vain_.add(kLate, kInVain);
+    return reasons_.add("frame_late");
+  }
   const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
   if (!added) reasons_.add(added.error());
   if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {
     reasons_.add("frame_without_imu");
+    in_vain_.add(kNoSamples, kInVain);
     publishWaiting(waiting_.take().first.stamp);
   }
   drain(false);
@@ -232,12 +242,13 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
 void Node::process(const FramePair& frames) {
   const FrameStamp& stamp = frames.first.stamp;
   last_image_ = stamp.time;
-  in_vain_.clear();
   const auto first = vision::monoOf(frames.first);
   if (!first) {
+    in_vain_.add(kNoImage, kInVain);
     reasons_.add(first.error());
     return publishWaiting(stamp);
   }
+  in_vain_.clear();
   cv::Mat second;
   if (frames.second) {
     if (const auto image = vision::monoOf(*frames.second)) {

@@ -7,10 +7,14 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kUnpaired = 4;
+constexpr std::chrono::milliseconds kReordered{300};  // by transports, at most
 
 }  // namespace
 
 Result<void> WaitingFrames::addFirst(const Frame& frame) {
+  const bool earlier_run = std::erase_if(pairs_, [&](const FramePair& waiting) {
+                             return waiting.first.stamp.time > frame.stamp.time + kReordered;
+                           }) > 0;
   const auto later = std::find_if(pairs_.begin(), pairs_.end(), [&](const FramePair& p) {
     return p.first.stamp.time >= frame.stamp.time;
   });
@@ -18,6 +22,7 @@ Result<void> WaitingFrames::addFirst(const Frame& frame) {
   if (reordered && later->first.stamp.time == frame.stamp.time) return fail("frame_duplicate");
   pairs_.insert(later, FramePair{frame, {}});
   std::erase_if(seconds_, [&](const Frame& waiting) { return pair(waiting); });
+  if (earlier_run) return fail("frame_of_earlier_run");
   if (reordered) return fail("frame_reordered");
   return {};
 }
@@ -32,6 +37,9 @@ bool WaitingFrames::pair(const Frame& second) {
 }
 
 Result<void> WaitingFrames::addSecond(const Frame& frame) {
+  std::erase_if(seconds_, [&](const Frame& waiting) {
+    return waiting.stamp.time > frame.stamp.time + kReordered;
+  });
   if (pair(frame)) return {};
   seconds_.push_back(frame);
   if (seconds_.size() <= kUnpaired) return {};

@@ -20,7 +20,9 @@ class WaitingFrames {
   explicit WaitingFrames(double pair_tolerance_s)
       : tolerance_(durationFromSeconds(pair_tolerance_s)) {}
 
-  /// Of the first camera. Refuses "frame_duplicate"; "frame_reordered": it is in, before others.
+  /// Of the first camera. Refuses "frame_duplicate"; "frame_reordered": it is in, before others;
+  /// "frame_of_earlier_run": it is in, and those that are ahead of it by more than any transport
+  /// reorders are given up.
   Result<void> addFirst(const Frame& frame);
   /// Of the second. "stereo_unpaired": the oldest one that found no partner has been given up.
   Result<void> addSecond(const Frame& frame);

@@ -361,6 +361,49 @@ TEST(VioNode, AnOldStateIsLeftAsideAndTheEpochGoesUp) {
   EXPECT_EQ(after.odometry.back().world, (WorldId{77, 3}));
 }
 
+TEST(VioNode, AFrameOfTheRunBeforeThatComesLateDoesNotStayInTheWay) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(3.0);
+  player.play(node, 0.0, 2.0);
+  const std::size_t before = r.odometry.size();
+  player.play(node, 0.0, 2.0, {}, [&](Frame&, double t) {
+    if (std::abs(t - 0.1) < 1e-6) node.onFrame(test::drawn(player.drive(), 2.05, 41));
+    return true;
+  });
+  node.flush();
+  EXPECT_EQ(node.reasons().of("clock_jumped_back"), 1u);
+  EXPECT_EQ(node.reasons().of("frame_of_earlier_run"), 1u);
+  EXPECT_EQ(node.reasons().of("frame_reordered"), 0u);
+  EXPECT_EQ(r.odometry.back().stamp.sequence, 40u) << "the old one is none of this run";
+  EXPECT_GE(r.odometry.size(), before + 39);
+  EXPECT_EQ(node.status(), "");
+}
+
+TEST(VioNode, SaysThatTheCamerasClockIsNotThatOfTheImu) {
+  using std::chrono::hours;
+  Player player(5.0);
+  for (const int shift : {-1, 1}) {
+    Config config;
+    config.max_pending = 10;
+    Recorder r;
+    Node node(config, 5, r.outputs());
+    node.onCalibration(calibration());
+    player.play(node, 0.0, 2.0);
+    ASSERT_EQ(node.health(), HealthState::kOk);
+    player.play(node, 2.05, 4.0, {}, [&](Frame& f, double) {
+      f.stamp.time += hours(shift);
+      return true;
+    });
+    EXPECT_EQ(node.health(), HealthState::kDegraded);
+    EXPECT_THAT(node.status(), HasSubstr(shift < 0 ? "jumped back" : "no inertial samples"));
+    player.play(node, 4.05, 5.0);
+    EXPECT_EQ(node.health(), HealthState::kOk) << "well again";
+    EXPECT_EQ(node.status(), "");
+  }
+}
+
 TEST(VioNode, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());

@@ -60,6 +60,19 @@ TEST(WaitingFrames, SecondsWithoutPartnersDoNotPileUp) {
   EXPECT_TRUE(waiting.take().second);
 }
 
+TEST(WaitingFrames, FramesOfAnEarlierRunAreGivenUp) {
+  WaitingFrames waiting(0.01);
+  EXPECT_TRUE(waiting.addSecond(frameAt(5000)));
+  EXPECT_TRUE(waiting.addFirst(frameAt(5100)));
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(1000))), "frame_of_earlier_run");
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(1050))), "");
+  EXPECT_EQ(waiting.size(), 2u);
+  EXPECT_TRUE(waiting.addSecond(frameAt(900)));
+  EXPECT_TRUE(waiting.frontMayBePaired()) << "the second camera's old image says nothing";
+  EXPECT_TRUE(waiting.addSecond(frameAt(1000)));
+  EXPECT_TRUE(waiting.front().second);
+}
+
 TEST(SpeedHistory, InterpolatesAndIsLessSureFurtherAway) {
   const auto ms = [](std::int64_t t) { return fromNanoseconds(t * kMs); };
   SpeedHistory speeds(0.15);
