@@ -56,8 +56,7 @@ void KnownPoseNode::onCalibration(const Calibration& calibration) {
   waiting_.clear();
   last_.reset();
   calibration_ = calibration;
-  std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
-  if (config_.stereo && calibration.cameras.size() > 1) models.emplace_back(calibration.cameras[1]);
+  std::vector<CameraModel> models = usedCameras(config_, calibration);
   cameras_ = std::make_unique<Cameras>(config_, std::move(models));
 }
 
@@ -74,7 +73,7 @@ std::string KnownPoseNode::status() const {
   if (!last_image_ && waiting_.empty())
     return "waits for frames; start capture, or mend the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
-  return {};
+  return cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
 }
 
 std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
@@ -131,7 +130,7 @@ void KnownPoseNode::onFrame(const Frame& frame) {
   }
   const CameraModel& model = models[second ? 1 : 0];
   if (auto why = otherSize(frame, model); !why.empty()) {
-    if (!second) other_size_.add(std::move(why), kOtherSizes);
+    second ? waiting_.refuseSecond(std::move(why)) : other_size_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
   if (!second) other_size_.clear();
@@ -139,7 +138,7 @@ void KnownPoseNode::onFrame(const Frame& frame) {
     if (isBefore(frame.stamp.time, newest_frame_)) clockJumpedBack();
     newest_frame_ = std::max(newest_frame_.value_or(frame.stamp.time), frame.stamp.time);
   }
-  if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
+  if (!second && last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
   const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
   if (!added) reasons_.add(added.error());
   if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {

@@ -56,8 +56,7 @@ void Node::onCalibration(const Calibration& calibration) {
     waiting_.clear();
   }
   calibration_ = calibration;
-  std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
-  if (config_.stereo && calibration.cameras.size() > 1) models.emplace_back(calibration.cameras[1]);
+  std::vector<CameraModel> models = usedCameras(config_, calibration);
   Options options = config_.core;
   if (config_.prefer_calibration && calibration.imu && calibration.imu->gyro_noise > 0 &&
       calibration.imu->accel_noise > 0) {
@@ -74,8 +73,14 @@ void Node::onCalibration(const Calibration& calibration) {
 
 HealthState Node::health() const {
   if (!in_vain_.sentence().empty()) return HealthState::kDegraded;
-  if (last_state_ == OdometryState::kTracking) return HealthState::kOk;
+  if (last_state_ == OdometryState::kTracking) {
+    return whyAlone().empty() ? HealthState::kOk : HealthState::kDegraded;
+  }
   return last_state_ == OdometryState::kDegraded ? HealthState::kDegraded : HealthState::kStarting;
+}
+
+std::string Node::whyAlone() const {
+  return cameras_ && cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
 }
 
 std::string Node::status() const {
@@ -91,7 +96,7 @@ std::string Node::status() const {
     return "has no start yet (" + last_start_reason_ +
            "); stand still for a second, or move with the camera on things that stand";
   }
-  if (last_state_ != OdometryState::kDegraded) return {};
+  if (last_state_ != OdometryState::kDegraded) return whyAlone();
   return degraded_frames_ > 0 ? "has just come over a gap or a restart"
                               : "sees no points; it goes by inertia (and speed)";
 }
@@ -137,11 +142,11 @@ void Node::onFrame(const Frame& frame) {
   }
   const CameraModel& model = cameras_->models[second ? 1 : 0];
   if (auto why = otherSize(frame, model); !why.empty()) {
-    if (!second) in_vain_.add(std::move(why), kOtherSizes);
+    second ? waiting_.refuseSecond(std::move(why)) : in_vain_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
-  if (last_image_ && frame.stamp.time <= *last_image_) {
-    if (!second) in_vain_.add(kLate, kInVain);
+  if (!second && last_image_ && frame.stamp.time <= *last_image_) {
+    in_vain_.add(kLate, kInVain);
     return reasons_.add("frame_late");
   }
   const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);

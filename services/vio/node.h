@@ -65,6 +65,7 @@ class Node {
   void drain(bool all);
   bool ready() const;
   bool waitsForPair() const;
+  std::string whyAlone() const;
   void process(const FramePair& frames);
   TrackedFrame trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now);
   void begin(TimePoint now, const FrameInput& input);

@@ -268,6 +268,19 @@ TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
   node_.flush();
   EXPECT_FALSE(node_.waitsFor());
   EXPECT_EQ(landmarks_.size(), 10u);
+  EXPECT_EQ(node_.health(), HealthState::kDegraded);
+  EXPECT_THAT(node_.status(), ::testing::HasSubstr("one camera"));
+  // From now on it is not awaited, until it is back.
+  play(10, 12);
+  EXPECT_EQ(landmarks_.size(), 12u);
+  for (std::uint64_t i = 11; i < 14; ++i) {
+    if (i > 11) play(i, i + 1);
+    node_.onFrame(imageOf(i, 1));
+  }
+  EXPECT_EQ(landmarks_.size(), 14u);
+  EXPECT_EQ(node_.reasons().of("frame_late"), 1u);
+  EXPECT_EQ(node_.reasons().of("stereo_unpaired"), 12u);
+  EXPECT_EQ(node_.status(), "");
 }
 
 TEST_F(KnownPosesInStereo, ABodyThatStandsKnowsDistances) {

@@ -404,6 +404,43 @@ TEST(VioNode, SaysThatTheCamerasClockIsNotThatOfTheImu) {
   }
 }
 
+TEST(VioNode, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
+  Calibration two = calibration();
+  two.cameras.push_back(test::testCamera(1));
+  Player player(4.0);
+  std::size_t most_waiting = 0, handed = 0;
+  const auto playTo = [&](Node& node, const Recorder& r) {
+    player.play(
+        node, 0.0, 4.0,
+        [&](ImuSample&, double t) {
+          // A period of the IMU before the next frame: what is still not answered waits for cam1.
+          if (t > 2.0 && std::abs(std::remainder(t - 0.045, 0.05)) < 1e-6) {
+            most_waiting = std::max(most_waiting, handed - r.odometry.size());
+          }
+          return true;
+        },
+        [&](Frame&, double) { return ++handed > 0; });
+  };
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(two);
+  playTo(node, r);
+  EXPECT_EQ(most_waiting, 0u);
+  EXPECT_GT(node.reasons().of("stereo_unpaired"), 60u);
+  EXPECT_EQ(r.odometry.back().state, OdometryState::kTracking);
+  EXPECT_EQ(node.health(), HealthState::kDegraded);
+  EXPECT_THAT(node.status(), HasSubstr("one camera"));
+  EXPECT_THAT(node.status(), HasSubstr("stereo.enabled"));
+  Config first_only;
+  first_only.cameras = {"cam0"};
+  Recorder quiet;
+  Node mono(first_only, 5, quiet.outputs());
+  mono.onCalibration(two);
+  player.play(mono, 0.0, 2.0);
+  EXPECT_EQ(mono.health(), HealthState::kOk) << "nobody asked for two";
+  EXPECT_EQ(mono.reasons().of("stereo_unpaired"), 0u);
+}
+
 TEST(VioNode, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());
