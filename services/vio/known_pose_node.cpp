@@ -18,6 +18,12 @@ constexpr std::size_t kPoses = 256;  // that wait for their frames
 constexpr char kNoPose[] =
     "frames have no pose; start what publishes odometry, with the stamps of the frames";
 constexpr char kNoStart[] = "the poses may not be used yet: their program has no start";
+constexpr char kContradicted[] =
+    "the poses do not fit what the camera sees: they are of another body or in other axes than "
+    "T_BS of the calibration says, inverted (T_BW for T_WB), on another clock, or nearly all that "
+    "is seen moves; mend T_BS or the program that gives the poses";
+constexpr char kFar[] =
+    "nearly all points lie beyond vision.max_depth; raise it, or see that the poses are in metres";
 
 }  // namespace
 
@@ -55,6 +61,7 @@ void KnownPoseNode::onCalibration(const Calibration& calibration) {
   if (calibration_ && sameCameras(*calibration_, calibration)) return;
   waiting_.clear();
   last_.reset();
+  agreement_.clear();
   calibration_ = calibration;
   std::vector<CameraModel> models = usedCameras(config_, calibration);
   cameras_ = std::make_unique<Cameras>(config_, std::move(models));
@@ -73,7 +80,28 @@ std::string KnownPoseNode::status() const {
   if (!last_image_ && waiting_.empty())
     return "waits for frames; start capture, or mend the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
+  if (auto wrong = statusOfPoses(); !wrong.empty()) return wrong;
   return cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
+}
+
+std::string KnownPoseNode::statusOfPoses() const {
+  switch (agreement_.verdict()) {
+    case Agreement::Verdict::kContradicted:
+      return kContradicted;
+    case Agreement::Verdict::kFar:
+      return kFar;
+    case Agreement::Verdict::kGood:
+      break;
+  }
+  return {};
+}
+
+void KnownPoseNode::judgePoses() {
+  const PointMapper& mapper = cameras_->mapper;
+  agreement_.add(mapper.mapped(), mapper.scale(), mapper.moved());
+  const auto verdict = agreement_.verdict();
+  if (verdict == Agreement::Verdict::kContradicted) reasons_.add("poses_contradict_images");
+  if (verdict == Agreement::Verdict::kFar) reasons_.add("points_too_far");
 }
 
 std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
@@ -94,6 +122,7 @@ void KnownPoseNode::clockJumpedBack() {
   newest_frame_.reset();
   last_image_.reset();
   last_.reset();
+  agreement_.clear();
   if (!cameras_) return;
   cameras_->tracker.reset();
   cameras_->mapper.clear();
@@ -176,6 +205,7 @@ void KnownPoseNode::drain(bool all) {
 void KnownPoseNode::begin(const WorldId& world) {
   if (last_ && last_->world == world) return;
   cameras_->mapper.clear();
+  agreement_.clear();
   last_.reset();
 }
 
@@ -203,6 +233,7 @@ void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
       moving_.boxes(cameras_->models[0], odometry.world, odometry.T_WB, odometry.stamp.time);
   const Eigen::Vector3d turn = cameras_->models[0].calibration().readout_s * pose.rate_B;
   cameras_->mapper.add(pose, cameras_->tracker.track(*first, second, R, masked, turn));
+  judgePoses();
   last_ = odometry;
   in_vain_.clear();
   landmarks_(landmarksMessage(odometry.stamp, instance_, odometry.world,
