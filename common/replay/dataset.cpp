@@ -1,6 +1,7 @@
 #include "common/replay/dataset.h"
 
 #include <algorithm>
+#include <set>
 
 #include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
@@ -46,6 +47,20 @@ Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
   return image->clone();
 }
 
+/// Frames keep their numbers; samples stay.
+void keepEach(std::size_t every, Recording& recording) {
+  std::set<std::uint64_t> kept;
+  std::size_t seen = 0;
+  for (const auto& frame : recording.frames) {
+    if (frame.camera == 0 && seen++ % every == 0) kept.insert(frame.index);
+  }
+  std::erase_if(recording.frames, [&](const auto& frame) { return !kept.contains(frame.index); });
+  recording.frame_count = kept.size();
+  for (CameraCalibration& camera : recording.calibration.cameras) {
+    camera.rate_hz /= static_cast<double>(every);
+  }
+}
+
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
   const bool recorded = RecordedMessages::looksLikeOne(path);
@@ -79,6 +94,7 @@ std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
     const Calibration rig = readRig(options.rig, &recording.notes);
     applyRig(rig, options.rig.string(), recording.calibration);
   }
+  if (options.every > 1) keepEach(options.every, recording);
   return std::make_unique<Dataset>(options, std::move(recording));
 }
 

@@ -32,6 +32,7 @@ struct DatasetOptions {
   std::optional<ImageEncoding> encoding = {};   ///< of cam0; as the files are where not given
   std::optional<ImageEncoding> second_encoding = {};  ///< of cam1
   std::filesystem::path rig = {};  ///< rig file instead of the drive's own calibration
+  std::size_t every = 1;           ///< each N-th frame of cam0 alone, with its partner
   bool decode = true;              ///< false: frames carry stamp and size, but no pixels
   /// Of a recording of ROS: topics by cam0, cam1, imu, where types and names do not tell.
   std::map<std::string, std::string> topics = {};

@@ -121,6 +121,7 @@ class RosDriveReader {
       recording_.calibration.cameras.push_back(calibrationOf(i));
     if (!recording_.imu.empty()) recording_.calibration.imu = imuCalibration();
     noteTopics();
+    for (const std::string& note : messages_.notes()) recording_.notes.push_back(note);
     return std::move(recording_);
   }
 

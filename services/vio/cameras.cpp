@@ -6,6 +6,16 @@
 
 namespace perdure::vio {
 
+std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration) {
+  std::vector<CameraModel> used{CameraModel(calibration.cameras.at(0))};
+  if (!config.stereo || calibration.cameras.size() < 2) return used;
+  const CameraCalibration& second = calibration.cameras[1];
+  if (std::count(config.cameras.begin(), config.cameras.end(), second.name) > 0) {
+    used.emplace_back(second);
+  }
+  return used;
+}
+
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
   std::vector<RigidTransform> T_BC;
   for (const CameraModel& m : all) T_BC.push_back(m.T_BC());

@@ -20,6 +20,10 @@ struct Cameras {
   std::vector<CameraModel> models;
 };
 
+/// The first camera of the calibration, and the second one where it is wanted and its frames are
+/// read.
+std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
+
 /// What the estimators know of cameras: where on the body, and how long an image is read out, s.
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all);
 std::vector<double> readouts(const std::vector<CameraModel>& all);

@@ -14,13 +14,16 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kPoses = 256;  // that wait for their frames
-constexpr int kInVain = 10;          // frames in a row, until that is worth a word
 
 constexpr char kNoPose[] =
     "frames have no pose; start what publishes odometry, with the stamps of the frames";
 constexpr char kNoStart[] = "the poses may not be used yet: their program has no start";
-constexpr char kOtherSize[] = "frames differ in size from their calibration; mend one of them";
-constexpr char kNoImage[] = "images cannot be read; mend the camera";
+constexpr char kContradicted[] =
+    "the poses do not fit what the camera sees: they are of another body or in other axes than "
+    "T_BS of the calibration says, inverted (T_BW for T_WB), on another clock, or nearly all that "
+    "is seen moves; mend T_BS or the program that gives the poses";
+constexpr char kFar[] =
+    "nearly all points lie beyond vision.max_depth; raise it, or see that the poses are in metres";
 
 }  // namespace
 
@@ -58,24 +61,47 @@ void KnownPoseNode::onCalibration(const Calibration& calibration) {
   if (calibration_ && sameCameras(*calibration_, calibration)) return;
   waiting_.clear();
   last_.reset();
+  agreement_.clear();
   calibration_ = calibration;
-  std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
-  if (config_.stereo && calibration.cameras.size() > 1) models.emplace_back(calibration.cameras[1]);
+  std::vector<CameraModel> models = usedCameras(config_, calibration);
   cameras_ = std::make_unique<Cameras>(config_, std::move(models));
 }
 
 HealthState KnownPoseNode::health() const {
+  if (!other_size_.sentence().empty()) return HealthState::kDegraded;
   if (!last_) return HealthState::kStarting;
   return status().empty() ? HealthState::kOk : HealthState::kDegraded;
 }
 
 std::string KnownPoseNode::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
-  if (in_vain_ > kInVain) return why_;
+  if (!other_size_.sentence().empty()) return other_size_.sentence();
+  if (!in_vain_.sentence().empty()) return in_vain_.sentence();
   if (!last_image_ && waiting_.empty())
     return "waits for frames; start capture, or mend the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
+  if (auto wrong = statusOfPoses(); !wrong.empty()) return wrong;
+  return cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
+}
+
+std::string KnownPoseNode::statusOfPoses() const {
+  switch (agreement_.verdict()) {
+    case Agreement::Verdict::kContradicted:
+      return kContradicted;
+    case Agreement::Verdict::kFar:
+      return kFar;
+    case Agreement::Verdict::kGood:
+      break;
+  }
   return {};
+}
+
+void KnownPoseNode::judgePoses() {
+  const PointMapper& mapper = cameras_->mapper;
+  agreement_.add(mapper.mapped(), mapper.scale(), mapper.moved());
+  const auto verdict = agreement_.verdict();
+  if (verdict == Agreement::Verdict::kContradicted) reasons_.add("poses_contradict_images");
+  if (verdict == Agreement::Verdict::kFar) reasons_.add("points_too_far");
 }
 
 std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
@@ -96,6 +122,7 @@ void KnownPoseNode::clockJumpedBack() {
   newest_frame_.reset();
   last_image_.reset();
   last_.reset();
+  agreement_.clear();
   if (!cameras_) return;
   cameras_->tracker.reset();
   cameras_->mapper.clear();
@@ -103,8 +130,7 @@ void KnownPoseNode::clockJumpedBack() {
 
 void KnownPoseNode::giveUp(const Reason& reason, const char* why) {
   reasons_.add(reason);
-  ++in_vain_;
-  why_ = why;
+  in_vain_.add(why, kInVain);
 }
 
 void KnownPoseNode::onOdometry(const Odometry& odometry) {
@@ -132,16 +158,16 @@ void KnownPoseNode::onFrame(const Frame& frame) {
     return;
   }
   const CameraModel& model = models[second ? 1 : 0];
-  if (frame.width != static_cast<std::uint32_t>(model.width()) ||
-      frame.height != static_cast<std::uint32_t>(model.height())) {
-    return second ? reasons_.add("frame_size_differs")
-                  : giveUp({"frame_size_differs", ""}, kOtherSize);
+  if (auto why = otherSize(frame, model); !why.empty()) {
+    second ? waiting_.refuseSecond(std::move(why)) : other_size_.add(std::move(why), kOtherSizes);
+    return reasons_.add("frame_size_differs");
   }
+  if (!second) other_size_.clear();
   if (!second) {
     if (isBefore(frame.stamp.time, newest_frame_)) clockJumpedBack();
     newest_frame_ = std::max(newest_frame_.value_or(frame.stamp.time), frame.stamp.time);
   }
-  if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
+  if (!second && last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
   const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
   if (!added) reasons_.add(added.error());
   if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {
@@ -179,6 +205,7 @@ void KnownPoseNode::drain(bool all) {
 void KnownPoseNode::begin(const WorldId& world) {
   if (last_ && last_->world == world) return;
   cameras_->mapper.clear();
+  agreement_.clear();
   last_.reset();
 }
 
@@ -206,8 +233,9 @@ void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
       moving_.boxes(cameras_->models[0], odometry.world, odometry.T_WB, odometry.stamp.time);
   const Eigen::Vector3d turn = cameras_->models[0].calibration().readout_s * pose.rate_B;
   cameras_->mapper.add(pose, cameras_->tracker.track(*first, second, R, masked, turn));
+  judgePoses();
   last_ = odometry;
-  in_vain_ = 0;
+  in_vain_.clear();
   landmarks_(landmarksMessage(odometry.stamp, instance_, odometry.world,
                               cameras_->models[0].calibration().name, cameras_->mapper.landmarks(),
                               *first));

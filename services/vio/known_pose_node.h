@@ -12,7 +12,9 @@
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
 #include "services/vio/config.h"
+#include "services/vio/core/known_poses/agreement.h"
 #include "services/vio/core/known_poses/point_mapper.h"
+#include "services/vio/in_vain.h"
 #include "services/vio/moving_mask.h"
 #include "services/vio/waiting_frames.h"
 
@@ -39,9 +41,12 @@ class KnownPoseNode {
   HealthState health() const;
   /// One sentence: what it waits for, or what is wrong; empty when all is well.
   std::string status() const;
+  /// The same of the poses alone: where they contradict the images.
+  std::string statusOfPoses() const;
 
  private:
   struct Cameras;
+  void judgePoses();
   void drain(bool all);
   bool isBefore(TimePoint time, const std::optional<TimePoint>& newest) const;
   void clockJumpedBack();
@@ -61,8 +66,9 @@ class KnownPoseNode {
   std::optional<Odometry> last_;  ///< of the last image that was used
   std::optional<TimePoint> last_image_;
   std::optional<TimePoint> newest_frame_;  ///< that has been heard
-  int in_vain_ = 0;                        ///< frames in a row that gave no landmarks
-  const char* why_ = "";                   ///< of the last of those, with the mend
+  Agreement agreement_;
+  InVain other_size_;
+  InVain in_vain_;  ///< frames that gave no landmarks
   mutable ReasonCounts all_reasons_;
   ReasonCounts reasons_;
 };

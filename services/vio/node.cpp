@@ -11,6 +11,12 @@ namespace {
 
 constexpr int kUnaidedFrames = 5;  // without an image's help
 
+constexpr char kLate[] =
+    "frames are older than those before them; the camera's clock jumped back and the IMU's did "
+    "not: give both one clock";
+constexpr char kNoSamples[] =
+    "frames have no inertial samples of their time; start the IMU, or give both one clock";
+
 double seconds(Duration d) { return toSeconds(d); }
 
 }  // namespace
@@ -50,8 +56,7 @@ void Node::onCalibration(const Calibration& calibration) {
     waiting_.clear();
   }
   calibration_ = calibration;
-  std::vector<CameraModel> models{CameraModel(calibration.cameras[0])};
-  if (config_.stereo && calibration.cameras.size() > 1) models.emplace_back(calibration.cameras[1]);
+  std::vector<CameraModel> models = usedCameras(config_, calibration);
   Options options = config_.core;
   if (config_.prefer_calibration && calibration.imu && calibration.imu->gyro_noise > 0 &&
       calibration.imu->accel_noise > 0) {
@@ -67,12 +72,20 @@ void Node::onCalibration(const Calibration& calibration) {
 }
 
 HealthState Node::health() const {
-  if (last_state_ == OdometryState::kTracking) return HealthState::kOk;
+  if (!in_vain_.sentence().empty()) return HealthState::kDegraded;
+  if (last_state_ == OdometryState::kTracking) {
+    return whyAlone().empty() ? HealthState::kOk : HealthState::kDegraded;
+  }
   return last_state_ == OdometryState::kDegraded ? HealthState::kDegraded : HealthState::kStarting;
+}
+
+std::string Node::whyAlone() const {
+  return cameras_ && cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
 }
 
 std::string Node::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
+  if (!in_vain_.sentence().empty()) return in_vain_.sentence();
   if (imu_.empty()) return "waits for inertial samples; start capture, or mend the IMU";
   if (!last_image_) return "waits for frames; start capture, or mend the camera";
   if (!started() && last_start_reason_ == "start_picture_moves_imu_does_not") {
@@ -83,7 +96,7 @@ std::string Node::status() const {
     return "has no start yet (" + last_start_reason_ +
            "); stand still for a second, or move with the camera on things that stand";
   }
-  if (last_state_ != OdometryState::kDegraded) return {};
+  if (last_state_ != OdometryState::kDegraded) return whyAlone();
   return degraded_frames_ > 0 ? "has just come over a gap or a restart"
                               : "sees no points; it goes by inertia (and speed)";
 }
@@ -128,15 +141,19 @@ void Node::onFrame(const Frame& frame) {
     return;
   }
   const CameraModel& model = cameras_->models[second ? 1 : 0];
-  if (frame.width != static_cast<std::uint32_t>(model.width()) ||
-      frame.height != static_cast<std::uint32_t>(model.height())) {
+  if (auto why = otherSize(frame, model); !why.empty()) {
+    second ? waiting_.refuseSecond(std::move(why)) : in_vain_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
-  if (last_image_ && frame.stamp.time <= *last_image_) return reasons_.add("frame_late");
+  if (!second && last_image_ && frame.stamp.time <= *last_image_) {
+    in_vain_.add(kLate, kInVain);
+    return reasons_.add("frame_late");
+  }
   const auto added = second ? waiting_.addSecond(frame) : waiting_.addFirst(frame);
   if (!added) reasons_.add(added.error());
   if (static_cast<std::int64_t>(waiting_.size()) > config_.max_pending) {
     reasons_.add("frame_without_imu");
+    in_vain_.add(kNoSamples, kInVain);
     publishWaiting(waiting_.take().first.stamp);
   }
   drain(false);
@@ -232,9 +249,11 @@ void Node::process(const FramePair& frames) {
   last_image_ = stamp.time;
   const auto first = vision::monoOf(frames.first);
   if (!first) {
+    in_vain_.add(kNoImage, kInVain);
     reasons_.add(first.error());
     return publishWaiting(stamp);
   }
+  in_vain_.clear();
   cv::Mat second;
   if (frames.second) {
     if (const auto image = vision::monoOf(*frames.second)) {

@@ -18,6 +18,7 @@
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
+#include "services/vio/in_vain.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {
@@ -64,6 +65,7 @@ class Node {
   void drain(bool all);
   bool ready() const;
   bool waitsForPair() const;
+  std::string whyAlone() const;
   void process(const FramePair& frames);
   TrackedFrame trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now);
   void begin(TimePoint now, const FrameInput& input);
@@ -88,6 +90,7 @@ class Node {
   SpeedHistory speeds_;
   WaitingFrames waiting_;
   MovingMask moving_;
+  InVain in_vain_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;

@@ -7,10 +7,15 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kUnpaired = 4;
+constexpr std::size_t kAlone = 10;  // frames in a row, from which on the second camera is absent
+constexpr std::chrono::milliseconds kReordered{300};  // by transports, at most
 
 }  // namespace
 
 Result<void> WaitingFrames::addFirst(const Frame& frame) {
+  const bool earlier_run = std::erase_if(pairs_, [&](const FramePair& waiting) {
+                             return waiting.first.stamp.time > frame.stamp.time + kReordered;
+                           }) > 0;
   const auto later = std::find_if(pairs_.begin(), pairs_.end(), [&](const FramePair& p) {
     return p.first.stamp.time >= frame.stamp.time;
   });
@@ -18,6 +23,7 @@ Result<void> WaitingFrames::addFirst(const Frame& frame) {
   if (reordered && later->first.stamp.time == frame.stamp.time) return fail("frame_duplicate");
   pairs_.insert(later, FramePair{frame, {}});
   std::erase_if(seconds_, [&](const Frame& waiting) { return pair(waiting); });
+  if (earlier_run) return fail("frame_of_earlier_run");
   if (reordered) return fail("frame_reordered");
   return {};
 }
@@ -32,30 +38,66 @@ bool WaitingFrames::pair(const Frame& second) {
 }
 
 Result<void> WaitingFrames::addSecond(const Frame& frame) {
+  std::erase_if(seconds_, [&](const Frame& waiting) {
+    return waiting.stamp.time > frame.stamp.time + kReordered;
+  });
+  trouble_.clear();
+  if (isLate(frame)) return fail("frame_late");
   if (pair(frame)) return {};
   seconds_.push_back(frame);
   if (seconds_.size() <= kUnpaired) return {};
   seconds_.pop_front();
+  trouble_ = "its stamps differ from those of the first by more than stereo.pair_tolerance";
   return fail("stereo_unpaired");
+}
+
+/// Where it is of a frame that was not awaited, the camera is back.
+bool WaitingFrames::isLate(const Frame& second) {
+  if (!taken_ || second.stamp.time > *taken_ + tolerance_) return false;
+  trouble_ = "its images come too late";
+  if (std::any_of(missed_.begin(), missed_.end(), [&](TimePoint first) {
+        return std::chrono::abs(second.stamp.time - first) <= tolerance_;
+      })) {
+    missed_.clear();
+  }
+  return true;
 }
 
 FramePair WaitingFrames::take() {
   FramePair next = std::move(pairs_.front());
   pairs_.pop_front();
+  taken_ = next.first.stamp.time;
+  if (next.second) {
+    alone_ = 0;
+    missed_.clear();
+    return next;
+  }
+  ++alone_;
+  missed_.push_back(*taken_);
+  if (missed_.size() > kAlone) missed_.pop_front();
   return next;
 }
 
 bool WaitingFrames::frontMayBePaired() const {
-  if (pairs_.front().second) return false;
+  if (pairs_.front().second || missed_.size() >= kAlone) return false;
   if (pairs_.size() > 1 && (pairs_[1].second || pairs_.size() > 3)) return false;
   const TimePoint last = pairs_.front().first.stamp.time + tolerance_;
   return std::none_of(seconds_.begin(), seconds_.end(),
                       [&](const Frame& f) { return f.stamp.time > last; });
 }
 
+std::string WaitingFrames::whyAlone() const {
+  if (alone_ < static_cast<int>(kAlone)) return {};
+  return "goes on with one camera, for no image of the second one fits: " +
+         (trouble_.empty() ? "none comes" : trouble_) +
+         "; mend that camera, or set stereo.enabled to false";
+}
+
 void WaitingFrames::clear() {
   pairs_.clear();
   seconds_.clear();
+  missed_.clear();
+  taken_.reset();
 }
 
 }  // namespace perdure::vio

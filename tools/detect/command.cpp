@@ -35,6 +35,9 @@ void addDetectCommand(CLI::App& app) {
   CLI::App* detect = app.add_subcommand(
       "detect", "Write a network's detections of a dataset to a CSV that --detections reads");
   detect->add_option("--data", options->data, "Dataset folder")->required();
+  detect->add_option(
+      "--sequence", options->sequence,
+      "Of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example seq-01");
   detect->add_option("--model", options->inference.model.path, "Network (.onnx, .cfg)")->required();
   detect->add_option("--out", options->out, "The CSV")->required();
   detect

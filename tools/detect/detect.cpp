@@ -55,6 +55,7 @@ DetectSummary detect(const DetectOptions& options,
                      const std::function<void(std::uint64_t, std::uint64_t)>& report) {
   replay::DatasetOptions data;
   data.path = options.data;
+  data.sequence = options.sequence;
   const auto dataset = replay::Dataset::open(data);
   inference::Node node(options.inference, 1);
   CheckedFile file(options.out);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <string>
 
 #include "common/types/detections.h"
 #include "services/inference/config.h"
@@ -13,6 +14,7 @@ namespace perdure::tools {
 
 struct DetectOptions {
   std::filesystem::path data, out;
+  std::string sequence;  ///< of KITTI tracking, and of a 7-Scenes folder with several
   inference::Config inference;
 };
 

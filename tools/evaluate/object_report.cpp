@@ -38,11 +38,12 @@ nlohmann::ordered_json toReport(const ObjectScore& score) {
 }
 
 nlohmann::ordered_json reportSimulated(const fs::path& folder, const fs::path& out,
-                                       std::uint64_t first_frame) {
+                                       const std::optional<std::set<std::uint64_t>>& used) {
   const SimulatedTruth truth = readSimulatedTruth(folder);
   SimulatedRun run = pairWithTruth(truth, readObjectRows(out / "objects_final.csv"),
                                    replay::PoseFile::read(out / "trajectory.tum").poses(), "");
-  run.frames.erase(run.frames.begin(), run.frames.lower_bound(first_frame));
+  std::erase_if(run.frames,
+                [&](const auto& frame) { return used && !used->contains(frame.first); });
   const ObjectScore score = scoreFrames(run.frames, {.frame_interval_s = truth.frameInterval()});
   auto report = toReport(score);
   report["objects"] = score.objects;

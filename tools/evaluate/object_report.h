@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 
 #include "tools/evaluate/object_score.h"
 
@@ -13,10 +15,11 @@ namespace perdure::tools {
 nlohmann::ordered_json toReport(const ObjectScore& score);
 
 /// Copies all of the simulated folder but its images to OUT/truth, which is then a simulated folder
-/// for `perdure evaluate`, and scores OUT/objects_final.csv, all classes together, from
-/// `first_frame` on. Throws StartupError where the folder or OUT lacks a part.
+/// for `perdure evaluate`, and scores OUT/objects_final.csv, all classes together, over the
+/// frames that were `used` (nothing: all). Throws StartupError where the folder or OUT lacks a
+/// part.
 nlohmann::ordered_json reportSimulated(const std::filesystem::path& folder,
                                        const std::filesystem::path& out,
-                                       std::uint64_t first_frame = 0);
+                                       const std::optional<std::set<std::uint64_t>>& used = {});
 
 }  // namespace perdure::tools

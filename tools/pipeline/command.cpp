@@ -49,6 +49,8 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "Begin with a stored map: it is copied to OUT/map.sqlite and stays as it is");
   app.add_option("--from", options.from, "Begin so many seconds after the first frame")
       ->check(CLI::NonNegativeNumber);
+  app.add_option("--every", options.every, "Use each N-th frame only")
+      ->check(CLI::Range(1, 1000000));
   app.add_option("--seconds", options.seconds, "Stop after so many seconds of data")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--seed", options.seed, "Of --detections simulated and --odometry drifting")
@@ -102,6 +104,9 @@ void run(const PipelineOptions& options) {
       std::fprintf(stderr, "%s: %s %llu times\n", service.c_str(), code.c_str(),
                    static_cast<unsigned long long>(count));
     }
+  }
+  if (const auto doubt = pipeline.doubtOfPoses(); !doubt.empty()) {
+    std::fprintf(stderr, "At the end: %s\n", doubt.c_str());
   }
   std::printf("%llu frames, %llu poses, %llu detections, %zu objects on the map: %s\n",
               static_cast<unsigned long long>(pipeline.counts().frames),

@@ -252,6 +252,10 @@ std::string Pipeline::drawOverlay(
   return writeOverlay(outputs_->log(), data, outputs_->folder() / "overlay.mp4", progress);
 }
 
+std::string Pipeline::doubtOfPoses() const {
+  return known_poses_ ? known_poses_->statusOfPoses() : std::string();
+}
+
 std::map<std::string, ReasonCounts> Pipeline::reasons() const {
   std::map<std::string, ReasonCounts> all{{"capture", dataset_->reasons()},
                                           {"semantic_filter", filter_->reasons()},

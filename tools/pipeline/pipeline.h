@@ -63,12 +63,15 @@ class Pipeline {
   std::uint64_t firstFrame() const { return first_index_; }
   bool usesVio() const { return uses_vio_; }
   bool usesModel() const { return inference_ != nullptr; }
+  /// A sentence where the poses that were given contradict the images; else empty.
+  std::string doubtOfPoses() const;
   /// Counted reasons by service.
   std::map<std::string, ReasonCounts> reasons() const;
 
  private:
   // In pipeline_open.cpp.
   void openOdometry(const PipelineOptions& options);
+  void checkLandmarks() const;
   void openKnownPoses();
   void openDetections(const PipelineOptions& options);
   void openData();

@@ -26,6 +26,7 @@ bool usesTruth(const PipelineOptions& options) {
 Pipeline::Pipeline(const PipelineOptions& options)
     : options_(options), configs_(readServiceConfigs(options)) {
   cv::setNumThreads(1);
+  checkLandmarks();
   checkRecorded();
   const bool of_data = options.odometry == "vio" || usesTruth(options);
   if (!of_data && !recorded_) {
@@ -112,6 +113,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
   if (pose_file_ && pose_file_->format() == replay::PoseFormat::kKitti) {
     data.frame_count = pose_file_->poses().size();
   }
+  data.every = options.every;
   data.source = instanceOf(kCapture);
   data.second_encoding = ImageEncoding::kMono8;
   data.decode = options.odometry == "vio" || options.detections == "model" || options.landmarks;
@@ -131,12 +133,6 @@ void Pipeline::openData() {
 }
 
 void Pipeline::openOdometry(const PipelineOptions& options) {
-  if (options.landmarks && (recorded_ || options.odometry == "vio")) {
-    throw StartupError(ExitCode::kUsage,
-                       "--landmarks is for given poses (a file, truth, drifting); "
-                       "--odometry " +
-                           options.odometry + " has its own; leave it away");
-  }
   if (recorded_) return;
   PoseAccuracy accuracy;
   if (usesTruth(options)) {
@@ -173,6 +169,23 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   vio_ = std::make_unique<vio::Node>(configs_.vio, instanceOf(kVio), std::move(sinks));
   vio_->setWorld(session_);
   vio_->onCalibration(dataset_->calibration());
+}
+
+void Pipeline::checkLandmarks() const {
+  if (!options_.landmarks) return;
+  const std::string given =
+      "--landmarks makes points where poses are given: by a file, truth or "
+      "drifting; ";
+  if (options_.odometry == "vio") {
+    throw StartupError(ExitCode::kUsage, given + "vio makes its own: leave --landmarks away");
+  }
+  if (options_.odometry == "recorded") {
+    throw StartupError(ExitCode::kUsage,
+                       given +
+                           "--odometry recorded takes the points that were recorded: leave "
+                           "--landmarks away. For new points of the recorded images give "
+                           "--odometry a pose file, such as the trajectory.tum of that run");
+  }
 }
 
 void Pipeline::openKnownPoses() {

@@ -27,10 +27,11 @@ void Pipeline::checkRecorded() {
   const bool odometry = options_.odometry == kRecorded,
              detections = options_.detections == kRecorded;
   recorded_ = odometry && detections;
-  if (recorded_ && options_.from > 0.0) {
-    throw StartupError(ExitCode::kUsage,
-                       "--from leaves out data, and recorded odometry and detections are given as "
-                       "the filter heard them; give --seconds alone");
+  if (recorded_ && (options_.from > 0.0 || options_.every > 1)) {
+    throw StartupError(
+        ExitCode::kUsage,
+        "--from and --every leave out data, and recorded odometry and detections are given as "
+        "the filter heard them; give --seconds alone");
   }
   if (odometry != detections) {
     throw StartupError(ExitCode::kUsage,

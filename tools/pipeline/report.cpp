@@ -1,6 +1,7 @@
 #include "tools/pipeline/report.h"
 
 #include <filesystem>
+#include <set>
 
 #include "common/base/ids.h"
 #include "tools/data_check/data_check.h"
@@ -53,8 +54,17 @@ void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequ
   }
 }
 
+/// Those of the data that the run was over.
+std::set<std::uint64_t> usedFrames(const Pipeline& pipeline) {
+  std::set<std::uint64_t> used;
+  for (const auto& frame : pipeline.dataset().recording().frames) {
+    if (frame.index >= pipeline.firstFrame()) used.insert(frame.index);
+  }
+  return used;
+}
+
 Json objectScore(const PipelineOptions& options, const fs::path& labels_file,
-                 std::uint64_t first_frame) {
+                 const std::set<std::uint64_t>& used) {
   const fs::path out = options.out;
   const auto labels = replay::readKittiLabels(labels_file);
   auto calibration = replay::readTrackingCalibration(fs::path(options.data) / "calib" /
@@ -66,7 +76,7 @@ Json objectScore(const PipelineOptions& options, const fs::path& labels_file,
   const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
   std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
   auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
-  truth.erase(truth.begin(), truth.lower_bound(first_frame));
+  std::erase_if(truth, [&](const auto& frame) { return !used.contains(frame.first); });
   return toReport(scoreObjects(rows, truth, poses, calibration, {}));
 }
 
@@ -80,6 +90,7 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
                  {"sequence", options.sequence},
                  {"odometry", options.odometry},
                  {"detections", options.detections},
+                 {"every", options.every},
                  {"model", options.model}};
   report["data_check"] = {{"notes", pipeline.dataset().recording().notes},
                           {"findings", toJson(pipeline.findings())}};
@@ -91,9 +102,9 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
       pipeline.dataset().kind() == replay::DatasetKind::kKittiTracking && fs::exists(labels);
   if (pipeline.outputs().odometryFrames() == 0) return report;
   if (isSimulated(options.data))
-    report["objects"] = reportSimulated(options.data, options.out, pipeline.firstFrame());
+    report["objects"] = reportSimulated(options.data, options.out, usedFrames(pipeline));
   if (has_truth) {
-    report["objects"] = objectScore(options, labels, pipeline.firstFrame());
+    report["objects"] = objectScore(options, labels, usedFrames(pipeline));
     copyTruth(options.data, fs::path(options.out) / "truth", options.sequence);
   }
   return report;

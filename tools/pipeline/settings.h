@@ -27,6 +27,7 @@ struct PipelineOptions {
   double box_origin = 0.0;
   bool outline_boxes = false;
   bool landmarks = false;  ///< with poses that are given: points from the images too
+  std::size_t every = 1;   ///< each N-th frame alone
   double from = 0.0;       ///< seconds after the first frame at which to begin
   std::optional<double> seconds;
   std::optional<std::int64_t> seed;      ///< of --detections simulated and --odometry drifting

@@ -61,22 +61,17 @@ std::vector<fs::path> filesWith(const fs::path& path, const char* extension) {
   return files;
 }
 
-/// rosbag2 packs whole files where it is told to: "run_0.db3.zstd".
+/// rosbag2 packs whole files where it is told to: "run_0.db3.zstd". Of a folder only those that
+/// nobody has unpacked beside.
 std::vector<fs::path> packedFiles(const fs::path& path) {
   auto files = filesWith(path, ".zstd");
-  std::erase_if(files, [](const fs::path& file) {
+  std::erase_if(files, [&](const fs::path& file) {
     const auto inner = file.stem().extension();
-    return inner != ".db3" && inner != ".mcap";
+    std::error_code ignored;
+    return (inner != ".db3" && inner != ".mcap") ||
+           (file != path && fs::exists(file.parent_path() / file.stem(), ignored));
   });
   return files;
-}
-
-void refusePacked(const fs::path& path) {
-  const auto packed = packedFiles(path);
-  if (packed.empty()) return;
-  throw StartupError(ExitCode::kUnavailable,
-                     packed.front().string() + " is packed as a whole; unpack it first: zstd -d " +
-                         packed.front().string());
 }
 
 bool holdsRos(const fs::path& path) {
@@ -94,9 +89,9 @@ bool RosMessages::looksLikeOne(const fs::path& path) {
 }
 
 RosMessages::RosMessages(const fs::path& path) {
-  refusePacked(path);
   for (const auto& file : filesWith(path, ".bag")) sources_.push_back(openBag(file));
   for (const auto& file : filesWith(path, ".db3")) sources_.push_back(openDb3(file));
+  for (const auto& file : packedFiles(path)) openPacked(file);
   if (sources_.empty()) sources_.push_back(std::make_unique<McapSource>(path));
   for (const auto& source : sources_) {
     for (const auto& [name, topic] : source->topics()) {
@@ -106,6 +101,22 @@ RosMessages::RosMessages(const fs::path& path) {
       all.messages += before;
     }
   }
+}
+
+void RosMessages::openPacked(const fs::path& file) {
+  unpacked_.push_back(UnpackedFile::of(file));
+  const fs::path& plain = unpacked_.back()->path();
+  if (plain.extension() == ".db3") {
+    sources_.push_back(openDb3(plain));
+  } else {
+    sources_.push_back(std::make_unique<McapSource>(plain));
+  }
+}
+
+std::vector<std::string> RosMessages::notes() const {
+  std::vector<std::string> notes;
+  for (const auto& file : unpacked_) notes.push_back(file->note());
+  return notes;
 }
 
 ReasonCounts RosMessages::reasons() const {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/replay/recordings/unpacked_file.h"
 #include "common/ros/bytes.h"
 
 namespace perdure::replay {
@@ -64,6 +65,8 @@ class RosMessages {
   explicit RosMessages(const std::filesystem::path& path);
 
   const RosTopics& topics() const { return topics_; }
+  /// For people: what was unpacked.
+  std::vector<std::string> notes() const;
   ReasonCounts reasons() const;
   /// The last thing that was counted, for people.
   std::string lastProblem() const;
@@ -77,6 +80,8 @@ class RosMessages {
   }
 
  private:
+  void openPacked(const std::filesystem::path& file);
+  std::vector<std::shared_ptr<const UnpackedFile>> unpacked_;  ///< goes after the sources
   std::vector<std::unique_ptr<RosSource>> sources_;
   std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each
   RosTopics topics_;

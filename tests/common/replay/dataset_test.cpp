@@ -29,6 +29,17 @@ TEST(Dataset, FoldersThatAreNoneAreToldWhatTheyCouldBe) {
               HasSubstr("the dataset folder is missing"));
 }
 
+TEST(Dataset, EachNthFrameComesWithItsPartnerNumberAndAllSamples) {
+  const auto root = tinyEuroc("each_second", true);
+  const auto all = Dataset::open({.path = root}), some = Dataset::open({.path = root, .every = 2});
+  EXPECT_THAT(frameIndices(*some), ElementsAre(0, 0, 2, 2, 4, 4));
+  EXPECT_EQ(some->frameCount(), 3U);
+  EXPECT_EQ(some->recording().imu.size(), all->recording().imu.size());
+  EXPECT_DOUBLE_EQ(some->calibration().cameras[0].rate_hz,
+                   all->calibration().cameras[0].rate_hz / 2);
+  EXPECT_EQ(some->skip(durationFromSeconds(0.05)), 2U);
+}
+
 TEST(Dataset, ATruncatedImageIsCountedAndItsIndexNotGivenAgain) {
   const auto root = tinyEuroc("truncated");
   truncate(root / "mav0/cam0/data/1050000000.png", 0.6);

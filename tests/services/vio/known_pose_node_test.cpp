@@ -10,6 +10,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/math/so3.h"
 #include "tests/services/vio/drawn_drive.h"
 #include "tests/services/vio/simulated_drive.h"
 
@@ -245,6 +246,76 @@ TEST_F(KnownPoses, HealthIsNotOkWhereNothingGoesOut) {
               HasSubstr("no pose"));
 }
 
+/// Of a camera that is turned by so much from where the calibration has it, about axes of the body.
+RigidTransform turned(double x_deg, double y_deg, double z_deg) {
+  const Eigen::Vector3d turn(x_deg, y_deg, z_deg);
+  return {expQuaternion(turn * (M_PI / 180.0)).toRotationMatrix(), Eigen::Vector3d::Zero()};
+}
+
+TEST_F(KnownPoses, SaysThatThePosesAreOfAnotherBody) {
+  const std::array<RigidTransform, 4> axes{turned(45, 0, 0), turned(0, 0, 90), turned(0, 0, 180),
+                                           turned(0, 90, 0)};
+  for (const RigidTransform& wrong : axes) {
+    Calibration calibration = calibrationOf(drive_);
+    calibration.cameras[0].T_BC = wrong * calibration.cameras[0].T_BC;
+    KnownPoseNode node({}, 5, [](const Landmarks&) {});
+    node.onCalibration(calibration);
+    for (std::uint64_t i = 0; i < 80; ++i) {
+      node.onFrame(imageOf(i));
+      node.onOdometry(poseOf(i));
+    }
+    EXPECT_EQ(node.health(), HealthState::kDegraded);
+    EXPECT_THAT(node.status(), ::testing::HasSubstr("T_BS"));
+    EXPECT_GT(node.reasons().of("poses_contradict_images"), 10u);
+  }
+  play(0, 120);
+  EXPECT_EQ(node_.status(), "") << "the right ones";
+}
+
+TEST_F(KnownPoses, IsWellAgainOnceThePosesAre) {
+  for (std::uint64_t i = 0; i < 160; ++i) {
+    Odometry pose = poseOf(i);
+    if (i < 80) pose.T_WB = pose.T_WB.inverse();
+    node_.onFrame(imageOf(i));
+    node_.onOdometry(pose);
+    if (i == 79) {
+      EXPECT_THAT(node_.status(), ::testing::HasSubstr("T_WB"));
+    }
+  }
+  EXPECT_EQ(node_.status(), "");
+}
+
+TEST_F(KnownPoses, SaysThatThePosesAreInAnotherUnit) {
+  for (std::uint64_t i = 0; i < 80; ++i) {
+    Odometry pose = poseOf(i);
+    pose.T_WB.p *= 1000.0;
+    node_.onFrame(imageOf(i));
+    node_.onOdometry(pose);
+  }
+  EXPECT_EQ(node_.health(), HealthState::kDegraded);
+  EXPECT_THAT(node_.status(), ::testing::HasSubstr("in metres"));
+}
+
+TEST_F(KnownPoses, WhatStandsAndSeesThingsMoveHasNoWrongPoses) {
+  for (std::uint64_t i = 0; i < 80; ++i) {
+    Odometry pose = poseOf(i);
+    pose.T_WB = poseOf(0).T_WB;
+    node_.onFrame(imageOf(i));
+    node_.onOdometry(pose);
+  }
+  EXPECT_EQ(node_.status(), "") << "traffic that fills the picture";
+}
+
+TEST_F(KnownPoses, SaysFromTheStartThatFramesHaveAnotherSize) {
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    Frame small = imageOf(i);
+    small.width = 640;
+    node_.onFrame(small);
+  }
+  EXPECT_EQ(node_.health(), HealthState::kDegraded);
+  EXPECT_THAT(node_.status(), ::testing::HasSubstr("frames of cam0 are 640×480"));
+}
+
 TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
   EXPECT_FALSE(node_.waitsFor());
   // The second camera is gone; its images may still come, until some frames say that they do not.
@@ -258,6 +329,19 @@ TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
   node_.flush();
   EXPECT_FALSE(node_.waitsFor());
   EXPECT_EQ(landmarks_.size(), 10u);
+  EXPECT_EQ(node_.health(), HealthState::kDegraded);
+  EXPECT_THAT(node_.status(), ::testing::HasSubstr("one camera"));
+  // From now on it is not awaited, until it is back.
+  play(10, 12);
+  EXPECT_EQ(landmarks_.size(), 12u);
+  for (std::uint64_t i = 11; i < 14; ++i) {
+    if (i > 11) play(i, i + 1);
+    node_.onFrame(imageOf(i, 1));
+  }
+  EXPECT_EQ(landmarks_.size(), 14u);
+  EXPECT_EQ(node_.reasons().of("frame_late"), 1u);
+  EXPECT_EQ(node_.reasons().of("stereo_unpaired"), 12u);
+  EXPECT_EQ(node_.status(), "");
 }
 
 TEST_F(KnownPosesInStereo, ABodyThatStandsKnowsDistances) {

@@ -1,11 +1,14 @@
 #include "services/vio/waiting_frames.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "services/vio/core/start/speed_history.h"
 
 namespace perdure::vio {
 namespace {
+
+using ::testing::HasSubstr;
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -58,6 +61,66 @@ TEST(WaitingFrames, SecondsWithoutPartnersDoNotPileUp) {
   EXPECT_FALSE(waiting.take().second) << "given up";
   EXPECT_TRUE(waiting.addFirst(frameAt(400)));
   EXPECT_TRUE(waiting.take().second);
+}
+
+TEST(WaitingFrames, FramesOfAnEarlierRunAreGivenUp) {
+  WaitingFrames waiting(0.01);
+  EXPECT_TRUE(waiting.addSecond(frameAt(5000)));
+  EXPECT_TRUE(waiting.addFirst(frameAt(5100)));
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(1000))), "frame_of_earlier_run");
+  EXPECT_EQ(codeOf(waiting.addFirst(frameAt(1050))), "");
+  EXPECT_EQ(waiting.size(), 2u);
+  EXPECT_TRUE(waiting.addSecond(frameAt(900)));
+  EXPECT_TRUE(waiting.frontMayBePaired()) << "the second camera's old image says nothing";
+  EXPECT_TRUE(waiting.addSecond(frameAt(1000)));
+  EXPECT_TRUE(waiting.front().second);
+}
+
+/// Frames of the first camera until it is sure that there is no second one.
+void goAlone(WaitingFrames& waiting, int frames) {
+  for (int i = 0; i < frames; ++i) {
+    EXPECT_TRUE(waiting.addFirst(frameAt(50 * i)));
+    waiting.take();
+  }
+}
+
+TEST(WaitingFrames, ACameraThatIsAbsentIsNotAwaitedUntilItIsBack) {
+  WaitingFrames waiting(0.01);
+  goAlone(waiting, 9);
+  EXPECT_TRUE(waiting.addFirst(frameAt(450)));
+  EXPECT_TRUE(waiting.frontMayBePaired());
+  EXPECT_EQ(waiting.whyAlone(), "");
+  waiting.take();
+  EXPECT_THAT(waiting.whyAlone(), HasSubstr("none comes"));
+  EXPECT_TRUE(waiting.addFirst(frameAt(500)));
+  EXPECT_FALSE(waiting.frontMayBePaired());
+  waiting.take();
+  EXPECT_EQ(codeOf(waiting.addSecond(frameAt(503))), "frame_late");
+  EXPECT_TRUE(waiting.addFirst(frameAt(550)));
+  EXPECT_TRUE(waiting.frontMayBePaired()) << "it is back";
+  EXPECT_TRUE(waiting.addSecond(frameAt(553)));
+  EXPECT_TRUE(waiting.take().second);
+  EXPECT_EQ(waiting.whyAlone(), "");
+}
+
+TEST(WaitingFrames, TellWhyNoPartnerFits) {
+  WaitingFrames late(0.01);
+  goAlone(late, 12);
+  EXPECT_EQ(codeOf(late.addSecond(frameAt(100))), "frame_late");
+  EXPECT_THAT(late.whyAlone(), HasSubstr("too late"));
+  WaitingFrames apart(0.01);
+  for (int i = 0; i < 12; ++i) {
+    (void)apart.addFirst(frameAt(50 * i));
+    (void)apart.addSecond(frameAt(50 * i + 25));
+    apart.take();
+  }
+  EXPECT_THAT(apart.whyAlone(), HasSubstr("stereo.pair_tolerance"));
+  EXPECT_TRUE(apart.addFirst(frameAt(1000)));
+  EXPECT_FALSE(apart.frontMayBePaired()) << "stamps that never fit are not awaited";
+  WaitingFrames small(0.01);
+  goAlone(small, 10);
+  small.refuseSecond("frames of cam1 are small");
+  EXPECT_THAT(small.whyAlone(), HasSubstr("cam1 are small"));
 }
 
 TEST(SpeedHistory, InterpolatesAndIsLessSureFurtherAway) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "common/replay/dataset.h"
@@ -45,6 +46,24 @@ TEST(DoctorOfNetworks, TheServicesOwnIsTakenFromItsConfiguration) {
   EXPECT_EQ(configuredNetwork(folder), "/here/net.onnx");
   std::ofstream(folder / "inference.yaml") << "model: [\n";
   EXPECT_EQ(configuredNetwork(folder), "");
+}
+
+TEST(DoctorOfRecordings, FindsNothingWrongWithTheLayoutOf7Scenes) {
+  const fs::path scene = replay::tinySevenScenes("doctor_scene");
+  const Findings found = checkRigBy(scene, "", 10.0);
+  ASSERT_GE(found.size(), 2u);
+  for (const Finding& finding : found) {
+    EXPECT_NE(finding.verdict, Verdict::kFail) << finding.text;
+  }
+  EXPECT_EQ(found.back().verdict, Verdict::kOk);
+  EXPECT_THAT(found.back().text, HasSubstr("--odometry truth"));
+  for (const char* name : {"0", "1", "2"}) {
+    replay::writeGrey(scene / ("frame-00000" + std::string(name) + ".color.png"), 640, 480, 90);
+  }
+  const Findings grey = checkRigBy(scene, "", 10.0);
+  EXPECT_TRUE(std::any_of(grey.begin(), grey.end(), [](const Finding& finding) {
+    return finding.verdict == Verdict::kWarn;
+  })) << "images of one grey";
 }
 
 }  // namespace

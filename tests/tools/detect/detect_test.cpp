@@ -62,6 +62,19 @@ TEST(Detect, ScoreIsTheSoftMaxOfTheActivationsAndAzimuthMayBeMissing) {
   EXPECT_THAT(out.str(), HasSubstr(",,,-1,2\n"));
 }
 
+TEST(Detect, OfASceneWithSeveralSequencesTakesTheOneThatIsNamed) {
+  auto options = tinyOptions("detect_scene");
+  const fs::path scene = replay::freshFolder("detect_scenes");
+  for (const char* name : {"seq-01", "seq-02"}) {
+    fs::rename(replay::tinySevenScenes(std::string("detect_") + name), scene / name);
+  }
+  fs::remove(scene / "seq-02/frame-000002.color.png");
+  options.data = scene;
+  EXPECT_THAT(replay::startupErrorOf([&] { detect(options, {}); }), HasSubstr("--sequence"));
+  options.sequence = "seq-01";
+  EXPECT_EQ(detect(options, {}).frames, 3u);
+}
+
 TEST(Detect, SaysWhenItsFileCannotBeWritten) {
   auto options = tinyOptions("detect_unwritable");
   options.out = options.data / "none" / "detections.csv";

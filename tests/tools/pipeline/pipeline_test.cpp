@@ -204,6 +204,25 @@ TEST(Pipeline, FromBeginsLaterAndLeavesTheNumbersOfTheFrames) {
   EXPECT_THAT(errorOf(options), HasSubstr("--from"));
 }
 
+TEST(Pipeline, EachNthFrameIsARunOfALowerRate) {
+  const auto street = makeStreet("every");
+  auto options = streetOptions(street, "whole");
+  runPipeline(options);
+  options.out = (street / "third").string();
+  options.every = 3;
+  runPipeline(options);
+  const auto whole = replay::PoseFile::read(street / "whole/trajectory.tum").poses();
+  const auto third = replay::PoseFile::read(street / "third/trajectory.tum").poses();
+  ASSERT_EQ(third.size(), (whole.size() + 2) / 3);
+  EXPECT_EQ(third[1].time, whole[3].time);
+  EXPECT_EQ(third[1].T_WB.p, whole[3].T_WB.p);
+  const auto rows = readObjectRows(street / "third/objects_inst.csv");
+  ASSERT_FALSE(rows.empty());
+  for (const auto& row : rows) EXPECT_EQ(row.frame % 3, 0U);
+  options.odometry = options.detections = "recorded";
+  EXPECT_THAT(errorOf(options), HasSubstr("--every"));
+}
+
 TEST(Pipeline, FramesWithoutAPoseAreCountedAndLeaveNoLine) {
   const auto street = makeStreet("few_poses");
   std::string tum;
@@ -294,7 +313,11 @@ TEST(Pipeline, GivenPosesHaveLandmarksToo) {
   EXPECT_THAT(errorOf(options), HasSubstr("has no images"));
   drawStreet(street);
   options.odometry = "vio";
-  EXPECT_THAT(errorOf(options), HasSubstr("--landmarks is for given poses"));
+  EXPECT_THAT(errorOf(options), HasSubstr("vio makes its own: leave --landmarks away"));
+  options.odometry = options.detections = "recorded";
+  EXPECT_THAT(errorOf(options),
+              ::testing::AllOf(HasSubstr("leave --landmarks away"), HasSubstr("pose file")));
+  options.detections = (street / "boxes.csv").string();
   options.odometry = (street / "poses.txt").string();
   options.record = true;
   runPipeline(options);

@@ -13,6 +13,8 @@ constexpr std::size_t kViews = 24;   // poses that are kept
 constexpr std::size_t kRecent = 12;  // of which the newest, in any case
 constexpr double kForget = 0.05;     // of the scale that was, with each image of
 constexpr double kMany = 10.0;       // points or more; with fewer it is less
+constexpr double kMoved = 0.05;      // m: less is rest
+constexpr double kTurned = 0.05;     // rad
 constexpr double kGate = 3.0;        // residuals of a point, in those of the others
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
@@ -33,6 +35,7 @@ void PointMapper::clear() {
   views_.clear();
   database_.clear();
   landmarks_.clear();
+  mapped_ = {};
 }
 
 /// Tracks that have ended go, and the poses from before the first view of all others.
@@ -94,6 +97,18 @@ bool PointMapper::isSure(const Triangulated& point) const {
   return point.rms <= kGate * scale_ && point.relative_sigma * scale_ < options_.max_relative_sigma;
 }
 
+/// Why a track has no place.
+void PointMapper::note(const Reason& why) {
+  if (why.code == "triangulation_depth") ++mapped_.contradicted;
+  if (why.code == "triangulation_far") ++mapped_.far;
+}
+
+bool PointMapper::moved() const {
+  if (views_.size() < 2) return false;
+  const RigidTransform &before = views_.front().pose.T_WB, &now = views_.back().pose.T_WB;
+  return (now.p - before.p).norm() > kMoved || now.q.angularDistance(before.q) > kTurned;
+}
+
 void PointMapper::learnScale(const std::vector<Candidate>& candidates) {
   if (candidates.empty()) return;
   std::vector<double> fits;
@@ -111,12 +126,16 @@ void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
   forgetEnded();
   if (views_.size() > kViews) forgetOne();
   std::vector<Candidate> candidates;
+  mapped_ = {};
   for (const TrackedPoint& seen : tracked.points) {
     const Track* track = database_.find(seen.id);
     if (!track || viewsOf(*track) < window_.min_observations) continue;
     const auto rays = raysOf(*track);
     auto point = triangulate(rays, options_);
-    if (!point) continue;
+    if (!point) {
+      note(point.error());
+      continue;
+    }
     point->rms = std::sqrt(lackOfFit(*point, rays.size()));
     candidates.push_back({&seen, *point});
   }
@@ -131,6 +150,7 @@ void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
     l.pixel = c.seen->seen[0]->pixel;
     landmarks_.push_back(l);
   }
+  mapped_.sure = landmarks_.size();
   learnScale(candidates);
 }
 

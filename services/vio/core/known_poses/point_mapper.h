@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "services/vio/core/known_poses/agreement.h"
 #include "services/vio/core/state/options.h"
 #include "services/vio/core/state/row_motion.h"
 #include "services/vio/core/tracks/tracks.h"
@@ -34,6 +35,12 @@ class PointMapper {
   /// Points seen in the newest image whose position is known, by rising id. Those that do not fit
   /// their poses as the others do are left out: they move, or were followed wrongly.
   const std::vector<LandmarkEstimate>& landmarks() const { return landmarks_; }
+  /// Of the newest image.
+  const Mapped& mapped() const { return mapped_; }
+  /// How much worse tracks agree with the poses than VisionOptions::sigma_px says; at least 1.
+  double scale() const { return scale_; }
+  /// Between the oldest and the newest pose that are kept.
+  bool moved() const;
   /// Deviation of a tracked point from where pose and place put it, in pixels: at least
   /// VisionOptions::sigma_px; more where the poses have errors of their own.
   double noisePx() const { return scale_ * options_.sigma_px; }
@@ -53,6 +60,7 @@ class PointMapper {
   void forgetOne();
   std::vector<Ray> raysOf(const Track& track) const;
   RigidTransform cameraOf(const View& view, std::size_t camera, double row) const;
+  void note(const Reason& why);
   bool isSure(const Triangulated& point) const;
   void learnScale(const std::vector<Candidate>& candidates);
 
@@ -65,6 +73,7 @@ class PointMapper {
   std::uint64_t frame_ = 0;
   double scale_ = 1.0;  ///< of the residuals
   std::vector<LandmarkEstimate> landmarks_;
+  Mapped mapped_;
 };
 
 }  // namespace perdure::vio

@@ -96,9 +96,8 @@ Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptio
     }
   }
   const double depth = 1.0 / m.z();
-  if (!n.in_front || !(depth > options.min_depth_m) || !(depth < options.max_depth_m)) {
-    return fail("triangulation_depth");
-  }
+  if (!n.in_front || !(depth > options.min_depth_m)) return fail("triangulation_depth");
+  if (!(depth < options.max_depth_m)) return fail("triangulation_far");
   const Matrix3d cov_m = n.A.inverse();
   const double relative = std::sqrt(cov_m(2, 2)) * depth;  // σ(1/z) · z = σ(z) / z
   if (!(relative < options.max_relative_sigma)) return fail("triangulation_condition");

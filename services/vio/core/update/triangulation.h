@@ -26,7 +26,8 @@ struct Triangulated {
   double rms;                  ///< of the weighted residuals
 };
 
-/// Needs two rays. Fails with "triangulation_…": views, parallel, depth, condition.
+/// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or
+/// too near), far, condition.
 Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options);
 
 /// The rays of a track from the clones that saw it.

@@ -1,0 +1,156 @@
+#include "common/replay/recordings/unpacked_file.h"
+
+#include <fmt/format.h>
+#include <stdlib.h>
+#include <zstd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <vector>
+
+#include "common/base/errors.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
+
+std::string sizeOf(std::uint64_t bytes) {
+  const double megabytes = static_cast<double>(bytes) * 1e-6;
+  return megabytes < 1000.0 ? fmt::format("{:.1f} MB", megabytes)
+                            : fmt::format("{:.1f} GB", megabytes * 1e-3);
+}
+
+[[noreturn]] void throwUnusable(const fs::path& packed, const std::string& why) {
+  throw StartupError(ExitCode::kUnavailable, packed.string() + " " + why);
+}
+
+fs::path newFolder(const fs::path& packed) {
+  std::error_code error;
+  const fs::path place = fs::temp_directory_path(error);
+  std::string name = (place / "perdure-unpacked-XXXXXX").string();
+  if (!error && mkdtemp(name.data()) != nullptr) return name;
+  throwUnusable(packed,
+                "is packed as a whole, and there is no place to unpack it: set TMPDIR to a "
+                "folder that can be written");
+}
+
+[[noreturn]] void throwFull(const fs::path& packed, const fs::path& to, std::uint64_t size,
+                            std::uint64_t came) {
+  std::error_code ignored;
+  const auto free = fs::space(to.parent_path().parent_path(), ignored).available;
+  throwUnusable(packed,
+                fmt::format("is packed as a whole; unpacked it takes {}, and {} has {} left: set "
+                            "TMPDIR to a folder with more room, or unpack it there: zstd -d",
+                            size > 0 ? sizeOf(size) : "more than " + sizeOf(came),
+                            to.parent_path().parent_path().string(), sizeOf(free + came)));
+}
+
+/// In steps, frame by frame.
+class Unpacking {
+ public:
+  explicit Unpacking(OpenFile in) : in_(std::move(in)), room_(ZSTD_DStreamOutSize()) { read(); }
+
+  /// What the first frame says of its size; 0 where it says nothing.
+  std::uint64_t size() const {
+    const auto size = ZSTD_getFrameContentSize(packed_.data(), filled_.size);
+    return size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ? 0 : size;
+  }
+  /// What comes next; empty at the end, or where whole() says that there should be more.
+  std::vector<std::uint8_t> next() {
+    while (true) {
+      if (filled_.pos == filled_.size) read();
+      ZSTD_outBuffer out{room_.data(), room_.size(), 0};
+      const std::size_t before = filled_.pos;
+      const std::size_t state = ZSTD_decompressStream(context_.get(), &out, &filled_);
+      if (ZSTD_isError(state) != 0) return damaged();
+      if (out.pos > 0 || filled_.pos > before) whole_ = state == 0;
+      if (out.pos > 0) return {room_.begin(), room_.begin() + static_cast<long>(out.pos)};
+      if (filled_.size == 0) return {};
+    }
+  }
+  bool whole() const { return whole_; }
+
+ private:
+  void read() {
+    filled_ = {packed_.data(), std::fread(packed_.data(), 1, packed_.size(), in_.get()), 0};
+  }
+  std::vector<std::uint8_t> damaged() {
+    whole_ = false;
+    return {};
+  }
+
+  OpenFile in_;
+  std::vector<std::uint8_t> packed_ = std::vector<std::uint8_t>(ZSTD_DStreamInSize()), room_;
+  std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context_{ZSTD_createDCtx(), &ZSTD_freeDCtx};
+  ZSTD_inBuffer filled_{};
+  bool whole_ = false;
+};
+
+}  // namespace
+
+UnpackedFile::UnpackedFile(const fs::path& packed)
+    : packed_(packed), path_(newFolder(packed) / packed.stem()) {
+  try {
+    unpack();
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(path_.parent_path(), ignored);
+    throw;
+  }
+}
+
+UnpackedFile::~UnpackedFile() {
+  std::error_code ignored;
+  fs::remove_all(path_.parent_path(), ignored);
+}
+
+void UnpackedFile::unpack() {
+  OpenFile in(std::fopen(packed_.c_str(), "rb"));
+  if (!in) throwUnusable(packed_, std::string("cannot be read: ") + std::strerror(errno));
+  Unpacking unpacking(std::move(in));
+  const std::uint64_t stated = unpacking.size();
+  std::error_code unknown;
+  const auto space = fs::space(path_.parent_path(), unknown);
+  if (!unknown && stated > space.available) throwFull(packed_, path_, stated, 0);
+  OpenFile out(std::fopen(path_.c_str(), "wb"));
+  if (!out) throwUnusable(packed_, "cannot be unpacked: " + std::string(std::strerror(errno)));
+  for (auto bytes = unpacking.next(); !bytes.empty(); bytes = unpacking.next()) {
+    const std::size_t written = std::fwrite(bytes.data(), 1, bytes.size(), out.get());
+    size_ += written;
+    if (written < bytes.size()) throwFull(packed_, path_, stated, size_);
+  }
+  if (std::fflush(out.get()) != 0) throwFull(packed_, path_, stated, size_);
+  if (!unpacking.whole()) {
+    throwUnusable(packed_, fmt::format("is damaged or cut: {} of it can be unpacked; copy it again "
+                                       "from where it was recorded",
+                                       sizeOf(size_)));
+  }
+}
+
+std::string UnpackedFile::note() const {
+  return fmt::format("{} is packed as a whole: it was unpacked to {} ({}), which goes at the end",
+                     packed_.string(), path_.string(), sizeOf(size_));
+}
+
+std::shared_ptr<const UnpackedFile> UnpackedFile::of(const fs::path& packed) {
+  static std::mutex mutex;
+  static std::map<fs::path, std::weak_ptr<const UnpackedFile>> known;
+  const std::lock_guard lock(mutex);
+  std::error_code ignored;
+  auto& entry = known[fs::weakly_canonical(packed, ignored)];
+  if (auto there = entry.lock()) return there;
+  auto unpacked = std::make_shared<const UnpackedFile>(packed);
+  entry = unpacked;
+  return unpacked;
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,32 @@
+#include "services/vio/core/known_poses/agreement.h"
+
+#include <algorithm>
+
+namespace perdure::vio {
+namespace {
+
+constexpr double kForgets = 1.0 / 40;  // with each image
+constexpr std::size_t kFewest = 40;    // images, until there is a verdict
+constexpr double kTracks = 2.0;        // in an image, at least, that a verdict rests on
+constexpr double kMisfit = 15.0;       // scale; rough poses have up to 8
+constexpr double kNearlyAll = 10.0;    // far ones for each landmark
+
+}  // namespace
+
+void Agreement::add(const Mapped& mapped, double scale, bool moved) {
+  if (!moved) return;
+  ++images_;
+  scale_ = scale;
+  contradicted_ += kForgets * (static_cast<double>(mapped.contradicted) - contradicted_);
+  far_ += kForgets * (static_cast<double>(mapped.far) - far_);
+  sure_ += kForgets * (static_cast<double>(mapped.sure) - sure_);
+}
+
+Agreement::Verdict Agreement::verdict() const {
+  if (images_ < kFewest) return Verdict::kGood;
+  const bool misfit = sure_ > kTracks && scale_ > kMisfit;
+  if (misfit || contradicted_ > std::max(sure_, kTracks)) return Verdict::kContradicted;
+  return far_ > std::max(kNearlyAll * sure_, kTracks) ? Verdict::kFar : Verdict::kGood;
+}
+
+}  // namespace perdure::vio
