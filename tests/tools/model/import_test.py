@@ -21,6 +21,7 @@ except ImportError as missing:
 
 sys.path.insert(0, str(Path(__file__).parent))
 import tiny_networks as tiny
+import tiny_queries
 from perdure_model import __main__ as importer
 from perdure_model.faults import Fault
 from perdure_model.graph import Graph, Node
@@ -349,6 +350,36 @@ class Operators(Importing):
         message, _ = self.refused(self.whole(more, {"out": [1, 8, 7]}), NAMES, "--family=detr")
         self.assertIn("computes with Einsum inside the network", message)
         self.assertIn("pred_logits", message)
+
+    def test_networks_that_choose_their_queries_want_onnx_runtime(self):
+        for make in (tiny_queries.rtdetr, tiny_queries.rtdetr_chosen):
+            path = self.made(make)
+            (self.folder / "out.onnx").unlink(missing_ok=True)
+            message, _ = self.refused(path, NAMES)
+            self.assertIn("computes with GatherElements, GridSample, TopK inside the network", message)
+            self.assertIn("a Perdure that was built with ONNX Runtime (Debian 13)", message)
+            told, keys = self.run_import(path, NAMES, "--onnx-runtime")
+            self.assertIn("for ONNX Runtime alone", told)
+            self.assertIn("colours from 0 to 1", told)
+            self.assertEqual((keys["family"], keys["backend"]), ("detr", "onnxruntime"))
+            self.assertEqual(keys["activation"], {"class": "sigmoid", "background": "none"})
+            self.assertEqual((keys["input"]["scale"], keys["input"]["mean"]), (1 / 255, [0, 0, 0]))
+            written = Graph.load(self.folder / "out.onnx")
+            self.assertEqual(list(written.inputs), ["images"])
+            self.assertEqual([written.shape(o) for o in written.outputs], [[1, 6, 4], [1, 6, 3]])
+            onnx.checker.check_model(str(self.folder / "out.onnx"))
+
+    def test_what_the_user_says_of_the_input_goes_before_what_is_usual(self):
+        _, keys = self.run_import(self.made(tiny_queries.rtdetr), NAMES, "--onnx-runtime", "--scale=1", "--mean=1,2,3")
+        self.assertEqual((keys["input"]["scale"], keys["input"]["mean"]), (1, [1, 2, 3]))
+
+    def test_a_graph_within_an_operator_is_taken_by_no_runtime(self):
+        value = helper.make_tensor_value_info("inner", TensorProto.FLOAT, None)
+        same = helper.make_graph([helper.make_node("Identity", ["rows"], ["inner"])], "inner", [], [value])
+        more = [helper.make_node("If", ["yes"], ["some"], then_branch=same, else_branch=same),
+                helper.make_node("Identity", ["some"], ["out"])]
+        path = self.whole(more, {"out": [1, 8, 7]}, {"yes": np.array(True)})
+        self.assertIn("computes with If", self.refused(path, NAMES, "--family=detr", "--onnx-runtime")[0])
 
     def test_another_runtimes_operators_are_named(self):
         more = [helper.make_node("FusedThing", ["rows"], ["out"], domain="com.example")]
