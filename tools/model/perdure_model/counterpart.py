@@ -1,5 +1,8 @@
 """What a network answers to an image, by something else than what the service computes with."""
 
+import os
+import sys
+
 import numpy as np
 import onnx
 from onnx import TensorProto, helper
@@ -28,11 +31,27 @@ def zeros_for(given, types):
     return np.zeros([d if isinstance(d, int) else 1 for d in given.shape], types[given.type])
 
 
-def by_onnx_runtime(path, graph, image, found):
-    unsure = "not compared with the file's own answers: "
+def quietly_imported():
+    """onnxruntime; None where it is not installed. Debian's shares a library with onnx, whose
+    operators it registers again, with a line of complaint for each of them."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    sys.stderr.flush()
+    os.dup2(nowhere, 2)
     try:
         import onnxruntime
+        return onnxruntime
     except ImportError:
+        return None
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def by_onnx_runtime(path, graph, image, found):
+    unsure = "not compared with the file's own answers: "
+    onnxruntime = quietly_imported()
+    if onnxruntime is None:
         return {}, unsure + "python3-onnxruntime is not installed"
     sources = sources_of(graph, found)
     model = onnx.load(str(path))

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/process/held_errors.h"
 #include "services/inference/core/network/network.h"
 
 namespace perdure::inference {
@@ -10,9 +11,17 @@ namespace {
 
 constexpr const char* kWho = "ONNX Runtime ";
 
+/// Debian's library registers operators that ONNX's own has registered before it, which complains
+/// of each of them.
+Ort::Env quietEnvironment() {
+  const HeldErrors held(
+      [](const std::string& line) { return !line.empty() && !line.starts_with("Schema error: "); });
+  return {ORT_LOGGING_LEVEL_FATAL, "perdure"};
+}
+
 /// One for the process, and silent: what fails is thrown.
 Ort::Env& environment() {
-  static Ort::Env env(ORT_LOGGING_LEVEL_FATAL, "perdure");
+  static Ort::Env env = quietEnvironment();
   return env;
 }
 
