@@ -11,17 +11,9 @@ namespace {
 
 constexpr const char* kWho = "ONNX Runtime ";
 
-/// Debian's library registers operators that ONNX's own has registered before it, which complains
-/// of each of them.
-Ort::Env quietEnvironment() {
-  const HeldErrors held(
-      [](const std::string& line) { return !line.empty() && !line.starts_with("Schema error: "); });
-  return {ORT_LOGGING_LEVEL_FATAL, "perdure"};
-}
-
 /// One for the process, and silent: what fails is thrown.
 Ort::Env& environment() {
-  static Ort::Env env = quietEnvironment();
+  static Ort::Env env(ORT_LOGGING_LEVEL_FATAL, "perdure");
   return env;
 }
 
@@ -129,6 +121,10 @@ Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile& file,
   if (!file.darknet_weights.empty()) {
     return fail("model_unreadable", kWho + std::string("does not take Darknet files"));
   }
+  // Debian's library registers operators that ONNX's own has registered before it, which complains
+  // of each of them.
+  const HeldErrors held(
+      [](const std::string& line) { return !line.empty() && !line.starts_with("Schema error: "); });
   try {
     auto network = std::make_unique<OnnxRuntimeNetwork>(file.bytes, tensors, threads);
     if (const auto suits = network->suits(); !suits) return tl::unexpected(suits.error());
