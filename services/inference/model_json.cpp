@@ -128,6 +128,8 @@ void readAll(JsonReader& reader, const std::string& file, ModelDescription& mode
   if (const Json* input = reader.need("input")) readInput(*input, reader, model.input);
   readClasses(reader, file, model);
   readHeads(reader, file, model);
+  reader.choice<bool>("backend", model.for_onnx_runtime, {{"auto", false}, {"onnxruntime", true}},
+                      false);
   reader.number("box_sigma", model.box_sigma, 0, 1);
   reader.choice<BoxExtent>("box_extent", model.boxes,
                            {{"cuboid", BoxExtent::kCuboid}, {"outline", BoxExtent::kOutline}},

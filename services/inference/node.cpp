@@ -14,10 +14,20 @@ namespace {
 
 std::unique_ptr<Network> networkOf(const Config& config, const ModelFile& file) {
   auto network =
-      loadNetwork({file.network, file.darknet_weights}, tensorNames(file.description),
-                  backendOf(config.model.backend), static_cast<int>(config.model.threads));
+      loadNetwork({file.network, file.darknet_weights, file.description.for_onnx_runtime},
+                  tensorNames(file.description), backendOf(config.model.backend),
+                  static_cast<int>(config.model.threads));
   if (network) return std::move(*network);
   const auto& [code, detail] = network.error();
+  if (code == "backend_absent" && config.model.backend == "auto") {
+    throw StartupError(ExitCode::kConfiguration,
+                       config.model.path +
+                           " has operators that OpenCV does not have (backend in "
+                           "its model.json), and " +
+                           detail +
+                           ": take another network, or build again where libonnxruntime-dev is "
+                           "(Debian 13).");
+  }
   if (code == "backend_absent") {
     throw StartupError(ExitCode::kConfiguration,
                        "model.backend is onnxruntime, and " + detail +

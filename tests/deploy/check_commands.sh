@@ -20,8 +20,7 @@ expect 64 "unknown option '--everything'" deploy/package --everything
 expect 0 "perdure-{services,tools,gateway,ros2,python,models,dev}" deploy/package --help
 for script in deploy/demo deploy/install deploy/package tests/run .ci/run; do bash -n "$script"; done
 # What libcamera loads as it runs is no library that a program depends on: the list has to name it.
-eval "$(sed -n '/^runtime=(/,/)$/p' deploy/install)"
-case " ${runtime[*]} " in *" libcamera-ipa "*) ;; *)
+grep -qx libcamera-ipa <<< "$(deploy/install --list --runtime)" || {
   echo "deploy/install --runtime installs libcamera without its modules for sensors, libcamera-ipa"
-  exit 1 ;;
-esac
+  exit 1
+}

@@ -34,11 +34,13 @@ build_packages() {
   deploy/package > "$work/package.log" 2>&1 || { tail -n 30 "$work/package.log"; fail "deploy/package"; exit 1; }
 }
 
+# The packages are of this machine's release.
+release=$(. /etc/os-release && echo "${VERSION_CODENAME:-bookworm}")
 make_base() {
   [ -e "$work/base/etc/debian_version" ] && return
   rm -rf "$work/base.new"
   debootstrap --variant=minbase --include=systemd,systemd-sysv,dbus,udev,procps,iproute2 \
-    bookworm "$work/base.new" "$mirror" > "$work/debootstrap.log" 2>&1 ||
+    "$release" "$work/base.new" "$mirror" > "$work/debootstrap.log" 2>&1 ||
     skip "debootstrap cannot make a root ($(tail -n 1 "$work/debootstrap.log"))"
   mv "$work/base.new" "$work/base"
 }

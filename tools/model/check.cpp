@@ -50,7 +50,8 @@ double differenceOf(const inference::Tensor& tensor, const std::vector<float>& e
 Answers checkAnswers(const fs::path& path, const fs::path& reference) {
   const auto file = inference::readModelFile(path.string(), path.string() + ".model.json", {});
   const auto names = inference::tensorNames(file.description);
-  auto network = inference::loadNetwork({file.network, ""}, names);
+  const bool other = file.description.for_onnx_runtime;
+  auto network = inference::loadNetwork({file.network, "", other}, names);
   if (!network) throw notLoaded(path, network.error());
   const auto& input = file.description.input;
   const int sizes[] = {1, 3, input.height, input.width};
@@ -59,12 +60,12 @@ Answers checkAnswers(const fs::path& path, const fs::path& reference) {
   const cv::Mat blob(4, sizes, CV_32F, const_cast<float*>(noise.data()));
   const auto tensors = (*network)->forward(blob);
   if (!tensors) throw notLoaded(path, tensors.error());
-  Answers answers;
+  Answers answers{0.0, "", other ? "ONNX Runtime" : "OpenCV"};
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto& tensor = (*tensors)[i];
     const double difference =
         differenceOf(tensor, floatsIn(reference / (names[i] + ".f32"), tensor.values.size()));
-    if (difference >= answers.difference) answers = {difference, names[i]};
+    if (difference >= answers.difference) answers = {difference, names[i], answers.by};
   }
   return answers;
 }

@@ -81,12 +81,13 @@ void compare(const fs::path& network, const fs::path& reference) {
   if (answers.difference > kMostDifference) {
     throw StartupError(
         ExitCode::kConfiguration,
-        fmt::format("OpenCV computes {} of {} otherwise than the file says (by {:.2g} of its "
+        fmt::format("{} computes {} of {} otherwise than the file says (by {:.2g} of its "
                     "largest value), so that its boxes would be wrong; export it with another "
                     "opset (11 to 13), or a plainer network of the family",
-                    answers.tensor, network.string(), answers.difference));
+                    answers.by, answers.tensor, network.string(), answers.difference));
   }
-  std::printf("OpenCV      answers as the file says (within %.0e)\n", answers.difference);
+  std::printf("%-11s answers as the file says (within %.0e)\n", answers.by.c_str(),
+              answers.difference);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/subprocess.h"
+#include "services/inference/core/network/network.h"
 
 namespace perdure::tools {
 namespace {
@@ -52,6 +53,7 @@ int importNetwork(const ImportRequest& request) {
   if (!request.reference.empty()) {
     words.insert(words.end(), {"--reference", request.reference.string()});
   }
+  if (inference::hasOnnxRuntime()) words.emplace_back("--onnx-runtime");
   words.insert(words.end(), request.arguments.begin(), request.arguments.end());
   if (!fs::exists(kPython)) {
     throw StartupError(ExitCode::kUnavailable,

@@ -118,7 +118,8 @@ struct ModelDescription {
   double class_exponent = 1.0;
   std::vector<Level> levels;
   Outputs outputs;
-  BoxForm box_form;  ///< of `outputs` with whole boxes
+  bool for_onnx_runtime = false;  ///< OpenCV does not have all of its operators
+  BoxForm box_form;               ///< of `outputs` with whole boxes
   /// YOLOv8, NanoDet: a distance to a side is the mean over 0 … bins − 1; 1: the value itself
   int bins = 0;
   bool exponents = false;    ///< of one bin: the value is the distance's logarithm

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A Debian 12 root for the guest, its kernel, and the modules that Debian's kernel leaves out.
+# A Debian root of this machine's release for the guest, its kernel, and the modules that Debian's kernel leaves out.
 # usage: make_root.sh FOLDER; makes FOLDER/{root.img,vmlinuz,initrd}, unless what they are made of is as it was.
 # 77 where something that it needs is absent.
 set -euo pipefail
@@ -11,22 +11,24 @@ mkdir -p "$folder"
 folder=$(realpath "$folder")
 skip() { echo "$1: skipped"; exit 77; }
 
-eval "$(sed -n '/^runtime=(/,/)$/p' "$source/deploy/install")"
+mapfile -t runtime < <("$source/deploy/install" --list --runtime)
 packages=(systemd systemd-sysv udev kmod initramfs-tools zstd procps python3-minimal
   i2c-tools libcamera-ipa v4l-utils libasan8 libubsan1 "${runtime[@]}")
 version=$(apt-cache depends linux-headers-amd64 2> /dev/null |
   sed -n 's/.*Depends: linux-headers-\([0-9].*\)/\1/p' | head -n 1)
+series=$(cut -d. -f1,2 <<< "$version")
+release=$(. /etc/os-release && echo "${VERSION_CODENAME:-bookworm}")
 made_of=$({ echo "$version ${packages[*]}"; cat "$0" "$here"/kernel/*; } | sha256sum)
 [ ! -e "$folder/root.img" ] || [ "$(cat "$folder/made_of" 2> /dev/null)" != "$made_of" ] || exit 0
 
-[ -n "$version" ] && [ -d "/usr/src/linux-headers-$version" ] && [ -e /usr/src/linux-source-6.1.tar.xz ] ||
+[ -n "$version" ] && [ -d "/usr/src/linux-headers-$version" ] && [ -e "/usr/src/linux-source-$series.tar.xz" ] ||
   skip "the kernel's headers or its source are not here (deploy/install --guest)"
 
 # Sources of IIO's trigger by a timer, from Debian's kernel.
 modules=$folder/modules
 rm -rf "$modules"
 mkdir -p "$modules"
-tar -C "$modules" -xf /usr/src/linux-source-6.1.tar.xz --strip-components=3 --wildcards \
+tar -C "$modules" -xf "/usr/src/linux-source-$series.tar.xz" --strip-components=3 --wildcards \
   '*/drivers/iio/industrialio-configfs.c' '*/drivers/iio/industrialio-sw-trigger.c' '*/drivers/iio/trigger/iio-trig-hrtimer.c'
 mv "$modules"/trigger/*.c "$modules"
 cp "$here"/kernel/* "$modules"
@@ -36,11 +38,11 @@ make -C "/usr/src/linux-headers-$version" M="$modules" modules > "$folder/module
 root=$folder/root
 rm -rf "$root"
 trap 'rm -rf "$root"' EXIT
-debootstrap --variant=minbase --include=ca-certificates bookworm "$root" "$mirror" > "$folder/root.log" 2>&1 ||
+debootstrap --variant=minbase --include=ca-certificates "$release" "$root" "$mirror" > "$folder/root.log" 2>&1 ||
   skip "debootstrap cannot make a root ($(tail -n 1 "$folder/root.log"))"
 cat > "$root/etc/apt/sources.list" <<TEXT
-deb $mirror bookworm main
-deb $mirror-security bookworm-security main
+deb $mirror $release main
+deb $mirror-security $release-security main
 TEXT
 cp /etc/resolv.conf "$root/etc/"
 printf 'path-exclude=/usr/share/%s/*\n' doc man locale > "$root/etc/dpkg/dpkg.cfg.d/small"

@@ -1,5 +1,6 @@
-// Each family from the exported file to boxes with evidence: imported, repaired, loaded by OpenCV
-// and decoded as the service does, against what the generator computed from the published rules.
+// Each family from the exported file to boxes with evidence: imported, repaired, loaded by OpenCV,
+// or by ONNX Runtime where that alone has the operators, and decoded as the service does, against
+// what the generator computed from the published rules.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -56,8 +57,10 @@ std::vector<std::string> linesOf(const fs::path& file) {
 std::vector<inference::Candidate> candidatesOf(const fs::path& network, const fs::path& picture) {
   auto file = inference::readModelFile(network.string(), "", {});
   file.description.calibration = {1.0, 0.5};
-  auto loaded =
-      inference::loadWithOpenCv({file.network, ""}, inference::tensorNames(file.description));
+  const auto names = inference::tensorNames(file.description);
+  auto loaded = file.description.for_onnx_runtime
+                    ? inference::loadWithOnnxRuntime({file.network, ""}, names, 1)
+                    : inference::loadWithOpenCv({file.network, ""}, names);
   EXPECT_TRUE(loaded) << loaded.error().detail;
   const auto blob = inference::makeBlob(file.description.input, readPicture(picture));
   const auto tensors = (*loaded)->forward(*blob);
@@ -91,6 +94,10 @@ class Families : public ::testing::TestWithParam<const char*> {
   }
   void SetUp() override {
     if (folder_.empty()) GTEST_SKIP() << "python3-onnx is not installed (deploy/install --build)";
+    const bool queries = std::string(GetParam()).starts_with("rtdetr");
+    if (queries && !inference::hasOnnxRuntime()) {
+      GTEST_SKIP() << "skipped: built where ONNX Runtime is not (Debian 12 has none)";
+    }
     here_ = folder_ / GetParam();
     out_ = importedPath(here_ / "net.onnx", "");
   }
@@ -142,7 +149,8 @@ INSTANTIATE_TEST_SUITE_P(All, Families,
                                            "ssd", "ssd_offsets", "detr", "detr_sigmoids", "yolov10",
                                            "yolov10_both", "yolo26", "rtmdet", "rtmdet_suppressed",
                                            "picodet", "picodet_leftovers", "yolo_fastestv2",
-                                           "yolov8_qdq", "yolov8_dynamic", "yolov8_qlinear"),
+                                           "rtdetr", "rtdetr_chosen", "yolov8_qdq",
+                                           "yolov8_dynamic", "yolov8_qlinear"),
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace

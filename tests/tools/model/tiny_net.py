@@ -28,6 +28,7 @@ class Net:
         blob = (pixels - np.array(mean, np.float32)) * np.array(scale, np.float32)
         self.nodes, self.constants, self.values = [], [], {"images": blob.transpose(2, 0, 1)[None]}
         self.input_shape = [1, 3, SIZE, SIZE]
+        self.more_inputs = []  # (name, type, shape), of which the heads know nothing
         self.opset = 12
 
     def constant(self, value):
@@ -70,8 +71,8 @@ class Net:
         infos = [helper.make_tensor_value_info(n, FLOAT, s) for n, s in outputs]
         infos += [helper.make_tensor_value_info(n, t, None) for n, t in free_outputs]
         graph = helper.make_graph(self.nodes, "tiny",
-                                  [helper.make_tensor_value_info("images", FLOAT,
-                                                                 self.input_shape)], infos, self.constants)
+                                  [helper.make_tensor_value_info(*what) for what in
+                                   (("images", FLOAT, self.input_shape), *self.more_inputs)], infos, self.constants)
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", self.opset)])
         model.ir_version = 7
         helper.set_model_props(model, dict(metadata))

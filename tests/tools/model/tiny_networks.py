@@ -349,9 +349,10 @@ def detr_sigmoids(folder):
 
 
 def later():
-    """Those of later years are in a file of their own, which reads this one."""
+    """Those of later years are in files of their own, which read this one."""
     import tiny_networks_later
-    return tiny_networks_later.ALL
+    import tiny_queries
+    return *tiny_networks_later.ALL, *tiny_queries.ALL
 
 
 ALL = (yolov5, yolov5_heads, yolov7, yolov5_suppressed, yolov8, yolov8_masks, yolov8_open_size, yolov8_whole, yolox,

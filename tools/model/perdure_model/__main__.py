@@ -15,6 +15,7 @@ except ImportError as missing:
           "--model)", file=sys.stderr)
     sys.exit(69)
 
+from . import counterpart
 from . import heads as tracing
 from . import level_families, output_families, quantised, reshaping, sayings
 from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault
@@ -44,6 +45,7 @@ def parsed(arguments):
     parser.add_argument("--variances", default="0.1,0.2")
     parser.add_argument("--boxes", default="")
     parser.add_argument("--y-first", action="store_true")
+    parser.add_argument("--onnx-runtime", action="store_true", help="the program has it beside OpenCV")
     parser.add_argument("--bins", type=int)
     parser.add_argument("--cell-offset", type=float)
     for name in ("colour", "fit", "scale", "mean", "pad"):
@@ -57,6 +59,7 @@ class Request:
     def __init__(self, args):
         self.family, self.bins, self.cell_offset = args.family, args.bins, args.cell_offset
         self.boxes, self.y_first = args.boxes, args.y_first
+        self.onnx_runtime = args.onnx_runtime
         self.names = names_of(args.classes) if args.classes else None
         try:
             self.size, self.camera = (pair_of(text) for text in (args.size, args.camera))
@@ -139,6 +142,9 @@ def recognise(path, graph, size, request):
     best = found[0] if found else None
     choosing = tracing.choosing_operators(graph)
     disagrees = best is not None and best.disagreement is not None and best.disagreement >= level_families.AGREES
+    if (best is None or disagrees) and choosing and request.family in ("", "detr"):
+        best = output_families.queried(output_families.Outputs(graph, size, request)) or best
+        disagrees = disagrees and not (best and best.family == "detr")
     if (best is None or disagrees) and choosing and request.family != "detr":
         sayings.refuse_choosing(path, choosing, request.family)
     if best is None or disagrees and not request.anchors:
@@ -165,7 +171,8 @@ def check_names(path, found, request, graph):
     return names
 
 
-def cut(path, graph, found):
+def cut(path, graph, found, request):
+    """Returns the operators that are left and that OpenCV does not have."""
     was = {n.kind for n in graph.nodes}
     graph.keep(found.cuts)
     for old, new in found.cuts.items():  # the names may be taken: all others make way first
@@ -173,14 +180,15 @@ def cut(path, graph, found):
     for new in found.cuts.values():
         graph.rename(new, f"perdure_was_{new}")
         graph.rename(f"perdure_cut_{new}", new)
-    sayings.refuse_inside(path, graph, found.family)
+    inside = sayings.inside(path, graph, found.family, request.onnx_runtime)
     others = [i for i in graph.inputs if i != graph.image]
     if others:
         raise Fault(f"{path} needs the inputs {', '.join(others)} beside the image; export a network that takes an "
                     "image only")
-    gone = [k for k in tracing.CHOOSING if k in was]
+    gone = [k for k in tracing.CHOOSING if k in was - {n.kind for n in graph.nodes}]
     if gone:
         found.notes.append(f"{', '.join(gone)} was cut off: Perdure takes the heads before it")
+    return inside
 
 
 def other_size(args, graph, found, size, request):
@@ -196,6 +204,10 @@ def other_size(args, graph, found, size, request):
     return list(new)
 
 
+def input_of(found, request):
+    return {**INPUTS[found.family], **found.input, **request.input}
+
+
 def description(args, found, names, size, request):
     keys = dict(found.keys)
     if keys.get("boxes", {}).get("form") == "offsets":
@@ -204,19 +216,19 @@ def description(args, found, names, size, request):
         np.savetxt(str(args.out) + ".priors.txt", request.priors, fmt="%.7g")
     return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
             "family": found.family,
-            "input": {"width": size[0], "height": size[1], **INPUTS[found.family],
-                      **request.input}, "classes": names, **keys,
+            "input": {"width": size[0], "height": size[1], **input_of(found, request)}, "classes": names, **keys,
             "calibration": {"temperature": 1.0, "clutter_rate": USUAL_CLUTTER_RATE}}
 
 
-def write_reference(graph, size, given, outputs, folder):
-    """What the network answers to pixels of noise, computed here: OpenCV must say the same."""
+def write_reference(args, graph, size, given, found, inside):
+    """What the network answers to pixels of noise: the service must say the same."""
+    folder, outputs = args.reference, list(found.cuts.values())
     pixels = np.random.default_rng(11).uniform(0, 255, (1, 3, size[1], size[0]))
     mean, scale = (np.broadcast_to(given[k], 3).reshape(3, 1, 1) for k in ("mean", "scale"))
     image = ((pixels - mean) * scale).astype(np.float32)
-    values, stuck = graph.evaluate({graph.image: image}, outputs)
-    if any(o not in values for o in outputs):
-        return f"not compared with OpenCV's answers: {', '.join(sorted(set(stuck)))} has no counterpart here"
+    values, why = counterpart.answers(args.network, graph, image, found, outputs, inside)
+    if why:
+        return why
     folder.mkdir(parents=True, exist_ok=True)
     image.tofile(folder / "input.f32")
     for name in outputs:
@@ -234,14 +246,17 @@ def run(args):
     found = recognise(args.network, graph, size, request)
     names = check_names(args.network, found, request, graph)
     found.notes += [eight_bits] if eight_bits else []
-    cut(args.network, graph, found)
+    inside = cut(args.network, graph, found, request)
     size = other_size(args, graph, found, size, request)
     outputs = list(found.cuts.values())
-    given = {**INPUTS[found.family], **request.input}
+    given = input_of(found, request)
     if args.reference:  # of the graph as it was, so that a wrong repair shows too
-        why = write_reference(graph, size, given, outputs, args.reference)
+        why = write_reference(args, graph, size, given, found, inside)
         found.notes += [why] if why else []
-    repaired = Repair(graph).run()
+    repaired = {} if inside else Repair(graph).run()  # what OpenCV wants is not what the standard says
+    if inside:
+        found.keys["backend"] = "onnxruntime"
+        found.notes.append(f"it computes with {', '.join(inside)}, which OpenCV does not have: for ONNX Runtime alone")
     graph.keep(outputs)
     text = json.dumps(description(args, found, names, size, request), indent=1)
     try:

@@ -30,3 +30,4 @@ class Finding:
     notes: list = field(default_factory=list)    # sentences for people
     compared: str = ""                           # how its decoding was held against the file's own
     disagreement: float = None
+    input: dict = field(default_factory=dict)    # where it is another than the family's usual one

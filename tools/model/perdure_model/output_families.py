@@ -5,7 +5,7 @@ import numpy as np
 from .faults import Fault
 from .finding import Finding
 from .graph import Node
-from .heads import decoding_nodes, find_heads
+from .heads import CHOOSING, decoding_nodes, find_heads
 
 # The scores pass these as they are, so that an activation before them may be left out.
 PASSING = {"Reshape", "Transpose", "Concat", "Slice", "Squeeze", "Unsqueeze", "Flatten", "Identity", "Split", "Cast",
@@ -17,12 +17,15 @@ class Outputs:
     def __init__(self, graph, size, request):
         self.graph, self.size, self.request = graph, size, request
         self.shapes = {o: graph.shape(o) for o in graph.outputs}
+        self.known = None  # (boxes, scores), where they are found behind the outputs
 
     def of_rank(self, rank):
         return {o: s for o, s in self.shapes.items() if s is not None and len(s) == rank and s[0] == 1}
 
     def pair(self):
         """(boxes, scores) where one output is (1,N,4) and another (1,N,C)."""
+        if self.known:
+            return self.known
         found = self.of_rank(3)
         count = len(self.request.names or [])
         pairs = [(b, s) for b in found for s in found if b != s and found[b][2] == 4 and found[b][1] == found[s][1]]
@@ -177,6 +180,61 @@ def two(outputs):
     form = box_form(outputs, boxes, family, found)
     if form:
         found.keys["boxes"] = form
+    return found
+
+
+def chosen(graph, name):
+    """Whether the rows of a tensor were picked out of others, and are no decoder's answers."""
+    producers, todo = graph.producers(), [name]
+    while todo:
+        node = producers.get(todo.pop())
+        if node is None:
+            continue
+        if node.kind in CHOOSING or node.kind in ("GatherElements", "GatherND"):
+            return True
+        if node.kind in PASSING or node.kind in ("Sigmoid", "Softmax", "Mul", "Div"):
+            todo += node.inputs
+    return False
+
+
+def before_choice(outputs):
+    """(boxes, scores) of a decoder behind which its exporter added the choice of the best: the
+    sigmoids that TopK looks at, and the boxes (1,Q,4) of centres that are taken apart for corners."""
+    graph = outputs.graph
+    producers = graph.producers()
+    ends = graph.ancestors([o for o in graph.outputs])
+    for choice in reversed([n for n in ends if n.kind == "TopK"]):
+        scores = choice.inputs[0]
+        while scores in producers and producers[scores].kind in ("Reshape", "Flatten", "Squeeze"):
+            scores = producers[scores].inputs[0]
+        shape = graph.shape(scores)
+        if shape is None or len(shape) != 3 or scores not in producers or producers[scores].kind != "Sigmoid":
+            continue
+        for node in reversed(ends):
+            whole = graph.shape(node.inputs[0]) if node.inputs else None
+            apart = node.kind in ("Split", "Gather", "Slice") and whole == [1, shape[1], 4]
+            if apart and not chosen(graph, node.inputs[0]):
+                return node.inputs[0], scores
+    return None
+
+
+def queried(outputs):
+    """RT-DETR, D-FINE and their kin: a decoder answers for queries that were chosen before it."""
+    graph, pair = outputs.graph, outputs.pair()
+    if pair is None or any(chosen(graph, name) for name in pair):
+        pair = before_choice(outputs)
+        if pair is None or pair[0] in graph.outputs:
+            return None
+        graph.outputs = [*graph.outputs, *pair]
+        outputs.shapes.update({name: graph.shape(name) for name in pair})
+        outputs.known = pair
+    found = two(outputs)
+    if found is None or found.family != "detr":
+        return None
+    found.input = {"scale": 1 / 255, "mean": [0, 0, 0]}
+    found.notes.append("its queries are chosen inside, as in RT-DETR and D-FINE, and its input is taken for theirs: "
+                       "colours from 0 to 1; where it is another give --scale and --mean")
+    found.compared = "its boxes are taken as the file gives them"
     return found
 
 

@@ -1,5 +1,7 @@
 """What is said where a network cannot be taken: the operator's name, and the export that works."""
 
+from onnx import GraphProto
+
 from .faults import Fault
 
 FAMILIES = ("yolov5", "yolov7", "yolov8", "yolox", "nanodet", "picodet", "rtmdet", "fastestdet", "yolo-fastestv2", "ssd",
@@ -45,14 +47,17 @@ def refuse_own(path, graph):
                     "tools/train wrote beside it")
 
 
-def refuse_inside(path, graph, family):
-    """Operators that are left after the cut and that OpenCV 4.6 has not."""
+def inside(path, graph, family, onnx_runtime):
+    """Operators that are left after the cut and that OpenCV 4.6 has not. Refused where there is no
+    ONNX Runtime, which has them unless they are another runtime's own or hold graphs."""
     found = sorted({n.kind for n in graph.nodes if n.kind in INSIDE or n.domain})
-    if not found:
-        return
+    own = any(n.domain or any(isinstance(a, GraphProto) for a in n.attributes.values()) for n in graph.nodes)
+    if not found or (onnx_runtime and not own):
+        return found
     foreign = sorted({f"{n.domain}.{n.kind}" for n in graph.nodes if n.domain})
     more = f" {', '.join(foreign)} belong to another runtime." if foreign else ""
     if "TopK" in found and family == "detr":
-        more += " RT-DETR and its kin choose their queries so; take DETR, or a YOLO."
+        more += " RT-DETR and its kin choose their queries so; take DETR or a YOLO, or a Perdure that was built with " \
+                "ONNX Runtime (Debian 13)."
     raise Fault(f"{path} computes with {', '.join(found)} inside the network, which OpenCV 4.6 does not have.{more} "
                 f"{exports(family)}")

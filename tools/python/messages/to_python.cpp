@@ -102,9 +102,9 @@ class Giver {
   }
   template <class W>
   void pose(const char*, const RigidTransform& d, W&) {
-    static const MessageClass& type = messageClass("Pose");
-    py::object pose = type.make();
-    Giver giver(type, pose);
+    static const MessageClass* const type = &messageClass("Pose");
+    py::object pose = type->make();
+    Giver giver(*type, pose);
     giver.set(arrayOf(Eigen::Vector4d(d.q.coeffs())));
     giver.set(arrayOf(d.p));
     set(std::move(pose));

@@ -175,17 +175,9 @@ bool World::setTime(double t_s) {
 }
 
 void World::intersect(const int* valid, RTCRayHit8& rays) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect8(valid, top_, &context, &rays);
+  intersectCoherent(valid, top_, rays);
 }
 
-void World::occluded(const int* valid, RTCRay8& rays) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcOccluded8(valid, top_, &context, &rays);
-}
+void World::occluded(const int* valid, RTCRay8& rays) const { occludedCoherent(valid, top_, rays); }
 
 }  // namespace perdure::tools

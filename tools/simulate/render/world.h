@@ -1,9 +1,7 @@
 // A scene as Embree holds it: all that stays where it is in one tree of triangles, and each object
-// that moves, comes or goes an instance beside it, of which only the transform changes. Embree 3.13
+// that moves, comes or goes an instance beside it, of which only the transform changes. Embree
 // (Wald et al., SIGGRAPH 2014).
 #pragma once
-
-#include <embree3/rtcore.h>
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "common/sim/scene.h"
+#include "tools/simulate/render/embree.h"
 #include "tools/simulate/render/surface.h"
 
 namespace perdure::tools {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <libcamera/control_ids.h>
 #include <libcamera/formats.h>
+#include <libcamera/transform.h>
+#include <libcamera/version.h>
 
 #include <array>
 #include <cmath>
@@ -61,6 +63,28 @@ class Asking {
   std::string missing_, refused_;
 };
 
+// From 0.5 on each of the two is automatic or not by itself, and ignored while it is. A camera
+// without an automatic gain then has no AeEnable.
+#if LIBCAMERA_VERSION_MAJOR > 0 || LIBCAMERA_VERSION_MINOR >= 5
+void askManualExposure(Asking& asking) {
+  if (!asking.offers(controls::ExposureTimeMode)) {
+    return asking.set(controls::AeEnable, false, "camera.exposure_ms");
+  }
+  asking.list().set(controls::ExposureTimeMode,
+                    static_cast<std::int32_t>(controls::ExposureTimeModeManual));
+}
+void askManualGain(Asking& asking) {
+  if (!asking.offers(controls::AnalogueGainMode)) return;
+  asking.list().set(controls::AnalogueGainMode,
+                    static_cast<std::int32_t>(controls::AnalogueGainModeManual));
+}
+#else
+void askManualExposure(Asking& asking) {
+  asking.set(controls::AeEnable, false, "camera.exposure_ms");
+}
+void askManualGain(Asking&) {}
+#endif
+
 /// Without it the images would be of another lens than the rig's, and nobody would see why.
 void askFocus(const CameraSettings& settings, Asking& asking) {
   const bool manual = settings.focus == "manual";
@@ -82,6 +106,23 @@ void askFocus(const CameraSettings& settings, Asking& asking) {
   asking.list().set(controls::LensPosition, place);
 }
 
+libcamera::Transform transformOf(const std::string& flip) {
+  if (flip == "horizontal") return libcamera::Transform::HFlip;
+  if (flip == "vertical") return libcamera::Transform::VFlip;
+  return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
+}
+
+// What was a change of the upright image became the orientation that comes of it in libcamera 0.2.
+#if __has_include(<libcamera/orientation.h>)
+libcamera::Orientation orientationOf(const std::string& flip) {
+  return libcamera::Orientation::Rotate0 * transformOf(flip);
+}
+auto& orientationIn(auto& configuration) { return configuration.orientation; }
+#else
+libcamera::Transform orientationOf(const std::string& flip) { return transformOf(flip); }
+auto& orientationIn(auto& configuration) { return configuration.transform; }
+#endif
+
 }  // namespace
 
 AskedControls controlsFor(const CameraSettings& settings,
@@ -94,11 +135,12 @@ AskedControls controlsFor(const CameraSettings& settings,
                       libcamera::Span<const std::int64_t, 2>(limits));
   }
   if (settings.exposure_ms > 0.0) {
-    asking.set(controls::AeEnable, false, "camera.exposure_ms");
+    askManualExposure(asking);
     asking.set(controls::ExposureTime, static_cast<std::int32_t>(1e3 * settings.exposure_ms),
                "camera.exposure_ms");
   }
   if (settings.gain > 0.0) {
+    askManualGain(asking);
     asking.set(controls::AnalogueGain, static_cast<float>(settings.gain), "camera.gain");
   }
   if (settings.crop.size() == 4) {
@@ -114,10 +156,12 @@ AskedControls controlsFor(const CameraSettings& settings,
 
 std::span<const KnownFormat> knownFormats() { return kFormats; }
 
-libcamera::Transform transformOf(const std::string& flip) {
-  if (flip == "horizontal") return libcamera::Transform::HFlip;
-  if (flip == "vertical") return libcamera::Transform::VFlip;
-  return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
+void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip) {
+  orientationIn(configuration) = orientationOf(flip);
+}
+
+bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip) {
+  return orientationIn(configuration) == orientationOf(flip);
 }
 
 }  // namespace perdure::capture

@@ -1,9 +1,9 @@
 // What is asked of a camera by libcamera's controls.
 #pragma once
 
+#include <libcamera/camera.h>
 #include <libcamera/controls.h>
 #include <libcamera/pixel_format.h>
-#include <libcamera/transform.h>
 
 #include <span>
 #include <string>
@@ -27,7 +27,9 @@ using KnownFormat = std::pair<libcamera::PixelFormat, PixelLayout>;
 /// The best first.
 std::span<const KnownFormat> knownFormats();
 
-/// Of `camera.flip`.
-libcamera::Transform transformOf(const std::string& flip);
+/// Asks for `camera.flip`; validate() takes back what the camera cannot do.
+void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
+/// Whether it is still asked for.
+bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
 
 }  // namespace perdure::capture

@@ -129,8 +129,7 @@ Result<void> Session::configure() {
   chooseFormat(wanted);
   wanted.size = {settings_.width, settings_.height};
   wanted.bufferCount = RunningCamera::kBuffers;
-  const libcamera::Transform turned = transformOf(settings_.flip);
-  configuration_->transform = turned;
+  askFlip(*configuration_, settings_.flip);
   const bool valid = configuration_->validate() != libcamera::CameraConfiguration::Invalid;
   const auto formats = knownFormats();
   const auto known = std::find_if(formats.begin(), formats.end(), [&](const auto& entry) {
@@ -147,7 +146,7 @@ Result<void> Session::configure() {
                     settings_.format, settings_.width, settings_.height));
   }
   layout_ = known->second;
-  if (configuration_->transform != turned) {
+  if (!flips(*configuration_, settings_.flip)) {
     return fail("camera_absent",
                 fmt::format("the camera {} cannot mirror its images; set camera.flip to none, and "
                             "calibrate it as it is mounted.",

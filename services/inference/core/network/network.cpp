@@ -25,6 +25,7 @@ Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile&,
 Result<std::unique_ptr<Network>> loadNetwork(const NetworkFile& file,
                                              const std::vector<std::string>& tensors,
                                              Backend backend, int threads) {
+  if (backend == Backend::kAuto && file.for_onnx_runtime) backend = Backend::kOnnxRuntime;
   if (backend == Backend::kOnnxRuntime) return loadWithOnnxRuntime(file, tensors, threads);
   auto by_opencv = loadWithOpenCv(file, tensors);
   const bool other = backend == Backend::kAuto && hasOnnxRuntime() && file.darknet_weights.empty();

@@ -13,7 +13,8 @@
 namespace perdure::inference {
 
 enum class Backend {
-  kAuto,  ///< OpenCV, and where it does not take the file ONNX Runtime
+  kAuto,  ///< ONNX Runtime for a file that is for it; else OpenCV, and where it does not take the
+          ///< file ONNX Runtime
   kOpenCv,
   kOnnxRuntime,
 };
@@ -25,8 +26,9 @@ Backend backendOf(const std::string& name);
 bool hasOnnxRuntime();
 
 struct NetworkFile {
-  std::string bytes;            ///< of an .onnx, or of a Darknet .cfg
-  std::string darknet_weights;  ///< bytes of its .weights; empty: ONNX
+  std::string bytes;              ///< of an .onnx, or of a Darknet .cfg
+  std::string darknet_weights;    ///< bytes of its .weights; empty: ONNX
+  bool for_onnx_runtime = false;  ///< as its description says
 };
 
 class Network {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/process/held_errors.h"
 #include "services/inference/core/network/network.h"
 
 namespace perdure::inference {
@@ -120,6 +121,10 @@ Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile& file,
   if (!file.darknet_weights.empty()) {
     return fail("model_unreadable", kWho + std::string("does not take Darknet files"));
   }
+  // Debian's library registers operators that ONNX's own has registered before it, which complains
+  // of each of them.
+  const HeldErrors held(
+      [](const std::string& line) { return !line.empty() && !line.starts_with("Schema error: "); });
   try {
     auto network = std::make_unique<OnnxRuntimeNetwork>(file.bytes, tensors, threads);
     if (const auto suits = network->suits(); !suits) return tl::unexpected(suits.error());

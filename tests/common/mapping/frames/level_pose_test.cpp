@@ -95,7 +95,8 @@ TEST(Levelled, TakesTheZAxisWhereXIsVertical) {
   R.col(0) = Eigen::Vector3d::UnitZ();
   R.col(2) = rotationAboutZ(0.7).col(0);
   R.col(1) = R.col(2).cross(R.col(0));
-  EXPECT_NEAR(yawOf(levelled({R, {}}, Eigen::Vector3d::UnitZ()).R()), 0.7, 1e-12);
+  EXPECT_NEAR(yawOf(levelled({R, Eigen::Vector3d::Zero()}, Eigen::Vector3d::UnitZ()).R()), 0.7,
+              1e-12);
 }
 
 }  // namespace

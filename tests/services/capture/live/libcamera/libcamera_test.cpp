@@ -1,6 +1,7 @@
 // What of libcamera can be asked without a camera.
 #include <gmock/gmock.h>
 #include <libcamera/libcamera.h>
+#include <libcamera/version.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -120,6 +121,66 @@ TEST(LibcameraControls, ARegionOfInterestIsAskedForOrMissed) {
   const libcamera::ControlInfoMap none(libcamera::ControlInfoMap::Map{}, controls::controls);
   EXPECT_THAT(controlsFor(settings, none).missing, HasSubstr("ScalerCrop (camera.crop)"));
 }
+
+#if LIBCAMERA_VERSION_MAJOR > 0 || LIBCAMERA_VERSION_MINOR >= 5
+TEST(LibcameraControls, ExposureAndGainAreMadeManualEachWhereTheCameraHasThatApart) {
+  const auto mode = [] { return libcamera::ControlInfo(0, 1, 0); };
+  libcamera::ControlInfoMap::Map map = {
+      {&controls::ExposureTimeMode, mode()},
+      {&controls::ExposureTime, libcamera::ControlInfo(100, 500'000, 15'600)},
+      {&controls::AnalogueGainMode, mode()},
+      {&controls::AnalogueGain, libcamera::ControlInfo(0.5F, 4.0F, 1.0F)}};
+  const libcamera::ControlInfoMap offered{std::move(map), controls::controls};
+  const AskedControls asked = controlsFor(manual(), offered);
+  EXPECT_EQ(asked.list.get(controls::ExposureTimeMode), controls::ExposureTimeModeManual);
+  EXPECT_EQ(asked.list.get(controls::AnalogueGainMode), controls::AnalogueGainModeManual);
+  EXPECT_EQ(asked.missing, "");
+}
+#endif
+
+/// A camera that cannot turn its images.
+class Fixed : public libcamera::CameraConfiguration {
+ public:
+  Status validate() override {
+    const bool as_it_was = flips(*this, "none");
+    if (!as_it_was) askFlip(*this, "none");
+    return as_it_was ? Valid : Adjusted;
+  }
+};
+
+TEST(LibcameraControls, AFlipIsAskedForAndItIsSeenWhereTheCameraTakesItBack) {
+  for (const char* flip : {"horizontal", "vertical", "both"}) {
+    Fixed configuration;
+    EXPECT_TRUE(flips(configuration, "none")) << "as it comes";
+    askFlip(configuration, flip);
+    EXPECT_TRUE(flips(configuration, flip));
+    EXPECT_FALSE(flips(configuration, "none"));
+    configuration.validate();
+    EXPECT_FALSE(flips(configuration, flip));
+  }
+}
+
+#if __has_include(<libcamera/orientation.h>)
+TEST(LibcameraControls, AFlipIsAnOrientationOfTheUprightImage) {
+  Fixed configuration;
+  askFlip(configuration, "horizontal");
+  EXPECT_EQ(configuration.orientation, libcamera::Orientation::Rotate0Mirror);
+  askFlip(configuration, "vertical");
+  EXPECT_EQ(configuration.orientation, libcamera::Orientation::Rotate180Mirror);
+  askFlip(configuration, "both");
+  EXPECT_EQ(configuration.orientation, libcamera::Orientation::Rotate180);
+}
+#else
+TEST(LibcameraControls, AFlipIsATransformOfTheUprightImage) {
+  Fixed configuration;
+  askFlip(configuration, "horizontal");
+  EXPECT_EQ(configuration.transform, libcamera::Transform::HFlip);
+  askFlip(configuration, "vertical");
+  EXPECT_EQ(configuration.transform, libcamera::Transform::VFlip);
+  askFlip(configuration, "both");
+  EXPECT_EQ(configuration.transform, libcamera::Transform::HVFlip);
+}
+#endif
 
 TEST(LibcameraLog, KeepsTheWordsOfWarningsAndWhatIsWorse) {
   EXPECT_EQ(worthLogging("[0:01:02.34] [77] ERROR V4L2 v4l2_videodevice.cpp:1697 /dev/video0: "

@@ -23,8 +23,8 @@ ModelDescription tinyDescription() {
 }
 
 /// What decodes from heads that are the same in all four cells.
-std::vector<Candidate> decoded(const testing::TinyOnnx& tiny, const DecodeOptions& options,
-                               ModelDescription model = tinyDescription()) {
+std::vector<Candidate> decodedHeads(const testing::TinyOnnx& tiny, const DecodeOptions& options,
+                                    ModelDescription model = tinyDescription()) {
   std::vector<std::vector<float>> values;
   for (const auto* head : {&tiny.box, &tiny.logits, &tiny.azimuth}) {
     values.emplace_back();
@@ -48,7 +48,7 @@ TEST(DecodePerdure, CellsReachBeyondABorderThatTheStrideDoesNotDivide) {
 }
 
 TEST(DecodePerdure, SidesAreSoftPlusDistancesFromTheCentreOfTheCell) {
-  const auto out = decoded({}, {0.05, {0, 1}});
+  const auto out = decodedHeads({}, {0.05, {0, 1}});
   ASSERT_EQ(out.size(), 4u);
   const Box& b = out[3].box;  // column 1, row 1: centre (48, 48)
   EXPECT_NEAR(b.x1, 48 - 32 * softPlus(0.5), 1e-5);
@@ -62,7 +62,7 @@ TEST(DecodePerdure, ACellMayLieOutsideTheObjectThatItFinds) {
   model.reach = 0.5;
   testing::TinyOnnx tiny;
   tiny.box = {-5.0F, 1.0F, 2.0F, 2.0F};
-  const Box b = decoded(tiny, {0.05, {0, 1}}, model)[3].box;
+  const Box b = decodedHeads(tiny, {0.05, {0, 1}}, model)[3].box;
   EXPECT_NEAR(b.x1, 48 - 32 * (softPlus(-5.0) - 0.5), 1e-5);
   EXPECT_GT(b.x1, 48) << "to the right of the cell's centre";
 }
@@ -86,11 +86,11 @@ TEST(DecodePerdure, SpreadIsTheDeviationOfEachSide) {
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR((*out)[0].side_sigma[i], 1.5 * 32 * softPlus(spread[i]), 1e-4);
   }
-  EXPECT_EQ(decoded(tiny, {0.05, {0, 1}})[0].side_sigma[0], 0.0) << "unknown without a spread";
+  EXPECT_EQ(decodedHeads(tiny, {0.05, {0, 1}})[0].side_sigma[0], 0.0) << "unknown without a spread";
 }
 
 TEST(DecodePerdure, ActivationsAreLogitsAgainstTheBackgroundsCalibrated) {
-  const auto out = decoded({}, {0.05, {0, 1}});
+  const auto out = decodedHeads({}, {0.05, {0, 1}});
   const double sum = 1 + std::exp(1.0) + std::exp(-2.0);
   EXPECT_NEAR(out[0].score, std::exp(1.0) / sum, 1e-6);
   ASSERT_EQ(out[0].activations.size(), 3u);
@@ -101,8 +101,8 @@ TEST(DecodePerdure, ActivationsAreLogitsAgainstTheBackgroundsCalibrated) {
 
 TEST(DecodePerdure, ThresholdLooksAtTheSoftMaxOfTheWantedClasses) {
   const double p = std::exp(-2.0) / (1 + std::exp(1.0) + std::exp(-2.0));
-  EXPECT_TRUE(decoded({}, {p + 0.001, {1}}).empty());
-  const auto out = decoded({}, {p - 0.001, {1}});
+  EXPECT_TRUE(decodedHeads({}, {p + 0.001, {1}}).empty());
+  const auto out = decodedHeads({}, {p - 0.001, {1}});
   ASSERT_EQ(out.size(), 4u);
   EXPECT_EQ(out[0].activations.size(), 2u);
 }
@@ -110,18 +110,18 @@ TEST(DecodePerdure, ThresholdLooksAtTheSoftMaxOfTheWantedClasses) {
 TEST(DecodePerdure, NoLookIsCertain) {
   testing::TinyOnnx sure;
   sure.logits = {-900.0F, 900.0F, 0.0F};
-  const auto out = decoded(sure, {0.05, {0, 1}});
+  const auto out = decodedHeads(sure, {0.05, {0, 1}});
   EXPECT_NEAR(out[0].activations[1], 15 + std::log(3.0), 1e-4);
 }
 
 TEST(DecodePerdure, AzimuthIsTheLikeliestBinAndItsResidual) {
-  const auto out = decoded({}, {0.05, {0, 1}});
+  const auto out = decodedHeads({}, {0.05, {0, 1}});
   ASSERT_TRUE(out[0].azimuth);
   EXPECT_NEAR(*out[0].azimuth, kPi / 2 + 0.5 * kPi / 4, 1e-6);
   EXPECT_GT(out[0].azimuth_sigma, 0.2);
   testing::TinyOnnx other;
   other.azimuth = {0, 0, 0, 6, 0, 0, 0, 0};
-  EXPECT_NEAR(*decoded(other, {0.05, {0, 1}})[0].azimuth, -kPi / 2, 1e-6);
+  EXPECT_NEAR(*decodedHeads(other, {0.05, {0, 1}})[0].azimuth, -kPi / 2, 1e-6);
 }
 
 TEST(DecodePerdure, SigmaGrowsWithDoubtButNotByAMistakeOfFrontForBack) {
@@ -129,16 +129,16 @@ TEST(DecodePerdure, SigmaGrowsWithDoubtButNotByAMistakeOfFrontForBack) {
   sure.azimuth = {0, 40, 0, 0, 0, 0, 0, 0};
   flipped.azimuth = {0, 40, 0, 40, 0, 0, 0, 0};
   doubtful.azimuth = {40, 40, -40, -40, 0, 0, 0, 0};
-  EXPECT_NEAR(decoded(sure, {0.05, {0}})[0].azimuth_sigma, 0.2, 1e-6);
-  EXPECT_NEAR(decoded(flipped, {0.05, {0}})[0].azimuth_sigma, 0.2, 1e-6);
-  EXPECT_GT(decoded(doubtful, {0.05, {0}})[0].azimuth_sigma, kPi / 4);
+  EXPECT_NEAR(decodedHeads(sure, {0.05, {0}})[0].azimuth_sigma, 0.2, 1e-6);
+  EXPECT_NEAR(decodedHeads(flipped, {0.05, {0}})[0].azimuth_sigma, 0.2, 1e-6);
+  EXPECT_GT(decodedHeads(doubtful, {0.05, {0}})[0].azimuth_sigma, kPi / 4);
 }
 
 TEST(DecodePerdure, OnlyClassesThatHaveAnAzimuthReportOne) {
   testing::TinyOnnx person;
   person.logits = {0.0F, 1.0F, 2.0F};
-  EXPECT_FALSE(decoded(person, {0.05, {0, 1}})[0].azimuth);
-  EXPECT_TRUE(decoded(person, {0.05, {0}})[0].azimuth) << "the best wanted class is the car";
+  EXPECT_FALSE(decodedHeads(person, {0.05, {0, 1}})[0].azimuth);
+  EXPECT_TRUE(decodedHeads(person, {0.05, {0}})[0].azimuth) << "the best wanted class is the car";
 }
 
 TEST(DecodePerdure, AModelMayHaveNoAzimuthAtAll) {
@@ -148,7 +148,7 @@ TEST(DecodePerdure, AModelMayHaveNoAzimuthAtAll) {
   json.replace(json.find(R"(, "azimuth": "azimuth32")"), 24, "");
   const auto model = parseModelDescription(json, "m.json");
   EXPECT_EQ(tensorNames(model), (std::vector<std::string>{"box32", "logits32"}));
-  EXPECT_FALSE(decoded(plain, {0.05, {0, 1}}, model)[0].azimuth);
+  EXPECT_FALSE(decodedHeads(plain, {0.05, {0, 1}}, model)[0].azimuth);
 }
 
 TEST(DecodePerdure, RefusesADescriptionThatDoesNotFitItself) {

@@ -57,6 +57,22 @@ TEST_F(Backends, SayThatTheBuildHasNoOnnxRuntime) {
   EXPECT_THAT(error(config({}, "onnxruntime")), HasSubstr("build again where libonnxruntime-dev"));
 }
 
+TEST_F(Backends, OfAutoIsTheOneThatTheDescriptionNames) {
+  const Config c = config({}, "auto");
+  std::string description = testing::TinyOnnx().json();
+  description.insert(1, R"("backend": "onnxruntime", )");
+  std::ofstream(c.model.path + ".model.json") << description;
+  if (hasOnnxRuntime()) {
+    EXPECT_THAT(Node(c, 1).backend(), HasSubstr("ONNX Runtime"));
+  } else {
+    EXPECT_THAT(error(c), HasSubstr("has operators that OpenCV does not have"));
+    EXPECT_THAT(error(c), HasSubstr("build again where libonnxruntime-dev is (Debian 13)"));
+  }
+  description.replace(description.find("onnxruntime"), 11, "tensorflow!");
+  std::ofstream(c.model.path + ".model.json") << description;
+  EXPECT_THAT(error(c), HasSubstr("backend: \"tensorflow!\" is not one of auto, onnxruntime"));
+}
+
 class OnnxRuntime : public Backends {
  protected:
   void SetUp() override {
