@@ -316,16 +316,24 @@ class Network(unittest.TestCase):
             support.SOURCE / "config/semantic_filter.yaml", "--set", "bus.vehicle=driven",
         ), Child(*script(LOOKS.replace("NATS", str(nats))), drive.mcap) as network:  # fmt: skip
             next(perdure.subscribe("model", vehicle="driven", timeout=20))
+            for subscription in heard.values():
+                self.assertTrue(subscription.wait_for_writer(20))
             later, last = [], None
             for pose in self.frames(spoiled=()):
                 found = next(heard["detections"])
                 if found.stamp.sequence >= 30:
                     later.append(found)
-                # The filter's predictions of the frame before are there for the next one.
+                # The filter's predictions of the frame before are there for the next one. What was
+                # given before filter and network had found each other is lost.
+                begins = pose.stamp.sequence < 5
                 while pose.stamp.sequence > 0 and (
                     last is None or last.stamp.sequence < pose.stamp.sequence - 1
                 ):
-                    last = next(heard["objects"])
+                    came = heard["objects"].next(1 if begins else 20)
+                    if came is None and begins:
+                        break
+                    self.assertIsNotNone(came, "objects stopped")
+                    last = came
             while last is None or last.stamp.sequence < pose.stamp.sequence:
                 last = next(heard["objects"])
             network.process.terminate()
