@@ -51,35 +51,84 @@ std::optional<std::int64_t> LeastDelay::offset() const {
 
 void Clocks::addInput(const std::string& input, bool shared) { inputs_[input].shared = shared; }
 
-void Clocks::observeCommon(TimePoint time, std::int64_t now_ns) {
-  Input& input = inputs_[kElsewhere];
-  if (reference_.empty()) reference_ = kElsewhere;
-  const std::int64_t ns = toNanoseconds(time);
-  input.delay.observe(ns, now_ns);
-  input.last_offset_ns = now_ns - ns;
-  input.last_heard_ns = now_ns;
+void Clocks::hear(Input& input, std::int64_t offset_ns, std::int64_t now_ns) const {
+  if (input.heard_ns && near(offset_ns, input.offset_ns)) {
+    if (!input.kept_ns || !near(*input.kept_ns, offset_ns)) input.kept_since_ns = *input.heard_ns;
+    input.kept_ns = offset_ns;
+  }
+  input.offset_ns = offset_ns;
+  input.heard_ns = now_ns;
 }
 
-Result<void> Clocks::requireSame(const std::string& name, std::int64_t offset_ns,
-                                 std::int64_t now_ns) const {
-  if (reference_.empty() || reference_ == name) return {};
-  const Input& other = inputs_.at(reference_);
-  if (now_ns - other.last_heard_ns > kSecond) return {};  // it may have jumped, too
-  const std::int64_t apart = offset_ns - other.last_offset_ns;
-  if (std::llabs(apart) <= apart_ns_) return {};
-  return fail("stamp_elsewhere",
-              fmt::format("stamps of {0} are {1} {2} those of {3}: two clocks. Let both drivers "
-                          "stamp by one clock, or set in.{0}.clock: own",
-                          name, spanText(apart), apart > 0 ? "behind" : "ahead of", reference_));
+bool Clocks::near(std::int64_t a_ns, std::int64_t b_ns) const {
+  return std::llabs(a_ns - b_ns) <= apart_ns_;
+}
+
+void Clocks::observeCommon(TimePoint time, std::int64_t now_ns) {
+  Input& input = inputs_[kElsewhere];
+  const std::int64_t ns = toNanoseconds(time);
+  hear(input, now_ns - ns, now_ns);
+  input.delay.observe(ns, now_ns);
+  if (reference_.empty() || reference_ == kElsewhere) {
+    reference_ = kElsewhere;
+    common_ns_ = now_ns - ns;
+  }
+}
+
+std::vector<std::string> Clocks::keepersOf(std::int64_t offset_ns, std::int64_t now_ns) const {
+  std::vector<std::string> keepers;
+  for (const auto& [name, input] : inputs_) {
+    if (input.shared && input.kept_ns && now_ns - *input.heard_ns <= kSecond &&
+        near(*input.kept_ns, offset_ns))
+      keepers.push_back(name);
+  }
+  return keepers;
+}
+
+Reason Clocks::elsewhere(const std::string& name, std::int64_t offset_ns,
+                         std::int64_t now_ns) const {
+  std::vector<std::string> others = keepersOf(*common_ns_, now_ns);
+  std::erase(others, name);
+  const std::int64_t apart = offset_ns - *common_ns_;
+  const std::string span = spanText(apart) + (apart > 0 ? " behind" : " ahead of");
+  if (others.empty()) {
+    return {"stamp_elsewhere", "stamps of " + name + " are " + span +
+                                   " those before: was the clock set, or are there two drivers?"};
+  }
+  return {"stamp_elsewhere",
+          fmt::format("stamps of {0} are {1} those of {2}: two clocks. Let both drivers "
+                      "stamp by one clock, or set in.{0}.clock: own",
+                      name, span, others.front())};
+}
+
+Result<void> Clocks::requireCommon(const std::string& name, std::int64_t offset_ns,
+                                   std::int64_t now_ns) {
+  if (common_ns_ && near(*common_ns_, offset_ns)) {
+    common_ns_ = offset_ns;
+    return {};
+  }
+  const std::vector<std::string> keepers = keepersOf(offset_ns, now_ns);
+  const bool kept_long = std::any_of(keepers.begin(), keepers.end(), [&](const std::string& one) {
+    return now_ns - inputs_.at(one).kept_since_ns >= kSecond / 2;
+  });
+  const bool nobody_else = std::count_if(inputs_.begin(), inputs_.end(),
+                                         [](const auto& one) { return one.second.shared; }) == 1;
+  const std::size_t before = common_ns_ ? keepersOf(*common_ns_, now_ns).size() : 0;
+  if ((keepers.size() > 1 || kept_long || nobody_else) && keepers.size() > before) {
+    common_ns_ = offset_ns;
+    reference_ = name;
+    return {};
+  }
+  if (common_ns_) return tl::unexpected(elsewhere(name, offset_ns, now_ns));
+  return fail("clock_unknown");  // for a moment: nothing to tell a person
 }
 
 Result<std::int64_t> Clocks::onCommon(const std::string& name, Input& input, std::int64_t stamp_ns,
                                       std::int64_t now_ns) {
   if (input.shared) {
-    if (const auto same = requireSame(name, now_ns - stamp_ns, now_ns); !same)
-      return tl::unexpected(same.error());
+    if (const auto common = requireCommon(name, now_ns - stamp_ns, now_ns); !common)
+      return tl::unexpected(common.error());
     input.delay.observe(stamp_ns, now_ns);
-    if (reference_.empty()) reference_ = name;
     return stamp_ns;
   }
   input.delay.observe(stamp_ns, now_ns);
@@ -109,10 +158,9 @@ Result<TimePoint> Clocks::place(const std::string& name, const ros::Time& stamp,
     return fail("stamp_malformed", "stamps of " + name + " are no times; mend the driver");
   }
   const std::int64_t stamp_ns = stamp.sec * kSecond + stamp.nanosec;
+  hear(input, now_ns - stamp_ns, now_ns);
   const auto time_ns = onCommon(name, input, stamp_ns, now_ns);
   if (!time_ns) return tl::unexpected(time_ns.error());
-  input.last_offset_ns = now_ns - stamp_ns;
-  input.last_heard_ns = now_ns;
   const TimePoint time = fromNanoseconds(*time_ns);
   // A driver that is started again, or a recording that is, begins anew.
   const bool anew = input.last && *input.last - time > Duration(kSecond);
