@@ -128,7 +128,6 @@ Context::Context(const std::string& process, const bus::Domain& domain,
     if (clock_steps_.recent()) counts.add("wall_clock_stepped_just_now");
   });
   every(std::chrono::seconds(1), [this] { publishHealth(); });
-  every(std::chrono::milliseconds(100), [this] { noteSilence(); });
   noteSharedMemory();
   publishHealth();
 }
