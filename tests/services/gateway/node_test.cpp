@@ -272,6 +272,14 @@ TEST_F(GatewayNode, TellsTheTransformFromMapToOdomAndAgainWhenItJumps) {
   EXPECT_EQ(frame["sessions"], 2);
   EXPECT_EQ(frame["loops"], 3);
   EXPECT_EQ(frame["body_sigma"], json({0.2, 0.3, 0.1, 0.01}));
+  MapFrame not_known = frameOfMap();
+  not_known.covariance.setZero();
+  not_known.anchors = 2;
+  node_.onMapFrame(not_known);
+  EXPECT_EQ(on(kMapToOdom).back()["body_sigma"], json::array());
+  not_known.anchors = 1;  // the map begins here
+  node_.onMapFrame(not_known);
+  EXPECT_EQ(on(kMapToOdom).back()["body_sigma"], json({0, 0, 0, 0}));
   MapFrame jumped = frameOfMap();
   jumped.T_MW.p.x() = 101;
   node_.onMapFrame(jumped);
