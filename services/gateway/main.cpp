@@ -76,7 +76,7 @@ class Beginning {
     const bool begins = !looked_at_ && !wanted.empty();
     looked_at_ = !wanted.empty();
     if (begins) until_ns_ = now_ns + kPatience;
-    if (!looked_at_) awaited_.reset();
+    if (!looked_at_) awaited_.reset(), later_.clear();
     if (begins || awaited_) {
       awaited_ = wanted;
     } else {
@@ -85,6 +85,12 @@ class Beginning {
   }
   void heard() {
     if (const auto wanted = std::exchange(awaited_, std::nullopt)) node_.setWanted(*wanted);
+    for (const auto& work : std::exchange(later_, {})) work();
+  }
+  /// At once, or as soon as the node knows that somebody looks.
+  void afterwards(std::function<void()> work) {
+    if (!awaited_) return work();
+    later_.push_back(std::move(work));
   }
   void tick(std::int64_t now_ns) {
     if (now_ns >= until_ns_) heard();
@@ -95,6 +101,7 @@ class Beginning {
   gateway::Node& node_;
   bool looked_at_ = false;
   std::optional<gateway::Channels> awaited_;
+  std::vector<std::function<void()>> later_;
   std::int64_t until_ns_ = 0;
 };
 
@@ -122,7 +129,7 @@ void listenToObjects(service::Context& context, gateway::Node& node, Beginning& 
 }
 
 std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
-                                                      gateway::Node& node,
+                                                      gateway::Node& node, Beginning& beginning,
                                                       const gateway::Config& config) {
   using namespace gateway;
   std::vector<std::unique_ptr<OnDemand>> readers;
@@ -135,7 +142,9 @@ std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
         [&node, i](const Frame& m) { node.onFrame(i, m); }));
     readers.push_back(std::make_unique<NewestOfBefore<Frame>>(
         context, topics::frame(config.cameras[i]), Channels{cameraChannel(i, kImage)},
-        [&node, i](const Frame& m) { node.onFrameOfBefore(i, m); }));
+        [&node, &beginning, i](const Frame& m) {
+          beginning.afterwards([&node, i, m] { node.onFrameOfBefore(i, m); });
+        }));
   }
   readers.push_back(std::make_unique<ReaderOnDemand<Detections>>(
       context, topics::kDetections, for_detections,
@@ -188,8 +197,13 @@ web::Content contentFor(const service::Context& context, const gateway::Config& 
     const std::string type = bus::findTopic(topic)->typeName();
     channels.push_back(gateway::rawChannel(id++, topic, type, wire::idlOf(type)));
   }
+  web::Files files(folder);
+  if (!config.cameras.empty()) {
+    files.replaceIn("/foxglove_layout.json", "/camera/cam0/",
+                    "/camera/" + config.cameras.front() + "/");
+  }
   return {"perdure", toHex(context.instance()), std::move(channels), gateway::serviceTable(),
-          web::Files(folder)};
+          std::move(files)};
 }
 
 std::string addressOf(const gateway::Config& config, std::uint16_t port) {
@@ -223,7 +237,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                       .query = [&](const MapQuery& query) { (void)questions.write(query); }});
   listenAlways(context, node);
   Beginning beginning(node);
-  auto readers = listenOnDemand(context, node, config);
+  auto readers = listenOnDemand(context, node, beginning, config);
   listenToObjects(context, node, beginning, config, readers);
   listenToRaw(context, server, readers);
   gateway::Channels followed;

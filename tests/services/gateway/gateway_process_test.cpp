@@ -129,6 +129,17 @@ TEST_F(Gateway, ServesPageHealthAndMetrics) {
   EXPECT_THAT(get(port_, "/metrics").text, HasSubstr("perdure_service_up{process=\"gateway\"} 1"));
 }
 
+TEST_F(Gateway, ServesTheLayoutForItsOwnCamera) {
+  std::filesystem::create_directories(folder_.file("page"));
+  std::ofstream(folder_.file("page/index.html")) << "<title>the page</title>";
+  std::filesystem::copy_file(sources() / "tools/viewer/src/foxglove_layout.json",
+                             folder_.file("page/foxglove_layout.json"));
+  start({"page.folder=" + folder_.file("page"), "image.cameras=[front]"});
+  const std::string layout = get(port_, "/foxglove_layout.json").text;
+  EXPECT_THAT(layout, HasSubstr("\"/camera/front/image\""));
+  EXPECT_THAT(layout, Not(HasSubstr("cam0")));
+}
+
 TEST_F(Gateway, SaysInOneSentenceWhereThereIsNoPage) {
   start({"page.folder=" + folder_.file("absent")});
   EXPECT_THAT(get(port_, "/").text, HasSubstr("The page was not built"));
@@ -207,6 +218,15 @@ TEST_F(Gateway, TellsTheEndOfADriveToWhoComesAfterIt) {
   EXPECT_THAT(client->readMessage(2), HasSubstr("\"pose\""));
   client->sendFrame(subscribe(3, channels_["/camera/cam0/image"]));
   EXPECT_THAT(client->readMessage(3), HasSubstr("\xff\xd8\xff"));
+}
+
+/// Nothing else comes by which it would be told that somebody looks.
+TEST_F(Gateway, TellsTheLastImageWhereThereAreNoObjects) {
+  start();
+  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  ASSERT_TRUE(frames.write(greyFrame(1)).has_value());
+  const auto client = lookingAt("/camera/cam0/image");
+  EXPECT_THAT(client->readMessage(1), HasSubstr("\xff\xd8\xff"));
 }
 
 /// As a page that is loaded again does, when nothing new comes.
