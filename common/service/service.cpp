@@ -247,7 +247,12 @@ void Context::publishHealth() {
   if ((misses || !ending.empty()) && health.state == HealthState::kOk) {
     health.state = HealthState::kDegraded;
   }
-  if (health.message.empty()) health.message = ending.empty() ? shared_memory_ : ending;
+  const std::string& besides = ending.empty() ? shared_memory_ : ending;
+  if (health.message.empty()) {
+    health.message = besides;
+  } else if (misses || !ending.empty()) {
+    health.message = besides + "; " + health.message;
+  }
   const std::string silent = silence();
   if (!silent.empty() && health.state != HealthState::kFailed) {
     // What was wrong before may be why it is silent.

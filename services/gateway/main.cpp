@@ -272,8 +272,11 @@ void serve(service::Context& context, const gateway::Config& config, const std::
     for (const auto& [reason, n] : stats.reasons.all()) counts.add(reason, n);
   });
   bus::Discovery discovery(context.participant());
+  const std::string address = addressOf(config, server.port());
   context.onHealth([&] {
     const web::Stats stats = server.stats();
+    context.health().state(HealthState::kOk,
+                           "at " + address + " for " + std::to_string(stats.clients) + " clients");
     const std::int64_t now = monotonicNs();
     node.setStandIns(standIns(context.participant(), discovery, node.vitalSigns()));
     context.health().setDropped(stats.dropped);
@@ -286,7 +289,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
   });
   context.watch([&] { return server.goesOn(); });
   context.log().info("{} at {}", has_page ? "the page is" : "no page was built; Foxglove connects",
-                     addressOf(config, server.port()));
+                     address);
   context.run();
 }
 

@@ -129,6 +129,18 @@ TEST_F(Gateway, ServesPageHealthAndMetrics) {
   EXPECT_THAT(get(port_, "/metrics").text, HasSubstr("perdure_service_up{process=\"gateway\"} 1"));
 }
 
+TEST_F(Gateway, SaysInHealthWhereItIsAndForHowMany) {
+  start();
+  const auto client = lookingAt("/health");
+  bus::Reader<Health> healths(participant_, bus::topics::kHealth);
+  std::string message;
+  const std::string expected = "at http://127.0.0.1:" + std::to_string(port_) + "/ for 1 clients";
+  EXPECT_TRUE(eventually(10s, [&] {
+    healths.drain([&](const Health& health) { message = health.message; });
+    return message == expected;
+  })) << message;
+}
+
 TEST_F(Gateway, ServesTheLayoutForItsOwnCamera) {
   std::filesystem::create_directories(folder_.file("page"));
   std::ofstream(folder_.file("page/index.html")) << "<title>the page</title>";
