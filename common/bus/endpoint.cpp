@@ -36,16 +36,21 @@ QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
 }
 
 /// Readers ask for the weakest liveliness, so that every writer's suits them.
-QosPtr readerQos(const Qos& qos, const SharedMemory& memory) {
-  return commonQos(qos, memory, qos.shared_memory);
+QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
+  const bool of_before = from == ReadFrom::kKept;  // shared memory has nothing of before
+  QosPtr result = commonQos(qos, memory, qos.shared_memory && !of_before);
+  if (of_before) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  return result;
 }
 
 QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
                  bool through) {
   QosPtr result = commonQos(qos, memory, through);
   dds_qset_writer_data_lifecycle(result.get(), false);  // a death is not the end of its objects
-  if (qos.latched) {
-    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth,
+  const bool kept = qos.kept && !(memory.on() && through);
+  if (kept) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (qos.latched || kept) {
+    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, kept ? 1 : qos.depth,
                                 DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   }
   const double lease = options.lease_s > 0 ? options.lease_s : qos.lease_s;
@@ -103,11 +108,11 @@ Entity createTopic(const Participant& participant, const std::string& topic) {
                  "the topic " + topic);
 }
 
-std::shared_ptr<const Entity> createReader(const Participant& participant,
-                                           const std::string& topic) {
+std::shared_ptr<const Entity> createReader(const Participant& participant, const std::string& topic,
+                                           ReadFrom from) {
   const Entity entity = createTopic(participant, topic);
   const Qos& row = infoOf(topic).qos;
-  const QosPtr qos = readerQos(row, participant.sharedMemory());
+  const QosPtr qos = readerQos(row, participant.sharedMemory(), from);
   Entity reader =
       created(dds_create_reader(participant.handle(), entity.handle(), qos.get(), nullptr),
               "a reader of " + topic);
@@ -178,8 +183,8 @@ void Endpoint::addRefusals(ReasonCounts& counts) const {
   for (const auto& [reason, n] : refusals_.all()) counts.add(reason, n);
 }
 
-RawReader::RawReader(const Participant& participant, const std::string& topic)
-    : Endpoint(topic, createReader(participant, topic)) {}
+RawReader::RawReader(const Participant& participant, const std::string& topic, ReadFrom from)
+    : Endpoint(topic, createReader(participant, topic, from)) {}
 
 std::size_t RawReader::matched() const { return matchedWriters(handle()); }
 

@@ -51,6 +51,12 @@ class Endpoint {
 
 class RawWriter;
 
+/// What a reader of a topic that is not latched gets of before.
+enum class ReadFrom {
+  kNow,   ///< nothing
+  kKept,  ///< the newest, of writers that keep it (Qos::kept); those that do not are not heard
+};
+
 class RawReader : public Endpoint {
  public:
   /// How many writers are matched now.
@@ -65,7 +71,8 @@ class RawReader : public Endpoint {
   void report(ReasonCounts& counts) const;
 
  protected:
-  RawReader(const Participant& participant, const std::string& topic);
+  RawReader(const Participant& participant, const std::string& topic,
+            ReadFrom from = ReadFrom::kNow);
   /// Takes what is there, at most one batch; true where there may be more.
   bool takeBatch(const std::function<void(const void* wire)>& on_value,
                  const std::function<void(const void* wire)>& on_gone);
@@ -82,8 +89,8 @@ class Reader : public RawReader {
  public:
   using Handler = std::function<void(const T&)>;
 
-  Reader(const Participant& participant, const Topic<T>& topic)
-      : RawReader(participant, topic.name) {}
+  Reader(const Participant& participant, const Topic<T>& topic, ReadFrom from = ReadFrom::kNow)
+      : RawReader(participant, topic.name, from) {}
 
   /// Hands over everything that has come, in its order; malformed messages are counted. `on_gone`
   /// gets the key of each disposed instance (other fields mean nothing).

@@ -26,7 +26,10 @@ TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded, Rol
 }
 
 constexpr Qos reliable(int depth) { return {.depth = depth}; }
-constexpr Qos shared(int depth) { return {.depth = depth, .shared_memory = true}; }
+constexpr Qos kept(int depth) { return {.depth = depth, .kept = true}; }
+constexpr Qos keptAndShared(int depth) {
+  return {.depth = depth, .kept = true, .shared_memory = true};
+}
 constexpr Qos bestEffort(int depth) { return {.reliable = false, .depth = depth}; }
 constexpr Qos latched(int depth, double lease_s = 0.0) {
   return {.depth = depth, .latched = true, .lease_s = lease_s};
@@ -44,8 +47,8 @@ Table makeTable() {
   constexpr bool kRecorded = true, kNotRecorded = false;
   constexpr Roles kServices = kCapture | kVio | kInference | kSemanticFilter | kMapStore;
   return {
-      TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), shared(4), kCameraHz, kRecorded,
-                kCapture | kPlayer | kRos2Driver, kVio | kInference | kWatchers},
+      TopicInfo{kFramePrefix, &wire::Type<Frame>::descriptor(), keptAndShared(4), kCameraHz,
+                kRecorded, kCapture | kPlayer | kRos2Driver, kVio | kInference | kWatchers},
       row(kImu, latched(512), kImuHz, kRecorded, kCapture | kRos2Driver, kVio),
       row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
       row(kCalibration, latched(1), 0, kRecorded, kCapture | kRos2Driver,
@@ -60,7 +63,7 @@ Table makeTable() {
       row(kModel, latched(1), 0, kRecorded, kInference | kRos2Driver,
           kInference | kSemanticFilter | kSubscriber),
       row(kSwap, reliable(16), 0, kRecorded, kInference, kInference | kSemanticFilter),
-      row(kObjects, reliable(8), kCameraHz, kRecorded, kSemanticFilter,
+      row(kObjects, kept(8), kCameraHz, kRecorded, kSemanticFilter,
           kMapStore | kVio | kSubscriber),  // vio masks what moves (input.moving_mask)
       row(kObjectState, latched(1), 0, kNotRecorded, kSemanticFilter, kSubscriber),
       row(kRecalled, reliable(8), 0, kRecorded, kMapStore, kSemanticFilter),

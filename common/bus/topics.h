@@ -16,6 +16,7 @@ struct Qos {
   bool reliable = true;
   int depth = 1;               ///< KEEP_LAST
   bool latched = false;        ///< TRANSIENT_LOCAL: who comes late gets the last `depth` samples
+  bool kept = false;           ///< writers keep the newest, for readers that ask (ReadFrom::kKept)
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
   double lease_s = 0.0;        ///< of the liveliness; 0 = infinite
   bool shared_memory = false;  ///< where it is on; for topics without key and latching alone

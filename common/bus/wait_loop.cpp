@@ -27,9 +27,10 @@ void WaitLoop::off(const Endpoint& reader) {
   std::erase_if(sources_, [&](const Source& source) { return source.reader == &reader; });
 }
 
-void WaitLoop::every(std::chrono::nanoseconds period, std::function<void()> tick) {
+void WaitLoop::every(std::chrono::nanoseconds period, std::function<void()> tick,
+                     std::function<bool()> wanted) {
   check(period.count() > 0, "a tick has a period");
-  ticks_.push_back({period, Clock::now() + period, std::move(tick)});
+  ticks_.push_back({period, Clock::now() + period, std::move(tick), std::move(wanted)});
 }
 
 void WaitLoop::run() {
@@ -56,8 +57,9 @@ void WaitLoop::wake() { dds_set_guardcondition(guard_.handle(), true); }
 
 std::chrono::nanoseconds WaitLoop::untilNextTick(std::chrono::nanoseconds longest) const {
   const Clock::time_point now = Clock::now();
-  for (const Tick& tick : ticks_)
-    longest = std::min<std::chrono::nanoseconds>(longest, tick.next - now);
+  for (const Tick& tick : ticks_) {
+    if (!tick.rests()) longest = std::min<std::chrono::nanoseconds>(longest, tick.next - now);
+  }
   return std::max(longest, std::chrono::nanoseconds(0));
 }
 
@@ -72,7 +74,7 @@ void WaitLoop::handleMessages() {
 void WaitLoop::handleTicks() {
   for (Tick& tick : ticks_) {
     const Clock::time_point now = Clock::now();
-    if (stopped_ || now < tick.next) continue;
+    if (stopped_ || now < tick.next || tick.rests()) continue;
     tick.next = std::max(tick.next + tick.period, now);
     tick.handler();
   }

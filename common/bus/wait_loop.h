@@ -43,7 +43,9 @@ class WaitLoop {
   /// being gone through.
   void off(const Endpoint& reader);
   /// First after one period; a late tick is not made up for.
-  void every(std::chrono::nanoseconds period, std::function<void()> tick);
+  /// `wanted`: it rests while that is false; asked in the loop's thread.
+  void every(std::chrono::nanoseconds period, std::function<void()> tick,
+             std::function<bool()> wanted = {});
   /// Runs in the loop's thread soon after wake(); several wake-ups may become one call.
   void onWake(std::function<void()> handler) { on_wake_ = std::move(handler); }
 
@@ -69,6 +71,8 @@ class WaitLoop {
     std::chrono::nanoseconds period;
     Clock::time_point next;
     std::function<void()> handler;
+    std::function<bool()> wanted;
+    bool rests() const { return wanted && !wanted(); }
   };
 
   template <class T>

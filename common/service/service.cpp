@@ -128,7 +128,6 @@ Context::Context(const std::string& process, const bus::Domain& domain,
     if (clock_steps_.recent()) counts.add("wall_clock_stepped_just_now");
   });
   every(std::chrono::seconds(1), [this] { publishHealth(); });
-  every(std::chrono::milliseconds(100), [this] { noteSilence(); });
   noteSharedMemory();
   publishHealth();
 }
@@ -248,7 +247,12 @@ void Context::publishHealth() {
   if ((misses || !ending.empty()) && health.state == HealthState::kOk) {
     health.state = HealthState::kDegraded;
   }
-  if (health.message.empty()) health.message = ending.empty() ? shared_memory_ : ending;
+  const std::string& besides = ending.empty() ? shared_memory_ : ending;
+  if (health.message.empty()) {
+    health.message = besides;
+  } else if (misses || !ending.empty()) {
+    health.message = besides + "; " + health.message;
+  }
   const std::string silent = silence();
   if (!silent.empty() && health.state != HealthState::kFailed) {
     // What was wrong before may be why it is silent.

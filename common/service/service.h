@@ -74,6 +74,7 @@ class Context {
   /// Without this nothing goes out. Where it came and has fallen silent, Health is degraded and
   /// says so, at once. Its handler calls heard().
   Input& needs(const std::string& what, const std::string& mend) {
+    if (inputs_.empty()) every(std::chrono::milliseconds(100), [this] { noteSilence(); });
     return inputs_.emplace_back(what, mend);
   }
 

@@ -52,7 +52,7 @@ struct MapFrame {
   WorldId world;  ///< W
   WorldId map;    ///< M: it begins as the W of the oldest session that hangs together with this one
   RigidTransform T_MW;
-  /// Of the body's place and yaw in M, [δp, δyaw], m and rad; the first anchor of M is exact.
+  /// Of the body's place and yaw in M, [δp, δyaw], m and rad; all 0: see hasCovariance().
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   std::uint64_t revision = 0;  ///< counts changes of the graph
   std::uint32_t sessions = 0;  ///< that hang together with this one, itself included

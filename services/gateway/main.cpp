@@ -12,158 +12,22 @@
 #include "common/service/service.h"
 #include "common/wire/cdr.h"
 #include "services/gateway/node.h"
+#include "services/gateway/readers.h"
 #include "services/gateway/web/server.h"
 
 namespace {
 
 using namespace perdure;
+using gateway::BytesOnDemand;
+using gateway::NewestOfBefore;
+using gateway::OnDemand;
+using gateway::ReaderOnDemand;
 namespace topics = bus::topics;
 namespace web = gateway::web;
 
 std::int64_t monotonicNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
-
-/// A reader that is there while somebody looks: nothing is sent to this host for nobody.
-class OnDemand {
- public:
-  OnDemand(service::Context& context, gateway::Channels channels)
-      : context_(context), channels_(std::move(channels)) {}
-  virtual ~OnDemand() = default;
-  void follow(const gateway::Channels& wanted) {
-    bool now = false;
-    for (const std::uint32_t channel : channels_) now = now || wanted.contains(channel);
-    if (now == open_) return;
-    open_ = now;
-    if (now) {
-      open();
-    } else {
-      close();
-    }
-  }
-
- protected:
-  virtual void open() = 0;
-  virtual void close() = 0;
-  service::Context& context_;
-
- private:
-  const gateway::Channels channels_;
-  bool open_ = false;
-};
-
-template <class T>
-class ReaderOnDemand : public OnDemand {
- public:
-  ReaderOnDemand(service::Context& context, bus::Topic<T> topic, gateway::Channels channels,
-                 Sink<T> handler, Sink<T> on_gone = {})
-      : OnDemand(context, std::move(channels)),
-        topic_(std::move(topic)),
-        handler_(std::move(handler)),
-        on_gone_(std::move(on_gone)) {
-    context.countReasons([this](ReasonCounts& counts) {
-      for (const auto& [reason, n] : before_.all()) counts.add(reason, n);
-      if (reader_) reader_->report(counts);
-    });
-  }
-
- private:
-  void open() override {
-    reader_ = std::make_unique<bus::Reader<T>>(context_.participant(), topic_);
-    context_.loop().on(*reader_, handler_, on_gone_);
-  }
-  void close() override {
-    reader_->report(before_);
-    context_.loop().off(*reader_);
-    reader_.reset();
-  }
-
-  const bus::Topic<T> topic_;
-  const Sink<T> handler_, on_gone_;
-  std::unique_ptr<bus::Reader<T>> reader_;
-  ReasonCounts before_;
-};
-
-/// The same of a topic's bytes as they come.
-class BytesOnDemand : public OnDemand {
- public:
-  using Handler = std::function<void(const bus::CdrMessage&)>;
-  BytesOnDemand(service::Context& context, std::string topic, gateway::Channels channels,
-                Handler handler)
-      : OnDemand(context, std::move(channels)),
-        topic_(std::move(topic)),
-        handler_(std::move(handler)) {}
-
- private:
-  void open() override {
-    reader_ = std::make_unique<bus::CdrReader>(context_.participant(), topic_);
-    context_.loop().on(*reader_, handler_);
-  }
-  void close() override {
-    context_.loop().off(*reader_);
-    reader_.reset();
-  }
-
-  const std::string topic_;
-  const Handler handler_;
-  std::unique_ptr<bus::CdrReader> reader_;
-};
-
-/// What is heard even while nobody looks, for who comes late: then seldom and, of what is told
-/// whole each time, the newest alone. It is one reader all along: nothing is lost where somebody
-/// begins to look.
-template <class T>
-class Overheard : public OnDemand {
- public:
-  enum class Which { kAll, kNewest };
-
-  Overheard(service::Context& context, const bus::Topic<T>& topic, Which which,
-            gateway::Channels channels, Sink<T> handler)
-      : OnDemand(context, std::move(channels)),
-        which_(which),
-        handler_(std::move(handler)),
-        reader_(context.participant(), topic.name) {
-    context.countReasons([this](ReasonCounts& counts) {
-      reader_.report(counts);
-      for (const auto& [reason, n] : malformed_.all()) counts.add(reason, n);
-    });
-  }
-  /// What has come while nobody looks.
-  void hear() {
-    if (!looked_at_) take(which_);
-  }
-
- private:
-  void take(Which which) {
-    std::vector<std::uint8_t> newest;
-    while (reader_.drainBatch([&](const bus::CdrMessage& message) {
-      if (which == Which::kAll) return hand(message.bytes);
-      newest.assign(message.bytes.begin(), message.bytes.end());
-    })) {
-    }
-    if (!newest.empty()) hand(newest);
-  }
-  void hand(std::span<const std::uint8_t> bytes) {
-    const auto value = wire::decodeCdr<T>(bytes, nullptr);
-    if (value) return handler_(*value);
-    malformed_.add(reader_.topic() + "_malformed_" + value.error().code);
-  }
-  void open() override {
-    looked_at_ = true;
-    take(which_);
-    context_.loop().on(reader_, [this](const bus::CdrMessage& m) { hand(m.bytes); });
-  }
-  void close() override {
-    context_.loop().off(reader_);
-    looked_at_ = false;
-  }
-
-  const Which which_;
-  const Sink<T> handler_;
-  bus::CdrReader reader_;
-  bool looked_at_ = false;
-  ReasonCounts malformed_;
-};
 
 /// Topics of @final types, which readers of CDR decode by their IDL.
 constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
@@ -175,17 +39,22 @@ struct Mail {
   std::vector<gateway::Call> calls;
 };
 
-std::vector<gateway::Figure> figuresOf(const web::Stats& stats, std::size_t objects) {
+std::vector<gateway::Figure> figuresOf(const web::Stats& stats,
+                                       const std::optional<std::size_t>& objects) {
   const auto number = [](auto n) { return static_cast<double>(n); };
-  return {{"clients", "WebSocket clients now", false, number(stats.clients)},
-          {"connections", "connections now", false, number(stats.connections)},
-          {"objects", "objects in the working set", false, number(objects)},
-          {"sent_bytes_total", "bytes sent", true, number(stats.bytes_sent)},
-          {"sent_messages_total", "WebSocket messages sent", true, number(stats.messages_sent)},
-          {"encoded_total", "messages of channels made, once for all clients", true,
-           number(stats.published)},
-          {"lost_total", "messages that slow clients lost", true, number(stats.dropped)},
-          {"requests_total", "HTTP requests", true, number(stats.requests)}};
+  std::vector<gateway::Figure> figures = {
+      {"clients", "WebSocket clients now", false, number(stats.clients)},
+      {"connections", "connections now", false, number(stats.connections)},
+      {"sent_bytes_total", "bytes sent", true, number(stats.bytes_sent)},
+      {"sent_messages_total", "WebSocket messages sent", true, number(stats.messages_sent)},
+      {"encoded_total", "messages of channels made, once for all clients", true,
+       number(stats.published)},
+      {"lost_total", "messages that slow clients lost", true, number(stats.dropped)},
+      {"requests_total", "HTTP requests", true, number(stats.requests)}};
+  if (objects)
+    figures.push_back(
+        {"objects", "objects in the working set; while somebody looks", false, number(*objects)});
+  return figures;
 }
 
 void listenAlways(service::Context& context, gateway::Node& node) {
@@ -197,32 +66,70 @@ void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(topics::kMapReply, [&](const MapReply& m) { node.onMapReply(m); });
 }
 
-/// Objects and odometry: for histories, the way so far, and where events were.
-void overhear(service::Context& context, gateway::Node& node, const gateway::Config& config,
-              std::vector<std::unique_ptr<OnDemand>>& readers) {
+/// To who begins to look where nobody did, the newest is told as soon as it is heard; what was
+/// heard before, where nothing comes.
+class Beginning {
+ public:
+  explicit Beginning(gateway::Node& node) : node_(node) {}
+  void setWanted(const gateway::Channels& wanted, std::int64_t now_ns) {
+    constexpr std::int64_t kPatience = 400'000'000;
+    const bool begins = !looked_at_ && !wanted.empty();
+    looked_at_ = !wanted.empty();
+    if (begins) until_ns_ = now_ns + kPatience;
+    if (!looked_at_) awaited_.reset(), later_.clear();
+    if (begins || awaited_) {
+      awaited_ = wanted;
+    } else {
+      node_.setWanted(wanted);
+    }
+  }
+  void heard() {
+    if (const auto wanted = std::exchange(awaited_, std::nullopt)) node_.setWanted(*wanted);
+    for (const auto& work : std::exchange(later_, {})) work();
+  }
+  /// At once, or as soon as the node knows that somebody looks.
+  void afterwards(std::function<void()> work) {
+    if (!awaited_) return work();
+    later_.push_back(std::move(work));
+  }
+  void tick(std::int64_t now_ns) {
+    if (now_ns >= until_ns_) heard();
+  }
+  bool lookedAt() const { return looked_at_; }
+
+ private:
+  gateway::Node& node_;
+  bool looked_at_ = false;
+  std::optional<gateway::Channels> awaited_;
+  std::vector<std::function<void()>> later_;
+  std::int64_t until_ns_ = 0;
+};
+
+/// What nearly all channels rest on.
+void listenToObjects(service::Context& context, gateway::Node& node, Beginning& beginning,
+                     const gateway::Config& config,
+                     std::vector<std::unique_ptr<OnDemand>>& readers) {
   gateway::Channels all;
   for (const auto& channel : gateway::channelTable(config.cameras)) all.insert(channel.id);
-  auto odometry = std::make_unique<Overheard<Odometry>>(
-      context, topics::kOdometry, Overheard<Odometry>::Which::kAll, all,
-      [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); });
-  auto objects = std::make_unique<Overheard<Objects>>(
-      context, topics::kObjects, Overheard<Objects>::Which::kNewest, all, [&](const Objects& m) {
-        context.health().frameIn();
-        node.onObjects(m, monotonicNs());
-        context.health().frameOut();
-      });
-  // As often as the history of an object is sampled.
-  context.every(std::chrono::milliseconds(500),
-                [odometry = odometry.get(), objects = objects.get()] {
-                  odometry->hear();
-                  objects->hear();
-                });
-  readers.push_back(std::move(odometry));
-  readers.push_back(std::move(objects));
+  readers.push_back(std::make_unique<NewestOfBefore<Objects>>(context, topics::kObjects, all,
+                                                              [&](const Objects& m) {
+                                                                node.onObjectsOfBefore(m);
+                                                                beginning.heard();
+                                                              }));
+  readers.push_back(std::make_unique<ReaderOnDemand<Odometry>>(
+      context, topics::kOdometry, all,
+      [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); }));
+  readers.push_back(std::make_unique<ReaderOnDemand<Objects>>(context, topics::kObjects, all,
+                                                              [&](const Objects& m) {
+                                                                context.health().frameIn();
+                                                                node.onObjects(m, monotonicNs());
+                                                                context.health().frameOut();
+                                                                beginning.heard();
+                                                              }));
 }
 
 std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
-                                                      gateway::Node& node,
+                                                      gateway::Node& node, Beginning& beginning,
                                                       const gateway::Config& config) {
   using namespace gateway;
   std::vector<std::unique_ptr<OnDemand>> readers;
@@ -233,6 +140,11 @@ std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
     readers.push_back(std::make_unique<ReaderOnDemand<Frame>>(
         context, topics::frame(config.cameras[i]), Channels{cameraChannel(i, kImage)},
         [&node, i](const Frame& m) { node.onFrame(i, m); }));
+    readers.push_back(std::make_unique<NewestOfBefore<Frame>>(
+        context, topics::frame(config.cameras[i]), Channels{cameraChannel(i, kImage)},
+        [&node, &beginning, i](const Frame& m) {
+          beginning.afterwards([&node, i, m] { node.onFrameOfBefore(i, m); });
+        }));
   }
   readers.push_back(std::make_unique<ReaderOnDemand<Detections>>(
       context, topics::kDetections, for_detections,
@@ -285,8 +197,13 @@ web::Content contentFor(const service::Context& context, const gateway::Config& 
     const std::string type = bus::findTopic(topic)->typeName();
     channels.push_back(gateway::rawChannel(id++, topic, type, wire::idlOf(type)));
   }
+  web::Files files(folder);
+  if (!config.cameras.empty()) {
+    files.replaceIn("/foxglove_layout.json", "/camera/cam0/",
+                    "/camera/" + config.cameras.front() + "/");
+  }
   return {"perdure", toHex(context.instance()), std::move(channels), gateway::serviceTable(),
-          web::Files(folder)};
+          std::move(files)};
 }
 
 std::string addressOf(const gateway::Config& config, std::uint16_t port) {
@@ -319,9 +236,11 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                       .answer = [&](const gateway::Answer& answer) { server.answer(answer); },
                       .query = [&](const MapQuery& query) { (void)questions.write(query); }});
   listenAlways(context, node);
-  auto readers = listenOnDemand(context, node, config);
-  overhear(context, node, config, readers);
+  Beginning beginning(node);
+  auto readers = listenOnDemand(context, node, beginning, config);
+  listenToObjects(context, node, beginning, config, readers);
   listenToRaw(context, server, readers);
+  gateway::Channels followed;
   context.loop().onWake([&] {
     std::vector<gateway::Channels> changes;
     std::vector<gateway::Call> calls;
@@ -331,30 +250,46 @@ void serve(service::Context& context, const gateway::Config& config, const std::
       calls.swap(mail.calls);
     }
     for (const gateway::Channels& wanted : changes) {
-      node.setWanted(wanted);
+      beginning.setWanted(wanted, monotonicNs());
       for (const auto& reader : readers) reader->follow(wanted);
+      followed = wanted;
+    }
+    if (changes.empty()) {
+      for (const auto& reader : readers) reader->follow(followed);
     }
     for (const gateway::Call& call : calls) node.onCall(call, monotonicNs());
   });
-  context.every(std::chrono::milliseconds(100), [&] { node.tick(monotonicNs()); });
+  context.loop().every(
+      std::chrono::milliseconds(100),
+      [&] {
+        beginning.tick(monotonicNs());
+        node.tick(monotonicNs());
+      },
+      [&] { return beginning.lookedAt() || node.waits(); });
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&](ReasonCounts& counts) {
     const web::Stats stats = server.stats();
     for (const auto& [reason, n] : stats.reasons.all()) counts.add(reason, n);
   });
   bus::Discovery discovery(context.participant());
+  const std::string address = addressOf(config, server.port());
   context.onHealth([&] {
     const web::Stats stats = server.stats();
+    context.health().state(HealthState::kOk,
+                           "at " + address + " for " + std::to_string(stats.clients) + " clients");
     const std::int64_t now = monotonicNs();
     node.setStandIns(standIns(context.participant(), discovery, node.vitalSigns()));
     context.health().setDropped(stats.dropped);
     server.setTexts(
         node.vitalSigns().healthz(now),
-        node.vitalSigns().metrics(now, figuresOf(stats, node.objects()), stats.reasons.all()));
+        node.vitalSigns().metrics(
+            now,
+            figuresOf(stats, beginning.lookedAt() ? std::optional(node.objects()) : std::nullopt),
+            stats.reasons.all()));
   });
   context.watch([&] { return server.goesOn(); });
   context.log().info("{} at {}", has_page ? "the page is" : "no page was built; Foxglove connects",
-                     addressOf(config, server.port()));
+                     address);
   context.run();
 }
 

@@ -9,8 +9,8 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::size_t kMostEvents = 256;
 constexpr std::chrono::seconds kLongBack{2};  // a recording begins again, or another drive does
+constexpr std::chrono::seconds kGap{1};  // of the sensor clock; what was before is not the way here
 
 }  // namespace
 
@@ -56,6 +56,7 @@ void Node::setWanted(const Channels& wanted) {
   const bool looked_at_graph = wantsGraph();
   const Channels before = std::exchange(wanted_, wanted);
   lookAtGraph(looked_at_graph);
+  away_ = away_ || wanted.empty();
   if (before.empty() && !wanted.empty() && time_ != TimePoint{}) outputs_.time(time_);
   if (!wantsTiles()) map_.clear();  // their reader is closed
   for (const std::uint32_t channel : wanted) {
@@ -145,11 +146,18 @@ void Node::onFrame(std::size_t camera, const Frame& frame) {
                         compressedImage(frame.stamp, config_.cameras[camera], *jpeg->data))});
 }
 
+/// The newest of live ones is newer.
+void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
+  const auto& last = image_pace_[camera].last;
+  if (!last || frame.stamp.time > *last) onFrame(camera, frame);
+}
+
 void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   last_.odometry_ns = now_ns;
   if (odometry.state == OdometryState::kInitialising) return;
   // Other parts of it are in the M of another W.
   map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);
+  beginAnew(odometry.stamp.time);
   odometry_ = odometry;
   placeEvents();
   newest(odometry.stamp.time);
@@ -182,9 +190,35 @@ void Node::onModel(const ModelInfo& model) {
   if (wants(kModel)) sendNow(kModel);
 }
 
+/// After a while in which nobody looked, way and histories begin where somebody looks again.
+void Node::beginAnew(TimePoint time) {
+  if (!std::exchange(away_, false) || (time >= time_ && time - time_ < kGap)) return;
+  trajectory_.clear();
+  history_.clear();
+  detections_.clear();
+  awaited_.clear();
+  odometry_.reset();
+}
+
 void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   last_.objects_ns = now_ns;
+  const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
+  constexpr double kLongest = 1e4;  // ms; beyond it is another host's clock, or a recording
+  latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
+  take(objects);
+}
+
+void Node::onObjectsOfBefore(const Objects& objects) {
+  const bool known =
+      objects_ && objects_->world == objects.world && objects.stamp.time <= objects_->stamp.time;
+  if (known) return;
+  latency_ms_ = -1;
+  take(objects);
+}
+
+void Node::take(const Objects& objects) {
   sendAwaited();
+  beginAnew(objects.stamp.time);
   const bool again = objects_ && objects.stamp.time + kLongBack < objects_->stamp.time;
   if (again || (objects_ && objects_->world != objects.world)) {
     history_.clear();
@@ -192,9 +226,6 @@ void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   }
   objects_ = objects;
   placeEvents();
-  const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
-  constexpr double kLongest = 1e4;  // ms; beyond it is another host's clock, or a recording
-  latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
   newest(objects.stamp.time);
   history_.add(objects);
   if (!odometry_) trajectory_.add(objects.stamp.time, objects.world, objects.T_WB);
@@ -236,65 +267,14 @@ void Node::sendAnnotations(std::size_t camera, bool now) {
   };
   if (wants(cameraChannel(camera, kAnnotations)))
     say(kAnnotations, imageAnnotations(*objects_, *cameras_[camera], detections));
-  if (wants(cameraChannel(camera, kLikelihood)))
+  // Where no detections were heard it is not known what the network says.
+  if (wants(cameraChannel(camera, kLikelihood)) && found != detections_.end())
     say(kLikelihood,
         likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr));
 }
 
 void Node::sendAwaited() {
   for (const std::size_t camera : std::set<std::size_t>(awaited_)) sendAnnotations(camera, true);
-}
-
-void Node::onEvent(const Event& event) {
-  events_.push_back({event, placeOf(event)});
-  unplaced_ = unplaced_ || (event.object_id == 0 && !events_.back().place);
-  if (events_.size() > kMostEvents) events_.pop_front();
-  noteReturns(event);
-  if (event.kind == EventKind::kLoopClosed || event.kind == EventKind::kLoopWithdrawn ||
-      event.kind == EventKind::kRelocalised) {
-    graph_pace_.changed();
-  }
-  if (wants(kEvents)) sendEvent(events_.back(), false);
-  if (wants(kLog)) sendEvent(events_.back(), true);
-}
-
-/// An event may be heard before the first pose of its W. Who asks later is told where it was.
-void Node::placeEvents() {
-  if (!unplaced_) return;
-  unplaced_ = false;
-  for (Happened& happened : events_) {
-    if (happened.event.object_id != 0 || happened.place) continue;
-    happened.place = placeOf(happened.event);
-    unplaced_ = unplaced_ || !happened.place;
-  }
-}
-
-/// Of an object: where it is believed to be; of the whole map: where the vehicle is.
-std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
-  if (event.world != world() || !(odometry_ || objects_)) return std::nullopt;
-  if (event.object_id == 0) return pose().p;
-  if (!objects_) return std::nullopt;
-  for (const ObjectBelief& object : objects_->objects) {
-    if (object.id == event.object_id) return Eigen::Vector3d(object.best().mean.head<3>());
-  }
-  return std::nullopt;
-}
-
-void Node::sendEvent(const Happened& happened, bool as_log) {
-  const Event& event = happened.event;
-  outputs_.message({as_log ? kLog : kEvents, event.stamp.time,
-                    std::make_shared<const std::string>(
-                        as_log ? eventLog(event) : eventJson(event, happened.place))});
-}
-
-/// A prediction holds until the object is seen again, or is no more.
-void Node::noteReturns(const Event& event) {
-  if (event.kind == EventKind::kPredictedReturn) {
-    returns_[event.object_id] = event;
-  } else if (event.kind == EventKind::kReappeared || event.kind == EventKind::kGone ||
-             event.kind == EventKind::kMerged || event.kind == EventKind::kArchived) {
-    returns_.erase(event.object_id);
-  }
 }
 
 void Node::onMapFrame(const MapFrame& frame) {

@@ -46,6 +46,9 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
+  /// The newest of before somebody looked: the last of a drive that has ended, among others.
+  void onObjectsOfBefore(const Objects& objects);
+  void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
   void onHealth(const Health& health, std::int64_t now_ns) {
     vital_signs_.onHealth(health, now_ns);
@@ -57,8 +60,9 @@ class Node {
   /// The graph as map_store told it to whoever asked: of recordings.
   void onMapGraph(const MapReply& reply);
   void onCall(const Call& call, std::int64_t now_ns);
-  /// About ten times a second.
+  /// About ten times a second while somebody looks, or waits() for an answer.
   void tick(std::int64_t now_ns);
+  bool waits() const { return !pending_.empty(); }
 
   void setStandIns(std::map<std::string, std::string> sentences) {
     vital_signs_.setStandIns(std::move(sentences));
@@ -86,6 +90,8 @@ class Node {
   void send(std::uint32_t channel, std::string payload);
   void sendNow(std::uint32_t channel);
   void sendNow(std::size_t camera, std::uint32_t channel);
+  void take(const Objects& objects);
+  void beginAnew(TimePoint time);
   void sendObjects();
   void sendAnnotations(std::size_t camera, bool now);
   void sendAwaited();
@@ -95,6 +101,7 @@ class Node {
   };
   void sendEvent(const Happened& happened, bool as_log);
   std::optional<Eigen::Vector3d> placeOf(const Event& event) const;
+  std::optional<TimePoint> timeOfPose() const;
   void placeEvents();
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< how many objects it told
@@ -120,6 +127,7 @@ class Node {
   VitalSigns vital_signs_;
   Silence last_;
   TimePoint time_;
+  bool away_ = false;  ///< nobody has looked, so that what is known may be of long ago
 
   std::optional<Calibration> calibration_;
   std::vector<std::optional<CameraModel>> cameras_;

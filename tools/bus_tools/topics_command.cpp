@@ -25,6 +25,7 @@ std::string qosText(const bus::Qos& qos) {
   std::string text = qos.reliable ? "reliable" : "best-effort";
   text += " " + std::to_string(qos.depth);
   if (qos.latched) text += ", latched";
+  if (qos.kept) text += ", the newest kept";
   if (qos.exclusive) text += ", exclusive";
   return text;
 }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/ids.h"
+#include "common/types/map_graph.h"
 #include "services/gateway/core/pieces.h"
 
 namespace perdure::gateway {
@@ -59,6 +60,7 @@ std::string mapFrameJson(const MapFrame& frame) {
   const RigidTransform& T = frame.T_MW;
   const std::array<double, 7> pose{T.p.x(), T.p.y(), T.p.z(), T.q.x(), T.q.y(), T.q.z(), T.q.w()};
   const Eigen::Vector4d sigma = frame.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const std::size_t known = hasCovariance(frame) ? 4 : 0;
   JsonWriter json;
   json.begin('{').key("timestamp");
   putTime(json, frame.stamp.time);
@@ -67,7 +69,7 @@ std::string mapFrameJson(const MapFrame& frame) {
   json.key("T_MW");
   putNumbers(json, pose, 6);
   json.key("body_sigma");
-  putNumbers(json, {sigma.data(), 4}, 4);
+  putNumbers(json, {sigma.data(), known}, 4);
   json.key("revision").integer(frame.revision).key("sessions").integer(frame.sessions);
   json.key("loops").integer(frame.loops).key("anchors").integer(frame.anchors);
   return json.end('}').take();

@@ -26,6 +26,7 @@ std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
 class Trajectory {
  public:
   void add(TimePoint time, const WorldId& world, const RigidTransform& T_WB);
+  void clear() { poses_.clear(); }
   std::string posesInFrame() const;
   std::size_t size() const { return poses_.size(); }
 

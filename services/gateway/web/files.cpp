@@ -65,6 +65,19 @@ std::shared_ptr<const File> Files::find(std::string_view path) const {
   return found == files_.end() ? nullptr : found->second;
 }
 
+void Files::replaceIn(const std::string& path, const std::string& from, const std::string& to) {
+  const auto found = files_.find(path);
+  if (found == files_.end() || from == to) return;
+  auto changed = std::make_shared<File>(*found->second);
+  std::string& text = changed->content;
+  for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+  changed->packed.clear();  // it is of what was there before
+  changed->tag = '"' + toHex(digest(text)) + '"';
+  found->second = std::move(changed);
+}
+
 fs::path usualPageFolder() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);

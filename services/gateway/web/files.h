@@ -26,6 +26,8 @@ class Files {
   /// Of "/viewer.js"; "/" is index.html. Empty where there is none.
   std::shared_ptr<const File> find(std::string_view path) const;
   bool empty() const { return files_.empty(); }
+  /// Of one file, where it is there: each `from` becomes `to`.
+  void replaceIn(const std::string& path, const std::string& from, const std::string& to);
 
  private:
   std::map<std::string, std::shared_ptr<const File>, std::less<>> files_;

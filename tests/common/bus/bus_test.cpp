@@ -235,6 +235,38 @@ TEST_F(Bus, AnOwnerThatMissesItsLeaseIsTold) {
       runUntil(loop, [&] { return reportOf(reader).of("detections_writers_silent") == 1; }));
 }
 
+TEST_F(Bus, WhoComesLateGetsTheNewestThatIsKeptWhereHeAsks) {
+  Writer<Objects> writer(there, topics::kObjects);
+  for (std::uint64_t sequence : {1, 2, 3}) {
+    Objects objects;
+    objects.stamp.sequence = sequence;
+    ASSERT_TRUE(writer.write(objects));
+  }
+  Reader<Objects> now(here, topics::kObjects), kept(here, topics::kObjects, ReadFrom::kKept);
+  std::vector<std::uint64_t> got, got_now;
+  loop.on(kept, [&](const Objects& m) { got.push_back(m.stamp.sequence); });
+  loop.on(now, [&](const Objects& m) { got_now.push_back(m.stamp.sequence); });
+  EXPECT_TRUE(runUntil(loop, [&] { return !got.empty() && now.matched() == 1; }));
+  EXPECT_THAT(got, ElementsAre(3));
+  Objects live;
+  live.stamp.sequence = 4;
+  ASSERT_TRUE(writer.write(live));
+  EXPECT_TRUE(runUntil(loop, [&] { return !got_now.empty(); }));
+  EXPECT_THAT(got_now, ElementsAre(4)) << "who does not ask gets nothing of before";
+}
+
+TEST_F(Bus, ATickRestsWhileItIsNotWanted) {
+  bool wanted = false;
+  int ticks = 0, others = 0;
+  loop.every(
+      kStep, [&] { ++ticks; }, [&] { return wanted; });
+  loop.every(10 * kStep, [&] { ++others; });
+  ASSERT_TRUE(runUntil(loop, [&] { return others == 1; }));
+  EXPECT_EQ(ticks, 0);
+  wanted = true;
+  EXPECT_TRUE(runUntil(loop, [&] { return ticks > 1; }));
+}
+
 TEST_F(Bus, DiscoveryNamesProcessesAndTheirEndpoints) {
   Discovery discovery(here);
   Writer<ImuSample> writer(there, topics::kImu);

@@ -23,10 +23,20 @@ using namespace std::chrono_literals;
 using namespace perdure::test;
 using nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string subscribe(std::uint32_t id, std::uint32_t channel) {
   return json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}}
       .dump();
+}
+
+Frame greyFrame(std::uint64_t sequence) {
+  Frame frame;
+  frame.stamp = frameOf(sequence, {}).stamp;
+  frame.camera = "cam0";
+  frame.width = 64, frame.height = 48;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(64 * 48, std::uint8_t{90});
+  return frame;
 }
 
 class Gateway : public ::testing::Test {
@@ -43,7 +53,7 @@ class Gateway : public ::testing::Test {
       port_ = static_cast<std::uint16_t>(std::stoi(found[1]));
       return true;
     })) << child_->log();
-    ASSERT_TRUE(eventually(20s, [&] { return objects_.matched() > 0; })) << child_->log();
+    ASSERT_TRUE(eventually(20s, [&] { return events_.matched() > 0; })) << child_->log();
   }
 
   /// A client that is greeted, with the ids of the channels by topic.
@@ -87,6 +97,7 @@ class Gateway : public ::testing::Test {
   bus::Domain domain_{ownNetwork()};
   bus::Participant participant_{domain_, "test"};
   bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
+  bus::Writer<Event> events_{participant_, bus::topics::kEvents};
   Folder folder_;
   std::unique_ptr<Child> child_;
   std::uint16_t port_ = 0;
@@ -110,9 +121,35 @@ TEST_F(Gateway, ServesPageHealthAndMetrics) {
   ASSERT_TRUE(eventually(5s, [&] {
     return get(port_, "/healthz").text.find("\"gateway\":\"ok\"") != std::string::npos;
   })) << get(port_, "/healthz").text;
+  EXPECT_THAT(get(port_, "/metrics").text, Not(HasSubstr("perdure_gateway_objects")))
+      << "nobody looks: it is not known";
+  const auto client = lookingAt("/objects");
   publish(1);
   EXPECT_TRUE(eventually(5s, [&] { return metric("perdure_gateway_objects") == 3; }));
   EXPECT_THAT(get(port_, "/metrics").text, HasSubstr("perdure_service_up{process=\"gateway\"} 1"));
+}
+
+TEST_F(Gateway, SaysInHealthWhereItIsAndForHowMany) {
+  start();
+  const auto client = lookingAt("/health");
+  bus::Reader<Health> healths(participant_, bus::topics::kHealth);
+  std::string message;
+  const std::string expected = "at http://127.0.0.1:" + std::to_string(port_) + "/ for 1 clients";
+  EXPECT_TRUE(eventually(10s, [&] {
+    healths.drain([&](const Health& health) { message = health.message; });
+    return message == expected;
+  })) << message;
+}
+
+TEST_F(Gateway, ServesTheLayoutForItsOwnCamera) {
+  std::filesystem::create_directories(folder_.file("page"));
+  std::ofstream(folder_.file("page/index.html")) << "<title>the page</title>";
+  std::filesystem::copy_file(sources() / "tools/viewer/src/foxglove_layout.json",
+                             folder_.file("page/foxglove_layout.json"));
+  start({"page.folder=" + folder_.file("page"), "image.cameras=[front]"});
+  const std::string layout = get(port_, "/foxglove_layout.json").text;
+  EXPECT_THAT(layout, HasSubstr("\"/camera/front/image\""));
+  EXPECT_THAT(layout, Not(HasSubstr("cam0")));
 }
 
 TEST_F(Gateway, SaysInOneSentenceWhereThereIsNoPage) {
@@ -155,18 +192,53 @@ TEST_F(Gateway, HasTheImagesSentToItOnlyWhileSomebodyLooks) {
   const auto client = greeted();
   EXPECT_EQ(frames.matched(), 0u);
   client->sendFrame(subscribe(4, channels_["/camera/cam0/image"]));
-  ASSERT_TRUE(eventually(10s, [&] { return frames.matched() == 1; }));
-  Frame frame;
-  frame.stamp = {42, 1, fromNanoseconds(5), 0};
-  frame.camera = "cam0";
-  frame.width = 64, frame.height = 48;
-  frame.data = std::make_shared<const std::vector<std::uint8_t>>(64 * 48, std::uint8_t{90});
-  ASSERT_TRUE(frames.write(frame).has_value());
+  ASSERT_TRUE(eventually(10s, [&] { return frames.matched() > 0; }));
+  ASSERT_TRUE(frames.write(greyFrame(1)).has_value());
   EXPECT_THAT(client->readMessage(4), HasSubstr("\xff\xd8\xff"));
   client->sendFrame(R"({"op":"unsubscribe","subscriptionIds":[4]})");
   EXPECT_TRUE(eventually(10s, [&] { return frames.matched() == 0; }));
   client->sendFrame(subscribe(5, channels_["/camera/cam0/image"]));
   EXPECT_TRUE(eventually(10s, [&] { return frames.matched() == 1; }));
+}
+
+TEST_F(Gateway, HasNothingThatIsFrequentSentToItWhileNobodyLooks) {
+  start();
+  bus::Writer<Odometry> odometry(participant_, bus::topics::kOdometry);
+  auto client = greeted();
+  publish(++sequence_);
+  EXPECT_EQ(objects_.matched() + odometry.matched(), 0u);
+  client->sendFrame(subscribe(1, channels_["/scene"]));
+  EXPECT_TRUE(eventually(10s, [&] { return objects_.matched() == 1 && odometry.matched() == 1; }));
+  client->sendFrame(R"({"op":"unsubscribe","subscriptionIds":[1]})");
+  EXPECT_TRUE(eventually(10s, [&] { return objects_.matched() + odometry.matched() == 0; }));
+}
+
+/// The drive has ended before anybody looked: objects, body and image are those of its last frame.
+TEST_F(Gateway, TellsTheEndOfADriveToWhoComesAfterIt) {
+  start();
+  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  for (int i = 0; i < 3; ++i) {
+    publish(++sequence_);
+    ASSERT_TRUE(frames.write(greyFrame(sequence_)).has_value());
+  }
+  const auto client = greeted();
+  client->sendFrame(subscribe(1, channels_["/objects"]));
+  const std::string objects = client->readMessage(1);
+  EXPECT_THAT(objects, HasSubstr("\"objects\":[{\"id\":1"));
+  EXPECT_THAT(objects, HasSubstr("\"latency_ms\":-1")) << "it is not of now";
+  client->sendFrame(subscribe(2, channels_["/pose"]));
+  EXPECT_THAT(client->readMessage(2), HasSubstr("\"pose\""));
+  client->sendFrame(subscribe(3, channels_["/camera/cam0/image"]));
+  EXPECT_THAT(client->readMessage(3), HasSubstr("\xff\xd8\xff"));
+}
+
+/// Nothing else comes by which it would be told that somebody looks.
+TEST_F(Gateway, TellsTheLastImageWhereThereAreNoObjects) {
+  start();
+  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  ASSERT_TRUE(frames.write(greyFrame(1)).has_value());
+  const auto client = lookingAt("/camera/cam0/image");
+  EXPECT_THAT(client->readMessage(1), HasSubstr("\xff\xd8\xff"));
 }
 
 /// As a page that is loaded again does, when nothing new comes.

@@ -103,7 +103,9 @@ class Drive {
     (void)objects_.write(objects);
     if (i % 10 == 1) tellMap(i, objects);
     queries_.drain([&](const MapQuery& query) {
-      if (query.kind == MapQueryKind::kGraph) (void)replies_.write(test::graphFor(query, {70, 1}));
+      if (query.kind != MapQueryKind::kGraph) return;
+      (void)replies_.write(test::graphFor(query, {70, 1}));
+      if (!std::exchange(told_loop_, true)) tellLoop(objects);  // somebody looks
     });
   }
 
@@ -116,6 +118,7 @@ class Drive {
     frame.T_MW.p.y() = 100;
     frame.sessions = 2;
     frame.loops = 1;
+    frame.anchors = 3;  // and how well the body's place is known is not
     (void)map_frame_.write(frame);
     MapTile tile;
     tile.revision = i;
@@ -127,11 +130,14 @@ class Drive {
     tile.objects[0].world = frame.map;
     tile.objects[0].provisional = true;
     (void)tiles_.write(tile);
+  }
+
+  void tellLoop(const Objects& objects) {
     Event loop = eventOf(EventKind::kLoopClosed, 0);
     loop.stamp = objects.stamp;
     loop.world = objects.world;
     loop.detail = "loop 1, by 4 objects";
-    if (i == 1) (void)events_.write(loop);
+    (void)events_.write(loop);
   }
 
   bus::Writer<Calibration> calibration_;
@@ -148,6 +154,7 @@ class Drive {
   bus::Writer<ImuSample> imu_;
   bus::Writer<SpeedSample> speed_;
   bus::Writer<Frame> frames_;
+  bool told_loop_ = false;
   std::atomic<bool> over_{false};
   std::thread thread_;
 };

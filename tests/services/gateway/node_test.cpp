@@ -272,6 +272,14 @@ TEST_F(GatewayNode, TellsTheTransformFromMapToOdomAndAgainWhenItJumps) {
   EXPECT_EQ(frame["sessions"], 2);
   EXPECT_EQ(frame["loops"], 3);
   EXPECT_EQ(frame["body_sigma"], json({0.2, 0.3, 0.1, 0.01}));
+  MapFrame not_known = frameOfMap();
+  not_known.covariance.setZero();
+  not_known.anchors = 2;
+  node_.onMapFrame(not_known);
+  EXPECT_EQ(on(kMapToOdom).back()["body_sigma"], json::array());
+  not_known.anchors = 1;  // the map begins here
+  node_.onMapFrame(not_known);
+  EXPECT_EQ(on(kMapToOdom).back()["body_sigma"], json({0, 0, 0, 0}));
   MapFrame jumped = frameOfMap();
   jumped.T_MW.p.x() = 101;
   node_.onMapFrame(jumped);
@@ -445,6 +453,48 @@ TEST_F(GatewayNode, TellsWhereAnEventWas) {
   constexpr int kWarning = 3;
   EXPECT_EQ(on(kLog).at(0)["level"], kWarning);
   EXPECT_EQ(on(kLog)[0]["message"], "the map took a loop back: loop 4");
+}
+
+/// Nothing is heard while nobody looks but events and what is latched.
+TEST_F(GatewayNode, BeginsTheWayAnewAfterAWhileInWhichNobodyLooked) {
+  Objects frame = frameOf(1, {objectAt(12, {10, -2, 0})});
+  node_.setWanted({kTrajectory});
+  node_.onObjects(frame, kSecond);
+  node_.setWanted({});
+  Event loop = test::eventOf(EventKind::kLoopClosed, 0);
+  loop.world = frame.world;
+  loop.stamp = frameOf(100, {}).stamp;
+  node_.onEvent(loop);
+  Objects much_later = frameOf(200, {objectAt(12, {10, -2, 0})});
+  much_later.T_WB.p.x() = 80;
+  node_.onObjects(much_later, 20 * kSecond);
+  node_.setWanted({kTrajectory, kEvents});
+  for (const json& pose : on(kTrajectory).back()["poses"]) EXPECT_EQ(pose["position"]["x"], 80);
+  ASSERT_EQ(on(kEvents).size(), 1u);
+  EXPECT_FALSE(on(kEvents)[0].contains("at")) << "where the vehicle was then nobody heard";
+}
+
+TEST_F(GatewayNode, GoesOnWithTheWayWhereSomebodyLooksAgainAtOnce) {
+  node_.setWanted({kTrajectory});
+  node_.onObjects(frameOf(1, {}), kSecond);
+  node_.setWanted({});
+  Objects next = frameOf(2, {});
+  next.T_WB.p.x() = 1;
+  node_.onObjects(next, kSecond);
+  node_.setWanted({kTrajectory});
+  EXPECT_EQ(on(kTrajectory).back()["poses"][0]["position"]["x"], 0);
+}
+
+TEST_F(GatewayNode, WhatIsOfBeforeDoesNotReplaceWhatIsNewer) {
+  node_.setWanted({kObjects, cameraChannel(0, kImage)});
+  node_.onObjects(frameOf(5, {}), kSecond);
+  node_.onFrame(0, grey(5));
+  said_.clear();
+  node_.onObjectsOfBefore(frameOf(4, {}));
+  node_.onFrameOfBefore(0, grey(4));
+  EXPECT_TRUE(said_.empty());
+  node_.onObjectsOfBefore(frameOf(6, {}));
+  EXPECT_EQ(on(kObjects).at(0)["latency_ms"], -1);
 }
 
 TEST_F(GatewayNode, AnswersSayWhatLiesOnAnotherMap) {

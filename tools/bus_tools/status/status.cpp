@@ -37,6 +37,15 @@ void addSentence(std::string& text, const std::string& sentence) {
   if (!sentence.empty()) text += (text.empty() ? "" : "; ") + sentence;
 }
 
+/// "48 s", "12 min", "5 h", "3 d".
+std::string spanText(double seconds) {
+  constexpr double kMinute = 60.0, kHour = 3600.0, kDay = 86400.0;
+  if (seconds < 2 * kMinute) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 2 * kHour) return fmt::format("{:.0f} min", seconds / kMinute);
+  if (seconds < 2 * kDay) return fmt::format("{:.0f} h", seconds / kHour);
+  return fmt::format("{:.0f} d", seconds / kDay);
+}
+
 StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
   StatusNode node{name};
   if (seen == nullptr) {
@@ -68,7 +77,15 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
                           h.frames_out, h.dropped, h.rss_bytes >> 20);
   if (seen->cpu >= 0) node.text += fmt::format("  {:.0f} % CPU", 100 * seen->cpu);
   if (node.level != Level::kOk) node.text = std::string(stateWord(h.state)) + "  " + node.text;
+  if (seen->up_s) {
+    node.data["up_s"] = *seen->up_s;
+    if (*seen->up_s >= kJustStarted) node.text += "  up " + spanText(*seen->up_s);
+  }
   addSentence(node.text, h.message);
+  if (seen->restarts > 0) {
+    node.data["restarts"] = seen->restarts;
+    addSentence(node.text, fmt::format("was started anew {} times meanwhile", seen->restarts));
+  }
   if (seen->up_s && *seen->up_s < kJustStarted) {
     node.level = std::max(node.level, Level::kDegraded);
     addSentence(node.text, fmt::format("started {:.1f} s ago", *seen->up_s));
@@ -368,6 +385,7 @@ StatusNode judge(const StatusSeen& seen) {
   root.add(judgeServices(seen));
   root.add(judgeSensors(seen, source));
   root.add(judgeTopics(seen, source));
+  if (isHeard(seen, "map_store")) root.add(judgeMap(seen));
   root.add(judgeHost(seen));
   if (seen.services.empty()) root.text = "no service is heard";
   return root;

@@ -13,6 +13,7 @@
 #include "common/bus/domain.h"
 #include "common/bus/topics.h"
 #include "common/types/health.h"
+#include "common/types/map.h"
 #include "common/types/sensors.h"
 
 namespace perdure::tools {
@@ -39,6 +40,7 @@ struct ServiceSeen {
   double frames_hz = 0.0;      ///< of frames_out, between its last two messages
   double cpu = 0.0;            ///< of one core, likewise; below 0 where it is not known
   std::optional<double> up_s;  ///< since its start, where that is known
+  int restarts = 0;            ///< that were seen since this listens
 };
 
 struct TopicSeen {
@@ -83,10 +85,14 @@ struct StatusSeen {
   std::map<std::string, ServiceSeen> services;  ///< by process
   std::map<std::string, TopicSeen> topics;      ///< by name, "frame/cam0" among them
   std::optional<Calibration> calibration;
+  std::optional<MapHeader> map_header;
+  std::optional<MapFrame> map_frame;  ///< with the map's graph
   HostSeen host;
 };
 
 StatusNode judge(const StatusSeen& seen);
+/// A part of it.
+StatusNode judgeMap(const StatusSeen& seen);
 
 const char* levelWord(Level level);
 /// Lines with branches; `colour` for a terminal.

@@ -70,6 +70,8 @@ void StatusWatch::listen(const bus::Topic<T>& topic) {
   loop_.on(*reader, [this, &heard = topics_[topic.name]](const T& message) {
     if constexpr (std::is_same_v<T, Health>) note(message);
     if constexpr (std::is_same_v<T, Calibration>) calibration_ = message;
+    if constexpr (std::is_same_v<T, MapHeader>) map_header_ = message;
+    if constexpr (std::is_same_v<T, MapFrame>) map_frame_ = message;
     arrived(heard, latencyOf(message));
   });
 }
@@ -80,6 +82,7 @@ void StatusWatch::note(const Health& health) {
   const double at = steadySeconds();
   const bool same = process.last.instance == health.instance && process.last_s > 0;
   if (!same && settled(at)) process.began_s = at;
+  if (!same && process.last_s > 0) ++process.restarts;
   process.before = same ? process.last : Health{};
   process.before_s = same && settled(process.last_s) ? process.last_s : -1.0;
   process.last = health;
@@ -100,8 +103,8 @@ void StatusWatch::arrived(Heard& heard, double latency_ms) {
 }
 
 ServiceSeen StatusWatch::seenOf(const Process& process, double at) const {
-  ServiceSeen seen{process.last, at - process.last_s, process.last.rate_hz, -1.0,
-                   upSeconds(process.last.pid)};
+  ServiceSeen seen{process.last, at - process.last_s,         process.last.rate_hz,
+                   -1.0,         upSeconds(process.last.pid), process.restarts};
   if (!seen.up_s && process.began_s > 0) seen.up_s = at - process.began_s;
   const double span = process.last_s - process.before_s;
   if (process.before_s < 0 || span <= 0) return seen;
@@ -114,6 +117,8 @@ StatusSeen StatusWatch::seen() {
   StatusSeen seen;
   seen.vehicle = options_.vehicle;
   seen.calibration = calibration_;
+  seen.map_header = map_header_;
+  seen.map_frame = map_frame_;
   const double at = steadySeconds();
   for (const auto& [name, process] : processes_) seen.services[name] = seenOf(process, at);
   for (auto& [name, heard] : topics_) {

@@ -35,6 +35,7 @@ class StatusWatch {
     Health before, last;
     double before_s = -1.0, last_s = -1.0;
     double began_s = -1.0;  ///< where its start was seen
+    int restarts = 0;
   };
 
   /// What comes at first may be latched: older than its arrival.
@@ -55,6 +56,8 @@ class StatusWatch {
   std::map<std::string, Heard> topics_;
   std::map<std::string, Process> processes_;
   std::optional<Calibration> calibration_;
+  std::optional<MapHeader> map_header_;
+  std::optional<MapFrame> map_frame_;
   std::function<void(const Health&)> on_health_;
 };
 

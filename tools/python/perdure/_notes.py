@@ -87,7 +87,7 @@ NOTES = {
     "MapHeader.tile_size_m": "m",
     "MapFrame": "How the odometry's W lies in the map's M.",
     "MapFrame.T_MW": "takes points of W to M",
-    "MapFrame.covariance": "of the body's [p, yaw] in M",
+    "MapFrame.covariance": "of the body's [p, yaw] in M; all 0 where anchors > 1: not known",
     "MapQuery": "A question to the running map store; ``perdure.Map()`` asks for you.",
     "MapQuery.low": "corner, or centre of the sphere",
     "MapQuery.radius": "m",

@@ -379,7 +379,7 @@ class MapFrame(Message):
     world: WorldId  # WorldId
     map: WorldId  # WorldId
     T_MW: Pose  # takes points of W to M
-    covariance: npt.NDArray[np.float64]  # (4, 4), symmetric, of the body's [p, yaw] in M
+    covariance: npt.NDArray[np.float64]  # (4, 4), symmetric, of the body's [p, yaw] in M; all 0 where anchors > 1: not known
     revision: int  # int
     sessions: int  # int
     loops: int  # int

@@ -1,5 +1,5 @@
 // The list of objects with its search, the log of events, and the state of services.
-import { colourOf, escaped, looksLike, percent, visibilityWords } from './words.js';
+import { colourOf, escaped, looksLike, percent, visibilityWords, wordsOfTime } from './words.js';
 
 const MOST_ROWS = 400;
 
@@ -121,7 +121,7 @@ export class EventLog {
       // Not the digits of a time: 0.1 s.
       if (id) words = words.replace(new RegExp(`(?<![\\d.])${id}(?!\\.?\\d)`), `<a data-object="${id}">${id}</a>`);
     }
-    line.innerHTML = `<time>${time < 0 ? 'before' : `${time.toFixed(1)} s`}</time><span>${words}</span>`;
+    line.innerHTML = `<time>${wordsOfTime(time)}</time><span>${words}</span>`;
     if (event.event === 'predicted_return') {
       // It is told again and again until the object is seen: the newest is enough.
       this.predicted.get(event.object_id)?.remove();

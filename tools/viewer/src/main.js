@@ -6,7 +6,7 @@ import { wordsOfPart } from './graph_panel.js';
 import { Model, troubleOf } from './model.js';
 import { ObjectPanel } from './object_panel.js';
 import { PlaybackBar } from './playback.js';
-import { MARKS, escaped, lookOfLoop } from './words.js';
+import { MARKS, escaped, lookOfLoop, wordsOfImage, wordsOfNoImage, wordsOfPlace } from './words.js';
 import { World } from './world.js';
 
 const $ = (id) => document.getElementById(id);
@@ -238,16 +238,21 @@ function figures(now) {
   const since = connection.range?.first ?? model.firstTime; // the bar of a recording says the same
   if (frame) items.push(['time', `${Math.max(0, model.time - since).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
-  if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor']);
-  if (frame) items.push(['rate', stands ? '–' : `${model.rate(now).toFixed(0)} Hz`, 'minor'], ['latency', frame.latency_ms >= 0 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
+  if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);
+  if (frame) items.push(['rate', stands ? '–' : `${model.rate(now).toFixed(0)} Hz`, 'minor'], ['latency', frame.latency_ms >= 0 && model.silentFor(now) < 2 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
 }
 
-function noImage(state) {
-  if (state === 'stale') return 'no image comes';
-  if (!connection.range) return 'no image yet: is the camera in image.cameras?';
-  return cameraTopic ? 'no image yet' : 'the recording has no images: perdure record --images keeps them';
+/** What is under the image, or in its place. */
+function captionOf(state) {
+  if (camera.figure.classList.contains('has-image')) {
+    return wordsOfImage(state, model.time - camera.shownTime);
+  }
+  const recorded = connection.range && (cameraTopic ? 'empty' : 'without');
+  const capture = model.health?.services.find((s) => s.process === 'capture');
+  return wordsOfNoImage(state, { recorded, openFor: (performance.now() - openedAt) / 1000, heard: capture?.stood_in_for || capture?.age_s < 2.5 });
 }
+const openedAt = performance.now();
 
 let stateAt = 0;
 function showState() {
@@ -265,8 +270,7 @@ function showState() {
   if ($('trouble').textContent !== sentence) $('trouble').textContent = sentence;
   $('figures').innerHTML = figures(now);
   if (!cameraTopic) lookThroughCamera();
-  if (camera.figure.classList.contains('has-image') && state === 'lost') camera.caption.textContent = 'the last image';
-  if (!camera.figure.classList.contains('has-image')) camera.caption.textContent = noImage(state);
+  camera.caption.textContent = captionOf(state);
 }
 
 function refresh() {

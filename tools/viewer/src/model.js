@@ -1,5 +1,7 @@
 // What the page knows: the newest of everything, and how the objects were since it was opened.
 
+const RATE_MS = 5000;
+
 export class Model {
   constructor() {
     this.objects = new Map(); // id → object, of the working set
@@ -13,7 +15,7 @@ export class Model {
     this.health = null;
     this.heardAt = 0; // performance.now() of the newest objects
     this.firstTime = null;
-    this.intervals = [];
+    this.arrivals = []; // of objects in the last seconds
   }
 
   takeObjects(message, now) {
@@ -28,11 +30,10 @@ export class Model {
     this.time = time;
     this.frame = frame;
     this.objects = new Map(objects.map((o) => [o.id, o]));
-    if (this.heardAt > 0) {
-      this.intervals.push(now - this.heardAt);
-      if (this.intervals.length > 30) this.intervals.shift();
-    }
+    if (this.heardAt > 0) this.live = true; // the first may be of before
     this.heardAt = now;
+    this.arrivals.push(now);
+    while (this.arrivals[0] < now - RATE_MS) this.arrivals.shift();
     for (const o of objects) this.remember(o, time);
   }
 
@@ -97,11 +98,10 @@ export class Model {
     return this.objects.get(id) ?? this.remembered.get(id);
   }
 
-  /** Messages of objects a second. */
+  /** Messages of objects a second. Over seconds: a page that stands still hears several at once. */
   rate(now) {
-    if (this.intervals.length < 2 || now - this.heardAt > 2000) return 0;
-    const sorted = [...this.intervals].sort((a, b) => a - b);
-    return 1000 / Math.max(1, sorted.reduce((a, b) => a + b, 0) / sorted.length);
+    if (this.arrivals.length < 3 || now - this.heardAt > 2000) return 0;
+    return (1000 * (this.arrivals.length - 1)) / Math.max(1, this.arrivals.at(-1) - this.arrivals[0]);
   }
 
   /** Where the page itself stood still, what waits has not been heard yet. */
@@ -134,7 +134,7 @@ export function troubleOf(model, connection, now) {
     return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
   // Who comes later is told the last objects once.
-  const last = silent > 2 || model.intervals.length === 0;
+  const last = silent > 2 || !model.live;
   if (last && capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
   if (silent > 2) {
     const bad = services.filter((s) => s.age_s >= 2.5).map((s) => `${s.process} has been silent for ${Math.round(s.age_s)} s`);

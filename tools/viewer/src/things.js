@@ -104,6 +104,9 @@ export class Thing {
     this.ellipsoid.position.fromArray(object.c);
     this.ellipsoid.quaternion.setFromRotationMatrix(axes);
     this.ellipsoid.scale.fromArray(variances.map((x) => Math.min(20, Math.max(0.01, 2 * Math.sqrt(x)))));
+    // One that is larger than its object must not hide what is around it.
+    const size = Math.max(...object.size) / 2, axis = Math.max(...this.ellipsoid.scale.toArray());
+    this.ellipsoid.material.opacity = 0.16 * Math.min(1, Math.max(0.25, size / axis));
   }
 
   choose(chosen) {

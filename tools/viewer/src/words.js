@@ -82,3 +82,30 @@ export const lookOfLoop = (loop) => (loop.state !== 'confirmed' ? loop.state : l
 
 /** A text node's worth of HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
+
+/** Under an image that is so many seconds older than the objects. */
+export function wordsOfImage(state, older) {
+  const old = older > 0.5 ? `${older.toFixed(1)} s before the objects that are shown` : '';
+  if (state === 'lost' || state === 'stale') return old ? `the last image, ${old}` : 'the last image';
+  return old ? `the image is of ${old}` : '';
+}
+
+/** In the place of an image. `recorded`: "" live, "without" images, or "empty" so far. */
+export function wordsOfNoImage(state, { recorded, openFor, heard }) {
+  if (recorded === 'without') return 'the recording has no images: perdure record --images keeps them';
+  if (recorded || state === 'lost' || state === 'connecting' || openFor < 3) return 'no image yet';
+  const none = 'No image has come since this page is open';
+  if (!heard) return `${none}: capture is not heard.`;
+  return state === 'stale' ? `${none}: the camera has stopped.` : `${none}: is the camera in image.cameras of the gateway?`;
+}
+
+/** Standard deviations [x, y, z, yaw] of the body in the map; empty: not known. */
+export function wordsOfPlace(sigma) {
+  return sigma.length > 0 ? `${Math.max(sigma[0], sigma[1]).toFixed(2)} m` : 'not known';
+}
+
+/** Seconds since the page was opened; of long before it may be of another clock. */
+export function wordsOfTime(seconds) {
+  if (seconds >= 0) return `${seconds.toFixed(1)} s`;
+  return seconds > -3600 ? `−${(-seconds).toFixed(1)} s` : 'before';
+}

@@ -12,6 +12,7 @@ export class World {
   constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
+    this.toolbar = document.getElementById('tools'); // names stay clear of it
     this.onPick = onPick;
     this.onPart = onPart;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });
@@ -370,9 +371,11 @@ export class World {
       candidates.push({ id, o, near, x: (at.x + 1) * width / 2, y: (1 - at.y) * height / 2 });
     }
     candidates.sort((a, b) => a.near - b.near);
-    const placed = [], shown = new Set();
+    const tools = this.toolbar.getBoundingClientRect(), view = this.canvas.getBoundingClientRect();
+    const bar = { l: tools.left - view.left, r: tools.right - view.left, t: tools.top - view.top, b: tools.bottom - view.top };
+    const placed = [bar], shown = new Set();
     for (const one of candidates) {
-      if (placed.length >= MOST_LABELS) break;
+      if (shown.size >= MOST_LABELS) break;
       const w = 7 * (one.o.class.length + String(one.id).length + 1) + 14;
       const box = { l: one.x - w / 2, r: one.x + w / 2, t: one.y - 20, b: one.y };
       if (placed.some((p) => p.l < box.r && p.r > box.l && p.t < box.b && p.b > box.t)) continue;

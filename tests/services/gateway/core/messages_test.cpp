@@ -2,11 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "services/gateway/core/annotations.h"
 #include "services/gateway/core/beliefs.h"
+#include "services/gateway/core/channels.h"
 #include "services/gateway/core/scene.h"
 #include "services/gateway/core/vital_signs.h"
 #include "services/gateway/core/world.h"
@@ -24,6 +28,40 @@ std::set<std::string> idsIn(const json& list) {
   std::set<std::string> ids;
   for (const auto& one : list) ids.insert(one["id"]);
   return ids;
+}
+
+/// "/objects.objects[:].r" and the like name a topic before the first dot.
+void gatherTopics(const json& node, std::set<std::string>& topics) {
+  const auto take = [&](const std::string& text) {
+    const std::string name = text.substr(0, text.find_first_of(".{["));
+    if (text.starts_with("/") && name != "/move_base_simple/goal" && name != "/clicked_point" &&
+        name != "/initialpose") {
+      topics.insert(name);
+    }
+  };
+  if (node.is_string()) return take(node);
+  if (!node.is_structured()) return;
+  for (const auto& [key, value] : node.items()) {
+    if (node.is_object()) take(key);
+    gatherTopics(value, topics);
+  }
+}
+
+TEST(FoxgloveLayout, NamesChannelsThatThereAre) {
+  std::ifstream file(std::filesystem::path(std::getenv("PERDURE_SOURCE")) /
+                     "tools/viewer/src/foxglove_layout.json");
+  const json layout = json::parse(file);
+  std::set<std::string> named, advertised;
+  gatherTopics(layout, named);
+  for (const ChannelInfo& channel : channelTable({"cam0"})) advertised.insert(channel.topic);
+  for (const std::string& topic : named) EXPECT_TRUE(advertised.contains(topic)) << topic;
+  for (const char* topic : {"/scene", "/map/scene", "/map/graph/scene", "/trajectory", "/landmarks",
+                            "/camera/cam0/image", "/camera/cam0/annotations", "/log", "/health"}) {
+    EXPECT_TRUE(named.contains(topic)) << topic;
+  }
+  const json& scene = layout["configById"]["3D!perdure"];
+  EXPECT_EQ(scene["followMode"], "follow-pose");
+  EXPECT_EQ(scene["followTf"], "base_link");
 }
 
 TEST(Scene, HasTheWholeSceneInEachMessageAndTellsForAWhileWhatHasGone) {

@@ -52,6 +52,33 @@ check(figures.page.events > 0, 'there are events');
 check(figures.page.services > 0, 'there are services');
 await page.screenshot({ path: join(out, 'live.png') });
 
+// What is not there is said.
+const words = await page.evaluate(async () => {
+  const { wordsOfImage, wordsOfNoImage, wordsOfPlace } = await import('./words.js');
+  return { figures: document.getElementById('figures').innerText, live: wordsOfImage('live', 0.1), late: wordsOfImage('live', 3), last: wordsOfImage('stale', 0),
+    ended: wordsOfNoImage('stale', { openFor: 9, heard: true }), silent: wordsOfNoImage('stale', { openFor: 9, heard: false }),
+    opened: wordsOfNoImage('live', { openFor: 1, heard: true }), place: wordsOfPlace([0.1, 0.25, 0.1, 0.1]) };
+});
+check(/σ in map\s*not known/.test(words.figures), `how well the place is known is not known (${words.figures})`);
+check(words.live === '' && words.late.includes('3.0 s before') && words.last === 'the last image' && words.place === '0.25 m', `an image that is old (${JSON.stringify(words)})`);
+check(words.ended.includes('since this page is open: the camera has stopped') && words.silent.includes('capture is not heard') && words.opened === 'no image yet', `no image (${JSON.stringify(words)})`);
+
+// How often objects come is told also where several were heard at once; names stay clear of buttons.
+const kept = await page.evaluate(async () => {
+  const { Model } = await import('./model.js');
+  const { wordsOfTime } = await import('./words.js');
+  const model = new Model();
+  for (let i = 0; i < 100; ++i) {
+    model.takeObjects({ objects: [], timestamp: { sec: i, nsec: 0 }, world: 'a', epoch: 1 }, 500 * Math.floor(i / 10)); // ten each half second
+  }
+  const bar = document.getElementById('tools').getBoundingClientRect();
+  const under = [...document.querySelectorAll('#labels span')].filter((e) => { const b = e.getBoundingClientRect(); return b.left < bar.right && b.right > bar.left && b.top < bar.bottom && b.bottom > bar.top; });
+  return { rate: model.rate(4500), under: under.length, times: [wordsOfTime(2), wordsOfTime(-3.25), wordsOfTime(-1e9)] };
+});
+check(kept.rate > 18 && kept.rate < 23, `a rate of 20 Hz is told as ${kept.rate}`);
+check(kept.under === 0, `${kept.under} names lie under the buttons`);
+check(String(kept.times) === '2.0 s,−3.3 s,before', `times of events (${kept.times})`);
+
 // A pixel that is not the background: the map is drawn, not only there.
 const lit = await page.evaluate(() => {
   const { world } = window.perdure;

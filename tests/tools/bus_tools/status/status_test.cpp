@@ -160,6 +160,41 @@ TEST(Status, AServiceThatWasStartedJustNowIsWorthTelling) {
   EXPECT_EQ(judge(seen).level, Level::kOk);
 }
 
+TEST(Status, TellsHowLongAServiceIsUpAndHowOftenItWasStartedMeanwhile) {
+  StatusSeen seen = sound();
+  seen.services["vio"].up_s = 90.0;
+  seen.services["capture"].up_s = 7 * 3600.0;
+  seen.services["capture"].restarts = 2;
+  const StatusNode root = judge(seen);
+  EXPECT_THAT(find(root, "vio").text, HasSubstr("up 90 s"));
+  EXPECT_THAT(find(root, "vio").text, Not(HasSubstr("anew")));
+  EXPECT_THAT(find(root, "capture").text, HasSubstr("up 7 h"));
+  EXPECT_THAT(find(root, "capture").text, HasSubstr("was started anew 2 times"));
+  EXPECT_EQ(toJson(find(root, "capture"))["restarts"], 2);
+}
+
+TEST(Status, TellsWhatIsOnTheMapAndOfItsGraph) {
+  StatusSeen seen = sound();
+  EXPECT_THAT(find(judge(seen), "graph").text, HasSubstr("graph.enabled"));
+  seen.map_header.emplace();
+  seen.map_header->objects = 412;
+  seen.map_header->tiles = 1;
+  MapFrame& frame = seen.map_frame.emplace();
+  frame.anchors = 57;
+  frame.loops = 3;
+  frame.sessions = 1;
+  EXPECT_THAT(find(judge(seen), "graph").text, HasSubstr("cannot be told"));
+  EXPECT_FALSE(toJson(find(judge(seen), "graph")).contains("body_sigma"));
+  frame.covariance.diagonal() << 0.04, 0.09, 0.01, 0.0001;
+  const StatusNode root = judge(seen);
+  EXPECT_EQ(root.level, Level::kOk);
+  EXPECT_EQ(find(find(root, "map"), "objects").text, "412 in 1 tile");
+  EXPECT_EQ(find(root, "graph").text,
+            "57 anchors, 3 loops, 1 session; the body is known to 0.30 m, 0.6° (σ)");
+  seen.services.erase("map_store");
+  EXPECT_EQ(find(judge(seen), "map").name, "none");
+}
+
 TEST(Status, ACameraThatNobodyHasIsNotMissed) {
   StatusSeen seen = sound();
   seen.topics["frame/cam1"] = {0, 1, 0, 0.0, {}, {}};

@@ -1,0 +1,73 @@
+// Events, and where they happened.
+#include "services/gateway/node.h"
+
+namespace perdure::gateway {
+namespace {
+
+constexpr std::size_t kMostEvents = 256;
+constexpr std::chrono::seconds kThen{1};  // the body's pose is that of an event so far from it
+
+}  // namespace
+
+void Node::onEvent(const Event& event) {
+  events_.push_back({event, placeOf(event)});
+  unplaced_ = unplaced_ || (event.object_id == 0 && !events_.back().place);
+  if (events_.size() > kMostEvents) events_.pop_front();
+  noteReturns(event);
+  if (event.kind == EventKind::kLoopClosed || event.kind == EventKind::kLoopWithdrawn ||
+      event.kind == EventKind::kRelocalised) {
+    graph_pace_.changed();
+  }
+  if (wants(kEvents)) sendEvent(events_.back(), false);
+  if (wants(kLog)) sendEvent(events_.back(), true);
+}
+
+/// An event may be heard before the first pose of its W. Who asks later is told where it was.
+void Node::placeEvents() {
+  if (!unplaced_) return;
+  unplaced_ = false;
+  for (Happened& happened : events_) {
+    if (happened.event.object_id != 0 || happened.place) continue;
+    happened.place = placeOf(happened.event);
+    unplaced_ = unplaced_ || (!happened.place && happened.event.stamp.time >= timeOfPose());
+  }
+}
+
+std::optional<TimePoint> Node::timeOfPose() const {
+  if (odometry_) return odometry_->stamp.time;
+  return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
+}
+
+/// Of an object: where it is believed to be; of the whole map: where the vehicle was then.
+std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
+  if (event.world != world() || !(odometry_ || objects_)) return std::nullopt;
+  if (event.object_id == 0) {
+    const TimePoint then = event.stamp.time, known = *timeOfPose();
+    return then < known + kThen && known < then + kThen ? std::optional(pose().p) : std::nullopt;
+  }
+  if (!objects_) return std::nullopt;
+  for (const ObjectBelief& object : objects_->objects) {
+    if (object.id == event.object_id) return Eigen::Vector3d(object.best().mean.head<3>());
+  }
+  return std::nullopt;
+}
+
+void Node::sendEvent(const Happened& happened, bool as_log) {
+  const Event& event = happened.event;
+  const auto place = happened.place ? happened.place : placeOf(event);
+  outputs_.message(
+      {as_log ? kLog : kEvents, event.stamp.time,
+       std::make_shared<const std::string>(as_log ? eventLog(event) : eventJson(event, place))});
+}
+
+/// A prediction holds until the object is seen again, or is no more.
+void Node::noteReturns(const Event& event) {
+  if (event.kind == EventKind::kPredictedReturn) {
+    returns_[event.object_id] = event;
+  } else if (event.kind == EventKind::kReappeared || event.kind == EventKind::kGone ||
+             event.kind == EventKind::kMerged || event.kind == EventKind::kArchived) {
+    returns_.erase(event.object_id);
+  }
+}
+
+}  // namespace perdure::gateway
