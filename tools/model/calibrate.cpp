@@ -39,6 +39,7 @@ struct Seen {
   std::vector<Candidate> candidates;
   std::vector<Target> targets;
   double width = 0.0, height = 0.0;  ///< of the image in the input
+  bool sides_known = true;
 };
 
 Calibration plain() { return {.temperature = 1.0, .clutter_rate = 0.5}; }
@@ -147,6 +148,7 @@ void Study::lookAt(LabelledData& data, std::size_t done, std::size_t all,
   for (const LabelledFrame& labels : data.frames) {
     if (const auto frame = data.dataset->frameAt(labels.frame)) {
       frames_.push_back(seenIn(*frame, labels));
+      frames_.back().sides_known = data.sides_known;
     }
     if (progress) progress(++done, all);
   }
@@ -224,6 +226,7 @@ void Study::measureSides(const Calibration& calibration) {
   std::vector<double> errors;
   std::map<std::size_t, std::array<std::vector<double>, 4>> insets;
   for (const Seen& frame : frames_) {
+    if (!frame.sides_known) continue;
     const auto boxes = reported(frame, calibration);
     const auto taken = match(boxes, frame.targets);
     for (std::size_t i = 0; i < boxes.size(); ++i) {

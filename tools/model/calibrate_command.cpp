@@ -27,7 +27,13 @@ did not see (five unbroken folds). Writes model.json and keeps the old one as mo
 
   perdure model calibrate net.onnx --frames DRIVE                     simulated, with its truth
   perdure model calibrate net.onnx --frames ROOT --sequence 0001      KITTI tracking with image_02
-  perdure model calibrate net.onnx --frames *_sync --labels label_02/0000.txt      KITTI raw)";
+  perdure model calibrate net.onnx --frames *_sync --labels label_02/0000.txt      KITTI raw
+
+Where nobody labelled anything, the objects that a run put on its map stand in for labels (with all
+classes of the network: what is not calibrated makes ghosts where few are asked for):
+
+  perdure pipeline --data DRIVE --odometry vio --detections model --model net.onnx --out OUT
+  perdure model calibrate net.onnx --frames DRIVE --labels OUT)";
 
 struct CalibrateRequest {
   CalibrateOptions options;
@@ -123,7 +129,10 @@ void addCalibrate(CLI::App& model) {
   command->add_option("--frames", request->folders, "labelled folders")
       ->required()
       ->type_name("DIR");
-  command->add_option("--labels", request->labels, "label_02/SEQUENCE.txt, of KITTI raw")
+  command
+      ->add_option(
+          "--labels", request->labels,
+          "label_02/SEQUENCE.txt, of KITTI raw; or OUT of `perdure pipeline` over the frames")
       ->type_name("FILE");
   command->add_option("--sequence", request->sequence, "of KITTI tracking")->type_name("NAME");
   command->add_option("--every", request->every, "look at each N-th frame")

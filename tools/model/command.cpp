@@ -116,6 +116,11 @@ void importAndLook(const ImportOptions& request) {
   }
   std::printf("written     %s, %s\nuse it      perdure-inference --set model.path=%s\n",
               out.c_str(), description.c_str(), out.c_str());
+  std::printf(
+      "calibrate   perdure model calibrate %s --frames DRIVE --labels OUT\n"
+      "            by a run over a drive of yours; until then ask for all classes: few "
+      "alone make ghosts\n",
+      out.c_str());
 }
 
 namespace {

@@ -8,6 +8,7 @@
 #include "common/math/so3.h"
 #include "common/replay/files/kitti_labels.h"
 #include "tools/evaluate/simulated_truth.h"
+#include "tools/model/map_labels.h"
 
 namespace perdure::tools {
 namespace {
@@ -16,22 +17,13 @@ namespace fs = std::filesystem;
 
 constexpr double kNothingSeen = 0.05, kEnoughSeen = 0.25, kWhollySeen = 0.95;
 
-/// Box around the eight corners' images, where all of them are in the image.
+/// Of a cuboid whose corners are all in the image.
 std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& key,
                           const RigidTransform& T_CW, const CameraModel& camera) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                               corner & 4 ? 0.5 : -0.5);
-    const Eigen::Vector3d p_W =
-        key.centre_W + rotationAboutZ(key.yaw) * half.cwiseProduct(object.size);
-    const auto pixel = camera.project(T_CW * p_W);
-    if (!pixel || !camera.inImage(*pixel)) return std::nullopt;
-    box.x1 = std::min(box.x1, pixel->x()), box.x2 = std::max(box.x2, pixel->x());
-    box.y1 = std::min(box.y1, pixel->y()), box.y2 = std::max(box.y2, pixel->y());
-  }
-  return box;
+  const auto box = boxAround(key.centre_W, key.yaw, object.size, T_CW, camera);
+  const bool inside =
+      box && camera.inImage({box->x1, box->y1}) && camera.inImage({box->x2, box->y2});
+  return inside ? box : std::nullopt;
 }
 
 /// A view of a simulated object as a label; nothing where too little of it is seen.
@@ -83,10 +75,12 @@ fs::path labelFile(const LabelRequest& request, replay::DatasetKind kind) {
   if (kind == replay::DatasetKind::kKittiTracking) {
     return request.data / "label_02" / (request.sequence + ".txt");
   }
-  throw StartupError(ExitCode::kUnavailable,
-                     request.data.string() +
-                         " has no labels of its own; give --labels label_02/SEQUENCE.txt, or a "
-                         "folder that `perdure simulate --out` made");
+  throw StartupError(
+      ExitCode::kUnavailable,
+      request.data.string() +
+          " has no labels of its own; give --labels OUT of a run of `perdure pipeline` "
+          "over it, --labels label_02/SEQUENCE.txt, or a folder that `perdure "
+          "simulate --out` made");
 }
 
 TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& aliases,
@@ -124,10 +118,29 @@ LabelledData readKitti(const LabelRequest& request, std::unique_ptr<replay::Data
 
 }  // namespace
 
+std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
+                             const Eigen::Vector3d& size, const RigidTransform& T_CW,
+                             const CameraModel& camera) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                               corner & 4 ? 0.5 : -0.5);
+    const auto pixel =
+        camera.project(T_CW * (centre_W + rotationAboutZ(yaw) * half.cwiseProduct(size)));
+    if (!pixel) return std::nullopt;
+    box.x1 = std::min(box.x1, pixel->x()), box.x2 = std::max(box.x2, pixel->x());
+    box.y1 = std::min(box.y1, pixel->y()), box.y2 = std::max(box.y2, pixel->y());
+  }
+  return box;
+}
+
 LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
                           double least_px) {
-  if (isSimulated(request.data)) return readSimulated(request, aliases, least_px);
+  const bool by_map = fs::is_directory(request.labels);
+  if (isSimulated(request.data) && !by_map) return readSimulated(request, aliases, least_px);
   auto dataset = replay::Dataset::open({.path = request.data, .sequence = request.sequence});
+  if (by_map) return readMapLabels(request, std::move(dataset), aliases, least_px);
   return readKitti(request, std::move(dataset), aliases, least_px);
 }
 

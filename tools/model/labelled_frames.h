@@ -1,4 +1,5 @@
-// Frames with true boxes, for calibration: simulated folders, and KITTI with its labels.
+// Frames with true boxes, for calibration: simulated folders, KITTI with its labels, and any frames
+// with the objects of a run over them (map_labels.h).
 #pragma once
 
 #include <filesystem>
@@ -8,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "common/camera/camera_model.h"
+#include "common/math/rigid_transform.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/class_aliases.h"
 #include "common/types/detections.h"
@@ -28,9 +31,10 @@ struct LabelledFrame {
 
 struct LabelRequest {
   std::filesystem::path data;
-  std::string sequence;          ///< of KITTI tracking
-  std::filesystem::path labels;  ///< label_02/SEQUENCE.txt; found by itself in KITTI tracking
-  std::uint64_t every = 1;       ///< each so many frames
+  std::string sequence;  ///< of KITTI tracking
+  /// label_02/SEQUENCE.txt, which is found by itself in KITTI tracking; or OUT of a run.
+  std::filesystem::path labels;
+  std::uint64_t every = 1;  ///< each so many frames
 };
 
 struct LabelledData {
@@ -38,7 +42,14 @@ struct LabelledData {
   std::vector<LabelledFrame> frames;  ///< in order
   /// Classes whose every instance is labelled; empty: of all things.
   std::set<std::string> judged;
+  bool sides_known = true;  ///< the sides of a box are those of the image, not a prediction
 };
+
+/// Box around the images of a cuboid's corners, not cut at the border; nothing where a corner has
+/// no image.
+std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
+                             const Eigen::Vector3d& size, const RigidTransform& T_CW,
+                             const CameraModel& camera);
 
 /// What shows under a quarter of itself, or is under `least_px` on its longer side (pixels of the
 /// image), is ignored; what shows under a twentieth is not there. Of KITTI: what is largely

@@ -99,8 +99,9 @@ TEST_F(BusTools, HzTellsTheRate) {
 TEST_F(BusTools, TopicsListsTheTableAndWhoIsThere) {
   const ProgramAnswer outcome = runWhilePublishing({perdure, "topics"});
   EXPECT_EQ(outcome.status, 0);
-  EXPECT_THAT(outcome.output, testing::ContainsRegex("objects +perdure::msg::Objects +reliable 8 "
-                                                     "+10 Hz +1 \\(semantic_filter\\) +0"));
+  EXPECT_THAT(outcome.output,
+              testing::ContainsRegex("objects +perdure::msg::Objects +reliable 8, the "
+                                     "newest kept +10 Hz +1 \\(semantic_filter\\) +0"));
   EXPECT_THAT(outcome.output, testing::ContainsRegex("map/header +perdure::msg::MapHeader"));
 }
 

@@ -53,6 +53,21 @@ class CalibrateRun : public testing::Test {
     return read(out);
   }
 
+  /// Mean log-likelihood of a box by the frames' own truth, with this model.json as it is; it is
+  /// left in spoiled.json.
+  double likelihoodByTruth(const fs::path& frames, const nlohmann::json& model) {
+    const fs::path description = folder_ / "spoiled.json";
+    std::ofstream(description) << model.dump();
+    const ProgramAnswer answer =
+        run({"model", "calibrate", network_.string(), "--quiet", "--dry-run", "--frames",
+             frames.string(), "--description", description.string()});
+    EXPECT_EQ(answer.status, 0) << answer.output;
+    double value = 0.0;
+    const std::string& text = answer.output;
+    std::istringstream(text.substr(text.find("log-likelihood") + 14)) >> value;
+    return value;
+  }
+
   const fs::path models_ = fromEnvironment("PERDURE_SOURCE") / "models";
   const fs::path network_ = models_ / "perdure_320x240.onnx";
   const fs::path folder_ =
@@ -82,6 +97,33 @@ TEST_F(CalibrateRun, MendsANetworkWhoseEvidenceWasSpoiledAndInferenceTakesTheFil
   config.model.description = (folder_ / "spoiled.new.json").string();
   const inference::Node node(config, 1);
   EXPECT_NEAR(node.description().calibration.temperature, b["temperature"].get<double>(), 1e-9);
+}
+
+/// A network that is too sure of itself, and frames that nobody labelled: the map of a run stands
+/// in. The truth of the frames judges what comes out.
+TEST_F(CalibrateRun, TheMapOfARunStandsInForLabels) {
+  const fs::path street = folder_ / "street", out = folder_ / "out";
+  const ProgramAnswer drawn =
+      run({"simulate", "--scene", "street", "--seed", "3", "--seconds", "12", "--rate", "10",
+           "--size", "320x240", "--quiet", "--out", street.string()});
+  ASSERT_EQ(drawn.status, 0) << drawn.output;
+  auto spoiled = read(models_ / "model.json");
+  spoiled["calibration"] = {{"temperature", 0.2}, {"clutter_rate", 0.5}};
+  const double before = likelihoodByTruth(street, spoiled);
+  const fs::path description = folder_ / "spoiled.json", mended = folder_ / "mended.json";
+  const ProgramAnswer mapped =
+      run({"pipeline", "--quiet", "--data", street.string(), "--odometry", "truth", "--detections",
+           "model", "--model", network_.string(), "--out", out.string(), "--set",
+           "inference.model.description=" + description.string()});
+  ASSERT_EQ(mapped.status, 0) << mapped.output;
+  const ProgramAnswer fitted = run({"model", "calibrate", network_.string(), "--quiet", "--frames",
+                                    street.string(), "--labels", out.string(), "--description",
+                                    description.string(), "--out", mended.string()});
+  ASSERT_EQ(fitted.status, 0) << fitted.output;
+  const auto model = read(mended);
+  EXPECT_GT(likelihoodByTruth(street, model), 0.8 * before) << "nats a box, below 0: " << before;
+  EXPECT_EQ(model.value("box_sigma", 0.0), spoiled.value("box_sigma", 0.0))
+      << "the sides of the map's boxes are no measure of a network's";
 }
 
 }  // namespace
