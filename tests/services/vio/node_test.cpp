@@ -313,18 +313,6 @@ TEST(VioNode, ANewRunOfTheClockBeginsANewEpoch) {
   EXPECT_NE(r.odometry.back().state, OdometryState::kInitialising);
 }
 
-TEST(VioNode, StartsInMotionAfterTheClockBeganAnewBeforeAnyStart) {
-  Recorder r;
-  Node node(Config{}, 5, r.outputs());
-  node.onCalibration(calibration());
-  Player player(4.0, 0.5);
-  player.play(node, 2.2, 2.35);
-  ASSERT_FALSE(node.started());
-  player.play(node, 1.5, 4.0);
-  EXPECT_EQ(node.reasons().of("clock_jumped_back"), 1u);
-  EXPECT_TRUE(node.started());
-}
-
 TEST(VioNode, ResumesWhereAnotherProcessStopped) {
   Recorder before, after;
   Player player(6.0);
