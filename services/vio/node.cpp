@@ -107,6 +107,7 @@ void Node::clockJumpedBack() {
   imu_.clear();
   speeds_.clear();
   waiting_.clear();
+  motion_initialiser_.clear();
   last_image_.reset();
   last_imu_time_.reset();
   if (started()) lose({"clock_jumped_back", ""});

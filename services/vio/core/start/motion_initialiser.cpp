@@ -24,6 +24,7 @@ constexpr double kMostNoise = 1.25;      // of the residuals, relative to what t
 constexpr double kFewestInFront = 0.8;   // share of the points, of the linear solution
 constexpr double kMostLinearPx = 3.0;    // its residual
 constexpr double kFewestParallaxPx = 2.0;
+constexpr double kMostAcceleration = 5.0;  // m/s², of the mean over a window
 
 /// The bearing from where the camera was at the middle row, by rotation alone: the way of the body
 /// between the rows lies in the epipolar plane. turn_C: of the camera, first to last row.
@@ -43,7 +44,9 @@ std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuff
                               const std::vector<CameraModel>& cameras, const Vector3d& gyro_bias) {
   std::vector<Vector3d> rates(times.size(), Vector3d::Zero());
   double readout_s = 0.0;
-  for (const CameraModel& c : cameras) readout_s = std::max(readout_s, c.calibration().readout_s);
+  for (const CameraModel& c : cameras) {
+    readout_s = std::max(readout_s, std::abs(c.calibration().readout_s));
+  }
   if (readout_s == 0.0) return rates;
   Nav nav;
   nav.gyro_bias = gyro_bias;
@@ -76,6 +79,8 @@ BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement&
 }  // namespace
 
 void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
+  // Another run of the clock: its frames and those before have no common window.
+  if (!frames_.empty() && imu_time <= frames_.back().time) clear();
   frames_.push_back({imu_time, input.tracked});
   const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
   while (frames_.front().time < imu_time - window) frames_.pop_front();
@@ -168,6 +173,10 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
 
 Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
                                        const std::vector<CameraModel>& cameras) {
+  // No increment reaches a frame from before the samples.
+  while (!imu.empty() && !frames_.empty() && frames_.front().time < imu.first()) {
+    frames_.pop_front();
+  }
   if (frames_.empty()) return fail("start_window_short");
   const TimePoint now = frames_.back().time;
   // A search costs as much as some frames, and another view of the same says little more.
@@ -184,7 +193,7 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
 
 Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
                                          const std::vector<CameraModel>& cameras) const {
-  if (frames_.size() < 5 || imu.empty() || imu.first() > frames_.front().time ||
+  if (frames_.size() < 5 || imu.empty() ||
       toSeconds(frames_.back().time - frames_.front().time) < kShortestWindow) {
     return fail("start_window_short");
   }
@@ -227,6 +236,10 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
       k = {x.dt, x.dq.toRotationMatrix(), x.dp, x.dv, tracked[i], rates[i]};
     }
     keyframes.push_back(k);
+  }
+  const double mean_force = keyframes.back().dv.norm() / keyframes.back().t;
+  if (std::abs(mean_force - options_.gravity) > kMostAcceleration) {
+    return fail("start_force_not_gravity");
   }
   const Views views = viewsOf(keyframes, cameras);
   if (views.size() < kFewestTracks) return fail("start_few_tracks");

@@ -16,11 +16,12 @@ class MotionInitialiser {
  public:
   explicit MotionInitialiser(const Options& options) : options_(options) {}
 
+  /// A time that is not later than the last one begins the window anew.
   void add(const FrameInput& input, TimePoint imu_time);
   void clear() { frames_.clear(), failed_.reset(); }
   /// A start at the newest frame, where the window has grown enough since the last search. Fails
-  /// with "start_window_short", "start_few_tracks", "start_no_parallax", "start_unobservable" or
-  /// "start_inconsistent".
+  /// with "start_window_short", "start_few_tracks", "start_no_parallax",
+  /// "start_force_not_gravity", "start_unobservable" or "start_inconsistent".
   Result<Start> start(const ImuBuffer& imu, const std::vector<CameraModel>& cameras);
 
  private:

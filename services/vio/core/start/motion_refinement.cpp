@@ -22,6 +22,7 @@ constexpr double kGyroBiasPrior = 0.3;  // rad/s: what a bias may be before anyt
 constexpr int kIterations = 50;
 constexpr double kLittleDamping = 1e-3;
 constexpr double kLargestStretch = 1.0;  // of a step, natural logarithm
+constexpr double kInertialCost = 6.0;    // of samples and biases, as much as it usually is at most
 constexpr double kLeastGain = 0.1;       // of the cost, below which no step is taken
 
 double huber(double deviations) {
@@ -39,12 +40,18 @@ double priorCost(const MotionWindow& w, const Options& o) {
              (o.calibration.time_offset_s * o.calibration.time_offset_s);
 }
 
-double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
+/// Of the increments, the biases and the time offset.
+double inertialCost(const Estimate& e, const Inertial& inertial, const Options& o) {
   double cost = priorCost(e.window, o);
   for (std::size_t i = 0; i < inertial.increments.size(); ++i) {
     const Vector9 r = inertialResidual(e.window, i, inertial.increments[i]);
     cost += r.dot(inertial.information[i] * r);
   }
+  return cost;
+}
+
+double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
+  double cost = inertialCost(e, inertial, o);
   for (std::size_t j = 0; j < e.rays.size(); ++j) {
     cost += e.rays[j].abr[2] * e.rays[j].abr[2] * nearness(o);
     for (const WindowView& v : e.window.points[j].views) {
@@ -250,7 +257,9 @@ Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0.0)) {
     return fail("start_unobservable");
   }
-  const double scale = std::max(1.0, result.noise_ratio * result.noise_ratio);
+  // Beside two thousand rows of images, those of the samples do not show in the ratio.
+  const double inertial_ratio = inertialCost(e, m.inertial, options) / kInertialCost;
+  const double scale = std::max({1.0, result.noise_ratio * result.noise_ratio, inertial_ratio});
   result.covariance = scale * marginal(covariance, e.window.poses.size() - 1);
   result.image_noise = imageNoise(m, options.vision.sigma_px);
   result.window = windowOf(std::move(m.estimate));

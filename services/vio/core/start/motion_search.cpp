@@ -1,5 +1,6 @@
 #include "services/vio/core/start/motion_search.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <utility>

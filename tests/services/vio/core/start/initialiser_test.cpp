@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "common/math/so3.h"
 #include "services/vio/core/start/linear_start.h"
 #include "services/vio/core/start/motion_initialiser.h"
@@ -136,6 +138,58 @@ TEST(MotionStart, FindsVelocityWithTwoCameras) {
   ASSERT_TRUE(start) << start.error().code;
   const Vector3d v_B = start->nav.q_WB.conjugate() * start->nav.v_WB;
   EXPECT_LT((v_B - truth.q_WB.conjugate() * truth.v_WB).norm(), 0.15);
+}
+
+/// The body turns and its speed changes all the while, from 2 s on.
+struct RoomStart {
+  test::SimulatedDrive drive{{}};
+  ImuBuffer imu;
+  MotionInitialiser initialiser{Options{}};
+  std::uint64_t frame = 0;
+
+  void addSamples(double from, double force_scale = 1.0) {
+    for (ImuReading r : drive.imu(5.0)) {
+      r.accel *= force_scale;
+      if (r.time >= drive.time(from)) EXPECT_TRUE(imu.add(r));
+    }
+  }
+  void addFrame(double t) {
+    initialiser.add({++frame, drive.time(t), drive.see(t), {}, {}}, drive.time(t));
+  }
+  /// The time of the first start from `from` on; nothing where there is none before `until`.
+  std::optional<double> startsAt(double from, double until) {
+    for (double t = from; t < until; t += 0.05) {
+      addFrame(t);
+      if (initialiser.start(imu, drive.cameras())) return t;
+    }
+    return std::nullopt;
+  }
+};
+
+TEST(MotionStart, FramesFromBeforeTheSamplesDoNotHoldItUp) {
+  RoomStart room;
+  room.addSamples(2.03);
+  const auto at = room.startsAt(2.0, 5.0);
+  ASSERT_TRUE(at);
+  EXPECT_LT(*at, 3.5) << "not a whole window later";
+}
+
+TEST(MotionStart, ANewRunOfTheClockIsAnotherWindow) {
+  RoomStart room;
+  room.addSamples(1.9);
+  for (double t = 2.5; t < 3.0; t += 0.05) room.addFrame(t);
+  ASSERT_FALSE(room.startsAt(2.0, 2.1));
+  EXPECT_TRUE(room.startsAt(2.1, 4.5));
+}
+
+TEST(MotionStart, RefusesSamplesInAnotherUnit) {
+  for (const double scale : {1.0 / 9.81, 0.38, 2.0}) {
+    RoomStart room;
+    room.addSamples(1.9, scale);
+    EXPECT_FALSE(room.startsAt(2.0, 4.5)) << scale;
+    EXPECT_EQ(room.initialiser.start(room.imu, room.drive.cameras()).error().code,
+              "start_force_not_gravity");
+  }
 }
 
 TEST(MotionStart, WaitsForItsWindow) {
