@@ -10,6 +10,7 @@
 #include "common/replay/recording.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/ros_messages.h"
+#include "common/replay/recordings/unpacked_file.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
 #include "common/vision/jpeg.h"
@@ -61,12 +62,21 @@ void keepEach(std::size_t every, Recording& recording) {
   }
 }
 
+bool hasMessages(const std::filesystem::path& path) {
+  return RecordedMessages::looksLikeOne(path) || RosMessages::looksLikeOne(path);
+}
+
+/// It is unpacked once where it is packed: to see whose it is, and to read it.
+Recording readMessages(const DatasetOptions& options) {
+  const UnpackedFiles kept = unpackedFiles(options.path, ".mcap");
+  return RosMessages::looksLikeOne(options.path) ? readRosDrive(options)
+                                                 : readRecordedDrive(options);
+}
+
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
-  const bool recorded = RecordedMessages::looksLikeOne(path);
   if (!std::filesystem::is_directory(path)) {
-    if (RosMessages::looksLikeOne(path)) return readRosDrive(options);
-    if (recorded) return readRecordedDrive(options);
+    if (hasMessages(path)) return readMessages(options);
     throwMissing(path, "the dataset folder",
                  "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, or "
                  "a recording (.mcap; of ROS also .db3 and .bag)");
@@ -75,8 +85,7 @@ Recording readRecording(const DatasetOptions& options) {
   if (looksLikeKittiTracking(path)) return readKittiTracking(options);
   if (looksLikeKittiRaw(path)) return readKittiRaw(options);
   if (looksLikeSevenScenes(path)) return readSevenScenes(options);
-  if (RosMessages::looksLikeOne(path)) return readRosDrive(options);
-  if (recorded) return readRecordedDrive(options);
+  if (hasMessages(path)) return readMessages(options);
   throw StartupError(ExitCode::kUnavailable,
                      path.string() +
                          " is no dataset folder that is known: give a folder with "

@@ -71,6 +71,7 @@ class DriveReader {
     }
     orderSamples();
     recording_.kind = DatasetKind::kRecording;
+    for (auto& note : messages_.notes()) recording_.notes.push_back(std::move(note));
     recording_.calibration.has_speed = !recording_.speed.empty();
     if (images_.empty()) images_ = std::move(looks_);
     addFrames();

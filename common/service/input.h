@@ -7,6 +7,9 @@
 
 namespace perdure::service {
 
+/// Among Health's reasons while nothing but the silence of inputs makes it degraded.
+inline constexpr char kInputSilent[] = "input_silent";
+
 /// In the loop's thread only.
 class Input {
  public:

@@ -254,6 +254,7 @@ void Context::publishHealth() {
     health.message = besides + "; " + health.message;
   }
   const std::string silent = silence();
+  const bool well_but_silent = !silent.empty() && health.state == HealthState::kOk;
   if (!silent.empty() && health.state != HealthState::kFailed) {
     // What was wrong before may be why it is silent.
     const bool well = health.state == HealthState::kOk || health.message.empty();
@@ -261,6 +262,7 @@ void Context::publishHealth() {
     health.state = HealthState::kDegraded;
   }
   health.reasons = reasons().all();
+  if (well_but_silent) health.reasons[kInputSilent] = 1;
   (void)health_writer_.write(health);
 }
 

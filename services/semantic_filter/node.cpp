@@ -83,6 +83,16 @@ void Node::onOdometry(const Odometry& odometry) {
   if (frame.input.boxes || !config_.history.wait_for_detections) flush();
 }
 
+/// Where the filter's camera has it; its vio may lead with another one.
+std::optional<Eigen::Vector2d> Node::pixelOf(const Landmark& landmark, const std::string& camera,
+                                             const View& view) const {
+  if (camera.empty() || camera == camera_name_) return landmark.pixel;
+  const RigidTransform T_WC = view.T_WB * view.camera->T_BC();
+  const auto pixel = view.camera->project(T_WC.inverse() * landmark.p_W);
+  if (!pixel || !view.camera->inImage(*pixel)) return std::nullopt;
+  return *pixel;
+}
+
 void Node::onLandmarks(const Landmarks& landmarks) {
   for (Frame& frame : history_.frames()) {
     if (!frame.input.stamp.sameFrame(landmarks.stamp)) continue;
@@ -94,8 +104,9 @@ void Node::onLandmarks(const Landmarks& landmarks) {
       const Eigen::Vector3d ray = landmark.p_W - centre;
       const Eigen::Vector3d along = ray.normalized();
       const double variance = along.dot(landmark.covariance * along);
-      frame.input.points.push_back(
-          {landmark.pixel, ray.norm(), std::sqrt(std::max(variance, 0.0))});
+      const auto pixel = pixelOf(landmark, landmarks.camera, frame.input.view);
+      if (!pixel) continue;
+      frame.input.points.push_back({*pixel, ray.norm(), std::sqrt(std::max(variance, 0.0))});
     }
     return;
   }

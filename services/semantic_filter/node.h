@@ -57,6 +57,8 @@ class Node {
 
   void beginWorld(const WorldId& world);
   const char* refusalOf(const Detections& detections) const;
+  std::optional<Eigen::Vector2d> pixelOf(const Landmark& landmark, const std::string& camera,
+                                         const View& view) const;
   bool attach(Frame& frame, const Detections& detections);
   bool use(Frame& frame, const Detections& detections);
   void keepEarly(const Detections& detections);

@@ -7,12 +7,14 @@
 namespace perdure::vio {
 
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration) {
-  std::vector<CameraModel> used{CameraModel(calibration.cameras.at(0))};
-  if (!config.stereo || calibration.cameras.size() < 2) return used;
-  const CameraCalibration& second = calibration.cameras[1];
-  if (std::count(config.cameras.begin(), config.cameras.end(), second.name) > 0) {
-    used.emplace_back(second);
+  const std::size_t wanted = config.stereo ? 2 : 1;
+  std::vector<CameraModel> used;
+  for (const std::string& name : config.cameras) {
+    const CameraCalibration* camera = calibration.camera(name);
+    const bool again = !used.empty() && used.front().calibration().name == name;
+    if (camera != nullptr && !again && used.size() < wanted) used.emplace_back(*camera);
   }
+  if (used.empty()) used.emplace_back(calibration.cameras.at(0));
   return used;
 }
 

@@ -20,8 +20,8 @@ struct Cameras {
   std::vector<CameraModel> models;
 };
 
-/// The first camera of the calibration, and the second one where it is wanted and its frames are
-/// read.
+/// Those whose frames are read, in the order of the configuration: the first one leads, and the
+/// second one is there where it is wanted. The calibration's first where it knows none of them.
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
 
 /// What the estimators know of cameras: where on the body, and how long an image is read out, s.

@@ -96,12 +96,25 @@ std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file) {
   return rows;
 }
 
-std::map<std::uint64_t, RigidTransform> posesByFrame(const std::vector<replay::StampedPose>& poses,
-                                                     const std::vector<EstimateRow>& rows) {
-  const Ties ties = tieLines(poses, rows);
+std::map<std::uint64_t, RigidTransform> posesByFrame(
+    const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows,
+    const std::optional<std::set<std::uint64_t>>& used) {
+  Ties ties = tieLines(poses, rows);
+  const bool all = !used || ties.empty();
+  std::vector<std::uint64_t> numbers;
+  if (!all) {
+    numbers.assign(used->begin(), used->end());
+    std::erase_if(ties, [&](const auto& tie) { return !used->contains(tie.second); });
+    for (auto& tie : ties) {
+      const auto at = std::lower_bound(numbers.begin(), numbers.end(), tie.second);
+      tie.second = static_cast<std::uint64_t>(at - numbers.begin());
+    }
+  }
   std::map<std::uint64_t, RigidTransform> result;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (const auto frame = frameOf(i, poses, ties)) result.emplace(*frame, poses[i].T_WB);
+    const auto frame = frameOf(i, poses, ties);
+    if (!frame || (!all && *frame >= numbers.size())) continue;
+    result.emplace(all ? *frame : numbers[*frame], poses[i].T_WB);
   }
   return result;
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -28,8 +29,10 @@ std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file);
 
 /// The body's pose by frame index. A trajectory has times only; the rows of the CSV tie times to
 /// frames, stamps that are multiples of 0.1 s from 0 (KITTI tracking) tie themselves, and lines
-/// between tied ones are consecutive frames, or where they cannot be, placed by time.
-std::map<std::uint64_t, RigidTransform> posesByFrame(const std::vector<replay::StampedPose>& poses,
-                                                     const std::vector<EstimateRow>& rows);
+/// between tied ones are consecutive frames, or where they cannot be, placed by time. `used`: the
+/// frames of the run, where it was not over all: consecutive are then those of them.
+std::map<std::uint64_t, RigidTransform> posesByFrame(
+    const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows,
+    const std::optional<std::set<std::uint64_t>>& used = {});
 
 }  // namespace perdure::tools

@@ -11,6 +11,7 @@
 #include "tools/evaluate/command.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/simulated_truth.h"
+#include "tools/evaluate/used_frames.h"
 
 namespace perdure::tools {
 namespace {
@@ -27,7 +28,8 @@ struct ObjectsOptions {
 struct Evaluated {
   ObjectScore score;
   std::uint64_t estimates = 0, poses = 0;
-  std::string of;  ///< for people: which truth, which class
+  std::string of;            ///< for people: which truth, which class
+  std::size_t left_out = 0;  ///< frames with truth that the run was not over
 };
 
 fs::path trajectoryOf(const ObjectsOptions& options) {
@@ -44,28 +46,35 @@ replay::KittiCalibration readCalibration(const ObjectsOptions& options) {
   return calibration;
 }
 
-Evaluated evaluateKitti(const ObjectsOptions& options) {
+Evaluated evaluateKitti(ObjectsOptions options) {
+  const auto used = usedFramesOf(fs::path(options.csv).parent_path());
+  if (used) options.score.frame_interval_s *= strideOf(*used);
   const std::string class_name = options.class_name.empty() ? "car" : options.class_name;
   const auto labels =
       replay::readKittiLabels(fs::path(options.truth) / "label_02" / (options.sequence + ".txt"));
   const auto calibration = readCalibration(options);
   auto rows = readObjectRows(options.csv);
-  const auto poses = posesByFrame(replay::PoseFile::read(trajectoryOf(options)).poses(), rows);
+  const auto poses =
+      posesByFrame(replay::PoseFile::read(trajectoryOf(options)).poses(), rows, used);
   std::erase_if(rows, [&](const EstimateRow& row) { return row.class_name != class_name; });
-  const auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+  auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
+  const std::size_t left_out = leaveOut(truth, used);
   return {scoreObjects(rows, truth, poses, calibration, options.score), rows.size(), poses.size(),
-          "sequence " + options.sequence + ", class " + class_name};
+          "sequence " + options.sequence + ", class " + class_name, left_out};
 }
 
 Evaluated evaluateSimulated(ObjectsOptions options) {
   const SimulatedTruth truth = readSimulatedTruth(options.truth);
-  const SimulatedRun run =
+  const auto used = usedFramesOf(fs::path(options.csv).parent_path());
+  SimulatedRun run =
       pairWithTruth(truth, readObjectRows(options.csv),
                     replay::PoseFile::read(trajectoryOf(options)).poses(), options.class_name);
-  options.score.frame_interval_s = truth.frameInterval();
+  const std::size_t left_out = leaveOut(run.frames, used);
+  options.score.frame_interval_s = truth.frameInterval() * (used ? strideOf(*used) : 1.0);
   Evaluated result{
       scoreFrames(run.frames, options.score), run.estimates, run.poses,
-      "simulated, " + (options.class_name.empty() ? "all classes" : "class " + options.class_name)};
+      "simulated, " + (options.class_name.empty() ? "all classes" : "class " + options.class_name),
+      left_out};
   result.score.outside = run.outside;
   return result;
 }
@@ -106,7 +115,8 @@ nlohmann::ordered_json toJson(const Evaluated& result) {
           {"estimates", result.estimates},
           {"neutral", s.neutral},
           {"outside_image", s.outside},
-          {"frames_with_pose", result.poses}};
+          {"frames_with_pose", result.poses},
+          {"frames_left_out", result.left_out}};
 }
 
 void printMishaps(const ObjectScore& score) {
@@ -144,6 +154,10 @@ void print(const Evaluated& result, const ObjectsOptions& options) {
       "%.2f interruptions a minute\n",
       static_cast<unsigned long long>(s.id_switches), s.idsPerFound(),
       json["duplicates_per_object"].get<double>(), json["flicker_per_minute"].get<double>());
+  if (result.left_out > 0) {
+    std::printf("%zu frames do not count: the run was not over them (--every, --from, --seconds)\n",
+                result.left_out);
+  }
 }
 
 }  // namespace

@@ -4,11 +4,13 @@
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
 #include "tools/evaluate/command.h"
 #include "tools/evaluate/trajectory_score.h"
+#include "tools/evaluate/used_frames.h"
 
 namespace perdure::tools {
 namespace {
@@ -27,21 +29,25 @@ struct TrajectoryOptions {
 struct Truth {
   PoseFile poses{PoseFormat::kTum, {}};
   std::vector<TimePoint> frames;
+  std::vector<std::uint64_t> numbers;  ///< of the frames
 };
 
-std::vector<TimePoint> frameTimes(const std::string& folder, const std::string& sequence,
-                                  std::optional<PoseFile>* truth) {
+void readFrames(const std::string& folder, const std::string& sequence,
+                std::optional<PoseFile>* own, Truth& truth) {
   replay::DatasetOptions options;
   options.path = folder;
   options.sequence = sequence;
   options.decode = false;
   const auto dataset = replay::Dataset::open(options);
-  if (truth != nullptr) *truth = dataset->truth();
-  std::vector<TimePoint> times;
+  if (own != nullptr) *own = dataset->truth();
+  truth.frames.clear();
+  truth.numbers.clear();
   for (std::uint64_t i = 0; i < dataset->frameCount(); ++i) {
-    if (const auto time = dataset->frameTime(i)) times.push_back(*time);
+    const auto time = dataset->frameTime(i);
+    if (!time) continue;
+    truth.frames.push_back(*time);
+    truth.numbers.push_back(i);
   }
-  return times;
 }
 
 /// KITTI's lines have no times: those of the frames, or 10 Hz from 0.
@@ -59,9 +65,9 @@ PoseFile withTimes(const PoseFile& file, const std::vector<TimePoint>& frames) {
 Truth readTruth(const TrajectoryOptions& options) {
   Truth truth;
   std::optional<PoseFile> own;
-  if (!options.data.empty()) truth.frames = frameTimes(options.data, options.sequence, nullptr);
+  if (!options.data.empty()) readFrames(options.data, options.sequence, nullptr, truth);
   if (fs::is_directory(options.truth)) {
-    truth.frames = frameTimes(options.truth, options.sequence, &own);
+    readFrames(options.truth, options.sequence, &own, truth);
     if (!own) {
       throw StartupError(ExitCode::kUnavailable,
                          options.truth + " holds no true trajectory; give a pose file to --truth");
@@ -75,7 +81,27 @@ struct Compared {
   TrajectoryScore score;
   double coverage = 0.0;
   std::size_t expected = 0;
+  std::size_t left_out = 0;  ///< frames that the run was not over
 };
+
+/// Takes the times of frames out that the run was not over; their number. Its report may count the
+/// frames of other data than these: poses at times that would go say so.
+std::size_t leaveOutUnused(const fs::path& run, const PoseFile& poses, Truth& truth) {
+  const auto used = usedFramesOf(run);
+  if (!used) return 0;
+  std::set<TimePoint> posed;
+  for (const auto& pose : poses.poses()) posed.insert(pose.time);
+  std::vector<TimePoint> kept;
+  for (std::size_t i = 0; i < truth.frames.size(); ++i) {
+    if (used->contains(truth.numbers[i]))
+      kept.push_back(truth.frames[i]);
+    else if (posed.contains(truth.frames[i]))
+      return 0;
+  }
+  const std::size_t left_out = truth.frames.size() - kept.size();
+  truth.frames = std::move(kept);
+  return left_out;
+}
 
 Alignment alignmentOf(const std::string& name) {
   if (name == "start") return Alignment::kStart;
@@ -96,13 +122,14 @@ const char* nameOf(Alignment alignment) {
 }
 
 Compared compare(const TrajectoryOptions& options) {
-  const Truth truth = readTruth(options);
+  Truth truth = readTruth(options);
   const PoseFile file = PoseFile::read(options.tum);
   if (file.format() != PoseFormat::kTum) {
     throw StartupError(ExitCode::kUsage, options.tum + " is no TUM file: t x y z qx qy qz qw");
   }
   const auto& poses = truth.poses.poses();
   const auto& frames = truth.frames;
+  const std::size_t left_out = leaveOutUnused(fs::path(options.tum).parent_path(), file, truth);
   const TimePoint begin = (frames.empty() ? file.poses().front().time : frames.front()) +
                           durationFromSeconds(options.skip_s);
   std::vector<PosePair> pairs;
@@ -118,6 +145,7 @@ Compared compare(const TrajectoryOptions& options) {
                            "where the truth has no times");
   }
   Compared result;
+  result.left_out = left_out;
   result.score = scoreTrajectory(pairs, alignmentOf(options.align));
   // Frames that ought to have a pose: those of the dataset that the truth spans.
   const auto expected = [&](TimePoint t) {
@@ -135,6 +163,7 @@ nlohmann::ordered_json toJson(const Compared& result) {
   const TrajectoryScore& s = result.score;
   return {{"poses", s.poses},
           {"frames_expected", result.expected},
+          {"frames_left_out", result.left_out},
           {"coverage", result.coverage},
           {"length_m", s.length_m},
           {"ate_rmse_m", s.ate_rmse_m},
@@ -153,6 +182,12 @@ void print(const Compared& result, const TrajectoryOptions& options) {
   const TrajectoryScore& s = result.score;
   std::printf("poses %zu of %zu frames (coverage %.4f), %.1f m\n", s.poses, result.expected,
               result.coverage, s.length_m);
+  if (result.left_out > 0) {
+    std::printf(
+        "%zu frames are not expected: the run was not over them (--every, --from, "
+        "--seconds)\n",
+        result.left_out);
+  }
   std::printf("ATE (%s): RMSE %.4f m, max %.4f m, rotation %.3f deg\n",
               nameOf(alignmentOf(options.align)), s.ate_rmse_m, s.ate_max_m, s.ate_rotation_deg);
   std::printf("RPE over 1 s: %.4f m, %.3f deg; drift at the end %.4f m\n", s.rpe_m, s.rpe_deg,

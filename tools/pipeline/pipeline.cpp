@@ -69,8 +69,10 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
     if (first_camera) {
       timer_.time("decode", [] {});
       if (!first_frame_) first_frame_ = frame->stamp.time;
-      if (options_.seconds && toSeconds(frame->stamp.time - *first_frame_) > *options_.seconds)
+      if (options_.seconds && toSeconds(frame->stamp.time - *first_frame_) > *options_.seconds) {
+        end_index_ = frame->stamp.sequence;
         break;
+      }
     }
     handle(*message);
     if (first_camera) progress(counts_);

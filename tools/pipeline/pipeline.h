@@ -61,6 +61,8 @@ class Pipeline {
   const replay::DataFindings& findings() const { return findings_; }
   /// Index of the first frame of the data that is used.
   std::uint64_t firstFrame() const { return first_index_; }
+  /// Of the first frame that --seconds left out.
+  std::optional<std::uint64_t> endFrame() const { return end_index_; }
   bool usesVio() const { return uses_vio_; }
   bool usesModel() const { return inference_ != nullptr; }
   /// A sentence where the poses that were given contradict the images; else empty.
@@ -140,7 +142,8 @@ class Pipeline {
   bus::Once odometry_once_;  // of the recording, as the service has it
   std::uint64_t model_hash_ = 0;
   std::optional<TimePoint> first_frame_;
-  std::uint64_t first_index_ = 0;                 ///< in the data, by --from
+  std::uint64_t first_index_ = 0;  ///< in the data, by --from
+  std::optional<std::uint64_t> end_index_;
   double frames_seconds_ = 0.0;                   // of the recording, since its first frame
   std::vector<Odometry> new_odometry_;            // of vio, not yet handed on
   std::vector<Odometry> held_;                    // given, until their landmarks are there

@@ -8,6 +8,7 @@
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
+#include "tools/evaluate/used_frames.h"
 
 namespace perdure::tools {
 namespace {
@@ -58,7 +59,8 @@ void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequ
 std::set<std::uint64_t> usedFrames(const Pipeline& pipeline) {
   std::set<std::uint64_t> used;
   for (const auto& frame : pipeline.dataset().recording().frames) {
-    if (frame.index >= pipeline.firstFrame()) used.insert(frame.index);
+    const bool late = pipeline.endFrame() && frame.index >= *pipeline.endFrame();
+    if (frame.index >= pipeline.firstFrame() && !late) used.insert(frame.index);
   }
   return used;
 }
@@ -73,7 +75,8 @@ Json objectScore(const PipelineOptions& options, const fs::path& labels_file,
   calibration.width = options.image_size.empty() ? size.width : options.image_size[0];
   calibration.height = options.image_size.empty() ? size.height : options.image_size[1];
   auto rows = readObjectRows(out / "objects_final.csv");
-  const auto poses = posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows);
+  const auto poses =
+      posesByFrame(replay::PoseFile::read(out / "trajectory.tum").poses(), rows, used);
   std::erase_if(rows, [](const EstimateRow& row) { return row.class_name != "car"; });
   auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
   std::erase_if(truth, [&](const auto& frame) { return !used.contains(frame.first); });
@@ -94,6 +97,7 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
                  {"model", options.model}};
   report["data_check"] = {{"notes", pipeline.dataset().recording().notes},
                           {"findings", toJson(pipeline.findings())}};
+  report["frames"] = framesToJson(usedFrames(pipeline));
   const auto& latency = pipeline.counts().latency_ms;
   report["services"] = services(pipeline, pipeline.reasons());
   report["latency_ms"] = {{"median", quantile(latency, 0.5)}, {"p99", quantile(latency, 0.99)}};

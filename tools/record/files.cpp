@@ -37,9 +37,15 @@ void printInfo(const std::string& path) {
   }
   for (const auto& [reason, n] : recording.reasons().all()) fmt::print("  {}: {}\n", reason, n);
   if (!recording.lastProblem().empty()) fmt::print("  {}\n", recording.lastProblem());
+  for (const std::string& note : recording.notes()) fmt::print("  {}\n", note);
 }
 
 void repair(const fs::path& file) {
+  if (replay::isPacked(file, ".mcap")) {
+    throw StartupError(ExitCode::kUsage, fmt::format("{} is packed as a whole; unpack it first: "
+                                                     "zstd -d {}, then repair what comes of it",
+                                                     file.string(), file.string()));
+  }
   auto reader = mcap::Reader::open(file);
   if (!reader) throw StartupError(ExitCode::kUnavailable, reader.error().detail);
   if (reader->finished()) return fmt::print("{} is whole\n", file.string());

@@ -13,14 +13,17 @@ namespace fs = std::filesystem;
 
 constexpr char kExtension[] = ".mcap";
 
-std::vector<fs::path> filesIn(const fs::path& path) {
+/// Without those that are packed.
+std::vector<fs::path> plainFilesIn(const fs::path& path) {
   std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return {path};
   std::vector<fs::path> files;
+  if (!fs::is_directory(path, ignored)) {
+    if (!isPacked(path, kExtension)) files.push_back(path);
+    return files;
+  }
   for (const auto& entry : fs::directory_iterator(path, ignored)) {
     if (entry.path().extension() == kExtension) files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end());
   return files;
 }
 
@@ -38,12 +41,16 @@ std::string topicOf(const std::string& channel) {
 
 bool RecordedMessages::looksLikeOne(const fs::path& path) {
   std::error_code ignored;
-  if (path.extension() == kExtension) return true;
-  return fs::is_directory(path, ignored) && !filesIn(path).empty();
+  if (path.extension() == kExtension || !packedFiles(path, kExtension).empty()) return true;
+  return fs::is_directory(path, ignored) && !plainFilesIn(path).empty();
 }
 
-RecordedMessages::RecordedMessages(const fs::path& path) {
-  const auto files = filesIn(path);
+RecordedMessages::RecordedMessages(const fs::path& path)
+    : unpacked_(unpackedFiles(path, kExtension)) {
+  auto files = plainFilesIn(path);
+  for (const auto& file : unpacked_) files.push_back(file->path());
+  std::sort(files.begin(), files.end(),
+            [](const auto& a, const auto& b) { return a.filename() < b.filename(); });
   for (const fs::path& file : files) openFile(file);
   for (std::size_t i = 0; i < files_.size(); ++i) {
     for (const auto& chunk : files_[i].chunks()) chunks_.push_back({i, &chunk});
@@ -93,6 +100,12 @@ void RecordedMessages::openFile(const fs::path& path) {
   }
   reader->letGo();  // a folder may hold more segments than a process may open
   files_.push_back(*std::move(reader));
+}
+
+std::vector<std::string> RecordedMessages::notes() const {
+  std::vector<std::string> notes;
+  for (const auto& file : unpacked_) notes.push_back(file->note());
+  return notes;
 }
 
 void RecordedMessages::count(const Reason& reason) {

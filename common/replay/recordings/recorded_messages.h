@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/replay/recordings/mcap_reader.h"
+#include "common/replay/recordings/unpacked_file.h"
 #include "common/wire/cdr.h"
 
 namespace perdure::replay {
@@ -41,7 +42,8 @@ class RecordedMessages {
     std::uint64_t messages = 0;
   };
 
-  /// A .mcap file, or a folder that holds some. Throws StartupError with the mend.
+  /// A .mcap file, or a folder that holds some; packed ones (.mcap.zstd) are unpacked. Throws
+  /// StartupError with the mend.
   explicit RecordedMessages(const std::filesystem::path& path);
   static bool looksLikeOne(const std::filesystem::path& path);
 
@@ -51,6 +53,8 @@ class RecordedMessages {
   /// Files without a summary, and chunks that are damaged, so far.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::string& lastProblem() const { return last_problem_; }
+  /// For people: what was unpacked.
+  std::vector<std::string> notes() const;
 
   /// Only of these topics (all where `wanted` is empty), and without chunks that end before.
   void rewind(std::function<bool(const std::string& topic)> wanted = {}, std::uint64_t from_ns = 0);
@@ -77,6 +81,7 @@ class RecordedMessages {
   void load(const ChunkPlace& place);
   bool isRepeated(const RecordedMessage& message);
 
+  UnpackedFiles unpacked_;  // goes after the files
   std::vector<mcap::Reader> files_;
   std::vector<ChunkPlace> chunks_;  // by time
   std::map<std::string, TopicCount> topics_;

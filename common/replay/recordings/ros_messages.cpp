@@ -4,6 +4,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/unpack.h"
 #include "common/ros/definition.h"
 
 namespace perdure::replay {
@@ -43,6 +44,7 @@ class McapSource : public RosSource {
     if (!message) return std::nullopt;
     return RosMessage{std::move(message->topic), message->log_ns, message->data, message->keeper};
   }
+  std::vector<std::string> notes() const override { return messages_.notes(); }
 
  private:
   RecordedMessages messages_;
@@ -61,19 +63,6 @@ std::vector<fs::path> filesWith(const fs::path& path, const char* extension) {
   return files;
 }
 
-/// rosbag2 packs whole files where it is told to: "run_0.db3.zstd". Of a folder only those that
-/// nobody has unpacked beside.
-std::vector<fs::path> packedFiles(const fs::path& path) {
-  auto files = filesWith(path, ".zstd");
-  std::erase_if(files, [&](const fs::path& file) {
-    const auto inner = file.stem().extension();
-    std::error_code ignored;
-    return (inner != ".db3" && inner != ".mcap") ||
-           (file != path && fs::exists(file.parent_path() / file.stem(), ignored));
-  });
-  return files;
-}
-
 bool holdsRos(const fs::path& path) {
   const RecordedMessages messages(path);
   return std::any_of(messages.topics().begin(), messages.topics().end(),
@@ -84,14 +73,14 @@ bool holdsRos(const fs::path& path) {
 
 bool RosMessages::looksLikeOne(const fs::path& path) {
   if (!filesWith(path, ".bag").empty() || !filesWith(path, ".db3").empty()) return true;
-  if (!packedFiles(path).empty()) return true;
-  return !filesWith(path, ".mcap").empty() && holdsRos(path);
+  if (!packedFiles(path, ".db3").empty()) return true;
+  return RecordedMessages::looksLikeOne(path) && holdsRos(path);
 }
 
-RosMessages::RosMessages(const fs::path& path) {
+RosMessages::RosMessages(const fs::path& path) : unpacked_(unpackedFiles(path, ".db3")) {
   for (const auto& file : filesWith(path, ".bag")) sources_.push_back(openBag(file));
   for (const auto& file : filesWith(path, ".db3")) sources_.push_back(openDb3(file));
-  for (const auto& file : packedFiles(path)) openPacked(file);
+  for (const auto& file : unpacked_) sources_.push_back(openDb3(file->path()));
   if (sources_.empty()) sources_.push_back(std::make_unique<McapSource>(path));
   for (const auto& source : sources_) {
     for (const auto& [name, topic] : source->topics()) {
@@ -103,24 +92,17 @@ RosMessages::RosMessages(const fs::path& path) {
   }
 }
 
-void RosMessages::openPacked(const fs::path& file) {
-  unpacked_.push_back(UnpackedFile::of(file));
-  const fs::path& plain = unpacked_.back()->path();
-  if (plain.extension() == ".db3") {
-    sources_.push_back(openDb3(plain));
-  } else {
-    sources_.push_back(std::make_unique<McapSource>(plain));
-  }
-}
-
 std::vector<std::string> RosMessages::notes() const {
   std::vector<std::string> notes;
   for (const auto& file : unpacked_) notes.push_back(file->note());
+  for (const auto& source : sources_) {
+    for (auto& note : source->notes()) notes.push_back(std::move(note));
+  }
   return notes;
 }
 
 ReasonCounts RosMessages::reasons() const {
-  ReasonCounts all;
+  ReasonCounts all = reasons_;
   for (const auto& source : sources_) {
     for (const auto& [reason, n] : source->reasons().all()) all.add(reason, n);
   }
@@ -128,7 +110,7 @@ ReasonCounts RosMessages::reasons() const {
 }
 
 std::string RosMessages::lastProblem() const {
-  std::string last;
+  std::string last = last_problem_;
   for (const auto& source : sources_) {
     if (!source->lastProblem().empty()) last = source->lastProblem();
   }
@@ -148,6 +130,30 @@ void RosMessages::rewind(const std::set<std::string>& wanted, std::uint64_t from
 }
 
 std::optional<RosMessage> RosMessages::next() {
+  auto message = nextRecorded();
+  while (message && !unpack(*message)) message = nextRecorded();
+  return message;
+}
+
+/// CDR never begins as a frame of zstd does.
+bool RosMessages::unpack(RosMessage& message) {
+  static constexpr std::uint64_t kLargest = 1u << 30;
+  if (topics_.at(message.topic).encoding != ros::Encoding::kCdr || !isZstd(message.data)) {
+    return true;
+  }
+  auto whole = wholeOfZstd(message.data, kLargest);
+  if (!whole) {
+    reasons_.add("message_packing_damaged");
+    last_problem_ = message.topic + " has a message that is packed by zstd and cannot be unpacked";
+    return false;
+  }
+  const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(*std::move(whole));
+  message.data = *bytes;
+  message.keeper = bytes;
+  return true;
+}
+
+std::optional<RosMessage> RosMessages::nextRecorded() {
   std::size_t first = heads_.size();
   for (std::size_t i = 0; i < heads_.size(); ++i) {
     if (heads_[i] && (first == heads_.size() || heads_[i]->log_ns < heads_[first]->log_ns))

@@ -42,6 +42,8 @@ class RosSource {
   /// Only these topics, and nothing that ended before.
   virtual void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) = 0;
   virtual std::optional<RosMessage> next() = 0;
+  /// For people: what was unpacked.
+  virtual std::vector<std::string> notes() const { return {}; }
 
  protected:
   void count(const Reason& reason) {
@@ -80,11 +82,16 @@ class RosMessages {
   }
 
  private:
-  void openPacked(const std::filesystem::path& file);
-  std::vector<std::shared_ptr<const UnpackedFile>> unpacked_;  ///< goes after the sources
+  /// The next of all sources, as it was recorded.
+  std::optional<RosMessage> nextRecorded();
+  /// Of rosbag2's `compression_mode: MESSAGE`; false where it is damaged, which is counted.
+  bool unpack(RosMessage& message);
+  UnpackedFiles unpacked_;  ///< SQLite's; goes after the sources
   std::vector<std::unique_ptr<RosSource>> sources_;
   std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each
   RosTopics topics_;
+  ReasonCounts reasons_;  ///< beside those of the sources
+  std::string last_problem_;
 };
 
 }  // namespace perdure::replay

@@ -4,6 +4,8 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
 
 namespace perdure::replay {
@@ -13,11 +15,12 @@ namespace {
 /// not cost a step each.
 class Unpacked {
  public:
-  explicit Unpacked(std::uint64_t most) : most_(most) {}
+  explicit Unpacked(std::uint64_t most)
+      : most_(most), step_(most < kStep ? static_cast<std::size_t>(most) + 1 : kStep) {}
   /// Beyond what was asked for, so that a stream that has more is not taken for whole.
   bool wantsMore() const { return used_ <= most_; }
   std::uint8_t* room() {
-    if (used_ == bytes_.size()) bytes_.resize(used_ + kStep);
+    if (used_ == bytes_.size()) bytes_.resize(used_ + step_);
     return bytes_.data() + used_;
   }
   std::size_t roomSize() const { return bytes_.size() - used_; }
@@ -30,6 +33,7 @@ class Unpacked {
  private:
   static constexpr std::size_t kStep = 1u << 20;
   std::uint64_t most_;
+  std::size_t step_;  ///< small ones are many, and are not given a megabyte each
   std::size_t used_ = 0;
   std::vector<std::uint8_t> bytes_;
 };
@@ -90,6 +94,21 @@ std::vector<std::uint8_t> unpackedZstd(std::span<const std::uint8_t> packed, std
     if (state == 0 && in.pos == in.size) break;
   }
   return unpacked.take();
+}
+
+bool isZstd(std::span<const std::uint8_t> bytes) {
+  static constexpr std::array<std::uint8_t, 4> kMagic = {0x28, 0xB5, 0x2F, 0xFD};
+  return bytes.size() > kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
+}
+
+std::optional<std::vector<std::uint8_t>> wholeOfZstd(std::span<const std::uint8_t> packed,
+                                                     std::uint64_t most) {
+  const auto stated = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  const bool unknown = stated == ZSTD_CONTENTSIZE_UNKNOWN;
+  if (stated == ZSTD_CONTENTSIZE_ERROR || (!unknown && stated > most)) return std::nullopt;
+  auto bytes = unpackedZstd(packed, unknown ? most : stated);
+  if (unknown ? bytes.empty() || bytes.size() > most : bytes.size() != stated) return std::nullopt;
+  return bytes;
 }
 
 }  // namespace perdure::replay

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,5 +14,11 @@ namespace perdure::replay {
 std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std::uint64_t most);
 std::vector<std::uint8_t> unpackedLz4(std::span<const std::uint8_t> packed, std::uint64_t most);
 std::vector<std::uint8_t> unpackedZstd(std::span<const std::uint8_t> packed, std::uint64_t most);
+
+/// Whether it begins as a frame of zstd does.
+bool isZstd(std::span<const std::uint8_t> bytes);
+/// One frame; nothing where it is damaged, cut or larger than `most`.
+std::optional<std::vector<std::uint8_t>> wholeOfZstd(std::span<const std::uint8_t> packed,
+                                                     std::uint64_t most);
 
 }  // namespace perdure::replay

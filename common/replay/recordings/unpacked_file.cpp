@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -151,6 +152,33 @@ std::shared_ptr<const UnpackedFile> UnpackedFile::of(const fs::path& packed) {
   auto unpacked = std::make_shared<const UnpackedFile>(packed);
   entry = unpacked;
   return unpacked;
+}
+
+bool isPacked(const fs::path& file, std::string_view extension) {
+  const auto outer = file.extension();
+  return (outer == ".zstd" || outer == ".zst") && file.stem().extension() == extension;
+}
+
+std::vector<fs::path> packedFiles(const fs::path& path, std::string_view extension) {
+  std::error_code ignored;
+  std::vector<fs::path> files;
+  if (!fs::is_directory(path, ignored)) {
+    if (isPacked(path, extension)) files.push_back(path);
+    return files;
+  }
+  for (const auto& entry : fs::directory_iterator(path, ignored)) {
+    const fs::path& file = entry.path();
+    const bool beside = fs::exists(file.parent_path() / file.stem(), ignored);
+    if (isPacked(file, extension) && !beside) files.push_back(file);
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+UnpackedFiles unpackedFiles(const fs::path& path, std::string_view extension) {
+  UnpackedFiles files;
+  for (const auto& file : packedFiles(path, extension)) files.push_back(UnpackedFile::of(file));
+  return files;
 }
 
 }  // namespace perdure::replay

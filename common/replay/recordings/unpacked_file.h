@@ -1,10 +1,12 @@
-// A file that is packed by zstd as a whole, as rosbag2 packs with `compression_mode: FILE`.
+// A file that is packed by zstd as a whole: by rosbag2 with `compression_mode: FILE`, or by hand.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace perdure::replay {
 
@@ -29,5 +31,14 @@ class UnpackedFile {
   std::filesystem::path packed_, path_;
   std::uint64_t size_ = 0;
 };
+
+/// "run_0.db3.zstd" or .zst: whether it is packed, and what it holds has this extension.
+bool isPacked(const std::filesystem::path& file, std::string_view extension);
+/// `path` itself, or of a folder those that nobody has unpacked beside; by name.
+std::vector<std::filesystem::path> packedFiles(const std::filesystem::path& path,
+                                               std::string_view extension);
+using UnpackedFiles = std::vector<std::shared_ptr<const UnpackedFile>>;
+/// All of packedFiles, unpacked. Throws as UnpackedFile::of.
+UnpackedFiles unpackedFiles(const std::filesystem::path& path, std::string_view extension);
 
 }  // namespace perdure::replay

@@ -3,43 +3,26 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
-#include <sys/resource.h>
-#include <zstd.h>
 
 #include <algorithm>
-#include <csignal>
-#include <cstdlib>
 #include <random>
 
 #include "common/replay/dataset.h"
-#include "common/replay/recordings/mcap_writer.h"
 #include "common/replay/recordings/ros_messages.h"
 #include "common/replay/ros_topics.h"
+#include "tests/common/replay/ros_twin.h"
 #include "tests/common/replay/tiny_datasets.h"
-#include "tests/interop/ros/drive_plan.h"
 
 namespace perdure::replay {
 namespace {
 
 namespace fs = std::filesystem;
 using test::PlanOptions;
+using test::Twin;
+using test::twinOf;
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
-
-/// A tiny drive as a folder, as .db3, and the rig file with the noise of its inertial unit.
-struct Twin {
-  fs::path folder, file, rig;
-};
-
-Twin twinOf(const std::string& name, const PlanOptions& options = {}, bool stereo = false) {
-  Twin twin{tinyEuroc(name + "_source", stereo), freshFolder(name) / "run_0.db3",
-            freshFolder(name + "_rig") / "rig.yaml"};
-  const auto dataset = Dataset::open({.path = twin.folder});
-  test::writeDb3(*dataset, twin.file, options);
-  test::writeImuRig(*dataset, twin.rig);
-  return twin;
-}
 
 void expectSame(const Dataset& a, const Dataset& b) {
   const CameraCalibration &one = a.calibration().cameras[0], &other = b.calibration().cameras[0];
@@ -210,104 +193,6 @@ TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheMend) {
   EXPECT_THAT(errorOf("a.bag"), HasSubstr("rosbag fix"));
   EXPECT_THAT(errorOf("b.bag"), HasSubstr("is no bag of ROS 1"));
   EXPECT_THAT(errorOf("c.db3"), HasSubstr("ros2 bag record"));
-}
-
-/// TMPDIR is a folder of its own as long as this lives.
-class PackedRecording : public testing::Test {
- protected:
-  PackedRecording() : place_(freshFolder("ros_unpacked")) {
-    if (const char* before = std::getenv("TMPDIR")) before_ = before;
-    setenv("TMPDIR", place_.c_str(), 1);
-  }
-  ~PackedRecording() override {
-    before_ ? setenv("TMPDIR", before_->c_str(), 1) : unsetenv("TMPDIR");
-  }
-  /// In two frames of zstd, as writers in parts do.
-  static fs::path packed(const fs::path& file, const fs::path& folder) {
-    const std::string bytes = readText(file);
-    const fs::path to = folder / (file.filename().string() + ".zstd");
-    std::string both;
-    for (const auto& part : {bytes.substr(0, bytes.size() / 2), bytes.substr(bytes.size() / 2)}) {
-      std::string frame(ZSTD_compressBound(part.size()), '\0');
-      frame.resize(ZSTD_compress(frame.data(), frame.size(), part.data(), part.size(), 1));
-      both += frame;
-    }
-    writeText(to, both);
-    return to;
-  }
-  /// Folders of what was unpacked.
-  std::ptrdiff_t unpacked() const {
-    return std::count_if(fs::directory_iterator(place_), {}, [](const auto& entry) {
-      return entry.path().filename().string().starts_with("perdure-unpacked-");
-    });
-  }
-  fs::path place_;
-  std::optional<std::string> before_;
-};
-
-TEST_F(PackedRecording, OfRosIsUnpackedForAsLongAsItIsRead) {
-  const Twin twin = twinOf("ros_whole", {}, true);
-  const fs::path folder = freshFolder("ros_whole_packed"), file = packed(twin.file, folder);
-  for (const fs::path& path : {file, folder}) {
-    const auto plain = Dataset::open({.path = twin.file, .rig = twin.rig});
-    {
-      const auto dataset = Dataset::open({.path = path, .rig = twin.rig});
-      const test::Given a = test::allOf(*plain), b = test::allOf(*dataset);
-      EXPECT_EQ(a.order, b.order);
-      EXPECT_EQ(a.pixels, b.pixels);
-      EXPECT_THAT(dataset->recording().notes, Contains(HasSubstr("it was unpacked to")));
-      EXPECT_EQ(unpacked(), 1) << "once for all cameras";
-    }
-    EXPECT_EQ(unpacked(), 0);
-  }
-  fs::copy_file(twin.file, folder / twin.file.filename());
-  const auto beside = Dataset::open({.path = folder, .rig = twin.rig});
-  EXPECT_EQ(unpacked(), 0) << "somebody has unpacked it";
-  EXPECT_EQ(beside->frameCount(), 5u);
-}
-
-TEST_F(PackedRecording, ThatCannotBeUnpackedSaysTheMendAndLeavesNothing) {
-  const Twin twin = twinOf("ros_unpackable");
-  const fs::path folder = freshFolder("ros_unpackable_packed"), file = packed(twin.file, folder);
-  const auto error = [&] {
-    return startupErrorOf([&] { Dataset::open({.path = folder, .rig = twin.rig}); });
-  };
-  struct rlimit before {};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{4096, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);
-  const std::string full = error();
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, handler);
-  EXPECT_THAT(full, AllOf(HasSubstr("run_0.db3.zstd is packed as a whole"), HasSubstr("TMPDIR")));
-  truncate(file, 0.9);
-  EXPECT_THAT(error(), HasSubstr("is damaged or cut"));
-  writeText(file, "no zstd");
-  EXPECT_THAT(error(), HasSubstr("is damaged or cut"));
-  writeText(file, "");
-  EXPECT_THAT(error(), HasSubstr("is damaged or cut"));
-  EXPECT_EQ(unpacked(), 0);
-  setenv("TMPDIR", (place_ / "none").c_str(), 1);
-  EXPECT_THAT(error(), HasSubstr("set TMPDIR"));
-}
-
-TEST_F(PackedRecording, InMcapIsReadToo) {
-  const fs::path folder = freshFolder("mcap_whole"), file = folder / "run_0.mcap";
-  mcap::Catalogue catalogue;
-  catalogue.schemas[1] = {1, "sensor_msgs/msg/Imu", "ros2msg", "float64 x"};
-  catalogue.channels[1] = {1, 1, "/imu/data", "cdr"};
-  mcap::Draft draft;
-  const std::vector<std::uint8_t> data(32, 1);
-  for (std::uint64_t i = 0; i < 3; ++i) draft.add({1, 0, 10 + i, 10 + i, data});
-  auto writer = mcap::Writer::create(file, "ros2");
-  ASSERT_TRUE(writer && writer->append(mcap::pack(draft), catalogue) && writer->finish());
-  const fs::path only = packed(file, freshFolder("mcap_whole_packed"));
-  EXPECT_TRUE(RosMessages::looksLikeOne(only));
-  const RosMessages messages(only);
-  ASSERT_TRUE(messages.topics().contains("/imu/data"));
-  EXPECT_EQ(messages.topics().at("/imu/data").messages, 3u);
-  EXPECT_EQ(messages.notes().size(), 1u);
 }
 
 RosTopics topicsOfTypes(std::vector<std::pair<const char*, const char*>> list) {

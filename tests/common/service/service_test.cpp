@@ -12,6 +12,7 @@
 
 #include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
+#include "common/service/input.h"
 #include "tests/common/bus/isolation.h"
 
 namespace perdure::service {
@@ -139,7 +140,9 @@ TEST_F(Service, IsDegradedWhileItsInputIsSilentAndWellWhenItComesBack) {
   EXPECT_TRUE(comesTo(false, [&] { return last.state == HealthState::kDegraded; }));
   EXPECT_THAT(last.message, StartsWith("no samples for "));
   EXPECT_THAT(last.message, HasSubstr(" s; send some"));
+  EXPECT_TRUE(last.reasons.contains(kInputSilent)) << "nothing else is wrong";
   EXPECT_TRUE(comesTo(true, well));
+  EXPECT_FALSE(last.reasons.contains(kInputSilent));
   running.signal(SIGTERM);
   EXPECT_EQ(running.waitForEnd(), 0);
 }

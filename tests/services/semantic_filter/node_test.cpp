@@ -101,6 +101,44 @@ TEST(Node, MapsAStreetOfParkedCars) {
   EXPECT_EQ(confirmed, 3);
 }
 
+/// Points on the fronts of the cars, as `camera` has them; of another camera its pixels are
+/// elsewhere.
+Landmarks landmarksAt(std::uint64_t k, const std::string& camera) {
+  static const CameraModel model{testing::makeCamera()};
+  Landmarks m;
+  m.stamp = stampOf(k);
+  m.instance = 2;
+  m.world = {5, 0};
+  m.camera = camera;
+  const RigidTransform T_CW = (driveTo(k, 0.4) * model.T_BC()).inverse();
+  for (const auto& o : kStreet) {
+    for (int i = -2; i <= 2; ++i) {
+      Landmark l;
+      l.id = m.landmarks.size();
+      l.p_W = o.x.head<3>() + Eigen::Vector3d(-2.0, 0.3 * i, 0.1 * i);
+      l.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+      const auto pixel = model.project(T_CW * l.p_W);
+      if (!pixel || !model.inImage(*pixel)) continue;
+      l.pixel = *pixel + (camera == "cam0" ? 0.0 : 80.0) * Eigen::Vector2d::UnitX();
+      m.landmarks.push_back(l);
+    }
+  }
+  return m;
+}
+
+TEST(Node, PointsOfAnotherCameraLieWhereItsOwnCameraHasThem) {
+  Harness none, own, other;
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    for (Harness* h : {&none, &own, &other}) {
+      h->node.onOdometry(odometryAt(k, driveTo(k, 0.4)));
+      if (h != &none) h->node.onLandmarks(landmarksAt(k, h == &own ? "cam0" : "cam1"));
+      h->node.onDetections(detectionsAt(k, boxesAt(kStreet, k, 0.4)));
+    }
+  }
+  EXPECT_GT(distanceBetween(none.node.belief(), own.node.belief()), 1e-7) << "points matter";
+  EXPECT_LT(distanceBetween(own.node.belief(), other.node.belief()), 1e-9);
+}
+
 TEST(Node, TopDownAnswersAloneInitiateNoTrack) {
   Harness h;
   for (std::uint64_t k = 0; k < 20; ++k) {

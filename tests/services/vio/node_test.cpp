@@ -441,6 +441,41 @@ TEST(VioNode, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
   EXPECT_EQ(mono.reasons().of("stereo_unpaired"), 0u);
 }
 
+TEST(VioNode, TheFirstCameraOfItsConfigurationLeads) {
+  Calibration two = calibration();
+  two.cameras.push_back(test::testCamera(1));
+  auto options = restThenDrive();
+  options.stereo = true;
+  const test::SimulatedDrive both(options);
+  for (const auto& cameras : std::vector<std::vector<std::string>>{{"cam1"}, {"cam1", "cam0"}}) {
+    Config config;
+    config.cameras = cameras;
+    Recorder r;
+    Node node(config, 5, r.outputs());
+    node.onCalibration(two);
+    Player player(4.0);
+    player.play(node, 0.0, 4.0, {}, [&](Frame& f, double t) {
+      const std::uint64_t k = f.stamp.sequence;
+      node.onFrame(test::drawn(both, t, k, 1));
+      f = test::drawn(both, t, k, 0);
+      return true;
+    });
+    EXPECT_GT(usable(r), 40u);
+    ASSERT_FALSE(r.landmarks.empty());
+    EXPECT_EQ(r.landmarks.back().camera, "cam1");
+    EXPECT_EQ(node.health(), HealthState::kOk) << node.status();
+    const auto first = std::find_if(r.odometry.begin(), r.odometry.end(), [](const Odometry& o) {
+      return o.state == OdometryState::kTracking;
+    });
+    ASSERT_NE(first, r.odometry.end());
+    const Odometry& last = r.odometry.back();
+    const auto truthAt = [&](const Odometry& o) {
+      return both.truth(toSeconds(o.stamp.time - both.time(0.0))).p_WB;
+    };
+    EXPECT_NEAR(travelled(last, *first), (truthAt(last) - truthAt(*first)).norm(), 0.25);
+  }
+}
+
 TEST(VioNode, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());

@@ -54,6 +54,19 @@ TEST(PosesByFrame, TenthsOfASecondFromZeroTieThemselves) {
   EXPECT_EQ(poses.at(5).p.x(), 5.0);
 }
 
+TEST(PosesByFrame, LinesOfARunOverEachThirdFrameAreThoseFrames) {
+  std::vector<replay::StampedPose> poses;
+  for (std::int64_t i = 0; i < 6; ++i) {
+    poses.push_back(poseAt(1'000'000'000 + i * 300'000'001, static_cast<double>(i)));
+  }
+  const std::vector<EstimateRow> rows = {rowOf(6, toNanoseconds(poses[2].time))};
+  const auto tied = posesByFrame(poses, rows, std::set<std::uint64_t>{0, 3, 6, 9, 12});
+  ASSERT_EQ(tied.size(), 5U) << "the last line is of no used frame";
+  for (const std::uint64_t i : {0U, 1U, 2U, 3U, 4U}) {
+    EXPECT_EQ(tied.at(3 * i).p.x(), static_cast<double>(i));
+  }
+}
+
 TEST(PosesByFrame, RowsTieTimesToFramesAndLinesBetweenAreConsecutive) {
   std::vector<replay::StampedPose> poses;
   for (int i = 0; i < 6; ++i) poses.push_back(poseAt(1'000'000'000 + i * 103'333'333, i));

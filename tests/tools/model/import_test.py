@@ -381,6 +381,31 @@ class Operators(Importing):
         path = self.whole(more, {"out": [1, 8, 7]}, {"yes": np.array(True)})
         self.assertIn("computes with If", self.refused(path, NAMES, "--family=detr", "--onnx-runtime")[0])
 
+    def with_another(self, kind, name, make, swap):
+        """The network of `make`, the operator that `swap` finds replaced by one that nobody knows."""
+        path = self.made(make)
+        model = onnx.load(str(path))
+        node = swap(model.graph.node)
+        node.op_type, node.name = kind, name
+        del node.attribute[:]
+        onnx.save(model, str(path))
+        return path
+
+    def test_a_level_that_an_unknown_operator_hides_is_not_left_out(self):
+        """In the features of one of its three levels, and behind the heads of one."""
+        def relu(nodes):
+            return [n for n in nodes if n.op_type == "Relu"][1]
+
+        for name, told in (("/neck/act", "(node /neck/act)"), ("", "(the node that gives t")):
+            message, status = self.refused(self.with_another("Unheard", name, tiny.yolox, relu), NAMES)
+            self.assertEqual(status, 78)
+            self.assertIn(f"has the operator Unheard {told}", message)
+            self.assertIn("only 2 of its levels were found; export it again without this operator", message)
+            self.assertIn("tools/export_onnx.py", message)
+        behind = self.with_another("Unheard", "tail", tiny.yolox,
+                                   lambda nodes: next(n for n in nodes if n.op_type == "Reshape"))
+        self.assertIn("has the operator Unheard (node tail)", self.refused(behind, NAMES)[0])
+
     def test_another_runtimes_operators_are_named(self):
         more = [helper.make_node("FusedThing", ["rows"], ["out"], domain="com.example")]
         message, _ = self.refused(self.whole(more, {"out": [1, 8, 7]}, domains=["com.example"]), NAMES, "--family=detr")

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -15,6 +16,7 @@
 #include "common/replay/files/text_file.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "tests/common/replay/tiny_datasets.h"
+#include "tools/evaluate/command.h"
 #include "tools/evaluate/object_rows.h"
 #include "tools/pipeline/report.h"
 
@@ -221,6 +223,57 @@ TEST(Pipeline, EachNthFrameIsARunOfALowerRate) {
   for (const auto& row : rows) EXPECT_EQ(row.frame % 3, 0U);
   options.odometry = options.detections = "recorded";
   EXPECT_THAT(errorOf(options), HasSubstr("--every"));
+}
+
+/// The car's label in each frame in which its box is.
+void labelStreet(const fs::path& street) {
+  auto calibration = replay::readTrackingCalibration(street / "calib/0000.txt");
+  calibration.width = 1242, calibration.height = 375;
+  const CameraModel camera(calibration.camera("cam0"));
+  std::string labels;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const auto box = boxOf(camera, frame);
+    const Eigen::Vector3d at = calibration.T_RI * (poseOf(frame).inverse() * kCarCentre);
+    char line[200];
+    std::snprintf(line, sizeof line, "%d 3 Car 0 0 0 %f %f %f %f 1.5 1.7 4.2 %f %f %f %f\n", frame,
+                  box ? box->x1 : 0.0, box ? box->y1 : 0.0, box ? box->x2 : 9.0,
+                  box ? box->y2 : 9.0, at.x(), at.y() + 0.75, at.z(), -kCarYaw - M_PI_2);
+    labels += line;
+  }
+  writeText(street / "label_02/0000.txt", labels);
+}
+
+nlohmann::json evaluated(const PipelineOptions& options) {
+  CLI::App app;
+  addEvaluateCommand(app);
+  ::testing::internal::CaptureStdout();
+  app.parse("evaluate objects " + options.out + "/objects_final.csv --sequence 0000 --truth " +
+            options.data + " --image-size 1242 375 --json");
+  std::fflush(stdout);
+  return nlohmann::json::parse(::testing::internal::GetCapturedStdout());
+}
+
+TEST(Pipeline, FramesThatItLeavesOutAreNoMisses) {
+  const auto street = makeStreet("left_out");
+  labelStreet(street);
+  auto options = streetOptions(street, "out");
+  options.image_size = {1242, 375};
+  const auto recall = [](const nlohmann::json& json) {
+    return json["cells"][5]["recall"].get<double>();  // a metre, any angle
+  };
+  runPipeline(options);
+  const auto whole = evaluated(options);
+  EXPECT_EQ(whole["frames_left_out"], 0);
+  EXPECT_GT(recall(whole), 0.9);
+  options.every = 3;
+  options.seconds = 4.05;
+  runPipeline(options);
+  const auto report = nlohmann::json::parse(readText(fs::path(options.out) / "report.json"));
+  EXPECT_EQ(report["frames"]["runs"].dump(), "[[0,39,3]]");
+  const auto third = evaluated(options);
+  EXPECT_EQ(third["frames_left_out"], kFrames - 14);
+  EXPECT_GT(recall(third), 0.7) << "the first of 14 frames are before it is known";
+  EXPECT_EQ(recall(third), report["objects"]["recall"].get<double>());
 }
 
 TEST(Pipeline, FramesWithoutAPoseAreCountedAndLeaveNoLine) {

@@ -5,15 +5,17 @@
 #include <algorithm>
 
 #include "common/bus/discovery.h"
+#include "common/service/input.h"
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
 namespace {
 
-constexpr double kSilentHealth = 1.5;  // s; it comes each second
-constexpr double kJustStarted = 5.0;   // s; a restart is worth knowing, though it is over
-constexpr double kSlow = 0.8;          // of the expected rate; below it is degraded
-constexpr double kLate = 200.0;        // ms from capture
+constexpr double kSilentHealth = 1.5;           // s; it comes each second
+constexpr double kJustStarted = 5.0;            // s; a restart is worth knowing, though it is over
+constexpr double kSlow = 0.8;                   // of the expected rate; below it is degraded
+constexpr double kLate = 200.0;                 // ms from capture
+constexpr char kEndOfDrive[] = "end of drive";  // capture's Health
 
 Level levelOf(HealthState state) {
   switch (state) {
@@ -46,7 +48,34 @@ std::string spanText(double seconds) {
   return fmt::format("{:.0f} d", seconds / kDay);
 }
 
-StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
+/// What the source does: nothing is expected of the topics before it starts and after it has ended.
+struct Source {
+  bool gives = false;
+  std::string why_not;
+  bool ended = false;
+};
+
+bool isHeard(const StatusSeen& seen, const std::string& process) {
+  const auto it = seen.services.find(process);
+  return it != seen.services.end() && it->second.age_s <= kSilentHealth;
+}
+
+Source sourceOf(const StatusSeen& seen) {
+  const auto it = seen.services.find("capture");
+  if (it == seen.services.end()) return {true, {}};
+  const Health& health = it->second.health;
+  if (health.message == kEndOfDrive) return {false, health.message, isHeard(seen, "capture")};
+  if (health.state == HealthState::kStarting) return {false, "capture is starting"};
+  return {true, {}};
+}
+
+/// Nothing more comes to it, and nothing else is wrong with it.
+bool endedWith(const Source& source, const Health& health) {
+  return source.ended && health.state == HealthState::kDegraded &&
+         health.reasons.contains(service::kInputSilent);
+}
+
+StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const Source& source) {
   StatusNode node{name};
   if (seen == nullptr) {
     node.level = Level::kFailed;
@@ -72,7 +101,8 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
                             seen->age_s, h.pid);
     return node;
   }
-  node.level = levelOf(h.state);
+  const bool ended = endedWith(source, h);
+  node.level = ended ? Level::kOk : levelOf(h.state);
   node.text = fmt::format("{:.1f} Hz  in {} out {} dropped {}  {} MB", seen->frames_hz, h.frames_in,
                           h.frames_out, h.dropped, h.rss_bytes >> 20);
   if (seen->cpu >= 0) node.text += fmt::format("  {:.0f} % CPU", 100 * seen->cpu);
@@ -81,7 +111,8 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
     node.data["up_s"] = *seen->up_s;
     if (*seen->up_s >= kJustStarted) node.text += "  up " + spanText(*seen->up_s);
   }
-  addSentence(node.text, h.message);
+  addSentence(node.text, ended ? std::string("nothing more comes: ") + kEndOfDrive : h.message);
+  if (ended) node.data["ended"] = true;
   if (seen->restarts > 0) {
     node.data["restarts"] = seen->restarts;
     addSentence(node.text, fmt::format("was started anew {} times meanwhile", seen->restarts));
@@ -91,11 +122,6 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen) {
     addSentence(node.text, fmt::format("started {:.1f} s ago", *seen->up_s));
   }
   return node;
-}
-
-bool isHeard(const StatusSeen& seen, const std::string& process) {
-  const auto it = seen.services.find(process);
-  return it != seen.services.end() && it->second.age_s <= kSilentHealth;
 }
 
 /// The process that writes what `service` would, where that is not heard; empty where none does.
@@ -123,37 +149,22 @@ StatusNode standingIn(const StatusSeen& seen, const std::string& service,
   return node;
 }
 
-StatusNode judgeServices(const StatusSeen& seen) {
+StatusNode judgeServices(const StatusSeen& seen, const Source& source) {
   StatusNode node{"services"};
   for (const char* name : kUsualServices) {
     const auto it = seen.services.find(name);
     if (const std::string process = standInFor(seen, name); !process.empty()) {
       node.add(standingIn(seen, name, process));
     } else {
-      node.add(judgeService(name, it == seen.services.end() ? nullptr : &it->second));
+      node.add(judgeService(name, it == seen.services.end() ? nullptr : &it->second, source));
     }
   }
   for (const auto& [name, service] : seen.services) {
     const bool usual = std::find(std::begin(kUsualServices), std::end(kUsualServices), name) !=
                        std::end(kUsualServices);
-    if (!usual) node.add(judgeService(name, &service));
+    if (!usual) node.add(judgeService(name, &service, source));
   }
   return node;
-}
-
-/// What the source does: nothing is expected of the topics before it starts and after it has ended.
-struct Source {
-  bool gives = false;
-  std::string why_not;
-};
-
-Source sourceOf(const StatusSeen& seen) {
-  const auto it = seen.services.find("capture");
-  if (it == seen.services.end()) return {true, {}};
-  const Health& health = it->second.health;
-  if (health.message == "end of drive") return {false, health.message};
-  if (health.state == HealthState::kStarting) return {false, "capture is starting"};
-  return {true, {}};
 }
 
 std::string figuresOf(const TopicSeen& topic, double expected) {
@@ -382,7 +393,7 @@ void StatusNode::add(StatusNode child) {
 StatusNode judge(const StatusSeen& seen) {
   StatusNode root{"perdure " + seen.vehicle};
   const Source source = sourceOf(seen);
-  root.add(judgeServices(seen));
+  root.add(judgeServices(seen, source));
   root.add(judgeSensors(seen, source));
   root.add(judgeTopics(seen, source));
   if (isHeard(seen, "map_store")) root.add(judgeMap(seen));

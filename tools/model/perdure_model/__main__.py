@@ -2,6 +2,7 @@
 network, its model.json and what to compare OpenCV's answers with; tells its findings."""
 
 import argparse
+import os
 import ast
 import json
 import sys
@@ -90,9 +91,8 @@ def pair_of(text):
 
 def names_of(text):
     """A file with a name a line, or a list with commas."""
-    path = Path(text)
-    if path.is_file():
-        names = [line.strip() for line in path.read_text(errors="replace").splitlines() if line.strip()]
+    if os.path.isfile(text):  # also of a list that is longer than any path: it is none
+        names = [line.strip() for line in Path(text).read_text(errors="replace").splitlines() if line.strip()]
     elif "," in text or not ("/" in text or text.endswith((".txt", ".names"))):
         names = [name.strip() for name in text.split(",")]
     else:
@@ -132,7 +132,7 @@ def names_in(graph):
 
 def recognise(path, graph, size, request):
     sayings.refuse_own(path, graph)
-    heads, _ = tracing.find_heads(graph)
+    heads, others = tracing.find_heads(graph)
     found = []
     if heads and request.family not in ("ssd", "detr"):
         found = level_families.candidates(level_families.Levels(graph, tracing.levels_of(heads), size, request),
@@ -149,6 +149,9 @@ def recognise(path, graph, size, request):
         sayings.refuse_choosing(path, choosing, request.family)
     if best is None or disagrees and not request.anchors:
         best = output_families.find(output_families.Outputs(graph, size, request)) or best
+    hidden = tracing.hides_heads(graph, others) if best is None or best in found else None
+    if hidden:
+        sayings.refuse_hidden(path, hidden, len(tracing.levels_of(heads)), best.family if best else request.family)
     if best is None:
         shapes = ", ".join(f"{o} {'x'.join(map(str, graph.shape(o) or ['?']))}" for o in graph.outputs)
         where = f"as {request.family}" if request.family else "as any family"

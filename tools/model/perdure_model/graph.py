@@ -14,9 +14,9 @@ KEEPS_SHAPE = ("HardSwish", "Mish")
 class Node:
     """Inputs and outputs are names; "" where an input is left out. Attributes are plain values."""
 
-    def __init__(self, kind, inputs, outputs, attributes=None, domain=""):
+    def __init__(self, kind, inputs, outputs, attributes=None, domain="", name=""):
         self.kind, self.inputs, self.outputs = kind, list(inputs), list(outputs)
-        self.attributes, self.domain = dict(attributes or {}), domain
+        self.attributes, self.domain, self.name = dict(attributes or {}), domain, name
 
     @classmethod
     def of(cls, proto):
@@ -29,7 +29,7 @@ class Node:
                 value = numpy_helper.to_array(value)
             attributes[a.name] = list(value) if a.type == a.INTS or a.type == a.FLOATS else value
         domain = "" if proto.domain == "ai.onnx" else proto.domain
-        return cls(proto.op_type, proto.input, proto.output, attributes, domain)
+        return cls(proto.op_type, proto.input, proto.output, attributes, domain, proto.name)
 
 
 class Graph:

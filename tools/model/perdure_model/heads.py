@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import onnx
 
 # What exporters write behind the heads: shapes, activations, arithmetic, choosing.
 DECODING = {
@@ -75,6 +76,22 @@ def find_heads(graph):
         else:
             others.append(name)
     return heads, others
+
+
+def is_unknown(node):
+    return bool(node.domain) or not onnx.defs.has(node.kind)
+
+
+def hides_heads(graph, others):
+    """The first operator that keeps heads from being found: behind it shapes are not known, or nobody knows what it
+    does. None where `others` (of find_heads) are no heads."""
+    producers = graph.producers()
+    behind = [producers[name] for name in others if name in producers]
+    for node in graph.ancestors([n.outputs[0] for n in behind if n.kind == "Conv" and graph.shape(n.outputs[0]) is None]):
+        inputs_known = all(i == "" or graph.shape(i) is not None for i in node.inputs)
+        if inputs_known and any(o and graph.shape(o) is None for o in node.outputs):
+            return node
+    return next((n for n in behind if is_unknown(n)), None)
 
 
 def levels_of(heads):

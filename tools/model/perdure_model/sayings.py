@@ -40,6 +40,15 @@ def refuse_choosing(path, operators, family):
                 f"{exports(family)}")
 
 
+def refuse_hidden(path, node, found, family):
+    """Without the heads behind it the network would be taken for one of fewer levels."""
+    what = f"{node.domain}.{node.kind}" if node.domain else node.kind
+    where = f"node {node.name}" if node.name else f"the node that gives {node.outputs[0]}"
+    levels = f"; only {found} of its levels were found" if found else ""
+    raise Fault(f"{path} has the operator {what} ({where}), behind which heads of the network cannot be seen{levels}; "
+                f"export it again without this operator. {exports(family)}")
+
+
 def refuse_own(path, graph):
     """The project's own family has calibrated numbers that no graph holds."""
     if {"logits8", "box8"} <= set(graph.outputs):

@@ -164,4 +164,10 @@ bool flips(const libcamera::CameraConfiguration& configuration, const std::strin
   return orientationIn(configuration) == orientationOf(flip);
 }
 
+std::string flipRefused(const libcamera::CameraConfiguration& configuration,
+                        const std::string& flip) {
+  if (flip == "none" || flips(configuration, flip)) return "";
+  return "cannot mirror its images as it is mounted; set camera.flip to none, and calibrate it so.";
+}
+
 }  // namespace perdure::capture

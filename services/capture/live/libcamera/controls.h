@@ -31,5 +31,10 @@ std::span<const KnownFormat> knownFormats();
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
 /// Whether it is still asked for.
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
+/// Why its images are not as `camera.flip` says, with the mend; empty where they are. With none
+/// they are as they come: of a camera that is mounted at 90° they stay turned, and so they are
+/// calibrated.
+std::string flipRefused(const libcamera::CameraConfiguration& configuration,
+                        const std::string& flip);
 
 }  // namespace perdure::capture

@@ -146,13 +146,9 @@ Result<void> Session::configure() {
                     settings_.format, settings_.width, settings_.height));
   }
   layout_ = known->second;
-  if (!flips(*configuration_, settings_.flip)) {
-    return fail("camera_absent",
-                fmt::format("the camera {} cannot mirror its images; set camera.flip to none, and "
-                            "calibrate it as it is mounted.",
-                            id()));
-  }
-  return {};
+  const std::string refused = flipRefused(*configuration_, settings_.flip);
+  if (refused.empty()) return {};
+  return fail("camera_absent", fmt::format("the camera {} {}", id(), refused));
 }
 
 Result<void> Session::allocate() {

@@ -263,6 +263,32 @@ TEST(Status, ExpectsNothingBeforeTheDriveAndAfterIt) {
   EXPECT_EQ(dominating(seen, "capture"), Level::kDegraded);
 }
 
+TEST(Status, ADriveThatHasEndedIsNoFaultOfTheServicesThatWaitForMore) {
+  StatusSeen seen = sound();
+  for (auto& [name, topic] : seen.topics) topic.age_s = 60.0;
+  const auto silence = [&](const char* name) {
+    auto& service = seen.services[name];
+    service.frames_hz = 0.0;
+    service.health.state = HealthState::kDegraded;
+    service.health.message = "no frames for 60.0 s; mend the camera, or start capture";
+    service.health.reasons["input_silent"] = 1;
+  };
+  for (const char* name : {"vio", "inference", "semantic_filter"}) silence(name);
+  seen.services["capture"].frames_hz = 0.0;
+  EXPECT_EQ(judge(seen).level, Level::kFailed) << "a camera that died";
+  EXPECT_EQ(find(judge(seen), "vio").level, Level::kDegraded);
+  seen.services["capture"].health.message = "end of drive";
+  EXPECT_EQ(judge(seen).level, Level::kOk) << toText(judge(seen), false);
+  EXPECT_THAT(find(judge(seen), "vio").text, HasSubstr("nothing more comes: end of drive"));
+  EXPECT_THAT(find(judge(seen), "vio").text, Not(HasSubstr("mend the camera")));
+  EXPECT_EQ(toJson(find(judge(seen), "vio"))["ended"], true);
+  seen.services["vio"].health.reasons.clear();
+  EXPECT_EQ(dominating(seen, "vio"), Level::kDegraded) << "something else is wrong with it";
+  silence("vio");
+  seen.services["capture"].age_s = 2.0;
+  EXPECT_EQ(find(judge(seen), "vio").level, Level::kDegraded) << "capture is gone";
+}
+
 TEST(Status, WithoutCalibrationTheSensorsAreDegraded) {
   StatusSeen seen = sound();
   seen.calibration.reset();

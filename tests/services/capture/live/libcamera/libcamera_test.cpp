@@ -160,6 +160,28 @@ TEST(LibcameraControls, AFlipIsAskedForAndItIsSeenWhereTheCameraTakesItBack) {
   }
 }
 
+/// A camera that is mounted at 90°: nothing turns its images upright, which libcamera says.
+class Rolled : public libcamera::CameraConfiguration {
+ public:
+  Status validate() override {
+#if __has_include(<libcamera/orientation.h>)
+    orientation = libcamera::Orientation::Rotate90;
+#else
+    transform = libcamera::Transform::Rot90;
+#endif
+    return Adjusted;
+  }
+};
+
+TEST(LibcameraControls, ImagesOfACameraThatIsMountedRolledAreTakenAsTheyCome) {
+  Rolled configuration;
+  askFlip(configuration, "none");
+  configuration.validate();
+  EXPECT_FALSE(flips(configuration, "none"));
+  EXPECT_EQ(flipRefused(configuration, "none"), "");
+  EXPECT_THAT(flipRefused(configuration, "both"), HasSubstr("set camera.flip to none"));
+}
+
 #if __has_include(<libcamera/orientation.h>)
 TEST(LibcameraControls, AFlipIsAnOrientationOfTheUprightImage) {
   Fixed configuration;

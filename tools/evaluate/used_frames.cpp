@@ -1,0 +1,74 @@
+#include "tools/evaluate/used_frames.h"
+
+#include <fstream>
+
+#include "common/base/errors.h"
+
+namespace perdure::tools {
+namespace {
+
+constexpr std::uint64_t kMostFrames = 100'000'000;
+
+struct Run {
+  std::uint64_t first = 0, last = 0, step = 1;
+};
+
+/// Nothing where it is none.
+std::optional<Run> runIn(const nlohmann::json& json) {
+  if (!json.is_array() || json.size() != 3) return std::nullopt;
+  for (const auto& n : json) {
+    if (!n.is_number_unsigned() || n.get<std::uint64_t>() > kMostFrames) return std::nullopt;
+  }
+  const Run run{json[0].get<std::uint64_t>(), json[1].get<std::uint64_t>(),
+                json[2].get<std::uint64_t>()};
+  if (run.step == 0 || run.last < run.first) return std::nullopt;
+  return run;
+}
+
+}  // namespace
+
+nlohmann::ordered_json framesToJson(const UsedFrames& frames) {
+  std::vector<Run> runs;
+  for (const std::uint64_t frame : frames) {
+    const bool begins = !runs.empty() && runs.back().first == runs.back().last;
+    if (begins) runs.back().step = frame - runs.back().first;
+    if (runs.empty() || frame != runs.back().last + runs.back().step) {
+      runs.push_back({frame, frame, 1});
+    } else {
+      runs.back().last = frame;
+    }
+  }
+  nlohmann::ordered_json json = {{"used", frames.size()},
+                                 {"runs", nlohmann::ordered_json::array()}};
+  for (const Run& run : runs) json["runs"].push_back({run.first, run.last, run.step});
+  return json;
+}
+
+std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run) {
+  const auto file = run / "report.json";
+  std::ifstream in(file);
+  if (!in) return std::nullopt;
+  const auto report = nlohmann::json::parse(in, nullptr, false);
+  if (!report.is_object() || !report.contains("frames")) return std::nullopt;
+  const auto& frames = report["frames"];
+  UsedFrames used;
+  bool whole = frames.is_object() && frames.contains("runs") && frames["runs"].is_array();
+  for (const auto& json : whole ? frames["runs"] : nlohmann::json::array()) {
+    const auto one = runIn(json);
+    whole = whole && one;
+    if (!whole) break;
+    for (std::uint64_t f = one->first; f <= one->last; f += one->step) used.insert(f);
+  }
+  if (whole) return used;
+  throw StartupError(ExitCode::kData, file.string() +
+                                          ": `frames` does not say which frames the run was over; "
+                                          "run perdure pipeline again, or take the file away");
+}
+
+double strideOf(const UsedFrames& frames) {
+  if (frames.size() < 2) return 1.0;
+  return static_cast<double>(*frames.rbegin() - *frames.begin()) /
+         static_cast<double>(frames.size() - 1);
+}
+
+}  // namespace perdure::tools
