@@ -227,6 +227,10 @@ class Classes(Importing):
         self.assertEqual(self.run_import(self.folder / "yolov8/net.onnx", "--classes=A,B,C")[1]["classes"],
                          ["a", "b", "c"])
 
+    def test_a_list_longer_than_a_path_is_a_list(self):
+        message, _ = self.refused(self.made(tiny.yolox), "--classes=" + ",".join(f"thing{i}" for i in range(800)))
+        self.assertIn("(yolox) has 3 classes and 800 names were given", message)
+
     def test_without_any_they_are_asked_for(self):
         message, status = self.refused(self.made(tiny.yolox))
         self.assertIn("does not say the names of its 3 classes; give --classes", message)

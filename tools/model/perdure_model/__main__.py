@@ -2,9 +2,9 @@
 network, its model.json and what to compare OpenCV's answers with; tells its findings."""
 
 import argparse
-import os
 import ast
 import json
+import os
 import sys
 from pathlib import Path
 
