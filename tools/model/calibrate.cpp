@@ -108,6 +108,7 @@ class Study {
   std::vector<BoxOutcome> outcomes(const Calibration& calibration) const;
   bool judged(std::size_t k) const { return judged_.empty() || judged_.contains(names_[k]); }
   void countTargets(const Calibration& calibration);
+  void requireTheSameFrames() const;
   void measureSides(const Calibration& calibration);
   void fitPrimedAnswers(Calibration& calibration);
   std::vector<PrimedOutcome> askAround(const Calibration& calibration) const;
@@ -222,6 +223,18 @@ void Study::countTargets(const Calibration& calibration) {
   }
 }
 
+/// What is on a map was seen by the network before it came there.
+void Study::requireTheSameFrames() const {
+  const bool by_map = std::any_of(frames_.begin(), frames_.end(),
+                                  [](const Seen& frame) { return !frame.sides_known; });
+  if (!by_map || 2 * result_.targets_found >= result_.targets) return;
+  throw StartupError(
+      ExitCode::kUnavailable,
+      "of " + std::to_string(result_.targets) + " objects that --labels expects " +
+          std::to_string(result_.targets_found) +
+          " are seen in --frames: is it a run over these frames, with this network?");
+}
+
 void Study::measureSides(const Calibration& calibration) {
   std::vector<double> errors;
   std::map<std::size_t, std::array<std::vector<double>, 4>> insets;
@@ -334,6 +347,8 @@ void Study::fit() {
     calibration.bias = s.bias;
     calibration.clutter_rate = clutterRateOf(boxes);
   }
+  countTargets(calibration);
+  requireTheSameFrames();
   boxes = outcomes(calibration);
   const auto right =
       std::count_if(boxes.begin(), boxes.end(), [](const auto& b) { return b.label > 0; });
@@ -351,7 +366,6 @@ void Study::fit() {
       before,
       std::vector<Softening>(before.size(), {result_.before.temperature, result_.before.bias}));
   result_.reliability_after = reliabilityOf(boxes, crossValidated(boxes, frames_.size()));
-  countTargets(calibration);
   if (!options_.primed_only) measureSides(calibration);
   fitPrimedAnswers(calibration);
   result_.fitted = calibration;

@@ -92,6 +92,10 @@ fs::path descriptionOf(const inference::Config& config) {
 
 void run(const CalibrateRequest& request) {
   CalibrateOptions options = request.options;
+  if (request.folders.size() > 1 && fs::is_directory(request.labels)) {
+    throw StartupError(ExitCode::kUsage, request.labels.string() +
+                                             " is of one run, over one drive; give one --frames");
+  }
   for (const fs::path& folder : request.folders) {
     options.data.push_back({folder, request.sequence, request.labels, request.every});
   }

@@ -8,6 +8,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kFolds = 5;
+constexpr double kMostBias = 20.0;  // nats; what model.json may hold
 constexpr std::size_t kBins = 15;
 constexpr std::size_t kLeastPlaces = 40;
 
@@ -69,6 +70,7 @@ Eigen::Vector2d minimise(const std::vector<BoxOutcome>& boxes, bool with_bias) {
     for (int half = 0; half < 30 && !better; ++half, step *= 0.5) {
       Eigen::Vector2d next = theta + step;
       next[0] = std::clamp(next[0], 0.05, 20.0);
+      next[1] = std::clamp(next[1], -kMostBias, kMostBias);
       const Cost there = costOf(boxes, next);
       if (!(there.value < cost.value)) continue;
       better = true;

@@ -138,7 +138,13 @@ std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
 LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
                           double least_px) {
   const bool by_map = fs::is_directory(request.labels);
-  if (isSimulated(request.data) && !by_map) return readSimulated(request, aliases, least_px);
+  if (isSimulated(request.data) && !by_map) {
+    if (request.labels.empty()) return readSimulated(request, aliases, least_px);
+    throw StartupError(ExitCode::kUnavailable,
+                       request.labels.string() +
+                           " is no folder, and a simulated drive has no label files; give OUT of "
+                           "`perdure pipeline` over it, or leave out --labels for its own truth");
+  }
   auto dataset = replay::Dataset::open({.path = request.data, .sequence = request.sequence});
   if (by_map) return readMapLabels(request, std::move(dataset), aliases, least_px);
   return readKitti(request, std::move(dataset), aliases, least_px);

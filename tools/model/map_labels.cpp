@@ -1,6 +1,7 @@
 #include "tools/model/map_labels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "common/base/errors.h"
@@ -14,6 +15,7 @@ constexpr double kSure = 0.9;     // score of an object that is taken for true
 constexpr double kInImage = 0.9;  // share of a box within the image that is no cut
 constexpr double kHidden = 0.25;  // share of a box behind nearer ones
 constexpr double kBeside = 0.25;  // of a box, on each side: what the map errs by
+constexpr double kSameTime_s = 1e-3;
 constexpr std::size_t kLeastViews = 20;
 
 struct View {
@@ -85,6 +87,19 @@ std::set<std::string> judgedIn(const std::vector<LabelledFrame>& frames) {
   return judged;
 }
 
+void requireSameFrames(const std::vector<EstimateRow>& rows, const replay::Dataset& dataset,
+                       const std::filesystem::path& run) {
+  const auto strange = std::count_if(rows.begin(), rows.end(), [&](const EstimateRow& row) {
+    const auto time = dataset.frameTime(row.frame);
+    return !time || std::abs(toSeconds(*time - row.time)) > kSameTime_s;
+  });
+  if (2 * static_cast<std::size_t>(strange) <= rows.size()) return;
+  throw StartupError(ExitCode::kUnavailable,
+                     run.string() +
+                         " is of another drive than --frames: the stamps of its frames "
+                         "differ; give OUT of a run over these frames");
+}
+
 }  // namespace
 
 LabelledData readMapLabels(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
@@ -92,6 +107,7 @@ LabelledData readMapLabels(const LabelRequest& request, std::unique_ptr<replay::
   const auto rows = readObjectRows(request.labels / "objects_final.csv");
   const auto poses =
       posesByFrame(replay::PoseFile::read(request.labels / "trajectory.tum").poses(), rows);
+  requireSameFrames(rows, *dataset, request.labels);
   const CameraModel camera(dataset->calibration().cameras.front());
   std::map<std::uint64_t, std::vector<const EstimateRow*>> by_frame;
   for (const EstimateRow& row : rows) by_frame[row.frame].push_back(&row);

@@ -50,6 +50,12 @@ void repair(const fs::path& file) {
   if (!reader) throw StartupError(ExitCode::kUnavailable, reader.error().detail);
   if (reader->finished()) return fmt::print("{} is whole\n", file.string());
   const auto cut = reader->cutBytes();
+  if (reader->chunks().empty()) {
+    throw StartupError(ExitCode::kUnavailable,
+                       fmt::format("{} holds no whole chunk: its {} bytes cannot be made a "
+                                   "recording, and it stays as it is",
+                                   file.string(), cut));
+  }
   if (const auto finished = reader->finish(); !finished) {
     throw StartupError(ExitCode::kUnavailable, finished.error().detail);
   }

@@ -126,5 +126,32 @@ TEST_F(CalibrateRun, TheMapOfARunStandsInForLabels) {
       << "the sides of the map's boxes are no measure of a network's";
 }
 
+/// The run was of frames with the same stamps, and of other things.
+TEST_F(CalibrateRun, LabelsOfOtherFramesAreRefused) {
+  const fs::path frames = folder_ / "frames", out = folder_ / "other";
+  fs::create_directories(out);
+  std::ofstream rows(out / "objects_final.csv"), poses(out / "trajectory.tum");
+  rows << "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible\n";
+  std::ifstream index(frames / "mav0/cam0/data.csv");
+  std::string line;
+  for (int i = -1; std::getline(index, line); ++i) {
+    if (i < 0) continue;  // the header
+    const std::string stamp = line.substr(0, line.find(','));
+    rows << "s," << i << "," << stamp << ",1,car,0.99,9,0,0,4,1.7,1.5,0,1\n";
+    poses << std::fixed << std::stod(stamp) * 1e-9 << " 0 0 0 0 0 0 1\n";
+  }
+  rows.close(), poses.close();
+  const auto refused = [&](const fs::path& labels) {
+    return run({"model", "calibrate", network_.string(), "--quiet", "--dry-run", "--frames",
+                frames.string(), "--labels", labels.string()});
+  };
+  const ProgramAnswer other = refused(out);
+  EXPECT_EQ(other.status, 69) << other.output;
+  EXPECT_NE(other.output.find("is it a run over these frames"), std::string::npos) << other.output;
+  const ProgramAnswer none = refused(folder_ / "nothere");
+  EXPECT_EQ(none.status, 69) << none.output;
+  EXPECT_NE(none.output.find("leave out --labels for its own truth"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace perdure::tools

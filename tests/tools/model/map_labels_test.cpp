@@ -25,14 +25,14 @@ struct Thing {
 class MapLabels : public ::testing::Test {
  protected:
   /// A run in which the body stood at the origin and found these.
-  void runFound(const std::vector<Thing>& things) {
+  void runFound(const std::vector<Thing>& things, std::int64_t later_ns = 0) {
     const auto dataset = replay::Dataset::open({.path = data_});
     const CameraModel camera(dataset->calibration().cameras.front());
     std::string rows =
         "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible\n";
     std::string poses;
     for (int i = 0; i < kFrames; ++i) {
-      const std::int64_t time = kFirst_ns + i * kPeriod_ns;
+      const std::int64_t time = kFirst_ns + later_ns + i * kPeriod_ns;
       poses += fmt::format("{:.2f} 0 0 0 0 0 0 1\n", static_cast<double>(time) * 1e-9);
       int id = 0;
       for (const Thing& t : things) {
@@ -104,6 +104,11 @@ TEST_F(MapLabels, WhatIsSeenTooRarelyIsRefusedWithTheMend) {
       << "of each second frame only";
   fs::remove(out_ / "objects_final.csv");
   EXPECT_THAT(replay::startupErrorOf([&] { (void)read(); }), HasSubstr("objects_final.csv"));
+}
+
+TEST_F(MapLabels, ARunOverAnotherDriveIsRefused) {
+  runFound(kFour, 20'000'000);
+  EXPECT_THAT(replay::startupErrorOf([&] { (void)read(); }), HasSubstr("is of another drive"));
 }
 
 }  // namespace

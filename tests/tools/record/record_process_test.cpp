@@ -225,6 +225,22 @@ TEST(PlayProcess, PlaysBesideAMapStoreAndSaysWhatIsLeftOut) {
   EXPECT_THAT(named.log(), HasSubstr("map/frame (map_store)"));
 }
 
+TEST(RepairProcess, AFileWithoutAWholeChunkStaysAsItIs) {
+  const test::Folder place;
+  const fs::path file = place.file("run.mcap");
+  replay::RecordingWriter recording(file);
+  for (std::uint64_t i = 0; i < 50; ++i) recording.add("imu", ImuSample{}, 1000 * i);
+  recording.finish();
+  const auto whole = replay::mcap::Reader::open(file);
+  ASSERT_TRUE(whole && whole->chunks().size() == 1);
+  const auto half = whole->chunks().front().offset + whole->chunks().front().length / 2;
+  fs::resize_file(file, half);
+  test::Child repair({perdure(), "record", "repair", file}, place.file("repair.log"));
+  EXPECT_EQ(repair.wait(20s), 69);
+  EXPECT_THAT(repair.log(), HasSubstr("holds no whole chunk"));
+  EXPECT_EQ(fs::file_size(file), half);
+}
+
 TEST(PlayProcess, SaysWhatTheRecordingHasNot) {
   const test::Folder place;
   replay::RecordingWriter recording(place.file("run.mcap"));
