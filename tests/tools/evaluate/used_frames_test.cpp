@@ -49,6 +49,15 @@ TEST(UsedFrames, ThatCannotBeAreRefused) {
   }
 }
 
+TEST(UsedFrames, WithoutAPoseAreThoseBetweenPoses) {
+  const auto at = [](int ms) { return TimePoint(std::chrono::milliseconds(ms)); };
+  const std::vector<replay::StampedPose> poses{{at(100), {}}, {at(200), {}}, {at(400), {}}};
+  EXPECT_EQ(withoutPose({at(0), at(50), at(500)}, poses), 0u) << "before and after";
+  EXPECT_EQ(withoutPose({at(100), at(150), at(201), at(300), at(399)}, poses), 2u);
+  EXPECT_EQ(withoutPose({at(100)}, {}), 0u);
+  EXPECT_THAT(noteOfUntold(2), HasSubstr("2 frames between poses have none"));
+}
+
 /// What `perdure evaluate trajectory` says of poses at the first, third and fifth of five frames.
 nlohmann::json judged(const fs::path& run, const fs::path& drive) {
   std::string tum;
@@ -74,9 +83,11 @@ TEST(UsedFrames, AloneAreExpectedToHaveAPose) {
   const auto all = judged(replay::freshFolder("used_all"), drive);
   EXPECT_EQ(all["frames_expected"], 5);
   EXPECT_EQ(all["frames_left_out"], 0);
+  EXPECT_EQ(all["frames_untold"], 2) << "left out or missed";
   const auto second = judged(reported("used_second", R"({"used": 3, "runs": [[0, 4, 2]]})"), drive);
   EXPECT_EQ(second["frames_expected"], 3);
   EXPECT_EQ(second["frames_left_out"], 2);
+  EXPECT_EQ(second["frames_untold"], 0);
   EXPECT_EQ(second["coverage"], 1.0);
   const auto other =
       judged(reported("used_of_other", R"({"used": 2, "runs": [[1, 3, 2]]})"), drive);
