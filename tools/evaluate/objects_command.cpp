@@ -39,6 +39,12 @@ fs::path trajectoryOf(const ObjectsOptions& options) {
   return options.trajectory.empty() ? beside : fs::path(options.trajectory);
 }
 
+std::vector<replay::StampedPose> posesOf(const ObjectsOptions& options) {
+  return replay::PoseFile::read(trajectoryOf(options),
+                                "--trajectory takes the trajectory.tum of the run")
+      .poses();
+}
+
 replay::KittiCalibration readCalibration(const ObjectsOptions& options) {
   const fs::path root = options.truth;
   auto calibration = replay::readTrackingCalibration(root / "calib" / (options.sequence + ".txt"));
@@ -56,8 +62,7 @@ Evaluated evaluateKitti(ObjectsOptions options) {
       replay::readKittiLabels(fs::path(options.truth) / "label_02" / (options.sequence + ".txt"));
   const auto calibration = readCalibration(options);
   auto rows = readObjectRows(options.csv);
-  const auto poses =
-      posesByFrame(replay::PoseFile::read(trajectoryOf(options)).poses(), rows, used);
+  const auto poses = posesByFrame(posesOf(options), rows, used);
   std::erase_if(rows, [&](const EstimateRow& row) { return row.class_name != class_name; });
   auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
   const std::size_t left_out = leaveOut(truth, used);
@@ -78,7 +83,7 @@ Evaluated evaluateKitti(ObjectsOptions options) {
 Evaluated evaluateSimulated(ObjectsOptions options) {
   const SimulatedTruth truth = readSimulatedTruth(options.truth);
   const auto used = usedFramesOf(fs::path(options.csv).parent_path());
-  const auto poses = replay::PoseFile::read(trajectoryOf(options)).poses();
+  const auto poses = posesOf(options);
   SimulatedRun run = pairWithTruth(truth, readObjectRows(options.csv), poses, options.class_name);
   const std::size_t left_out = leaveOut(run.frames, used);
   options.score.frame_interval_s = truth.frameInterval() * (used ? strideOf(*used) : 1.0);

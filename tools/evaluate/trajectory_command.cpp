@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 using replay::PoseFile;
 using replay::PoseFormat;
 
+constexpr char kTruthMend[] = "--truth takes a file of poses or a dataset folder";
+
 struct TrajectoryOptions {
   std::string truth, sequence, tum, data, align = "yaw";
   double skip_s = 0.0;
@@ -73,7 +75,7 @@ Truth readTruth(const TrajectoryOptions& options) {
                          options.truth + " holds no true trajectory; give a pose file to --truth");
     }
   }
-  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth), truth.frames);
+  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth, kTruthMend), truth.frames);
   return truth;
 }
 
@@ -124,7 +126,7 @@ const char* nameOf(Alignment alignment) {
 
 Compared compare(const TrajectoryOptions& options) {
   Truth truth = readTruth(options);
-  const PoseFile file = PoseFile::read(options.tum);
+  const PoseFile file = PoseFile::read(options.tum, "`perdure pipeline` writes trajectory.tum");
   if (file.format() != PoseFormat::kTum) {
     throw StartupError(ExitCode::kUsage, options.tum + " is no TUM file: t x y z qx qy qz qw");
   }

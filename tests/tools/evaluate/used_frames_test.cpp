@@ -74,6 +74,20 @@ nlohmann::json judged(const fs::path& run, const fs::path& drive) {
   return nlohmann::json::parse(::testing::internal::GetCapturedStdout());
 }
 
+TEST(EvaluateCommand, NamesItsOwnOptionWhereATrajectoryIsMissing) {
+  const auto run = replay::freshFolder("no_trajectory");
+  const auto error = [&](const std::string& line) {
+    CLI::App app;
+    addEvaluateCommand(app);
+    return startupErrorOf([&] { app.parse(line); });
+  };
+  const std::string tum = (run / "trajectory.tum").string();
+  EXPECT_THAT(error("evaluate trajectory " + tum + " --truth " + tum), HasSubstr("--truth takes"));
+  writeText(run / "truth.tum", "0 0 0 0 0 0 0 1\n");
+  EXPECT_THAT(error("evaluate trajectory " + tum + " --truth " + (run / "truth.tum").string()),
+              HasSubstr("`perdure pipeline` writes"));
+}
+
 TEST(UsedFrames, AloneAreExpectedToHaveAPose) {
   const auto drive = replay::tinyEuroc("used_drive");
   writeText(drive / "mav0/state_groundtruth_estimate0/data.csv",

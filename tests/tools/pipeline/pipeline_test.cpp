@@ -243,12 +243,16 @@ void labelStreet(const fs::path& street) {
   writeText(street / "label_02/0000.txt", labels);
 }
 
-nlohmann::json evaluated(const PipelineOptions& options) {
+void evaluateObjects(const PipelineOptions& options) {
   CLI::App app;
   addEvaluateCommand(app);
-  ::testing::internal::CaptureStdout();
   app.parse("evaluate objects " + options.out + "/objects_final.csv --sequence 0000 --truth " +
             options.data + " --image-size 1242 375 --json");
+}
+
+nlohmann::json evaluated(const PipelineOptions& options) {
+  ::testing::internal::CaptureStdout();
+  evaluateObjects(options);
   std::fflush(stdout);
   return nlohmann::json::parse(::testing::internal::GetCapturedStdout());
 }
@@ -277,6 +281,8 @@ TEST(Pipeline, FramesThatItLeavesOutAreNoMisses) {
   EXPECT_EQ(third["frames_untold"], 0);
   fs::remove(fs::path(options.out) / "report.json");
   EXPECT_EQ(evaluated(options)["frames_untold"], 26) << "of the first 40, 14 have a pose";
+  fs::remove(fs::path(options.out) / "trajectory.tum");
+  EXPECT_THAT(startupErrorOf([&] { evaluateObjects(options); }), HasSubstr("--trajectory takes"));
 }
 
 TEST(Pipeline, FramesThatItsRecordingLeftOutAreNoMisses) {
