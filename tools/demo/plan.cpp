@@ -192,6 +192,7 @@ std::string supervisorConfig(const std::vector<ServicePlan>& services, const Dem
   for (const ServicePlan& service : services) {
     std::string command;
     for (const std::string& word : service.command) command += quoted(word) + " ";
+    // supervisord expands stdout_logfile twice, all else once.
     // Ended by a fault after its first second, a program is started again without delay, however
     // often. One that cannot start is tried five times, 1, 2, 3, 4 seconds apart.
     text += fmt::format(
@@ -199,7 +200,7 @@ std::string supervisorConfig(const std::vector<ServicePlan>& services, const Dem
         "exitcodes=0\nstartsecs=1\nstartretries=4\nstopsignal=TERM\nstopwaitsecs=5\n"
         "redirect_stderr=true\nstdout_logfile={}\nstdout_logfile_maxbytes=0\n",
         service.name, command, escaped(fs::absolute(root).string()), priority--,
-        escaped(service.log));
+        escaped(escaped(service.log)));
   }
   return text;
 }

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <regex>
 #include <sstream>
 #include <thread>
@@ -27,6 +28,15 @@ std::string member(const std::string& xml, const std::string& name) {
   if (type_end == std::string::npos) return {};
   const auto end = xml.find('<', type_end + 1);
   return end == std::string::npos ? std::string() : xml.substr(type_end + 1, end - type_end - 1);
+}
+
+[[noreturn]] void throwUnusable(const std::string& why) {
+  throw StartupError(ExitCode::kUnavailable, why);
+}
+
+std::string textOf(const std::string& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 class Socket {
@@ -99,14 +109,22 @@ std::map<std::string, int> lastExits(const std::string& log) {
   return exits;
 }
 
+std::string complaintIn(const std::string& output) {
+  std::istringstream lines(output);
+  std::string last;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("Error: ")) return line;
+    if (!line.empty()) last = line;
+  }
+  return last;
+}
+
 Supervisor::Supervisor(const std::string& config_file, const std::string& socket,
                        const std::string& log)
     : socket_(socket) {
-  const StartupError silent(ExitCode::kUnavailable,
-                            "supervisord does not answer; install it with deploy/install "
-                            "--runtime, and see " +
-                                log);
-  if (!findProgram("supervisord")) throw silent;
+  if (!findProgram("supervisord")) {
+    throwUnusable("supervisord is missing; install it with deploy/install --runtime");
+  }
   // In a session of its own: Ctrl-C is this program's business.
   process_.emplace(ProgramOptions{.command = {"supervisord", "-n", "-c", config_file},
                                   .log = log,
@@ -115,9 +133,12 @@ Supervisor::Supervisor(const std::string& config_file, const std::string& socket
   constexpr std::chrono::seconds kPatience{20};
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!states()) {
-    if (!alive() || std::chrono::steady_clock::now() >= end) {
+    const bool ended = !alive();
+    if (ended || std::chrono::steady_clock::now() >= end) {
       process_->stop(kPatienceAtEnd);
-      throw silent;
+      const std::string words = ended ? complaintIn(textOf(log)) : std::string();
+      throwUnusable("supervisord " + std::string(ended ? "ended at once" : "does not answer") +
+                    (words.empty() ? "" : ": " + words) + "; see " + log);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }

@@ -27,9 +27,12 @@ std::map<std::string, int> countSpawns(const std::string& log);
 /// that of a program that ended too quickly).
 std::map<std::string, int> lastExits(const std::string& log);
 
+/// Why supervisord ended at once, in its own words as its output has them; empty where it has none.
+std::string complaintIn(const std::string& output);
+
 class Supervisor {
  public:
-  /// Throws StartupError where supervisord is not installed or does not answer.
+  /// Throws StartupError where supervisord is not installed, ends at once or does not answer.
   Supervisor(const std::string& config_file, const std::string& socket, const std::string& log);
   /// Ends supervisord, and with it what still runs.
   ~Supervisor();

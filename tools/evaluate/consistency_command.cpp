@@ -93,7 +93,8 @@ void print(const Consistency& consistency) {
 
 /// Without a sequence: the folder's own true trajectory, or that of a TUM file.
 replay::PoseFile truePoses(const std::string& truth) {
-  if (!fs::is_directory(truth)) return replay::PoseFile::read(truth);
+  if (!fs::is_directory(truth))
+    return replay::PoseFile::read(truth, "--truth takes a file of poses or a dataset folder");
   replay::DatasetOptions options;
   options.path = truth;
   options.decode = false;
@@ -108,7 +109,8 @@ void run(const ConsistencyOptions& options) {
   replay::PoseFile poses(replay::PoseFormat::kTum, {});
   if (isSimulated(options.truth)) {
     const SimulatedTruth truth = readSimulatedTruth(options.truth);
-    const auto trajectory = replay::PoseFile::read(out / "trajectory.tum").poses();
+    const auto trajectory =
+        replay::PoseFile::read(out / "trajectory.tum", "`perdure pipeline` writes it").poses();
     consistency.objects = scoreConsistency(readBeliefs(out / "objects.json"), truth.truth,
                                            alignedAtTheStart(truth, trajectory), options.within_m);
     poses = truth.body;

@@ -30,11 +30,19 @@ struct Evaluated {
   std::uint64_t estimates = 0, poses = 0;
   std::string of;            ///< for people: which truth, which class
   std::size_t left_out = 0;  ///< frames with truth that the run was not over
+  /// Frames between poses that have none, where nobody tells whether the run was over them.
+  std::size_t untold = 0;
 };
 
 fs::path trajectoryOf(const ObjectsOptions& options) {
   const fs::path beside = fs::path(options.csv).parent_path() / "trajectory.tum";
   return options.trajectory.empty() ? beside : fs::path(options.trajectory);
+}
+
+std::vector<replay::StampedPose> posesOf(const ObjectsOptions& options) {
+  return replay::PoseFile::read(trajectoryOf(options),
+                                "--trajectory takes the trajectory.tum of the run")
+      .poses();
 }
 
 replay::KittiCalibration readCalibration(const ObjectsOptions& options) {
@@ -54,27 +62,38 @@ Evaluated evaluateKitti(ObjectsOptions options) {
       replay::readKittiLabels(fs::path(options.truth) / "label_02" / (options.sequence + ".txt"));
   const auto calibration = readCalibration(options);
   auto rows = readObjectRows(options.csv);
-  const auto poses =
-      posesByFrame(replay::PoseFile::read(trajectoryOf(options)).poses(), rows, used);
+  const auto poses = posesByFrame(posesOf(options), rows, used);
   std::erase_if(rows, [&](const EstimateRow& row) { return row.class_name != class_name; });
   auto truth = sortTruth(labels, staticTracks(labels, calibration.T_RI, poses));
   const std::size_t left_out = leaveOut(truth, used);
-  return {scoreObjects(rows, truth, poses, calibration, options.score), rows.size(), poses.size(),
-          "sequence " + options.sequence + ", class " + class_name, left_out};
+  const auto unposed = [&](const auto& frame) {
+    return frame.first > poses.begin()->first && frame.first < poses.rbegin()->first &&
+           !poses.contains(frame.first);
+  };
+  const bool told = used || poses.empty();
+  const auto untold = told ? 0 : std::count_if(truth.begin(), truth.end(), unposed);
+  return {scoreObjects(rows, truth, poses, calibration, options.score),
+          rows.size(),
+          poses.size(),
+          "sequence " + options.sequence + ", class " + class_name,
+          left_out,
+          static_cast<std::size_t>(untold)};
 }
 
 Evaluated evaluateSimulated(ObjectsOptions options) {
   const SimulatedTruth truth = readSimulatedTruth(options.truth);
   const auto used = usedFramesOf(fs::path(options.csv).parent_path());
-  SimulatedRun run =
-      pairWithTruth(truth, readObjectRows(options.csv),
-                    replay::PoseFile::read(trajectoryOf(options)).poses(), options.class_name);
+  const auto poses = posesOf(options);
+  SimulatedRun run = pairWithTruth(truth, readObjectRows(options.csv), poses, options.class_name);
   const std::size_t left_out = leaveOut(run.frames, used);
   options.score.frame_interval_s = truth.frameInterval() * (used ? strideOf(*used) : 1.0);
   Evaluated result{
-      scoreFrames(run.frames, options.score), run.estimates, run.poses,
+      scoreFrames(run.frames, options.score),
+      run.estimates,
+      run.poses,
       "simulated, " + (options.class_name.empty() ? "all classes" : "class " + options.class_name),
-      left_out};
+      left_out,
+      used ? 0 : withoutPose(truth.frames, poses)};
   result.score.outside = run.outside;
   return result;
 }
@@ -116,7 +135,8 @@ nlohmann::ordered_json toJson(const Evaluated& result) {
           {"neutral", s.neutral},
           {"outside_image", s.outside},
           {"frames_with_pose", result.poses},
-          {"frames_left_out", result.left_out}};
+          {"frames_left_out", result.left_out},
+          {"frames_untold", result.untold}};
 }
 
 void printMishaps(const ObjectScore& score) {
@@ -158,6 +178,7 @@ void print(const Evaluated& result, const ObjectsOptions& options) {
     std::printf("%zu frames do not count: the run was not over them (--every, --from, --seconds)\n",
                 result.left_out);
   }
+  if (result.untold > 0) std::printf("%s\n", noteOfUntold(result.untold).c_str());
 }
 
 }  // namespace

@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 using replay::PoseFile;
 using replay::PoseFormat;
 
+constexpr char kTruthMend[] = "--truth takes a file of poses or a dataset folder";
+
 struct TrajectoryOptions {
   std::string truth, sequence, tum, data, align = "yaw";
   double skip_s = 0.0;
@@ -73,7 +75,7 @@ Truth readTruth(const TrajectoryOptions& options) {
                          options.truth + " holds no true trajectory; give a pose file to --truth");
     }
   }
-  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth), truth.frames);
+  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth, kTruthMend), truth.frames);
   return truth;
 }
 
@@ -82,6 +84,7 @@ struct Compared {
   double coverage = 0.0;
   std::size_t expected = 0;
   std::size_t left_out = 0;  ///< frames that the run was not over
+  std::size_t untold = 0;    ///< between poses and without one; nobody tells why
 };
 
 /// Takes the times of frames out that the run was not over; their number. Its report may count the
@@ -123,13 +126,14 @@ const char* nameOf(Alignment alignment) {
 
 Compared compare(const TrajectoryOptions& options) {
   Truth truth = readTruth(options);
-  const PoseFile file = PoseFile::read(options.tum);
+  const PoseFile file = PoseFile::read(options.tum, "`perdure pipeline` writes trajectory.tum");
   if (file.format() != PoseFormat::kTum) {
     throw StartupError(ExitCode::kUsage, options.tum + " is no TUM file: t x y z qx qy qz qw");
   }
   const auto& poses = truth.poses.poses();
   const auto& frames = truth.frames;
-  const std::size_t left_out = leaveOutUnused(fs::path(options.tum).parent_path(), file, truth);
+  const fs::path run = fs::path(options.tum).parent_path();
+  const std::size_t left_out = leaveOutUnused(run, file, truth);
   const TimePoint begin = (frames.empty() ? file.poses().front().time : frames.front()) +
                           durationFromSeconds(options.skip_s);
   std::vector<PosePair> pairs;
@@ -146,6 +150,7 @@ Compared compare(const TrajectoryOptions& options) {
   }
   Compared result;
   result.left_out = left_out;
+  if (!usedFramesOf(run)) result.untold = withoutPose(frames, file.poses());
   result.score = scoreTrajectory(pairs, alignmentOf(options.align));
   // Frames that ought to have a pose: those of the dataset that the truth spans.
   const auto expected = [&](TimePoint t) {
@@ -164,6 +169,7 @@ nlohmann::ordered_json toJson(const Compared& result) {
   return {{"poses", s.poses},
           {"frames_expected", result.expected},
           {"frames_left_out", result.left_out},
+          {"frames_untold", result.untold},
           {"coverage", result.coverage},
           {"length_m", s.length_m},
           {"ate_rmse_m", s.ate_rmse_m},
@@ -188,6 +194,7 @@ void print(const Compared& result, const TrajectoryOptions& options) {
         "--seconds)\n",
         result.left_out);
   }
+  if (result.untold > 0) std::printf("%s\n", noteOfUntold(result.untold).c_str());
   std::printf("ATE (%s): RMSE %.4f m, max %.4f m, rotation %.3f deg\n",
               nameOf(alignmentOf(options.align)), s.ate_rmse_m, s.ate_max_m, s.ate_rotation_deg);
   std::printf("RPE over 1 s: %.4f m, %.3f deg; drift at the end %.4f m\n", s.rpe_m, s.rpe_deg,

@@ -1,5 +1,6 @@
 #include "tools/evaluate/used_frames.h"
 
+#include <algorithm>
 #include <fstream>
 
 #include "common/base/errors.h"
@@ -63,6 +64,25 @@ std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run) {
   throw StartupError(ExitCode::kData, file.string() +
                                           ": `frames` does not say which frames the run was over; "
                                           "run perdure pipeline again, or take the file away");
+}
+
+std::size_t withoutPose(const std::vector<TimePoint>& frames,
+                        const std::vector<replay::StampedPose>& poses) {
+  constexpr Duration kSame = std::chrono::milliseconds(1);
+  if (poses.empty()) return 0;
+  const auto unposed = [&](TimePoint frame) {
+    if (frame < poses.front().time || frame > poses.back().time) return false;
+    const auto at = std::lower_bound(poses.begin(), poses.end(), frame - kSame,
+                                     [](const auto& pose, TimePoint t) { return pose.time < t; });
+    return at == poses.end() || at->time - frame > kSame;
+  };
+  return static_cast<std::size_t>(std::count_if(frames.begin(), frames.end(), unposed));
+}
+
+std::string noteOfUntold(std::size_t frames) {
+  return "note: " + std::to_string(frames) +
+         " frames between poses have none and count as missed; a run with --every leaves frames "
+         "out, and the report.json that tells which is not beside the trajectory";
 }
 
 double strideOf(const UsedFrames& frames) {

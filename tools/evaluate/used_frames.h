@@ -8,6 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <string>
+#include <vector>
+
+#include "common/replay/files/pose_file.h"
 
 namespace perdure::tools {
 
@@ -20,6 +24,14 @@ nlohmann::ordered_json framesToJson(const UsedFrames& frames);
 std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run);
 /// Frames of the data from one used one to the next; 1 where there are fewer than two.
 double strideOf(const UsedFrames& frames);
+
+/// Frames between the first pose and the last one at whose times there is none. Where nobody tells
+/// which frames the run was over, they are misses, or --every has left them out.
+std::size_t withoutPose(const std::vector<TimePoint>& frames,
+                        const std::vector<replay::StampedPose>& poses);
+
+/// The line that says so.
+std::string noteOfUntold(std::size_t frames);
 
 /// Takes those out that were not used; their number.
 template <class Value>

@@ -63,6 +63,9 @@ class Pipeline {
   std::uint64_t firstFrame() const { return first_index_; }
   /// Of the first frame that --seconds left out.
   std::optional<std::uint64_t> endFrame() const { return end_index_; }
+  /// Where odometry and detections are recorded ones: the frames that the filter heard of, by the
+  /// numbers that they had when they were recorded.
+  const std::optional<std::set<std::uint64_t>>& recordedFrames() const { return heard_frames_; }
   bool usesVio() const { return uses_vio_; }
   bool usesModel() const { return inference_ != nullptr; }
   /// A sentence where the poses that were given contradict the images; else empty.
@@ -144,6 +147,7 @@ class Pipeline {
   std::optional<TimePoint> first_frame_;
   std::uint64_t first_index_ = 0;  ///< in the data, by --from
   std::optional<std::uint64_t> end_index_;
+  std::optional<std::set<std::uint64_t>> heard_frames_;
   double frames_seconds_ = 0.0;                   // of the recording, since its first frame
   std::vector<Odometry> new_odometry_;            // of vio, not yet handed on
   std::vector<Odometry> held_;                    // given, until their landmarks are there

@@ -47,6 +47,7 @@ void Pipeline::checkRecorded() {
 void Pipeline::runRecorded(const std::function<void(const PipelineCounts&)>& progress) {
   replay::RecordedMessages messages(options_.data);
   messages.rewind(isFiltersInput);
+  heard_frames_.emplace();
   while (const auto message = timer_.timeTowardsNext("decode", [&] { return messages.next(); })) {
     const std::uint64_t frames = counts_.frames;
     handleRecorded(*message);
@@ -83,6 +84,7 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
       if (!first_frame_) first_frame_ = m.stamp.time;
       frames_seconds_ = toSeconds(m.stamp.time - *first_frame_);
       ++counts_.frames;
+      heard_frames_->insert(m.stamp.sequence);
       if (m.state != OdometryState::kInitialising) ++counts_.odometry;
       outputs_->onOdometry(m);
       timer_.timeTowardsNext("map_store", [&] { map_->onOdometry(m); });
@@ -98,6 +100,7 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
     give(Detections(), [&](const Detections& m) {
       outputs_->onDetections(m);
       ++counts_.inferred;
+      heard_frames_->insert(m.stamp.sequence);
       counts_.detections += m.detections.size();
       filter([&] { filter_->onDetections(m); });
     });

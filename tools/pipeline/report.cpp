@@ -55,8 +55,9 @@ void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequ
   }
 }
 
-/// Those of the data that the run was over.
+/// Those of the data that the run was over, by the numbers that the CSV has.
 std::set<std::uint64_t> usedFrames(const Pipeline& pipeline) {
+  if (const auto& recorded = pipeline.recordedFrames()) return *recorded;
   std::set<std::uint64_t> used;
   for (const auto& frame : pipeline.dataset().recording().frames) {
     const bool late = pipeline.endFrame() && frame.index >= *pipeline.endFrame();

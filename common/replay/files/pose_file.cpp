@@ -78,8 +78,8 @@ void addKitti(const TextLine& line, const std::vector<std::string_view>& fields,
 PoseFile::PoseFile(PoseFormat format, std::vector<StampedPose> poses)
     : format_(format), poses_(std::move(poses)) {}
 
-PoseFile PoseFile::read(const std::filesystem::path& file) {
-  const auto lines = readLines(file, "--odometry takes `vio`, `truth` or a file of poses");
+PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend) {
+  const auto lines = readLines(file, mend);
   Complaints wrong(file);
   std::vector<StampedPose> poses;
   std::size_t columns = 0, last_line = 0;

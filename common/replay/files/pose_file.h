@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "common/base/time.h"
@@ -23,7 +24,8 @@ class PoseFile {
   /// Throws StartupError(kUnavailable) that names each wrong line: a wrong count of numbers, a
   /// quaternion whose norm is not 1 (to 1e-2), a rotation matrix that is not orthonormal (to
   /// 1e-2), times that do not increase. Lines that begin with '#' are comments.
-  static PoseFile read(const std::filesystem::path& file);
+  /// `mend`: what to do where it cannot be read.
+  static PoseFile read(const std::filesystem::path& file, std::string_view mend = kMend);
   PoseFile(PoseFormat format, std::vector<StampedPose> poses);
 
   PoseFormat format() const { return format_; }
@@ -37,6 +39,7 @@ class PoseFile {
 
  private:
   std::optional<RigidTransform> atTime(TimePoint time, Duration max_gap) const;
+  static constexpr std::string_view kMend = "--odometry takes `vio`, `truth` or a file of poses";
   PoseFormat format_;
   std::vector<StampedPose> poses_;
 };

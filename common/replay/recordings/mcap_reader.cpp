@@ -60,6 +60,12 @@ Result<std::vector<std::uint8_t>> unpacked(const ChunkHead& head, Bytes packed) 
 
 }  // namespace
 
+std::string sentenceOfFollowed(const std::filesystem::path& file) {
+  return file.string() +
+         " holds a second recording behind the first one, which is not read; keep each in a file "
+         "of its own, in one folder";
+}
+
 bool forEachMessage(Bytes records, const std::function<void(const Message&, std::uint64_t)>& visit,
                     Catalogue& other) {
   const std::size_t size = records.size();
@@ -111,6 +117,7 @@ Reader::Reader(Reader&& other) noexcept
       damaged_(other.damaged_),
       problem_(std::move(other.problem_)),
       finished_(other.finished_),
+      followed_(other.followed_),
       catalogue_(std::move(other.catalogue_)),
       chunks_(std::move(other.chunks_)),
       statistics_(std::move(other.statistics_)),
@@ -231,9 +238,12 @@ bool Reader::scan() {
   return false;
 }
 
-bool Reader::endsAt(std::uint64_t end) const {
-  const auto magic = read(end, kMagic.size() + 1);
-  return std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end());
+bool Reader::endsAt(std::uint64_t end) {
+  const auto magic = read(end, kMagic.size());
+  const auto next = read(end + kMagic.size(), kMagic.size());
+  if (!std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end())) return false;
+  followed_ = std::equal(next.begin(), next.end(), kMagic.begin(), kMagic.end());
+  return next.empty();
 }
 
 /// False where nothing behind can be believed.
@@ -346,6 +356,7 @@ Result<Records> Reader::unpack(const ChunkIndex& chunk) const {
 
 Result<void> Reader::finish() {
   if (finished_) return {};
+  if (followed_) return fail("followed", sentenceOfFollowed(path_));
   std::vector<ChunkIndex> chunks = chunks_;
   for (const ChunkIndex& chunk : chunks) {
     if (chunk.compression == kBare) {

@@ -29,6 +29,8 @@ class Reader {
   /// Whether the file goes to its end: a footer and the magic, and no summary that is wrong.
   /// Otherwise all that is whole was found by looking.
   bool finished() const { return finished_; }
+  /// Whether another recording begins where it ends, as `cat` leaves two: that one is not read.
+  bool followed() const { return followed_; }
   const Catalogue& catalogue() const { return catalogue_; }
   const std::vector<ChunkIndex>& chunks() const { return chunks_; }
   const Statistics& statistics() const { return statistics_; }
@@ -47,7 +49,8 @@ class Reader {
   /// Keeps no file open from now on; unpack() opens it each time.
   void letGo();
 
-  /// Makes an unfinished file a finished one: cuts what is not whole, writes the summary.
+  /// Makes an unfinished file a finished one: cuts what is not whole, writes the summary. Refuses
+  /// one that is followed by another, which would be lost.
   Result<void> finish();
 
  private:
@@ -59,7 +62,7 @@ class Reader {
   bool plausible() const;
   bool describesAll() const;
   bool scan();
-  bool endsAt(std::uint64_t end) const;
+  bool endsAt(std::uint64_t end);
   bool scanRecord(Op op, std::uint64_t at, std::uint64_t length);
   bool scanChunk(std::uint64_t at, std::uint64_t length);
   void scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content);
@@ -70,12 +73,15 @@ class Reader {
   int file_ = -1;
   std::uint64_t size_ = 0, whole_ = 0, damaged_ = 0;
   Reason problem_;
-  bool finished_ = false;
+  bool finished_ = false, followed_ = false;
   Catalogue catalogue_;
   std::vector<ChunkIndex> chunks_;
   Statistics statistics_;
   Draft::Index last_index_;  ///< of the last chunk that the scan found
 };
+
+/// That another recording follows the first one in `file`, and the mend.
+std::string sentenceOfFollowed(const std::filesystem::path& file);
 
 /// Goes through a chunk's records; false where they are damaged (what came before was given).
 /// `other` gets schemas and channels.

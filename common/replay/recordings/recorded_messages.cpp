@@ -76,9 +76,7 @@ void RecordedMessages::openFile(const fs::path& path) {
     return count(reader.error());
   }
   if (!reader->finished()) {
-    count({"unfinished", path.string() +
-                             " was not finished: " + std::to_string(reader->cutBytes()) +
-                             " bytes at its end are lost; `perdure record repair` makes it whole"});
+    count({reader->followed() ? "followed" : "unfinished", whyUnfinished(*reader)});
   }
   if (reader->damagedChunks() > 0) count(reader->problem());
   const auto& catalogue = reader->catalogue();
@@ -100,6 +98,22 @@ void RecordedMessages::openFile(const fs::path& path) {
   }
   reader->letGo();  // a folder may hold more segments than a process may open
   files_.push_back(*std::move(reader));
+}
+
+/// The packed one, where it was unpacked: people know no other, and the copy goes.
+fs::path RecordedMessages::givenFor(const fs::path& file) const {
+  const auto same = [&](const auto& unpacked) { return unpacked->path() == file; };
+  const auto packed = std::find_if(unpacked_.begin(), unpacked_.end(), same);
+  return packed == unpacked_.end() ? file : (*packed)->packed();
+}
+
+std::string RecordedMessages::whyUnfinished(const mcap::Reader& reader) const {
+  const fs::path given = givenFor(reader.path());
+  if (reader.followed()) return mcap::sentenceOfFollowed(given);
+  const std::string first =
+      given == reader.path() ? "" : "unpack it first (zstd -d " + given.string() + "), then ";
+  return given.string() + " was not finished: " + std::to_string(reader.cutBytes()) +
+         " bytes at its end are lost; " + first + "`perdure record repair` makes it whole";
 }
 
 std::vector<std::string> RecordedMessages::notes() const {

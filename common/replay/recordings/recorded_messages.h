@@ -76,6 +76,8 @@ class RecordedMessages {
   };
 
   void openFile(const std::filesystem::path& path);
+  std::string whyUnfinished(const mcap::Reader& reader) const;
+  std::filesystem::path givenFor(const std::filesystem::path& file) const;
   void count(const Reason& reason);
   bool holdsWanted(const ChunkPlace& place) const;
   void load(const ChunkPlace& place);

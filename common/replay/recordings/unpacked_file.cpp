@@ -5,6 +5,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -60,6 +61,19 @@ class Unpacking {
  public:
   explicit Unpacking(OpenFile in) : in_(std::move(in)), room_(ZSTD_DStreamOutSize()) { read(); }
 
+  bool empty() const { return filled_.size == 0; }
+  /// Whether it begins as a frame of zstd does, as far as it goes.
+  bool looksPacked() const {
+    constexpr std::array<std::uint8_t, 4> kFrame{0x28, 0xB5, 0x2F, 0xFD},
+        kSkippable{0x50, 0x2A, 0x4D, 0x18};
+    const std::size_t size = std::min(filled_.size, kFrame.size());
+    const auto begins = [&](const auto& magic, std::uint8_t mask) {
+      return size > 0 && (packed_[0] & mask) == magic[0] &&
+             std::equal(magic.begin() + 1, magic.begin() + static_cast<long>(size),
+                        packed_.begin() + 1);
+    };
+    return begins(kFrame, 0xFF) || begins(kSkippable, 0xF0);
+  }
   /// What the first frame says of its size; 0 where it says nothing.
   std::uint64_t size() const {
     const auto size = ZSTD_getFrameContentSize(packed_.data(), filled_.size);
@@ -118,6 +132,15 @@ void UnpackedFile::unpack() {
   OpenFile in(std::fopen(packed_.c_str(), "rb"));
   if (!in) throwUnusable(packed_, std::string("cannot be read: ") + std::strerror(errno));
   Unpacking unpacking(std::move(in));
+  if (unpacking.empty()) {
+    throwUnusable(packed_, "is empty; copy it again from where it was recorded");
+  }
+  if (!unpacking.looksPacked()) {
+    throwUnusable(packed_,
+                  fmt::format("is not packed by zstd, though its name says so; if it was never "
+                              "packed, name it {}",
+                              packed_.stem().string()));
+  }
   const std::uint64_t stated = unpacking.size();
   std::error_code unknown;
   const auto space = fs::space(path_.parent_path(), unknown);

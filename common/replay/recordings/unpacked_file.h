@@ -15,7 +15,7 @@ namespace perdure::replay {
 class UnpackedFile {
  public:
   /// What all share that have it at a time: a recording is opened for each of its cameras. Throws
-  /// StartupError with the mend: no room, damaged or cut, not readable.
+  /// StartupError with the mend: no room, damaged or cut, empty, not packed, not readable.
   static std::shared_ptr<const UnpackedFile> of(const std::filesystem::path& packed);
   explicit UnpackedFile(const std::filesystem::path& packed);
   ~UnpackedFile();
@@ -23,6 +23,7 @@ class UnpackedFile {
   UnpackedFile& operator=(const UnpackedFile&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& packed() const { return packed_; }
   /// For people: from where to where, and how large.
   std::string note() const;
 

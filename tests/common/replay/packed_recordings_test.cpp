@@ -27,6 +27,8 @@ using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
 
 std::string zstdFrame(const std::string& bytes) {
   std::string frame(ZSTD_compressBound(bytes.size()), '\0');
@@ -101,9 +103,11 @@ TEST_F(PackedRecording, ThatCannotBeUnpackedSaysTheMendAndLeavesNothing) {
   truncate(file, 0.9);
   EXPECT_THAT(error(), HasSubstr("is damaged or cut"));
   writeText(file, "no zstd");
-  EXPECT_THAT(error(), HasSubstr("is damaged or cut"));
+  EXPECT_THAT(error(), AllOf(HasSubstr("is not packed by zstd"), HasSubstr("name it run_0.db3")));
+  writeText(file, "\x28\xB5\x2F");
+  EXPECT_THAT(error(), HasSubstr("is damaged or cut")) << "what there is of it is zstd's";
   writeText(file, "");
-  EXPECT_THAT(error(), HasSubstr("is damaged or cut"));
+  EXPECT_THAT(error(), HasSubstr("is empty"));
   EXPECT_EQ(unpacked(), 0);
   setenv("TMPDIR", (place_ / "none").c_str(), 1);
   EXPECT_THAT(error(), HasSubstr("set TMPDIR"));
@@ -156,6 +160,43 @@ TEST_F(PackedRecording, OfPerdureIsReadAsItsOwn) {
   fs::rename(only, folder / "run.mcap.zst");
   EXPECT_EQ(Dataset::open({.path = folder / "run.mcap.zst"})->frameCount(), 5u)
       << "zstd's own name";
+}
+
+/// With three samples of an inertial sensor.
+fs::path ownRecording(const std::string& name) {
+  const fs::path file = freshFolder(name) / "run.mcap";
+  RecordingWriter recording(file);
+  for (std::uint64_t i = 1; i < 4; ++i) recording.add("imu", ImuSample(), i);
+  EXPECT_TRUE(recording.finish());
+  return file;
+}
+
+TEST_F(PackedRecording, ThatWasNotFinishedIsNamedAsItWasGiven) {
+  const fs::path file = ownRecording("packed_unfinished");
+  const std::string bytes = readText(file);
+  writeText(file, bytes.substr(0, bytes.size() - 10));
+  const fs::path only = packed(file, freshFolder("packed_unfinished_packed"));
+  const RecordedMessages messages(only);
+  EXPECT_THAT(messages.lastProblem(), AllOf(StartsWith(only.string() + " was not finished"),
+                                            HasSubstr("unpack it first (zstd -d " + only.string()),
+                                            Not(HasSubstr("perdure-unpacked"))));
+}
+
+TEST_F(PackedRecording, ThatASecondOneFollowsSaysSoAndKeepsBoth) {
+  const fs::path file = ownRecording("packed_followed");
+  const std::string bytes = readText(file);
+  writeText(file, bytes + bytes);
+  const fs::path only = packed(file, freshFolder("packed_followed_packed"));
+  for (const fs::path& path : {file, only}) {
+    const RecordedMessages messages(path);
+    EXPECT_EQ(messages.topics().at("imu").messages, 3u);
+    EXPECT_EQ(messages.reasons().of("followed"), 1u);
+    EXPECT_THAT(messages.lastProblem(), StartsWith(path.string() + " holds a second recording"));
+  }
+  const auto finished = mcap::Reader::open(file)->finish();
+  ASSERT_FALSE(finished);
+  EXPECT_THAT(finished.error().detail, HasSubstr("a second recording"));
+  EXPECT_EQ(readText(file), bytes + bytes);
 }
 
 /// As rosbag2 does with `compression_mode: MESSAGE`. `cut`: all frames but the first message's lose

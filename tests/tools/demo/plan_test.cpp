@@ -147,5 +147,15 @@ TEST_F(DemoPlan, QuotesWordsForSupervisord) {
   EXPECT_THAT(config, HasSubstr("file=/tmp/s.sock"));
 }
 
+TEST_F(DemoPlan, DoublesPercentSignsOfFoldersAsOftenAsTheyAreExpanded) {
+  options_.out = (folder_ / "50% off").string();
+  const auto folders = prepareFolders(options_);
+  const std::string config =
+      supervisorConfig(planServices(options_, folders), folders, "/tmp/s.sock", options_.root);
+  const std::string run = (folder_ / "50%").string();
+  EXPECT_THAT(config, HasSubstr("\nlogfile=" + run + "% off/run/supervisord.log\n"));
+  EXPECT_THAT(config, HasSubstr("\nstdout_logfile=" + run + "%%% off/run/vio.log\n"));
+}
+
 }  // namespace
 }  // namespace perdure::tools

@@ -12,6 +12,7 @@
 #include <functional>
 #include <thread>
 
+#include "common/base/errors.h"
 #include "tools/demo/plan.h"
 
 namespace perdure::tools {
@@ -100,6 +101,13 @@ TEST(SupervisorAnswers, GiveTheLastExitStatusFromTheLog) {
   EXPECT_FALSE(exits.contains("capture"));
 }
 
+TEST(SupervisorAnswers, GiveWhyItEndedAtOnce) {
+  EXPECT_EQ(complaintIn("Error: Format string '50% off' is badly formatted\nFor help, use -h\n"),
+            "Error: Format string '50% off' is badly formatted");
+  EXPECT_EQ(complaintIn("Traceback\nOSError: no room\n\n"), "OSError: no room");
+  EXPECT_EQ(complaintIn(""), "");
+}
+
 /// Real supervisord over shell programs.
 class Supervision : public ::testing::Test {
  protected:
@@ -108,11 +116,13 @@ class Supervision : public ::testing::Test {
       GTEST_SKIP() << "supervisord is not installed: deploy/install --runtime";
     }
     std::string name = (fs::temp_directory_path() / "perdure-sv-XXXXXX").string();
-    folders_.out = mkdtemp(name.data());
+    place_ = mkdtemp(name.data());
+    folders_.out = place_ / "50% off";
+    fs::create_directories(folders_.out);
     folders_.run = folders_.state = folders_.out;
   }
   void TearDown() override {
-    if (!folders_.out.empty()) fs::remove_all(folders_.out);
+    if (!place_.empty()) fs::remove_all(place_);
   }
 
   std::unique_ptr<Supervisor> start(const std::string& script) {
@@ -137,12 +147,13 @@ class Supervision : public ::testing::Test {
     return false;
   }
 
+  fs::path place_;
   DemoFolders folders_;
 };
 
 TEST_F(Supervision, StartsAKilledProgramAgainHoweverOften) {
   const std::string pid_file = (folders_.out / "pid").string();
-  const auto supervisor = start("echo $$ > " + pid_file + "; exec sleep 100");
+  const auto supervisor = start("echo $$ > '" + pid_file + "'; exec sleep 100");
   pid_t last = 0;
   for (int round = 1; round <= 5; ++round) {
     pid_t pid = 0;
@@ -164,6 +175,18 @@ TEST_F(Supervision, TellsOfAProgramThatCannotStart) {
     const auto states = failing->states();
     return states && states->at("worker").state == "BACKOFF" && lastExits(log())["worker"] == 78;
   }));
+}
+
+TEST_F(Supervision, ThatEndsAtOnceGivesItsOwnWords) {
+  const std::string config = (folders_.out / "wrong.conf").string();
+  std::ofstream(config) << "[supervisord]\nlogfile=/tmp/%(nothing)s\n";
+  try {
+    Supervisor(config, (folders_.out / "s").string(), (folders_.out / "out").string());
+    FAIL() << "it was not refused";
+  } catch (const StartupError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("ended at once: Error: "));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("; see "));
+  }
 }
 
 TEST_F(Supervision, StopsAProgramWhenTold) {

@@ -49,6 +49,15 @@ TEST(UsedFrames, ThatCannotBeAreRefused) {
   }
 }
 
+TEST(UsedFrames, WithoutAPoseAreThoseBetweenPoses) {
+  const auto at = [](int ms) { return TimePoint(std::chrono::milliseconds(ms)); };
+  const std::vector<replay::StampedPose> poses{{at(100), {}}, {at(200), {}}, {at(400), {}}};
+  EXPECT_EQ(withoutPose({at(0), at(50), at(500)}, poses), 0u) << "before and after";
+  EXPECT_EQ(withoutPose({at(100), at(150), at(201), at(300), at(399)}, poses), 2u);
+  EXPECT_EQ(withoutPose({at(100)}, {}), 0u);
+  EXPECT_THAT(noteOfUntold(2), HasSubstr("2 frames between poses have none"));
+}
+
 /// What `perdure evaluate trajectory` says of poses at the first, third and fifth of five frames.
 nlohmann::json judged(const fs::path& run, const fs::path& drive) {
   std::string tum;
@@ -65,6 +74,20 @@ nlohmann::json judged(const fs::path& run, const fs::path& drive) {
   return nlohmann::json::parse(::testing::internal::GetCapturedStdout());
 }
 
+TEST(EvaluateCommand, NamesItsOwnOptionWhereATrajectoryIsMissing) {
+  const auto run = replay::freshFolder("no_trajectory");
+  const auto error = [&](const std::string& line) {
+    CLI::App app;
+    addEvaluateCommand(app);
+    return startupErrorOf([&] { app.parse(line); });
+  };
+  const std::string tum = (run / "trajectory.tum").string();
+  EXPECT_THAT(error("evaluate trajectory " + tum + " --truth " + tum), HasSubstr("--truth takes"));
+  writeText(run / "truth.tum", "0 0 0 0 0 0 0 1\n");
+  EXPECT_THAT(error("evaluate trajectory " + tum + " --truth " + (run / "truth.tum").string()),
+              HasSubstr("`perdure pipeline` writes"));
+}
+
 TEST(UsedFrames, AloneAreExpectedToHaveAPose) {
   const auto drive = replay::tinyEuroc("used_drive");
   writeText(drive / "mav0/state_groundtruth_estimate0/data.csv",
@@ -74,9 +97,11 @@ TEST(UsedFrames, AloneAreExpectedToHaveAPose) {
   const auto all = judged(replay::freshFolder("used_all"), drive);
   EXPECT_EQ(all["frames_expected"], 5);
   EXPECT_EQ(all["frames_left_out"], 0);
+  EXPECT_EQ(all["frames_untold"], 2) << "left out or missed";
   const auto second = judged(reported("used_second", R"({"used": 3, "runs": [[0, 4, 2]]})"), drive);
   EXPECT_EQ(second["frames_expected"], 3);
   EXPECT_EQ(second["frames_left_out"], 2);
+  EXPECT_EQ(second["frames_untold"], 0);
   EXPECT_EQ(second["coverage"], 1.0);
   const auto other =
       judged(reported("used_of_other", R"({"used": 2, "runs": [[1, 3, 2]]})"), drive);

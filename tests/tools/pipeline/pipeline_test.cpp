@@ -243,12 +243,16 @@ void labelStreet(const fs::path& street) {
   writeText(street / "label_02/0000.txt", labels);
 }
 
-nlohmann::json evaluated(const PipelineOptions& options) {
+void evaluateObjects(const PipelineOptions& options) {
   CLI::App app;
   addEvaluateCommand(app);
-  ::testing::internal::CaptureStdout();
   app.parse("evaluate objects " + options.out + "/objects_final.csv --sequence 0000 --truth " +
             options.data + " --image-size 1242 375 --json");
+}
+
+nlohmann::json evaluated(const PipelineOptions& options) {
+  ::testing::internal::CaptureStdout();
+  evaluateObjects(options);
   std::fflush(stdout);
   return nlohmann::json::parse(::testing::internal::GetCapturedStdout());
 }
@@ -274,6 +278,33 @@ TEST(Pipeline, FramesThatItLeavesOutAreNoMisses) {
   EXPECT_EQ(third["frames_left_out"], kFrames - 14);
   EXPECT_GT(recall(third), 0.7) << "the first of 14 frames are before it is known";
   EXPECT_EQ(recall(third), report["objects"]["recall"].get<double>());
+  EXPECT_EQ(third["frames_untold"], 0);
+  fs::remove(fs::path(options.out) / "report.json");
+  EXPECT_EQ(evaluated(options)["frames_untold"], 26) << "of the first 40, 14 have a pose";
+  fs::remove(fs::path(options.out) / "trajectory.tum");
+  EXPECT_THAT(startupErrorOf([&] { evaluateObjects(options); }), HasSubstr("--trajectory takes"));
+}
+
+TEST(Pipeline, FramesThatItsRecordingLeftOutAreNoMisses) {
+  const auto street = makeStreet("left_out_recorded");
+  labelStreet(street);
+  auto options = streetOptions(street, "first");
+  options.image_size = {1242, 375};
+  options.from = 0.6;
+  options.every = 3;
+  options.record = true;
+  runPipeline(options);
+  auto again = options;
+  again.data = (street / "first/run.mcap").string();
+  again.odometry = again.detections = "recorded";
+  again.from = 0.0, again.every = 1;
+  again.record = false;
+  again.out = (street / "second").string();
+  runPipeline(again);
+  again.data = street.string();
+  EXPECT_EQ(evaluated(again), evaluated(options));
+  const auto report = nlohmann::json::parse(readText(street / "second/report.json"));
+  EXPECT_EQ(report["frames"]["runs"].dump(), "[[6,57,3]]") << "not their numbers in the recording";
 }
 
 TEST(Pipeline, FramesWithoutAPoseAreCountedAndLeaveNoLine) {
