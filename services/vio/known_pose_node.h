@@ -12,7 +12,7 @@
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
 #include "services/vio/config.h"
-#include "services/vio/core/known_poses/agreement.h"
+#include "services/vio/core/agreement.h"
 #include "services/vio/core/known_poses/point_mapper.h"
 #include "services/vio/in_vain.h"
 #include "services/vio/moving_mask.h"

@@ -17,6 +17,10 @@ constexpr char kLate[] =
 constexpr char kNoSamples[] =
     "frames have no inertial samples of their time; start the IMU, or give both one clock";
 
+constexpr char kImagesContradict[] =
+    "most of what the images show contradicts the IMU: see T_BS (is it the inverse?), the "
+    "gyroscope's unit (radians per second) and time_offset_s; or what moves fills the picture";
+
 double seconds(Duration d) { return toSeconds(d); }
 
 }  // namespace
@@ -55,6 +59,7 @@ void Node::onCalibration(const Calibration& calibration) {
     if (started()) lose({"calibration_changed", ""});
     waiting_.clear();
   }
+  agreement_.clear();
   calibration_ = calibration;
   std::vector<CameraModel> models = usedCameras(config_, calibration);
   Options options = config_.core;
@@ -74,7 +79,7 @@ void Node::onCalibration(const Calibration& calibration) {
 HealthState Node::health() const {
   if (!in_vain_.sentence().empty()) return HealthState::kDegraded;
   if (last_state_ == OdometryState::kTracking) {
-    return whyAlone().empty() ? HealthState::kOk : HealthState::kDegraded;
+    return status().empty() ? HealthState::kOk : HealthState::kDegraded;
   }
   return last_state_ == OdometryState::kDegraded ? HealthState::kDegraded : HealthState::kStarting;
 }
@@ -96,6 +101,7 @@ std::string Node::status() const {
     return "has no start yet (" + last_start_reason_ +
            "); stand still for a second, or move with the camera on things that stand";
   }
+  if (agreement_.verdict() == Agreement::Verdict::kContradicted) return kImagesContradict;
   if (last_state_ != OdometryState::kDegraded) return whyAlone();
   return degraded_frames_ > 0 ? "has just come over a gap or a restart"
                               : "sees no points; it goes by inertia (and speed)";
@@ -110,6 +116,7 @@ void Node::clockJumpedBack() {
   motion_initialiser_.clear();
   last_image_.reset();
   last_imu_time_.reset();
+  agreement_.clear();
   if (started()) lose({"clock_jumped_back", ""});
 }
 
@@ -291,9 +298,19 @@ void Node::process(const FramePair& frames) {
     return publishWaiting(stamp);
   }
   imu_.dropBefore(cameras_->estimator.state().time - std::chrono::seconds(3));
+  judgeImages(*estimate);
   publish(stamp, *estimate);
   publishLandmarks(stamp, *first);
   if (outputs_.innovations) outputs_.innovations(estimate->innovations);
+}
+
+void Node::judgeImages(const FrameEstimate& estimate) {
+  const Mapped mapped{static_cast<std::size_t>(estimate.points_refused), 0,
+                      static_cast<std::size_t>(estimate.points_used)};
+  agreement_.add(mapped, 1.0, !estimate.at_rest);
+  if (agreement_.verdict() == Agreement::Verdict::kContradicted) {
+    reasons_.add("images_contradict_imu");
+  }
 }
 
 void Node::lose(const Reason& reason) {

@@ -15,6 +15,7 @@
 #include "common/types/sensors.h"
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
+#include "services/vio/core/agreement.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
@@ -73,6 +74,7 @@ class Node {
   std::size_t framesIn(double seconds) const;
   bool resume(TimePoint now);
   void noteGaps(TimePoint now);
+  void judgeImages(const FrameEstimate& estimate);
   void lose(const Reason& reason);
   void publish(const FrameStamp& stamp, const FrameEstimate& estimate);
   void publishWaiting(const FrameStamp& stamp);
@@ -91,6 +93,7 @@ class Node {
   WaitingFrames waiting_;
   MovingMask moving_;
   InVain in_vain_;
+  Agreement agreement_;  ///< over starts: a rig that is wrong loses them
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;

@@ -47,6 +47,7 @@ class Watch {
     node_->flush();
     remember();
     check.resets = node_->reasons().of("reset");
+    check.contradicted = node_->reasons().of("images_contradict_imu");
     believe();
   }
   std::size_t samples() const { return samples_; }
@@ -197,6 +198,16 @@ Judgements judgeRig(const RigCheck& check) {
     all.push_back({Grade::kBad, fmt::format("vio lost its way {} times; calibrate anew, or record "
                                             "with the camera on things that stand",
                                             check.resets)});
+  }
+  const double against =
+      static_cast<double>(check.contradicted) / static_cast<double>(check.frames);
+  if (against > 0.05) {
+    all.push_back({against > 0.2 ? Grade::kBad : Grade::kDoubtful,
+                   fmt::format("images contradict the IMU in {:.0f} % of the drive; see T_BS (is "
+                               "it the inverse?), the gyroscope's unit (radians per second) and "
+                               "time_offset_s, or whether what moves fills the picture",
+                               100.0 * against)});
+    if (check.innovations.size() < 500) return all;
   }
   if (!check.believed || check.innovations.size() < 500) {
     all.push_back({Grade::kDoubtful,

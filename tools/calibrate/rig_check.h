@@ -21,6 +21,7 @@ struct RigCheckOptions {
 struct RigCheck {
   CameraCalibration camera;
   std::size_t frames = 0, tracked = 0, resets = 0;
+  std::size_t contradicted = 0;  ///< frames at which most of the last seconds' points were refused
   std::vector<vio::Innovation> innovations;
   bool believed = false;  ///< vio had a start and the following four say something
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();   ///< rad, right of R_BC

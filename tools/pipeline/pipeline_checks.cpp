@@ -118,6 +118,13 @@ void Pipeline::refuseNothing() const {
     refuse(fmt::format("no pose came of {} frames ({}{}{}): {}", counts_.frames, counted,
                        counted.empty() ? "" : "; ", listOf(reasons), mendOfStart(reasons)));
   }
+  if (const auto against = vio_ ? vio_->reasons().of("images_contradict_imu") : 0;
+      5 * against > counts_.frames) {
+    std::fprintf(stderr,
+                 "warning: images contradict the IMU at %zu of %zu frames: T_BS, the gyroscope's "
+                 "unit or time_offset_s may be wrong; see perdure doctor --data\n",
+                 static_cast<std::size_t>(against), static_cast<std::size_t>(counts_.frames));
+  }
   if (options_.detections == "none") return;
   // What came and went was there; nothing to find is no fault of the data then.
   const ObjectHistory& history = outputs_->history();

@@ -221,6 +221,7 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   if (!once) return tl::unexpected(once.error());
   forgetUsed(tracks, input.frame);
   out.points_used = slam->used + once->used;
+  out.points_refused = slam->gated + once->gated + once->behind;
   return {};
 }
 

@@ -50,6 +50,7 @@ struct FrameEstimate {
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
   int points_used = 0;                  ///< of this image, by all updates
+  int points_refused = 0;               ///< gated, or of rays that do not meet before the cameras
   std::vector<Innovation> innovations;  ///< where they are kept
 };
 

@@ -11,86 +11,13 @@
 #include "common/math/gaussian.h"
 #include "common/vision/image.h"
 #include "services/vio/core/tracks/descriptor.h"
-#include "tests/services/vio/drawn_drive.h"
-#include "tests/services/vio/simulated_drive.h"
+#include "tests/services/vio/player.h"
 
 namespace perdure::vio {
 namespace {
 
 using ::testing::HasSubstr;
-
-struct Recorder {
-  std::vector<Odometry> odometry;
-  std::vector<Landmarks> landmarks;
-  Outputs outputs() {
-    return {[this](const Odometry& o) { odometry.push_back(o); },
-            [this](const Landmarks& l) { landmarks.push_back(l); }};
-  }
-};
-
-Calibration calibration() {
-  Calibration c;
-  c.cameras = {test::testCamera(0)};
-  c.imu = ImuCalibration{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
-  return c;
-}
-
-test::DriveOptions restThenDrive(double rest_s = 1.0) {
-  test::DriveOptions options;
-  options.rest_s = rest_s;
-  options.points = 400;
-  return options;
-}
-
-/// Plays the drive from `from` to `until`; edit may change or drop (return false) a message.
-class Player {
- public:
-  explicit Player(double until, double rest_s = 1.0)
-      : drive_(restThenDrive(rest_s)), readings_(drive_.imu(until + 0.1)) {}
-
-  using EditImu = std::function<bool(ImuSample&, double)>;
-  using EditFrame = std::function<bool(Frame&, double)>;
-
-  void play(Node& node, double from, double until, const EditImu& imu = {},
-            const EditFrame& frame = {}) {
-    auto next_frame = static_cast<std::uint64_t>(std::lround(from / 0.05));
-    for (std::size_t i = 0; i < readings_.size(); ++i) {
-      const double t = 0.005 * static_cast<double>(i);
-      if (t < from) continue;
-      if (t > until) break;
-      const double t_frame = 0.05 * static_cast<double>(next_frame);
-      if (t >= t_frame) {
-        Frame f = test::drawn(drive_, t_frame, next_frame++);
-        if (!frame || frame(f, t_frame)) node.onFrame(f);
-      }
-      ImuSample s{1, i, readings_[i].time, readings_[i].gyro, readings_[i].accel};
-      if (!imu || imu(s, t)) node.onImu(s);
-    }
-  }
-  const test::SimulatedDrive& drive() const { return drive_; }
-
- private:
-  test::SimulatedDrive drive_;
-  std::vector<ImuReading> readings_;
-};
-
-std::size_t usable(const Recorder& r) {
-  return static_cast<std::size_t>(
-      std::count_if(r.odometry.begin(), r.odometry.end(),
-                    [](const Odometry& o) { return o.state != OdometryState::kInitialising; }));
-}
-
-void expectFinite(const Recorder& r) {
-  for (const Odometry& o : r.odometry) {
-    EXPECT_TRUE(o.T_WB.finite());
-    EXPECT_TRUE(o.v_WB.allFinite());
-    EXPECT_TRUE(o.covariance.allFinite());
-    EXPECT_TRUE(o.increment_covariance.allFinite());
-    EXPECT_TRUE(o.transition.allFinite());
-  }
-}
-
-double travelled(const Odometry& a, const Odometry& b) { return (a.T_WB.p - b.T_WB.p).norm(); }
+using namespace test;
 
 TEST(VioNode, StartsAtRestWithinASecondAndFollowsTheDrive) {
   Recorder r;
@@ -144,7 +71,7 @@ TEST(VioNode, EveryFrameIsAnsweredOnceAndInOrder) {
 }
 
 /// How far the motion from `from` to `to`, seconds of the drive, is from the truth's, in metres.
-double motionError(const Recorder& r, const test::SimulatedDrive& drive, double from, double to) {
+double motionError(const Recorder& r, const SimulatedDrive& drive, double from, double to) {
   const auto at = [&](double t) {
     return *std::find_if(r.odometry.begin(), r.odometry.end(), [&](const Odometry& o) {
       return toSeconds(o.stamp.time - drive.time(t)) > -1e-6;
@@ -369,7 +296,7 @@ TEST(VioNode, AFrameOfTheRunBeforeThatComesLateDoesNotStayInTheWay) {
   player.play(node, 0.0, 2.0);
   const std::size_t before = r.odometry.size();
   player.play(node, 0.0, 2.0, {}, [&](Frame&, double t) {
-    if (std::abs(t - 0.1) < 1e-6) node.onFrame(test::drawn(player.drive(), 2.05, 41));
+    if (std::abs(t - 0.1) < 1e-6) node.onFrame(drawn(player.drive(), 2.05, 41));
     return true;
   });
   node.flush();
@@ -381,72 +308,12 @@ TEST(VioNode, AFrameOfTheRunBeforeThatComesLateDoesNotStayInTheWay) {
   EXPECT_EQ(node.status(), "");
 }
 
-TEST(VioNode, SaysThatTheCamerasClockIsNotThatOfTheImu) {
-  using std::chrono::hours;
-  Player player(5.0);
-  for (const int shift : {-1, 1}) {
-    Config config;
-    config.max_pending = 10;
-    Recorder r;
-    Node node(config, 5, r.outputs());
-    node.onCalibration(calibration());
-    player.play(node, 0.0, 2.0);
-    ASSERT_EQ(node.health(), HealthState::kOk);
-    player.play(node, 2.05, 4.0, {}, [&](Frame& f, double) {
-      f.stamp.time += hours(shift);
-      return true;
-    });
-    EXPECT_EQ(node.health(), HealthState::kDegraded);
-    EXPECT_THAT(node.status(), HasSubstr(shift < 0 ? "jumped back" : "no inertial samples"));
-    player.play(node, 4.05, 5.0);
-    EXPECT_EQ(node.health(), HealthState::kOk) << "well again";
-    EXPECT_EQ(node.status(), "");
-  }
-}
-
-TEST(VioNode, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
-  Calibration two = calibration();
-  two.cameras.push_back(test::testCamera(1));
-  Player player(4.0);
-  std::size_t most_waiting = 0, handed = 0;
-  const auto playTo = [&](Node& node, const Recorder& r) {
-    player.play(
-        node, 0.0, 4.0,
-        [&](ImuSample&, double t) {
-          // A period of the IMU before the next frame: what is still not answered waits for cam1.
-          if (t > 2.0 && std::abs(std::remainder(t - 0.045, 0.05)) < 1e-6) {
-            most_waiting = std::max(most_waiting, handed - r.odometry.size());
-          }
-          return true;
-        },
-        [&](Frame&, double) { return ++handed > 0; });
-  };
-  Recorder r;
-  Node node(Config{}, 5, r.outputs());
-  node.onCalibration(two);
-  playTo(node, r);
-  EXPECT_EQ(most_waiting, 0u);
-  EXPECT_GT(node.reasons().of("stereo_unpaired"), 60u);
-  EXPECT_EQ(r.odometry.back().state, OdometryState::kTracking);
-  EXPECT_EQ(node.health(), HealthState::kDegraded);
-  EXPECT_THAT(node.status(), HasSubstr("one camera"));
-  EXPECT_THAT(node.status(), HasSubstr("stereo.enabled"));
-  Config first_only;
-  first_only.cameras = {"cam0"};
-  Recorder quiet;
-  Node mono(first_only, 5, quiet.outputs());
-  mono.onCalibration(two);
-  player.play(mono, 0.0, 2.0);
-  EXPECT_EQ(mono.health(), HealthState::kOk) << "nobody asked for two";
-  EXPECT_EQ(mono.reasons().of("stereo_unpaired"), 0u);
-}
-
 TEST(VioNode, TheFirstCameraOfItsConfigurationLeads) {
   Calibration two = calibration();
-  two.cameras.push_back(test::testCamera(1));
+  two.cameras.push_back(testCamera(1));
   auto options = restThenDrive();
   options.stereo = true;
-  const test::SimulatedDrive both(options);
+  const SimulatedDrive both(options);
   for (const auto& cameras : std::vector<std::vector<std::string>>{{"cam1"}, {"cam1", "cam0"}}) {
     Config config;
     config.cameras = cameras;
@@ -456,8 +323,8 @@ TEST(VioNode, TheFirstCameraOfItsConfigurationLeads) {
     Player player(4.0);
     player.play(node, 0.0, 4.0, {}, [&](Frame& f, double t) {
       const std::uint64_t k = f.stamp.sequence;
-      node.onFrame(test::drawn(both, t, k, 1));
-      f = test::drawn(both, t, k, 0);
+      node.onFrame(drawn(both, t, k, 1));
+      f = drawn(both, t, k, 0);
       return true;
     });
     EXPECT_GT(usable(r), 40u);
@@ -474,40 +341,6 @@ TEST(VioNode, TheFirstCameraOfItsConfigurationLeads) {
     };
     EXPECT_NEAR(travelled(last, *first), (truthAt(last) - truthAt(*first)).norm(), 0.25);
   }
-}
-
-TEST(VioNode, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
-  Recorder r;
-  Node node(Config{}, 5, r.outputs());
-  node.onCalibration(calibration());
-  Player player(4.0);
-  player.play(node, 0.0, 2.0);
-  ASSERT_EQ(node.health(), HealthState::kOk);
-  const auto small = [](Frame& f, double) { return (f.width = 640) > 0; };
-  player.play(node, 2.05, 2.5, {}, small);
-  EXPECT_EQ(node.health(), HealthState::kDegraded);
-  EXPECT_THAT(node.status(), HasSubstr("frames of cam0 are 640×480"));
-  EXPECT_THAT(node.status(), HasSubstr("752×480"));
-  EXPECT_GT(node.reasons().of("frame_size_differs"), 5u);
-  player.play(node, 2.55, 4.0);
-  EXPECT_EQ(node.status(), "") << "well again";
-
-  Node never(Config{}, 5, {});
-  never.onCalibration(calibration());
-  player.play(never, 0.0, 1.0, {}, small);
-  EXPECT_EQ(never.health(), HealthState::kDegraded);
-  EXPECT_THAT(never.status(), HasSubstr("640×480"));
-}
-
-TEST(VioNode, SaysWhatItWaitsFor) {
-  Recorder r;
-  Node node(Config{}, 5, r.outputs());
-  EXPECT_NE(node.status().find("calibration"), std::string::npos);
-  node.onCalibration(calibration());
-  EXPECT_NE(node.status().find("inertial"), std::string::npos);
-  EXPECT_EQ(node.health(), HealthState::kStarting);
-  EXPECT_TRUE(node.saveState().empty());
-  EXPECT_EQ(node.restoreState("nonsense").error().code, "state_malformed");
 }
 
 }  // namespace

@@ -79,6 +79,19 @@ TEST(RigCheck, ABiasThatWandersIsNotGravity) {
   EXPECT_THAT(worst(check).text, HasSubstr("gravity"));
 }
 
+TEST(RigCheck, ImagesThatContradictTheImuAreNotTooFew) {
+  RigCheck check = goodCheck();
+  check.innovations.resize(100);  // nearly all was refused
+  check.contradicted = 200;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("T_BS"));
+  for (const auto& one : judgeRig(check)) {
+    EXPECT_THAT(one.text, testing::Not(HasSubstr("record a minute")));
+  }
+  check.contradicted = 10;
+  EXPECT_THAT(worst(check).text, HasSubstr("record a minute"));
+}
+
 TEST(RigCheck, TooLittleToJudgeBySaysWhatToRecord) {
   RigCheck check = goodCheck();
   check.innovations.resize(100);

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "services/vio/core/known_poses/agreement.h"
+#include "services/vio/core/agreement.h"
 #include "services/vio/core/state/options.h"
 #include "services/vio/core/state/row_motion.h"
 #include "services/vio/core/tracks/tracks.h"

@@ -14,6 +14,7 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, not_triangulated = 0, gated = 0;
+  int behind = 0;       ///< of those not triangulated: their rays do not meet before the cameras
   bool jumped = false;  ///< the pose was widened
 };
 

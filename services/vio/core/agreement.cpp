@@ -1,4 +1,4 @@
-#include "services/vio/core/known_poses/agreement.h"
+#include "services/vio/core/agreement.h"
 
 #include <algorithm>
 
@@ -9,7 +9,8 @@ constexpr double kForgets = 1.0 / 40;  // with each image
 constexpr std::size_t kFewest = 40;    // images, until there is a verdict
 constexpr double kTracks = 2.0;        // in an image, at least, that a verdict rests on
 constexpr double kMisfit = 15.0;       // scale; rough poses have up to 8
-constexpr double kNearlyAll = 10.0;    // far ones for each landmark
+constexpr double kFewTracks = 0.5;     // in an image: enough where nearly all contradict
+constexpr double kNearlyAll = 10.0;    // for each that is sure
 
 }  // namespace
 
@@ -25,7 +26,10 @@ void Agreement::add(const Mapped& mapped, double scale, bool moved) {
 Agreement::Verdict Agreement::verdict() const {
   if (images_ < kFewest) return Verdict::kGood;
   const bool misfit = sure_ > kTracks && scale_ > kMisfit;
-  if (misfit || contradicted_ > std::max(sure_, kTracks)) return Verdict::kContradicted;
+  if (misfit || contradicted_ > std::max(sure_, kTracks) ||
+      contradicted_ > std::max(kNearlyAll * sure_, kFewTracks)) {
+    return Verdict::kContradicted;
+  }
   return far_ > std::max(kNearlyAll * sure_, kTracks) ? Verdict::kFar : Verdict::kGood;
 }
 

@@ -1,5 +1,5 @@
-// Whether given poses agree with what is seen: over the last images, how many tracks with parallax
-// have a place, and how many none that their poses allow.
+// Whether poses (given, or the filter's own) agree with what is seen: over the last images, how
+// many tracks with parallax have a place, and how many none that the poses allow.
 // Derivation: tools/docs/maths/vio-known-poses.md.
 #pragma once
 
@@ -9,9 +9,9 @@ namespace perdure::vio {
 
 /// What became of the tracks of one image.
 struct Mapped {
-  std::size_t contradicted = 0;  ///< their rays do not meet before the cameras
+  std::size_t contradicted = 0;  ///< their rays do not meet before the cameras, or fail the gate
   std::size_t far = 0;           ///< they meet beyond VisionOptions::max_depth_m
-  std::size_t sure = 0;          ///< landmarks
+  std::size_t sure = 0;          ///< landmarks, or what an update has used
 };
 
 class Agreement {

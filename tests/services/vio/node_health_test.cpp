@@ -1,0 +1,130 @@
+// What the node says of itself: what it waits for, and what is wrong with its inputs.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "services/vio/node.h"
+#include "tests/services/vio/player.h"
+
+namespace perdure::vio {
+namespace {
+
+using ::testing::HasSubstr;
+using namespace test;
+
+TEST(VioNodeHealth, SaysThatTheCamerasClockIsNotThatOfTheImu) {
+  using std::chrono::hours;
+  Player player(5.0);
+  for (const int shift : {-1, 1}) {
+    Config config;
+    config.max_pending = 10;
+    Recorder r;
+    Node node(config, 5, r.outputs());
+    node.onCalibration(calibration());
+    player.play(node, 0.0, 2.0);
+    ASSERT_EQ(node.health(), HealthState::kOk);
+    player.play(node, 2.05, 4.0, {}, [&](Frame& f, double) {
+      f.stamp.time += hours(shift);
+      return true;
+    });
+    EXPECT_EQ(node.health(), HealthState::kDegraded);
+    EXPECT_THAT(node.status(), HasSubstr(shift < 0 ? "jumped back" : "no inertial samples"));
+    player.play(node, 4.05, 5.0);
+    EXPECT_EQ(node.health(), HealthState::kOk) << "well again";
+    EXPECT_EQ(node.status(), "");
+  }
+}
+
+TEST(VioNodeHealth, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
+  Calibration two = calibration();
+  two.cameras.push_back(testCamera(1));
+  Player player(4.0);
+  std::size_t most_waiting = 0, handed = 0;
+  const auto playTo = [&](Node& node, const Recorder& r) {
+    player.play(
+        node, 0.0, 4.0,
+        [&](ImuSample&, double t) {
+          // A period of the IMU before the next frame: what is still not answered waits for cam1.
+          if (t > 2.0 && std::abs(std::remainder(t - 0.045, 0.05)) < 1e-6) {
+            most_waiting = std::max(most_waiting, handed - r.odometry.size());
+          }
+          return true;
+        },
+        [&](Frame&, double) { return ++handed > 0; });
+  };
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(two);
+  playTo(node, r);
+  EXPECT_EQ(most_waiting, 0u);
+  EXPECT_GT(node.reasons().of("stereo_unpaired"), 60u);
+  EXPECT_EQ(r.odometry.back().state, OdometryState::kTracking);
+  EXPECT_EQ(node.health(), HealthState::kDegraded);
+  EXPECT_THAT(node.status(), HasSubstr("one camera"));
+  EXPECT_THAT(node.status(), HasSubstr("stereo.enabled"));
+  Config first_only;
+  first_only.cameras = {"cam0"};
+  Recorder quiet;
+  Node mono(first_only, 5, quiet.outputs());
+  mono.onCalibration(two);
+  player.play(mono, 0.0, 2.0);
+  EXPECT_EQ(mono.health(), HealthState::kOk) << "nobody asked for two";
+  EXPECT_EQ(mono.reasons().of("stereo_unpaired"), 0u);
+}
+
+TEST(VioNodeHealth, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(calibration());
+  Player player(4.0);
+  player.play(node, 0.0, 2.0);
+  ASSERT_EQ(node.health(), HealthState::kOk);
+  const auto small = [](Frame& f, double) { return (f.width = 640) > 0; };
+  player.play(node, 2.05, 2.5, {}, small);
+  EXPECT_EQ(node.health(), HealthState::kDegraded);
+  EXPECT_THAT(node.status(), HasSubstr("frames of cam0 are 640×480"));
+  EXPECT_THAT(node.status(), HasSubstr("752×480"));
+  EXPECT_GT(node.reasons().of("frame_size_differs"), 5u);
+  player.play(node, 2.55, 4.0);
+  EXPECT_EQ(node.status(), "") << "well again";
+
+  Node never(Config{}, 5, {});
+  never.onCalibration(calibration());
+  player.play(never, 0.0, 1.0, {}, small);
+  EXPECT_EQ(never.health(), HealthState::kDegraded);
+  EXPECT_THAT(never.status(), HasSubstr("640×480"));
+}
+
+TEST(VioNodeHealth, SaysWhatItWaitsFor) {
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  EXPECT_NE(node.status().find("calibration"), std::string::npos);
+  node.onCalibration(calibration());
+  EXPECT_NE(node.status().find("inertial"), std::string::npos);
+  EXPECT_EQ(node.health(), HealthState::kStarting);
+  EXPECT_TRUE(node.saveState().empty());
+  EXPECT_EQ(node.restoreState("nonsense").error().code, "state_malformed");
+}
+
+TEST(VioNodeHealth, SaysThatTheImagesContradictTheImu) {
+  Player player(8.0);
+  const auto playTo = [&](Node& node, const Calibration& rig, const Player::EditImu& edit) {
+    node.onCalibration(rig);
+    player.play(node, 0.0, 8.0, edit);
+    return node.reasons().of("images_contradict_imu");
+  };
+  Calibration inverted = calibration();
+  RigidTransform& T_BC = inverted.cameras[0].T_BC;
+  T_BC = T_BC.inverse();
+  Node of_inverted(Config{}, 5, {});
+  EXPECT_GT(playTo(of_inverted, inverted, {}), 40u);
+  EXPECT_EQ(of_inverted.health(), HealthState::kDegraded);
+  EXPECT_THAT(of_inverted.status(), HasSubstr("T_BS"));
+
+  Node right(Config{}, 5, {});
+  EXPECT_EQ(playTo(right, calibration(), {}), 0u);
+  EXPECT_EQ(right.health(), HealthState::kOk);
+  EXPECT_EQ(right.status(), "");
+}
+
+}  // namespace
+}  // namespace perdure::vio
