@@ -56,7 +56,12 @@ void readImu(const fs::path& folder, Recording& recording) {
   const fs::path file = folder / "data.csv";
   const SensorTable table(file, "imu", judgeImu);
   addNotes(table, recording);
-  if (table.rows().empty()) throwMissing(file, "any inertial sample", "fetch it again");
+  if (table.rows().empty()) {
+    throw StartupError(ExitCode::kUnavailable,
+                       file.string() +
+                           " has no inertial sample (a head at most); fetch it again, or see why "
+                           "the recorder wrote none");
+  }
   const bool force_first = namesForceFirst(table.head());
   if (force_first) {
     recording.notes.push_back(file.string() +

@@ -15,7 +15,8 @@ namespace fs = std::filesystem;
 std::string readBytes(const fs::path& path, const std::string& what, const std::string& mend) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
-    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + " is missing; " + mend);
+    const char* why = fs::is_directory(path, error) ? " is a folder; " : " is missing; ";
+    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + why + mend);
   }
   std::ifstream in(path, std::ios::binary);
   std::ostringstream bytes;

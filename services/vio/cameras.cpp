@@ -18,6 +18,17 @@ std::vector<CameraModel> usedCameras(const Config& config, const Calibration& ca
   return used;
 }
 
+std::string unknownCamera(const Config& config, const Calibration& calibration) {
+  if (config.cameras == Config{}.cameras) return {};
+  for (const std::string& name : config.cameras) {
+    if (calibration.camera(name) != nullptr) continue;
+    std::string known;
+    for (const auto& camera : calibration.cameras) known += (known.empty() ? "" : ", ") + camera.name;
+    return "input.cameras names " + name + ", which the calibration does not (" + known + ")";
+  }
+  return {};
+}
+
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all) {
   std::vector<RigidTransform> T_BC;
   for (const CameraModel& m : all) T_BC.push_back(m.T_BC());

@@ -23,6 +23,9 @@ struct Cameras {
 /// Those whose frames are read, in the order of the configuration: the first one leads, and the
 /// second one is there where it is wanted. The calibration's first where it knows none of them.
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
+/// A sentence where the configuration names a camera that is not there; empty otherwise, or where
+/// it names none but the default's.
+std::string unknownCamera(const Config& config, const Calibration& calibration);
 
 /// What the estimators know of cameras: where on the body, and how long an image is read out, s.
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all);

@@ -81,6 +81,7 @@ std::string KnownPoseNode::status() const {
     return "waits for frames; start capture, or mend the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
   if (auto wrong = statusOfPoses(); !wrong.empty()) return wrong;
+  if (auto unknown = unknownCamera(config_, *calibration_); !unknown.empty()) return unknown;
   return cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
 }
 

@@ -85,7 +85,9 @@ HealthState Node::health() const {
 }
 
 std::string Node::whyAlone() const {
-  return cameras_ && cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
+  if (!cameras_) return {};
+  if (auto unknown = unknownCamera(config_, *calibration_); !unknown.empty()) return unknown;
+  return cameras_->models.size() == 2 ? waiting_.whyAlone() : std::string();
 }
 
 std::string Node::status() const {

@@ -152,6 +152,9 @@ TEST(Euroc, MissingPartsAreNamed) {
   fs::remove(root / "mav0/imu0/data.csv");
   EXPECT_THAT(errorOfEuroc(root), HasSubstr("imu0/data.csv"));
   root = tinyEuroc("missing");
+  writeText(root / "mav0/imu0/data.csv", "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n");
+  EXPECT_THAT(errorOfEuroc(root), HasSubstr("imu0/data.csv has no inertial sample"));
+  root = tinyEuroc("missing");
   fs::remove_all(root / "mav0/cam0/data");
   EXPECT_THAT(errorOfEuroc(root), HasSubstr("unpack the images"));
 }

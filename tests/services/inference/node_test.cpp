@@ -113,6 +113,8 @@ TEST_F(NodeTest, SaysWhichFileIsMissing) {
   c.model.path = (folder_ / "none.onnx").string();
   EXPECT_EQ(error(c).first, ExitCode::kUnavailable);
   EXPECT_THAT(error(c).second, HasSubstr("none.onnx is missing"));
+  c.model.path = folder_.string();
+  EXPECT_THAT(error(c).second, HasSubstr("is a folder"));
   c = config();
   fs::remove(folder_ / "tiny.weights");
   EXPECT_EQ(error(c).first, ExitCode::kUnavailable);

@@ -71,6 +71,24 @@ TEST(VioNodeHealth, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
   EXPECT_EQ(mono.reasons().of("stereo_unpaired"), 0u);
 }
 
+TEST(VioNodeHealth, SaysThatItsConfigurationNamesACameraThatIsNotThere) {
+  Player player(2.0);
+  const auto statusWith = [&](const std::vector<std::string>& cameras) {
+    Config config;
+    config.cameras = cameras;
+    Recorder r;
+    Node node(config, 5, r.outputs());
+    node.onCalibration(calibration());
+    player.play(node, 0.0, 2.0);
+    EXPECT_EQ(node.health(), node.status().empty() ? HealthState::kOk : HealthState::kDegraded);
+    return node.status();
+  };
+  EXPECT_EQ(statusWith({"cam0", "cam1"}), "") << "the default";
+  EXPECT_EQ(statusWith({"cam0"}), "");
+  EXPECT_THAT(statusWith({"left"}), HasSubstr("names left, which the calibration does not (cam0)"));
+  EXPECT_THAT(statusWith({"cam0", "cam9"}), HasSubstr("cam9"));
+}
+
 TEST(VioNodeHealth, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());

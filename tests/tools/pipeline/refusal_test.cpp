@@ -69,6 +69,12 @@ TEST(PipelineRefusal, WithoutTheImuItsUnitsDoNotMatter) {
   EXPECT_THAT(endOf(options).second, 0) << "poses at most .5 s apart, but the ends are exact";
 }
 
+TEST(PipelineRefusal, OneFrameIsNoDrive) {
+  auto options = optionsFor(makeTurningDrive("one_frame"));
+  options.every = 1000;
+  EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("--every 1000 leaves one frame"), 65));
+}
+
 TEST(PipelineRefusal, WhereNoImageCanBeReadTheLastOneIsNamed) {
   const auto root = makeTurningDrive("unreadable");
   for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
