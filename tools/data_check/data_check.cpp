@@ -15,9 +15,18 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
     if (finding.grade == Grade::kFatal) return findings;  // what is said of turns would follow
   }
   const auto turns =
-      judgeTurns(turnsOfImages(recording), recording.imu, recording.calibration.cameras.front());
+      judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
+                 recording.calibration.cameras.front());
   findings.insert(findings.end(), turns.begin(), turns.end());
   return findings;
+}
+
+replay::DataFindings checkPoses(const replay::Recording& recording,
+                                const replay::PoseFile& poses) {
+  if (recording.calibration.cameras.empty()) return {};
+  const auto samples = turnsOfPoses(poses, recording);
+  return judgePoseTurns(turnsOfImages(recording, samples, 60), samples,
+                        recording.calibration.cameras.front());
 }
 
 nlohmann::ordered_json toJson(const replay::DataFindings& findings) {

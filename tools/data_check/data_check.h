@@ -4,12 +4,16 @@
 #include <nlohmann/json.hpp>
 
 #include "common/replay/data_check.h"
+#include "common/replay/files/pose_file.h"
 
 namespace perdure::tools {
 
 /// Those of common/replay, and where images and samples are used whether they turn alike. Images
 /// are only looked at where `use.images`; takes some tenths of a second.
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use);
+
+/// Whether the images turn when poses that are given do.
+replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& poses);
 
 /// A list of {grade, code, text}.
 nlohmann::ordered_json toJson(const replay::DataFindings& findings);

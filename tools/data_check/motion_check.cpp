@@ -9,6 +9,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "common/camera/camera_model.h"
+#include "common/math/so3.h"
 
 namespace perdure::tools {
 namespace {
@@ -201,6 +202,7 @@ double rms(const Eigen::Matrix3Xd& turns) {
   return std::sqrt(turns.squaredNorm() / std::max<double>(1.0, static_cast<double>(turns.cols())));
 }
 
+constexpr double kEnough_px = 2.0;    ///< of turning between two images, to tell
 constexpr double kExplained = 0.3;    ///< of the turning is unexplained at most where all is well
 constexpr double kUnexplained = 0.7;  ///< and at least where it is not
 
@@ -226,10 +228,12 @@ replay::DataFindings judgeScale(double gyro, double images, double focal) {
 
 /// The time that must be added to the images' stamps; nothing where none explains.
 std::optional<double> betterOffset(const std::vector<Turn>& turns, const GyroIntegral& gyro,
-                                   const CameraCalibration& camera, const Eigen::Matrix3d& R_CB) {
+                                   const CameraCalibration& camera, const Eigen::Matrix3d& R_CB,
+                                   double most_s = 0.5) {
   double best = kExplained;
   std::optional<double> offset;
-  for (int step = -50; step <= 50; ++step) {
+  const int steps = static_cast<int>(std::lround(100.0 * most_s));
+  for (int step = -steps; step <= steps; ++step) {
     const double later = camera.time_offset_s + 0.01 * step;
     const Pairs pairs = pairsOf(turns, gyro, durationFromSeconds(later));
     if (2 * pairs.images.cols() < static_cast<Eigen::Index>(turns.size())) continue;
@@ -275,13 +279,14 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
 
 }  // namespace
 
-std::vector<Turn> turnsOfImages(const Recording& recording, std::size_t most) {
+std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<ImuSample>& samples,
+                                std::size_t most) {
   const Frames frames = firstCamera(recording);
-  if (frames.size() < 2 || recording.imu.size() < 2) return {};
+  if (frames.size() < 2 || samples.size() < 2) return {};
   const CameraCalibration& calibration = recording.calibration.cameras.front();
   const CameraModel camera(calibration);
   std::vector<Turn> turns;
-  for (const auto& [begin, end] : liveliestRuns(liveliness(frames, recording.imu), most)) {
+  for (const auto& [begin, end] : liveliestRuns(liveliness(frames, samples), most)) {
     cv::Mat before;
     for (std::size_t i = begin; i <= end; ++i) {
       const auto image = replay::monoImageOf(*frames[i]);
@@ -309,9 +314,53 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
   const double by_gyro = rms(pairs.gyro), by_images = rms(pairs.images);
   auto findings = judgeScale(by_gyro, by_images, camera.fx);
   if (!findings.empty()) return findings;
-  constexpr double kEnough_px = 2.0;
   if (std::min(by_gyro, by_images) * camera.fx < kEnough_px) return {};
   return judgePlace(turns, gyro, pairs, camera);
+}
+
+std::vector<ImuSample> turnsOfPoses(const replay::PoseFile& file, const Recording& recording) {
+  std::vector<replay::StampedPose> poses = file.poses();
+  if (file.format() == replay::PoseFormat::kKitti) {
+    const Frames frames = firstCamera(recording);
+    poses.resize(std::min(poses.size(), frames.size()));
+    for (std::size_t i = 0; i < poses.size(); ++i) poses[i].time = frames[i]->time;
+  }
+  std::vector<ImuSample> samples;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const Duration step = poses[i].time - poses[i - 1].time;
+    if (step <= Duration(0)) continue;
+    ImuSample sample;
+    sample.time = poses[i - 1].time + step / 2;
+    sample.gyro =
+        logSo3(Eigen::Quaterniond(poses[i - 1].T_WB.q.conjugate() * poses[i].T_WB.q)) /
+        toSeconds(step);
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
+                                    const std::vector<ImuSample>& samples,
+                                    const CameraCalibration& camera) {
+  constexpr double kLongest_s = 2.0, kLeast_s = 0.1;
+  constexpr double kClearly = 2.0;       // as much is explained no better by chance
+  CameraCalibration at_images = camera;  // poses are of the images' times
+  at_images.time_offset_s = 0.0;
+  const GyroIntegral poses(samples);
+  const Eigen::Matrix3d R_CB = camera.T_BC.R().transpose();
+  const Pairs pairs = pairsOf(turns, poses, Duration(0));
+  if (pairs.images.cols() < static_cast<Eigen::Index>(kLeastTurns)) return {};
+  if (rms(pairs.images) * camera.fx < kEnough_px) return {};
+  const auto later = betterOffset(turns, poses, at_images, R_CB, kLongest_s);
+  if (!later || std::abs(*later) < kLeast_s) return {};
+  const double left = unexplained(pairsOf(turns, poses, durationFromSeconds(*later)), R_CB);
+  if (unexplained(pairs, R_CB) < kClearly * left) return {};
+  return {
+      {DataFinding::Grade::kWarning, "poses_time_offset",
+       fmt::format("the images of {} turn {:.2f} s {} the poses that are given: {} {:.2f} s {} the "
+                   "times of the poses, or see which frame each of them is of",
+                   camera.name, std::abs(*later), *later > 0 ? "before" : "after",
+                   *later > 0 ? "subtract" : "add", std::abs(*later), *later > 0 ? "from" : "to")}};
 }
 
 }  // namespace perdure::tools

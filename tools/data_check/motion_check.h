@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/replay/data_check.h"
+#include "common/replay/files/pose_file.h"
 
 namespace perdure::tools {
 
@@ -18,14 +19,25 @@ struct Turn {
   Eigen::Vector3d of_images = Eigen::Vector3d::Zero();  ///< rad, in C
 };
 
-/// Of up to `most` pairs of images of cam0 that follow each other, where the gyroscope's rate
-/// changes most. Pairs with fewer than 15 corners that can be followed are left out.
-std::vector<Turn> turnsOfImages(const replay::Recording& recording, std::size_t most = 36);
+/// Of up to `most` pairs of images of cam0 that follow each other, where the rate of turn that
+/// `samples` say changes most. Pairs with fewer than 15 corners that can be followed are left out.
+std::vector<Turn> turnsOfImages(const replay::Recording& recording,
+                                const std::vector<ImuSample>& samples, std::size_t most = 36);
 
 /// Codes: gyro_in_degrees, gyro_too_small, T_BS_inverted, T_BS_turned, time_offset. Nothing where
 /// images or gyroscope turn too little to tell.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);
+
+/// The rates of turn between poses that follow each other, as a gyroscope on B would say them.
+/// Poses without a time (KITTI) have that of their frame.
+std::vector<ImuSample> turnsOfPoses(const replay::PoseFile& poses,
+                                    const replay::Recording& recording);
+
+/// Code: poses_time_offset. `samples`: turnsOfPoses.
+replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
+                                    const std::vector<ImuSample>& samples,
+                                    const CameraCalibration& camera);
 
 }  // namespace perdure::tools

@@ -63,6 +63,9 @@ void Pipeline::checkData() {
   findings_ =
       checkDrive(dataset_->recording(), {.images = data.decode, .imu = options_.odometry == "vio"});
   replay::refuseFatal(findings_, options_.data);
+  if (!pose_file_ || !data.decode) return;
+  const auto of_poses = checkPoses(dataset_->recording(), *pose_file_);
+  findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
 
 /// Rows of other frames would be left out in silence.

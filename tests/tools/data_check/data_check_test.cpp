@@ -45,7 +45,7 @@ TEST(DataCheck, ASoundDriveHasNoFinding) {
 TEST(DataCheck, ImagesTurnAsTheGyroscopeSays) {
   const auto root = makeTurningDrive("turns");
   const auto recording = Dataset::open({.path = root})->recording();
-  const auto turns = turnsOfImages(recording);
+  const auto turns = turnsOfImages(recording, recording.imu);
   ASSERT_GE(turns.size(), 30U);
   double worst = 0.0, largest = 0.0;
   for (const Turn& turn : turns) {
@@ -98,6 +98,37 @@ TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   const auto findings = findingsOf("late", drive);
   ASSERT_THAT(codesOf(findings), ElementsAre("time_offset"));
   EXPECT_THAT(findings[0].text, HasSubstr("time_offset_s to -0.25"));
+}
+
+/// The drive's true poses, by integration of its rates, with times that are so much too late.
+replay::PoseFile posesOf(const replay::Recording& recording, Duration late) {
+  std::vector<replay::StampedPose> poses;
+  RigidTransform T_WB;
+  for (std::size_t i = 0; i < recording.imu.size(); ++i) {
+    if (i > 0) {
+      const auto &a = recording.imu[i - 1], &b = recording.imu[i];
+      const Eigen::Vector3d rate = 0.5 * (a.gyro + b.gyro) - TurningDrive().gyro_bias;
+      T_WB.q = T_WB.q * expQuaternion(toSeconds(b.time - a.time) * rate);
+    }
+    if (i % 4 == 0) poses.push_back({recording.imu[i].time + late, T_WB});
+  }
+  return {replay::PoseFormat::kTum, poses};
+}
+
+TEST(DataCheck, PosesThatAreLateAreDoubtful) {
+  TurningDrive drive;
+  drive.seconds = 4.0;
+  const auto recording = Dataset::open({.path = makeTurningDrive("poses", drive)})->recording();
+  const auto findingsAt = [&](int late_ms) {
+    return checkPoses(recording, posesOf(recording, std::chrono::milliseconds(late_ms)));
+  };
+  EXPECT_THAT(codesOf(findingsAt(0)), ElementsAre());
+  EXPECT_THAT(codesOf(findingsAt(30)), ElementsAre());
+  const auto late = findingsAt(300), early = findingsAt(-200);
+  ASSERT_THAT(codesOf(late), ElementsAre("poses_time_offset"));
+  EXPECT_THAT(late[0].text, HasSubstr("0.30 s before the poses that are given: subtract 0.30 s"));
+  ASSERT_THAT(codesOf(early), ElementsAre("poses_time_offset"));
+  EXPECT_THAT(early[0].text, HasSubstr("add 0.20 s to"));
 }
 
 TEST(DataCheck, UnitsOfTheAccelerometerAreToldByGravity) {
