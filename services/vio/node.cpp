@@ -99,6 +99,10 @@ std::string Node::status() const {
     return "has no start yet: the IMU is at rest or moves evenly, and most of the picture moves; "
            "let traffic pass, or drive off";
   }
+  if (!started() && last_start_reason_ == "start_force_not_gravity") {
+    return "has no start: the accelerations are not those of gravity and motion; see their unit "
+           "(m/s²) and which columns they are in";
+  }
   if (!started()) {
     return "has no start yet (" + last_start_reason_ +
            "); stand still for a second, or move with the camera on things that stand";

@@ -112,6 +112,20 @@ TEST(VioNodeHealth, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
   EXPECT_THAT(never.status(), HasSubstr("640×480"));
 }
 
+TEST(VioNodeHealth, SaysThatTheAccelerationsAreInAnotherUnit) {
+  Node node(Config{}, 5, {});
+  node.onCalibration(calibration());
+  Player player(3.0, 0.0);
+  std::string status;  // at the first attempt that sees it
+  player.play(node, 0.0, 3.0, [&](ImuSample& sample, double) {
+    sample.accel /= 9.80665;
+    if (status.empty() && node.reasons().of("start_force_not_gravity") > 0) status = node.status();
+    return true;
+  });
+  EXPECT_FALSE(node.started());
+  EXPECT_THAT(status, HasSubstr("m/s²"));
+}
+
 TEST(VioNodeHealth, SaysWhatItWaitsFor) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());
