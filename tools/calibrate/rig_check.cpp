@@ -106,21 +106,24 @@ std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& inno
   return all;
 }
 
-/// What stays of the residuals over the image, px.
+/// What stays of the residuals over the image from one half of the drive to the other, px; 0 where
+/// it may be chance. A track's residuals are alike, so that those of one half prove nothing.
 double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
-  constexpr std::size_t kEnough = 40;
-  double square = 0.0, sum = 0.0, expected = 0.0;
-  for (const auto& r : residuals) square += r.residual.squaredNorm();
-  const double variance = square / static_cast<double>(std::max<std::size_t>(1, residuals.size()));
-  std::size_t cells = 0;
-  for (const Cell& cell : cellsOf(camera, residuals)) {
-    if (cell.corners < kEnough) continue;
-    sum += cell.mean.squaredNorm();
-    expected += variance / static_cast<double>(cell.corners);
-    ++cells;
+  constexpr std::size_t kEnough = 20;  // in a half
+  constexpr double kSure = 3.0;        // deviations
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  const auto before = cellsOf(camera, {residuals.begin(), middle});
+  const auto after = cellsOf(camera, {middle, residuals.end()});
+  double sum = 0.0, squares = 0.0, cells = 0.0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (before[i].corners < kEnough || after[i].corners < kEnough) continue;
+    const double common = before[i].mean.dot(after[i].mean);
+    sum += common, squares += common * common, cells += 1.0;
   }
-  return std::sqrt(std::max(0.0, sum - expected) /
-                   static_cast<double>(std::max<std::size_t>(1, cells)));
+  if (cells < 2.0) return 0.0;
+  const double mean = sum / cells;
+  const double sigma = std::sqrt(std::max(0.0, squares / cells - mean * mean) / (cells - 1.0));
+  return mean > kSure * sigma ? std::sqrt(mean) : 0.0;
 }
 
 /// How far vio moved a quantity, in deviations that a well calibrated rig has.

@@ -98,6 +98,12 @@ TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   const auto findings = findingsOf("late", drive);
   ASSERT_THAT(codesOf(findings), ElementsAre("time_offset"));
   EXPECT_THAT(findings[0].text, HasSubstr("time_offset_s to -0.25"));
+  drive.images_late = std::chrono::milliseconds(100);  // most of the turning fits even so
+  const auto slightly = findingsOf("slightly_late", drive);
+  ASSERT_THAT(codesOf(slightly), ElementsAre("time_offset"));
+  EXPECT_THAT(slightly[0].text, HasSubstr("time_offset_s to -0.10"));
+  drive.images_late = std::chrono::milliseconds(20);
+  EXPECT_THAT(codesOf(findingsOf("hardly_late", drive)), ElementsAre()) << "vio estimates it";
 }
 
 /// The drive's true poses, by integration of its rates, with times that are so much too late.
