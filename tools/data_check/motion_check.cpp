@@ -273,9 +273,8 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
                      "see which clock is wrong",
                      camera.name, *later)}};
   }
-  if (given < kUnexplained) return {};
   const Eigen::Matrix3d R_best = bestRotation(pairs);
-  if (unexplained(pairs, R_best) < kExplained) {
+  if (unexplained(pairs, R_best) < std::min(kExplained, given / kClearly)) {
     const double angle = Eigen::AngleAxisd(R_best * R_BC).angle();
     return {{DataFinding::Grade::kWarning, "T_BS_turned",
              fmt::format("the images of {} turn as if the camera were turned by about {:.0f}° from "

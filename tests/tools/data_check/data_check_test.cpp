@@ -91,6 +91,20 @@ TEST(DataCheck, AnIdentityInPlaceOfTheTransformIsDoubtful) {
   EXPECT_THAT(findings[0].text, HasSubstr("120°"));
 }
 
+TEST(DataCheck, ACameraTurnedByMoreThanTwentyDegreesIsDoubtful) {
+  const auto findingsAt = [](double degrees) {
+    TurningDrive drive;
+    const Eigen::Vector3d turn = degrees * M_PI / 180.0 * Eigen::Vector3d(0.6, 0.0, 0.8);
+    drive.written_T_BC = tests::trueCameraPlace();
+    drive.written_T_BC.q = drive.written_T_BC.q * expQuaternion(turn);
+    return findingsOf("turned", drive);
+  };
+  EXPECT_THAT(codesOf(findingsAt(5.0)), ElementsAre());
+  const auto turned = findingsAt(30.0);
+  ASSERT_THAT(codesOf(turned), ElementsAre("T_BS_turned"));
+  EXPECT_THAT(turned[0].text, testing::ContainsRegex("about (29|30|31)°"));
+}
+
 TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   TurningDrive drive;
   drive.seconds = 3.0;
