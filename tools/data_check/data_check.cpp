@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "tools/data_check/motion_check.h"
+#include "tools/data_check/stereo_check.h"
 
 namespace perdure::tools {
 
@@ -10,10 +11,13 @@ using Grade = replay::DataFinding::Grade;
 
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use) {
   replay::DataFindings findings = replay::checkData(recording, use);
-  if (!use.images || !use.imu || recording.calibration.cameras.empty()) return findings;
+  if (!use.images || recording.calibration.cameras.empty()) return findings;
   for (const auto& finding : findings) {
     if (finding.grade == Grade::kFatal) return findings;  // what is said of turns would follow
   }
+  const auto stereo = checkStereo(recording);
+  findings.insert(findings.end(), stereo.begin(), stereo.end());
+  if (!use.imu) return findings;
   const auto turns =
       judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
                  recording.calibration.cameras.front());
