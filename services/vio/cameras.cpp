@@ -23,7 +23,8 @@ std::string unknownCamera(const Config& config, const Calibration& calibration) 
   for (const std::string& name : config.cameras) {
     if (calibration.camera(name) != nullptr) continue;
     std::string known;
-    for (const auto& camera : calibration.cameras) known += (known.empty() ? "" : ", ") + camera.name;
+    for (const auto& camera : calibration.cameras)
+      known += (known.empty() ? "" : ", ") + camera.name;
     return "input.cameras names " + name + ", which the calibration does not (" + known + ")";
   }
   return {};

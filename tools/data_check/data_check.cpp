@@ -18,15 +18,13 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   const auto stereo = checkStereo(recording);
   findings.insert(findings.end(), stereo.begin(), stereo.end());
   if (!use.imu) return findings;
-  const auto turns =
-      judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
-                 recording.calibration.cameras.front());
+  const auto turns = judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
+                                recording.calibration.cameras.front());
   findings.insert(findings.end(), turns.begin(), turns.end());
   return findings;
 }
 
-replay::DataFindings checkPoses(const replay::Recording& recording,
-                                const replay::PoseFile& poses) {
+replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& poses) {
   if (recording.calibration.cameras.empty()) return {};
   const auto samples = turnsOfPoses(poses, recording);
   return judgePoseTurns(turnsOfImages(recording, samples, 60), samples,

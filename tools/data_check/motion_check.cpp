@@ -338,9 +338,8 @@ std::vector<ImuSample> turnsOfPoses(const replay::PoseFile& file, const Recordin
     if (step <= Duration(0)) continue;
     ImuSample sample;
     sample.time = poses[i - 1].time + step / 2;
-    sample.gyro =
-        logSo3(Eigen::Quaterniond(poses[i - 1].T_WB.q.conjugate() * poses[i].T_WB.q)) /
-        toSeconds(step);
+    sample.gyro = logSo3(Eigen::Quaterniond(poses[i - 1].T_WB.q.conjugate() * poses[i].T_WB.q)) /
+                  toSeconds(step);
     samples.push_back(sample);
   }
   return samples;

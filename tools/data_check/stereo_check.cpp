@@ -97,7 +97,8 @@ replay::DataFindings checkStereo(const Recording& recording) {
     const Vector3d normal = t.cross(ray);
     constexpr double kAlongBaseline = 0.1;
     if (normal.norm() < kAlongBaseline) continue;
-    off_px.push_back(cameras[1].fx * std::abs(std::asin(normal.normalized().dot(match.second))));
+    const double sine = std::min(1.0, std::abs(normal.normalized().dot(match.second)));
+    off_px.push_back(cameras[1].fx * std::asin(sine));
     // Of what is before the cameras: towards t, as ray + t / depth has it.
     const double parallax = -normal.normalized().dot(ray.cross(match.second));
     if (std::abs(parallax) * cameras[1].fx < 2.0) continue;

@@ -108,9 +108,10 @@ void Pipeline::refuseNothing() const {
                                                        : "; the last: " + dataset_->lastProblem()));
   }
   if (counts_.frames == 1 && options_.every > 1) {
-    refuse(fmt::format("--every {} leaves one frame, and no distance is known from one; give a "
-                       "smaller number",
-                       options_.every));
+    refuse(
+        fmt::format("--every {} leaves one frame, and no distance is known from one; give a "
+                    "smaller number",
+                    options_.every));
   }
   if (counts_.odometry == 0 && pose_file_ && !recording.frames.empty() &&
       pose_file_->format() == replay::PoseFormat::kTum) {

@@ -85,6 +85,8 @@ inline void expectFinite(const Recorder& r) {
   }
 }
 
-inline double travelled(const Odometry& a, const Odometry& b) { return (a.T_WB.p - b.T_WB.p).norm(); }
+inline double travelled(const Odometry& a, const Odometry& b) {
+  return (a.T_WB.p - b.T_WB.p).norm();
+}
 
 }  // namespace perdure::vio::test

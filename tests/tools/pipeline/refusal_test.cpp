@@ -118,9 +118,8 @@ TEST(PipelineRefusal, AnEmptyMapWithDetectionsIsNoSuccess) {
   options.odometry = (root / "poses.tum").string();
   std::string poses;
   for (int i = 0; i <= 20; ++i) {
-    poses +=
-        "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " " +
-        std::to_string(0.2 * i) + " 0 0 0 0 0 1\n";
+    poses += "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " " +
+             std::to_string(0.2 * i) + " 0 0 0 0 0 1\n";
   }
   writeText(options.odometry, poses);
   options.detections = (root / "boxes.csv").string();
