@@ -52,7 +52,7 @@ void describeWindow(Options& o, Fields& f) {
             {"Jacobians on a path that no update moves"});
 }
 
-void describeVision(Options& o, Fields& f) {
+void describeVision(Options& o, Config& c, Fields& f) {
   f.number("vision.sigma_px", o.vision.sigma_px, positive(), {"noise of a tracked point", "px"});
   f.number("vision.gate_probability", o.vision.gate_probability, between(0.5, 0.99999),
            {"of the χ² gates: the share of good points that pass"});
@@ -68,6 +68,9 @@ void describeVision(Options& o, Fields& f) {
             {"the camera-IMU time offset is part of the state"});
   f.boolean("calibration.estimate_readout", o.calibration.estimate_readout,
             {"the read-out of a rolling shutter is part of the state; 0 in the rig stays 0"});
+  f.number("calibration.gyro_scale", c.gyro_scale, between(0, 0.1),
+           {"deviation of the gyroscope's scale on each axis, as its data sheet has it; 0: not "
+            "estimated"});
   f.number("calibration.extrinsic_rotation", o.calibration.extrinsic_rotation, positive(),
            {"deviation of the given extrinsics", "rad"});
   f.number("calibration.extrinsic_position", o.calibration.extrinsic_position_m, positive(),
@@ -161,7 +164,7 @@ void describe(Config& c, Fields& f) {
   f.number("gravity", c.core.gravity, between(9.7, 9.9), {"at the place of use", "m/s²"});
   describeImu(c.core, c, f);
   describeWindow(c.core, f);
-  describeVision(c.core, f);
+  describeVision(c.core, c, f);
   describeTracker(c.tracker, c, f);
   describeStart(c.core, f);
   describeAids(c.core, c, f);

@@ -20,6 +20,7 @@ struct Config {
   bool stereo = true;                                ///< use the second camera where there is one
   bool prefer_calibration = true;   ///< the IMU noise that comes with the calibration
   double imu_inflation = 3.0;       ///< on the densities of the inertial noise, in motion
+  double gyro_scale = 0.01;         ///< deviation of the gyroscope's scale from 1
   double imu_slack_s = 0.0;         ///< samples are awaited this long past a frame
   double pair_tolerance_s = 0.01;   ///< of two cameras' stamps
   double speed_wait_s = 0.12;       ///< a frame waits this long for its speed sample

@@ -71,6 +71,7 @@ void Node::onCalibration(const Calibration& calibration) {
     options.imu.accel_walk = std::max(calibration.imu->accel_bias_walk, 1e-6);
   }
   options.imu.inflation = config_.imu_inflation;
+  options.calibration.gyro_scale = config_.gyro_scale;
   cameras_ = std::make_unique<Cameras>(config_, options, models);
   if (outputs_.innovations) cameras_->estimator.keepInnovations();
   motion_initialiser_ = MotionInitialiser(options);

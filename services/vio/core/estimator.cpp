@@ -19,7 +19,7 @@ namespace {
 
 // Beyond these a filter is lost, whatever it believes.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
-constexpr double kMaxSpeedSigma = 10.0;
+constexpr double kMaxSpeedSigma = 10.0, kMaxScaleError = 0.3;
 
 std::int64_t asInt(std::size_t n) { return static_cast<std::int64_t>(n); }
 
@@ -35,7 +35,9 @@ Estimator::Estimator(const Options& options, const std::vector<RigidTransform>& 
 Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) {
   if (!state_ || to <= state_->time || imu.empty()) return Eigen::Matrix3d::Identity();
   imu.between(state_->time, to, readings_);
-  return integrateRotation(readings_, state_->nav.gyro_bias).toRotationMatrix().transpose();
+  return integrateRotation(readings_, state_->nav.gyro_bias, state_->gyro_scale)
+      .toRotationMatrix()
+      .transpose();
 }
 
 Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
@@ -43,7 +45,8 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   if (readout_s == 0.0 || imu.empty()) return Eigen::Vector3d::Zero();
   const Duration half = durationFromSeconds(0.5 * std::abs(readout_s));
   const Nav nav = state_ ? state_->nav : Nav{};
-  return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_).rate;
+  const Eigen::Vector3d scale = state_ ? state_->gyro_scale : Eigen::Vector3d::Ones();
+  return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
 /// What the newest clone's rows are seen from; again after an update, with its velocity and biases.
@@ -52,7 +55,7 @@ void Estimator::measureRows(const ImuBuffer& imu) {
   if (readout_s == 0.0) return;
   const Duration half = durationFromSeconds(0.5 * std::abs(readout_s));
   state_->clones.back().rows =
-      rowMotion(state_->nav, imu, state_->time, half, options_.gravity, rows_);
+      rowMotion(state_->nav, imu, state_->time, half, options_.gravity, rows_, state_->gyro_scale);
 }
 
 Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& imu) {
@@ -61,12 +64,13 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   Eigen::Vector3d rate;
   if (to > state_->time) {
     imu.between(state_->time, to, readings_);
-    const ImuIncrement x =
-        integrate(readings_, state_->nav.gyro_bias, state_->nav.accel_bias, options_.imu);
+    const ImuIncrement x = integrate(readings_, state_->nav.gyro_bias, state_->nav.accel_bias,
+                                     options_.imu, state_->gyro_scale);
     propagate(*state_, x, to, options_.gravity, options_.window.first_estimates);
     rate = x.end_rate;
   } else if (to == state_->time) {
-    rate = imu.between(to, to + Duration(1)).front().gyro - state_->nav.gyro_bias;
+    rate = (imu.between(to, to + Duration(1)).front().gyro - state_->nav.gyro_bias)
+               .cwiseQuotient(state_->gyro_scale);
   } else {
     return fail("frame_not_after_state");
   }
@@ -269,6 +273,9 @@ Result<void> Estimator::sane() const {
   if (state_->nav.v_WB.norm() > kMaxSpeed) return fail("numbers_speed_absurd");
   if (state_->nav.gyro_bias.norm() > kMaxGyroBias) return fail("numbers_gyro_bias_absurd");
   if (state_->nav.accel_bias.norm() > kMaxAccelBias) return fail("numbers_accel_bias_absurd");
+  if ((state_->gyro_scale.array() - 1.0).abs().maxCoeff() > kMaxScaleError) {
+    return fail("numbers_gyro_scale_absurd");
+  }
   if (state_->P().diagonal().segment<3>(kVelocity).maxCoeff() > kMaxSpeedSigma * kMaxSpeedSigma) {
     return fail("numbers_velocity_unknown");
   }

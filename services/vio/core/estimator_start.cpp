@@ -8,7 +8,7 @@ namespace perdure::vio {
 void Estimator::start(const Start& start) {
   state_.emplace(T_BC_, time_offset_s_, static_cast<int>(options_.window.clones),
                  static_cast<int>(options_.window.slam_features), readout_s_,
-                 options_.calibration.estimate_readout);
+                 options_.calibration.estimate_readout, options_.calibration.gyro_scale > 0.0);
   state_->nav = state_->nav_linear = start.nav;
   state_->time = start.time;
   auto P = state_->P();
@@ -43,6 +43,9 @@ void Estimator::start(const Start& start) {
   for (std::size_t i = 0; i < T_BC_.size(); ++i) {
     if (const auto at = state_->readoutAt(i)) P(*at, *at) = c.readout_s * c.readout_s;
   }
+  if (const auto at = state_->scaleAt()) {
+    P.diagonal().segment<kScaleSize>(*at).setConstant(c.gyro_scale * c.gyro_scale);
+  }
   database_.clear();
   previous_frame_.reset();
   agreed_ = false;
@@ -58,6 +61,7 @@ bool Estimator::fits(const SavedState& saved) const {
     if (rolls != (saved.readout_s[i] != 0.0)) return false;
     size += rolls && options_.calibration.estimate_readout;
   }
+  if (options_.calibration.gyro_scale > 0.0) size += kScaleSize;
   return saved.covariance.rows() == size;
 }
 
@@ -67,6 +71,7 @@ void Estimator::restore(const SavedState& saved) {
   state_->T_BC = saved.T_BC;
   state_->time_offset_s = saved.time_offset_s;
   state_->readout_s = saved.readout_s;
+  state_->gyro_scale = saved.gyro_scale;
   state_->P() = saved.covariance;
 }
 
@@ -78,6 +83,7 @@ SavedState Estimator::save() const {
   s.T_BC = state_->T_BC;
   s.time_offset_s = state_->time_offset_s;
   s.readout_s = state_->readout_s;
+  s.gyro_scale = state_->gyro_scale;
   const int n = state_->calibrationEnd();
   s.covariance = state_->P().topLeftCorner(n, n);
   return s;

@@ -48,6 +48,12 @@ ImuBuffer samplesOf(test::SimulatedDrive& drive, double seconds) {
   return imu;
 }
 
+Options optionsOfTheService() {
+  Options options;
+  options.calibration.gyro_scale = 0.01;
+  return options;
+}
+
 struct RunningFilter {
   test::SimulatedDrive drive;
   ImuBuffer imu;
@@ -55,7 +61,9 @@ struct RunningFilter {
   std::uint64_t frame = 0;
 
   RunningFilter(const test::DriveOptions& options, double seconds)
-      : drive(options), imu(samplesOf(drive, seconds)), estimator(Options{}, drive.T_BC(), 0.0) {
+      : drive(options),
+        imu(samplesOf(drive, seconds)),
+        estimator(optionsOfTheService(), drive.T_BC(), 0.0) {
     estimator.start(test::startAt(drive, kBegin, options.seed, 1.0));
   }
 
@@ -88,8 +96,8 @@ TEST_F(Propagation, AllocatesNothing) {
     for (std::uint64_t k = 1; k <= 100; ++k) {
       const TimePoint to = state.time + durationFromSeconds(kFramePeriod);
       run.imu.between(state.time, to, readings);
-      const ImuIncrement x =
-          integrate(readings, state.nav.gyro_bias, state.nav.accel_bias, Options{}.imu);
+      const ImuIncrement x = integrate(readings, state.nav.gyro_bias, state.nav.accel_bias,
+                                       Options{}.imu, state.gyro_scale);
       propagate(state, x, to, Options{}.gravity, true);
       state.addClone(run.frame + k, to, x.end_rate, true);
       state.removeClone(state.clones.front().frame);

@@ -23,8 +23,12 @@ constexpr int kRuns = 30, kFewRuns = 8;
 constexpr std::array<int, 6> kSeconds{10, 20, 30, 40, 50, 60};
 constexpr std::array<const char*, 3> kWhat{"orientation", "position", "velocity"};
 
-/// NEES of orientation, position and velocity at each of kSeconds.
-using Nees = std::array<std::array<double, 3>, kSeconds.size()>;
+/// NEES of orientation, position and velocity at each of kSeconds; of the gyroscope's scale at the
+/// end.
+struct Nees {
+  std::array<std::array<double, 3>, kSeconds.size()> at{};
+  double scale = 0.0;
+};
 
 class Draws {
  public:
@@ -39,8 +43,9 @@ class Draws {
 
 /// A minute after a start at rest; W is placed on the truth at the first output, by yaw and
 /// position.
-Nees run(unsigned seed, test::DrivePlace place) {
-  const Options options;
+Nees run(unsigned seed, test::DrivePlace place, double gyro_scale) {
+  Options options;
+  options.calibration.gyro_scale = gyro_scale;
   const CalibrationOptions& calibration = options.calibration;
   Draws draws(1000 + seed);
   test::DriveOptions drive_options;
@@ -52,6 +57,7 @@ Nees run(unsigned seed, test::DrivePlace place) {
   drive_options.gyro_bias = draws.three(0.02);
   drive_options.accel_bias = draws.three(options.start.accel_bias_sigma);
   drive_options.time_offset_s = draws.one(calibration.time_offset_s);
+  drive_options.gyro_scale += Draws(5000 + seed).three(gyro_scale);
   test::SimulatedDrive drive(drive_options);
   ImuBuffer imu;
   for (const ImuReading& r : drive.imu(kSeconds.back() + 1.0)) EXPECT_TRUE(imu.add(r));
@@ -85,20 +91,27 @@ Nees run(unsigned seed, test::DrivePlace place) {
                                          Vector3d(turn * (truth.p_WB - begin.p_WB) - out->nav.p_WB),
                                          Vector3d(turn * truth.v_WB - out->nav.v_WB)};
     for (int what = 0; what < 3; ++what) {
-      result[next][static_cast<std::size_t>(what)] = squaredMahalanobis(
+      result.at[next][static_cast<std::size_t>(what)] = squaredMahalanobis(
           errors[static_cast<std::size_t>(what)], out->covariance.block<3, 3>(3 * what, 3 * what));
     }
     ++next;
   }
+  if (const auto at = estimator.state().scaleAt()) {
+    result.scale =
+        squaredMahalanobis(Vector3d(drive_options.gyro_scale - estimator.state().gyro_scale),
+                           Eigen::Matrix3d(estimator.state().P().block<3, 3>(*at, *at)));
+  }
   return result;
 }
 
-void expectNineTenthsInTheirBand(test::DrivePlace place, int runs) {
+void expectNineTenthsInTheirBand(test::DrivePlace place, int runs, double gyro_scale = 0.0) {
   std::array<std::array<double, 3>, kSeconds.size()> sum{};
+  double scale = 0.0;
   for (int seed = 1; seed <= runs; ++seed) {
-    const Nees nees = run(static_cast<unsigned>(seed), place);
+    const Nees nees = run(static_cast<unsigned>(seed), place, gyro_scale);
+    scale += nees.scale;
     for (std::size_t k = 0; k < kSeconds.size(); ++k) {
-      for (std::size_t what = 0; what < 3; ++what) sum[k][what] += nees[k][what];
+      for (std::size_t what = 0; what < 3; ++what) sum[k][what] += nees.at[k][what];
     }
   }
   const double low = chi2Quantile(0.025, 3 * runs), high = chi2Quantile(0.975, 3 * runs);
@@ -114,6 +127,11 @@ void expectNineTenthsInTheirBand(test::DrivePlace place, int runs) {
     }
   }
   EXPECT_GE(10 * inside, 9 * asked);
+  if (gyro_scale == 0.0) return;
+  std::printf("gyroscope's scale %.2f (%.2f … %.2f)\n", scale / (3 * runs), low / (3 * runs),
+              high / (3 * runs));
+  EXPECT_GT(scale, low);
+  EXPECT_LT(scale, high);
 }
 
 TEST(Consistency, NineTenthsOfTheMeanErrorsOfAFewRunsLieInTheirBand) {
@@ -124,6 +142,10 @@ TEST(Consistency, NineTenthsOfTheMeanErrorsOfAFewRunsLieInTheirBand) {
 // and the covariance has to say how that fades.
 TEST(Consistency, AFewRunsHoldAtConstantVelocityWithoutSpeed) {
   expectNineTenthsInTheirBand(test::DrivePlace::kStreet, kFewRuns);
+}
+
+TEST(LongConsistency, HoldsWithAGyroscopeWhoseScaleIsOff) {
+  expectNineTenthsInTheirBand(test::DrivePlace::kRoom, kRuns, 0.01);
 }
 
 TEST(LongConsistency, NineTenthsOfTheMeanErrorsLieInTheirBand) {

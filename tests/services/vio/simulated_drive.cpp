@@ -163,7 +163,8 @@ std::vector<ImuReading> SimulatedDrive::imu(double until) {
   Vector3d gyro_bias = options_.gyro_bias, accel_bias = options_.accel_bias;
   for (int i = 0; i * dt <= until; ++i) {
     const double t = i * dt;
-    result.push_back({time(t), rateTruth(t) + gyro_bias + noise(options_.noise.gyro * root),
+    const Vector3d rate = options_.gyro_scale.cwiseProduct(rateTruth(t));
+    result.push_back({time(t), rate + gyro_bias + noise(options_.noise.gyro * root),
                       forceTruth(t) + accel_bias + noise(options_.noise.accel * root)});
     if (!options_.walking_biases) continue;
     biases_.emplace_back(gyro_bias, accel_bias);

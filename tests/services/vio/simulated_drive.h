@@ -34,6 +34,7 @@ struct DriveOptions {
   RigidTransform jump;
   double jump_from_s = 1e9, jump_until_s = 1e9;
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  ///< a reading without bias, of the rate
 };
 
 class SimulatedDrive {

@@ -11,16 +11,24 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Rotation over `dt` with the rate going linearly from w0 to w1 (second-order Magnus), and its
-/// derivative by a bias that both rates contain.
+/// Over `dt`, with the rate going linearly from w0 to w1 (second-order Magnus).
+Vector3d turned(const Vector3d& w0, const Vector3d& w1, double dt) {
+  return 0.5 * (w0 + w1) * dt + w0.cross(w1) * (dt * dt / 12.0);
+}
+
+/// That rotation, and its derivatives by what both rates contain.
 struct Turn {
-  Matrix3d R, J_bias;  ///< J_bias: right tangent of R by the bias
+  Matrix3d R, J_bias, J_scale;  ///< J: right tangent of R by the bias, by the scale
 };
 
-Turn turn(const Vector3d& w0, const Vector3d& w1, double dt) {
-  const Vector3d theta = 0.5 * (w0 + w1) * dt + w0.cross(w1) * (dt * dt / 12.0);
-  const Matrix3d d_theta = -dt * Matrix3d::Identity() + (dt * dt / 12.0) * skew(w1 - w0);
-  return {expSo3(theta), rightJacobianSo3(theta) * d_theta};
+Turn turn(const Vector3d& w0, const Vector3d& w1, double dt, const Vector3d& scale) {
+  const Vector3d theta = turned(w0, w1, dt);
+  const Matrix3d half = 0.5 * dt * Matrix3d::Identity(), J = rightJacobianSo3(theta);
+  const double c = dt * dt / 12.0;
+  const Matrix3d J0 = J * (half - c * skew(w1)), J1 = J * (half + c * skew(w0));
+  const Vector3d by = -scale.cwiseInverse();  // d w / d bias; d w / d scale is w times that
+  return {expSo3(theta), (J0 + J1) * by.asDiagonal(),
+          (J0 * w0.asDiagonal() + J1 * w1.asDiagonal()) * by.asDiagonal()};
 }
 
 /// Time in which the velocity of linearisation follows the estimated one, s.
@@ -54,17 +62,19 @@ Densities densities(const ImuReading& a, const ImuReading& b, double dt, const I
 }
 
 void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vector3d& bg,
-          const Vector3d& ba, const ImuNoise& noise) {
+          const Vector3d& ba, const ImuNoise& noise, const Vector3d& scale) {
   const double dt = toSeconds(b.time - a.time);
-  const Vector3d w0 = a.gyro - bg, w1 = b.gyro - bg, wm = 0.5 * (w0 + w1);
+  const Vector3d w0 = (a.gyro - bg).cwiseQuotient(scale), w1 = (b.gyro - bg).cwiseQuotient(scale);
+  const Vector3d wm = 0.5 * (w0 + w1);
   const Vector3d f0 = a.accel - ba, f1 = b.accel - ba, fm = 0.5 * (f0 + f1);
-  const Turn half = turn(w0, wm, 0.5 * dt), whole = turn(w0, w1, dt);
+  const Turn half = turn(w0, wm, 0.5 * dt, scale), whole = turn(w0, w1, dt, scale);
   const Matrix3d R0 = x.dq.toRotationMatrix(), Rm = R0 * half.R, R1 = R0 * whole.R;
 
-  // d (R f) by the rotation error at the start and by the gyro bias, at start, middle and end.
+  // d (R f) by the rotation error at the start, by gyro bias and scale, at start, middle and end.
   const Matrix3d A0 = -R0 * skew(f0), Am = -Rm * skew(fm), A1 = -R1 * skew(f1);
   const Matrix3d Am_t = Am * half.R.transpose(), A1_t = A1 * whole.R.transpose();
   const Matrix3d Am_b = Am * half.J_bias, A1_b = A1 * whole.J_bias;
+  const Matrix3d Am_s = Am * half.J_scale, A1_s = A1 * whole.J_scale;
   const double v6 = dt / 6.0, p6 = dt * dt / 6.0;
 
   Matrix15d F = Matrix15d::Identity();
@@ -77,6 +87,8 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   F.block<3, 3>(kVelocity, kTheta) = v6 * (A0 + 4.0 * Am_t + A1_t);
   F.block<3, 3>(kVelocity, kGyroBias) = v6 * (4.0 * Am_b + A1_b);
   F.block<3, 3>(kVelocity, kAccelBias) = -v6 * (R0 + 4.0 * Rm + R1);
+  Matrix93d by_scale;
+  by_scale << whole.J_scale, p6 * 2.0 * Am_s, v6 * (4.0 * Am_s + A1_s);
 
   const Densities d = densities(a, b, dt, noise);
   const Matrix3d I = Matrix3d::Identity();
@@ -91,6 +103,7 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   Q.block<3, 3>(kGyroBias, kGyroBias) = gyro_walk * gyro_walk * dt * I;
   Q.block<3, 3>(kAccelBias, kAccelBias) = accel_walk * accel_walk * dt * I;
 
+  x.by_scale = (F.topLeftCorner<9, 9>() * x.by_scale + by_scale).eval();
   x.F = (F * x.F).eval();
   x.Q = (F * x.Q * F.transpose() + Q).eval();
   x.dp += x.dv * dt + p6 * (R0 * f0 + 2.0 * (Rm * fm));
@@ -105,11 +118,12 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
 }  // namespace
 
 ImuIncrement integrate(const std::vector<ImuReading>& readings, const Vector3d& gyro_bias,
-                       const Vector3d& accel_bias, const ImuNoise& noise) {
+                       const Vector3d& accel_bias, const ImuNoise& noise,
+                       const Vector3d& gyro_scale) {
   check(readings.size() >= 2, "an interval has two ends");
   ImuIncrement x;
   for (std::size_t i = 1; i < readings.size(); ++i) {
-    step(x, readings[i - 1], readings[i], gyro_bias, accel_bias, noise);
+    step(x, readings[i - 1], readings[i], gyro_bias, accel_bias, noise, gyro_scale);
   }
   x.mean_rate /= x.dt;
   x.mean_force /= x.dt;
@@ -117,23 +131,26 @@ ImuIncrement integrate(const std::vector<ImuReading>& readings, const Vector3d& 
 }
 
 Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
-                                     const Vector3d& gyro_bias) {
+                                     const Vector3d& gyro_bias, const Vector3d& gyro_scale) {
+  const auto rate = [&](const ImuReading& r) {
+    return Vector3d((r.gyro - gyro_bias).cwiseQuotient(gyro_scale));
+  };
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   for (std::size_t i = 1; i < readings.size(); ++i) {
     const ImuReading &a = readings[i - 1], &b = readings[i];
-    const Matrix3d R = turn(a.gyro - gyro_bias, b.gyro - gyro_bias, toSeconds(b.time - a.time)).R;
+    const Matrix3d R = expSo3(turned(rate(a), rate(b), toSeconds(b.time - a.time)));
     q = Eigen::Quaterniond(Matrix3d(q.toRotationMatrix() * R)).normalized();
   }
   return q;
 }
 
 RowMotion rowMotion(const Nav& nav, const ImuBuffer& imu, TimePoint time, Duration half,
-                    double gravity, std::vector<ImuReading>& readings) {
+                    double gravity, std::vector<ImuReading>& readings, const Vector3d& gyro_scale) {
   const double h = toSeconds(half);
   imu.between(time - half, time, readings);
-  const Vector3d before = logSo3(integrateRotation(readings, nav.gyro_bias));
+  const Vector3d before = logSo3(integrateRotation(readings, nav.gyro_bias, gyro_scale));
   imu.between(time, time + half, readings);
-  const Vector3d after = logSo3(integrateRotation(readings, nav.gyro_bias));
+  const Vector3d after = logSo3(integrateRotation(readings, nav.gyro_bias, gyro_scale));
   const Eigen::Quaterniond q_BW = nav.q_WB.conjugate();
   RowMotion m;
   m.rate = (before + after) / (2.0 * h);
@@ -168,6 +185,34 @@ Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& x, cons
   return Phi;
 }
 
+namespace {
+
+/// How the errors of navigation follow from those before, and from the scale's where that is
+/// estimated.
+struct Moves {
+  const Matrix15d& Phi;
+  Matrix93d by_scale;
+  std::optional<int> scale_at;
+};
+
+/// The covariance of navigation afterwards.
+Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
+  const auto P = state.P();
+  Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;
+  if (!m.scale_at) return result;
+  const Eigen::Matrix<double, kNavSize, 3> cross =
+      m.Phi * P.block<kNavSize, kScaleSize>(0, *m.scale_at);
+  const Eigen::Matrix<double, kNavSize, 9> added = cross * m.by_scale.transpose();
+  result.leftCols<9>() += added;
+  result.topRows<9>() += added.transpose();
+  result.topLeftCorner<9, 9>() += m.by_scale *
+                                  P.block<kScaleSize, kScaleSize>(*m.scale_at, *m.scale_at) *
+                                  m.by_scale.transpose();
+  return result;
+}
+
+}  // namespace
+
 void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity,
                bool first_estimates) {
   const Matrix3d R0 = state.nav.q_WB.toRotationMatrix();
@@ -185,17 +230,24 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
   G.block<3, 3>(kPosition, kPosition) = R0;
   G.block<3, 3>(kVelocity, kVelocity) = R0;
 
+  Moves moves{Phi, x.by_scale, state.scaleAt()};
+  moves.by_scale.middleRows<3>(kPosition) = R0 * x.by_scale.middleRows<3>(kPosition);
+  moves.by_scale.middleRows<3>(kVelocity) = R0 * x.by_scale.middleRows<3>(kVelocity);
+
   auto P = state.P();
   const Eigen::Index rest = state.size() - kNavSize;
-  Matrix15d P_nav =
-      Phi * P.topLeftCorner<kNavSize, kNavSize>() * Phi.transpose() + G * x.Q * G.transpose();
+  const Matrix15d P_nav = movedNav(state, moves, G * x.Q * G.transpose());
   P.topLeftCorner<kNavSize, kNavSize>() = 0.5 * (P_nav + P_nav.transpose());
   // In pieces that fit on the stack.
   constexpr int kPiece = 32;
   for (Eigen::Index at = 0; at < rest; at += kPiece) {
     auto cross = P.block(0, kNavSize + at, kNavSize, std::min<Eigen::Index>(kPiece, rest - at));
-    const Eigen::Matrix<double, kNavSize, Eigen::Dynamic, Eigen::ColMajor, kNavSize, kPiece> moved =
+    Eigen::Matrix<double, kNavSize, Eigen::Dynamic, Eigen::ColMajor, kNavSize, kPiece> moved =
         Phi * cross;
+    if (moves.scale_at) {
+      moved.topRows<9>().noalias() +=
+          moves.by_scale * P.block(*moves.scale_at, kNavSize + at, kScaleSize, cross.cols());
+    }
     cross = moved;
   }
   P.bottomLeftCorner(rest, kNavSize) = P.topRightCorner(kNavSize, rest).transpose();

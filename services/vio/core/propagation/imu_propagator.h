@@ -14,31 +14,37 @@
 namespace perdure::vio {
 
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
+using Matrix93d = Eigen::Matrix<double, 9, 3>;
 
 /// Increment from body frame B0 to B1; gravity and the initial velocity are not in it.
 struct ImuIncrement {
   double dt = 0.0;                                                             ///< s
   Eigen::Quaterniond dq = Eigen::Quaterniond::Identity();                      ///< R_B0_B1
   Eigen::Vector3d dv = Eigen::Vector3d::Zero(), dp = Eigen::Vector3d::Zero();  ///< in B0
-  Matrix15d F = Matrix15d::Identity();  ///< d [θ, dp, dv, bg, ba] at the end / at the start
-  Matrix15d Q = Matrix15d::Zero();      ///< noise of the same
-  Eigen::Vector3d end_rate = Eigen::Vector3d::Zero();    ///< w_WB_B at the end, bias removed
-  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();   ///< bias removed
+  Matrix15d F = Matrix15d::Identity();     ///< d [θ, dp, dv, bg, ba] at the end / at the start
+  Matrix15d Q = Matrix15d::Zero();         ///< noise of the same
+  Matrix93d by_scale = Matrix93d::Zero();  ///< d [θ, dp, dv] at the end / gyroscope's scale
+  Eigen::Vector3d end_rate = Eigen::Vector3d::Zero();    ///< w_WB_B at the end, corrected
+  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();   ///< bias and scale removed
   Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();  ///< bias removed, in B
 };
 
-/// readings: at least two, in time order, as ImuBuffer::between gives them.
+/// readings: at least two, in time order, as ImuBuffer::between gives them. A rate is
+/// (reading − bias) / scale.
 ImuIncrement integrate(const std::vector<ImuReading>& readings, const Eigen::Vector3d& gyro_bias,
-                       const Eigen::Vector3d& accel_bias, const ImuNoise& noise);
+                       const Eigen::Vector3d& accel_bias, const ImuNoise& noise,
+                       const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());
 
 /// integrate()'s dq alone: R_B0_B1.
 Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
-                                     const Eigen::Vector3d& gyro_bias);
+                                     const Eigen::Vector3d& gyro_bias,
+                                     const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());
 
 /// The body's motion from `half` before `time` until as long after it, where `nav` is at `time`.
 /// Samples are held where they do not reach. `readings`: memory that is used again.
 RowMotion rowMotion(const Nav& nav, const ImuBuffer& imu, TimePoint time, Duration half,
-                    double gravity, std::vector<ImuReading>& readings);
+                    double gravity, std::vector<ImuReading>& readings,
+                    const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());
 
 /// The navigation state after the increment; gravity in m/s², along −z of W.
 Nav predict(const Nav& nav, const ImuIncrement& increment, double gravity);

@@ -55,6 +55,7 @@ struct CalibrationOptions {
   double second_camera_factor = 0.1;  ///< a stereo pair is calibrated better among itself
   double time_offset_s = 0.005;
   double readout_s = 0.005;  ///< of a rolling shutter
+  double gyro_scale = 0.0;   ///< of each axis, from 1; 0: exact, not estimated
 };
 
 struct StartOptions {

@@ -7,7 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr const char* kMagic = "perdure-vio-state-2";
+constexpr const char* kMagic = "perdure-vio-state-3";
 // What a vehicle may do unobserved: turn, accelerate.
 constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
 // A restart loses the correlations with the window.
@@ -85,6 +85,7 @@ std::string toText(const SavedState& s) {
   }
   put(body, s.time_offset_s);
   for (const double readout : s.readout_s) put(body, readout);
+  put(body, s.gyro_scale);
   put(body, s.covariance);
   return std::string(kMagic) + ' ' + toHex(digest(body)) + '\n' + body;
 }
@@ -106,8 +107,8 @@ Result<SavedState> fromText(const std::string& text) {
   const auto cameras = in.integer<std::size_t>();
   const auto n = in.integer<Eigen::Index>();
   if (!in.good() || cameras < 1 || cameras > 2) return malformed("its head");
-  const Eigen::Index without_readouts = kNavSize + 6 * static_cast<Eigen::Index>(cameras) + 1;
-  if (n < without_readouts || n > without_readouts + static_cast<Eigen::Index>(cameras)) {
+  const Eigen::Index least = kNavSize + 6 * static_cast<Eigen::Index>(cameras) + 1;
+  if (n < least || n > least + static_cast<Eigen::Index>(cameras) + kScaleSize) {
     return malformed("its head");
   }
   s.nav.q_WB = in.rotation();
@@ -120,6 +121,7 @@ Result<SavedState> fromText(const std::string& text) {
   }
   s.time_offset_s = in.number();
   for (std::size_t i = 0; i < cameras; ++i) s.readout_s.push_back(in.number());
+  s.gyro_scale = in.vector();
   s.covariance.resize(n, n);
   for (Eigen::Index c = 0; c < n; ++c) {
     for (Eigen::Index r = 0; r < n; ++r) s.covariance(r, c) = in.number();

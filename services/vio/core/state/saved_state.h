@@ -18,7 +18,9 @@ struct SavedState {
   std::vector<RigidTransform> T_BC;
   double time_offset_s = 0.0;
   std::vector<double> readout_s;  ///< of each camera
-  Eigen::MatrixXd covariance;     ///< of [nav, extrinsics, time offset, estimated read-outs]
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
+  /// Of [nav, extrinsics, time offset, read-outs and scale where they are estimated].
+  Eigen::MatrixXd covariance;
   std::uint64_t next_track = 1;
 };
 

@@ -26,16 +26,19 @@ Workspace::Matrix Workspace::take(Eigen::Index rows, Eigen::Index columns) {
 }
 
 State::State(const std::vector<RigidTransform>& cameras, double offset, int max_clones,
-             int max_points, const std::vector<double>& readouts, bool estimate_readout)
+             int max_points, const std::vector<double>& readouts, bool estimate_readout,
+             bool estimate_scale)
     : T_BC(cameras),
       time_offset_s(offset),
       readout_s(readouts.empty() ? std::vector<double>(cameras.size(), 0.0) : readouts),
       readout_at_(cameras.size(), -1),
+      estimates_scale_(estimate_scale),
       size_(kNavSize + 6 * static_cast<int>(cameras.size()) + 1) {
   check(readout_s.size() == cameras.size(), "each camera has a read-out, or none");
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     if (estimate_readout && rolls(c)) readout_at_[c] = size_++;
   }
+  size_ = calibrationEnd();
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
   // The largest updates: of all points, and of compressed rows by calibration and clones.
@@ -165,6 +168,7 @@ void State::apply(const VectorView& dx) {
   for (std::size_t c = 0; c < readout_s.size(); ++c) {
     if (const auto at = readoutAt(c)) readout_s[c] += dx[*at];
   }
+  if (const auto at = scaleAt()) gyro_scale += dx.segment<kScaleSize>(*at);
   for (Clone& c : clones) c.T_WB = boxPlus(c.T_WB, dx.segment<6>(c.at));
   for (PointState& p : points) p.p_W += dx.segment<3>(p.at);
 }
@@ -243,7 +247,7 @@ Result<void> State::update(std::span<const Measurement> measurements) {
 
 bool State::healthy() const {
   if (!nav.T_WB().finite() || !nav.v_WB.allFinite() || !nav.gyro_bias.allFinite() ||
-      !nav.accel_bias.allFinite() || !std::isfinite(time_offset_s)) {
+      !nav.accel_bias.allFinite() || !std::isfinite(time_offset_s) || !gyro_scale.allFinite()) {
     return false;
   }
   if (!std::all_of(readout_s.begin(), readout_s.end(), [](double s) { return std::isfinite(s); })) {

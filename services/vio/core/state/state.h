@@ -1,8 +1,8 @@
 // The filter's state: navigation, camera-IMU calibration, a window of past poses and points, and
 // the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
-// Order of the error: nav [θ, p, v, b_g, b_a], per camera [θ_BC, p_BC], time offset, read-outs that
-// are estimated, then clones and points in the order in which they came. Rotations err on the
-// right, R = R̂ Exp(θ).
+// Order of the error: nav [θ, p, v, b_g, b_a], per camera [θ_BC, p_BC], time offset, read-outs and
+// gyroscope scale where they are estimated, then clones and points in the order in which they came.
+// Rotations err on the right, R = R̂ Exp(θ).
 #pragma once
 
 #include <Eigen/Core>
@@ -88,15 +88,17 @@ class Workspace {
   Eigen::Index taken_ = 0;
 };
 
-inline constexpr int kNavSize = 15;
+inline constexpr int kNavSize = 15, kScaleSize = 3;
 inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
 
 class State {
  public:
   /// readout_s: of each camera, 0 where all rows are exposed at once; none given: all are. Those
-  /// that are not 0 are in the error where estimate_readout says so.
+  /// that are not 0 are in the error where estimate_readout says so, the gyroscope's scale where
+  /// estimate_scale does.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
-        int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false);
+        int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
+        bool estimate_scale = false);
 
   /// nav_linear: q as predicted, p and v on a path that no update moves: where Jacobians are taken.
   Nav nav, nav_linear;
@@ -104,7 +106,9 @@ class State {
   std::vector<RigidTransform> T_BC;  ///< one for each camera
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
   std::vector<double> readout_s;     ///< of each camera: first to last row; 0: all at once
-  std::vector<Clone> clones;         ///< oldest first
+  /// Of each axis: a reading without its bias is so many times the rate.
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
+  std::vector<Clone> clones;  ///< oldest first
   std::vector<PointState> points;
 
   int size() const { return size_; }
@@ -113,8 +117,14 @@ class State {
   /// Where the error of a camera's read-out is; nothing where that is not estimated.
   std::optional<int> readoutAt(std::size_t camera) const;
   int readoutCount() const;
+  /// Where the error of the gyroscope's scale is; nothing where that is not estimated.
+  std::optional<int> scaleAt() const {
+    return estimates_scale_ ? std::optional(timeOffsetAt() + 1 + readoutCount()) : std::nullopt;
+  }
   /// What comes before clones and points.
-  int calibrationEnd() const { return timeOffsetAt() + 1 + readoutCount(); }
+  int calibrationEnd() const {
+    return timeOffsetAt() + 1 + readoutCount() + (estimates_scale_ ? kScaleSize : 0);
+  }
   bool rolls(std::size_t camera) const { return readout_s[camera] != 0.0; }
   /// Of all cameras; 0 where none rolls.
   double longestReadout() const {
@@ -168,6 +178,7 @@ class State {
   void remove(int at, int size);
 
   std::vector<int> readout_at_;  ///< of each camera; −1: not estimated
+  bool estimates_scale_;
   int size_;
   Eigen::MatrixXd P_;  ///< capacity; the upper left size_ × size_ counts
   Workspace workspace_;
