@@ -22,8 +22,8 @@ struct Turn {
 /// changes most. Pairs with fewer than 15 corners that can be followed are left out.
 std::vector<Turn> turnsOfImages(const replay::Recording& recording, std::size_t most = 36);
 
-/// Codes: gyro_in_degrees, gyro_too_small, T_BS_inverted, T_BS_turned, time_offset. Nothing where
-/// images or gyroscope turn too little to tell.
+/// Codes: gyro_in_degrees, gyro_too_small, gyro_constant, T_BS_inverted, T_BS_turned, time_offset.
+/// Nothing where images or gyroscope turn too little to tell.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);
