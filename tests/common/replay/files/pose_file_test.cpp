@@ -45,6 +45,12 @@ TEST(PoseFile, TumPosesAreInterpolatedBetweenCloseNeighboursOnly) {
   EXPECT_TRUE(poses.at(0, at(9.0005))) << "within a millisecond it is the same time";
 }
 
+TEST(PoseFile, NanosecondsAreToldToBeNoSeconds) {
+  EXPECT_THAT(errorOfPoses("1403715273262142976 0 0 0 0 0 0 1\n"),
+              HasSubstr(":1: the time 1403715273262142976 is not in seconds; where it is in "
+                        "nanoseconds, divide it by 1000000000"));
+}
+
 TEST(PoseFile, AnEmptyLineAmongKittisIsNamedSinceItWouldShiftTheOthers) {
   const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   EXPECT_THAT(errorOfPoses(pose + "\n" + pose), HasSubstr("poses.txt:2: the line is empty"));
