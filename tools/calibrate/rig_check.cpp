@@ -211,7 +211,7 @@ Judgements judgeRig(const RigCheck& check) {
   }
   if (5 * check.speed_refused > check.frames) {
     all.push_back({Grade::kBad, fmt::format("the speed contradicts camera and IMU at {} of {} "
-                                            "images; see its unit (m/s) and its stamps",
+                                            "images; see its unit (m/s), its stamps and the IMU",
                                             check.speed_refused, check.frames)});
   }
   const double against =

@@ -22,7 +22,7 @@ constexpr Doubt kDoubts[] = {
     {"points_too_far", 20, "nearly all points lie beyond vision.max_depth",
      "see that the poses are in metres, or raise it"},
     {"speed_gated", 5, "the speed contradicts camera and IMU and was refused",
-     "see its unit (m/s) and its stamps, or leave it away (vio.speed.enabled=false)"},
+     "see its unit (m/s), its stamps and the IMU, or leave it away (vio.speed.enabled=false)"},
 };
 
 }  // namespace

@@ -82,7 +82,7 @@ TEST(PoseFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 -1 0\n"), HasSubstr("right-handed"));
   EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\n"), HasSubstr("0 0 0 1"));
   EXPECT_THAT(errorOfPoses("0 0 0 nan 0 0 0 1\n"), HasSubstr(":1: write eight finite numbers"));
-  EXPECT_THAT(errorOfPoses("-9223372036854775808.5 0 0 0 0 0 0 1\n"), HasSubstr(":1: write eight"));
+  EXPECT_THAT(errorOfPoses("-9223372036854775808.5 0 0 0 0 0 0 1\n"), HasSubstr(":1: the time"));
   EXPECT_THAT(errorOfPoses("1e300 0 0 0 -1e300 1 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
   EXPECT_THAT(errorOfPoses("1 2 3\n"), HasSubstr(":1: 3 numbers; write 8"));
   EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0\n"), HasSubstr(":2: 4 numbers"));
