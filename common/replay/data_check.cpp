@@ -125,6 +125,23 @@ void checkRate(const Recording& recording, DataFindings& findings) {
                    rate, said)});
 }
 
+/// Whether the mean force, which is away from the ground, points down in the image.
+void checkUpright(const Recording& recording, DataFindings& findings) {
+  if (recording.imu.size() < 20 || recording.calibration.cameras.empty()) return;
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : recording.imu) sum += sample.accel;
+  const Eigen::Vector3d up_C = camera.T_BC.q.conjugate() * sum.normalized();
+  constexpr double kSurely = 0.8;  // within 37°
+  if (!(up_C.y() > kSurely)) return;
+  findings.push_back(
+      {Grade::kWarning, "images_upside_down",
+       fmt::format("by the accelerometer the images of {} are upside down: see the signs of the "
+                   "accelerometer (at rest it reads +9.8 along what points up) and T_BS; where the "
+                   "camera hangs upside down, turn its images",
+                   camera.name)});
+}
+
 bool isFlat(const cv::Mat& image) {
   cv::Scalar mean, deviation;
   cv::meanStdDev(image, mean, deviation);
@@ -226,6 +243,7 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
     findings.insert(findings.end(), units.begin(), units.end());
   }
   if (!use.images) return findings;
+  if (use.imu) checkUpright(recording, findings);
   for (std::size_t camera = 0; camera < recording.calibration.cameras.size(); ++camera) {
     checkImages(recording, camera, findings);
   }

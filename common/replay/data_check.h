@@ -25,7 +25,8 @@ struct DataUse {
 
 /// Looks at three images of each camera, and at all stamps and samples. Codes: image_unreadable,
 /// image_size, image_flat, clocks_apart, imu_covers_part, imu_rate, accel_in_g, accel_in_mg,
-/// accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale.
+/// accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
+/// images_upside_down.
 DataFindings checkData(const Recording& recording, const DataUse& use);
 
 /// Of the inertial samples alone.

@@ -18,8 +18,9 @@ constexpr char kNoSamples[] =
     "frames have no inertial samples of their time; start the IMU, or give both one clock";
 
 constexpr char kImagesContradict[] =
-    "most of what the images show contradicts the IMU: see T_BS (is it the inverse?), the "
-    "gyroscope's unit (radians per second) and time_offset_s; or what moves fills the picture";
+    "most of what the images show contradicts the IMU: see T_BS (is it the inverse?), the IMU's "
+    "axes, signs and units (radians per second), the focal length and time_offset_s; or what moves "
+    "fills the picture";
 
 double seconds(Duration d) { return toSeconds(d); }
 

@@ -47,6 +47,10 @@ class Watch {
     node_->flush();
     remember();
     check.resets = node_->reasons().of("reset");
+    check.holes = node_->reasons().of("clock_jumped_or_blackout") +
+                  node_->reasons().of("imu_gap_too_long") +
+                  node_->reasons().of("clock_jumped_back");
+    check.speed_refused = node_->reasons().of("speed_gated");
     check.contradicted = node_->reasons().of("images_contradict_imu");
     believe();
   }
@@ -197,18 +201,30 @@ Judgements judgeRig(const RigCheck& check) {
                                      : Grade::kBad,
                        fmt::format("vio tracked {} of {} images", check.tracked, check.frames),
                        "move with the camera on things that stand, or calibrate anew"));
-  if (check.resets > 0) {
+  if (check.holes > 0) {
+    all.push_back({Grade::kBad,
+                   fmt::format("stamps jump, or samples are missing, {} times for so long that vio "
+                               "began anew; see what writes the recording, or cut it there",
+                               check.holes)});
+  }
+  if (check.resets > check.holes) {
     all.push_back({Grade::kBad, fmt::format("vio lost its way {} times; calibrate anew, or record "
                                             "with the camera on things that stand",
-                                            check.resets)});
+                                            check.resets - check.holes)});
+  }
+  if (5 * check.speed_refused > check.frames) {
+    all.push_back({Grade::kBad, fmt::format("the speed contradicts camera and IMU at {} of {} "
+                                            "images; see its unit (m/s), its stamps and the IMU",
+                                            check.speed_refused, check.frames)});
   }
   const double against =
       static_cast<double>(check.contradicted) / static_cast<double>(check.frames);
   if (against > 0.05) {
     all.push_back({against > 0.2 ? Grade::kBad : Grade::kDoubtful,
                    fmt::format("images contradict the IMU in {:.0f} % of the drive; see T_BS (is "
-                               "it the inverse?), the gyroscope's unit (radians per second) and "
-                               "time_offset_s, or whether what moves fills the picture",
+                               "it the inverse?), the IMU's axes, signs and units (radians per "
+                               "second), the focal length and time_offset_s, or whether what moves "
+                               "fills the picture",
                                100.0 * against)});
     if (check.innovations.size() < 500) return all;
   }

@@ -21,6 +21,8 @@ struct RigCheckOptions {
 struct RigCheck {
   CameraCalibration camera;
   std::size_t frames = 0, tracked = 0, resets = 0;
+  std::size_t holes = 0;  ///< of the resets: stamps jumped, or samples were missing
+  std::size_t speed_refused = 0;
   std::size_t contradicted = 0;  ///< frames at which most of the last seconds' points were refused
   std::vector<vio::Innovation> innovations;
   bool believed = false;  ///< vio had a start and the following four say something

@@ -216,11 +216,18 @@ replay::DataFindings judgeScale(double gyro, double images, double focal) {
                  "per second (or the images stand still); multiply its columns by 0.0174533",
                  std::min(ratio, 9999.0))}};
   }
+  if (gyro < 1e-12 && images * focal > 3.0) {
+    return {{DataFinding::Grade::kFatal, "gyro_constant",
+             "the gyroscope says the same all the time while the images turn: it is off, or its "
+             "columns were not recorded; record w_x, w_y, w_z, which vio needs"}};
+  }
   if (ratio < 1.0 / 20.0 && images * focal > 3.0) {
     return {
         {DataFinding::Grade::kFatal, "gyro_too_small",
          fmt::format("the images turn {:.0f} times as much as the gyroscope says: its unit is too "
-                     "small; where degrees were converted twice, multiply its columns by 57.2958",
+                     "small (where degrees were converted twice, multiply its columns by 57.2958), "
+                     "or the images "
+                     "are of another drive",
                      1.0 / std::max(1e-4, ratio))}};
   }
   return {};

@@ -108,6 +108,9 @@ void run(const PipelineOptions& options) {
   if (const auto doubt = pipeline.doubtOfPoses(); !doubt.empty()) {
     std::fprintf(stderr, "At the end: %s\n", doubt.c_str());
   }
+  for (const auto& doubt : pipeline.doubts()) {
+    std::fprintf(stderr, "warning: %s\n", doubt.c_str());
+  }
   std::printf("%llu frames, %llu poses, %llu detections, %zu objects on the map: %s\n",
               static_cast<unsigned long long>(pipeline.counts().frames),
               static_cast<unsigned long long>(pipeline.counts().odometry),

@@ -70,6 +70,8 @@ class Pipeline {
   bool usesModel() const { return inference_ != nullptr; }
   /// A sentence where the poses that were given contradict the images; else empty.
   std::string doubtOfPoses() const;
+  /// What was counted in the run and must be told, a sentence each.
+  std::vector<std::string> doubts() const;
   /// Counted reasons by service.
   std::map<std::string, ReasonCounts> reasons() const;
 

@@ -8,7 +8,9 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "services/vio/cameras.h"
 #include "tools/data_check/data_check.h"
+#include "tools/pipeline/doubts.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {
@@ -62,6 +64,13 @@ void Pipeline::checkData() {
   const auto data = dataOptions();
   findings_ =
       checkDrive(dataset_->recording(), {.images = data.decode, .imu = options_.odometry == "vio"});
+  if (options_.odometry == "vio" || options_.landmarks) {
+    const auto unknown = vio::unknownCamera(configs_.vio, dataset_->calibration());
+    if (!unknown.empty()) {
+      findings_.push_back({replay::DataFinding::Grade::kWarning, "camera_unknown",
+                           unknown + "; set vio.input.cameras to these"});
+    }
+  }
   replay::refuseFatal(findings_, options_.data);
   if (!pose_file_ || !data.decode) return;
   const auto of_poses = checkPoses(dataset_->recording(), *pose_file_);
@@ -96,6 +105,13 @@ void Pipeline::refuseUnwritten() const {
   }
 }
 
+std::vector<std::string> Pipeline::doubts() const {
+  const ReasonCounts of_vio = vio_           ? vio_->reasons()
+                              : known_poses_ ? known_poses_->reasons()
+                                             : ReasonCounts();
+  return doubtsOfRun(of_vio, counts_.frames, reasons_.of("frame_without_pose"));
+}
+
 void Pipeline::refuseNothing() const {
   const auto& recording = dataset_->recording();
   const std::string counted = listOf(dataset_->reasons());
@@ -126,13 +142,6 @@ void Pipeline::refuseNothing() const {
     const ReasonCounts reasons = vio_ ? vio_->reasons() : ReasonCounts();
     refuse(fmt::format("no pose came of {} frames ({}{}{}): {}", counts_.frames, counted,
                        counted.empty() ? "" : "; ", listOf(reasons), mendOfStart(reasons)));
-  }
-  if (const auto against = vio_ ? vio_->reasons().of("images_contradict_imu") : 0;
-      5 * against > counts_.frames) {
-    std::fprintf(stderr,
-                 "warning: images contradict the IMU at %zu of %zu frames: T_BS, the gyroscope's "
-                 "unit or time_offset_s may be wrong; see perdure doctor --data\n",
-                 static_cast<std::size_t>(against), static_cast<std::size_t>(counts_.frames));
   }
   if (options_.detections == "none") return;
   // What came and went was there; nothing to find is no fault of the data then.

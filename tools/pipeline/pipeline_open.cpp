@@ -5,6 +5,7 @@
 #include "common/replay/files/class_aliases.h"
 #include "common/replay/ros_topics.h"
 #include "services/semantic_filter/priors.h"
+#include "tools/evaluate/simulated_truth.h"
 #include "tools/pipeline/instances.h"
 #include "tools/pipeline/pipeline.h"
 

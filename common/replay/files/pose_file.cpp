@@ -38,7 +38,12 @@ void addTum(const TextLine& line, const std::vector<std::string_view>& fields,
             std::vector<StampedPose>& poses, Complaints& wrong) {
   const auto time = parseSeconds(fields[0]);
   const auto v = parseNumbers(fields);
-  if (!v || !time) return wrong.add(line.number, "write eight finite numbers, t x y z qx qy qz qw");
+  if (v && !time) {
+    return wrong.add(line.number, "the time " + std::string(fields[0]) +
+                                      " is not in seconds; where it is in nanoseconds, divide it "
+                                      "by 1000000000");
+  }
+  if (!v) return wrong.add(line.number, "write eight finite numbers, t x y z qx qy qz qw");
   const Eigen::Quaterniond q((*v)[7], (*v)[4], (*v)[5], (*v)[6]);
   if (std::abs(q.norm() - 1.0) > kUnitTolerance) {
     return wrong.add(line.number, "the quaternion's norm is " + std::to_string(q.norm()) +

@@ -92,6 +92,25 @@ TEST(RigCheck, ImagesThatContradictTheImuAreNotTooFew) {
   EXPECT_THAT(worst(check).text, HasSubstr("record a minute"));
 }
 
+TEST(RigCheck, AHoleOfTheRecordingIsNoFaultOfTheRig) {
+  RigCheck check = goodCheck();
+  check.resets = check.holes = 1;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("stamps jump, or samples are missing, 1 times"));
+  for (const auto& one : judgeRig(check)) {
+    EXPECT_THAT(one.text, testing::Not(HasSubstr("calibrate anew")));
+  }
+}
+
+TEST(RigCheck, ASpeedThatIsNearlyAlwaysRefusedIsTold) {
+  RigCheck check = goodCheck();
+  check.speed_refused = 400;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("see its unit (m/s)"));
+  check.speed_refused = 50;
+  EXPECT_EQ(worst(check).grade, Grade::kGood);
+}
+
 TEST(RigCheck, TooLittleToJudgeBySaysWhatToRecord) {
   RigCheck check = goodCheck();
   check.innovations.resize(100);

@@ -75,6 +75,22 @@ TEST(DataCheck, DegreesPerSecondAreSeenByTheImages) {
   EXPECT_THAT(codesOf(findingsOf("converted_twice", drive)), ElementsAre("gyro_too_small"));
 }
 
+TEST(DataCheck, AGyroscopeThatIsOffIsNoMatterOfUnits) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { sample.gyro.setConstant(0.01); };
+  const auto findings = findingsOf("gyro_off", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("gyro_constant"));
+  EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
+}
+
+TEST(DataCheck, AnAccelerometerOfTheOtherSignTurnsTheImagesUpsideDown) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { sample.accel = -sample.accel; };
+  const auto findings = findingsOf("other_sign", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("images_upside_down"));
+  EXPECT_THAT(findings[0].text, HasSubstr("signs of the accelerometer"));
+}
+
 TEST(DataCheck, ATransformTheWrongWayRoundIsNamed) {
   TurningDrive drive;
   drive.written_T_BC = tests::trueCameraPlace().inverse();

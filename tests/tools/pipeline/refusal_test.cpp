@@ -69,6 +69,16 @@ TEST(PipelineRefusal, WithoutTheImuItsUnitsDoNotMatter) {
   EXPECT_THAT(endOf(options).second, 0) << "poses at most .5 s apart, but the ends are exact";
 }
 
+TEST(PipelineRefusal, ACameraThatTheDriveLacksIsTold) {
+  auto options = optionsFor(makeTurningDrive("unknown_camera"));
+  EXPECT_TRUE(Pipeline(options).findings().empty());
+  options.assignments = {"vio.input.cameras=[left]"};
+  const auto findings = Pipeline(options).findings();
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].code, "camera_unknown");
+  EXPECT_THAT(findings[0].text, HasSubstr("names left, which the calibration does not (cam0)"));
+}
+
 TEST(PipelineRefusal, OneFrameIsNoDrive) {
   auto options = optionsFor(makeTurningDrive("one_frame"));
   options.every = 1000;

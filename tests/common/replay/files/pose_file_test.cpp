@@ -45,6 +45,12 @@ TEST(PoseFile, TumPosesAreInterpolatedBetweenCloseNeighboursOnly) {
   EXPECT_TRUE(poses.at(0, at(9.0005))) << "within a millisecond it is the same time";
 }
 
+TEST(PoseFile, NanosecondsAreToldToBeNoSeconds) {
+  EXPECT_THAT(errorOfPoses("1403715273262142976 0 0 0 0 0 0 1\n"),
+              HasSubstr(":1: the time 1403715273262142976 is not in seconds; where it is in "
+                        "nanoseconds, divide it by 1000000000"));
+}
+
 TEST(PoseFile, AnEmptyLineAmongKittisIsNamedSinceItWouldShiftTheOthers) {
   const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   EXPECT_THAT(errorOfPoses(pose + "\n" + pose), HasSubstr("poses.txt:2: the line is empty"));
@@ -76,7 +82,7 @@ TEST(PoseFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 -1 0\n"), HasSubstr("right-handed"));
   EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\n"), HasSubstr("0 0 0 1"));
   EXPECT_THAT(errorOfPoses("0 0 0 nan 0 0 0 1\n"), HasSubstr(":1: write eight finite numbers"));
-  EXPECT_THAT(errorOfPoses("-9223372036854775808.5 0 0 0 0 0 0 1\n"), HasSubstr(":1: write eight"));
+  EXPECT_THAT(errorOfPoses("-9223372036854775808.5 0 0 0 0 0 0 1\n"), HasSubstr(":1: the time"));
   EXPECT_THAT(errorOfPoses("1e300 0 0 0 -1e300 1 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
   EXPECT_THAT(errorOfPoses("1 2 3\n"), HasSubstr(":1: 3 numbers; write 8"));
   EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0\n"), HasSubstr(":2: 4 numbers"));

@@ -1,0 +1,49 @@
+#include "tools/pipeline/doubts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace perdure::tools {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::vector<std::string> doubtsAt(const char* code, std::uint64_t times) {
+  ReasonCounts vio;
+  vio.add(code, times);
+  return doubtsOfRun(vio, 240, 0);
+}
+
+TEST(Doubts, AGoodRunHasNone) {
+  EXPECT_THAT(doubtsOfRun({}, 240, 0), IsEmpty());
+  EXPECT_THAT(doubtsOfRun({}, 0, 0), IsEmpty());
+  EXPECT_THAT(doubtsAt("msckf_gated", 900), IsEmpty());
+  EXPECT_THAT(doubtsAt("speed_gated", 20), IsEmpty());
+}
+
+TEST(Doubts, ContradictionsOfATenthOfTheRunAreTold) {
+  EXPECT_THAT(doubtsAt("images_contradict_imu", 24),
+              ElementsAre(AllOf(HasSubstr("at 24 of 240 frames"), HasSubstr("axes, signs"))));
+  EXPECT_THAT(doubtsAt("images_contradict_imu", 12), IsEmpty());
+  EXPECT_THAT(doubtsAt("poses_contradict_images", 24), ElementsAre(HasSubstr("T_BW for T_WB")));
+  EXPECT_THAT(doubtsAt("points_too_far", 24), ElementsAre(HasSubstr("in metres")));
+}
+
+TEST(Doubts, ASpeedThatIsRefusedIsTold) {
+  EXPECT_THAT(doubtsAt("speed_gated", 200), ElementsAre(HasSubstr("its unit (m/s)")));
+}
+
+TEST(Doubts, TwoFramesOfReferenceAreTold) {
+  EXPECT_THAT(doubtsAt("reset", 1), ElementsAre(HasSubstr("not in one frame of reference")));
+}
+
+TEST(Doubts, PosesOfAPartOfTheDriveAreTold) {
+  EXPECT_THAT(doubtsOfRun({}, 240, 10), IsEmpty());
+  EXPECT_THAT(doubtsOfRun({}, 240, 234), ElementsAre(HasSubstr("234 of 240 frames have no pose")));
+}
+
+}  // namespace
+}  // namespace perdure::tools

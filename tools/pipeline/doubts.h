@@ -1,0 +1,18 @@
+// What a run that ended well has counted, and a person must be told all the same: sentences with
+// the mend.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace perdure::tools {
+
+/// vio: reasons of vio, or of what makes points where poses are given; frames: of the first camera;
+/// without_pose: of those, where poses are given.
+std::vector<std::string> doubtsOfRun(const ReasonCounts& vio, std::uint64_t frames,
+                                     std::uint64_t without_pose);
+
+}  // namespace perdure::tools
