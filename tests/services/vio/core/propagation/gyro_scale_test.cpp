@@ -6,6 +6,7 @@
 #include "common/math/so3.h"
 #include "services/vio/core/estimator.h"
 #include "services/vio/core/propagation/imu_propagator.h"
+#include "tests/services/vio/core/propagation/turning_readings.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {
@@ -16,29 +17,8 @@ using Eigen::VectorXd;
 
 const Vector3d kScale(1.04, 0.97, 1.02);
 
-std::vector<ImuReading> turningReadings() {
-  std::vector<ImuReading> readings;
-  for (int i = 0; i <= 10; ++i) {
-    const double t = 0.02 * i;
-    readings.push_back({fromNanoseconds(0) + durationFromSeconds(t),
-                        Vector3d(std::sin(9 * t) + 0.4, 1.5 * std::cos(7 * t), 0.8 - 3 * t),
-                        Vector3d(2 * std::sin(5 * t), 9.8 - 4 * t, 3 * std::cos(11 * t))});
-  }
-  return readings;
-}
-
-Nav navInTheMiddle() {
-  Nav nav;
-  nav.q_WB = expQuaternion(Vector3d(0.3, -0.7, 1.1));
-  nav.p_WB = {1, 2, 3};
-  nav.v_WB = {0.5, -1.5, 0.7};
-  nav.gyro_bias = {0.02, -0.05, 0.03};
-  nav.accel_bias = {0.1, 0.2, -0.15};
-  return nav;
-}
-
 ImuIncrement scaledIncrement(const Nav& nav, const Vector3d& scale) {
-  return integrate(turningReadings(), nav.gyro_bias, nav.accel_bias, ImuNoise{}, scale);
+  return integrate(test::turningReadings(), nav.gyro_bias, nav.accel_bias, ImuNoise{}, scale);
 }
 
 /// [θ, p, v] of the prediction.
@@ -61,7 +41,7 @@ Eigen::MatrixXd numericByGyro(const Nav& nav) {
 }
 
 TEST(GyroScale, DerivativesOfThePredictionAgreeWithNumericOnes) {
-  const Nav nav = navInTheMiddle();
+  const Nav nav = test::navInTheMiddle();
   const ImuIncrement x = scaledIncrement(nav, kScale);
   const Eigen::Matrix3d R = nav.q_WB.toRotationMatrix();
   Eigen::MatrixXd analytic(9, 6);
@@ -72,7 +52,7 @@ TEST(GyroScale, DerivativesOfThePredictionAgreeWithNumericOnes) {
 }
 
 TEST(GyroScale, AScaledReadingIsTheSameRate) {
-  const Nav nav = navInTheMiddle();
+  const Nav nav = test::navInTheMiddle();
   test::SimulatedDrive drive({});
   ImuBuffer plain, scaled;
   for (ImuReading r : drive.imu(1.0)) {
@@ -98,7 +78,7 @@ TEST(GyroScale, AScaledReadingIsTheSameRate) {
 
 TEST(GyroScale, TheCovarianceFollowsTheDerivatives) {
   State state(std::vector<RigidTransform>(2), 0.0, 8, 4, {}, false, true);
-  state.nav = state.nav_linear = navInTheMiddle();
+  state.nav = state.nav_linear = test::navInTheMiddle();
   state.gyro_scale = kScale;
   for (std::uint64_t frame = 1; frame <= 8; ++frame) {
     state.addClone(frame, fromNanoseconds(0), Vector3d::Zero(), false);

@@ -4,6 +4,7 @@
 
 #include "common/math/numeric_jacobian.h"
 #include "common/math/so3.h"
+#include "tests/services/vio/core/propagation/turning_readings.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {
@@ -11,27 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-std::vector<ImuReading> wildReadings() {
-  std::vector<ImuReading> readings;
-  for (int i = 0; i <= 10; ++i) {
-    const double t = 0.02 * i;
-    readings.push_back({fromNanoseconds(0) + durationFromSeconds(t),
-                        Vector3d(std::sin(9 * t) + 0.4, 1.5 * std::cos(7 * t), 0.8 - 3 * t),
-                        Vector3d(2 * std::sin(5 * t), 9.8 - 4 * t, 3 * std::cos(11 * t))});
-  }
-  return readings;
-}
-
-Nav someNav() {
-  Nav nav;
-  nav.q_WB = expQuaternion(Vector3d(0.3, -0.7, 1.1));
-  nav.p_WB = {1, 2, 3};
-  nav.v_WB = {0.5, -1.5, 0.7};
-  nav.gyro_bias = {0.02, -0.05, 0.03};
-  nav.accel_bias = {0.1, 0.2, -0.15};
-  return nav;
-}
 
 Nav perturbed(const Nav& nav, const VectorXd& d) {
   Nav n = nav;
@@ -67,8 +47,8 @@ TEST(ImuPropagator, PredictsTheAnalyticTrajectoryWithinTolerance) {
 }
 
 TEST(ImuPropagator, TransitionIsTheDerivativeOfThePrediction) {
-  const auto readings = wildReadings();
-  const Nav nav = someNav();
+  const auto readings = test::turningReadings();
+  const Nav nav = test::navInTheMiddle();
   const auto end = [&](const Nav& from) {
     return predict(from, integrate(readings, from.gyro_bias, from.accel_bias, ImuNoise{}), 9.81);
   };
@@ -83,7 +63,7 @@ TEST(ImuPropagator, TransitionIsTheDerivativeOfThePrediction) {
 }
 
 TEST(ImuPropagator, NoiseCovarianceMatchesMonteCarlo) {
-  const Nav nav = someNav();
+  const Nav nav = test::navInTheMiddle();
   ImuNoise noise;
   noise.gyro = 0.01;
   noise.accel = 0.05;
@@ -123,7 +103,7 @@ TEST(ImuPropagator, NoiseCovarianceMatchesMonteCarlo) {
 }
 
 TEST(ImuPropagator, SparseSamplesAreTrustedLess) {
-  auto readings = wildReadings();
+  auto readings = test::turningReadings();
   ImuNoise noise;
   noise.interpolation_from_s = 1.0;
   const double dense = integrate(readings, Vector3d::Zero(), Vector3d::Zero(), noise).Q(6, 6);
