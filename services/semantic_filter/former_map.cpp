@@ -16,11 +16,12 @@ constexpr std::size_t kLastSeen = 16;  // objects that refine the alignment near
 
 bool stands(const ObjectBelief& belief) { return belief.confirmed && belief.moving < 0.5; }
 
-std::vector<PlacedThing> standing(const std::vector<Track>& objects, double min_speed) {
+std::vector<PlacedThing> standing(const std::vector<Track>& objects, const ClassPriors& priors,
+                                  double min_speed) {
   std::vector<PlacedThing> result;
   for (const Track& o : objects) {
     if (!o.life.confirmed || o.life.recalled) continue;
-    const ObjectBelief belief = toBelief(o, min_speed);
+    const ObjectBelief belief = toBelief(o, priors, min_speed);
     if (stands(belief)) result.push_back(placedOf(belief));
   }
   return result;
@@ -56,7 +57,7 @@ const FrameAlignment* FormerMap::look(const std::vector<Track>& objects,
                                       const Eigen::Vector3d& p_WB, TimePoint now) {
   if (!lookout_) return nullptr;
   if (looked_from_ && toSeconds(now - looked_at_) < kPause_s) return nullptr;
-  const auto seen = standing(objects, parameters_.motion.min_speed);
+  const auto seen = standing(objects, priors_, parameters_.motion.min_speed);
   const bool changed =
       !looked_from_ || seen.size() != looked_with_ || (p_WB - *looked_from_).norm() > kStep_m;
   if (!changed || seen.size() < static_cast<std::size_t>(parameters_.alignment.pairs)) {
@@ -84,7 +85,7 @@ void FormerMap::refine(const std::vector<Track>& objects) {
   for (const Track& o : objects) {
     const auto there = laid_.find(o.id);
     if (there == laid_.end() || o.life.recalled || o.life.hits <= there->second.second) continue;
-    const ObjectBelief belief = toBelief(o, parameters_.motion.min_speed);
+    const ObjectBelief belief = toBelief(o, priors_, parameters_.motion.min_speed);
     if (stands(belief)) {
       seen_again.push_back({o.life.last_seen, {there->second.first, placedOf(belief)}});
     }

@@ -15,8 +15,10 @@ namespace perdure::semantic_filter {
 
 class FormerMap {
  public:
-  explicit FormerMap(const Parameters& parameters)
-      : parameters_(parameters), questions_(parameters.memory, parameters.motion.min_speed) {}
+  FormerMap(const Parameters& parameters, const ClassPriors& priors)
+      : parameters_(parameters),
+        priors_(priors),
+        questions_(parameters.memory, parameters.motion.min_speed) {}
 
   /// Keeps the objects known when `world` ended. If an earlier map still waits, the one with more
   /// objects is kept.
@@ -47,6 +49,7 @@ class FormerMap {
 
  private:
   Parameters parameters_;
+  ClassPriors priors_;
   Archive questions_;
   std::optional<WorldId> world_;
   std::vector<ObjectBelief> kept_;

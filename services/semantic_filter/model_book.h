@@ -18,6 +18,7 @@ namespace perdure::semantic_filter {
 class ModelBook {
  public:
   explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
+  const ClassPriors& priors() const { return priors_; }
 
   /// Reason of failure: "model_contradicts_its_hash". The first information for a hash stays valid.
   Result<void> add(const ModelInfo& info);

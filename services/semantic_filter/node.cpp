@@ -28,7 +28,7 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       history_(config.filter, priors, static_cast<std::size_t>(config.history.frames), reasons_),
       models_(priors),
       archive_(config.filter.memory, config.filter.motion.min_speed),
-      former_(config.filter) {}
+      former_(config.filter, priors) {}
 
 void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) {
@@ -231,10 +231,10 @@ void Node::publish(const Frame& frame) {
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const Track& object = tracks[i];
     ObjectBelief& belief = objects.objects[i];
-    toBelief(object, motion.min_speed, belief);
+    toBelief(object, models_.priors(), motion.min_speed, belief);
     if (belief.moving > 0.5) {
       const Track now = extrapolated(object, frame.input.stamp.time, motion);
-      belief.classes = toBelief(now, motion.min_speed).classes;
+      belief.classes = toBelief(now, models_.priors(), motion.min_speed).classes;
     }
   }
   auto merges = history_.takeLateMerges();

@@ -62,7 +62,7 @@ void Node::ask(const Archive::Question& question, const WorldId& world) {
 void Node::keepFormer() {
   std::vector<ObjectBelief> objects;
   for (const Track& o : history_.belief().tracks) {
-    objects.push_back(toBelief(o, config_.filter.motion.min_speed));
+    objects.push_back(toBelief(o, models_.priors(), config_.filter.motion.min_speed));
   }
   former_.keep(*world_, objects);
 }

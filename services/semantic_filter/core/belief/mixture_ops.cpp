@@ -8,6 +8,8 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
+
 namespace perdure::semantic_filter {
 
 namespace {
@@ -123,8 +125,9 @@ double distance2(const Hypothesis& a, const Hypothesis& b) {
 }
 
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate) {
-  const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
-  return !(squaredDeviation<3>(d, prior.log_size_covariance) < size_gate * size_gate);
+  const SizePrior size = sizePriorOf(prior, h.upper_part);
+  const Eigen::Vector3d d = h.x.segment<3>(kSize) - size.mean;
+  return !(squaredDeviation<3>(d, size.covariance) < size_gate * size_gate);
 }
 
 }  // namespace perdure::semantic_filter

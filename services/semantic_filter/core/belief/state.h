@@ -31,7 +31,8 @@ struct GroundContact {
 struct Hypothesis {
   std::string class_name;
   bool moving = false;
-  double weight = 0.0;  ///< of the hypothesis given that the object exists; all sum to 1
+  bool upper_part = false;  ///< x is of the part that is seen (core/belief/upper_part.h)
+  double weight = 0.0;      ///< of the hypothesis given that the object exists; all sum to 1
   State x = State::Zero();
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();

@@ -8,6 +8,7 @@
 #include "common/math/small_cholesky.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
 
 namespace perdure::semantic_filter {
 
@@ -39,17 +40,19 @@ Matrix7d definite(const Matrix7d& P) {
 
 /// The Gaussian of the heaviest hypothesis of a class. Its covariance holds the second moments of
 /// the others of the class about its mean.
-void toClassBelief(const Track& track, const std::string& name, ClassBelief& belief) {
+void toClassBelief(const Track& track, const ClassPrior& prior, const std::string& name,
+                   ClassBelief& belief) {
   belief.name = name;
   belief.probability = 0.0;
-  const Hypothesis* heaviest = nullptr;
+  std::optional<Hypothesis> heaviest;
   Matrix7d moments = Matrix7d::Zero();
   Eigen::Matrix<double, 7, 6> cross = Eigen::Matrix<double, 7, 6>::Zero();
   double weight = 0.0;
-  for (const auto& h : track.hypotheses) {
-    if (h.class_name != name) continue;
+  for (const auto& of_track : track.hypotheses) {
+    if (of_track.class_name != name) continue;
+    const Hypothesis h = wholeOf(of_track, prior);
     belief.probability += h.weight;
-    if (!heaviest) heaviest = &h;
+    if (!heaviest) heaviest = h;
     if (h.moving != heaviest->moving) continue;
     const Vector7d d = geometryDifference(h, *heaviest);
     moments += h.weight * (h.P.topLeftCorner<7, 7>() + d * d.transpose());
@@ -68,7 +71,8 @@ void toClassBelief(const Track& track, const std::string& name, ClassBelief& bel
 
 }  // namespace
 
-void toBelief(const Track& track, double min_speed, ObjectBelief& belief) {
+void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
+              ObjectBelief& belief) {
   belief.id = track.id;
   belief.existence = track.existence;
   belief.confirmed = track.life.confirmed;
@@ -79,7 +83,8 @@ void toBelief(const Track& track, double min_speed, ObjectBelief& belief) {
     if (std::none_of(names.begin(), names.end(), same)) names.push_back(&h.class_name);
   }
   belief.classes.resize(names.size());
-  for (std::size_t i = 0; i < names.size(); ++i) toClassBelief(track, *names[i], belief.classes[i]);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    toClassBelief(track, priors.of(*names[i]), *names[i], belief.classes[i]);
   const auto likelier = [](const auto& a, const auto& b) { return a.probability > b.probability; };
   if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
     std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
@@ -102,9 +107,9 @@ void toBelief(const Track& track, double min_speed, ObjectBelief& belief) {
   track.classes.publish(belief.why);
 }
 
-ObjectBelief toBelief(const Track& track, double min_speed) {
+ObjectBelief toBelief(const Track& track, const ClassPriors& priors, double min_speed) {
   ObjectBelief belief;
-  toBelief(track, min_speed, belief);
+  toBelief(track, priors, min_speed, belief);
   return belief;
 }
 

@@ -2,15 +2,18 @@
 // tools/docs/maths/state_and_mixture.md.
 #pragma once
 
+#include "services/semantic_filter/core/belief/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {
 
 /// Publishes one Gaussian for each class: the mean of its heaviest hypothesis, and the second
 /// moments of the others about it. `min_speed`: m/s, above which a track counts as moving.
-ObjectBelief toBelief(const Track& track, double min_speed);
+/// Of a hypothesis that is an upper part the whole object is published.
+ObjectBelief toBelief(const Track& track, const ClassPriors& priors, double min_speed);
 /// The same into `belief`, whose memory it uses again.
-void toBelief(const Track& track, double min_speed, ObjectBelief& belief);
+void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
+              ObjectBelief& belief);
 
 /// Makes a track from a published belief, with one hypothesis for each class. `back`: kRestore or
 /// kRecall.

@@ -93,21 +93,22 @@ void KeyframeBatch::poseCovariance(const ScratchVector<PoseJacobian>& J, SideMat
   }
 }
 
-BatchProblem::BatchProblem(const KeyframeBatch& batch, bool moving, const std::string& class_name,
-                           const State& start, const FrameContext& frame)
+BatchProblem::BatchProblem(const KeyframeBatch& batch, const Hypothesis& kind, const State& start,
+                           const FrameContext& frame)
     : batch_(batch),
       frame_(frame),
-      prior_(frame.priors->of(class_name)),
-      class_name_(class_name),
+      prior_(frame.priors->of(kind.class_name)),
+      size_(sizePriorOf(prior_, kind.upper_part)),
+      class_name_(kind.class_name),
       yaw_(start[kYaw]),
-      dim_(moving ? kMostFree : kGeometry) {
+      dim_(kind.moving ? kMostFree : kGeometry) {
   // *Other* is initiated with three sizes; here one Gaussian has to cover them.
-  if (class_name == kOtherClass) prior_.log_size_covariance.array() += kOtherScale * kOtherScale;
-  size_information_ = prior_.log_size_covariance.inverse();
+  if (class_name_ == kOtherClass) size_.covariance.array() += kOtherScale * kOtherScale;
+  size_information_ = size_.covariance.inverse();
   const auto& box = frame.parameters->box;
   scales_ = biasScales(box);
   heading_ = headingOf(logHeading(start));
-  if (!moving) return;
+  if (!moving()) return;
   const double s2 = std::max(prior_.speed_sigma * prior_.speed_sigma, 0.01);
   const Eigen::Vector3d along(std::cos(yaw_), std::sin(yaw_), 0.0);
   Eigen::Matrix3d P = s2 * along * along.transpose();
@@ -233,7 +234,7 @@ double SideCovariance::deviation(const PerSide& residual, Eigen::Index keyframe)
 Quadratic BatchProblem::quadratic(const State& x, const Gram& gram) const {
   Quadratic q{gram.topLeftCorner(dim_, dim_), gram.col(dim_).head(dim_)};
   q.G.block<3, 3>(kSize, kSize) += size_information_;
-  q.g.segment<3>(kSize) += size_information_ * (prior_.log_size - x.segment<3>(kSize));
+  q.g.segment<3>(kSize) += size_information_ * (size_.mean - x.segment<3>(kSize));
   const double yaw_information = 1.0 / (kYawSpread * kYawSpread);
   q.G(kYaw, kYaw) += yaw_information;
   q.g[kYaw] += yaw_information * wrapAngle(yaw_ - x[kYaw]);
@@ -246,7 +247,7 @@ Quadratic BatchProblem::quadratic(const State& x, const Gram& gram) const {
 }
 
 double BatchProblem::priorCost(const State& x) const {
-  const Eigen::Vector3d d = prior_.log_size - x.segment<3>(kSize);
+  const Eigen::Vector3d d = size_.mean - x.segment<3>(kSize);
   double cost = d.dot(size_information_ * d) + yawPriorCost(x);
   if (moving()) cost += x.tail<3>().dot(speed_information_ * x.tail<3>());
   return cost;

@@ -10,6 +10,7 @@
 
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
 #include "services/semantic_filter/core/measurement/azimuth.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 
@@ -114,10 +115,10 @@ struct Quadratic {
 /// keyframe.
 class BatchProblem {
  public:
-  /// The problem of one class, at rest or moving. `start` is the mean of the yaw prior; the heading
-  /// is what the azimuths say at `start`.
-  BatchProblem(const KeyframeBatch& batch, bool moving, const std::string& class_name,
-               const State& start, const FrameContext& frame);
+  /// The problem of hypotheses like `kind`: of its class, at rest or moving, whole or an upper
+  /// part. `start` is the mean of the yaw prior; the heading is what the azimuths say at `start`.
+  BatchProblem(const KeyframeBatch& batch, const Hypothesis& kind, const State& start,
+               const FrameContext& frame);
 
   int dim() const { return dim_; }
   bool moving() const { return dim_ == kMostFree; }
@@ -171,6 +172,7 @@ class BatchProblem {
   const KeyframeBatch& batch_;
   const FrameContext& frame_;
   ClassPrior prior_;
+  SizePrior size_;
   std::string class_name_;
   double yaw_, heading_ = 0.0;
   int dim_;

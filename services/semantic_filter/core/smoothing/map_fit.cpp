@@ -238,7 +238,7 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
 std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch& batch,
                                    const FrameContext& frame, const MapFit* like,
                                    const ScratchVector<const Hypothesis*>& found) {
-  const BatchProblem model(batch, start.moving, start.class_name, start.x, frame);
+  const BatchProblem model(batch, start, start.x, frame);
   State x = start.x;
   x.segment<4>(kBias).setZero();
   auto fit = fitKeyframes(model, x, batch, frame.parameters->box.tail,
@@ -259,9 +259,7 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
   return result;
 }
 
-BatchProblem MapFit::modelOf() const {
-  return {*batch_, hypothesis_.moving, hypothesis_.class_name, start_, *frame_};
-}
+BatchProblem MapFit::modelOf() const { return {*batch_, hypothesis_, start_, *frame_}; }
 
 const PerKeyframe& MapFit::inflations() const { return fit_->inflations; }
 

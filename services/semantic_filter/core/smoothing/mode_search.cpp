@@ -6,6 +6,7 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
 #include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/update/ground_contact.h"
 
@@ -14,10 +15,12 @@ namespace perdure::semantic_filter {
 namespace {
 
 bool sameMode(const Hypothesis& a, const Hypothesis& b) {
-  return std::min(distance2(a, b), distance2(b, a)) < gates::kSameMode;
+  return a.upper_part == b.upper_part &&
+         std::min(distance2(a, b), distance2(b, a)) < gates::kSameMode;
 }
 
 /// Returns starts at rest that no hypothesis may have: yaw turned by 45°, 90° and 135°, usual size.
+/// An upper part keeps the size that is seen.
 ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
   ScratchVector<Hypothesis> starts;
   if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
@@ -25,10 +28,35 @@ ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& 
     starts.push_back(best);
     Hypothesis& h = starts.back();
     h.x[kYaw] = wrapAngle(h.x[kYaw] + k * M_PI / 4);
-    h.x.segment<3>(kSize) = prior.log_size;
+    if (!h.upper_part) h.x.segment<3>(kSize) = prior.log_size;
     h.weight = 0.0;
   }
   return starts;
+}
+
+/// Returns the fits of the keyframes by an *other* track as one of a class, from four yaws.
+/// `upper_part`: by what is seen of an object of the class. `like`: a fit of the same batch.
+ScratchVector<MapFit> fitsAs(const Hypothesis& other, const ClassPrior& prior, bool upper_part,
+                             const KeyframeBatch& batch, const FrameContext& frame,
+                             const MapFit& as_other) {
+  Hypothesis start = other;
+  start.class_name = prior.name;
+  start.upper_part = upper_part;
+  if (!upper_part) start.x.segment<3>(kSize) = prior.log_size;
+  ScratchVector<Hypothesis> starts = otherStarts(start, prior);
+  starts.push_back(start);
+  ScratchVector<MapFit> fits;
+  for (const Hypothesis& one : starts) {
+    ScratchVector<const Hypothesis*> found;
+    for (const MapFit& f : fits) found.push_back(&f.hypothesis());
+    auto map_fit = fit(one, batch, frame, fits.empty() ? nullptr : &fits.front(), found);
+    // A fit with fewer compared sides is refused: one whose sides are all cut fits any box.
+    if (map_fit && map_fit->sides() >= as_other.sides() &&
+        !misshapen(map_fit->hypothesis(), prior, frame.parameters->tracks.size_gate)) {
+      fits.push_back(std::move(*map_fit));
+    }
+  }
+  return fits;
 }
 
 }  // namespace
@@ -41,10 +69,16 @@ std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
   return taken ? std::move(map_fit) : std::nullopt;
 }
 
+double besideKeyframes(Hypothesis& h, ObjectId id, const FrameContext& frame) {
+  // Something unmapped hides each of the four sides with the same probability.
+  const double share = h.upper_part ? 0.25 * frame.parameters->box.partial_view : 1.0;
+  return updateWithGround(h, id, frame) + std::log(share);
+}
+
 Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame) {
-  const double ground = updateWithGround(h, track.id, frame);
+  const double beside = besideKeyframes(h, track.id, frame);
   track.hypotheses.push_back(h);
-  return {track.hypotheses.size() - 1, std::move(map_fit), ground};
+  return {track.hypotheses.size() - 1, std::move(map_fit), beside};
 }
 
 Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes) {
@@ -70,8 +104,8 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
       motion.creeping + (1.0 - motion.creeping) * fasterThan(moving_fit.hypothesis(),
                                                              motion.slow_share * prior.speed_sigma);
   const double log_odds = std::clamp(
-      static_fit.logEvidence(inflations) - moving_fit.logEvidence(inflations) + at_rest.ground -
-          in_motion.ground + std::log((1.0 - prior.moving) / prior.moving / speed_prior_ratio),
+      static_fit.logEvidence(inflations) - moving_fit.logEvidence(inflations) + at_rest.beside -
+          in_motion.beside + std::log((1.0 - prior.moving) / prior.moving / speed_prior_ratio),
       -kMaxLogOdds, kMaxLogOdds);
   const double p_rest = 1.0 / (1.0 + std::exp(-log_odds));
   double weight[2] = {0.0, 0.0};
@@ -98,7 +132,7 @@ void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
     const bool duplicate = std::any_of(
         fits.begin(), f, [&](const Fitted& g) { return sameMode(hs[g.index], hs[f->index]); });
     log_evidence.push_back(duplicate ? kNone
-                                     : f->map_fit.logEvidence(inflations, true) + f->ground);
+                                     : f->map_fit.logEvidence(inflations, true) + f->beside);
     largest = std::max(largest, log_evidence.back());
   }
   for (auto& e : log_evidence) {
@@ -120,9 +154,18 @@ std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits) {
 
 void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits) {
   const Hypothesis best = track.hypotheses[fits.front().index];
-  for (const auto& start : otherStarts(best, frame.priors->of(best.class_name))) {
+  const ClassPrior& prior = frame.priors->of(best.class_name);
+  ScratchVector<Hypothesis> starts = otherStarts(best, prior);
+  if (best.upper_part) {  // by now the whole object may be seen
+    starts.push_back(wholeOf(best, prior));
+    starts.back().weight = 0.0;
+  }
+  for (const auto& start : starts) {
     ScratchVector<const Hypothesis*> found;
-    for (const Fitted& f : fits) found.push_back(&f.map_fit.hypothesis());
+    for (const Fitted& f : fits) {
+      if (f.map_fit.hypothesis().upper_part == start.upper_part)
+        found.push_back(&f.map_fit.hypothesis());
+    }
     auto map_fit = fit(start, batch, frame, &fits.front().map_fit, found);
     if (!map_fit) continue;
     Hypothesis h = map_fit->hypothesis();
@@ -136,7 +179,8 @@ void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& f
 std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const KeyframeBatch& batch,
                                 const FrameContext& frame) {
   constexpr double kContradicted = -1.0;  // nats
-  if (at_rest.ground > kContradicted) return std::nullopt;
+  if (at_rest.beside > kContradicted || at_rest.map_fit.hypothesis().upper_part)
+    return std::nullopt;
   const Hypothesis start = asMoving(track.hypotheses[at_rest.index]);
   if (frame.priors->of(start.class_name).moving <= 0.0) return std::nullopt;
   auto map_fit = fit(start, batch, frame, &at_rest.map_fit);
@@ -160,21 +204,10 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
   const double distance = (fitted_other.x.head<3>() - frame.view.T_WC().p).norm();
   const double place = std::sqrt(fitted_other.P.topLeftCorner<3, 3>().trace());
   if (place > p.tracks.scale_resolved * distance) return;
-  Hypothesis start = other;
-  start.class_name = track.lookalike.class_name;
-  start.x.segment<3>(kSize) = prior.log_size;
-  ScratchVector<Hypothesis> starts = otherStarts(start, prior);
-  starts.push_back(start);
-  ScratchVector<MapFit> fits;
-  for (const Hypothesis& one : starts) {
-    ScratchVector<const Hypothesis*> found;
-    for (const MapFit& f : fits) found.push_back(&f.hypothesis());
-    auto map_fit = fit(one, batch, frame, fits.empty() ? nullptr : &fits.front(), found);
-    // A fit with fewer compared sides is refused: one whose sides are all cut fits any box.
-    if (map_fit && map_fit->sides() >= as_other->sides() &&
-        !misshapen(map_fit->hypothesis(), prior, p.tracks.size_gate)) {
-      fits.push_back(std::move(*map_fit));
-    }
+  ScratchVector<MapFit> fits = fitsAs(other, prior, false, batch, frame, *as_other);
+  if (p.box.partial_view > 0.0) {
+    for (MapFit& one : fitsAs(other, prior, true, batch, frame, *as_other))
+      fits.push_back(std::move(one));
   }
   if (fits.empty()) return;
   PerKeyframe inflations = as_other->inflations();
@@ -184,8 +217,8 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
                                   std::log(std::max(p.clutter.other_lookalike, 1e-3));
   for (const MapFit& one : fits) {
     Hypothesis h = one.hypothesis();
-    const double ground = updateWithGround(h, track.id, frame);
-    const double odds = one.logEvidence(inflations) - other_evidence + initial_log_odds + ground;
+    const double beside = besideKeyframes(h, track.id, frame);
+    const double odds = one.logEvidence(inflations) - other_evidence + initial_log_odds + beside;
     if (odds < kLeastOdds) continue;
     track.hypotheses.push_back(h);
     track.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kMaxLogOdds));

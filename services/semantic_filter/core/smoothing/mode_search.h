@@ -15,7 +15,7 @@ namespace perdure::semantic_filter {
 struct Fitted {
   std::size_t index;
   MapFit map_fit;
-  double ground;  ///< log-likelihood ratio of its ground contact, nats
+  double beside;  ///< besideKeyframes, nats
 };
 using Fits = ScratchVector<Fitted>;
 
@@ -23,6 +23,10 @@ using Fits = ScratchVector<Fitted>;
 std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
                           const FrameContext& frame, const MapFit* like = nullptr,
                           const ScratchVector<const Hypothesis*>& found = {});
+/// Returns what else speaks for a fit, nats: the log-likelihood ratio of its ground contact, by
+/// which `h` is updated, and the log of the share of objects whose lower part is hidden, if `h` is
+/// an upper part.
+double besideKeyframes(Hypothesis& h, ObjectId id, const FrameContext& frame);
 /// Adds `h` with its ground contact to the track and returns it with its fit.
 Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame);
 /// Returns a start at rest for a moving hypothesis: its position at the middle keyframe.

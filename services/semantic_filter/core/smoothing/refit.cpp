@@ -48,9 +48,9 @@ std::optional<ResidualRatios> refitClass(Track& track, const std::string& name,
     auto map_fit = fit(h, batch, frame, fits.empty() ? nullptr : &fits.front().map_fit);
     if (!map_fit) continue;
     h = map_fit->hypothesis();
-    const double ground = updateWithGround(h, track.id, frame);
+    const double beside = besideKeyframes(h, track.id, frame);
     contradictions.add(map_fit->contradictions());
-    fits.push_back({i, std::move(*map_fit), ground});
+    fits.push_back({i, std::move(*map_fit), beside});
   }
   if (search && !static_fits.empty() && name == track.best().class_name) {
     searchModes(track, batch, frame, static_fits);

@@ -8,6 +8,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
 #include "services/semantic_filter/core/measurement/polygon.h"
 #include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
@@ -42,6 +43,7 @@ bool hasEnoughHits(const Track& known, const Track& other) {
 bool contradict(const Hypothesis& a, const Hypothesis& b) {
   constexpr double kTurned = 0.35;  // rad
   if (a.moving) return false;
+  if (a.upper_part != b.upper_part) return true;
   const Vector7d d = geometryDifference(a, b);
   if (std::abs(d[kYaw]) > kTurned) return true;
   const Cholesky P(a.P.topLeftCorner<kGeometry, kGeometry>() +
@@ -243,7 +245,8 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   const Matrix7d J_a = inverseSymmetric(P_a);
   const Matrix7d J_b = inverseSymmetric(P_b);
   Matrix7d J_prior = Matrix7d::Zero();
-  J_prior.block<3, 3>(kSize, kSize) = inverseSymmetric(prior.log_size_covariance);
+  const SizePrior size = sizePriorOf(prior, a.upper_part);
+  J_prior.block<3, 3>(kSize, kSize) = inverseSymmetric(size.covariance);
   Matrix7d J_new = J_b - J_prior;  // information of b without the prior, which a contains already
   if (eigenvalues(J_new).minCoeff() < 0.0) {
     J_new = 0.5 * J_b;  // the prior cannot be separated: half of b counts
@@ -251,7 +254,7 @@ Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prio
   }
   const Matrix7d P = inverseSymmetric(J_a + J_new);
   Vector7d prior_mean = Vector7d::Zero();  // relative to a
-  prior_mean.segment<3>(kSize) = prior.log_size - a.x.segment<3>(kSize);
+  prior_mean.segment<3>(kSize) = size.mean - a.x.segment<3>(kSize);
   const Vector7d d = geometryDifference(b, a);
   const Vector7d pull =
       J_new.isApprox(0.5 * J_b) ? Vector7d(J_new * d) : Vector7d(J_b * d - J_prior * prior_mean);

@@ -51,6 +51,7 @@ void mergeNearHypotheses(Track& track, double threshold) {
   for (std::size_t i = 0; i < hs.size(); ++i) {
     for (std::size_t j = hs.size() - 1; j > i; --j) {
       if (hs[i].class_name != hs[j].class_name || hs[i].moving != hs[j].moving) continue;
+      if (hs[i].upper_part != hs[j].upper_part) continue;
       if (differInCertainty(hs[i], hs[j])) continue;
       if (distance2(hs[i], hs[j]) > threshold) continue;
       mergeInto(hs[i], hs[j]);

@@ -5,6 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -54,8 +55,9 @@ std::vector<ClassPrior> candidatesOf(const std::vector<std::string>& names, cons
 }
 
 double logSizeDensity(const Hypothesis& h, const ClassPrior& prior) {
-  const Eigen::Matrix3d S = h.P.block<3, 3>(kSize, kSize) + prior.log_size_covariance;
-  const Eigen::Vector3d d = h.x.segment<3>(kSize) - prior.log_size;
+  const SizePrior size = sizePriorOf(prior, h.upper_part);
+  const Eigen::Matrix3d S = h.P.block<3, 3>(kSize, kSize) + size.covariance;
+  const Eigen::Vector3d d = h.x.segment<3>(kSize) - size.mean;
   return -0.5 * (squaredMahalanobis(d, S) + std::log(S.determinant()));
 }
 
@@ -63,9 +65,10 @@ double logSizeDensity(const Hypothesis& h, const ClassPrior& prior) {
 Hypothesis recast(Hypothesis h, const ClassPrior& prior) {
   h.class_name = prior.name;
   h.ground_contact = {};
-  const Eigen::Matrix3d S = h.P.block<3, 3>(kSize, kSize) + prior.log_size_covariance;
+  const SizePrior size = sizePriorOf(prior, h.upper_part);
+  const Eigen::Matrix3d S = h.P.block<3, 3>(kSize, kSize) + size.covariance;
   const Eigen::Matrix<double, kStateDim, 3> K = regressOn(S, h.P.middleCols<3>(kSize));
-  h.x += K * (prior.log_size - Eigen::Vector3d(h.x.segment<3>(kSize)));
+  h.x += K * (size.mean - Eigen::Vector3d(h.x.segment<3>(kSize)));
   h.P = (h.P - K * S * K.transpose()).eval();
   h.C = (h.C - K * h.C.middleRows<3>(kSize)).eval();
   makeSymmetric(h.P);

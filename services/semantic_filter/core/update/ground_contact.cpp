@@ -7,6 +7,7 @@
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "services/semantic_filter/core/belief/upper_part.h"
 
 namespace perdure::semantic_filter {
 
@@ -55,6 +56,10 @@ double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
   const GroundParameters& p = frame.parameters->ground;
   const double stands = frame.priors->of(h.class_name).stands;
   h.ground_contact = {};
+  if (h.upper_part) {  // it is the whole object that stands
+    Hypothesis whole = wholeOf(h, frame.priors->of(h.class_name));
+    return updateWithGround(whole, id, frame);
+  }
   if (!frame.ground || stands <= 0.0) return 0.0;
   if (!h.moving) h.ground_contact = groundContactOf(h, frame);
   const auto ground = frame.ground->below(h.x.head<3>(), id);

@@ -51,7 +51,7 @@ TEST(ExtrapolatedTrack, HasTheFullPredictedCovariance) {
   Matrix7d place_alone = P.topLeftCorner<7, 7>();
   place_alone.topLeftCorner<3, 3>() = later.best().P.topLeftCorner<3, 3>();
   EXPECT_EQ(Eigen::LLT<Matrix7d>(place_alone).info(), Eigen::NumericalIssue);
-  const Matrix7d published = toBelief(later, 0.7).best().covariance;
+  const Matrix7d published = toBelief(later, makePriors(), 0.7).best().covariance;
   EXPECT_EQ(Eigen::LLT<Matrix7d>(published).info(), Eigen::Success);
 }
 

@@ -18,7 +18,7 @@ TEST(TrackMessage, TheYawOfOtherIsUnknownBeforeAModeSearch) {
   const auto sigmaYaw = [](const char* name, bool sought) {
     Track object = makeObject(1, name, makeState(10, 0, 0.7, 0.3, 1, 1, 1), 0.004);
     object.hypotheses[0].modes_searched = sought;
-    return std::sqrt(toBelief(object, 0.7).best().covariance(kYaw, kYaw));
+    return std::sqrt(toBelief(object, makePriors(), 0.7).best().covariance(kYaw, kYaw));
   };
   const double any = M_PI / std::sqrt(12.0);
   EXPECT_NEAR(sigmaYaw("other", false), any, 1e-9);
@@ -29,7 +29,7 @@ TEST(TrackMessage, TheYawOfOtherIsUnknownBeforeAModeSearch) {
 TEST(TrackMessage, ACovarianceThatRoundingMadeIndefiniteIsRepairedAndOthersAreNotChanged) {
   Track object = makeObject(1, "car", makeState(1, 2, 3, 0.1, 4, 1.8, 1.5), 0.04);
   Matrix7d P = object.hypotheses[0].P.topLeftCorner<7, 7>();
-  EXPECT_EQ(toBelief(object, 0.7).best().covariance, P) << "to the bit";
+  EXPECT_EQ(toBelief(object, makePriors(), 0.7).best().covariance, P) << "to the bit";
   // Length and width differ by rounding only, far less than the place.
   P.block<2, 2>(kSize, kSize).setConstant(1e-8);
   P(kSize + 1, kSize + 1) -= 1e-18;
@@ -37,7 +37,7 @@ TEST(TrackMessage, ACovarianceThatRoundingMadeIndefiniteIsRepairedAndOthersAreNo
   object.hypotheses[0].P.topLeftCorner<7, 7>() = P;
   Eigen::LLT<Matrix7d> before(P);
   ASSERT_EQ(before.info(), Eigen::NumericalIssue);
-  const Matrix7d mended = toBelief(object, 0.7).best().covariance;
+  const Matrix7d mended = toBelief(object, makePriors(), 0.7).best().covariance;
   EXPECT_EQ(Eigen::LLT<Matrix7d>(mended).info(), Eigen::Success);
   EXPECT_EQ(mended, mended.transpose());
   const Vector7d sigma = P.diagonal().cwiseSqrt();

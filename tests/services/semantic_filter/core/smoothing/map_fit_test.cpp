@@ -217,7 +217,9 @@ TEST(BatchProblem, WhetherACensoredSideCountsDoesNotChangeTheVolume) {
     Keyframes keyframes = scene.keyframes();
     keyframes[9] = std::make_shared<const Keyframe>(cut);
     const KeyframeBatch looks(keyframes, frame.pose_error);
-    const BatchProblem model(looks, false, "car", scene.truth(), frame);
+    Hypothesis car;
+    car.class_name = "car";
+    const BatchProblem model(looks, car, scene.truth(), frame);
     const auto stack = model.linearise(scene.truth());
     const Eigen::VectorXd inflations =
         Eigen::VectorXd::Ones(static_cast<Eigen::Index>(looks.size()));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/chi2.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/ground_surface.h"
 #include "services/semantic_filter/core/belief/track_message.h"
@@ -14,6 +15,9 @@
 namespace perdure::semantic_filter {
 namespace {
 
+using testing::makePriors;
+using testing::makeState;
+using testing::parkedCar;
 using testing::Passing;
 
 /// A track in the wrong mode of yaw, for which the boxes are less likely.
@@ -42,8 +46,8 @@ TEST(ModeSearch, FindsTheYawThatTheFilterPruned) {
   EXPECT_GE(found, 17) << "of " << kRuns;
 }
 
-/// Whether a car at rest has a moving hypothesis after its refit, above a ground at `height` (m).
-bool mayMoveOver(double height, const Passing& scene) {
+/// The latest frame, above a ground at `height` (m).
+FrameContext overGround(double height, const Passing& scene) {
   FrameContext frame = scene.frame();
   BodyPath path;
   for (double x = 0.0; x <= 24.0; x += 4.0) path.advance({x, 0.0, 1.2});
@@ -51,6 +55,12 @@ bool mayMoveOver(double height, const Passing& scene) {
   ground.body_height_m = 1.2 - height;
   frame.ground = std::make_shared<const GroundSurface>(
       std::vector<Track>{}, path, GroundRoughness{}, frame.view.up_W, *frame.priors, ground);
+  return frame;
+}
+
+/// Whether a car at rest has a moving hypothesis after its refit.
+bool mayMoveOver(double height, const Passing& scene) {
+  const FrameContext frame = overGround(height, scene);
   Track object = turnedBy(0.0, scene);
   refit(object, frame);
   const auto& hs = object.hypotheses.read();
@@ -88,6 +98,73 @@ TEST(ModeSearch, OtherBecomesTheClassItResemblesIfAllKeyframesFit) {
   EXPECT_GE(cars, 17) << "of " << kRuns;
 }
 
+/// The cabin of that car: what is seen of it above a hedge that is not on the map.
+State cabin() {
+  const double top = parkedCar()[2] + 0.5 * std::exp(parkedCar()[kSize + 2]), height = 0.5;
+  return makeState(32.0, 5.0, top - 0.5 * height, 0.15, 2.2, 1.8, height);
+}
+
+Track otherLikeACar(const Passing& scene) {
+  Track object = turnedBy(0.0, scene);
+  object.hypotheses.front().class_name = kOtherClass;
+  object.lookalike.class_name = "car";
+  return object;
+}
+
+TEST(ModeSearch, OtherBecomesTheUpperPartOfTheClassItResembles) {
+  constexpr int kRuns = 20;
+  int cars = 0, placed = 0, high = 0;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    const Passing scene(seed, 0.0, 0.0, cabin());
+    Track object = otherLikeACar(scene);
+    refit(object, scene.frame());
+    if (object.best().class_name != "car" || !object.best().upper_part) continue;
+    ++cars;
+    const ClassBelief published = toBelief(object, *scene.frame().priors, 0.7).best();
+    const Eigen::Vector3d d = published.mean.head<3>() - parkedCar().head<3>();
+    const Eigen::Matrix3d P = published.covariance.topLeftCorner<3, 3>();
+    placed += d.dot(P.ldlt().solve(d)) < chi2Quantile(0.99, 3) ? 1 : 0;
+    const double height = published.mean[kSize + 2] - parkedCar()[kSize + 2];
+    high += height * height < 9.0 * published.covariance(kSize + 2, kSize + 2) ? 1 : 0;
+  }
+  EXPECT_GE(cars, 17) << "of " << kRuns;
+  EXPECT_GE(placed, cars - 1);
+  EXPECT_GE(high, cars - 1);
+}
+
+TEST(ModeSearch, NothingIsAnUpperPartIfAllIsAlwaysSeen) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Passing scene(seed, 0.0, 0.0, cabin());
+    scene.parameters().box.partial_view = 0.0;
+    Track object = otherLikeACar(scene);
+    refit(object, scene.frame());
+    EXPECT_EQ(object.best().class_name, kOtherClass) << seed;
+  }
+}
+
+TEST(ModeSearch, TheGroundSpeaksAgainstAnUpperPartThatStandsOnIt) {
+  const Passing scene(1, 0.0, 0.0, cabin());
+  const double underside = cabin()[2] - 0.5 * std::exp(cabin()[kSize + 2]);
+  Hypothesis h = scene.start(false);
+  h.x = cabin();
+  h.P *= 1e-3;
+  h.upper_part = true;
+  const double behind_a_hedge = besideKeyframes(h, 99, overGround(parkedCar()[2] - 0.725, scene));
+  EXPECT_GT(behind_a_hedge, besideKeyframes(h, 99, overGround(underside, scene)) + 3.0);
+}
+
+TEST(ModeSearch, AnUpperPartBecomesTheWholeObjectOnceThatIsSeen) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Passing scene(seed);
+    Track object = turnedBy(0.0, scene);
+    object.hypotheses.front().upper_part = true;
+    object.hypotheses.front().x.head<kBias>() = cabin().head<kBias>();
+    refit(object, scene.frame());
+    EXPECT_EQ(object.best().class_name, "car") << seed;
+    EXPECT_FALSE(object.best().upper_part) << seed;
+  }
+}
+
 TEST(ModeSearch, ModesThatTheKeyframesDoNotDistinguishArePublishedAsOneWideGaussian) {
   const Passing scene(4);
   Track object = turnedBy(0.0, scene);
@@ -97,7 +174,7 @@ TEST(ModeSearch, ModesThatTheKeyframesDoNotDistinguishArePublishedAsOneWideGauss
   turned.x[kYaw] += 1.0;
   turned.P(kYaw, kYaw) = object.hypotheses.front().P(kYaw, kYaw) = 0.01;
   object.hypotheses.push_back(turned);
-  const ObjectBelief belief = toBelief(object, 0.7);
+  const ObjectBelief belief = toBelief(object, makePriors(), 0.7);
   EXPECT_NEAR(belief.best().mean[3], object.best().x[kYaw], 1e-12);
   EXPECT_NEAR(belief.best().covariance(3, 3), 0.01 + 0.4 * 1.0, 1e-9);
 }

@@ -13,15 +13,17 @@
 
 namespace perdure::semantic_filter::testing {
 
+inline State parkedCar() { return makeState(32.0, 5.0, 0.8, 0.15, 4.3, 1.8, 1.45); }
+
 /// A car (or an object that moves like one) that the body passes. Its boxes are drawn from the
-/// model of the estimate.
+/// model of the estimate. `seen`: the cuboid of what is seen of it.
 class Passing {
  public:
-  explicit Passing(unsigned seed, double speed = 0.0, double pose_sigma = 0.0)
-      : camera_(makeCamera()), random_(seed), priors_(makePriors()) {
+  explicit Passing(unsigned seed, double speed = 0.0, double pose_sigma = 0.0,
+                   const State& seen = parkedCar())
+      : camera_(makeCamera()), random_(seed), priors_(makePriors()), truth_(seen) {
     for (auto& c : priors_.classes) c.moving = 0.2, c.speed_sigma = 8.0, c.stands = 0.97;
     parameters_.smoothing.new_view = 0.01;
-    truth_ = makeState(32.0, 5.0, 0.8, 0.15, 4.3, 1.8, 1.45);
     truth_[kVelocity] = speed;
     shift_ = Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_)) * pose_sigma;
     error_.covariance.bottomRightCorner<3, 3>().diagonal().setConstant(pose_sigma * pose_sigma);

@@ -137,7 +137,7 @@ TEST_F(Attribution, AnUnmappedOccluderExcusesPartOfAMiss) {
 
 TEST_F(Attribution, ARecalledObjectWithoutALedgerIsBookedAsRecalled) {
   computeVisibility(boxOfTheCar());
-  ObjectBelief belief = toBelief(object, 0.7);
+  ObjectBelief belief = toBelief(object, makePriors(), 0.7);
   const Track with = fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRestore);
   EXPECT_NEAR(with.existence.of(ExistenceEvidence::kRestore).log_odds, 0.0, 1e-12);
   EXPECT_EQ(with.existence.of(ExistenceEvidence::kRestore).count, 1U);

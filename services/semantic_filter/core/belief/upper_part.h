@@ -1,0 +1,29 @@
+// Upper part: of an object whose lower part something hides that is not on the map (a chair at a
+// table) only the upper part is seen, from every side. Such a hypothesis is of the object's class;
+// its cuboid is that of the part. So it predicts the boxes as they are, and pays for the hiding
+// thing once and not in every frame. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
+#pragma once
+
+#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/parameters.h"
+#include "services/semantic_filter/core/belief/state.h"
+
+namespace perdure::semantic_filter {
+
+/// Gaussian of log(l, w, h), log metres.
+struct SizePrior {
+  Eigen::Vector3d mean;
+  Eigen::Matrix3d covariance;
+};
+
+/// Returns the prior of the cuboid of an object, or of its upper part. Of that any share of height
+/// and of length is as likely as any other (the back of a chair, the cabin of a car); the width is
+/// that of the object.
+SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
+
+/// Returns the belief of the whole object: the top stays, and height and length are what the class
+/// says of an object that is at least as large as what is seen. A hypothesis of the whole object
+/// stays as it is. Objects are taken for upright along z of W, which is level to some degrees.
+Hypothesis wholeOf(const Hypothesis& h, const ClassPrior& prior);
+
+}  // namespace perdure::semantic_filter
