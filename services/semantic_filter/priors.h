@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "services/semantic_filter/config.h"
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 
 namespace perdure::semantic_filter {
 

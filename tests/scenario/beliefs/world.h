@@ -16,7 +16,7 @@
 #include "common/sim/detector.h"
 #include "common/sim/dice.h"
 #include "services/semantic_filter/config.h"
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/measurement/detection.h"
 #include "services/semantic_filter/core/update/predict.h"
 #include "services/semantic_filter/core/visibility/occlusion.h"

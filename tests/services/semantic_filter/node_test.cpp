@@ -315,7 +315,7 @@ Recalled restored(const std::vector<TrueObject>& things, const std::vector<doubl
   for (std::size_t i = 0; i < things.size(); ++i) {
     Track object = testing::makeObject(i + 1, things[i].class_name, things[i].x, variances[i]);
     object.life.confirmed = true;
-    recalled.objects.push_back(toBelief(object, makePriors(), 0.7));
+    recalled.objects.push_back(toBelief(object, testing::makePriors(), 0.7));
   }
   return recalled;
 }

@@ -59,9 +59,10 @@ SimulatedDrive::SimulatedDrive(const DriveOptions& options)
   for (int c = 0; c < (options.stereo ? 2 : 1); ++c) {
     CameraCalibration camera = testCamera(c);
     camera.readout_s = options.readout_s;
+    camera.T_BC.p.x() += options.camera_ahead_m;
     cameras_.emplace_back(camera);
   }
-  options.place == DrivePlace::kRoom ? buildRoom() : buildStreet();
+  options.place == DrivePlace::kStreet ? buildStreet() : buildRoom();
   ids_.assign(points_.size(), 0);
 }
 
@@ -111,6 +112,7 @@ double SimulatedDrive::phase(double t) const {
 Vector3d SimulatedDrive::position(double t) const {
   const double s = phase(t);
   if (options_.place == DrivePlace::kStreet) return {kStreetSpeed * s, 0.0, 0.0};
+  if (options_.place == DrivePlace::kSpot) return Vector3d::Zero();
   return {2.5 * std::cos(0.5 * s), 2.0 * std::sin(0.5 * s) + 0.3 * std::sin(1.7 * s),
           0.5 * std::sin(0.9 * s)};
 }

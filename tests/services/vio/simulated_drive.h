@@ -14,8 +14,9 @@
 
 namespace perdure::vio::test {
 
-/// Where it goes: round a room of 12 × 12 × 6 m, or along a street at an even 8.5 m/s.
-enum class DrivePlace { kRoom, kStreet };
+/// Where it goes: round a room of 12 × 12 × 6 m, along a street at an even 8.5 m/s, or nowhere: it
+/// turns in the middle of the room.
+enum class DrivePlace { kRoom, kStreet, kSpot };
 
 struct DriveOptions {
   DrivePlace place = DrivePlace::kRoom;
@@ -24,6 +25,7 @@ struct DriveOptions {
   ImuNoise noise;
   double pixel_sigma = 0.4;
   bool stereo = false;
+  double camera_ahead_m = 0.0;  ///< of where testCamera has it
   bool walking_biases = false;  ///< by the noise's walks; imu() has to go before truth()
   double time_offset_s = 0.0;   ///< true t_imu − t_image
   double readout_s = 0.0;       ///< true, of a rolling shutter: first to last row

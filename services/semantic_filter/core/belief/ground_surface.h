@@ -17,7 +17,7 @@
 
 #include "common/base/inplace_vector.h"
 #include "common/base/scratch.h"
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/parameters.h"
 

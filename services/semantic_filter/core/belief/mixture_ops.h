@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/belief/classes/shape.h"
 
 namespace perdure::semantic_filter {
 
@@ -31,7 +31,7 @@ struct GroundContact {
 struct Hypothesis {
   std::string class_name;
   bool moving = false;
-  bool upper_part = false;  ///< x is of the part that is seen (core/belief/upper_part.h)
+  bool upper_part = false;  ///< x is of the part that is seen (core/belief/classes/upper_part.h)
   double weight = 0.0;      ///< of the hypothesis given that the object exists; all sum to 1
   State x = State::Zero();
   StateCovariance P = StateCovariance::Identity();

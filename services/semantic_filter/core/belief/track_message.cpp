@@ -8,7 +8,7 @@
 #include "common/math/small_cholesky.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 
 namespace perdure::semantic_filter {
 

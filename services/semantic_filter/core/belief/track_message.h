@@ -2,7 +2,7 @@
 // tools/docs/maths/state_and_mixture.md.
 #pragma once
 
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {

@@ -4,7 +4,7 @@
 // tools/docs/maths/azimuth_and_heading.md.
 #pragma once
 
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
 
 namespace perdure::semantic_filter {

@@ -8,7 +8,7 @@
 #include <cstddef>
 
 #include "common/camera/camera_model.h"
-#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/belief/classes/shape.h"
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
 
 namespace perdure::semantic_filter {

@@ -14,7 +14,7 @@
 
 #include "common/base/shared_vector.h"
 #include "common/types/detections.h"
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/measurement/box_likelihood.h"
 
 namespace perdure::semantic_filter {

@@ -10,7 +10,7 @@
 
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/noise_scale.h"
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 #include "services/semantic_filter/core/measurement/azimuth.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 

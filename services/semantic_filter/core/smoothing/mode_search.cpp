@@ -6,7 +6,7 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 #include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/update/ground_contact.h"
 
@@ -51,10 +51,10 @@ ScratchVector<MapFit> fitsAs(const Hypothesis& other, const ClassPrior& prior, b
     for (const MapFit& f : fits) found.push_back(&f.hypothesis());
     auto map_fit = fit(one, batch, frame, fits.empty() ? nullptr : &fits.front(), found);
     // A fit with fewer compared sides is refused: one whose sides are all cut fits any box.
-    if (map_fit && map_fit->sides() >= as_other.sides() &&
-        !misshapen(map_fit->hypothesis(), prior, frame.parameters->tracks.size_gate)) {
-      fits.push_back(std::move(*map_fit));
-    }
+    if (!map_fit || map_fit->sides() < as_other.sides()) continue;
+    const Hypothesis& h = map_fit->hypothesis();
+    if (misshapen(h, prior, frame.parameters->tracks.size_gate)) continue;
+    if (!upper_part || lessThanHalf(h, prior)) fits.push_back(std::move(*map_fit));
   }
   return fits;
 }

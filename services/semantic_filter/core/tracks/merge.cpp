@@ -8,7 +8,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 #include "services/semantic_filter/core/measurement/polygon.h"
 #include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"

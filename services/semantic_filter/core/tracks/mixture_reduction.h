@@ -2,7 +2,7 @@
 // 1.4.16). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/parameters.h"
 

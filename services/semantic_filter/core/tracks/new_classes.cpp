@@ -5,7 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -88,9 +88,8 @@ void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
 
 namespace {
 
-/// Tracks of at least three views, the longest first, placed by the poses of the window.
-std::vector<WindowPoint> windowPoints(const MotionWindow& window,
-                                      const std::vector<const TrackedFrame*>& tracked,
+/// Tracks of at least three views, the longest first.
+std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tracked,
                                       const std::vector<CameraModel>& cameras) {
   std::map<std::uint64_t, WindowPoint> tracks;
   for (std::size_t k = 0; k < tracked.size(); ++k) {
@@ -112,19 +111,6 @@ std::vector<WindowPoint> windowPoints(const MotionWindow& window,
     return a.views.size() > b.views.size();
   });
   if (points.size() > kMostPoints) points.resize(kMostPoints);
-  for (WindowPoint& point : points) {
-    Matrix3d F = Matrix3d::Zero();
-    Vector3d b = Vector3d::Zero();
-    for (const WindowView& v : point.views) {
-      const WindowPose& pose = window.poses[v.keyframe];
-      const Vector3d ray = pose.R_B0_B * v.R_BC * v.normalised.homogeneous().normalized();
-      const Matrix3d across = Matrix3d::Identity() - ray * ray.transpose();
-      F += across;
-      b += across * (pose.p_B0 + pose.R_B0_B * v.p_BC);
-    }
-    F.diagonal().array() += 1e-9 * F.trace();
-    point.p_B0 = F.ldlt().solve(b);
-  }
   return points;
 }
 
@@ -260,7 +246,8 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
                             s.x.head<3>() * k.t + 0.5 * k.t * k.t * s.x.tail<3>() + k.dp,
                             s.x.head<3>() + k.t * s.x.tail<3>() + k.dv});
   }
-  window.points = windowPoints(window, tracked, cameras);
+  window.points = windowPoints(tracked, cameras);
+  placePoints(window);
   const auto refined = searchMinimum(std::move(window), imu, options_);
   if (!refined) return tl::unexpected(refined.error());
   if (refined->noise_ratio > kMostNoise) return fail("start_inconsistent");

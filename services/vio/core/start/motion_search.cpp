@@ -1,5 +1,6 @@
 #include "services/vio/core/start/motion_search.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -8,10 +9,12 @@
 namespace perdure::vio {
 namespace {
 
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kUsualDepth = 3.0;  // m
 constexpr double kAsLikely = 9.0;    // of the cost
+constexpr double kSame = 0.01;       // of the velocity
 // A share of a view's error stays as long as its track does, and no residual shows that share.
 constexpr double kNoiseMargin = 1.2;
 constexpr double kLeastNoise = 0.25;  // of vision.sigma_px
@@ -28,10 +31,11 @@ void placeAt(MotionWindow& window, double depth) {
 const Vector3d& velocity(const RefinedWindow& minimum) { return minimum.window.poses.back().v_B0; }
 
 bool apart(const RefinedWindow& a, const RefinedWindow& b, double share) {
-  return (velocity(a) - velocity(b)).norm() > share * velocity(a).norm();
+  return (velocity(a) - velocity(b)).norm() >
+         share * std::max(velocity(a).norm(), velocity(b).norm());
 }
 
-/// Two at most, the less costly first. Fails where there is none.
+/// The least costly first. Fails where there is none.
 using Minima = std::vector<RefinedWindow>;
 Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& imu,
                          const Options& options) {
@@ -46,11 +50,28 @@ Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& 
     }
   }
   if (minima.empty()) return failed;
-  if (minima.size() == 2 && minima[1].cost < minima[0].cost) std::swap(minima[0], minima[1]);
+  std::stable_sort(minima.begin(), minima.end(),
+                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
   return minima;
 }
 
 }  // namespace
+
+void placePoints(MotionWindow& window) {
+  for (WindowPoint& point : window.points) {
+    Matrix3d F = Matrix3d::Zero();
+    Vector3d b = Vector3d::Zero();
+    for (const WindowView& v : point.views) {
+      const WindowPose& pose = window.poses[v.keyframe];
+      const Vector3d ray = pose.R_B0_B * v.R_BC * v.normalised.homogeneous().normalized();
+      const Matrix3d across = Matrix3d::Identity() - ray * ray.transpose();
+      F += across;
+      b += across * (pose.p_B0 + pose.R_B0_B * v.p_BC);
+    }
+    F.diagonal().array() += 1e-9 * F.trace();
+    point.p_B0 = F.ldlt().solve(b);
+  }
+}
 
 Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
                                     const Options& options) {
@@ -58,11 +79,18 @@ Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
   // where all points are as far as things usually are.
   MotionWindow usual = window;
   placeAt(usual, kUsualDepth);
-  auto minima = refineAll({std::move(window), std::move(usual)}, imu, options);
+  // A third where the body rests: a camera far from a body that turns moves all the same.
+  MotionWindow resting = usual;
+  for (WindowPose& pose : resting.poses) pose.p_B0.setZero(), pose.v_B0.setZero();
+  placePoints(resting);
+  auto minima = refineAll({std::move(window), std::move(usual), std::move(resting)}, imu, options);
   if (!minima) return tl::unexpected(minima.error());
 
-  constexpr double kSame = 0.01;
-  if (minima->size() == 2 && !apart(minima->front(), minima->back(), kSame)) minima->pop_back();
+  for (auto i = minima->begin(); i != minima->end(); ++i) {
+    minima->erase(std::remove_if(i + 1, minima->end(),
+                                 [&](const RefinedWindow& m) { return !apart(*i, m, kSame); }),
+                  minima->end());
+  }
   Options as_seen = options;
   as_seen.vision.sigma_px *=
       std::clamp(kNoiseMargin * minima->front().image_noise, kLeastNoise, 1.0);
@@ -70,9 +98,10 @@ Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
   for (RefinedWindow& minimum : *minima) found.push_back(std::move(minimum.window));
   minima = refineAll(std::move(found), imu, as_seen);
   if (!minima) return tl::unexpected(minima.error());
-  const RefinedWindow &best = minima->front(), &other = minima->back();
-  if (other.cost < best.cost + kAsLikely && apart(best, other, kVelocityShare)) {
-    return fail("start_unobservable");
+  const RefinedWindow& best = minima->front();
+  for (const RefinedWindow& other : *minima) {
+    if (other.cost < best.cost + kAsLikely && apart(best, other, kVelocityShare))
+      return fail("start_unobservable");
   }
   return best;
 }

@@ -10,6 +10,9 @@ namespace perdure::vio {
 /// minimum that fits about as well is further off.
 inline constexpr double kVelocityShare = 0.16;
 
+/// Places the points where their rays meet, from the poses of the window.
+void placePoints(MotionWindow& window);
+
 /// Fails as refine() does, and with "start_unobservable" where another minimum fits about as well.
 Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
                                     const Options& options);

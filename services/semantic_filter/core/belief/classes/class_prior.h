@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/belief/classes/shape.h"
 
 namespace perdure::semantic_filter {
 

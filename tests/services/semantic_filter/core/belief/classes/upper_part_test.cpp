@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 
 #include <gtest/gtest.h>
 

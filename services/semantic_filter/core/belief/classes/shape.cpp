@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/belief/shape.h"
+#include "services/semantic_filter/core/belief/classes/shape.h"
 
 #include "common/base/check.h"
 

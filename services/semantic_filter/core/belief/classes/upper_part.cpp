@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/belief/upper_part.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 
 #include <algorithm>
 #include <cmath>
@@ -43,7 +43,12 @@ SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part) {
     size.mean[which] -= 1.0;
     size.covariance(which, which) += 1.0;
   }
+  size.mean[kHeight] -= std::log(2.0);
   return size;
+}
+
+bool lessThanHalf(const Hypothesis& h, const ClassPrior& prior) {
+  return h.x[kSize + kHeight] < usual(kHeight, h, prior).mean - std::log(2.0);
 }
 
 Hypothesis wholeOf(const Hypothesis& h, const ClassPrior& prior) {

@@ -4,7 +4,7 @@
 // thing once and not in every frame. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
 #pragma once
 
-#include "services/semantic_filter/core/belief/class_prior.h"
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/parameters.h"
 #include "services/semantic_filter/core/belief/state.h"
 
@@ -16,10 +16,14 @@ struct SizePrior {
   Eigen::Matrix3d covariance;
 };
 
-/// Returns the prior of the cuboid of an object, or of its upper part. Of that any share of height
-/// and of length is as likely as any other (the back of a chair, the cabin of a car); the width is
-/// that of the object.
+/// Returns the prior of the cuboid of an object, or of its upper part. That has any share of the
+/// length (the back of a chair, the cabin of a car), any share of the height up to a half, and the
+/// width of the object.
 SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
+
+/// Whether it has less than half of the usual height. Only such a cuboid is of an upper part: what
+/// is higher and too short is hidden at a side.
+bool lessThanHalf(const Hypothesis& h, const ClassPrior& prior);
 
 /// Returns the belief of the whole object: the top stays, and height and length are what the class
 /// says of an object that is at least as large as what is seen. A hypothesis of the whole object
