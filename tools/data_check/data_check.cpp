@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "tools/data_check/motion_check.h"
+#include "tools/data_check/pose_check.h"
 #include "tools/data_check/stereo_check.h"
 
 namespace perdure::tools {
@@ -24,11 +25,20 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   return findings;
 }
 
-replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& poses) {
+replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& file,
+                                const replay::DataUse& use) {
   if (recording.calibration.cameras.empty()) return {};
-  const auto samples = turnsOfPoses(poses, recording);
-  return judgePoseTurns(turnsOfImages(recording, samples, 60), samples,
-                        recording.calibration.cameras.front());
+  const auto poses = timedPoses(file, recording);
+  auto findings = judgePosesByGyro(poses, recording);
+  if (findings.empty() && (use.images || recording.imu.empty())) {
+    const CameraCalibration& camera = recording.calibration.cameras.front();
+    const auto samples = turnsOfPoses(poses);
+    const auto turns = turnsOfImages(recording, samples, use.images ? 60 : 36);
+    findings = judgePosesByImages(poses, turns, camera);
+    if (findings.empty()) findings = judgePoseTurns(turns, samples, camera);
+  }
+  if (!findings.empty()) return findings;  // accelerations would follow
+  return judgePoseUnit(poses, recording);
 }
 
 nlohmann::ordered_json toJson(const replay::DataFindings& findings) {

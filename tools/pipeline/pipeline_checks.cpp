@@ -72,8 +72,9 @@ void Pipeline::checkData() {
     }
   }
   replay::refuseFatal(findings_, options_.data);
-  if (!pose_file_ || !data.decode) return;
-  const auto of_poses = checkPoses(dataset_->recording(), *pose_file_);
+  if (!pose_file_) return;
+  const auto of_poses = checkPoses(dataset_->recording(), *pose_file_, {.images = data.decode});
+  replay::refuseFatal(of_poses, options_.odometry);
   findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
 

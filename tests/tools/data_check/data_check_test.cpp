@@ -156,7 +156,7 @@ TEST(DataCheck, PosesThatAreLateAreDoubtful) {
   drive.seconds = 4.0;
   const auto recording = Dataset::open({.path = makeTurningDrive("poses", drive)})->recording();
   const auto findingsAt = [&](int late_ms) {
-    return checkPoses(recording, posesOf(recording, std::chrono::milliseconds(late_ms)));
+    return checkPoses(recording, posesOf(recording, std::chrono::milliseconds(late_ms)), {});
   };
   EXPECT_THAT(codesOf(findingsAt(0)), ElementsAre());
   EXPECT_THAT(codesOf(findingsAt(30)), ElementsAre());
@@ -165,6 +165,20 @@ TEST(DataCheck, PosesThatAreLateAreDoubtful) {
   EXPECT_THAT(late[0].text, HasSubstr("0.30 s before the poses that are given: subtract 0.30 s"));
   ASSERT_THAT(codesOf(early), ElementsAre("poses_time_offset"));
   EXPECT_THAT(early[0].text, HasSubstr("add 0.20 s to"));
+}
+
+TEST(DataCheck, WithoutAnImuTheImagesTellHowPosesAreWritten) {
+  auto recording = Dataset::open({.path = makeTurningDrive("poses_alone")})->recording();
+  auto poses = posesOf(recording, Duration(0)).poses();
+  recording.imu.clear();
+  const auto findingsWith = [&] {
+    return checkPoses(recording, {replay::PoseFormat::kTum, poses}, {.images = false});
+  };
+  EXPECT_THAT(codesOf(findingsWith()), ElementsAre());
+  for (auto& pose : poses) pose.T_WB = pose.T_WB * tests::trueCameraPlace();
+  const auto of_camera = findingsWith();
+  ASSERT_THAT(codesOf(of_camera), ElementsAre("poses_of_camera"));
+  EXPECT_THAT(of_camera[0].text, HasSubstr("otherwise than the images in"));
 }
 
 TEST(DataCheck, UnitsOfTheAccelerometerAreToldByGravity) {
