@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "tools/data_check/axes_check.h"
 #include "tools/data_check/motion_check.h"
 #include "tools/data_check/pose_check.h"
 #include "tools/data_check/stereo_check.h"
@@ -19,9 +20,15 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   const auto stereo = checkStereo(recording);
   findings.insert(findings.end(), stereo.begin(), stereo.end());
   if (!use.imu) return findings;
-  const auto turns = judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
-                                recording.calibration.cameras.front());
-  findings.insert(findings.end(), turns.begin(), turns.end());
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  const auto turns = turnsOfImages(recording, recording.imu);
+  auto of_turns = judgeTurns(turns, recording.imu, camera);
+  const bool unit = !of_turns.empty() && of_turns.front().code.starts_with("gyro_");
+  // A mirror image looks like a T_BS that is turned or inverted, and is none.
+  if (auto axes = judgeAxes(turns, recording.imu, camera); !unit && !axes.empty()) {
+    of_turns = std::move(axes);
+  }
+  findings.insert(findings.end(), of_turns.begin(), of_turns.end());
   return findings;
 }
 

@@ -110,7 +110,9 @@ std::vector<std::string> Pipeline::doubts() const {
   const ReasonCounts of_vio = vio_           ? vio_->reasons()
                               : known_poses_ ? known_poses_->reasons()
                                              : ReasonCounts();
-  return doubtsOfRun(of_vio, counts_.frames, reasons_.of("frame_without_pose"));
+  auto doubts = doubtsOfRun(of_vio, counts_.frames, reasons_.of("frame_without_pose"));
+  if (rig_watch_ && doubts.empty()) doubts = doubtsOfRig(rig_watch_->check(of_vio));
+  return doubts;
 }
 
 void Pipeline::refuseNothing() const {

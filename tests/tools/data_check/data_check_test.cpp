@@ -91,6 +91,28 @@ TEST(DataCheck, AnAccelerometerOfTheOtherSignTurnsTheImagesUpsideDown) {
   EXPECT_THAT(findings[0].text, HasSubstr("signs of the accelerometer"));
 }
 
+TEST(DataCheck, AxesOfTheGyroscopeThatAreExchangedAreNamed) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { std::swap(sample.gyro.x(), sample.gyro.y()); };
+  const auto exchanged = findingsOf("exchanged_axes", drive);
+  ASSERT_THAT(codesOf(exchanged), ElementsAre("gyro_axes"));
+  EXPECT_THAT(exchanged[0].text, HasSubstr("w_x = w_y, w_y = w_x, w_z = w_z"));
+  EXPECT_EQ(exchanged[0].grade, DataFinding::Grade::kFatal);
+}
+
+TEST(DataCheck, AnAxisOfTheOtherSignIsNamed) {
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    TurningDrive drive;
+    drive.turning = 0.1;
+    drive.change = [&](ImuSample& sample) { sample.gyro[axis] = -sample.gyro[axis]; };
+    const auto findings = findingsOf("flipped_axis", drive);
+    ASSERT_THAT(codesOf(findings), ElementsAre("gyro_axes"));
+    EXPECT_EQ(findings[0].grade, DataFinding::Grade::kWarning);
+    const char name = "xyz"[axis];
+    EXPECT_THAT(findings[0].text, HasSubstr(std::string("w_") + name + " = -w_" + name));
+  }
+}
+
 TEST(DataCheck, ATransformTheWrongWayRoundIsNamed) {
   TurningDrive drive;
   drive.written_T_BC = tests::trueCameraPlace().inverse();
