@@ -64,7 +64,7 @@ std::string findDescription(const std::string& path, const std::vector<std::stri
                      "Nothing describes the network " + model.string() + ": looked for " +
                          listOf(candidates) +
                          "; let `perdure model import` make one, write it "
-                         "(services/inference/README.md, \"model.json\") or name it with "
+                         "(services/inference/model_json.md) or name it with "
                          "--set model.description=FILE.");
 }
 

@@ -160,7 +160,7 @@ ModelDescription parseModelDescription(const std::string& text, const std::strin
     message += (message.empty() ? "" : "\n") + file + ": " + problem;
   }
   throw StartupError(ExitCode::kConfiguration,
-                     message + "\nThe keys are explained in services/inference/README.md.");
+                     message + "\nThe keys are explained in services/inference/model_json.md.");
 }
 
 }  // namespace perdure::inference

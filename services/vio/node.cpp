@@ -110,6 +110,7 @@ std::string Node::status() const {
            "); stand still for a second, or move with the camera on things that stand";
   }
   if (agreement_.verdict() == Agreement::Verdict::kContradicted) return kImagesContradict;
+  if (started() && *speed_doubt_.sentence() != '\0') return speed_doubt_.sentence();
   if (last_state_ != OdometryState::kDegraded) return whyAlone();
   return degraded_frames_ > 0 ? "has just come over a gap or a restart"
                               : "sees no points; it goes by inertia (and speed)";
@@ -316,6 +317,7 @@ void Node::judgeImages(const FrameEstimate& estimate) {
   const Mapped mapped{static_cast<std::size_t>(estimate.points_refused), 0,
                       static_cast<std::size_t>(estimate.points_used)};
   agreement_.add(mapped, 1.0, !estimate.at_rest);
+  speed_doubt_.add(cameras_->estimator.state().time, estimate.speed_refused);
   if (agreement_.verdict() == Agreement::Verdict::kContradicted) {
     reasons_.add("images_contradict_imu");
   }

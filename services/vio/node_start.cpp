@@ -16,8 +16,8 @@ bool Node::resume(TimePoint now) {
     world_.epoch = saved.world.epoch + 1;
     return false;
   }
-  if (!cameras_->estimator.fits(saved)) {
-    reasons_.add("state_other_cameras");
+  if (const auto fits = cameras_->estimator.fits(saved); !fits) {
+    reasons_.add(fits.error());
     world_.epoch = saved.world.epoch + 1;
     return false;
   }

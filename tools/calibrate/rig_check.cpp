@@ -16,20 +16,21 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
+constexpr std::size_t kFewest = 500;  // innovations, to judge a rig by
 
 /// Vio over the drive, in one thread.
-class Watch {
+class Watched {
  public:
-  Watch(const RigCheckOptions& options, const replay::Dataset& dataset) {
+  Watched(const RigCheckOptions& options, const replay::Dataset& dataset)
+      : watch_(dataset.calibration().cameras[0], options.seconds) {
     vio::Outputs outputs;
-    outputs.odometry = [this](const Odometry& odometry) { take(odometry); };
+    outputs.odometry = [this](const Odometry& odometry) { watch_.onOdometry(odometry); };
     outputs.innovations = [this](const std::vector<vio::Innovation>& all) {
-      check.innovations.insert(check.innovations.end(), all.begin(), all.end());
+      watch_.onInnovations(all);
     };
     node_ = std::make_unique<vio::Node>(options.vio, 1, std::move(outputs));
     node_->setWorld({1, 0});
     node_->onCalibration(dataset.calibration());
-    check.camera = dataset.calibration().cameras[0];
   }
 
   void run(replay::Dataset& dataset, double seconds) {
@@ -42,53 +43,17 @@ class Watch {
       if (!first) first = frame->stamp.time;
       if (toSeconds(frame->stamp.time - *first) > seconds) break;
       node_->onFrame(*frame);
-      remember();
+      watch_.remember(*node_);
     }
     node_->flush();
-    remember();
-    check.resets = node_->reasons().of("reset");
-    check.holes = node_->reasons().of("clock_jumped_or_blackout") +
-                  node_->reasons().of("imu_gap_too_long") +
-                  node_->reasons().of("clock_jumped_back");
-    check.speed_refused = node_->reasons().of("speed_gated");
-    check.contradicted = node_->reasons().of("images_contradict_imu");
-    believe();
+    watch_.remember(*node_);
   }
   std::size_t samples() const { return samples_; }
-
-  RigCheck check;
+  RigCheck check() const { return watch_.check(node_->reasons()); }
 
  private:
-  void take(const Odometry& odometry) {
-    ++check.frames;
-    if (odometry.state == OdometryState::kInitialising) return;
-    ++check.tracked;
-    gyro_.push_back(odometry.gyro_bias);
-    accel_.push_back(odometry.accel_bias);
-  }
-  /// A filter that resets forgets: the last belief before counts.
-  void remember() {
-    if (node_->started()) saved_ = node_->saveState();
-  }
-  void believe() {
-    const auto saved = vio::fromText(saved_);
-    if (!saved || gyro_.empty()) return;
-    check.believed = true;
-    const RigidTransform& T_BC = saved->T_BC[0];
-    check.turned = logSo3(Eigen::Quaterniond(check.camera.T_BC.q.conjugate() * T_BC.q));
-    check.shifted = T_BC.p - check.camera.T_BC.p;
-    check.later_s = saved->time_offset_s - check.camera.time_offset_s;
-    const auto variances = saved->covariance.diagonal().eval();
-    check.sigma << variances.segment<6>(vio::kNavSize).cwiseSqrt(),
-        std::sqrt(variances[variances.size() - 1]);
-    check.gyro_bias = gyro_.back(), check.accel_bias = accel_.back();
-    check.gyro_bias_change = (gyro_.back() - gyro_[gyro_.size() / 2]).norm();
-    check.accel_bias_change = (accel_.back() - accel_[accel_.size() / 2]).norm();
-  }
-
+  RigWatch watch_;
   std::unique_ptr<vio::Node> node_;
-  std::string saved_;
-  std::vector<Eigen::Vector3d> gyro_, accel_;
   std::size_t samples_ = 0;
 };
 
@@ -162,6 +127,54 @@ void judgePlaceOf(const RigCheck& check, bool lens_fits, Judgements& all) {
 
 }  // namespace
 
+RigWatch::RigWatch(const CameraCalibration& camera, double seconds)
+    : seconds_(durationFromSeconds(seconds)) {
+  check_.camera = camera;
+}
+
+void RigWatch::onOdometry(const Odometry& odometry) {
+  if (!last_) until_ = odometry.stamp.time + seconds_;
+  last_ = odometry.stamp.time;
+  if (late()) return;
+  ++check_.frames;
+  if (odometry.state == OdometryState::kInitialising) return;
+  ++check_.tracked;
+  gyro_.push_back(odometry.gyro_bias);
+  accel_.push_back(odometry.accel_bias);
+}
+
+void RigWatch::onInnovations(const std::vector<vio::Innovation>& innovations) {
+  if (late()) return;
+  check_.innovations.insert(check_.innovations.end(), innovations.begin(), innovations.end());
+}
+
+void RigWatch::remember(const vio::Node& node) {
+  if (!late() && node.started()) saved_ = node.saveState();
+}
+
+RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
+  RigCheck check = check_;
+  check.resets = of_vio.of("reset");
+  check.holes = of_vio.of("clock_jumped_or_blackout") + of_vio.of("imu_gap_too_long") +
+                of_vio.of("clock_jumped_back");
+  check.speed_refused = of_vio.of("speed_gated");
+  check.contradicted = of_vio.of("images_contradict_imu");
+  const auto saved = vio::fromText(saved_);
+  if (!saved || gyro_.empty()) return check;
+  check.believed = true;
+  const RigidTransform& T_BC = saved->T_BC[0];
+  check.turned = logSo3(Eigen::Quaterniond(check.camera.T_BC.q.conjugate() * T_BC.q));
+  check.shifted = T_BC.p - check.camera.T_BC.p;
+  check.later_s = saved->time_offset_s - check.camera.time_offset_s;
+  const auto variances = saved->covariance.diagonal().eval();
+  check.sigma << variances.segment<6>(vio::kNavSize).cwiseSqrt(),
+      std::sqrt(variances[variances.size() - 1]);
+  check.gyro_bias = gyro_.back(), check.accel_bias = accel_.back();
+  check.gyro_bias_change = (gyro_.back() - gyro_[gyro_.size() / 2]).norm();
+  check.accel_bias_change = (accel_.back() - accel_[accel_.size() / 2]).norm();
+  return check;
+}
+
 double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   std::vector<double> values;
   for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
@@ -182,15 +195,16 @@ RigCheck checkRig(const RigCheckOptions& options) {
                            " has no inertial samples, by which alone a rig can "
                            "be judged; record imu along with the images");
   }
-  Watch watch(options, *dataset);
-  watch.run(*dataset, options.seconds);
-  if (watch.check.frames == 0 || watch.samples() == 0) {
+  Watched watched(options, *dataset);
+  watched.run(*dataset, options.seconds);
+  RigCheck check = watched.check();
+  if (check.frames == 0 || watched.samples() == 0) {
     throw StartupError(ExitCode::kUnavailable,
                        options.data.string() +
                            " has no images (or no inertial samples) that can be "
                            "read; record with --images");
   }
-  return std::move(watch.check);
+  return check;
 }
 
 Judgements judgeRig(const RigCheck& check) {
@@ -226,9 +240,16 @@ Judgements judgeRig(const RigCheck& check) {
                                "second), the focal length and time_offset_s, or whether what moves "
                                "fills the picture",
                                100.0 * against)});
-    if (check.innovations.size() < 500) return all;
+    if (check.innovations.size() < kFewest) return all;
   }
-  if (!check.believed || check.innovations.size() < 500) {
+  const Judgements belief = judgeBelief(check);
+  all.insert(all.end(), belief.begin(), belief.end());
+  return all;
+}
+
+Judgements judgeBelief(const RigCheck& check) {
+  Judgements all;
+  if (!check.believed || check.innovations.size() < kFewest) {
     all.push_back({Grade::kDoubtful,
                    fmt::format("there are {} innovations only, too few to judge the rig by; record "
                                "a minute of motion in a place with texture",

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "services/vio/config.h"
 #include "services/vio/core/update/updater_slam.h"
+#include "services/vio/node.h"
 #include "tools/calibrate/verdict.h"
 
 namespace perdure::calibrate {
@@ -34,11 +37,36 @@ struct RigCheck {
   double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< over the second half of the drive
 };
 
+/// Listens to a vio as it runs.
+class RigWatch {
+ public:
+  /// What comes later than `seconds` after the first odometry is not looked at.
+  RigWatch(const CameraCalibration& camera, double seconds);
+  void onOdometry(const Odometry& odometry);
+  void onInnovations(const std::vector<vio::Innovation>& innovations);
+  /// After an image: a filter that resets forgets, and the last belief before counts.
+  void remember(const vio::Node& node);
+  RigCheck check(const ReasonCounts& of_vio) const;
+
+ private:
+  bool late() const { return last_ && *last_ > until_; }
+
+  RigCheck check_;
+  Duration seconds_;
+  TimePoint until_;
+  std::optional<TimePoint> last_;
+  std::string saved_;
+  std::vector<Eigen::Vector3d> gyro_, accel_;
+};
+
 /// Throws StartupError where the recording or the rig cannot be read, or has no images or samples.
 RigCheck checkRig(const RigCheckOptions& options);
 
 /// Median of the normalised innovations squared over what it is to be (1 where all is as believed).
 double innovationRatio(const std::vector<vio::Innovation>& innovations);
+/// How vio fared, then judgeBelief where it fared well enough.
 Judgements judgeRig(const RigCheck& check);
+/// What it came to believe of lens, place and IMU; that there is too little to tell by, too.
+Judgements judgeBelief(const RigCheck& check);
 
 }  // namespace perdure::calibrate

@@ -12,8 +12,10 @@ namespace perdure::tools {
 /// are only looked at where `use.images`; takes some tenths of a second.
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use);
 
-/// Whether the images turn when poses that are given do.
-replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& poses);
+/// Whether poses that are given turn and accelerate as the IMU says; and whether the images turn
+/// with them, where `use.images` or where there is no IMU.
+replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& file,
+                                const replay::DataUse& use);
 
 /// A list of {grade, code, text}.
 nlohmann::ordered_json toJson(const replay::DataFindings& findings);

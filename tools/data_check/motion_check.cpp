@@ -332,13 +332,7 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
   return judgePlace(turns, gyro, pairs, camera);
 }
 
-std::vector<ImuSample> turnsOfPoses(const replay::PoseFile& file, const Recording& recording) {
-  std::vector<replay::StampedPose> poses = file.poses();
-  if (file.format() == replay::PoseFormat::kKitti) {
-    const Frames frames = firstCamera(recording);
-    poses.resize(std::min(poses.size(), frames.size()));
-    for (std::size_t i = 0; i < poses.size(); ++i) poses[i].time = frames[i]->time;
-  }
+std::vector<ImuSample> turnsOfPoses(const std::vector<replay::StampedPose>& poses) {
   std::vector<ImuSample> samples;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const Duration step = poses[i].time - poses[i - 1].time;

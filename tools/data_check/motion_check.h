@@ -31,9 +31,7 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const CameraCalibration& camera);
 
 /// The rates of turn between poses that follow each other, as a gyroscope on B would say them.
-/// Poses without a time (KITTI) have that of their frame.
-std::vector<ImuSample> turnsOfPoses(const replay::PoseFile& poses,
-                                    const replay::Recording& recording);
+std::vector<ImuSample> turnsOfPoses(const std::vector<replay::StampedPose>& poses);
 
 /// Code: poses_time_offset. `samples`: turnsOfPoses.
 replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,

@@ -25,7 +25,7 @@ suppression), repairs what OpenCV 4.6 cannot load or computes wrongly, compares 
 with what the file says, and looks at a picture. Writes
 
   NAME.perdure.onnx               the network, for OpenCV 4.6
-  NAME.perdure.onnx.model.json    what its numbers mean (services/inference/README.md)
+  NAME.perdure.onnx.model.json    what its numbers mean (services/inference/model_json.md)
   NAME.perdure.png                what it sees
 
   perdure model import yolov8n.onnx --image street.jpg        names are in the file

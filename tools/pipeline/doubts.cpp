@@ -51,4 +51,13 @@ std::vector<std::string> doubtsOfRun(const ReasonCounts& vio, std::uint64_t fram
   return doubts;
 }
 
+std::vector<std::string> doubtsOfRig(const calibrate::RigCheck& check) {
+  std::vector<std::string> doubts;
+  for (const auto& judgement : calibrate::judgeBelief(check)) {
+    if (judgement.grade == calibrate::Grade::kBad)
+      doubts.push_back("the rig, or an axis of the IMU, does not fit the run: " + judgement.text);
+  }
+  return doubts;
+}
+
 }  // namespace perdure::tools

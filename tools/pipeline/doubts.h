@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "tools/calibrate/rig_check.h"
 
 namespace perdure::tools {
 
@@ -14,5 +15,8 @@ namespace perdure::tools {
 /// without_pose: of those, where poses are given.
 std::vector<std::string> doubtsOfRun(const ReasonCounts& vio, std::uint64_t frames,
                                      std::uint64_t without_pose);
+
+/// What vio came to believe of the rig that the rig cannot be. `check`: of the run.
+std::vector<std::string> doubtsOfRig(const calibrate::RigCheck& check);
 
 }  // namespace perdure::tools

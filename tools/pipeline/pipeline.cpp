@@ -77,7 +77,10 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
     handle(*message);
     if (first_camera) progress(counts_);
   }
-  if (vio_) timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
+  if (vio_) {
+    timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
+    rig_watch_->remember(*vio_);
+  }
   if (known_poses_) {
     timer_.timeTowardsNext("vio", [&] { known_poses_->flush(); });
     releasePoses();
@@ -105,6 +108,8 @@ void Pipeline::handleFrame(const Frame& frame) {
     started_ms_[frame.stamp.sequence] = wallMs();
   }
   if (first_camera && pose_at_) givePose(frame);
+  constexpr std::uint64_t kEach = 20;  // frames; a state is dear to write
+  if (first_camera && vio_ && counts_.frames % kEach == 0) rig_watch_->remember(*vio_);
   if (vio_ || known_poses_) {
     const auto work = [&] { vio_ ? vio_->onFrame(frame) : known_poses_->onFrame(frame); };
     if (first_camera)

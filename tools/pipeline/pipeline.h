@@ -19,6 +19,7 @@
 #include "services/semantic_filter/node.h"
 #include "services/vio/known_pose_node.h"
 #include "services/vio/node.h"
+#include "tools/calibrate/rig_check.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
 #include "tools/pipeline/map_follower.h"
@@ -138,6 +139,7 @@ class Pipeline {
   std::unique_ptr<inference::Node> inference_;
   std::unique_ptr<SimulatedDetections> simulated_;
   std::unique_ptr<vio::Node> vio_;
+  std::optional<calibrate::RigWatch> rig_watch_;     ///< of vio
   std::unique_ptr<vio::KnownPoseNode> known_poses_;  ///< landmarks where the poses are given
   std::unique_ptr<semantic_filter::Node> filter_;
   std::unique_ptr<MapMemory> map_;

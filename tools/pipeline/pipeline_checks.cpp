@@ -72,8 +72,9 @@ void Pipeline::checkData() {
     }
   }
   replay::refuseFatal(findings_, options_.data);
-  if (!pose_file_ || !data.decode) return;
-  const auto of_poses = checkPoses(dataset_->recording(), *pose_file_);
+  if (!pose_file_) return;
+  const auto of_poses = checkPoses(dataset_->recording(), *pose_file_, {.images = data.decode});
+  replay::refuseFatal(of_poses, options_.odometry);
   findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
 
@@ -109,7 +110,9 @@ std::vector<std::string> Pipeline::doubts() const {
   const ReasonCounts of_vio = vio_           ? vio_->reasons()
                               : known_poses_ ? known_poses_->reasons()
                                              : ReasonCounts();
-  return doubtsOfRun(of_vio, counts_.frames, reasons_.of("frame_without_pose"));
+  auto doubts = doubtsOfRun(of_vio, counts_.frames, reasons_.of("frame_without_pose"));
+  if (rig_watch_ && doubts.empty()) doubts = doubtsOfRig(rig_watch_->check(of_vio));
+  return doubts;
 }
 
 void Pipeline::refuseNothing() const {

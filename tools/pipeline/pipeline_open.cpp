@@ -162,7 +162,15 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
                                                    "needs; give --odometry a pose file");
   }
   vio::Outputs sinks;
-  sinks.odometry = [this](const Odometry& odometry) { new_odometry_.push_back(odometry); };
+  sinks.odometry = [this](const Odometry& odometry) {
+    new_odometry_.push_back(odometry);
+    rig_watch_->onOdometry(odometry);
+  };
+  sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
+    rig_watch_->onInnovations(all);
+  };
+  constexpr double kWatched_s = 60.0;  // as perdure doctor does
+  rig_watch_.emplace(dataset_->calibration().cameras.front(), kWatched_s);
   sinks.landmarks = [this](const Landmarks& landmarks) {
     landmarks_[landmarks.stamp.sequence] = landmarks;
     outputs_->onLandmarks(landmarks);

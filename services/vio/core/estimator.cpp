@@ -290,6 +290,7 @@ Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffe
   if (options_.speed.enabled && input.speed) {
     const auto done = updateSpeed(*state_, input.speed->speed, input.speed->sigma, options_.speed);
     if (!done) reasons_.add(done.error());
+    out.speed_refused = !done && done.error().code == "speed_gated";
   }
   out.at_rest = restUpdate(input, imu, from);
   if (out.at_rest) {

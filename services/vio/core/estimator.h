@@ -49,6 +49,7 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
+  std::optional<bool> speed_refused;    ///< by the gate; nothing where there was no speed
   int points_used = 0;                  ///< of this image, by all updates
   int points_refused = 0;               ///< gated, or of rays that do not meet before the cameras
   std::vector<Innovation> innovations;  ///< where they are kept
@@ -64,8 +65,9 @@ class Estimator {
   void start(const Start& start);
   /// Begins with a saved state of the same cameras.
   void restore(const SavedState& saved);
-  /// As many cameras, and the same shutters.
-  bool fits(const SavedState& saved) const;
+  /// As many cameras, the same shutters, the same things estimated. Fails with what differs:
+  /// state_other_cameras, state_other_shutter, state_other_gyro_scale, state_other_readout.
+  Result<void> fits(const SavedState& saved) const;
   /// What restore takes; world and next_track are the caller's. Needs started().
   SavedState save() const;
   bool started() const { return state_.has_value(); }

@@ -53,20 +53,31 @@ void Estimator::start(const Start& start) {
   if (start.at_rest) standstill_.confirm(start.time, restExpectation(*state_, options_.gravity));
 }
 
-bool Estimator::fits(const SavedState& saved) const {
-  if (saved.T_BC.size() != T_BC_.size() || saved.readout_s.size() != T_BC_.size()) return false;
+Result<void> Estimator::fits(const SavedState& saved) const {
+  if (saved.T_BC.size() != T_BC_.size() || saved.readout_s.size() != T_BC_.size()) {
+    return fail("state_other_cameras", "the saved state has another number of cameras");
+  }
   Eigen::Index size = kNavSize + 6 * static_cast<Eigen::Index>(T_BC_.size()) + 1;
   for (std::size_t i = 0; i < T_BC_.size(); ++i) {
     const bool rolls = readout_s_[i] != 0.0;
-    if (rolls != (saved.readout_s[i] != 0.0)) return false;
+    if (rolls != (saved.readout_s[i] != 0.0)) {
+      return fail("state_other_shutter", "only one of the two has readout_s of a camera");
+    }
     size += rolls && options_.calibration.estimate_readout;
   }
-  if (options_.calibration.gyro_scale > 0.0) size += kScaleSize;
-  return saved.covariance.rows() == size;
+  const bool scale = options_.calibration.gyro_scale > 0.0;
+  if (scale) size += kScaleSize;
+  const Eigen::Index more = saved.covariance.rows() - size;
+  if (more == 0) return {};
+  if (more == (scale ? -kScaleSize : kScaleSize)) {
+    return fail("state_other_gyro_scale",
+                "calibration.gyro_scale is 0 now and was not when the state was saved, or was 0");
+  }
+  return fail("state_other_readout", "another number of read-outs is estimated");
 }
 
 void Estimator::restore(const SavedState& saved) {
-  check(fits(saved), "the cameras that were saved");
+  check(fits(saved).has_value(), "the cameras that were saved");
   start({saved.time, saved.nav, saved.covariance.topLeftCorner<15, 15>()});
   state_->T_BC = saved.T_BC;
   state_->time_offset_s = saved.time_offset_s;

@@ -128,6 +128,7 @@ TEST_F(NodeTest, SaysWhereItLookedForADescription) {
   EXPECT_EQ(code, ExitCode::kUnavailable);
   EXPECT_THAT(message, HasSubstr("tiny.cfg.model.json"));
   EXPECT_THAT(message, HasSubstr("model.description"));
+  EXPECT_THAT(message, HasSubstr("services/inference/model_json.md"));
 }
 
 TEST_F(NodeTest, RefusesAFileThatIsNotANetwork) {

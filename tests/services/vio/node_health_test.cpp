@@ -89,6 +89,35 @@ TEST(VioNodeHealth, SaysThatItsConfigurationNamesACameraThatIsNotThere) {
   EXPECT_THAT(statusWith({"cam0", "cam9"}), HasSubstr("cam9"));
 }
 
+TEST(VioNodeHealth, SaysThatTheSpeedIsRefused) {
+  Calibration with_speed = calibration();
+  with_speed.has_speed = true;
+  Player player(7.0);
+  Recorder r;
+  Node node(Config{}, 5, r.outputs());
+  node.onCalibration(with_speed);
+  double unit = 1.0;
+  const auto tell = [&](ImuSample& sample, double t) {
+    if (std::abs(std::remainder(t, 0.05)) > 1e-6) return true;
+    const Nav truth = player.drive().truth(t);
+    const double speed = (truth.q_WB.conjugate() * truth.v_WB).x();
+    node.onSpeed({1, 0, sample.time, unit * speed, 0.05});
+    return true;
+  };
+  player.play(node, 0.0, 3.0, tell);
+  ASSERT_EQ(node.health(), HealthState::kOk) << node.status();
+  unit = 3.6;  // km/h
+  player.play(node, 3.05, 3.25, tell);
+  EXPECT_EQ(node.status(), "") << "a few are nothing to speak of";
+  player.play(node, 3.3, 5.0, tell);
+  EXPECT_EQ(node.health(), HealthState::kDegraded);
+  EXPECT_THAT(node.status(), HasSubstr("speed contradicts camera and IMU"));
+  EXPECT_THAT(node.status(), HasSubstr("m/s"));
+  unit = 1.0;
+  player.play(node, 5.05, 7.0, tell);
+  EXPECT_EQ(node.status(), "") << "well again";
+}
+
 TEST(VioNodeHealth, SaysThatFramesHaveAnotherSizeThanTheirCalibration) {
   Recorder r;
   Node node(Config{}, 5, r.outputs());

@@ -91,6 +91,28 @@ TEST(DataCheck, AnAccelerometerOfTheOtherSignTurnsTheImagesUpsideDown) {
   EXPECT_THAT(findings[0].text, HasSubstr("signs of the accelerometer"));
 }
 
+TEST(DataCheck, AxesOfTheGyroscopeThatAreExchangedAreNamed) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { std::swap(sample.gyro.x(), sample.gyro.y()); };
+  const auto exchanged = findingsOf("exchanged_axes", drive);
+  ASSERT_THAT(codesOf(exchanged), ElementsAre("gyro_axes"));
+  EXPECT_THAT(exchanged[0].text, HasSubstr("w_x = w_y, w_y = w_x, w_z = w_z"));
+  EXPECT_EQ(exchanged[0].grade, DataFinding::Grade::kFatal);
+}
+
+TEST(DataCheck, AnAxisOfTheOtherSignIsNamed) {
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    TurningDrive drive;
+    drive.turning = 0.1;
+    drive.change = [&](ImuSample& sample) { sample.gyro[axis] = -sample.gyro[axis]; };
+    const auto findings = findingsOf("flipped_axis", drive);
+    ASSERT_THAT(codesOf(findings), ElementsAre("gyro_axes"));
+    EXPECT_EQ(findings[0].grade, DataFinding::Grade::kWarning);
+    const char name = "xyz"[axis];
+    EXPECT_THAT(findings[0].text, HasSubstr(std::string("w_") + name + " = -w_" + name));
+  }
+}
+
 TEST(DataCheck, ATransformTheWrongWayRoundIsNamed) {
   TurningDrive drive;
   drive.written_T_BC = tests::trueCameraPlace().inverse();
@@ -156,7 +178,7 @@ TEST(DataCheck, PosesThatAreLateAreDoubtful) {
   drive.seconds = 4.0;
   const auto recording = Dataset::open({.path = makeTurningDrive("poses", drive)})->recording();
   const auto findingsAt = [&](int late_ms) {
-    return checkPoses(recording, posesOf(recording, std::chrono::milliseconds(late_ms)));
+    return checkPoses(recording, posesOf(recording, std::chrono::milliseconds(late_ms)), {});
   };
   EXPECT_THAT(codesOf(findingsAt(0)), ElementsAre());
   EXPECT_THAT(codesOf(findingsAt(30)), ElementsAre());
@@ -165,6 +187,20 @@ TEST(DataCheck, PosesThatAreLateAreDoubtful) {
   EXPECT_THAT(late[0].text, HasSubstr("0.30 s before the poses that are given: subtract 0.30 s"));
   ASSERT_THAT(codesOf(early), ElementsAre("poses_time_offset"));
   EXPECT_THAT(early[0].text, HasSubstr("add 0.20 s to"));
+}
+
+TEST(DataCheck, WithoutAnImuTheImagesTellHowPosesAreWritten) {
+  auto recording = Dataset::open({.path = makeTurningDrive("poses_alone")})->recording();
+  auto poses = posesOf(recording, Duration(0)).poses();
+  recording.imu.clear();
+  const auto findingsWith = [&] {
+    return checkPoses(recording, {replay::PoseFormat::kTum, poses}, {.images = false});
+  };
+  EXPECT_THAT(codesOf(findingsWith()), ElementsAre());
+  for (auto& pose : poses) pose.T_WB = pose.T_WB * tests::trueCameraPlace();
+  const auto of_camera = findingsWith();
+  ASSERT_THAT(codesOf(of_camera), ElementsAre("poses_of_camera"));
+  EXPECT_THAT(of_camera[0].text, HasSubstr("otherwise than the images in"));
 }
 
 TEST(DataCheck, UnitsOfTheAccelerometerAreToldByGravity) {

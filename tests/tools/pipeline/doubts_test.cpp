@@ -40,6 +40,21 @@ TEST(Doubts, TwoFramesOfReferenceAreTold) {
   EXPECT_THAT(doubtsAt("reset", 1), ElementsAre(HasSubstr("not in one frame of reference")));
 }
 
+TEST(Doubts, ARigThatTheRunContradictsIsTold) {
+  calibrate::RigCheck check;
+  check.believed = true;
+  check.camera.width = 640, check.camera.height = 480;
+  vio::Innovation one;
+  one.used = true, one.rows = 2, one.nis = 1.4;
+  check.innovations.assign(600, one);
+  EXPECT_THAT(doubtsOfRig(check), IsEmpty());
+  check.turned = {0.3, 0, 0};
+  EXPECT_THAT(doubtsOfRig(check), ElementsAre(AllOf(HasSubstr("does not fit the run"),
+                                                    HasSubstr("the camera's rotation 17.19°"))));
+  check.innovations.clear();  // a run without a start is told elsewhere
+  EXPECT_THAT(doubtsOfRig(check), IsEmpty());
+}
+
 TEST(Doubts, PosesOfAPartOfTheDriveAreTold) {
   EXPECT_THAT(doubtsOfRun({}, 240, 10), IsEmpty());
   EXPECT_THAT(doubtsOfRun({}, 240, 234), ElementsAre(HasSubstr("234 of 240 frames have no pose")));

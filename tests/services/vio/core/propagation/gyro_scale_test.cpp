@@ -126,7 +126,11 @@ TEST(GyroScale, ComesBackFromASavedStateWhereItIsEstimated) {
   with.state().gyro_scale = kScale;
   const auto saved = fromText(toText(with.save()));
   ASSERT_TRUE(saved) << saved.error().detail;
-  EXPECT_FALSE(without.fits(*saved));
+  ASSERT_FALSE(without.fits(*saved));
+  EXPECT_EQ(without.fits(*saved).error().code, "state_other_gyro_scale");
+  without.start(test::startAt(drive, 0.2, 1, 1.0));
+  ASSERT_FALSE(with.fits(without.save()));
+  EXPECT_EQ(with.fits(without.save()).error().code, "state_other_gyro_scale");
   ASSERT_TRUE(with.fits(*saved));
   with.restore(*saved);
   EXPECT_EQ(with.state().gyro_scale, kScale);

@@ -166,7 +166,8 @@ TEST(RollingState, ComesBackOnlyToTheSameShutter) {
   rolling.start(test::startAt(drive, 0.2, 1, 1.0));
   rolling.state().readout_s[0] = 0.0187;
   const SavedState saved = rolling.save();
-  EXPECT_FALSE(global.fits(saved));
+  ASSERT_FALSE(global.fits(saved));
+  EXPECT_EQ(global.fits(saved).error().code, "state_other_shutter");
   ASSERT_TRUE(rolling.fits(saved));
   rolling.restore(saved);
   EXPECT_EQ(rolling.state().readout_s[0], 0.0187);

@@ -1,0 +1,219 @@
+#include "tools/data_check/pose_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/math/so3.h"
+#include "tests/tools/data_check/turning_drive.h"
+#include "tools/data_check/data_check.h"
+
+namespace perdure::tools {
+namespace {
+
+using replay::DataFinding;
+using replay::StampedPose;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using Poses = std::vector<StampedPose>;
+
+std::vector<std::string> codesIn(const replay::DataFindings& findings) {
+  std::vector<std::string> codes;
+  for (const auto& finding : findings) codes.push_back(finding.code);
+  return codes;
+}
+
+/// 20 s in which the body turns about all axes, or as a vehicle about z alone, and accelerates.
+struct Way {
+  replay::Recording recording;
+  Poses poses;  ///< at 200 Hz
+};
+
+Way wayOf(const Eigen::Vector3d& turning) {
+  constexpr double kStep_s = 0.005, kSeconds = 20.0;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> noise;
+  Way way;
+  CameraCalibration camera;
+  camera.name = "cam0", camera.width = 640, camera.height = 480;
+  camera.fx = camera.fy = 400, camera.cx = 320, camera.cy = 240;
+  camera.T_BC = tests::trueCameraPlace();
+  way.recording.calibration.cameras.push_back(camera);
+  Eigen::Quaterniond q = expQuaternion({0.1, -0.2, 0.5});
+  for (int i = 0; i * kStep_s < kSeconds; ++i) {
+    const double t = i * kStep_s;
+    const TimePoint time(durationFromSeconds(100.0 + t));
+    const Eigen::Vector3d phase(5.1 * t, 4.3 * t + 1.0, 3.2 * t + 2.0);
+    const Eigen::Vector3d rate = turning.cwiseProduct(phase.array().sin().matrix());
+    const Eigen::Vector3d place(2.0 * t + std::sin(1.5 * t), std::cos(1.9 * t), 0.1 * t);
+    const Eigen::Vector3d push(-2.25 * std::sin(1.5 * t), -3.61 * std::cos(1.9 * t), 0.0);
+    way.poses.push_back({time, RigidTransform(q, place)});
+    ImuSample sample;
+    sample.time = time;
+    sample.gyro = rate + Eigen::Vector3d(0.02, -0.05, 0.03);
+    sample.accel = q.conjugate() * (push + Eigen::Vector3d(0, 0, 9.81));
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      sample.gyro[axis] += 0.005 * noise(random), sample.accel[axis] += 0.1 * noise(random);
+    }
+    way.recording.imu.push_back(sample);
+    q = q * expQuaternion(kStep_s * rate);
+  }
+  return way;
+}
+
+const Way& phone() {
+  static const Way way = wayOf({1.0, 0.8, 1.2});
+  return way;
+}
+const Way& vehicle() {
+  static const Way way = wayOf({0.01, 0.01, 0.3});
+  return way;
+}
+
+Poses changed(Poses poses, const std::function<RigidTransform(const RigidTransform&)>& change) {
+  for (auto& pose : poses) pose.T_WB = change(pose.T_WB);
+  return poses;
+}
+Poses inverted(const Poses& poses) {
+  return changed(poses, [](const RigidTransform& T) { return T.inverse(); });
+}
+Poses ofCamera(const Poses& poses) {
+  return changed(poses, [](const RigidTransform& T) { return T * tests::trueCameraPlace(); });
+}
+/// As they are read where the file has w first.
+Poses withWFirst(const Poses& poses) {
+  return changed(poses, [](const RigidTransform& T) {
+    return RigidTransform(Eigen::Quaterniond(T.q.z(), T.q.w(), T.q.x(), T.q.y()), T.p);
+  });
+}
+Poses inUnit(const Poses& poses, double metre) {
+  return changed(poses, [&](const RigidTransform& T) {
+    return RigidTransform(T.q, Eigen::Vector3d(metre * T.p));
+  });
+}
+Poses eachOf(const Poses& poses, std::size_t n) {
+  Poses some;
+  for (std::size_t i = 0; i < poses.size(); i += n) some.push_back(poses[i]);
+  return some;
+}
+Poses rough(const Poses& poses, double rad, double metre) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise;
+  const auto drawn = [&](double sigma) {
+    const double x = noise(random), y = noise(random), z = noise(random);
+    return Eigen::Vector3d(sigma * Eigen::Vector3d(x, y, z));
+  };
+  return changed(poses, [&](const RigidTransform& T) {
+    return RigidTransform(T.q * expQuaternion(drawn(rad)), Eigen::Vector3d(T.p + drawn(metre)));
+  });
+}
+
+replay::DataFindings findingsOf(const Way& way, const Poses& poses) {
+  return checkPoses(way.recording, {replay::PoseFormat::kTum, poses}, {.images = false});
+}
+
+TEST(PoseCheck, SoundPosesHaveNoFinding) {
+  for (const Way* way : {&phone(), &vehicle()}) {
+    for (const std::size_t each : {1, 4, 20}) {  // 200, 50 and 10 Hz
+      const Poses poses = eachOf(way->poses, each);
+      EXPECT_THAT(codesIn(findingsOf(*way, poses)), ElementsAre());
+      EXPECT_THAT(codesIn(findingsOf(*way, rough(poses, 0.005, 0.01))), ElementsAre());
+      EXPECT_THAT(codesIn(findingsOf(*way, rough(poses, 0.05, 0.2))), ElementsAre());
+    }
+  }
+}
+
+TEST(PoseCheck, PosesTheWrongWayRoundAreNamed) {
+  for (const Way* way : {&phone(), &vehicle()}) {
+    const auto findings = findingsOf(*way, rough(inverted(way->poses), 0.005, 0.01));
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_inverted"));
+    EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
+    EXPECT_THAT(findings[0].text,
+                AllOf(HasSubstr("otherwise than the gyroscope in"),
+                      HasSubstr("the world in the body"), HasSubstr("give their inverse")));
+  }
+}
+
+TEST(PoseCheck, PosesOfTheCameraAreNamed) {
+  for (const Way* way : {&phone(), &vehicle()}) {
+    const auto findings = findingsOf(*way, ofCamera(way->poses));
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_of_camera"));
+    EXPECT_THAT(findings[0].text, HasSubstr("T_WC times the inverse of T_BS"));
+    EXPECT_THAT(codesIn(findingsOf(*way, inverted(ofCamera(way->poses)))),
+                ElementsAre("poses_inverted"));
+  }
+}
+
+TEST(PoseCheck, AQuaternionWithWFirstIsNamed) {
+  for (const Way* way : {&phone(), &vehicle()}) {
+    const auto findings = findingsOf(*way, withWFirst(way->poses));
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_w_first"));
+    EXPECT_THAT(findings[0].text, HasSubstr("qx qy qz qw"));
+  }
+}
+
+TEST(PoseCheck, OtherAxesAreTold) {
+  const Eigen::Quaterniond down(0, 1, 0, 0);  // x forward, y right, z down
+  const auto findings = findingsOf(phone(), changed(phone().poses, [&](const RigidTransform& T) {
+                                     return RigidTransform(T.q * down, T.p);
+                                   }));
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_other_axes"));
+  EXPECT_THAT(findings[0].text, HasSubstr("x is x, y is -y, z is -z"));
+}
+
+TEST(PoseCheck, TheUnitOfLengthIsToldByTheAccelerometer) {
+  const auto textAt = [](double metre) {
+    const auto findings = findingsOf(phone(), inUnit(phone().poses, metre));
+    return findings.empty() ? std::string() : findings[0].code + ": " + findings[0].text;
+  };
+  EXPECT_THAT(textAt(100.0), AllOf(HasSubstr("poses_unit"), HasSubstr("centimetres; multiply x, "
+                                                                      "y, z by 0.01")));
+  EXPECT_THAT(textAt(1000.0), HasSubstr("millimetres"));
+  EXPECT_THAT(textAt(0.2), HasSubstr("no scale of their own"));
+  EXPECT_EQ(textAt(1.3), "");
+}
+
+TEST(PoseCheck, ASpeedThatNothingHasIsToldWithoutAnImu) {
+  Way way = phone();
+  way.recording.imu.clear();
+  EXPECT_THAT(codesIn(findingsOf(way, way.poses)), ElementsAre());
+  EXPECT_THAT(codesIn(findingsOf(way, inUnit(way.poses, 1000.0))), ElementsAre("poses_too_fast"));
+}
+
+TEST(PoseCheck, PosesOnAnotherClockAreToldByTheGyroscope) {
+  Poses late = phone().poses;
+  for (auto& pose : late) pose.time += std::chrono::milliseconds(400);
+  const auto findings = findingsOf(phone(), late);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_time_offset"));
+  EXPECT_THAT(findings[0].text, HasSubstr("subtract 0.40 s from"));
+}
+
+TEST(PoseCheck, PosesOfAnotherDriveAreTold) {
+  EXPECT_THAT(codesIn(findingsOf(wayOf({1.4, 0.0, 0.0}), wayOf({0.0, 1.4, 0.3}).poses)),
+              ElementsAre("poses_contradict_gyro"));
+}
+
+TEST(PoseCheck, AnImuInOtherUnitsIsNotTakenForTruth) {
+  Way way = phone();
+  for (auto& sample : way.recording.imu) sample.gyro *= 57.3, sample.accel *= 1000.0;
+  EXPECT_THAT(codesIn(findingsOf(way, way.poses)), ElementsAre());
+}
+
+TEST(PoseCheck, KittiPosesHaveTheTimesOfTheirFrames) {
+  replay::Recording recording;
+  for (const std::uint64_t index : {2U, 4U, 9U}) {
+    recording.frames.push_back(
+        {TimePoint(std::chrono::milliseconds(100 * index)), index, 0, {}, {}});
+  }
+  Poses poses(6);
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].T_WB.p.x() = static_cast<double>(i);
+  const Poses timed = timedPoses({replay::PoseFormat::kKitti, poses}, recording);
+  ASSERT_EQ(timed.size(), 2U);
+  EXPECT_EQ(timed[1].time, TimePoint(std::chrono::milliseconds(400)));
+  EXPECT_EQ(timed[1].T_WB.p.x(), 4.0);
+}
+
+}  // namespace
+}  // namespace perdure::tools

@@ -1,0 +1,111 @@
+#include "tools/data_check/axes_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+
+#include "tools/data_check/turn_integral.h"
+
+namespace perdure::tools {
+namespace {
+
+/// Row i of the gyroscope as it should be is `sign[i]` times row `from[i]` of what it says.
+struct SignedAxes {
+  std::array<Eigen::Index, 3> from{0, 1, 2};
+  std::array<int, 3> sign{1, 1, 1};
+
+  bool changes(Eigen::Index i) const {
+    const auto at = static_cast<std::size_t>(i);
+    return from[at] != i || sign[at] < 0;
+  }
+  bool exchanges() const { return from != SignedAxes().from; }
+  bool mirrors() const {
+    Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i) M(static_cast<Eigen::Index>(i), from[i]) = sign[i];
+    return M.determinant() < 0.0;
+  }
+};
+
+/// The 24 mirror images.
+std::vector<SignedAxes> mirroredAxes() {
+  std::vector<SignedAxes> all;
+  SignedAxes axes;
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      for (int i = 0; i < 3; ++i) axes.sign[static_cast<std::size_t>(i)] = signs >> i & 1 ? -1 : 1;
+      if (axes.mirrors()) all.push_back(axes);
+    }
+  } while (std::next_permutation(axes.from.begin(), axes.from.end()));
+  return all;
+}
+
+/// Share of the images' turning about axis i that `axes` leave unexplained.
+double leftAbout(const TurnPairs& pairs, const SignedAxes& axes, Eigen::Index i) {
+  const auto at = static_cast<std::size_t>(i);
+  return (pairs.reference.row(i) - axes.sign[at] * pairs.given.row(axes.from[at])).squaredNorm() /
+         std::max(1e-18, pairs.reference.row(i).squaredNorm());
+}
+
+std::string textOf(const SignedAxes& axes) {
+  std::string text;
+  for (std::size_t i = 0; i < 3; ++i) {
+    text += fmt::format("{}w_{} = {}w_{}", i == 0 ? "" : ", ", "xyz"[i],
+                        axes.sign[i] < 0 ? "-" : "", "xyz"[static_cast<std::size_t>(axes.from[i])]);
+  }
+  return text;
+}
+
+/// What is left on average about the axes that change; nothing where one of them does not gain.
+std::optional<double> leftBy(const TurnPairs& pairs, const SignedAxes& axes, double least_rad) {
+  constexpr double kWrong = 0.4, kRight = 0.3, kClearly = 3.0;
+  const double count = std::max<double>(1.0, static_cast<double>(pairs.reference.cols()));
+  double sum = 0.0, before = 0.0, changed = 0.0;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (!axes.changes(i)) continue;
+    if (pairs.reference.row(i).squaredNorm() < count * least_rad * least_rad) return std::nullopt;
+    const double left = leftAbout(pairs, axes, i), now = leftAbout(pairs, {}, i);
+    if (left > kRight || kClearly * left > now) return std::nullopt;
+    sum += left, before += now, changed += 1.0;
+  }
+  if (changed == 0.0 || before < kWrong * changed) return std::nullopt;
+  return sum / changed;
+}
+
+}  // namespace
+
+replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
+                               const std::vector<ImuSample>& samples,
+                               const CameraCalibration& camera) {
+  constexpr std::size_t kFewest = 12;
+  constexpr double kEnough_px = 0.1, kMuch_px = 2.0;
+  const TurnIntegral gyro(samples);
+  const Duration later = durationFromSeconds(camera.time_offset_s);
+  std::vector<Eigen::Vector3d> images, said;
+  for (const Turn& turn : turns) {
+    if (!gyro.covers(turn.from + later, turn.to + later)) continue;
+    images.push_back(camera.T_BC.q * turn.of_images);
+    said.push_back(gyro.between(turn.from + later, turn.to + later));
+  }
+  if (images.size() < kFewest) return {};
+  const TurnPairs pairs(images, said);
+  std::optional<double> least;
+  SignedAxes best;
+  for (const SignedAxes& axes : mirroredAxes()) {
+    const auto left = leftBy(pairs, axes, kEnough_px / camera.fx);
+    if (left && (!least || *left < *least)) least = left, best = axes;
+  }
+  if (!least) return {};
+  // Nothing else looks like an exchange; one sign may be that of a way round a thing close by.
+  const bool sure = best.exchanges() && leftBy(pairs, best, kMuch_px / camera.fx);
+  return {{sure ? replay::DataFinding::Grade::kFatal : replay::DataFinding::Grade::kWarning,
+           "gyro_axes",
+           fmt::format("the images turn as if the gyroscope's axes were others: {} leave {:.0f} % "
+                       "of their turning about these axes unexplained, in {} pairs of images: see "
+                       "the order and the signs of its columns, or the axes of T_BS",
+                       textOf(best), 100.0 * *least, images.size())}};
+}
+
+}  // namespace perdure::tools
