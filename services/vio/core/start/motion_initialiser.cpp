@@ -234,7 +234,9 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   s.x.setZero();
   for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
   if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
-    return fail("start_inconsistent");
+    // Nothing near the truth: the search begins at rest, and gravity against the mean force.
+    s.x.setZero();
+    s.x.tail<3>() = -options_.gravity * keyframes.back().dv.normalized();
   }
 
   MotionWindow window;

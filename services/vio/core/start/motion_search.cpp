@@ -55,6 +55,31 @@ Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& 
   return minima;
 }
 
+/// Leaves the least costly of those that are the same.
+void keepApart(Minima& minima) {
+  std::stable_sort(minima.begin(), minima.end(),
+                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  for (auto i = minima.begin(); i != minima.end(); ++i) {
+    const auto same = [&](const RefinedWindow& m) { return !apart(*i, m, kSame); };
+    minima.erase(std::remove_if(i + 1, minima.end(), same), minima.end());
+  }
+}
+
+/// Whether a camera moves by the turn of the body alone about as far as the body moves. Then the
+/// body may rest: a third search begins there.
+bool turnMovesCameras(const MotionWindow& window) {
+  constexpr double kShare = 0.3;
+  double by_turn = 0.0, by_body = 0.0;
+  for (const WindowPoint& point : window.points) {
+    for (const WindowView& v : point.views) {
+      const WindowPose& pose = window.poses[v.keyframe];
+      by_turn = std::max(by_turn, (pose.R_B0_B * v.p_BC - v.p_BC).norm());
+      by_body = std::max(by_body, pose.p_B0.norm());
+    }
+  }
+  return by_turn > kShare * by_body;
+}
+
 }  // namespace
 
 void placePoints(MotionWindow& window) {
@@ -79,18 +104,16 @@ Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
   // where all points are as far as things usually are.
   MotionWindow usual = window;
   placeAt(usual, kUsualDepth);
-  // A third where the body rests: a camera far from a body that turns moves all the same.
-  MotionWindow resting = usual;
-  for (WindowPose& pose : resting.poses) pose.p_B0.setZero(), pose.v_B0.setZero();
-  placePoints(resting);
-  auto minima = refineAll({std::move(window), std::move(usual), std::move(resting)}, imu, options);
+  MotionWindow resting = window;
+  auto minima = refineAll({std::move(window), std::move(usual)}, imu, options);
   if (!minima) return tl::unexpected(minima.error());
-
-  for (auto i = minima->begin(); i != minima->end(); ++i) {
-    minima->erase(std::remove_if(i + 1, minima->end(),
-                                 [&](const RefinedWindow& m) { return !apart(*i, m, kSame); }),
-                  minima->end());
+  if (turnMovesCameras(minima->front().window)) {
+    for (WindowPose& pose : resting.poses) pose.p_B0.setZero(), pose.v_B0.setZero();
+    placePoints(resting);
+    if (auto at_rest = refine(std::move(resting), imu, options))
+      minima->push_back(std::move(*at_rest));
   }
+  keepApart(*minima);
   Options as_seen = options;
   as_seen.vision.sigma_px *=
       std::clamp(kNoiseMargin * minima->front().image_noise, kLeastNoise, 1.0);
