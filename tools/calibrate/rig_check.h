@@ -20,6 +20,7 @@ struct RigCheckOptions {
 /// What vio came to believe of the first camera's place, against the rig; and how it fared.
 struct RigCheck {
   CameraCalibration camera;
+  std::size_t cameras = 1;
   std::size_t frames = 0, tracked = 0, resets = 0;
   std::size_t holes = 0;  ///< of the resets: stamps jumped, or samples were missing
   std::size_t speed_refused = 0;
@@ -40,5 +41,10 @@ RigCheck checkRig(const RigCheckOptions& options);
 /// Median of the normalised innovations squared over what it is to be (1 where all is as believed).
 double innovationRatio(const std::vector<vio::Innovation>& innovations);
 Judgements judgeRig(const RigCheck& check);
+
+/// Whether so much contradicts with two cameras that it is worth to look with the first one alone,
+/// and what that says: nothing where it contradicts as well.
+bool isSecondSuspect(const RigCheck& check);
+Judgements judgeSecond(const RigCheck& both, const RigCheck& alone);
 
 }  // namespace perdure::calibrate

@@ -42,6 +42,18 @@ bool checkRecording(const std::string& data, const std::string& rig, Findings& f
   return usable;
 }
 
+/// A camera that hangs upside down is no fault where vio, which feels gravity, agrees.
+void settleUpsideDown(const calibrate::Judgements& judgements, Findings& findings) {
+  if (calibrate::worstOf(judgements) != calibrate::Grade::kGood) return;
+  for (Finding& finding : findings) {
+    if (finding.text.find(replay::kUpsideDown) == std::string::npos) continue;
+    finding.verdict = Verdict::kOk;
+    finding.text =
+        "the camera hangs upside down, as T_BS has it, and vio agrees; objects are found "
+        "better in images that are turned";
+  }
+}
+
 void showProgress(std::size_t done, std::size_t all) {
   constexpr std::size_t kEvery = 50;
   if (!isatty(STDERR_FILENO) || (done % kEvery != 0 && done != all)) return;
@@ -55,7 +67,15 @@ Findings checkRigBy(const std::string& recording, const std::string& rig, double
   if (!checkRecording(recording, rig, findings)) return findings;
   calibrate::RigCheckOptions options;
   options.data = recording, options.rig = rig, options.seconds = seconds;
-  for (const auto& judgement : calibrate::judgeRig(calibrate::checkRig(options))) {
+  const auto check = calibrate::checkRig(options);
+  auto judgements = calibrate::judgeRig(check);
+  settleUpsideDown(judgements, findings);
+  if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
+    options.vio.stereo = false;
+    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(options));
+    judgements.insert(judgements.begin(), second.begin(), second.end());
+  }
+  for (const auto& judgement : judgements) {
     const Verdict verdict = judgement.grade == calibrate::Grade::kGood       ? Verdict::kOk
                             : judgement.grade == calibrate::Grade::kDoubtful ? Verdict::kWarn
                                                                              : Verdict::kFail;
