@@ -198,7 +198,9 @@ class StereoJudge {
     const RigidTransform turn(expQuaternion(turned.by), Vector3d::Zero());
     const Fit mended = fitOf(matches, turn * T_C1C0_, fx);
     const bool wrong = given.off_px > kFarOff_px || given.isBehind();
-    if (!wrong && !isTurned(turned, given, mended)) return {};
+    // A turn about the vertical axis from one image to the next looks like parallax of both signs.
+    const bool mixed = given.behind > kFewestMatches && 3 * given.behind > given.before;
+    if (!wrong && !mixed && !isTurned(turned, given, mended)) return {};
     if (auto late = judgeStamps(); !late.empty()) return late;
     if (isTurned(turned, given, mended)) return judgeTurned(turned, given);
     const std::string of = fmt::format("T_BS of {}", second_.calibration().name);
@@ -210,6 +212,7 @@ class StereoJudge {
                                  "relative to the other camera, nor the inverse), or calibrate",
                                  of, name0, given.off_px));
     }
+    if (!given.isBehind()) return {};
     return warning("stereo_wrong_side",
                    fmt::format("{} has it on the wrong side of {}: what both see would be behind "
                                "them; are the folders, or the signs of the baseline, exchanged?",

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+#include <sstream>
+
 #include "common/math/so3.h"
 #include "common/sim/dice.h"
 #include "tests/common/replay/tiny_datasets.h"

@@ -53,8 +53,8 @@ Frame seenBy(const CameraCalibration& camera, const Eigen::Quaterniond& q_WB = {
 Frame rearranged(const Frame& frame, const std::function<std::size_t(std::size_t)>& from) {
   Frame other = frame;
   auto pixels = std::make_shared<std::vector<std::uint8_t>>();
-  for (std::size_t i = 0; i < frame.data.size(); ++i) {
-    pixels->push_back(frame.data.data()[from(i)]);
+  for (std::size_t i = 0; i < frame.data->size(); ++i) {
+    pixels->push_back((*frame.data)[from(i)]);
   }
   other.data = pixels;
   return other;
@@ -100,13 +100,13 @@ replay::DataFindings findingsWith(const std::function<void(RigidTransform&)>& ch
   return checkStereo(recording);
 }
 
-std::vector<std::string> codesOf(const replay::DataFindings& findings) {
+std::vector<std::string> stereoCodesOf(const replay::DataFindings& findings) {
   std::vector<std::string> codes;
   for (const auto& finding : findings) codes.push_back(finding.code);
   return codes;
 }
 std::vector<std::string> codesWith(const std::function<void(RigidTransform&)>& change) {
-  return codesOf(findingsWith(change));
+  return stereoCodesOf(findingsWith(change));
 }
 
 TEST(StereoCheck, TwoCamerasThatFitHaveNoFinding) {
@@ -133,36 +133,36 @@ TEST(StereoCheck, TwoCamerasAtOnePlaceOrExchangedAreDoubtful) {
 }
 
 TEST(StereoCheck, CamerasOfDifferentSizeOrDirectionAreCompared) {
-  EXPECT_THAT(codesOf(checkStereo(twoPairs(twoCameras(320, 160)))), ElementsAre());
-  EXPECT_THAT(codesOf(checkStereo(twoPairs(twoCameras(160, 320)))), ElementsAre());
+  EXPECT_THAT(stereoCodesOf(checkStereo(twoPairs(twoCameras(320, 160)))), ElementsAre());
+  EXPECT_THAT(stereoCodesOf(checkStereo(twoPairs(twoCameras(160, 320)))), ElementsAre());
   Calibration hanging = twoCameras(320, 240);
   hanging.cameras[1].T_BC.q = hanging.cameras[1].T_BC.q * expQuaternion({0.0, 0.0, M_PI});
-  EXPECT_THAT(codesOf(checkStereo(twoPairs(hanging))), ElementsAre());
+  EXPECT_THAT(stereoCodesOf(checkStereo(twoPairs(hanging))), ElementsAre());
 }
 
 TEST(StereoCheck, ExposureIsNoMatter) {
   const auto darker = [](const Frame& seen) {
     Frame frame = seen;
     auto pixels = std::make_shared<std::vector<std::uint8_t>>();
-    for (std::size_t i = 0; i < seen.data.size(); ++i) {
-      pixels->push_back(static_cast<std::uint8_t>(20.0 + 0.3 * seen.data.data()[i]));
+    for (std::size_t i = 0; i < seen.data->size(); ++i) {
+      pixels->push_back(static_cast<std::uint8_t>(20.0 + 0.3 * (*seen.data)[i]));
     }
     frame.data = pixels;
     return frame;
   };
-  EXPECT_THAT(codesOf(checkStereo(twoPairs(twoCameras(), darker))), ElementsAre());
+  EXPECT_THAT(stereoCodesOf(checkStereo(twoPairs(twoCameras(), darker))), ElementsAre());
 }
 
 TEST(StereoCheck, ASecondCameraUpsideDownOrMirroredIsNamed) {
   const auto upside_down = checkStereo(twoPairs(twoCameras(), [](const Frame& seen) {
-    return rearranged(seen, [&](std::size_t i) { return seen.data.size() - 1 - i; });
+    return rearranged(seen, [&](std::size_t i) { return seen.data->size() - 1 - i; });
   }));
-  ASSERT_THAT(codesOf(upside_down), ElementsAre("stereo_flipped"));
+  ASSERT_THAT(stereoCodesOf(upside_down), ElementsAre("stereo_flipped"));
   EXPECT_THAT(upside_down[0].text, HasSubstr("images of cam1 are upside down"));
   const auto mirrored = checkStereo(twoPairs(twoCameras(), [](const Frame& seen) {
     return rearranged(seen, [&](std::size_t i) { return i - i % 320 + 319 - i % 320; });
   }));
-  ASSERT_THAT(codesOf(mirrored), ElementsAre("stereo_flipped"));
+  ASSERT_THAT(stereoCodesOf(mirrored), ElementsAre("stereo_flipped"));
   EXPECT_THAT(mirrored[0].text, HasSubstr("images of cam1 are mirrored"));
 }
 
@@ -170,7 +170,7 @@ TEST(StereoCheck, ImagesOfSomethingElseAreDoubtful) {
   Calibration elsewhere = twoCameras();
   const auto behind = seenBy(elsewhere.cameras[1], expQuaternion({0.0, 0.0, 2.5}));
   const auto findings = checkStereo(twoPairs(elsewhere, [&](const Frame&) { return behind; }));
-  ASSERT_THAT(codesOf(findings), ElementsAre("stereo_unmatched"));
+  ASSERT_THAT(stereoCodesOf(findings), ElementsAre("stereo_unmatched"));
   EXPECT_THAT(findings[0].text, HasSubstr("of the corners of cam0 are found in cam1"));
 }
 
@@ -179,7 +179,7 @@ TEST(StereoCheck, ATurnAboutTheVerticalAxisIsNoExchange) {
     const auto findings = findingsWith([&](RigidTransform& T_BC) {
       T_BC.q = T_BC.q * expQuaternion(Vector3d(0.0, degrees * M_PI / 180.0, 0.0));
     });
-    ASSERT_THAT(codesOf(findings), ElementsAre("stereo_turned"));
+    ASSERT_THAT(stereoCodesOf(findings), ElementsAre("stereo_turned"));
     EXPECT_THAT(findings[0].text, HasSubstr(degrees > 5.0 ? "about 10." : "about 2."));
     EXPECT_THAT(findings[0].text, HasSubstr("about its vertical axis"));
   }
@@ -187,8 +187,9 @@ TEST(StereoCheck, ATurnAboutTheVerticalAxisIsNoExchange) {
 
 TEST(StereoCheck, OneImageForBothCamerasIsNamed) {
   const Frame first = seenBy(twoCameras().cameras[0]);
-  EXPECT_THAT(codesOf(checkStereo(twoPairs(twoCameras(), [&](const Frame&) { return first; }))),
-              ElementsAre("stereo_same_images"));
+  EXPECT_THAT(
+      stereoCodesOf(checkStereo(twoPairs(twoCameras(), [&](const Frame&) { return first; }))),
+      ElementsAre("stereo_same_images"));
 }
 
 TEST(StereoCheck, LateStampsOfTheSecondCameraAreToldFromAWrongPlace) {
@@ -207,7 +208,7 @@ TEST(StereoCheck, LateStampsOfTheSecondCameraAreToldFromAWrongPlace) {
     }
   }
   const auto findings = checkStereo(recording);
-  ASSERT_THAT(codesOf(findings), ElementsAre("stereo_stamps"));
+  ASSERT_THAT(stereoCodesOf(findings), ElementsAre("stereo_stamps"));
   EXPECT_THAT(findings[0].text, HasSubstr("are 0.40 s too late"));
 }
 
