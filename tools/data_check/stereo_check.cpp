@@ -172,7 +172,7 @@ class StereoJudge {
     return warning("stereo_unmatched",
                    fmt::format("only {:.0f} % of the corners of {} are found in {}, which by T_BS "
                                "sees the same: are its images of another time or another camera, "
-                               "turned or mirrored, or is T_BS wrong?",
+                               "turned or mirrored, or are T_BS or its focal length wrong?",
                                100.0 * best.share(), name0, name1));
   }
 

@@ -42,18 +42,6 @@ bool checkRecording(const std::string& data, const std::string& rig, Findings& f
   return usable;
 }
 
-/// A camera that hangs upside down is no fault where vio, which feels gravity, agrees.
-void settleUpsideDown(const calibrate::Judgements& judgements, Findings& findings) {
-  if (calibrate::worstOf(judgements) != calibrate::Grade::kGood) return;
-  for (Finding& finding : findings) {
-    if (finding.text.find(replay::kUpsideDown) == std::string::npos) continue;
-    finding.verdict = Verdict::kOk;
-    finding.text =
-        "the camera hangs upside down, as T_BS has it, and vio agrees; objects are found "
-        "better in images that are turned";
-  }
-}
-
 void showProgress(std::size_t done, std::size_t all) {
   constexpr std::size_t kEvery = 50;
   if (!isatty(STDERR_FILENO) || (done % kEvery != 0 && done != all)) return;
@@ -62,6 +50,16 @@ void showProgress(std::size_t done, std::size_t all) {
 
 }  // namespace
 
+void settleUpsideDown(bool vio_agrees, Findings& findings) {
+  if (!vio_agrees) return;
+  for (Finding& finding : findings) {
+    if (finding.text.find(replay::kUpsideDown) == std::string::npos) continue;
+    finding = {Verdict::kOk,
+               "the camera hangs upside down, as T_BS has it, and vio agrees; objects are found "
+               "better in images that are turned"};
+  }
+}
+
 Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds) {
   Findings findings;
   if (!checkRecording(recording, rig, findings)) return findings;
@@ -69,7 +67,7 @@ Findings checkRigBy(const std::string& recording, const std::string& rig, double
   options.data = recording, options.rig = rig, options.seconds = seconds;
   const auto check = calibrate::checkRig(options);
   auto judgements = calibrate::judgeRig(check);
-  settleUpsideDown(judgements, findings);
+  settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
   if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
     options.vio.stereo = false;
     const auto second = calibrate::judgeSecond(check, calibrate::checkRig(options));
