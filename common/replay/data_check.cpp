@@ -136,10 +136,9 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
   if (!(up_C.y() > kSurely)) return;
   findings.push_back(
       {Grade::kWarning, "images_upside_down",
-       fmt::format("by the accelerometer the images of {} are upside down: see the signs of the "
-                   "accelerometer (at rest it reads +9.8 along what points up) and T_BS; where the "
-                   "camera hangs upside down, turn its images",
-                   camera.name)});
+       fmt::format("{}: by T_BS and the accelerometer {} hangs so; where it does not, see T_BS and "
+                   "the signs of the accelerometer (at rest it reads +9.8 along what points up)",
+                   kUpsideDown, camera.name)});
 }
 
 bool isFlat(const cv::Mat& image) {

@@ -59,8 +59,9 @@ struct Recording {
   DatasetKind kind = DatasetKind::kEuroc;
   Calibration calibration;
   std::size_t frame_count = 0;
-  std::vector<FrameFile> frames;  ///< by time, cameras in order
-  std::vector<ImuSample> imu;     ///< by time
+  std::vector<FrameFile> frames;         ///< by time, cameras in order
+  std::vector<TimePoint> unpaired = {};  ///< of cam1's frames that none of cam0 is near to
+  std::vector<ImuSample> imu;            ///< by time
   std::vector<SpeedSample> speed;
   /// Of the body, in a world whose z is up. Of a KITTI drive: by OXTS, east, north and up.
   std::optional<PoseFile> truth;

@@ -159,6 +159,7 @@ void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording
       const auto* pair = pairOf(first, row.time);
       if (!pair) {
         recording.reasons.add("stereo_unmatched");
+        recording.unpaired.push_back(row.time);
         continue;
       }
       frame.index = pair->index;

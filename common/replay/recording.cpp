@@ -60,11 +60,10 @@ void sortFrames(Recording& recording) {
 }
 
 const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
-  static constexpr Duration kSame = std::chrono::milliseconds(5);
   const auto at = std::lower_bound(
       first.begin(), first.end(), time,
-      [](const auto& frame, TimePoint of) { return between(of, frame.time) > kSame; });
-  return at != first.end() && between(at->time, time) <= kSame ? &*at : nullptr;
+      [](const auto& frame, TimePoint of) { return between(of, frame.time) > kPairedWithin; });
+  return at != first.end() && between(at->time, time) <= kPairedWithin ? &*at : nullptr;
 }
 
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera) {

@@ -54,7 +54,8 @@ void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& r
 }
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
-/// The frame of cam0 that was taken within 5 ms; `first` by time.
+inline constexpr Duration kPairedWithin = std::chrono::milliseconds(5);
+/// The frame of cam0 that was taken within kPairedWithin; `first` by time.
 const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time);
 /// Frames a second of a camera; 1 where they do not tell.
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera);

@@ -235,6 +235,7 @@ class RosDriveReader {
         const auto* pair = pairOf(first, seen.time);
         if (pair == nullptr) {
           recording_.reasons.add("stereo_unmatched");
+          recording_.unpaired.push_back(seen.time);
           continue;
         }
         frame.index = pair->index, frame.time = pair->time;

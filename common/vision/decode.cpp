@@ -78,6 +78,7 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 }
 
 int usedBits(const std::string& path) {
+  if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would complain on stderr
   cv::Mat image;
   try {
     image = cv::imread(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);

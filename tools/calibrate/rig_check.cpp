@@ -31,6 +31,7 @@ class Watched {
     node_ = std::make_unique<vio::Node>(options.vio, 1, std::move(outputs));
     node_->setWorld({1, 0});
     node_->onCalibration(dataset.calibration());
+    cameras_ = dataset.calibration().cameras.size();
   }
 
   void run(replay::Dataset& dataset, double seconds) {
@@ -49,10 +50,15 @@ class Watched {
     watch_.remember(*node_);
   }
   std::size_t samples() const { return samples_; }
-  RigCheck check() const { return watch_.check(node_->reasons()); }
+  RigCheck check() const {
+    RigCheck check = watch_.check(node_->reasons());
+    check.cameras = cameras_;
+    return check;
+  }
 
  private:
   RigWatch watch_;
+  std::size_t cameras_ = 1;
   std::unique_ptr<vio::Node> node_;
   std::size_t samples_ = 0;
 };
@@ -104,11 +110,16 @@ Judgement judgeMove(const char* what, double moved, double sigma, double good, d
                 fmt::format("vio sees the {} {} off the rig", what, shown), mend);
 }
 
-void judgePlaceOf(const RigCheck& check, bool lens_fits, Judgements& all) {
+constexpr char kNoMend[] = "no mend before what is said above is excluded";
+
+/// Of the camera's place and time; `sole`: nothing else explains what they are off by.
+Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
+  Judgements all;
   const char* again =
-      lens_fits ? "calibrate again (perdure calibrate), or see whether the camera has moved"
-                : "the lens, which does not fit either, may be why: calibrate both (perdure "
-                  "calibrate)";
+      !sole       ? kNoMend
+      : lens_fits ? "calibrate again (perdure calibrate), or see whether the camera has moved"
+                  : "the lens, which does not fit either, may be why: calibrate both (perdure "
+                    "calibrate)";
   const double turned = check.turned.norm(), shifted = check.shifted.norm();
   all.push_back(judgeMove(
       "camera's rotation", turned, check.sigma.head<3>().norm(), 0.4 / kDegrees, 1.0 / kDegrees,
@@ -121,8 +132,37 @@ void judgePlaceOf(const RigCheck& check, bool lens_fits, Judgements& all) {
   all.push_back(
       judgeMove("time offset", std::abs(check.later_s), check.sigma[6], 2e-3, 8e-3,
                 fmt::format("{:.2f} ms (± {:.2f})", 1e3 * check.later_s, 1e3 * check.sigma[6]),
-                fmt::format("set time_offset_s to {:.4f}, or calibrate again",
-                            check.camera.time_offset_s + check.later_s)));
+                sole ? fmt::format("set time_offset_s to {:.4f}, or calibrate again",
+                                   check.camera.time_offset_s + check.later_s)
+                     : kNoMend));
+  return all;
+}
+
+Judgement judgeGravity(const RigCheck& check) {
+  return judged(std::max(gradeOf(check.accel_bias.norm(), 0.5, 1.5),
+                         gradeOf(check.accel_bias_change, 0.2, 0.6)),
+                fmt::format("accelerometer bias {:.3f} m/s², changed by {:.3f} in the second half",
+                            check.accel_bias.norm(), check.accel_bias_change),
+                "gravity is not explained: the camera's rotation on the IMU, `gravity` in "
+                "vio.yaml or the IMU's scale is wrong");
+}
+
+/// Share of the images that contradict the IMU.
+double againstOf(const RigCheck& check) {
+  return static_cast<double>(check.contradicted) /
+         static_cast<double>(std::max<std::size_t>(1, check.frames));
+}
+
+constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
+
+/// What is off at once: one cause moves it all, and a number for each is none of it.
+void judgeAllAtOnce(const Judgements& place, const Judgement& gravity, Judgements& all) {
+  const auto isOff = [](const Judgement& one) { return one.grade != Grade::kGood; };
+  const auto off = std::count_if(place.begin(), place.end(), isOff) + (isOff(gravity) ? 1 : 0);
+  all.push_back({off > 2 ? Grade::kBad : Grade::kDoubtful,
+                 "the camera's place, its time and gravity are not explained together, which one "
+                 "cause does: the order, signs and units of the IMU's columns, T_BS by many "
+                 "degrees, or the focal length; exclude these first"});
 }
 
 }  // namespace
@@ -231,15 +271,17 @@ Judgements judgeRig(const RigCheck& check) {
                                             "images; see its unit (m/s), its stamps and the IMU",
                                             check.speed_refused, check.frames)});
   }
-  const double against =
-      static_cast<double>(check.contradicted) / static_cast<double>(check.frames);
-  if (against > 0.05) {
-    all.push_back({against > 0.2 ? Grade::kBad : Grade::kDoubtful,
-                   fmt::format("images contradict the IMU in {:.0f} % of the drive; see T_BS (is "
-                               "it the inverse?), the IMU's axes, signs and units (radians per "
-                               "second), the focal length and time_offset_s, or whether what moves "
-                               "fills the picture",
-                               100.0 * against)});
+  const double against = againstOf(check);
+  const bool many_against = against > kManyAgainst;
+  if (against > kFewAgainst) {
+    all.push_back(
+        {many_against ? Grade::kBad : Grade::kDoubtful,
+         fmt::format(
+             "images contradict the IMU in {:.0f} % of the drive; see T_BS (is it the "
+             "inverse?), the IMU's axes, signs and units (radians per second), the focal "
+             "length and time_offset_s, or whether what moves fills the picture{}",
+             100.0 * against,
+             many_against ? "; numbers that follow are no mend before these are excluded" : "")});
     if (check.innovations.size() < kFewest) return all;
   }
   const Judgements belief = judgeBelief(check);
@@ -273,21 +315,38 @@ Judgements judgeBelief(const RigCheck& check) {
   const Grade lens = gradeOf(pattern, 0.06, 0.2);
   all.push_back(judged(lens, fmt::format("residuals that stay over the image: {:.3f} px", pattern),
                        "focal length or distortion are wrong: calibrate the lens again"));
-  judgePlaceOf(check, lens == Grade::kGood, all);
+  const bool many_against = againstOf(check) > kManyAgainst;
+  const Judgement gravity = judgeGravity(check);
+  auto place = judgePlaceOf(check, lens == Grade::kGood, !many_against);
+  const auto off = std::count_if(place.begin(), place.end(),
+                                 [](const auto& one) { return one.grade != Grade::kGood; });
+  const bool at_once = lens == Grade::kGood && off > 0 && off + (gravity.grade > Grade::kGood) > 1;
+  if (at_once && !many_against) {
+    judgeAllAtOnce(place, gravity, all);
+    place = judgePlaceOf(check, true, false);
+  }
+  all.insert(all.end(), place.begin(), place.end());
   all.push_back(judged(gradeOf(check.gyro_bias.norm(), 0.1, 0.3),
                        fmt::format("gyroscope bias {:.4f} rad/s, changed by {:.4f} in the second "
                                    "half",
                                    check.gyro_bias.norm(), check.gyro_bias_change),
                        "that is much: does the IMU speak radians, and is it warm?"));
-  all.push_back(
-      judged(std::max(gradeOf(check.accel_bias.norm(), 0.5, 1.5),
-                      gradeOf(check.accel_bias_change, 0.2, 0.6)),
-             fmt::format("accelerometer bias {:.3f} m/s², changed by {:.3f} in the second "
-                         "half",
-                         check.accel_bias.norm(), check.accel_bias_change),
-             "gravity is not explained: the camera's rotation on the IMU, `gravity` in "
-             "vio.yaml or the IMU's scale is wrong"));
+  all.push_back(gravity);
   return all;
 }
+
+Judgements judgeSecond(const RigCheck& both, const RigCheck& alone) {
+  if (againstOf(both) < kManyAgainst || againstOf(alone) > kFewAgainst ||
+      2 * alone.tracked < alone.frames) {
+    return {};
+  }
+  return {{Grade::kBad,
+           fmt::format("with the first camera alone images contradict the IMU in {:.0f} % of the "
+                       "drive, with both in {:.0f} %: the second camera is wrong; see its T_BS "
+                       "(the length of the baseline, too), its images and its stamps",
+                       100.0 * againstOf(alone), 100.0 * againstOf(both))}};
+}
+
+bool isSecondSuspect(const RigCheck& check) { return againstOf(check) > kManyAgainst; }
 
 }  // namespace perdure::calibrate

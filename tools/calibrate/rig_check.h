@@ -23,6 +23,7 @@ struct RigCheckOptions {
 /// What vio came to believe of the first camera's place, against the rig; and how it fared.
 struct RigCheck {
   CameraCalibration camera;
+  std::size_t cameras = 1;
   std::size_t frames = 0, tracked = 0, resets = 0;
   std::size_t holes = 0;  ///< of the resets: stamps jumped, or samples were missing
   std::size_t speed_refused = 0;
@@ -68,5 +69,10 @@ double innovationRatio(const std::vector<vio::Innovation>& innovations);
 Judgements judgeRig(const RigCheck& check);
 /// What it came to believe of lens, place and IMU; that there is too little to tell by, too.
 Judgements judgeBelief(const RigCheck& check);
+
+/// Whether so much contradicts with two cameras that it is worth to look with the first one alone,
+/// and what that says: nothing where it contradicts as well.
+bool isSecondSuspect(const RigCheck& check);
+Judgements judgeSecond(const RigCheck& both, const RigCheck& alone);
 
 }  // namespace perdure::calibrate

@@ -1,9 +1,14 @@
 #include "tools/data_check/data_check.h"
 
+#include <fmt/format.h>
+
 #include <cstdio>
+#include <opencv2/core.hpp>
 
 #include "tools/data_check/axes_check.h"
+#include "tools/data_check/axis_changes.h"
 #include "tools/data_check/motion_check.h"
+#include "tools/data_check/pair_check.h"
 #include "tools/data_check/pose_check.h"
 #include "tools/data_check/stereo_check.h"
 
@@ -11,24 +16,48 @@ namespace perdure::tools {
 
 using Grade = replay::DataFinding::Grade;
 
+namespace {
+
+/// A check that fails is no reason to stop: what it would say is said of it.
+template <class Check>
+void add(const char* of, replay::DataFindings& findings, Check&& check) {
+  replay::DataFindings more;
+  try {
+    more = check();
+  } catch (const cv::Exception& error) {
+    more = {{Grade::kWarning, "check_failed",
+             fmt::format("{} could not be checked: {}", of, error.err)}};
+  }
+  findings.insert(findings.end(), more.begin(), more.end());
+}
+
+replay::DataFindings checkTurns(const replay::Recording& recording) {
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  const auto turns = turnsOfImages(recording, recording.imu);
+  const auto findings = judgeTurns(turns, recording.imu, camera);
+  const bool unit = !findings.empty() && findings.front().code.starts_with("gyro_");
+  if (unit) return findings;
+  // A mirror image looks like a T_BS that is turned or inverted, and is none.
+  auto axes = judgeAxes(turns, recording.imu, camera);
+  if (!axes.empty()) return axes;
+  if (!findings.empty()) return findings;
+  constexpr std::size_t kTurns = 120;  // an axis with little turning needs more
+  return judgeAxisChanges(turnsOfImages(recording, livelinessOfAxes(recording.imu), kTurns),
+                          recording.imu, camera);
+}
+
+}  // namespace
+
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use) {
-  replay::DataFindings findings = replay::checkData(recording, use);
+  replay::DataFindings findings;
+  add("the recording", findings, [&] { return replay::checkData(recording, use); });
   if (!use.images || recording.calibration.cameras.empty()) return findings;
   for (const auto& finding : findings) {
     if (finding.grade == Grade::kFatal) return findings;  // what is said of turns would follow
   }
-  const auto stereo = checkStereo(recording);
-  findings.insert(findings.end(), stereo.begin(), stereo.end());
-  if (!use.imu) return findings;
-  const CameraCalibration& camera = recording.calibration.cameras.front();
-  const auto turns = turnsOfImages(recording, recording.imu);
-  auto of_turns = judgeTurns(turns, recording.imu, camera);
-  const bool unit = !of_turns.empty() && of_turns.front().code.starts_with("gyro_");
-  // A mirror image looks like a T_BS that is turned or inverted, and is none.
-  if (auto axes = judgeAxes(turns, recording.imu, camera); !unit && !axes.empty()) {
-    of_turns = std::move(axes);
-  }
-  findings.insert(findings.end(), of_turns.begin(), of_turns.end());
+  add("what belongs together", findings, [&] { return checkPairs(recording); });
+  add("the two cameras", findings, [&] { return checkStereo(recording); });
+  if (use.imu) add("turning", findings, [&] { return checkTurns(recording); });
   return findings;
 }
 

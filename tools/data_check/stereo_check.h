@@ -7,7 +7,8 @@
 
 namespace perdure::tools {
 
-/// Looks at up to eight pairs of cam0 and cam1. Codes: stereo_same_place, stereo_epipolar,
+/// Looks at up to eight pairs of cam0 and cam1. Codes: stereo_same_images, stereo_same_place,
+/// stereo_flipped, stereo_unmatched, stereo_stamps, stereo_epipolar, stereo_turned,
 /// stereo_wrong_side. Nothing where there is one camera, or too little can be matched.
 replay::DataFindings checkStereo(const replay::Recording& recording);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "common/replay/data_check.h"
 #include "common/replay/dataset.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tools/bus_tools/doctor/doctor.h"
@@ -46,6 +47,16 @@ TEST(DoctorOfNetworks, TheServicesOwnIsTakenFromItsConfiguration) {
   EXPECT_EQ(configuredNetwork(folder), "/here/net.onnx");
   std::ofstream(folder / "inference.yaml") << "model: [\n";
   EXPECT_EQ(configuredNetwork(folder), "");
+}
+
+TEST(DoctorOfRecordings, ACameraThatHangsUpsideDownIsFineWhereVioAgrees) {
+  const std::string told = std::string(replay::kUpsideDown) + ": by T_BS …";
+  Findings findings{{Verdict::kWarn, told}, {Verdict::kWarn, "another"}};
+  settleUpsideDown(false, findings);
+  EXPECT_EQ(findings[0].text, told);
+  settleUpsideDown(true, findings);
+  EXPECT_EQ(findings[0].verdict, Verdict::kOk);
+  EXPECT_EQ(findings[1].verdict, Verdict::kWarn);
 }
 
 TEST(DoctorOfRecordings, FindsNothingWrongWithTheLayoutOf7Scenes) {

@@ -72,6 +72,39 @@ TEST(RigCheck, ATimeOffsetComesWithTheValueToSet) {
   EXPECT_THAT(worst(check).text, HasSubstr("set time_offset_s to 0.0160"));
 }
 
+TEST(RigCheck, WhatIsOffAtOnceIsNoMend) {
+  RigCheck check = goodCheck();
+  check.turned = {0.0, 0.012, 0.0};
+  check.later_s = 0.012;
+  check.accel_bias_change = 0.3;
+  EXPECT_EQ(worst(check).grade, Grade::kBad);
+  EXPECT_THAT(worst(check).text, HasSubstr("order, signs and units of the IMU's columns"));
+  for (const auto& one : judgeRig(check)) {
+    EXPECT_THAT(one.text, testing::Not(HasSubstr("set time_offset_s")));
+  }
+}
+
+TEST(RigCheck, WhereMuchContradictsNumbersAreNoMend) {
+  RigCheck check = goodCheck();
+  check.contradicted = 150;
+  check.turned = {0.0, 0.085, 0.0};
+  EXPECT_THAT(worst(check).text, HasSubstr("are no mend before"));
+  for (const auto& one : judgeRig(check)) {
+    EXPECT_THAT(one.text, testing::Not(HasSubstr("calibrate again")));
+  }
+}
+
+TEST(RigCheck, ASecondCameraAloneThatContradictsIsNamed) {
+  RigCheck both = goodCheck(), alone = goodCheck();
+  EXPECT_FALSE(isSecondSuspect(both));
+  both.contradicted = 300;
+  EXPECT_TRUE(isSecondSuspect(both));
+  ASSERT_EQ(judgeSecond(both, alone).size(), 1U);
+  EXPECT_THAT(judgeSecond(both, alone)[0].text, HasSubstr("the second camera is wrong"));
+  alone.contradicted = 300;
+  EXPECT_TRUE(judgeSecond(both, alone).empty());
+}
+
 TEST(RigCheck, ABiasThatWandersIsNotGravity) {
   RigCheck check = goodCheck();
   check.accel_bias_change = 0.8;

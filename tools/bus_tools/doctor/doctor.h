@@ -31,6 +31,8 @@ Finding checkWritable(const std::string& folder);
 /// Of the bus: who is there, what each says of itself, what does not fit together.
 Findings checkBus(const bus::Options& options, double seconds);
 
+/// A camera that hangs upside down is no fault where vio, which feels gravity, agrees.
+void settleUpsideDown(bool vio_agrees, Findings& findings);
 /// Of a recording: stamps, units, images, axes; and where these can be used at all, of a rig file
 /// (empty: the recording's own) by the innovations of vio over it.
 Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds);

@@ -50,12 +50,30 @@ void showProgress(std::size_t done, std::size_t all) {
 
 }  // namespace
 
+void settleUpsideDown(bool vio_agrees, Findings& findings) {
+  if (!vio_agrees) return;
+  for (Finding& finding : findings) {
+    if (finding.text.find(replay::kUpsideDown) == std::string::npos) continue;
+    finding = {Verdict::kOk,
+               "the camera hangs upside down, as T_BS has it, and vio agrees; objects are found "
+               "better in images that are turned"};
+  }
+}
+
 Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds) {
   Findings findings;
   if (!checkRecording(recording, rig, findings)) return findings;
   calibrate::RigCheckOptions options;
   options.data = recording, options.rig = rig, options.seconds = seconds;
-  for (const auto& judgement : calibrate::judgeRig(calibrate::checkRig(options))) {
+  const auto check = calibrate::checkRig(options);
+  auto judgements = calibrate::judgeRig(check);
+  settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
+  if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
+    options.vio.stereo = false;
+    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(options));
+    judgements.insert(judgements.begin(), second.begin(), second.end());
+  }
+  for (const auto& judgement : judgements) {
     const Verdict verdict = judgement.grade == calibrate::Grade::kGood       ? Verdict::kOk
                             : judgement.grade == calibrate::Grade::kDoubtful ? Verdict::kWarn
                                                                              : Verdict::kFail;

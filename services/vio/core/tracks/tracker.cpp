@@ -38,6 +38,11 @@ bool worse(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 Tracker::Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras)
     : options_(options), cameras_(cameras) {
   check(!cameras.empty() && cameras.size() <= kMaxCameras, "one or two cameras");
+  if (cameras.size() < 2) return;
+  const CameraModel &a = cameras[0], &b = cameras[1];
+  if (a.width() == b.width() && a.height() == b.height()) return;
+  const double scale = a.fx() / b.fx();
+  as_first_ = {scale, toCv({a.cx() - scale * b.cx(), a.cy() - scale * b.cy()})};
 }
 
 void Tracker::reset() {
@@ -212,13 +217,27 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
   }
 }
 
+cv::Mat Tracker::asFirst(const cv::Mat& second) const {
+  if (!as_first_) return second;
+  const auto [scale, shift] = *as_first_;
+  const auto size =
+      cv::Size(static_cast<int>(cameras_[0].width()), static_cast<int>(cameras_[0].height()));
+  cv::Mat smooth = second, image;
+  if (scale < 0.75) cv::GaussianBlur(second, smooth, {}, 0.4 / scale);  // against aliases
+  const cv::Matx23d to(scale, 0, shift.x, 0, scale, shift.y);
+  cv::warpAffine(smooth, image, to, size, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return image;
+}
+
 void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
                                const std::vector<cv::Mat>& second) {
   if (points_.empty()) return;
   std::vector<cv::Point2f> from, to, back;
   for (const Point& p : points_) {
     from.push_back(p.pixel);
-    to.push_back(p.has_second ? p.second : p.pixel);
+    to.push_back(!p.has_second ? p.pixel
+                 : as_first_   ? as_first_->scale * p.second + as_first_->shift
+                               : p.second);
   }
   back = from;
   std::vector<std::uint8_t> status, status_back;
@@ -233,6 +252,7 @@ void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
     Point& p = points_[i];
     p.has_second = false;
     if (!status[i] || !status_back[i] || cv::norm(back[i] - from[i]) > 1.0) continue;
+    if (as_first_) to[i] = (to[i] - as_first_->shift) / as_first_->scale;
     if (!cameras_[1].inImage(toEigen(to[i]), kBorder)) continue;
     const auto seen = imagePoint(cameras_[1], toEigen(to[i]));
     if (!seen) continue;
@@ -282,7 +302,7 @@ TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
   detect(first, masked);
   if (stereo) {
     followIntoSecond(pyramid(first, options_.stereo_levels),
-                     pyramid(second, options_.stereo_levels));
+                     pyramid(asFirst(second), options_.stereo_levels));
   } else {
     for (Point& p : points_) p.has_second = false;
   }

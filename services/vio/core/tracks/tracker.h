@@ -84,10 +84,17 @@ class Tracker {
                             const std::optional<Eigen::Matrix3d>& R);
   void detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked);
   void followIntoSecond(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second);
+  /// The second image in the first one's size and scale, where their sizes differ.
+  cv::Mat asFirst(const cv::Mat& second) const;
   TrackedFrame result() const;
 
   TrackerOptions options_;
   std::vector<CameraModel> cameras_;
+  struct Placed {
+    double scale;
+    cv::Point2f shift;
+  };
+  std::optional<Placed> as_first_;  ///< of the second camera's pixels; nothing for equal sizes
   std::vector<Point> points_;
   Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< of the first camera in C, while read out
   std::vector<cv::Mat> previous_;

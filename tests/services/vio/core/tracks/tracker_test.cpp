@@ -156,6 +156,27 @@ TEST(Tracker, FindsTheSecondCamerasPointsOnTheirEpipolarLines) {
   EXPECT_GT(paired, 80);
 }
 
+TEST(Tracker, ASecondCameraOfHalfTheSizeIsFollowed) {
+  CameraCalibration first = test::testCamera(0), second = test::testCamera(1);
+  for (CameraCalibration* camera : {&first, &second}) {
+    camera->distortion = DistortionModel::kNone;
+    camera->distortion_coefficients.clear();
+  }
+  second.width /= 2, second.height /= 2, second.fx /= 2, second.fy /= 2;
+  second.cx = 0.5 * (second.cx + 0.5) - 0.5, second.cy = 0.5 * (second.cy + 0.5) - 0.5;
+  Tracker tracker(TrackerOptions{}, {CameraModel(first), CameraModel(second)});
+  const cv::Mat image = texture();
+  cv::Mat half;
+  cv::resize(shifted(image, -12.5, 0), half, {}, 0.5, 0.5, cv::INTER_AREA);
+  int paired = 0;
+  for (const TrackedPoint& p : tracker.track(image, half, {}).points) {
+    if (!p.seen[1]) continue;
+    EXPECT_NEAR(p.seen[0]->pixel.x() - 2.0 * p.seen[1]->pixel.x() - 0.5, 12.5, 0.4);
+    ++paired;
+  }
+  EXPECT_GT(paired, 60);
+}
+
 TEST(Tracker, IdsAreNotGivenAgainAfterAReset) {
   Tracker tracker(TrackerOptions{}, {CameraModel(test::testCamera(0))});
   const TrackedFrame before = tracker.track(texture(), {}, {});
