@@ -158,6 +158,24 @@ TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   EXPECT_THAT(codesOf(findingsOf("hardly_late", drive)), ElementsAre()) << "vio estimates it";
 }
 
+TEST(DataCheck, AnOffsetBeyondTheSearchGetsNoNumber) {
+  const auto findingsAt = [](int late_ms) {
+    TurningDrive drive;
+    drive.seconds = 6.0;
+    drive.images_late = std::chrono::milliseconds(late_ms);
+    const auto root = makeTurningDrive("very_late", drive);
+    const auto recording = Dataset::open({.path = root})->recording();
+    // Half a period looks like a flipped axis in this drive, so the axes are not asked.
+    return judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
+                      recording.calibration.cameras.front());
+  };
+  const auto late = findingsAt(700);
+  ASSERT_THAT(codesOf(late), ElementsAre("time_offset"));
+  EXPECT_THAT(late[0].text, HasSubstr("time_offset_s to -0.70"));
+  EXPECT_THAT(codesOf(findingsAt(1050)), testing::Not(testing::Contains("time_offset")))
+      << "the search ends at 1 s";
+}
+
 /// The drive's true poses, by integration of its rates, with times that are so much too late.
 replay::PoseFile posesOf(const replay::Recording& recording, Duration late) {
   std::vector<replay::StampedPose> poses;
