@@ -13,7 +13,7 @@ std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples);
 /// Compares how turning changes from image to image, which what a camera's own way adds hardly
 /// does. Code: gyro_axes. Nothing where fewer than 60 changes, or unclear ones, are seen.
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
-                               const std::vector<ImuSample>& samples,
-                               const CameraCalibration& camera);
+                                      const std::vector<ImuSample>& samples,
+                                      const CameraCalibration& camera);
 
 }  // namespace perdure::tools

@@ -5,11 +5,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
+#include <opencv2/core.hpp>
 
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
+#include "tools/data_check/image_turn.h"
 
 namespace perdure::tools {
 namespace {
@@ -18,7 +18,6 @@ using replay::DataFinding;
 using replay::Recording;
 using Frames = std::vector<const Recording::FrameFile*>;
 
-constexpr std::size_t kLeastCorners = 15;
 constexpr std::size_t kLeastTurns = 8;
 constexpr double kDegrees = 180.0 / M_PI;
 
@@ -66,24 +65,15 @@ Frames firstCamera(const Recording& recording) {
   return frames;
 }
 
-/// How far each pair's turn is from their mean; 0 where there are no samples.
+/// By how much each pair's turn differs from the one before; 0 where there are no samples. A turn
+/// that lasts tells nothing of the time.
 std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample>& samples) {
   const GyroIntegral gyro(samples);
-  std::vector<Eigen::Vector3d> turns;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  std::vector<bool> covered;
-  double count = 0.0;
-  for (std::size_t i = 0; i + 1 < frames.size(); ++i) {
-    const TimePoint from = frames[i]->time, to = frames[i + 1]->time;
-    covered.push_back(gyro.covers(from, to));
-    turns.push_back(covered.back() ? gyro.between(from, to) : Eigen::Vector3d::Zero());
-    if (!covered.back()) continue;
-    mean += turns.back();
-    count += 1.0;
-  }
-  std::vector<double> values;
-  for (std::size_t i = 0; i < turns.size(); ++i) {
-    values.push_back(covered[i] ? (turns[i] - mean / std::max(1.0, count)).norm() : 0.0);
+  std::vector<double> values(frames.empty() ? 0 : frames.size() - 1, 0.0);
+  for (std::size_t i = 0; i + 2 < frames.size(); ++i) {
+    const TimePoint from = frames[i]->time, middle = frames[i + 1]->time, to = frames[i + 2]->time;
+    if (!gyro.covers(from, to)) continue;
+    values[i + 1] = (gyro.between(middle, to) - gyro.between(from, middle)).norm();
   }
   return values;
 }
@@ -105,60 +95,6 @@ std::vector<std::pair<std::size_t, std::size_t>> liveliestRuns(const std::vector
   std::vector<std::pair<std::size_t, std::size_t>> chosen;
   for (const auto& [negative, begin] : runs) chosen.emplace_back(begin, begin + length);
   return chosen;
-}
-
-struct Flow {
-  Eigen::Vector3d ray, step;  ///< unit, in C; and by how much it moved
-};
-
-std::vector<Flow> flowBetween(const CameraModel& camera, const cv::Mat& first,
-                              const cv::Mat& second) {
-  std::vector<cv::Point2f> from, to;
-  cv::goodFeaturesToTrack(first, from, 150, 0.01, 0.02 * first.cols + 2.0);
-  if (from.size() < kLeastCorners) return {};
-  std::vector<uchar> found;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(first, second, from, to, found, error, cv::Size(15, 15), 4);
-  std::vector<Flow> flow;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    if (found[i] == 0) continue;
-    const auto a = camera.unproject({from[i].x, from[i].y});
-    const auto b = camera.unproject({to[i].x, to[i].y});
-    if (!a || !b) continue;
-    const Eigen::Vector3d ray = a->homogeneous().normalized();
-    flow.push_back({ray, b->homogeneous().normalized() - ray});
-  }
-  return flow;
-}
-
-Eigen::Matrix3d crossOf(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-/// The small rotation of the camera that explains the flow: step = ray × rotation.
-Eigen::Vector3d rotationOf(const std::vector<Flow>& flow) {
-  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
-  double scale = 1.0;  // the first round is plain least squares
-  for (int round = 0; round < 8; ++round) {
-    Eigen::Matrix3d A = 1e-12 * Eigen::Matrix3d::Identity();
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-    std::vector<double> errors;
-    for (const Flow& one : flow) {
-      const Eigen::Matrix3d X = crossOf(one.ray);
-      const double error = (one.step - X * rotation).norm() / scale;
-      const double weight = round == 0 ? 1.0 : 1.0 / (1.0 + error * error);
-      A += weight * X.transpose() * X;
-      b += weight * X.transpose() * one.step;
-    }
-    rotation = A.ldlt().solve(b);
-    for (const Flow& one : flow) errors.push_back((one.step - one.ray.cross(rotation)).norm());
-    std::nth_element(errors.begin(),
-                     errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
-    scale = std::max(1e-6, errors[errors.size() / 2]);
-  }
-  return rotation;
 }
 
 /// What gyroscope and images say of the same pairs, without their means, in columns.
@@ -245,6 +181,7 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const GyroInt
   };
   double best = std::min(kExplained, leftAt(camera.time_offset_s) / clearly);
   std::optional<double> offset;
+  bool inside = false;  // at the edge of the search the best may lie beyond
   const int steps = static_cast<int>(std::lround(100.0 * most_s));
   for (int step = -steps; step <= steps; ++step) {
     const double later = camera.time_offset_s + 0.01 * step;
@@ -252,8 +189,9 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const GyroInt
     if (left >= best) continue;
     best = left;
     offset = later;
+    inside = std::abs(step) < steps;
   }
-  return offset;
+  return inside ? offset : std::nullopt;
 }
 
 replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegral& gyro,
@@ -261,7 +199,10 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
   const Eigen::Matrix3d R_BC = camera.T_BC.R(), R_CB = R_BC.transpose();
   const double given = unexplained(pairs, R_CB);
   const double inverse = unexplained(pairs, R_BC);
-  if (given > kUnexplained && inverse < kExplained) {
+  // Where another rotation explains clearly more, as columns in another order do, it is no inverse.
+  const double least = unexplained(pairs, bestRotation(pairs));
+  constexpr double kNoise = 0.05;
+  if (given > kUnexplained && inverse < std::min(kExplained, 2.0 * least + kNoise)) {
     return {{DataFinding::Grade::kFatal, "T_BS_inverted",
              fmt::format(
                  "T_BS of {} is the wrong way round: its inverse explains {:.0f} % of the "
@@ -269,9 +210,8 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
                  "inverse of Kalibr's T_cam_imu)",
                  camera.name, 100.0 * (1.0 - inverse), 100.0 * std::max(0.0, 1.0 - given))}};
   }
-  // What leaves less unexplained is short, and vio estimates it; in a small room the body's own way
-  // explains as much.
-  constexpr double kShown = 0.1, kLongest_s = 0.5, kClearly = 2.0;
+  // What leaves less unexplained is short, and vio estimates it.
+  constexpr double kShown = 0.02, kLongest_s = 1.0, kClearly = 3.0;
   if (given < kShown) return {};
   if (const auto later = betterOffset(turns, gyro, camera, kLongest_s, kClearly)) {
     return {
@@ -280,8 +220,9 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
                      "see which clock is wrong",
                      camera.name, *later)}};
   }
+  constexpr double kTurned = 0.1;
   const Eigen::Matrix3d R_best = bestRotation(pairs);
-  if (unexplained(pairs, R_best) < std::min(kExplained, given / kClearly)) {
+  if (given > kTurned && unexplained(pairs, R_best) < std::min(kExplained, given / 2.0)) {
     const double angle = Eigen::AngleAxisd(R_best * R_BC).angle();
     return {{DataFinding::Grade::kWarning, "T_BS_turned",
              fmt::format("the images of {} turn as if the camera were turned by about {:.0f}° from "
@@ -309,7 +250,7 @@ std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<Im
       const cv::Mat now = fits ? *image : cv::Mat();
       if (i > begin && !before.empty() && !now.empty()) {
         const auto flow = flowBetween(camera, before, now);
-        if (flow.size() >= kLeastCorners) {
+        if (!flow.empty()) {
           turns.push_back({frames[i - 1]->time, frames[i]->time, rotationOf(flow)});
         }
       }

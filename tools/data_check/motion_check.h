@@ -22,7 +22,7 @@ struct Turn {
 /// Of up to `most` pairs of images of cam0 that follow each other, where the rate of turn that
 /// `samples` say changes most. Pairs with fewer than 15 corners that can be followed are left out.
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
-                                const std::vector<ImuSample>& samples, std::size_t most = 36);
+                                const std::vector<ImuSample>& samples, std::size_t most = 60);
 
 /// Codes: gyro_in_degrees, gyro_too_small, gyro_constant, T_BS_inverted, T_BS_turned, time_offset.
 /// Nothing where images or gyroscope turn too little to tell.

@@ -108,11 +108,11 @@ Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C
 }
 
 std::string axisText(const Vector3d& turn) {
-  constexpr std::array kAxes{"horizontal", "vertical", "optical"};
+  constexpr std::array kAxisNames{"horizontal", "vertical", "optical"};
   Eigen::Index axis = 0;
   const double most = turn.cwiseAbs().maxCoeff(&axis);
   if (most < 0.8 * turn.norm()) return {};
-  return fmt::format(" about its {} axis", kAxes[static_cast<std::size_t>(axis)]);
+  return fmt::format(" about its {} axis", kAxisNames[static_cast<std::size_t>(axis)]);
 }
 
 DataFindings warning(const char* code, std::string text) {

@@ -49,7 +49,10 @@ void addTum(const TextLine& line, const std::vector<std::string_view>& fields,
     return wrong.add(line.number, "the quaternion's norm is " + std::to_string(q.norm()) +
                                       ", not 1; the order is qx qy qz qw");
   }
-  if (!poses.empty() && *time <= poses.back().time) {
+  if (!poses.empty() && *time == poses.back().time) {
+    return wrong.add(line.number, "the time is that of the line before; leave one of them out");
+  }
+  if (!poses.empty() && *time < poses.back().time) {
     return wrong.add(line.number, "the time does not increase; sort the lines by time");
   }
   poses.push_back({*time, RigidTransform(q, {(*v)[1], (*v)[2], (*v)[3]})});
@@ -111,7 +114,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
   }
   wrong.throwIfAny();
   if (poses.empty()) {
-    throw StartupError(ExitCode::kUnavailable, file.string() + ": holds no poses");
+    throw StartupError(ExitCode::kData, file.string() + ": holds no poses");
   }
   return PoseFile(columns == 8 ? PoseFormat::kTum : PoseFormat::kKitti, std::move(poses));
 }

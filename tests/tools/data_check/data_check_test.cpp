@@ -100,6 +100,20 @@ TEST(DataCheck, AxesOfTheGyroscopeThatAreExchangedAreNamed) {
   EXPECT_EQ(exchanged[0].grade, DataFinding::Grade::kFatal);
 }
 
+// `doctor --fix` inverts a T_BS that is surely the wrong way round.
+TEST(DataCheck, ColumnsInAnotherOrderAreNoInvertedTransform) {
+  TurningDrive drive;
+  for (const int by : {1, 2}) {
+    drive.change = [by](ImuSample& sample) {
+      const Eigen::Vector3d w = sample.gyro;
+      for (int i = 0; i < 3; ++i) sample.gyro[i] = w[(i + by) % 3];
+    };
+    const auto codes = codesOf(findingsOf("rolled_axes", drive));
+    EXPECT_FALSE(codes.empty()) << by;
+    EXPECT_EQ(std::count(codes.begin(), codes.end(), "T_BS_inverted"), 0) << by;
+  }
+}
+
 TEST(DataCheck, AnAxisOfTheOtherSignIsNamed) {
   for (const Eigen::Index axis : {0, 1, 2}) {
     TurningDrive drive;
@@ -156,6 +170,24 @@ TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   EXPECT_THAT(slightly[0].text, HasSubstr("time_offset_s to -0.10"));
   drive.images_late = std::chrono::milliseconds(20);
   EXPECT_THAT(codesOf(findingsOf("hardly_late", drive)), ElementsAre()) << "vio estimates it";
+}
+
+TEST(DataCheck, AnOffsetBeyondTheSearchGetsNoNumber) {
+  const auto findingsAt = [](int late_ms) {
+    TurningDrive drive;
+    drive.seconds = 6.0;
+    drive.images_late = std::chrono::milliseconds(late_ms);
+    const auto root = makeTurningDrive("very_late", drive);
+    const auto recording = Dataset::open({.path = root})->recording();
+    // Half a period looks like a flipped axis in this drive, so the axes are not asked.
+    return judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
+                      recording.calibration.cameras.front());
+  };
+  const auto late = findingsAt(700);
+  ASSERT_THAT(codesOf(late), ElementsAre("time_offset"));
+  EXPECT_THAT(late[0].text, HasSubstr("time_offset_s to -0.70"));
+  EXPECT_THAT(codesOf(findingsAt(1050)), testing::Not(testing::Contains("time_offset")))
+      << "the search ends at 1 s";
 }
 
 /// The drive's true poses, by integration of its rates, with times that are so much too late.

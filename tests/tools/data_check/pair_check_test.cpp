@@ -10,7 +10,7 @@
 #include "common/sim/dice.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tests/support/camera.h"
-#include "tools/data_check/axes_check.h"
+#include "tools/data_check/axis_changes.h"
 #include "tools/data_check/data_check.h"
 
 namespace perdure::tools {
@@ -118,10 +118,10 @@ replay::DataFindings axesOf(const std::function<Eigen::Vector3d(const Eigen::Vec
       samples.push_back(sample);
     }
   }
-  return judgeAxes(turns, samples, camera);
+  return judgeAxisChanges(turns, samples, camera);
 }
 
-TEST(AxesCheck, AnExchangeIsHeardBesideTheAxisThatTurnsMost) {
+TEST(AxisChanges, AnExchangeIsHeardBesideTheAxisThatTurnsMost) {
   EXPECT_TRUE(axesOf([](const auto& w) { return w; }).empty());
   EXPECT_THAT(textOf(axesOf([](const auto& w) { return Eigen::Vector3d(w.y(), w.x(), w.z()); }),
                      "gyro_axes"),

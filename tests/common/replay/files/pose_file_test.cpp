@@ -76,7 +76,7 @@ TEST(PoseFile, KittiLinesOfTwelveAndSixteenNumbersAreByFrame) {
 TEST(PoseFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 0.5\n"),
               HasSubstr("poses.txt:2: the quat"));
-  EXPECT_THAT(errorOfPoses("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"),
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n"),
               HasSubstr(":2: the time does not"));
   EXPECT_THAT(errorOfPoses("1 0 0 0 0 2 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
   EXPECT_THAT(errorOfPoses("1 0 0 0 0 1 0 0 0 0 -1 0\n"), HasSubstr("right-handed"));
@@ -86,6 +86,8 @@ TEST(PoseFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(errorOfPoses("1e300 0 0 0 -1e300 1 0 0 0 0 1 0\n"), HasSubstr(":1: the rotation"));
   EXPECT_THAT(errorOfPoses("1 2 3\n"), HasSubstr(":1: 3 numbers; write 8"));
   EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0\n"), HasSubstr(":2: 4 numbers"));
+  EXPECT_THAT(errorOfPoses("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"),
+              HasSubstr("the time is that of the line before; leave one of them out"));
   EXPECT_THAT(errorOfPoses("# nothing\n"), HasSubstr("holds no poses"));
   EXPECT_THAT(startupErrorOf([] { PoseFile::read("/nowhere.txt"); }), HasSubstr("--odometry"));
 }
