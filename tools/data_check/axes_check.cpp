@@ -58,20 +58,28 @@ std::string textOf(const SignedAxes& axes) {
   return text;
 }
 
-/// What is left on average about the axes that change; nothing where one of them does not gain.
-std::optional<double> leftBy(const TurnPairs& pairs, const SignedAxes& axes, double least_rad) {
+/// What a change of axes leaves unexplained of the images' turning.
+struct Left {
+  double of_changed;  ///< share, on average about the axes that change
+  double of_all;      ///< share of all turning
+};
+
+/// Nothing where an axis that changes does not gain.
+std::optional<Left> leftBy(const TurnPairs& pairs, const SignedAxes& axes, double least_rad) {
   constexpr double kWrong = 0.4, kRight = 0.3, kClearly = 3.0;
-  const double count = std::max<double>(1.0, static_cast<double>(pairs.reference.cols()));
-  double sum = 0.0, before = 0.0, changed = 0.0;
+  const double count = std::max<double>(1.0, static_cast<double>(pairs.count()));
+  double sum = 0.0, before = 0.0, changed = 0.0, all = 0.0;
   for (Eigen::Index i = 0; i < 3; ++i) {
+    const double left = leftAbout(pairs, axes, i), turning = pairs.reference.row(i).squaredNorm();
+    all += left * turning;
     if (!axes.changes(i)) continue;
-    if (pairs.reference.row(i).squaredNorm() < count * least_rad * least_rad) return std::nullopt;
-    const double left = leftAbout(pairs, axes, i), now = leftAbout(pairs, {}, i);
+    if (turning < count * least_rad * least_rad) return std::nullopt;
+    const double now = leftAbout(pairs, {}, i);
     if (left > kRight || kClearly * left > now) return std::nullopt;
     sum += left, before += now, changed += 1.0;
   }
   if (changed == 0.0 || before < kWrong * changed) return std::nullopt;
-  return sum / changed;
+  return Left{sum / changed, all / std::max(1e-18, pairs.reference.squaredNorm())};
 }
 
 }  // namespace
@@ -91,11 +99,11 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
   }
   if (images.size() < kFewest) return {};
   const TurnPairs pairs(images, said);
-  std::optional<double> least;
+  std::optional<Left> least;
   SignedAxes best;
   for (const SignedAxes& axes : mirroredAxes()) {
     const auto left = leftBy(pairs, axes, kEnough_px / camera.fx);
-    if (left && (!least || *left < *least)) least = left, best = axes;
+    if (left && (!least || left->of_all < least->of_all)) least = left, best = axes;
   }
   if (!least) return {};
   // Nothing else looks like an exchange; one sign may be that of a way round a thing close by.
@@ -105,7 +113,7 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
            fmt::format("the images turn as if the gyroscope's axes were others: {} leave {:.0f} % "
                        "of their turning about these axes unexplained, in {} pairs of images: see "
                        "the order and the signs of its columns, or the axes of T_BS",
-                       textOf(best), 100.0 * *least, images.size())}};
+                       textOf(best), 100.0 * least->of_changed, images.size())}};
 }
 
 }  // namespace perdure::tools

@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 
+#include "tools/data_check/turn_integral.h"
+
 namespace perdure::tools {
 namespace {
 
@@ -14,19 +16,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr std::size_t kFewestChanges = 60;
-
-/// The mean rate of turn between two times; nothing where there is no sample.
-std::optional<Vector3d> meanRate(const std::vector<ImuSample>& samples, TimePoint from,
-                                 TimePoint to) {
-  const auto first =
-      std::lower_bound(samples.begin(), samples.end(), from,
-                       [](const ImuSample& sample, TimePoint t) { return sample.time < t; });
-  Vector3d sum = Vector3d::Zero();
-  double count = 0.0;
-  for (auto at = first; at != samples.end() && at->time < to; ++at) sum += at->gyro, count += 1.0;
-  if (count < 1.0) return std::nullopt;
-  return Vector3d(sum / count);
-}
 
 /// Changes of the turning from one pair of images to the next, of both sides, in B.
 struct AxisChanges {
@@ -37,17 +26,19 @@ AxisChanges axisChangesOf(const std::vector<Turn>& turns, const std::vector<ImuS
                           const CameraCalibration& camera) {
   const Matrix3d R_BC = camera.T_BC.R();
   const Duration later = durationFromSeconds(camera.time_offset_s);
+  const TurnIntegral gyro(samples);
+  const auto rateOf = [&](const Turn& turn) {
+    return Vector3d(gyro.between(turn.from + later, turn.to + later) /
+                    toSeconds(turn.to - turn.from));
+  };
   AxisChanges changes;
   for (std::size_t i = 1; i < turns.size(); ++i) {
     const Turn &a = turns[i - 1], &b = turns[i];
-    if (a.to != b.from) continue;
-    const auto before = meanRate(samples, a.from + later, a.to + later);
-    const auto after = meanRate(samples, b.from + later, b.to + later);
-    if (!before || !after) continue;
+    if (a.to != b.from || !gyro.covers(a.from + later, b.to + later)) continue;
     const Vector3d rate_a = a.of_images / toSeconds(a.to - a.from);
     const Vector3d rate_b = b.of_images / toSeconds(b.to - b.from);
     changes.images.push_back(R_BC * (rate_b - rate_a));
-    changes.gyro.push_back(*after - *before);
+    changes.gyro.push_back(rateOf(b) - rateOf(a));
   }
   return changes;
 }

@@ -31,15 +31,32 @@ void add(const char* of, replay::DataFindings& findings, Check&& check) {
   findings.insert(findings.end(), more.begin(), more.end());
 }
 
+/// Whether the stamps may be why another order or sign of axes fits, as where a camera swings.
+bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                        CameraCalibration camera) {
+  const auto later = offsetOfTurns(turns, samples, camera);
+  if (!later) return false;
+  camera.time_offset_s = *later;
+  return judgeAxes(turns, samples, camera).empty();
+}
+
 replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto turns = turnsOfImages(recording, recording.imu);
   const auto findings = judgeTurns(turns, recording.imu, camera);
-  const bool unit = !findings.empty() && findings.front().code.starts_with("gyro_");
+  const bool unit = !findings.empty() && findings.front().code.starts_with("gyro_") &&
+                    findings.front().code != "gyro_scale";
   if (unit) return findings;
   // A mirror image looks like a T_BS that is turned or inverted, and is none.
   auto axes = judgeAxes(turns, recording.imu, camera);
-  if (!axes.empty()) return axes;
+  if (!axes.empty()) {
+    const bool offset = !findings.empty() && findings.front().code == "time_offset";
+    if (!offset || !offsetExplainsAxes(turns, recording.imu, camera)) return axes;
+    axes.front().text += "; or see the stamps, which explain it as well:";
+    axes.front().grade = Grade::kWarning;
+    axes.push_back(findings.front());
+    return axes;
+  }
   if (!findings.empty()) return findings;
   constexpr std::size_t kTurns = 120;  // an axis with little turning needs more
   return judgeAxisChanges(turnsOfImages(recording, livelinessOfAxes(recording.imu), kTurns),

@@ -10,6 +10,7 @@
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
 #include "tools/data_check/image_turn.h"
+#include "tools/data_check/turn_integral.h"
 
 namespace perdure::tools {
 namespace {
@@ -20,42 +21,6 @@ using Frames = std::vector<const Recording::FrameFile*>;
 
 constexpr std::size_t kLeastTurns = 8;
 constexpr double kDegrees = 180.0 / M_PI;
-
-/// The integral of the rates of turn: what it gains is the way of a short turn.
-class GyroIntegral {
- public:
-  explicit GyroIntegral(const std::vector<ImuSample>& samples) : samples_(samples) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      if (i > 0) {
-        const double dt = toSeconds(samples[i].time - samples[i - 1].time);
-        sum += 0.5 * dt * (samples[i].gyro + samples[i - 1].gyro);
-      }
-      sums_.push_back(sum);
-    }
-  }
-  bool covers(TimePoint from, TimePoint to) const {
-    return samples_.size() > 1 && samples_.front().time <= from && to <= samples_.back().time;
-  }
-  /// Both covered.
-  Eigen::Vector3d between(TimePoint from, TimePoint to) const { return at(to) - at(from); }
-
- private:
-  Eigen::Vector3d at(TimePoint time) const {
-    const auto next =
-        std::upper_bound(samples_.begin(), samples_.end(), time,
-                         [](TimePoint t, const ImuSample& sample) { return t < sample.time; });
-    if (next == samples_.end()) return sums_.back();
-    if (next == samples_.begin()) return sums_.front();
-    const auto i = static_cast<std::size_t>(next - samples_.begin());
-    const double share =
-        toSeconds(time - samples_[i - 1].time) / toSeconds(samples_[i].time - samples_[i - 1].time);
-    return sums_[i - 1] + share * (sums_[i] - sums_[i - 1]);
-  }
-
-  const std::vector<ImuSample>& samples_;
-  std::vector<Eigen::Vector3d> sums_;
-};
 
 Frames firstCamera(const Recording& recording) {
   Frames frames;
@@ -68,7 +33,7 @@ Frames firstCamera(const Recording& recording) {
 /// By how much each pair's turn differs from the one before; 0 where there are no samples. A turn
 /// that lasts tells nothing of the time.
 std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample>& samples) {
-  const GyroIntegral gyro(samples);
+  const TurnIntegral gyro(samples);
   std::vector<double> values(frames.empty() ? 0 : frames.size() - 1, 0.0);
   for (std::size_t i = 0; i + 2 < frames.size(); ++i) {
     const TimePoint from = frames[i]->time, middle = frames[i + 1]->time, to = frames[i + 2]->time;
@@ -97,45 +62,16 @@ std::vector<std::pair<std::size_t, std::size_t>> liveliestRuns(const std::vector
   return chosen;
 }
 
-/// What gyroscope and images say of the same pairs, without their means, in columns.
-struct Pairs {
-  Eigen::Matrix3Xd gyro, images;
-};
-
-Pairs pairsOf(const std::vector<Turn>& turns, const GyroIntegral& gyro, Duration later) {
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> both;
+/// Of the images (reference) and of the gyroscope so much later.
+TurnPairs pairsOf(const std::vector<Turn>& turns, const TurnIntegral& gyro, double later_s) {
+  const Duration later = durationFromSeconds(later_s);
+  std::vector<Eigen::Vector3d> images, said;
   for (const Turn& turn : turns) {
     if (!gyro.covers(turn.from + later, turn.to + later)) continue;
-    both.emplace_back(gyro.between(turn.from + later, turn.to + later), turn.of_images);
+    images.push_back(turn.of_images);
+    said.push_back(gyro.between(turn.from + later, turn.to + later));
   }
-  Pairs pairs{Eigen::Matrix3Xd(3, both.size()), Eigen::Matrix3Xd(3, both.size())};
-  for (std::size_t i = 0; i < both.size(); ++i) {
-    pairs.gyro.col(static_cast<Eigen::Index>(i)) = both[i].first;
-    pairs.images.col(static_cast<Eigen::Index>(i)) = both[i].second;
-  }
-  if (both.empty()) return pairs;
-  pairs.gyro.colwise() -= pairs.gyro.rowwise().mean().eval();
-  pairs.images.colwise() -= pairs.images.rowwise().mean().eval();
-  return pairs;
-}
-
-/// Share of the images' turning that R_CB leaves unexplained: 0 where all is explained.
-double unexplained(const Pairs& pairs, const Eigen::Matrix3d& R_CB) {
-  return (pairs.images - R_CB * pairs.gyro).squaredNorm() /
-         std::max(1e-18, pairs.images.squaredNorm());
-}
-
-/// The rotation that explains best (Kabsch).
-Eigen::Matrix3d bestRotation(const Pairs& pairs) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(pairs.images * pairs.gyro.transpose(),
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();
-  S(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * S * svd.matrixV().transpose();
-}
-
-double rms(const Eigen::Matrix3Xd& turns) {
-  return std::sqrt(turns.squaredNorm() / std::max<double>(1.0, static_cast<double>(turns.cols())));
+  return {images, said};
 }
 
 constexpr double kEnough_px = 2.0;    ///< of turning between two images, to tell
@@ -171,13 +107,12 @@ replay::DataFindings judgeScale(double gyro, double images, double focal) {
 
 /// The time that must be added to the images' stamps, where it explains the turning, and `clearly`
 /// times as well as `camera.time_offset_s` does.
-std::optional<double> betterOffset(const std::vector<Turn>& turns, const GyroIntegral& gyro,
+std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnIntegral& gyro,
                                    const CameraCalibration& camera, double most_s, double clearly) {
   const Eigen::Matrix3d R_CB = camera.T_BC.R().transpose();
   const auto leftAt = [&](double later) {
-    const Pairs pairs = pairsOf(turns, gyro, durationFromSeconds(later));
-    const bool few = 2 * pairs.images.cols() < static_cast<Eigen::Index>(turns.size());
-    return few ? 1.0 : unexplained(pairs, R_CB);
+    const TurnPairs pairs = pairsOf(turns, gyro, later);
+    return 2 * pairs.count() < turns.size() ? 1.0 : pairs.unexplained(R_CB);
   };
   double best = std::min(kExplained, leftAt(camera.time_offset_s) / clearly);
   std::optional<double> offset;
@@ -194,13 +129,32 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const GyroInt
   return inside ? offset : std::nullopt;
 }
 
-replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegral& gyro,
-                                const Pairs& pairs, const CameraCalibration& camera) {
+/// Of rates that are some tenths too large or small, where both sides agree on all else.
+replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration& camera) {
+  constexpr double kLeast = 0.1, kSurely = 3.0, kAgreed = 0.05;
+  const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
+  const double all = std::max(1e-18, said.squaredNorm());
+  const double shown = (pairs.reference.array() * said.array()).sum() / all;
+  const double left = (pairs.reference - shown * said).squaredNorm();
+  const double sigma = std::sqrt(left / (static_cast<double>(3 * pairs.count()) * all));
+  if (left > kAgreed * pairs.reference.squaredNorm()) return {};
+  if (std::abs(shown - 1.0) < kLeast + kSurely * sigma) return {};
+  return {{DataFinding::Grade::kWarning, "gyro_scale",
+           fmt::format("the gyroscope says {:.2f} times the turning that {} shows, in {} pairs of "
+                       "images: see the scale of its columns, or the focal length",
+                       1.0 / shown, camera.name, pairs.count())}};
+}
+
+/// Of the images' stamps, s.
+constexpr double kLongestOffset_s = 1.0, kOffsetClearly = 3.0;
+
+replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegral& gyro,
+                                const TurnPairs& pairs, const CameraCalibration& camera) {
   const Eigen::Matrix3d R_BC = camera.T_BC.R(), R_CB = R_BC.transpose();
-  const double given = unexplained(pairs, R_CB);
-  const double inverse = unexplained(pairs, R_BC);
+  const double given = pairs.unexplained(R_CB);
+  const double inverse = pairs.unexplained(R_BC);
   // Where another rotation explains clearly more, as columns in another order do, it is no inverse.
-  const double least = unexplained(pairs, bestRotation(pairs));
+  const double least = pairs.unexplained(pairs.bestRotation());
   constexpr double kNoise = 0.05;
   if (given > kUnexplained && inverse < std::min(kExplained, 2.0 * least + kNoise)) {
     return {{DataFinding::Grade::kFatal, "T_BS_inverted",
@@ -211,9 +165,9 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
                  camera.name, 100.0 * (1.0 - inverse), 100.0 * std::max(0.0, 1.0 - given))}};
   }
   // What leaves less unexplained is short, and vio estimates it.
-  constexpr double kShown = 0.02, kLongest_s = 1.0, kClearly = 3.0;
+  constexpr double kShown = 0.02;
   if (given < kShown) return {};
-  if (const auto later = betterOffset(turns, gyro, camera, kLongest_s, kClearly)) {
+  if (const auto later = betterOffset(turns, gyro, camera, kLongestOffset_s, kOffsetClearly)) {
     return {
         {DataFinding::Grade::kWarning, "time_offset",
          fmt::format("the stamps of {} and of the IMU do not fit: set time_offset_s to {:.2f}, and "
@@ -221,8 +175,8 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const GyroIntegr
                      camera.name, *later)}};
   }
   constexpr double kTurned = 0.1;
-  const Eigen::Matrix3d R_best = bestRotation(pairs);
-  if (given > kTurned && unexplained(pairs, R_best) < std::min(kExplained, given / 2.0)) {
+  const Eigen::Matrix3d R_best = pairs.bestRotation();
+  if (given > kTurned && pairs.unexplained(R_best) < std::min(kExplained, given / 2.0)) {
     const double angle = Eigen::AngleAxisd(R_best * R_BC).angle();
     return {{DataFinding::Grade::kWarning, "T_BS_turned",
              fmt::format("the images of {} turn as if the camera were turned by about {:.0f}° from "
@@ -263,14 +217,21 @@ std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<Im
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera) {
-  const GyroIntegral gyro(samples);
-  const Pairs pairs = pairsOf(turns, gyro, durationFromSeconds(camera.time_offset_s));
-  if (pairs.images.cols() < static_cast<Eigen::Index>(kLeastTurns)) return {};
-  const double by_gyro = rms(pairs.gyro), by_images = rms(pairs.images);
+  const TurnIntegral gyro(samples);
+  const TurnPairs pairs = pairsOf(turns, gyro, camera.time_offset_s);
+  if (pairs.count() < kLeastTurns) return {};
+  const double by_gyro = pairs.turningOfGiven(), by_images = pairs.turning();
   auto findings = judgeScale(by_gyro, by_images, camera.fx);
   if (!findings.empty()) return findings;
   if (std::min(by_gyro, by_images) * camera.fx < kEnough_px) return {};
-  return judgePlace(turns, gyro, pairs, camera);
+  auto place = judgePlace(turns, gyro, pairs, camera);
+  return place.empty() ? judgeFactor(pairs, camera) : place;
+}
+
+std::optional<double> offsetOfTurns(const std::vector<Turn>& turns,
+                                    const std::vector<ImuSample>& samples,
+                                    const CameraCalibration& camera) {
+  return betterOffset(turns, TurnIntegral(samples), camera, kLongestOffset_s, kOffsetClearly);
 }
 
 std::vector<ImuSample> turnsOfPoses(const std::vector<replay::StampedPose>& poses) {
@@ -293,10 +254,10 @@ replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
   constexpr double kLongest_s = 2.0, kLeast_s = 0.1, kClearly = 3.0;
   CameraCalibration at_images = camera;  // poses are of the images' times
   at_images.time_offset_s = 0.0;
-  const GyroIntegral poses(samples);
-  const Pairs pairs = pairsOf(turns, poses, Duration(0));
-  if (pairs.images.cols() < static_cast<Eigen::Index>(kLeastTurns)) return {};
-  if (rms(pairs.images) * camera.fx < kEnough_px) return {};
+  const TurnIntegral poses(samples);
+  const TurnPairs pairs = pairsOf(turns, poses, 0.0);
+  if (pairs.count() < kLeastTurns) return {};
+  if (pairs.turning() * camera.fx < kEnough_px) return {};
   const auto later = betterOffset(turns, poses, at_images, kLongest_s, kClearly);
   if (!later || std::abs(*later) < kLeast_s) return {};
   return {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "common/replay/data_check.h"
@@ -24,11 +25,18 @@ struct Turn {
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
                                 const std::vector<ImuSample>& samples, std::size_t most = 60);
 
-/// Codes: gyro_in_degrees, gyro_too_small, gyro_constant, T_BS_inverted, T_BS_turned, time_offset.
+/// Codes: gyro_in_degrees, gyro_too_small, gyro_constant, gyro_scale, T_BS_inverted, T_BS_turned,
+/// time_offset.
 /// Nothing where images or gyroscope turn too little to tell.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);
+
+/// The camera's time offset, s, with which the gyroscope explains the images' turning, and three
+/// times as well as with the one given; nothing where none does.
+std::optional<double> offsetOfTurns(const std::vector<Turn>& turns,
+                                    const std::vector<ImuSample>& samples,
+                                    const CameraCalibration& camera);
 
 /// The rates of turn between poses that follow each other, as a gyroscope on B would say them.
 std::vector<ImuSample> turnsOfPoses(const std::vector<replay::StampedPose>& poses);

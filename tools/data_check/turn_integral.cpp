@@ -20,6 +20,10 @@ Eigen::Matrix3Xd withoutMean(const std::vector<Eigen::Vector3d>& turns) {
   return columns;
 }
 
+double rms(const Eigen::Matrix3Xd& turns) {
+  return std::sqrt(turns.squaredNorm() / std::max<double>(1.0, static_cast<double>(turns.cols())));
+}
+
 }  // namespace
 
 TurnIntegral::TurnIntegral(const std::vector<ImuSample>& samples) : samples_(samples) {
@@ -65,9 +69,12 @@ TurnPairs::TurnPairs(const std::vector<Eigen::Vector3d>& of_reference,
                      const std::vector<Eigen::Vector3d>& of_given)
     : reference(withoutMean(of_reference)), given(withoutMean(of_given)) {}
 
-double TurnPairs::turning() const {
-  const auto count = static_cast<double>(reference.cols());
-  return std::sqrt(reference.squaredNorm() / std::max(1.0, count));
+double TurnPairs::turning() const { return rms(reference); }
+
+double TurnPairs::turningOfGiven() const { return rms(given); }
+
+double TurnPairs::unexplained(const Eigen::Matrix3d& R) const {
+  return (reference - R * given).squaredNorm() / std::max(1e-18, reference.squaredNorm());
 }
 
 double TurnPairs::disagreementBy(const Eigen::Matrix3d& R) const {

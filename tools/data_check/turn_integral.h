@@ -34,8 +34,13 @@ struct TurnPairs {
 
   TurnPairs(const std::vector<Eigen::Vector3d>& reference,
             const std::vector<Eigen::Vector3d>& given);
-  /// Root of the mean square of the reference, rad.
+  std::size_t count() const { return static_cast<std::size_t>(reference.cols()); }
+  /// Root of the mean square, rad: of the reference, and of those given.
   double turning() const;
+  double turningOfGiven() const;
+  /// Share of the reference that those given, turned by R, leave unexplained: 0 where all is
+  /// explained.
+  double unexplained(const Eigen::Matrix3d& R) const;
   /// 0: they are the same; 1: one has nothing to do with the other; 2: they are opposite.
   double disagreement() const { return disagreementBy(Eigen::Matrix3d::Identity()); }
   /// Of those given, turned by R.

@@ -100,6 +100,28 @@ TEST(DataCheck, AxesOfTheGyroscopeThatAreExchangedAreNamed) {
   EXPECT_EQ(exchanged[0].grade, DataFinding::Grade::kFatal);
 }
 
+TEST(DataCheck, AGyroscopeThatSaysTooMuchIsDoubtful) {
+  const auto findingsAt = [](double factor) {
+    TurningDrive drive;
+    drive.change = [=](ImuSample& sample) { sample.gyro *= factor; };
+    return findingsOf("factor", drive);
+  };
+  const auto large = findingsAt(1.2);
+  ASSERT_THAT(codesOf(large), ElementsAre("gyro_scale"));
+  EXPECT_THAT(large[0].text, testing::ContainsRegex("says 1.(19|20|21) times the turning"));
+  EXPECT_THAT(codesOf(findingsAt(0.8)), ElementsAre("gyro_scale"));
+  EXPECT_THAT(codesOf(findingsAt(1.05)), ElementsAre());
+}
+
+TEST(DataCheck, AllSignsOfTheGyroscopeAreNamedTogether) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) { sample.gyro = -sample.gyro; };
+  const auto findings = findingsOf("all_signs", drive);
+  // In this drive, which swings, half a period of offset explains it as well.
+  ASSERT_THAT(codesOf(findings), ElementsAre("gyro_axes", "time_offset"));
+  EXPECT_THAT(findings[0].text, HasSubstr("w_x = -w_x, w_y = -w_y, w_z = -w_z"));
+}
+
 // `doctor --fix` inverts a T_BS that is surely the wrong way round.
 TEST(DataCheck, ColumnsInAnotherOrderAreNoInvertedTransform) {
   TurningDrive drive;
@@ -170,6 +192,16 @@ TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   EXPECT_THAT(slightly[0].text, HasSubstr("time_offset_s to -0.10"));
   drive.images_late = std::chrono::milliseconds(20);
   EXPECT_THAT(codesOf(findingsOf("hardly_late", drive)), ElementsAre()) << "vio estimates it";
+}
+
+TEST(DataCheck, HalfAPeriodOfASwingMayBeStampsOrSigns) {
+  TurningDrive drive;
+  drive.seconds = 6.0;
+  drive.images_late = std::chrono::milliseconds(700);
+  const auto findings = findingsOf("half_a_period", drive);
+  ASSERT_THAT(codesOf(findings), ElementsAre("gyro_axes", "time_offset"));
+  EXPECT_THAT(findings[0].text, HasSubstr("or see the stamps, which explain it as well"));
+  EXPECT_THAT(findings[1].text, HasSubstr("time_offset_s to -0.70"));
 }
 
 TEST(DataCheck, AnOffsetBeyondTheSearchGetsNoNumber) {
