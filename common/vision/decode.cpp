@@ -1,10 +1,10 @@
 #include "common/vision/decode.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
 namespace perdure::vision {
@@ -26,6 +26,15 @@ bool endsAsItShould(std::string_view bytes) {
 int readFlags(std::optional<ImageEncoding> encoding) {
   if (!encoding) return cv::IMREAD_ANYCOLOR;
   return *encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE;
+}
+
+/// By its head: JPEG, or PNG that says so. Other kinds have to be decoded to tell.
+bool hasEightBits(const std::string& path) {
+  constexpr std::size_t kDepthOfPng = 24;
+  std::array<char, kDepthOfPng + 1> head{};
+  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
+  const std::string_view start(head.data(), head.size());
+  return start.starts_with("\xFF\xD8") || (start.starts_with("\x89PNG") && head[kDepthOfPng] <= 8);
 }
 
 }  // namespace
@@ -50,11 +59,14 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
 
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
                                 int bits) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const auto size = file ? std::streamoff(file.tellg()) : -1;
+  if (size < 0 || std::filesystem::is_directory(path)) {
     return fail("image_missing", path + " cannot be read");
   }
-  const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  file.seekg(0).read(bytes.data(), size);
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
   auto image = decodeImage(bytes, encoding, bits);
   if (!image) return fail(image.error().code, path + ": " + image.error().detail);
   return image;
@@ -79,6 +91,7 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 
 int usedBits(const std::string& path) {
   if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would complain on stderr
+  if (hasEightBits(path)) return 16;
   cv::Mat image;
   try {
     image = cv::imread(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);

@@ -9,6 +9,7 @@
 #include "common/math/chi2.h"
 #include "common/math/so3.h"
 #include "common/replay/dataset.h"
+#include "common/replay/read_ahead.h"
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
 
@@ -34,17 +35,21 @@ class Watched {
     cameras_ = dataset.calibration().cameras.size();
   }
 
-  void run(replay::Dataset& dataset, double seconds) {
+  void run(replay::Dataset& dataset, const RigCheckOptions& options) {
+    constexpr std::size_t kEvery = 20;  // images
     std::optional<TimePoint> first;
-    while (const auto message = dataset.next()) {
+    std::size_t images = 0;
+    replay::ReadAhead ahead(dataset);
+    while (const auto message = ahead.next()) {
       if (const auto* imu = std::get_if<ImuSample>(&*message)) node_->onImu(*imu), ++samples_;
       if (const auto* speed = std::get_if<SpeedSample>(&*message)) node_->onSpeed(*speed);
       const auto* frame = std::get_if<Frame>(&*message);
       if (!frame || !frame->data) continue;
       if (!first) first = frame->stamp.time;
-      if (toSeconds(frame->stamp.time - *first) > seconds) break;
+      if (toSeconds(frame->stamp.time - *first) > options.seconds) break;
       node_->onFrame(*frame);
       watch_.remember(*node_);
+      if (options.until_sure && ++images % kEvery == 0 && isSurelyGood(check())) break;
     }
     node_->flush();
     watch_.remember(*node_);
@@ -101,12 +106,19 @@ double patternOf(const CameraCalibration& camera, const std::vector<CornerResidu
   return mean > kSure * sigma ? std::sqrt(mean) : 0.0;
 }
 
+/// Up to which a camera's place and time are good, and from which they are bad.
+struct Bars {
+  double good, bad;
+};
+constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
+    kLater_s{2e-3, 8e-3};
+
 /// How far vio moved a quantity, in deviations that a well calibrated rig has.
-Judgement judgeMove(const char* what, double moved, double sigma, double good, double bad,
+Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
                     const std::string& shown, const std::string& mend) {
   // A move that vio itself is not sure of says nothing.
   const bool sure = moved > 3.0 * sigma;
-  return judged(sure ? gradeOf(moved, good, bad) : Grade::kGood,
+  return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
                 fmt::format("vio sees the {} {} off the rig", what, shown), mend);
 }
 
@@ -122,15 +134,15 @@ Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
                     "calibrate)";
   const double turned = check.turned.norm(), shifted = check.shifted.norm();
   all.push_back(judgeMove(
-      "camera's rotation", turned, check.sigma.head<3>().norm(), 0.4 / kDegrees, 1.0 / kDegrees,
+      "camera's rotation", turned, check.sigma.head<3>().norm(), kTurned,
       fmt::format("{:.2f}° (± {:.2f})", kDegrees * turned, kDegrees * check.sigma.head<3>().norm()),
       again));
   all.push_back(judgeMove(
-      "camera's position", shifted, check.sigma.segment<3>(3).norm(), 0.015, 0.04,
+      "camera's position", shifted, check.sigma.segment<3>(3).norm(), kShifted_m,
       fmt::format("{:.1f} mm (± {:.1f})", 1e3 * shifted, 1e3 * check.sigma.segment<3>(3).norm()),
       again));
   all.push_back(
-      judgeMove("time offset", std::abs(check.later_s), check.sigma[6], 2e-3, 8e-3,
+      judgeMove("time offset", std::abs(check.later_s), check.sigma[6], kLater_s,
                 fmt::format("{:.2f} ms (± {:.2f})", 1e3 * check.later_s, 1e3 * check.sigma[6]),
                 sole ? fmt::format("set time_offset_s to {:.4f}, or calibrate again",
                                    check.camera.time_offset_s + check.later_s)
@@ -215,6 +227,14 @@ RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
   return check;
 }
 
+bool isSurelyGood(const RigCheck& check) {
+  constexpr double kHalf = 0.5;  // what is bad is then five deviations off
+  const bool sure = check.believed && check.sigma.head<3>().norm() < kHalf * kTurned.good &&
+                    check.sigma.segment<3>(3).norm() < kHalf * kShifted_m.good &&
+                    check.sigma[6] < kHalf * kLater_s.good;
+  return sure && worstOf(judgeRig(check)) == Grade::kGood;
+}
+
 double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   std::vector<double> values;
   for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
@@ -236,7 +256,7 @@ RigCheck checkRig(const RigCheckOptions& options) {
                            "be judged; record imu along with the images");
   }
   Watched watched(options, *dataset);
-  watched.run(*dataset, options.seconds);
+  watched.run(*dataset, options);
   RigCheck check = watched.check();
   if (check.frames == 0 || watched.samples() == 0) {
     throw StartupError(ExitCode::kUnavailable,

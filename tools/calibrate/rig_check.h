@@ -17,6 +17,7 @@ namespace perdure::calibrate {
 struct RigCheckOptions {
   std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
   double seconds = 60.0;            ///< of the drive, at most
+  bool until_sure = false;          ///< ends where all is good and vio is sure of it
   vio::Config vio;
 };
 
@@ -37,6 +38,9 @@ struct RigCheck {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;
   double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< over the second half of the drive
 };
+
+/// All is good, and what is bad would be told: deviations are at most half of what is good.
+bool isSurelyGood(const RigCheck& check);
 
 /// Listens to a vio as it runs.
 class RigWatch {

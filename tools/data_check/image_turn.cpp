@@ -99,20 +99,28 @@ Motion withWay(const std::vector<Flow>& flow, const Motion& start) {
   return motion;
 }
 
+const cv::Size kWindow(15, 15);
+constexpr int kLevels = 4;
+
 }  // namespace
 
-std::vector<Flow> flowBetween(const CameraModel& camera, const cv::Mat& first,
-                              const cv::Mat& second) {
+FollowedImage::FollowedImage(const cv::Mat& grey) : image(grey) {
+  if (!grey.empty()) cv::buildOpticalFlowPyramid(grey, pyramid, kWindow, kLevels);
+}
+
+std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,
+                              const FollowedImage& second) {
   std::vector<cv::Point2f> from, to;
-  cv::goodFeaturesToTrack(first, from, 150, 0.01, 0.02 * first.cols + 2.0);
+  cv::goodFeaturesToTrack(first.image, from, 150, 0.01, 0.02 * first.image.cols + 2.0);
   if (from.size() < kFewestCorners) return {};
   std::vector<uchar> found;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(first, second, from, to, found, error, cv::Size(15, 15), 4);
+  cv::calcOpticalFlowPyrLK(first.pyramid, second.pyramid, from, to, found, error, kWindow, kLevels);
   // Who does not come back to where it began was lost on the way.
   std::vector<cv::Point2f> back;
   std::vector<uchar> found_back;
-  cv::calcOpticalFlowPyrLK(second, first, to, back, found_back, error, cv::Size(15, 15), 4);
+  cv::calcOpticalFlowPyrLK(second.pyramid, first.pyramid, to, back, found_back, error, kWindow,
+                           kLevels);
   constexpr double kBack_px = 1.0;
   std::vector<Flow> flow;
   for (std::size_t i = 0; i < from.size(); ++i) {

@@ -14,9 +14,19 @@ struct Flow {
   Eigen::Vector3d ray, step;  ///< unit, in C; and by how much it moved
 };
 
+/// An image with what is needed to follow its corners; empty without one.
+struct FollowedImage {
+  cv::Mat image;
+  std::vector<cv::Mat> pyramid;
+
+  FollowedImage() = default;
+  explicit FollowedImage(const cv::Mat& grey);
+  bool empty() const { return image.empty(); }
+};
+
 /// Of corners that can be followed; empty where there are too few.
-std::vector<Flow> flowBetween(const CameraModel& camera, const cv::Mat& first,
-                              const cv::Mat& second);
+std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,
+                              const FollowedImage& second);
 
 /// The small rotation of the camera, rad in C. The way is left out only where the flow shows one:
 /// where all is far, the flow along the lines tells of the turn, too.

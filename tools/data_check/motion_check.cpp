@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <opencv2/core.hpp>
 
 #include "common/camera/camera_model.h"
@@ -44,8 +45,8 @@ std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample
 }
 
 /// Runs of pairs that follow each other, so that each image is decoded once: the liveliest ones.
-std::vector<std::pair<std::size_t, std::size_t>> liveliestRuns(const std::vector<double>& values,
-                                                               std::size_t most) {
+using Run = std::pair<std::size_t, std::size_t>;
+std::vector<Run> liveliestRuns(const std::vector<double>& values, std::size_t most) {
   constexpr std::size_t kRuns = 3;
   const std::size_t length = std::max<std::size_t>(1, most / kRuns);
   if (values.size() <= most) return {{0, values.size()}};
@@ -57,9 +58,30 @@ std::vector<std::pair<std::size_t, std::size_t>> liveliestRuns(const std::vector
   }
   std::sort(runs.begin(), runs.end());
   runs.resize(std::min(runs.size(), kRuns));
-  std::vector<std::pair<std::size_t, std::size_t>> chosen;
+  std::vector<Run> chosen;
   for (const auto& [negative, begin] : runs) chosen.emplace_back(begin, begin + length);
   return chosen;
+}
+
+std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& calibration,
+                             const Run& run) {
+  const CameraModel camera(calibration);
+  std::vector<Turn> turns;
+  FollowedImage before;
+  for (std::size_t i = run.first; i <= run.second; ++i) {
+    const auto image = replay::monoImageOf(*frames[i]);
+    const bool fits = image && image->cols == static_cast<int>(calibration.width) &&
+                      image->rows == static_cast<int>(calibration.height);
+    FollowedImage now = fits ? FollowedImage(*image) : FollowedImage();
+    if (i > run.first && !before.empty() && !now.empty()) {
+      const auto flow = flowBetween(camera, before, now);
+      if (!flow.empty()) {
+        turns.push_back({frames[i - 1]->time, frames[i]->time, rotationOf(flow)});
+      }
+    }
+    before = std::move(now);
+  }
+  return turns;
 }
 
 /// Of the images (reference) and of the gyroscope so much later.
@@ -193,23 +215,17 @@ std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<Im
   const Frames frames = firstCamera(recording);
   if (frames.size() < 2 || samples.size() < 2) return {};
   const CameraCalibration& calibration = recording.calibration.cameras.front();
-  const CameraModel camera(calibration);
+  // Files are read in parallel; what a recording loads comes from one place in it.
+  const bool files = !frames.front()->load;
+  std::vector<std::future<std::vector<Turn>>> runs;
+  for (const auto& run : liveliestRuns(liveliness(frames, samples), most)) {
+    runs.push_back(std::async(files ? std::launch::async : std::launch::deferred,
+                              [&, run] { return turnsOfRun(frames, calibration, run); }));
+  }
   std::vector<Turn> turns;
-  for (const auto& [begin, end] : liveliestRuns(liveliness(frames, samples), most)) {
-    cv::Mat before;
-    for (std::size_t i = begin; i <= end; ++i) {
-      const auto image = replay::monoImageOf(*frames[i]);
-      const bool fits = image && image->cols == static_cast<int>(calibration.width) &&
-                        image->rows == static_cast<int>(calibration.height);
-      const cv::Mat now = fits ? *image : cv::Mat();
-      if (i > begin && !before.empty() && !now.empty()) {
-        const auto flow = flowBetween(camera, before, now);
-        if (!flow.empty()) {
-          turns.push_back({frames[i - 1]->time, frames[i]->time, rotationOf(flow)});
-        }
-      }
-      before = now;
-    }
+  for (auto& run : runs) {
+    const auto more = run.get();
+    turns.insert(turns.end(), more.begin(), more.end());
   }
   return turns;
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/replay/read_ahead.h"
 #include "tests/common/replay/tiny_datasets.h"
 
 namespace perdure::replay {
@@ -38,6 +39,28 @@ TEST(Dataset, EachNthFrameComesWithItsPartnerNumberAndAllSamples) {
   EXPECT_DOUBLE_EQ(some->calibration().cameras[0].rate_hz,
                    all->calibration().cameras[0].rate_hz / 2);
   EXPECT_EQ(some->skip(durationFromSeconds(0.05)), 2U);
+}
+
+TEST(ReadAhead, GivesWhatTheDriveHasInItsOrderAndMayEndEarly) {
+  const auto root = tinyEuroc("ahead");
+  const auto plain = Dataset::open({.path = root}), read = Dataset::open({.path = root});
+  {
+    ReadAhead ahead(*read, 2);
+    while (const auto expected = plain->next()) {
+      const auto message = ahead.next();
+      ASSERT_TRUE(message);
+      EXPECT_EQ(message->index(), expected->index());
+      const auto* frame = std::get_if<Frame>(&*message);
+      if (frame) {
+        EXPECT_EQ(frame->stamp.time, std::get<Frame>(*expected).stamp.time);
+      }
+    }
+    EXPECT_FALSE(ahead.next());
+    EXPECT_FALSE(ahead.next());
+  }
+  const auto again = Dataset::open({.path = root});
+  ReadAhead unread(*again, 1);  // whose thread waits for room when it ends
+  EXPECT_TRUE(unread.next());
 }
 
 TEST(Dataset, ATruncatedImageIsCountedAndItsIndexNotGivenAgain) {

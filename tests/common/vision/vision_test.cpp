@@ -96,5 +96,19 @@ TEST(Decode, AMissingFileIsNamed) {
   EXPECT_NE(image.error().detail.find("/nowhere/7.png"), std::string::npos);
 }
 
+TEST(Decode, UsedBitsAreThoseOfDeepImagesOnly) {
+  const auto bitsOf = [](const std::string& name, const cv::Mat& image) {
+    const std::string path = testing::TempDir() + "bits" + name;
+    cv::imwrite(path, image);
+    return usedBits(path);
+  };
+  EXPECT_EQ(bitsOf("12.png", cv::Mat(8, 8, CV_16UC1, cv::Scalar(4000))), 12);
+  EXPECT_EQ(bitsOf("16.png", cv::Mat(8, 8, CV_16UC1, cv::Scalar(40000))), 16);
+  EXPECT_EQ(bitsOf("10.tiff", cv::Mat(8, 8, CV_16UC1, cv::Scalar(1000))), 10);
+  EXPECT_EQ(bitsOf("8.png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(200))), 16);
+  EXPECT_EQ(bitsOf("8.jpg", cv::Mat(8, 8, CV_8UC1, cv::Scalar(200))), 16);
+  EXPECT_EQ(usedBits(testing::TempDir() + "no_such.png"), 16);
+}
+
 }  // namespace
 }  // namespace perdure::vision

@@ -34,7 +34,7 @@ class RigCheckRun : public testing::Test {
 
   static RigCheck checkOf(const Calibration& rig) {
     std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
-    return checkRig({folder_ / "drive", folder_ / "rig.yaml", 60.0, {}});
+    return checkRig({.data = folder_ / "drive", .rig = folder_ / "rig.yaml", .vio = {}});
   }
 
   inline static fs::path folder_;
@@ -43,6 +43,16 @@ class RigCheckRun : public testing::Test {
 
 TEST_F(RigCheckRun, ARightRigIsGood) {
   for (const Judgement& j : judgeRig(checkOf(rig_))) EXPECT_EQ(j.grade, Grade::kGood) << j.text;
+}
+
+// One that is off is looked at to the end of the drive.
+TEST_F(RigCheckRun, EndsEarlyOnlyWhereAllIsGood) {
+  Calibration rig = rig_;
+  rig.cameras[0].time_offset_s = 0.012;
+  std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
+  const RigCheck late = checkRig(
+      {.data = folder_ / "drive", .rig = folder_ / "rig.yaml", .until_sure = true, .vio = {}});
+  EXPECT_EQ(late.frames, 300U);
 }
 
 TEST_F(RigCheckRun, ATurnedCameraIsFoundByHowFar) {

@@ -64,6 +64,20 @@ TEST(RigCheck, ACameraThatMovedIsToldOnlyWhereVioIsSure) {
   EXPECT_EQ(worst(check).grade, Grade::kGood) << worst(check).text;
 }
 
+// Where vio would not tell what is bad, more of the drive has to be looked at.
+TEST(RigCheck, IsSurelyGoodWhereWhatIsBadWouldBeTold) {
+  RigCheck check = goodCheck();
+  EXPECT_TRUE(isSurelyGood(check));
+  check.sigma.segment<3>(3).setConstant(0.006);
+  EXPECT_FALSE(isSurelyGood(check)) << "10 mm of deviation in all";
+  check = goodCheck();
+  check.later_s = 0.004;
+  EXPECT_FALSE(isSurelyGood(check)) << "it is doubtful";
+  check = goodCheck();
+  check.innovations.resize(400);
+  EXPECT_FALSE(isSurelyGood(check)) << "too few innovations";
+}
+
 TEST(RigCheck, ATimeOffsetComesWithTheValueToSet) {
   RigCheck check = goodCheck();
   check.camera.time_offset_s = 0.004;

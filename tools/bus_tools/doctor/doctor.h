@@ -1,6 +1,7 @@
 // The checks of `perdure doctor`: each is a line with its verdict and, where it fails, the mend.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,8 @@ Findings checkBus(const bus::Options& options, double seconds);
 void settleUpsideDown(bool vio_agrees, Findings& findings);
 /// Of a recording: stamps, units, images, axes; and where these can be used at all, of a rig file
 /// (empty: the recording's own) by the innovations of vio over it.
-Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds);
+Findings checkRigBy(const std::string& recording, const std::string& rig,
+                    std::optional<double> seconds = {});
 
 /// model.path of inference.yaml in the folder; empty where none is set.
 std::string configuredNetwork(const std::string& folder);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "common/base/errors.h"
 #include "tools/bus_tools/command.h"
@@ -22,7 +23,7 @@ struct DoctorOptions {
   std::string report;
   bool images = false;
   std::string recording, rig, copy, network;
-  double rig_seconds = 60.0;
+  std::optional<double> rig_seconds;
 };
 
 const char* wordOf(Verdict verdict) {
@@ -144,9 +145,11 @@ void addDoctorCommand(CLI::App& app) {
                    "with --data: the network whose input is compared with the camera's shape; "
                    "model.path of inference.yaml where not given")
       ->type_name("FILE");
-  command->add_option("--rig-seconds", options->rig_seconds, "of the recording, at most")
-      ->check(CLI::Range(5.0, 3600.0))
-      ->capture_default_str();
+  command
+      ->add_option("--rig-seconds", options->rig_seconds,
+                   "of the recording by which the rig is judged; until it is surely good, and 60 "
+                   "at most, where not given")
+      ->check(CLI::Range(5.0, 3600.0));
   command->add_flag("--images", options->images, "with an image of each camera in the report");
   addBusOptions(*command, options->bus);
   command->callback([options] { runDoctor(*options); });

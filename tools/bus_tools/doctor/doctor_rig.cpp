@@ -60,11 +60,14 @@ void settleUpsideDown(bool vio_agrees, Findings& findings) {
   }
 }
 
-Findings checkRigBy(const std::string& recording, const std::string& rig, double seconds) {
+Findings checkRigBy(const std::string& recording, const std::string& rig,
+                    std::optional<double> seconds) {
   Findings findings;
   if (!checkRecording(recording, rig, findings)) return findings;
   calibrate::RigCheckOptions options;
-  options.data = recording, options.rig = rig, options.seconds = seconds;
+  options.data = recording, options.rig = rig;
+  options.until_sure = !seconds;
+  if (seconds) options.seconds = *seconds;
   const auto check = calibrate::checkRig(options);
   auto judgements = calibrate::judgeRig(check);
   settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
