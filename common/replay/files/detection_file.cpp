@@ -129,7 +129,7 @@ std::optional<std::set<std::uint64_t>> readFrameList(std::filesystem::path file)
 bool isHeaderless(const std::vector<TextLine>& lines, const DetectionFileOptions& options) {
   if (lines.empty()) {
     throw StartupError(
-        ExitCode::kUnavailable,
+        ExitCode::kData,
         options.file.string() + " is empty; it begins with a header frame,class,x1,y1,x2,y2,score");
   }
   if (!parseNumber(split(lines[0].text, ',')[0])) return false;

@@ -99,7 +99,7 @@ void Complaints::throwIfAny() const {
   if (count_ > kShownComplaints) {
     message += "\nand " + std::to_string(count_ - kShownComplaints) + " more";
   }
-  throw StartupError(ExitCode::kUnavailable, message);
+  throw StartupError(ExitCode::kData, message);
 }
 
 }  // namespace perdure::replay

@@ -41,7 +41,7 @@ class Complaints {
   explicit Complaints(std::filesystem::path file) : file_(std::move(file)) {}
   void add(std::size_t line, std::string_view what);
   bool empty() const { return count_ == 0; }
-  /// Throws StartupError(kUnavailable) with the first ten and the number of the rest, if any.
+  /// Throws StartupError(kData) with the first ten and the number of the rest, if any.
   void throwIfAny() const;
 
  private:

@@ -105,6 +105,14 @@ TEST(DetectionFile, RrcWithoutHeaderNeedsAClassAndIsShiftedOnlyWhenAsked) {
   EXPECT_DOUBLE_EQ(readCsv(rrc, options).at(0)->front().box.x1, 295.021);
 }
 
+TEST(DetectionFile, WrongLinesAreWrongDataAndNoFileThatIsMissing) {
+  const std::string header(kHeader);
+  for (const std::string& text : {std::string(), header + "0,car,1,2,x,4,.5,\n", header + "0,car\n",
+                                  std::string("frame\n")}) {
+    EXPECT_EQ(startupCodeOf([&] { readCsv(text); }), ExitCode::kData) << text;
+  }
+}
+
 TEST(DetectionFile, EveryWrongLineIsLocated) {
   const std::string h = kHeader;
   EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,0.5,\n0,car,9,2,3,4,0.5,\n"),

@@ -73,6 +73,13 @@ TEST(PoseFile, KittiLinesOfTwelveAndSixteenNumbersAreByFrame) {
   }
 }
 
+TEST(PoseFile, WrongLinesAreWrongDataAndNoFileThatIsMissing) {
+  for (const char* text : {"0 0 0 nan 0 0 0 1\n", "0 0 0 x 0 0 0 1\n", "1 2 3\n", "", "# none\n"}) {
+    EXPECT_EQ(startupCodeOf([&] { readPoses(text); }), ExitCode::kData) << text;
+  }
+  EXPECT_EQ(startupCodeOf([] { PoseFile::read("/nowhere.txt"); }), ExitCode::kUnavailable);
+}
+
 TEST(PoseFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(errorOfPoses("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 0.5\n"),
               HasSubstr("poses.txt:2: the quat"));

@@ -50,6 +50,7 @@ TEST(TextFile, ComplaintsNameFileAndLineAndCountTheRest) {
   EXPECT_THAT(error, HasSubstr("file.csv:1: is wrong"));
   EXPECT_THAT(error, HasSubstr("file.csv:10: is wrong"));
   EXPECT_THAT(error, HasSubstr("and 2 more"));
+  EXPECT_EQ(startupCodeOf([&] { complaints.throwIfAny(); }), ExitCode::kData);
 }
 
 }  // namespace
