@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/common/replay/tiny_datasets.h"
@@ -111,6 +112,23 @@ TEST(DetectionFile, WrongLinesAreWrongDataAndNoFileThatIsMissing) {
                                   std::string("frame\n")}) {
     EXPECT_EQ(startupCodeOf([&] { readCsv(text); }), ExitCode::kData) << text;
   }
+}
+
+TEST(DetectionFile, TablesOfOtherProgramsAreReadWhereTheirMeaningIsSure) {
+  const std::string header = "frame,class,x1,y1,x2,y2,score,azimuth\n", row = "3,car,1,2,3,4,.5,\n";
+  std::string with_semicolons = header + row;
+  std::replace(with_semicolons.begin(), with_semicolons.end(), ',', ';');
+  for (const std::string& text :
+       {"\xEF\xBB\xBF" + header + row, "# " + header + row, with_semicolons,
+        header + "3,car,1,2,3,4,.5,\r\n",
+        std::string("frame\tclass\tx1\ty1\tx2\ty2\tscore\n3\tcar\t1\t2\t3\t4\t.5\n")}) {
+    EXPECT_EQ(errorOfCsv(text), "") << text;
+    ASSERT_EQ(readCsv(text).at(3)->size(), 1U) << text;
+    EXPECT_EQ(readCsv(text).at(3)->front().box.y2, 4.0) << text;
+  }
+  DetectionFileOptions options;
+  options.class_name = "Car";
+  EXPECT_EQ(readCsv("3 1 2 3 4 .5\n", options).at(3)->size(), 1U) << "without a header";
 }
 
 TEST(DetectionFile, EveryWrongLineIsLocated) {
