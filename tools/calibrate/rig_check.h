@@ -16,6 +16,7 @@ namespace perdure::calibrate {
 
 struct RigCheckOptions {
   std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
+  std::string sequence;             ///< of KITTI tracking or 7-Scenes
   double seconds = 60.0;            ///< of the drive, at most
   vio::Config vio;
 };
