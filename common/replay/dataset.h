@@ -72,7 +72,8 @@ struct Recording {
 
 class Dataset {
  public:
-  /// Throws StartupError(kUnavailable) with what is missing and the mend.
+  /// Throws StartupError with the mend: kUnavailable where something is missing, kData where a file
+  /// cannot be used as it is.
   static std::unique_ptr<Dataset> open(const DatasetOptions& options);
   Dataset(const DatasetOptions& options, Recording recording);
 

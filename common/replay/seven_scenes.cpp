@@ -237,7 +237,7 @@ std::map<std::size_t, RigidTransform> readPoses(const SceneFiles& files, Recordi
     }
   }
   if (count > 10) all += "\nand " + std::to_string(count - 10) + " more";
-  if (count > 0) throw StartupError(ExitCode::kUnavailable, all);
+  if (count > 0) throw StartupError(ExitCode::kData, all);
   return poses;
 }
 

@@ -246,7 +246,7 @@ double innovationRatio(const std::vector<vio::Innovation>& innovations) {
 
 RigCheck checkRig(const RigCheckOptions& options) {
   replay::DatasetOptions wanted;
-  wanted.path = options.data, wanted.rig = options.rig;
+  wanted.path = options.data, wanted.rig = options.rig, wanted.sequence = options.sequence;
   wanted.encoding = wanted.second_encoding = ImageEncoding::kMono8;
   const auto dataset = replay::Dataset::open(wanted);
   if (!dataset->calibration().imu) {

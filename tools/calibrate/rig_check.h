@@ -16,9 +16,10 @@ namespace perdure::calibrate {
 
 struct RigCheckOptions {
   std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
+  std::string sequence = {};        ///< of KITTI tracking or 7-Scenes
   double seconds = 60.0;            ///< of the drive, at most
   bool until_sure = false;          ///< ends where all is good and vio is sure of it
-  vio::Config vio;
+  vio::Config vio = {};
 };
 
 /// What vio came to believe of the first camera's place, against the rig; and how it fared.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "tools/data_check/pose_check.h"
 #include "tools/data_check/turn_integral.h"
@@ -80,10 +81,17 @@ std::vector<Push> pushesOf(const std::vector<StampedPose>& poses,
 }
 
 /// What one metre of the poses is by the accelerometer, at least and at most: noise of the poses
-/// lessens the one, noise of the accelerometer raises the other.
+/// lessens the one, noise of the accelerometer raises the other, and both have twice the deviation
+/// of a ratio of so many steps.
 struct Scale {
-  double least, most, common;  ///< common: share of the accelerations that both have
+  double least, metres, most;
+  double common;  ///< share of the accelerations that both have
   std::size_t steps;
+
+  bool fits(double unit) const {
+    constexpr double kSystematic = 1.05;  // scale of the accelerometer, clocks, smoothed poses
+    return least < kSystematic * unit && most > unit / kSystematic;
+  }
 };
 
 /// Gravity and the bias are free.
@@ -105,15 +113,24 @@ std::optional<Scale> scaleOf(const std::vector<Push>& pushes) {
   const double poses = both.col(0).squaredNorm(), imu = both.col(1).squaredNorm();
   const double product = both.col(0).dot(both.col(1));
   if (poses <= 0.0 || imu <= 0.0 || product <= 0.0) return std::nullopt;
-  return Scale{product / poses, imu / product, product * product / (poses * imu), pushes.size()};
+  const double common = product * product / (poses * imu);
+  // Steps overlap by half.
+  const double deviation =
+      std::sqrt(2.0 * (1.0 - common) / (common * static_cast<double>(rows - 8)));
+  const double spread = std::exp(2.0 * deviation);
+  return Scale{product / poses / spread, std::sqrt(imu / poses), imu / product * spread, common,
+               pushes.size()};
 }
 
 struct LengthUnit {
   double metres;
   const char* name;
+  double widest;  ///< most/least up to which it is named: a scale of no unit may be near it
 };
-constexpr std::array kLengthUnits{LengthUnit{0.001, "millimetres"}, LengthUnit{0.01, "centimetres"},
-                                  LengthUnit{1000.0, "kilometres"}};
+constexpr double kAny = 1e9;
+constexpr std::array kLengthUnits{
+    LengthUnit{0.001, "millimetres", kAny}, LengthUnit{0.01, "centimetres", kAny},
+    LengthUnit{0.3048, "feet", 1.25}, LengthUnit{1000.0, "kilometres", kAny}};
 
 /// Gravity is what it measures most of the time.
 bool measuresGravity(const std::vector<ImuSample>& samples) {
@@ -127,23 +144,27 @@ bool measuresGravity(const std::vector<ImuSample>& samples) {
 }
 
 DataFindings unitFinding(const Scale& scale) {
-  const double metres = std::sqrt(scale.least * scale.most);
-  constexpr double kNear = 1.6;
+  const char* perhaps = "";
   for (const LengthUnit& unit : kLengthUnits) {
-    if (metres > kNear * unit.metres || metres < unit.metres / kNear) continue;
+    if (!scale.fits(unit.metres)) continue;
+    if (scale.most > unit.widest * scale.least) {
+      perhaps = unit.name;
+      continue;
+    }
     return {
         {Grade::kFatal, "poses_unit",
          fmt::format("the poses accelerate {:.3g} times as much as the accelerometer says, over "
                      "{} steps of the drive: they are in {}; multiply x, y, z by {:g}",
-                     1.0 / metres, scale.steps, unit.name, unit.metres)}};
+                     1.0 / scale.metres, scale.steps, unit.name, unit.metres)}};
   }
-  return {
-      {Grade::kWarning, "poses_unit",
-       fmt::format("the poses accelerate {:.2g} times as much as the accelerometer says, over {} "
-                   "steps of the drive: where they have no scale of their own (one camera), "
-                   "multiply x, y, z by {:.3g}; else see their unit, and that of the "
-                   "accelerometer",
-                   1.0 / metres, scale.steps, metres)}};
+  const bool no_unit = std::string_view(perhaps).empty();
+  return {{Grade::kWarning, "poses_unit",
+           fmt::format("the poses accelerate {:.3g} times as much as the accelerometer says, over "
+                       "{} steps of the drive: their unit is {:.3g} m ({:.3g} to {:.3g}), which "
+                       "{}; poses of one camera have no scale of their own: multiply x, y, z by "
+                       "{:.3g}, or see their unit, and that of the accelerometer",
+                       1.0 / scale.metres, scale.steps, scale.metres, scale.least, scale.most,
+                       no_unit ? "is no unit" : fmt::format("may be {}", perhaps), scale.metres)}};
 }
 
 DataFindings judgeSpeed(const std::vector<StampedPose>& poses) {
@@ -170,7 +191,7 @@ DataFindings judgeSpeed(const std::vector<StampedPose>& poses) {
 
 DataFindings judgePoseUnit(const std::vector<StampedPose>& poses,
                            const replay::Recording& recording) {
-  constexpr double kCommon = 0.5, kFactor = 2.0;
+  constexpr double kCommon = 0.5, kFactor = 2.0, kClearly = 0.9, kClearFactor = 1.4;
   std::optional<Scale> best;
   if (measuresGravity(recording.imu) && !recording.calibration.cameras.empty()) {
     const TurnIntegral gyro(recording.imu);
@@ -180,7 +201,8 @@ DataFindings judgePoseUnit(const std::vector<StampedPose>& poses,
     }
   }
   if (best && best->common > kCommon) {
-    const bool sound = best->least < kFactor && best->most > 1.0 / kFactor;
+    const double factor = best->common > kClearly ? kClearFactor : kFactor;
+    const bool sound = best->least < factor && best->most > 1.0 / factor;
     return sound ? DataFindings() : unitFinding(*best);
   }
   return judgeSpeed(poses);

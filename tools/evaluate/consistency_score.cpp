@@ -101,7 +101,7 @@ std::vector<OdometryRow> readOdometry(const std::filesystem::path& file) {
                        : std::nullopt;
     const auto time = v ? replay::parseInteger(fields[1]) : std::nullopt;
     if (!time) {
-      throw StartupError(ExitCode::kUnavailable,
+      throw StartupError(ExitCode::kData,
                          fmt::format("{}:{}: no line of odometry.csv; `perdure pipeline` writes it",
                                      file.string(), line.number));
     }

@@ -63,7 +63,7 @@ struct OdometryRow {
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();
   Matrix9d covariance = Matrix9d::Zero();  ///< of [θ, p, v]: θ on the right, p and v in W
 };
-/// Throws StartupError(kUnavailable) where the file is missing or a line is none.
+/// Throws StartupError: kUnavailable where the file is missing, kData where a line is none.
 std::vector<OdometryRow> readOdometry(const std::filesystem::path& file);
 
 /// Takes the truth's world into the run's, by position and by the turn about z that brings the two

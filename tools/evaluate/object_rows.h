@@ -24,7 +24,7 @@ struct EstimateRow {
   double length = 0, width = 0, height = 0, yaw = 0;
 };
 
-/// Throws StartupError(kUnavailable) that names each wrong line.
+/// Throws StartupError(kData) that names each wrong line.
 std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file);
 
 /// The body's pose by frame index. A trajectory has times only; the rows of the CSV tie times to

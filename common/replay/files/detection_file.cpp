@@ -14,6 +14,7 @@ namespace {
 /// Where each field stands in a row.
 struct Columns {
   std::size_t frame = 0, x1 = 0, y1 = 0, x2 = 0, y2 = 0, score = 0, count = 0;
+  char separator = ',';
   std::optional<std::size_t> class_name, azimuth;
   std::optional<std::size_t> sigma_azimuth;
   std::optional<std::array<std::size_t, 4>> sigmas;
@@ -25,7 +26,10 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
   Columns columns;
   Complaints wrong(file);
   std::map<std::string, std::size_t> at;
-  const auto names = split(line.text, ',');
+  std::string_view text = line.text;
+  if (text.starts_with('#')) text.remove_prefix(1);
+  columns.separator = separatorOf(text);
+  const auto names = split(text, columns.separator);
   columns.count = names.size();
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string name = toLower(names[i]);
@@ -54,8 +58,9 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
   return columns;
 }
 
-Columns headerlessColumns() {
+Columns headerlessColumns(const TextLine& line) {
   Columns columns;
+  columns.separator = separatorOf(line.text);
   columns.frame = 0, columns.x1 = 1, columns.y1 = 2, columns.x2 = 3, columns.y2 = 4;
   columns.score = 5, columns.count = 6;
   return columns;
@@ -129,10 +134,10 @@ std::optional<std::set<std::uint64_t>> readFrameList(std::filesystem::path file)
 bool isHeaderless(const std::vector<TextLine>& lines, const DetectionFileOptions& options) {
   if (lines.empty()) {
     throw StartupError(
-        ExitCode::kUnavailable,
+        ExitCode::kData,
         options.file.string() + " is empty; it begins with a header frame,class,x1,y1,x2,y2,score");
   }
-  if (!parseNumber(split(lines[0].text, ',')[0])) return false;
+  if (!parseNumber(fieldsOf(lines[0].text)[0])) return false;
   if (options.class_name.empty()) {
     throw StartupError(ExitCode::kUsage, options.file.string() +
                                              " has no header: say the class of its boxes with "
@@ -145,7 +150,7 @@ using NumberedRow = std::pair<std::uint64_t, DetectionFile::Row>;
 
 Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
                             const DetectionFileOptions& options, const ClassAliases& aliases) {
-  const auto fields = split(text, ',');
+  const auto fields = split(text, columns.separator);
   if (fields.size() != columns.count) {
     return fail("detection_malformed", std::to_string(fields.size()) + " fields; " +
                                            std::to_string(columns.count) + " are expected");
@@ -172,7 +177,7 @@ DetectionFile DetectionFile::read(const DetectionFileOptions& options,
   result.listed_frames_ = readFrameList(options.file);
   const bool headerless = isHeaderless(lines, options);
   const Columns columns =
-      headerless ? headerlessColumns() : readHeader(options.file, lines[0], aliases);
+      headerless ? headerlessColumns(lines[0]) : readHeader(options.file, lines[0], aliases);
   for (const auto& [column, name] : columns.logits) result.logit_classes_.push_back(name);
   Complaints wrong(options.file);
   for (std::size_t i = headerless ? 0 : 1; i < lines.size(); ++i) {

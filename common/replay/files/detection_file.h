@@ -35,7 +35,7 @@ struct DetectionFileOptions {
 /// it have a message at all.
 class DetectionFile {
  public:
-  /// Throws StartupError(kUnavailable) that names each wrong line with the mend.
+  /// Throws StartupError(kData) that names each wrong line with the mend.
   static DetectionFile read(const DetectionFileOptions& options, const ClassAliases& aliases);
 
   /// Classes known at a frame: those of `logit:` columns, else those of rows up to that frame, so

@@ -31,10 +31,10 @@ class Entries {
       const auto found = entries_.find(name);
       if (found == entries_.end()) continue;
       if (found->second.size() == count) return found->second;
-      throw StartupError(ExitCode::kUnavailable, file_.string() + ": " + name + " has " +
-                                                     std::to_string(found->second.size()) +
-                                                     " numbers, not " + std::to_string(count) +
-                                                     "; fetch KITTI's calibration file again");
+      throw StartupError(ExitCode::kData, file_.string() + ": " + name + " has " +
+                                              std::to_string(found->second.size()) +
+                                              " numbers, not " + std::to_string(count) +
+                                              "; fetch KITTI's calibration file again");
     }
     throw StartupError(ExitCode::kUnavailable, file_.string() + ": " + names.front() +
                                                    " is missing; fetch KITTI's calibration again");
@@ -78,8 +78,8 @@ class Entries {
     return R;
   }
   [[noreturn]] void wrong(const std::string& name, const std::string& what) const {
-    throw StartupError(ExitCode::kUnavailable, file_.string() + ": " + name + " " + what +
-                                                   "; fetch KITTI's calibration file again");
+    throw StartupError(ExitCode::kData, file_.string() + ": " + name + " " + what +
+                                            "; fetch KITTI's calibration file again");
   }
 
   std::filesystem::path file_;

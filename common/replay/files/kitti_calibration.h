@@ -22,7 +22,8 @@ struct KittiCalibration {
   CameraCalibration camera(const std::string& name) const;
 };
 
-/// Throws StartupError(kUnavailable) that names the file or entry that is missing, with the mend.
+/// Throws StartupError that names the file or entry with the mend: kUnavailable where it is
+/// missing, kData where it is wrong.
 KittiCalibration readTrackingCalibration(const std::filesystem::path& file);
 /// `folder` holds the three files.
 KittiCalibration readRawCalibration(const std::filesystem::path& folder);

@@ -25,7 +25,7 @@ struct KittiLabel {
 };
 
 /// KITTI gives the middle of the box's bottom; `centre` is half the height above it. Throws
-/// StartupError(kUnavailable) that names each wrong line.
+/// StartupError(kData) that names each wrong line.
 std::vector<KittiLabel> readKittiLabels(const std::filesystem::path& file);
 
 }  // namespace perdure::replay

@@ -34,7 +34,18 @@ std::optional<TimePoint> parseSeconds(std::string_view text) {
   return TimePoint(durationFromSeconds(*seconds));
 }
 
-void addTum(const TextLine& line, const std::vector<std::string_view>& fields,
+/// Whether names of eight columns say that a quaternion's w comes first (q_w, qx [], q_RS_y …).
+bool namesWFirst(const std::vector<std::string_view>& names) {
+  constexpr std::string_view kOrder = "wxyz";
+  if (names.size() != 8) return false;
+  for (std::size_t i = 0; i < kOrder.size(); ++i) {
+    const std::string name = toLower(trim(names[4 + i].substr(0, names[4 + i].find('['))));
+    if (!name.ends_with(kOrder[i])) return false;
+  }
+  return true;
+}
+
+void addTum(const TextLine& line, const std::vector<std::string_view>& fields, bool w_first,
             std::vector<StampedPose>& poses, Complaints& wrong) {
   const auto time = parseSeconds(fields[0]);
   const auto v = parseNumbers(fields);
@@ -43,8 +54,13 @@ void addTum(const TextLine& line, const std::vector<std::string_view>& fields,
                                       " is not in seconds; where it is in nanoseconds, divide it "
                                       "by 1000000000");
   }
-  if (!v) return wrong.add(line.number, "write eight finite numbers, t x y z qx qy qz qw");
-  const Eigen::Quaterniond q((*v)[7], (*v)[4], (*v)[5], (*v)[6]);
+  if (!v) {
+    return wrong.add(line.number,
+                     "write eight finite numbers, t x y z qx qy qz qw, with decimal points; leave "
+                     "out a line whose pose is not known");
+  }
+  const std::size_t x = w_first ? 5 : 4, w = w_first ? 4 : 7;
+  const Eigen::Quaterniond q((*v)[w], (*v)[x], (*v)[x + 1], (*v)[x + 2]);
   if (std::abs(q.norm() - 1.0) > kUnitTolerance) {
     return wrong.add(line.number, "the quaternion's norm is " + std::to_string(q.norm()) +
                                       ", not 1; the order is qx qy qz qw");
@@ -61,7 +77,11 @@ void addTum(const TextLine& line, const std::vector<std::string_view>& fields,
 void addKitti(const TextLine& line, const std::vector<std::string_view>& fields,
               std::vector<StampedPose>& poses, Complaints& wrong) {
   const auto v = parseNumbers(fields);
-  if (!v) return wrong.add(line.number, "write 12 or 16 finite numbers, row by row");
+  if (!v) {
+    return wrong.add(line.number,
+                     "write 12 or 16 finite numbers, row by row, with decimal points; where a "
+                     "frame's pose is not known, give lines t x y z qx qy qz qw of the others");
+  }
   Eigen::Matrix3d R;
   Eigen::Vector3d p;
   for (std::size_t row = 0; row < 3; ++row) {
@@ -91,6 +111,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
   Complaints wrong(file);
   std::vector<StampedPose> poses;
   std::size_t columns = 0, last_line = 0;
+  bool w_first = false, headed = false;
   for (const auto& line : lines) {
     const std::size_t expected = std::exchange(last_line, line.number) + 1;
     // A line without time is the pose of the frame of its number.
@@ -98,8 +119,13 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
       wrong.add(expected,
                 "the line is empty, and poses are counted by lines; write the frame's pose");
     }
-    if (line.text.starts_with('#')) continue;
-    const auto fields = split(line.text, line.text.find(',') != std::string::npos ? ',' : ' ');
+    const bool comment = line.text.starts_with('#');
+    const auto fields = fieldsOf(std::string_view(line.text).substr(comment ? 1 : 0));
+    if (comment || (columns == 0 && !headed && isHeader(fields))) {
+      headed = headed || !comment;
+      w_first = w_first || (columns == 0 && namesWFirst(fields));
+      continue;
+    }
     if (columns == 0) columns = fields.size();
     const bool known = columns == 8 || columns == 12 || columns == 16;
     if (!known || fields.size() != columns) {
@@ -107,7 +133,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
                                  " numbers; write 8 (TUM: t x y z qx qy qz qw) or 12 or 16 (KITTI: "
                                  "a row-major pose) in every line");
     } else if (columns == 8) {
-      addTum(line, fields, poses, wrong);
+      addTum(line, fields, w_first, poses, wrong);
     } else {
       addKitti(line, fields, poses, wrong);
     }

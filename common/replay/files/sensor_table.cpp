@@ -8,20 +8,6 @@
 namespace perdure::replay {
 namespace {
 
-char separatorOf(std::string_view line) {
-  for (const char separator : {',', ';'}) {
-    if (line.find(separator) != line.npos) return separator;
-  }
-  return ' ';
-}
-
-/// Without the empty ones that a comma at the line's end makes.
-std::vector<std::string_view> fieldsOf(std::string_view line) {
-  auto fields = split(line, separatorOf(line));
-  while (fields.size() > 1 && fields.back().empty()) fields.pop_back();
-  return fields;
-}
-
 bool beginsNumber(std::string_view text) {
   return !text.empty() && text.find_first_of("0123456789+-.") == 0;
 }

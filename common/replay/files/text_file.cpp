@@ -1,5 +1,6 @@
 #include "common/replay/files/text_file.h"
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -34,6 +35,10 @@ std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_v
   std::vector<TextLine> lines;
   std::string text;
   for (std::size_t number = 1; std::getline(file, text); ++number) {
+    if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+    if (number == 1 && (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))) {
+      throw StartupError(ExitCode::kData, path.string() + " is UTF-16; save it as UTF-8");
+    }
     const auto trimmed = trim(text);
     if (!trimmed.empty()) lines.push_back({number, std::string(trimmed)});
   }
@@ -68,6 +73,19 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   }
 }
 
+char separatorOf(std::string_view line) {
+  for (const char separator : {',', ';'}) {
+    if (line.find(separator) != line.npos) return separator;
+  }
+  return ' ';
+}
+
+std::vector<std::string_view> fieldsOf(std::string_view line) {
+  auto fields = split(line, separatorOf(line));
+  while (fields.size() > 1 && fields.back().empty()) fields.pop_back();
+  return fields;
+}
+
 std::optional<double> parseNumber(std::string_view text) {
   const auto value = parseWhole<double>(text);
   return value && std::isfinite(*value) ? value : std::nullopt;
@@ -87,6 +105,15 @@ std::optional<std::vector<double>> parseNumbers(const std::vector<std::string_vi
   return values;
 }
 
+bool isHeader(const std::vector<std::string_view>& fields) {
+  const auto is_number = [](std::string_view field) {
+    const std::string lower = toLower(field);
+    return lower.empty() || lower.find_first_of("0123456789+-.") == 0 || lower == "nan" ||
+           lower == "inf" || lower == "infinity";
+  };
+  return fields.size() > 1 && std::none_of(fields.begin(), fields.end(), is_number);
+}
+
 void Complaints::add(std::size_t line, std::string_view what) {
   if (++count_ > kShownComplaints) return;
   if (!text_.empty()) text_ += '\n';
@@ -99,7 +126,7 @@ void Complaints::throwIfAny() const {
   if (count_ > kShownComplaints) {
     message += "\nand " + std::to_string(count_ - kShownComplaints) + " more";
   }
-  throw StartupError(ExitCode::kUnavailable, message);
+  throw StartupError(ExitCode::kData, message);
 }
 
 }  // namespace perdure::replay

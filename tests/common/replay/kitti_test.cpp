@@ -279,6 +279,7 @@ TEST(KittiLabels, WrongLinesAreLocated) {
   const auto error = startupErrorOf([&] { readKittiLabels(file); });
   EXPECT_THAT(error, HasSubstr("0000.txt:2: 17 fields"));
   EXPECT_THAT(error, HasSubstr("0000.txt:3: a field is not a number"));
+  EXPECT_EQ(startupCodeOf([&] { readKittiLabels(file); }), ExitCode::kData);
 }
 
 // As many frames as the last label says would be laid out.

@@ -108,6 +108,7 @@ TEST(SevenScenes, WrongPosesAndMissingPartsAreNamed) {
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("more than 1000 km away"));
   writeText(pose, "1 0 0 0\n0 1 0 x\n0 0 1 0\n0 0 0 1\n");
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("line 2 is not of numbers"));
+  EXPECT_EQ(startupCodeOf([&] { Dataset::open({.path = folder}); }), ExitCode::kData);
   for (const char* name : {"0", "1", "2"}) {
     fs::remove(folder / ("frame-00000" + std::string(name) + ".pose.txt"));
   }

@@ -10,8 +10,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "common/base/errors.h"
-
 namespace perdure::replay {
 namespace {
 
@@ -242,6 +240,15 @@ std::string startupErrorOf(const std::function<void()>& action) {
     return error.what();
   }
   return {};
+}
+
+ExitCode startupCodeOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const StartupError& error) {
+    return error.code();
+  }
+  return ExitCode::kOk;
 }
 
 }  // namespace perdure::replay

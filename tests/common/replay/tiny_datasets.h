@@ -6,6 +6,8 @@
 #include <functional>
 #include <string>
 
+#include "common/base/errors.h"
+
 namespace perdure::replay {
 
 /// An empty folder under the test's own temporary folder; what was there is removed.
@@ -35,5 +37,7 @@ Eigen::Vector3d tinySevenScenesUp();
 
 /// The message of the StartupError that `action` throws, or "" where it throws none.
 std::string startupErrorOf(const std::function<void()>& action);
+/// Its exit status; kOk where it throws none.
+ExitCode startupCodeOf(const std::function<void()>& action);
 
 }  // namespace perdure::replay

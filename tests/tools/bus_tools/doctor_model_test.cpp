@@ -33,8 +33,9 @@ TEST(DoctorOfNetworks, WarnsOfAShapeThatWastesAThirdOfTheInput) {
   const auto camera = replay::Dataset::open({.path = drive})->calibration().cameras.front();
   const int side = 32 * 8;
   const auto other = static_cast<int>(side * camera.height / camera.width / 32 * 32);
-  EXPECT_TRUE(checkNetworkShape(drive, "", networkOf(folder, side, std::max(32, other))).empty());
-  const Findings found = checkNetworkShape(drive, "", networkOf(folder, 4 * side, 64));
+  EXPECT_TRUE(
+      checkNetworkShape({.data = drive}, networkOf(folder, side, std::max(32, other))).empty());
+  const Findings found = checkNetworkShape({.data = drive}, networkOf(folder, 4 * side, 64));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].verdict, Verdict::kWarn);
   EXPECT_THAT(found[0].text, HasSubstr("--input camera --image PICTURE"));
@@ -59,9 +60,20 @@ TEST(DoctorOfRecordings, ACameraThatHangsUpsideDownIsFineWhereVioAgrees) {
   EXPECT_EQ(findings[1].verdict, Verdict::kWarn);
 }
 
+TEST(DoctorOfRecordings, TakesOneSequenceOfSeveral) {
+  const fs::path root = replay::tinyKittiTracking("doctor_tracking");
+  EXPECT_THAT(replay::startupErrorOf([&] { checkRigBy({.data = root}, 10.0); }),
+              HasSubstr("name one with --sequence (0000, 0001)"));
+  for (const char* sequence : {"0000", "0001"}) {  // with images, and of labels alone
+    const Findings found = checkRigBy({.data = root, .sequence = sequence}, 10.0);
+    ASSERT_FALSE(found.empty());
+    EXPECT_THAT(found.back().text, HasSubstr("as always in KITTI tracking")) << sequence;
+  }
+}
+
 TEST(DoctorOfRecordings, FindsNothingWrongWithTheLayoutOf7Scenes) {
   const fs::path scene = replay::tinySevenScenes("doctor_scene");
-  const Findings found = checkRigBy(scene, "", 10.0);
+  const Findings found = checkRigBy({.data = scene}, 10.0);
   ASSERT_GE(found.size(), 2u);
   for (const Finding& finding : found) {
     EXPECT_NE(finding.verdict, Verdict::kFail) << finding.text;
@@ -71,7 +83,7 @@ TEST(DoctorOfRecordings, FindsNothingWrongWithTheLayoutOf7Scenes) {
   for (const char* name : {"0", "1", "2"}) {
     replay::writeGrey(scene / ("frame-00000" + std::string(name) + ".color.png"), 640, 480, 90);
   }
-  const Findings grey = checkRigBy(scene, "", 10.0);
+  const Findings grey = checkRigBy({.data = scene}, 10.0);
   EXPECT_TRUE(std::any_of(grey.begin(), grey.end(), [](const Finding& finding) {
     return finding.verdict == Verdict::kWarn;
   })) << "images of one grey";

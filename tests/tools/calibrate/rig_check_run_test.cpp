@@ -34,7 +34,7 @@ class RigCheckRun : public testing::Test {
 
   static RigCheck checkOf(const Calibration& rig) {
     std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
-    return checkRig({.data = folder_ / "drive", .rig = folder_ / "rig.yaml", .vio = {}});
+    return checkRig({.data = folder_ / "drive", .rig = folder_ / "rig.yaml"});
   }
 
   inline static fs::path folder_;
@@ -50,8 +50,8 @@ TEST_F(RigCheckRun, EndsEarlyOnlyWhereAllIsGood) {
   Calibration rig = rig_;
   rig.cameras[0].time_offset_s = 0.012;
   std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
-  const RigCheck late = checkRig(
-      {.data = folder_ / "drive", .rig = folder_ / "rig.yaml", .until_sure = true, .vio = {}});
+  const RigCheck late =
+      checkRig({.data = folder_ / "drive", .rig = folder_ / "rig.yaml", .until_sure = true});
   EXPECT_EQ(late.frames, 300U);
 }
 

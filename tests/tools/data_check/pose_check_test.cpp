@@ -171,8 +171,27 @@ TEST(PoseCheck, TheUnitOfLengthIsToldByTheAccelerometer) {
   EXPECT_THAT(textAt(100.0), AllOf(HasSubstr("poses_unit"), HasSubstr("centimetres; multiply x, "
                                                                       "y, z by 0.01")));
   EXPECT_THAT(textAt(1000.0), HasSubstr("millimetres"));
-  EXPECT_THAT(textAt(0.2), HasSubstr("no scale of their own"));
+  EXPECT_THAT(textAt(0.001), HasSubstr("kilometres; multiply x, y, z by 1000"));
+  EXPECT_THAT(textAt(1.0 / 0.3048), HasSubstr("feet; multiply x, y, z by 0.3048"));
   EXPECT_EQ(textAt(1.3), "");
+}
+
+TEST(PoseCheck, AScaleThatIsNoUnitIsToldWithItsSpread) {
+  for (const double metre : {0.2, 0.65, 1.6, 2.5, 4.0, 70.0, 1400.0}) {
+    const auto findings = findingsOf(phone(), inUnit(phone().poses, metre));
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_unit")) << metre;
+    EXPECT_EQ(findings[0].grade, DataFinding::Grade::kWarning) << metre;
+    EXPECT_THAT(findings[0].text,
+                AllOf(HasSubstr("which is no unit"), HasSubstr("no scale of their own")));
+  }
+}
+
+TEST(PoseCheck, FeetAreNamedOnlyWhereNoOtherScaleIsAsLikely) {
+  const Poses poses = inUnit(rough(eachOf(phone().poses, 20), 0.02, 0.15), 1.0 / 0.3048);
+  const auto findings = findingsOf(phone(), poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_unit"));
+  EXPECT_EQ(findings[0].grade, DataFinding::Grade::kWarning);
+  EXPECT_THAT(findings[0].text, HasSubstr("which may be feet"));
 }
 
 TEST(PoseCheck, ASpeedThatNothingHasIsToldWithoutAnImu) {

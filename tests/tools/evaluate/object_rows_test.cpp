@@ -43,6 +43,7 @@ TEST(ObjectRows, WrongLinesAreLocated) {
   const auto error = replay::startupErrorOf([&] { readObjectRows(file); });
   EXPECT_THAT(error, HasSubstr("o.csv:2:"));
   EXPECT_THAT(error, HasSubstr("o.csv:3:"));
+  EXPECT_EQ(replay::startupCodeOf([&] { readObjectRows(file); }), ExitCode::kData);
   replay::writeText(file, "frame,id\n");
   EXPECT_THAT(replay::startupErrorOf([&] { readObjectRows(file); }),
               HasSubstr("o.csv:1: the header"));

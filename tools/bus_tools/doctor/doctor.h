@@ -32,25 +32,27 @@ Finding checkWritable(const std::string& folder);
 /// Of the bus: who is there, what each says of itself, what does not fit together.
 Findings checkBus(const bus::Options& options, double seconds);
 
+struct Drive {
+  std::string data;
+  std::string rig = {};       ///< a file in place of the recording's own calibration
+  std::string sequence = {};  ///< of KITTI tracking, and of a 7-Scenes folder with several
+};
+
 /// A camera that hangs upside down is no fault where vio, which feels gravity, agrees.
 void settleUpsideDown(bool vio_agrees, Findings& findings);
-/// Of a recording: stamps, units, images, axes; and where these can be used at all, of a rig file
-/// (empty: the recording's own) by the innovations of vio over it.
-Findings checkRigBy(const std::string& recording, const std::string& rig,
-                    std::optional<double> seconds = {});
+/// Of a recording: stamps, units, images, axes; and where these can be used at all, of its rig by
+/// the innovations of vio over it, for so many seconds, or until the rig is surely good.
+Findings checkRigBy(const Drive& drive, std::optional<double> seconds = {});
 
 /// model.path of inference.yaml in the folder; empty where none is set.
 std::string configuredNetwork(const std::string& folder);
 /// Warns where a letterboxed network shows a third of its input no image of the recording's cam0.
-/// `rig`: a file in place of the recording's own calibration; empty: none. Throws StartupError as
-/// the service does.
-Findings checkNetworkShape(const std::string& recording, const std::string& rig,
-                           const std::string& network);
+/// Throws StartupError as the service does.
+Findings checkNetworkShape(const Drive& drive, const std::string& network);
 
 /// Writes a copy of a recording to `folder` with what is sure mended, and looks at it again. The
 /// progress goes to standard error. Throws StartupError as writeDrive does.
-Findings fixRecording(const std::string& recording, const std::string& rig,
-                      const std::string& folder);
+Findings fixRecording(const Drive& given, const std::string& folder);
 
 /// The largest bus.shared_memory_mb in the folder's files; 0 where none is set.
 std::int64_t configuredSharedMemory(const std::string& folder);

@@ -22,7 +22,8 @@ struct DoctorOptions {
   std::string configuration = configurationFolder();
   std::string report;
   bool images = false;
-  std::string recording, rig, copy, network;
+  Drive drive;
+  std::string copy, network;
   std::optional<double> rig_seconds;
 };
 
@@ -46,25 +47,29 @@ void stopIfFailed(const Findings& findings, int status = 1) {
 }
 
 void runDoctor(const DoctorOptions& given) {
-  if (!given.rig.empty() && given.recording.empty()) {
+  if (!given.drive.rig.empty() && given.drive.data.empty()) {
     throw StartupError(ExitCode::kUsage,
                        "--rig is judged by a recording; give --data DRIVE (with images) as well");
   }
-  if (!given.copy.empty() && given.recording.empty()) {
+  if (!given.drive.sequence.empty() && given.drive.data.empty()) {
+    throw StartupError(ExitCode::kUsage, "--sequence is of a recording; give --data DRIVE as well");
+  }
+  if (!given.copy.empty() && given.drive.data.empty()) {
     throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
   }
-  if (!given.recording.empty()) {
-    Findings findings = given.copy.empty()
-                            ? checkRigBy(given.recording, given.rig, given.rig_seconds)
-                            : fixRecording(given.recording, given.rig, given.copy);
+  if (!given.drive.data.empty()) {
+    Findings findings = given.copy.empty() ? checkRigBy(given.drive, given.rig_seconds)
+                                           : fixRecording(given.drive, given.copy);
     const bool named = !given.network.empty();
     const auto network = named ? given.network : configuredNetwork(given.configuration);
     std::error_code error;
     if (named || std::filesystem::is_regular_file(network, error)) {
       // A recording that needs a mend may not open: then its copy does.
-      const auto& recording = given.copy.empty() ? given.recording : given.copy;
+      const Drive drive = given.copy.empty() || !std::filesystem::is_directory(given.copy, error)
+                              ? given.drive
+                              : Drive{.data = given.copy, .rig = given.drive.rig};
       try {
-        const Findings shape = checkNetworkShape(recording, given.rig, network);
+        const Findings shape = checkNetworkShape(drive, network);
         findings.insert(findings.end(), shape.begin(), shape.end());
       } catch (const StartupError& e) {
         // What was found of the recording is told all the same.
@@ -129,11 +134,16 @@ void addDoctorCommand(CLI::App& app) {
                    "five seconds of Health, journal")
       ->type_name("FILE.tar.gz");
   command
-      ->add_option("--data", options->recording,
+      ->add_option("--data", options->drive.data,
                    "judge a rig by this recording instead (dataset folder or .mcap with images): "
                    "vio runs over it, and its innovations tell")
       ->type_name("DRIVE");
-  command->add_option("--rig", options->rig,
+  command
+      ->add_option("--sequence", options->drive.sequence,
+                   "of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example "
+                   "seq-01")
+      ->type_name("NAME");
+  command->add_option("--rig", options->drive.rig,
                       "the rig file to judge; the recording's own calibration where not given");
   command
       ->add_option("--fix", options->copy,

@@ -25,9 +25,9 @@ std::string configuredNetwork(const std::string& folder) {
   }
 }
 
-Findings checkNetworkShape(const std::string& recording, const std::string& rig,
-                           const std::string& network) {
-  const auto dataset = replay::Dataset::open({.path = recording, .rig = rig, .decode = false});
+Findings checkNetworkShape(const Drive& drive, const std::string& network) {
+  const auto dataset = replay::Dataset::open(
+      {.path = drive.data, .sequence = drive.sequence, .rig = drive.rig, .decode = false});
   if (dataset->calibration().cameras.empty()) return {};
   const auto& camera = dataset->calibration().cameras.front();
   const auto file = inference::readModelFile(network, "", inference::standardModelFolders());

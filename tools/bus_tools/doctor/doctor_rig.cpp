@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -23,20 +24,25 @@ bool addFindings(const replay::DataFindings& of_data, Findings& findings) {
 }
 
 /// Whether the rig can be judged over it.
-bool checkRecording(const std::string& data, const std::string& rig, Findings& findings) {
-  const auto dataset = replay::Dataset::open({.path = data, .rig = rig});
+bool checkRecording(const Drive& drive, Findings& findings) {
+  const auto dataset =
+      replay::Dataset::open({.path = drive.data, .sequence = drive.sequence, .rig = drive.rig});
   const replay::Recording& recording = dataset->recording();
   // Those of 7-Scenes tell what its layout leaves open; nothing is wrong with the data.
-  const bool of_layout = recording.kind == replay::DatasetKind::kSevenScenes;
+  const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;
+  const bool of_layout = scenes || recording.kind == replay::DatasetKind::kKittiTracking;
   for (const auto& note : recording.notes) {
     findings.push_back({of_layout ? Verdict::kOk : Verdict::kWarn, note});
   }
   const bool usable = addFindings(checkDrive(dataset->recording(), {}), findings);
   if (findings.empty()) findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
   if (usable && of_layout && !recording.calibration.imu) {
-    findings.push_back({Verdict::kOk,
-                        "there are no inertial samples, as always in 7-Scenes: the rig is not "
-                        "judged, and vio cannot run; --odometry truth takes the poses"});
+    findings.push_back(
+        {Verdict::kOk,
+         fmt::format("there are no inertial samples, as always in {}: the rig is not judged, and "
+                     "vio cannot run; --odometry {}",
+                     scenes ? "7-Scenes" : "KITTI tracking",
+                     scenes ? "truth takes the poses" : "takes a file of poses")});
     return false;
   }
   return usable;
@@ -60,12 +66,11 @@ void settleUpsideDown(bool vio_agrees, Findings& findings) {
   }
 }
 
-Findings checkRigBy(const std::string& recording, const std::string& rig,
-                    std::optional<double> seconds) {
+Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
   Findings findings;
-  if (!checkRecording(recording, rig, findings)) return findings;
+  if (!checkRecording(drive, findings)) return findings;
   calibrate::RigCheckOptions options;
-  options.data = recording, options.rig = rig;
+  options.data = drive.data, options.rig = drive.rig, options.sequence = drive.sequence;
   options.until_sure = !seconds;
   if (seconds) options.seconds = *seconds;
   const auto check = calibrate::checkRig(options);
@@ -85,10 +90,10 @@ Findings checkRigBy(const std::string& recording, const std::string& rig,
   return findings;
 }
 
-Findings fixRecording(const std::string& recording, const std::string& rig,
-                      const std::string& folder) {
-  const MendedText text(recording);
-  const auto dataset = replay::Dataset::open({.path = text.drive(), .rig = rig});
+Findings fixRecording(const Drive& given, const std::string& folder) {
+  const MendedText text(given.data);
+  const auto dataset =
+      replay::Dataset::open({.path = text.drive(), .sequence = given.sequence, .rig = given.rig});
   const MendedDrive drive = mendDrive(dataset->recording());
   Findings findings;
   for (const auto& mend : text.mends()) findings.push_back({Verdict::kOk, mend});
@@ -98,7 +103,7 @@ Findings fixRecording(const std::string& recording, const std::string& rig,
         {Verdict::kOk, "counted while reading: " + reason + ", " + std::to_string(count)});
   }
   for (const auto& mend : drive.mends) findings.push_back({Verdict::kOk, mend});
-  if (findings.empty() && rig.empty()) {
+  if (findings.empty() && given.rig.empty()) {
     if (addFindings(drive.left, findings)) {
       findings.push_back({Verdict::kOk, "there is nothing to mend; no copy is written"});
     } else {
@@ -111,7 +116,7 @@ Findings fixRecording(const std::string& recording, const std::string& rig,
         {Verdict::kWarn, std::to_string(left_out) + " images cannot be read and are left out"});
   }
   findings.push_back({Verdict::kOk, "written: " + folder});
-  checkRecording(folder, {}, findings);
+  checkRecording({.data = folder}, findings);
   return findings;
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/common/replay/tiny_datasets.h"
@@ -103,6 +104,31 @@ TEST(DetectionFile, RrcWithoutHeaderNeedsAClassAndIsShiftedOnlyWhenAsked) {
   EXPECT_THAT(as_is.modelAt(0).classes, ElementsAre("car"));
   options.box_origin = 1.0;
   EXPECT_DOUBLE_EQ(readCsv(rrc, options).at(0)->front().box.x1, 295.021);
+}
+
+TEST(DetectionFile, WrongLinesAreWrongDataAndNoFileThatIsMissing) {
+  const std::string header(kHeader);
+  for (const std::string& text : {std::string(), header + "0,car,1,2,x,4,.5,\n", header + "0,car\n",
+                                  std::string("frame\n")}) {
+    EXPECT_EQ(startupCodeOf([&] { readCsv(text); }), ExitCode::kData) << text;
+  }
+}
+
+TEST(DetectionFile, TablesOfOtherProgramsAreReadWhereTheirMeaningIsSure) {
+  const std::string header = "frame,class,x1,y1,x2,y2,score,azimuth\n", row = "3,car,1,2,3,4,.5,\n";
+  std::string with_semicolons = header + row;
+  std::replace(with_semicolons.begin(), with_semicolons.end(), ',', ';');
+  for (const std::string& text :
+       {"\xEF\xBB\xBF" + header + row, "# " + header + row, with_semicolons,
+        header + "3,car,1,2,3,4,.5,\r\n",
+        std::string("frame\tclass\tx1\ty1\tx2\ty2\tscore\n3\tcar\t1\t2\t3\t4\t.5\n")}) {
+    EXPECT_EQ(errorOfCsv(text), "") << text;
+    ASSERT_EQ(readCsv(text).at(3)->size(), 1U) << text;
+    EXPECT_EQ(readCsv(text).at(3)->front().box.y2, 4.0) << text;
+  }
+  DetectionFileOptions options;
+  options.class_name = "Car";
+  EXPECT_EQ(readCsv("3 1 2 3 4 .5\n", options).at(3)->size(), 1U) << "without a header";
 }
 
 TEST(DetectionFile, EveryWrongLineIsLocated) {

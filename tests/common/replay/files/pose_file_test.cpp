@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
 
 #include "common/math/so3.h"
@@ -45,6 +46,44 @@ TEST(PoseFile, TumPosesAreInterpolatedBetweenCloseNeighboursOnly) {
   EXPECT_TRUE(poses.at(0, at(9.0005))) << "within a millisecond it is the same time";
 }
 
+TEST(PoseFile, LinesOfOtherProgramsAreReadWhereTheirMeaningIsSure) {
+  const std::string names = "timestamp tx ty tz qx qy qz qw\n", line = "1.5 1 2 3 0 0 0 1\n";
+  std::string with_commas = names + line, with_semicolons = names + line;
+  std::replace(with_commas.begin(), with_commas.end(), ' ', ',');
+  std::replace(with_semicolons.begin(), with_semicolons.end(), ' ', ';');
+  for (const std::string& text :
+       {names + line, "#" + names + line, "# " + names + line, "\xEF\xBB\xBF" + line,
+        "\xEF\xBB\xBF" + names + line, names + "1.5 1 2 3 0 0 0 1\r\n", with_commas,
+        with_semicolons, std::string("1.5\t1\t2\t3\t0\t0\t0\t1\n"),
+        std::string("1.5, 1, 2, 3, 0, 0, 0, 1,\n")}) {
+    EXPECT_EQ(errorOfPoses(text), "") << text;
+    const auto poses = readPoses(text).poses();
+    ASSERT_EQ(poses.size(), 1U) << text;
+    EXPECT_EQ(poses[0].time, at(1.5)) << text;
+    EXPECT_TRUE(poses[0].T_WB.p.isApprox(Eigen::Vector3d(1, 2, 3))) << text;
+    EXPECT_TRUE(poses[0].T_WB.R().isIdentity()) << text;
+  }
+  const std::string kitti =
+      "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz\n1 0 0 4 0 1 0 5 0 0 1 6\n";
+  EXPECT_EQ(readPoses(kitti).at(0, at(0))->p.z(), 6.0);
+}
+
+TEST(PoseFile, AHeaderThatNamesWFirstIsBelieved) {
+  for (const char* names :
+       {"t,x,y,z,qw,qx,qy,qz", "#t, px, py, pz, q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"}) {
+    const auto poses = readPoses(std::string(names) + "\n1,0,0,0,1,0,0,0\n").poses();
+    EXPECT_TRUE(poses.at(0).T_WB.R().isIdentity()) << names;
+  }
+}
+
+TEST(PoseFile, OneHeaderIsNoneOfManyLinesOfWords) {
+  EXPECT_THAT(errorOfPoses("hello world\nhello world\n"), HasSubstr(":2: 2 numbers; write 8"));
+  EXPECT_THAT(errorOfPoses("nan nan nan nan nan nan nan nan\n"),
+              HasSubstr(":1: write eight finite numbers"));
+  EXPECT_THAT(errorOfPoses("1 nan nan nan nan nan nan nan\n"),
+              HasSubstr("leave out a line whose pose is not known"));
+}
+
 TEST(PoseFile, NanosecondsAreToldToBeNoSeconds) {
   EXPECT_THAT(errorOfPoses("1403715273262142976 0 0 0 0 0 0 1\n"),
               HasSubstr(":1: the time 1403715273262142976 is not in seconds; where it is in "
@@ -71,6 +110,13 @@ TEST(PoseFile, KittiLinesOfTwelveAndSixteenNumbersAreByFrame) {
     EXPECT_NEAR(yawOf(second->R()), std::numbers::pi / 2, 1e-12);
     EXPECT_FALSE(poses.at(2, at(0)));
   }
+}
+
+TEST(PoseFile, WrongLinesAreWrongDataAndNoFileThatIsMissing) {
+  for (const char* text : {"0 0 0 nan 0 0 0 1\n", "0 0 0 x 0 0 0 1\n", "1 2 3\n", "", "# none\n"}) {
+    EXPECT_EQ(startupCodeOf([&] { readPoses(text); }), ExitCode::kData) << text;
+  }
+  EXPECT_EQ(startupCodeOf([] { PoseFile::read("/nowhere.txt"); }), ExitCode::kUnavailable);
 }
 
 TEST(PoseFile, EveryWrongLineIsLocated) {

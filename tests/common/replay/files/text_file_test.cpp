@@ -21,6 +21,37 @@ TEST(TextFile, LinesAreTrimmedNumberedAndNeverEmpty) {
   EXPECT_EQ(lines[2].text, "three");
 }
 
+TEST(TextFile, AMarkOfUtf8IsNoText) {
+  const auto file = freshFolder("text") / "a.txt";
+  writeText(file,
+            "\xEF\xBB\xBF"
+            "1,2\n\xEF\xBB\xBF"
+            "3\n");
+  const auto lines = readLines(file, "");
+  EXPECT_EQ(lines[0].text, "1,2");
+  EXPECT_EQ(lines[1].text,
+            "\xEF\xBB\xBF"
+            "3")
+      << "it stands at a file's begin alone";
+  writeText(file, std::string("\xFF\xFE"
+                              "1\0",
+                              4));
+  EXPECT_THAT(startupErrorOf([&] { readLines(file, ""); }), HasSubstr("UTF-16; save it as UTF-8"));
+}
+
+TEST(TextFile, FieldsAreSeparatedByCommasElseSemicolonsElseBlanks) {
+  EXPECT_THAT(fieldsOf("a b, c,"), ElementsAre("a b", "c"));
+  EXPECT_THAT(fieldsOf("a; b"), ElementsAre("a", "b"));
+  EXPECT_THAT(fieldsOf("a\tb"), ElementsAre("a", "b"));
+}
+
+TEST(TextFile, AHeaderHoldsNoNumber) {
+  EXPECT_TRUE(isHeader({"timestamp", "tx", "nanoseconds"}));
+  EXPECT_FALSE(isHeader({"word"}));
+  for (const char* field : {"1", "-inf", "NaN", ".5", "", "1x"})
+    EXPECT_FALSE(isHeader({"tx", field}));
+}
+
 TEST(TextFile, AMissingFileIsNamedWithTheMend) {
   const auto error = startupErrorOf([] { readLines("/nowhere/x.csv", "make it"); });
   EXPECT_THAT(error, HasSubstr("/nowhere/x.csv"));
@@ -50,6 +81,7 @@ TEST(TextFile, ComplaintsNameFileAndLineAndCountTheRest) {
   EXPECT_THAT(error, HasSubstr("file.csv:1: is wrong"));
   EXPECT_THAT(error, HasSubstr("file.csv:10: is wrong"));
   EXPECT_THAT(error, HasSubstr("and 2 more"));
+  EXPECT_EQ(startupCodeOf([&] { complaints.throwIfAny(); }), ExitCode::kData);
 }
 
 }  // namespace
