@@ -30,14 +30,30 @@ double medianOf(std::vector<double> values) {
   return *middle;
 }
 
-void addForceUnit(double force, DataFindings& findings) {
+/// Whether forces have no direction in common and many sizes, which gravity would give them.
+bool isWithoutGravity(const std::vector<ImuSample>& samples) {
+  constexpr double kCommon = 0.4, kSpread = 0.3;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double sizes = 0.0, squares = 0.0;
+  for (const ImuSample& sample : samples) {
+    sum += sample.accel;
+    sizes += sample.accel.norm(), squares += sample.accel.squaredNorm();
+  }
+  const auto count = static_cast<double>(samples.size());
+  const double mean = sizes / count;
+  const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
+  return sum.norm() < kCommon * sizes && deviation > kSpread * mean;
+}
+
+void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindings& findings) {
   // Gravity is 9.8 m/s²; what moves reads somewhat more or less.
   constexpr std::array kUnits{
       Unit{0.85, 1.25, "accel_in_g", "the unit is g; multiply the columns by 9.80665"},
       Unit{850, 1250, "accel_in_mg", "the unit is mg; multiply the columns by 0.00980665"},
       Unit{8300, 12300, "accel_in_mm", "the unit is mm/s²; divide the columns by 1000"}};
+  const bool without = isWithoutGravity(samples);
   for (const Unit& unit : kUnits) {
-    if (force < unit.low || force > unit.high) continue;
+    if (without || force < unit.low || force > unit.high) continue;
     findings.push_back({Grade::kFatal, unit.code,
                         fmt::format("the accelerometer measures {:.3g} m/s² (median) where gravity "
                                     "alone is 9.8: {}",
@@ -222,7 +238,7 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
              turn, force)});
     return findings;
   }
-  addForceUnit(force, findings);
+  addForceUnit(samples, force, findings);
   if (turn > 6.0) {
     findings.push_back(
         {Grade::kWarning, "gyro_scale",

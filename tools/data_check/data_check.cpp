@@ -10,6 +10,7 @@
 #include "tools/data_check/motion_check.h"
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/pose_check.h"
+#include "tools/data_check/rig_numbers.h"
 #include "tools/data_check/stereo_check.h"
 
 namespace perdure::tools {
@@ -44,9 +45,9 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto turns = turnsOfImages(recording, recording.imu);
   const auto findings = judgeTurns(turns, recording.imu, camera);
-  const bool unit = !findings.empty() && findings.front().code.starts_with("gyro_") &&
-                    findings.front().code != "gyro_scale";
-  if (unit) return findings;
+  const bool unit = !findings.empty() && (findings.front().code.starts_with("gyro_") ||
+                                          findings.front().code == "images_still");
+  if (unit && findings.front().code != "gyro_factor") return findings;
   // A mirror image looks like a T_BS that is turned or inverted, and is none.
   auto axes = judgeAxes(turns, recording.imu, camera);
   if (!axes.empty()) {
@@ -68,6 +69,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use) {
   replay::DataFindings findings;
   add("the recording", findings, [&] { return replay::checkData(recording, use); });
+  add("the rig", findings, [&] { return checkRigNumbers(recording.calibration); });
   if (!use.images || recording.calibration.cameras.empty()) return findings;
   for (const auto& finding : findings) {
     if (finding.grade == Grade::kFatal) return findings;  // what is said of turns would follow

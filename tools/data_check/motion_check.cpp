@@ -100,15 +100,37 @@ constexpr double kEnough_px = 2.0;    ///< of turning between two images, to tel
 constexpr double kExplained = 0.3;    ///< of the turning is unexplained at most where all is well
 constexpr double kUnexplained = 0.7;  ///< and at least where it is not
 
+/// Whether rates are what the images show in degrees: of one course with it and 57 times as large,
+/// or, where T_BS may be wrong, too, so large while the images clearly turn.
+bool isInDegrees(const TurnPairs& pairs, const CameraCalibration& camera) {
+  constexpr double kClearly_px = 1.0, kCommon = 0.5;
+  const double ratio = pairs.turningOfGiven() / std::max(1e-9, pairs.turning());
+  const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
+  const double shown =
+      (pairs.reference.array() * said.array()).sum() / std::max(1e-18, said.squaredNorm());
+  const double left = (pairs.reference - shown * said).squaredNorm();
+  const bool of_one_course = left < kCommon * pairs.reference.squaredNorm();
+  if (of_one_course) return shown * kDegrees > 0.7 && shown * kDegrees < 1.4;
+  return pairs.turning() * camera.fx > kClearly_px && ratio > 0.5 * kDegrees &&
+         ratio < 2.0 * kDegrees;
+}
+
 /// Of a unit: rates that are far larger or smaller than what the images show.
-replay::DataFindings judgeScale(double gyro, double images, double focal) {
+replay::DataFindings judgeScale(const TurnPairs& pairs, const CameraCalibration& camera) {
+  const double gyro = pairs.turningOfGiven(), images = pairs.turning(), focal = camera.fx;
   const double ratio = gyro / std::max(1e-9, images);
   if (ratio > 20.0 && gyro * focal > 3.0) {
-    return {{DataFinding::Grade::kFatal, "gyro_in_degrees",
-             fmt::format(
-                 "the gyroscope's turning is {:.0f} times what the images show: it is in degrees "
-                 "per second (or the images stand still); multiply its columns by 0.0174533",
-                 std::min(ratio, 9999.0))}};
+    if (isInDegrees(pairs, camera)) {
+      return {{DataFinding::Grade::kFatal, "gyro_in_degrees",
+               fmt::format("the gyroscope's turning is {:.0f} times what the images show: it is in "
+                           "degrees per second; multiply its columns by 0.0174533",
+                           ratio)}};
+    }
+    return {{DataFinding::Grade::kFatal, "images_still",
+             fmt::format("the images of {} hardly turn ({:.2g} px from one to the next) while the "
+                         "gyroscope says {:.2g} px: images that stand still or come again, another "
+                         "drive's, or rates in another unit",
+                         camera.name, images * focal, gyro * focal)}};
   }
   if (gyro < 1e-12 && images * focal > 3.0) {
     return {{DataFinding::Grade::kFatal, "gyro_constant",
@@ -161,7 +183,7 @@ replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration
   const double sigma = std::sqrt(left / (static_cast<double>(3 * pairs.count()) * all));
   if (left > kAgreed * pairs.reference.squaredNorm()) return {};
   if (std::abs(shown - 1.0) < kLeast + kSurely * sigma) return {};
-  return {{DataFinding::Grade::kWarning, "gyro_scale",
+  return {{DataFinding::Grade::kWarning, "gyro_factor",
            fmt::format("the gyroscope says {:.2f} times the turning that {} shows, in {} pairs of "
                        "images: see the scale of its columns, or the focal length",
                        1.0 / shown, camera.name, pairs.count())}};
@@ -236,10 +258,9 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
   const TurnIntegral gyro(samples);
   const TurnPairs pairs = pairsOf(turns, gyro, camera.time_offset_s);
   if (pairs.count() < kLeastTurns) return {};
-  const double by_gyro = pairs.turningOfGiven(), by_images = pairs.turning();
-  auto findings = judgeScale(by_gyro, by_images, camera.fx);
+  auto findings = judgeScale(pairs, camera);
   if (!findings.empty()) return findings;
-  if (std::min(by_gyro, by_images) * camera.fx < kEnough_px) return {};
+  if (std::min(pairs.turningOfGiven(), pairs.turning()) * camera.fx < kEnough_px) return {};
   auto place = judgePlace(turns, gyro, pairs, camera);
   return place.empty() ? judgeFactor(pairs, camera) : place;
 }

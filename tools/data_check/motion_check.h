@@ -25,9 +25,8 @@ struct Turn {
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
                                 const std::vector<ImuSample>& samples, std::size_t most = 60);
 
-/// Codes: gyro_in_degrees, gyro_too_small, gyro_constant, gyro_scale, T_BS_inverted, T_BS_turned,
-/// time_offset.
-/// Nothing where images or gyroscope turn too little to tell.
+/// Codes: gyro_in_degrees, images_still, gyro_too_small, gyro_constant, gyro_factor, T_BS_inverted,
+/// T_BS_turned, time_offset. Nothing where images or gyroscope turn too little to tell.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);

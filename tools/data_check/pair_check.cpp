@@ -92,12 +92,17 @@ void checkPartners(const Recording& recording, replay::DataFindings& findings) {
 
 void checkPlace(const CameraCalibration& camera, replay::DataFindings& findings) {
   if (!hasPlaceInMm(camera)) return;
+  constexpr double kLargestRig_m = 3.0;
   const double far = camera.T_BC.p.norm();
+  const std::string centimetres =
+      1e-2 * far < kLargestRig_m
+          ? fmt::format(", or in centimetres? Then by 100, which gives {:.3g} m", 1e-2 * far)
+          : "";
   findings.push_back(
       {Grade::kWarning, "T_BS_in_mm",
        fmt::format("T_BS has {} {:.3g} m from the IMU: is its position in millimetres? Then divide "
-                   "the last column by 1000, which gives {:.3g} m",
-                   camera.name, far, 1e-3 * far)});
+                   "the last column by 1000, which gives {:.3g} m{}",
+                   camera.name, far, 1e-3 * far, centimetres)});
 }
 
 }  // namespace

@@ -16,12 +16,13 @@
 namespace perdure::tools {
 namespace {
 
-/// By more than a metre, from where it was first.
-bool hasMoved(const std::map<std::uint64_t, replay::StampedPose>& poses) {
-  constexpr double kMoved_m = 1.0;
-  return std::any_of(poses.begin(), poses.end(), [&](const auto& pose) {
-    return (pose.second.T_WB.p - poses.begin()->second.T_WB.p).norm() > kMoved_m;
-  });
+/// How far it came from where it was first, m.
+double wayOf(const std::map<std::uint64_t, replay::StampedPose>& poses) {
+  double farthest = 0.0;
+  for (const auto& [frame, pose] : poses) {
+    farthest = std::max(farthest, (pose.T_WB.p - poses.begin()->second.T_WB.p).norm());
+  }
+  return farthest;
 }
 
 /// "image_missing 120 times, image_size 3 times".
@@ -156,10 +157,14 @@ void Pipeline::refuseNothing() const {
                     "file) know what is in the images?",
                     counts_.frames));
   }
-  if (!hasMoved(outputs_->poses())) {
-    std::fprintf(stderr,
-                 "The camera never moved, so that no distance is known: the map is empty\n");
-    return;
+  const double moved = wayOf(outputs_->poses());
+  constexpr double kMoved_m = 1.0;
+  if (moved < kMoved_m) {
+    refuse(
+        fmt::format("{} detections in {} frames made no object, so the map is empty: by its "
+                    "poses the camera moved by {:.2g} m, from which no distance is known; give "
+                    "a part of the drive in which it moves, or see the poses",
+                    counts_.detections, counts_.frames, moved));
   }
   refuse(fmt::format(
       "{} detections in {} frames made no object, so the map is empty: do they belong to "

@@ -75,6 +75,14 @@ TEST(DataCheck, DegreesPerSecondAreSeenByTheImages) {
   EXPECT_THAT(codesOf(findingsOf("converted_twice", drive)), ElementsAre("gyro_too_small"));
 }
 
+TEST(DataCheck, ImagesThatStandStillAreNoMatterOfUnits) {
+  auto recording = Dataset::open({.path = makeTurningDrive("frozen")})->recording();
+  for (auto& frame : recording.frames) frame.path = recording.frames.front().path;
+  const auto findings = checkDrive(recording, {});
+  ASSERT_THAT(codesOf(findings), ElementsAre("images_still"));
+  EXPECT_THAT(findings[0].text, HasSubstr("stand still or come again"));
+}
+
 TEST(DataCheck, AGyroscopeThatIsOffIsNoMatterOfUnits) {
   TurningDrive drive;
   drive.change = [](ImuSample& sample) { sample.gyro.setConstant(0.01); };
@@ -107,9 +115,9 @@ TEST(DataCheck, AGyroscopeThatSaysTooMuchIsDoubtful) {
     return findingsOf("factor", drive);
   };
   const auto large = findingsAt(1.2);
-  ASSERT_THAT(codesOf(large), ElementsAre("gyro_scale"));
+  ASSERT_THAT(codesOf(large), ElementsAre("gyro_factor"));
   EXPECT_THAT(large[0].text, testing::ContainsRegex("says 1.(19|20|21) times the turning"));
-  EXPECT_THAT(codesOf(findingsAt(0.8)), ElementsAre("gyro_scale"));
+  EXPECT_THAT(codesOf(findingsAt(0.8)), ElementsAre("gyro_factor"));
   EXPECT_THAT(codesOf(findingsAt(1.05)), ElementsAre());
 }
 
@@ -279,6 +287,18 @@ TEST(DataCheck, UnitsOfTheAccelerometerAreToldByGravity) {
   EXPECT_THAT(codesAt(1000.0), ElementsAre("accel_in_mm"));
   EXPECT_THAT(codesAt(0.01), ElementsAre("accel_without_gravity"));
   EXPECT_THAT(codesAt(1.5), ElementsAre("accel_scale"));
+}
+
+// What is left has any size, that of g among them, and no direction.
+TEST(DataCheck, GravityThatWasTakenAwayIsNoMatterOfUnits) {
+  std::vector<ImuSample> samples(200);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double t = 0.1 * static_cast<double>(i);
+    samples[i].accel = {1.5 * std::sin(t), 1.2 * std::cos(1.3 * t), std::sin(0.7 * t)};
+  }
+  EXPECT_THAT(codesOf(replay::checkImuUnits(samples)), ElementsAre("accel_without_gravity"));
+  for (auto& sample : samples) sample.accel = 0.1 * sample.accel + Eigen::Vector3d(0, 0, 1);
+  EXPECT_THAT(codesOf(replay::checkImuUnits(samples)), ElementsAre("accel_in_g"));
 }
 
 TEST(DataCheck, ExchangedColumnsAreToldByGravity) {

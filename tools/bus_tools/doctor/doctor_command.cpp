@@ -119,6 +119,9 @@ void addDoctorCommand(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the mend");
   auto options = std::make_shared<DoctorOptions>();
+  // An unset variable of a script must not check something else.
+  const CLI::Validator not_empty(
+      [](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); }, "");
   command->add_option("--seconds", options->seconds, "how long to listen to the bus")
       ->capture_default_str();
   command->add_option("--data-dir", options->folders, "a folder that the services write to");
@@ -137,6 +140,7 @@ void addDoctorCommand(CLI::App& app) {
       ->add_option("--data", options->drive.data,
                    "judge a rig by this recording instead (dataset folder or .mcap with images): "
                    "vio runs over it, and its innovations tell")
+      ->check(not_empty)
       ->type_name("DRIVE");
   command
       ->add_option("--sequence", options->drive.sequence,
@@ -149,6 +153,7 @@ void addDoctorCommand(CLI::App& app) {
       ->add_option("--fix", options->copy,
                    "with --data: a new folder for a copy with what is sure mended (units, columns "
                    "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
+      ->check(not_empty)
       ->type_name("FOLDER");
   command
       ->add_option("--model", options->network,
