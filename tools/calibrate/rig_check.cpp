@@ -116,8 +116,8 @@ constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
 /// How far vio moved a quantity, in deviations that a well calibrated rig has.
 Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
                     const std::string& shown, const std::string& mend) {
-  // A move that vio itself is not sure of says nothing.
-  const bool sure = moved > 3.0 * sigma;
+  // A move that vio itself is not sure of says nothing, nor one that may be within what is good.
+  const bool sure = moved > 3.0 * sigma && moved - sigma > bars.good;
   return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
                 fmt::format("vio sees the {} {} off the rig", what, shown), mend);
 }
@@ -332,7 +332,7 @@ Judgements judgeBelief(const RigCheck& check) {
                        fmt::format("{:.1f} % of the points were refused by vio", 100 * left_out),
                        "much moves before the camera, images are blurred, or the rig is wrong"));
   const double pattern = patternOf(check.camera, residualsOf(check.innovations));
-  const Grade lens = gradeOf(pattern, 0.06, 0.2);
+  const Grade lens = gradeOf(pattern, 0.075, 0.2);
   all.push_back(judged(lens, fmt::format("residuals that stay over the image: {:.3f} px", pattern),
                        "focal length or distortion are wrong: calibrate the lens again"));
   const bool many_against = againstOf(check) > kManyAgainst;

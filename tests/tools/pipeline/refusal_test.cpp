@@ -122,20 +122,28 @@ TEST(PipelineRefusal, DetectionsOfOtherFramesAreRefusedBeforeTheRun) {
                                             65));
 }
 
+/// Twenty poses along x, so far apart.
+std::string posesAlongX(double step_m) {
+  std::string poses;
+  for (int i = 0; i <= 20; ++i) {
+    poses += "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " " +
+             std::to_string(step_m * i) + " 0 0 0 0 0 1\n";
+  }
+  return poses;
+}
+
 TEST(PipelineRefusal, AnEmptyMapWithDetectionsIsNoSuccess) {
   const auto root = makeTurningDrive("empty_map");
   auto options = optionsFor(root);
   options.odometry = (root / "poses.tum").string();
-  std::string poses;
-  for (int i = 0; i <= 20; ++i) {
-    poses += "100000000" + std::to_string(i / 10) + "." + std::to_string(i % 10) + " " +
-             std::to_string(0.2 * i) + " 0 0 0 0 0 1\n";
-  }
-  writeText(options.odometry, poses);
+  writeText(options.odometry, posesAlongX(0.2));
   options.detections = (root / "boxes.csv").string();
   writeText(options.detections, "frame,class,x1,y1,x2,y2,score\n3,car,1,2,30,40,0.2\n");
   EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("the map is empty"), 65));
   EXPECT_TRUE(fs::exists(root / "out/trajectory.tum")) << "what there is is written";
+  writeText(options.odometry, posesAlongX(0.02));
+  options.out = (root / "hardly_moved").string();
+  EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("the camera moved by 0.4 m"), 65));
 }
 
 TEST(PipelineRefusal, WhatWasMendedIsInTheReport) {
