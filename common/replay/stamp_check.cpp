@@ -50,8 +50,8 @@ bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFi
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
        fmt::format("{} of {} stamps of the {} are equal to another: they lost digits (written as "
-                   "float?); write them as integers of nanoseconds or with 9 decimals",
-                   repeated, all, of)});
+                   "float?){}; write them as integers of nanoseconds or with 9 decimals",
+                   repeated, all, of, unusable ? "" : ", or are those of packets")});
   return unusable;
 }
 

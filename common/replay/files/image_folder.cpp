@@ -55,8 +55,8 @@ std::optional<fs::path> ImageFolder::find(std::string_view name, TimePoint stamp
 std::string ImageFolder::others() const {
   std::error_code ignored;
   if (dead_links_ > 0) {
-    return std::to_string(dead_links_) + " files are links to nothing, the first of them " +
-           first_dead_ + " to " + fs::read_symlink(first_dead_, ignored).string() +
+    return std::to_string(dead_links_) + " links to nothing, the first of them " + first_dead_ +
+           " to " + fs::read_symlink(first_dead_, ignored).string() +
            ": copy the images themselves (cp -L, rsync -L)";
   }
   const auto most = std::max_element(other_endings_.begin(), other_endings_.end(),

@@ -95,7 +95,7 @@ TEST(DamagedFolder, LinksToNothingAndOtherEndingsAreNamed) {
     fs::remove(file);
     fs::create_symlink("/nowhere/" + file.filename().string(), file);
   });
-  EXPECT_THAT(errorIn(links), AllOf(HasSubstr("5 files are links to nothing"),
+  EXPECT_THAT(errorIn(links), AllOf(HasSubstr("holds 5 links to nothing"),
                                     HasSubstr("1000000000.png to /nowhere/1000000000.png")));
   const auto heic = damaged("images_heic", [](std::size_t, fs::path file) {
     const auto from = file;
