@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <random>
 #include <set>
 
 #include "common/replay/files/image_folder.h"
@@ -39,17 +39,13 @@ Listed listedOf(const Recording& recording, std::size_t camera) {
   return listed;
 }
 
-/// The first, the last, and some between: of files more, at places that follow no period.
-FileList someOf(const FileList& all) {
+/// The first, the middle and the last, and of files `more` by chance, which is always the same.
+FileList someOf(const FileList& all, std::size_t more) {
   if (all.empty()) return {};
   const std::size_t last = all.size() - 1;
-  std::set<std::size_t> places{0, last / 2 + last % 2, last};
-  constexpr double kGolden = 0.6180339887498949;
-  constexpr int kMore = 9;
-  for (int i = 1; i <= kMore && !all.front()->load; ++i) {
-    places.insert(
-        static_cast<std::size_t>(std::fmod(i * kGolden, 1.0) * static_cast<double>(last)));
-  }
+  std::set<std::size_t> places{0, all.size() / 2, last};
+  std::mt19937_64 chance(1);
+  for (std::size_t i = 0; i < more && !all.front()->load; ++i) places.insert(chance() % all.size());
   FileList some;
   for (const std::size_t place : places) some.push_back(all[place]);
   return some;
@@ -160,7 +156,9 @@ void checkImages(const Recording& recording, std::size_t camera, DataFindings& f
   const CameraCalibration& calibration = recording.calibration.cameras[camera];
   const Listed listed = listedOf(recording, camera);
   if (listed.all == 0 || !checkFiles(recording, camera, listed, findings)) return;
-  const Looked looked = lookAt(someOf(listed.whole), calibration);
+  Looked looked = lookAt(someOf(listed.whole, 9), calibration);
+  // Not by chance of the few.
+  if (looked.unreadable == looked.tried) looked = lookAt(someOf(listed.whole, 60), calibration);
   if (looked.unreadable == looked.tried) {
     return addNone(recording, camera,
                    fmt::format("that was tried ({}) can be read: {}", looked.tried, looked.why),
