@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/core.hpp>
 
 #include "common/base/errors.h"
+#include "common/replay/image_check.h"
+#include "common/replay/stamp_check.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
 #include "common/vision/jpeg.h"
@@ -157,66 +158,6 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
                    kUpsideDown, camera.name)});
 }
 
-bool isFlat(const cv::Mat& image) {
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(image, mean, deviation);
-  return deviation[0] < 1.5;
-}
-
-/// The first, the middle and the last of a camera.
-std::vector<const Recording::FrameFile*> someOf(const Recording& recording, std::size_t camera) {
-  std::vector<const Recording::FrameFile*> all, some;
-  for (const auto& frame : recording.frames) {
-    if (frame.camera == camera && (frame.load || !frame.path.empty())) all.push_back(&frame);
-  }
-  if (all.empty()) return {};
-  for (const std::size_t i : {std::size_t{0}, all.size() / 2, all.size() - 1}) {
-    if (some.empty() || some.back() != all[i]) some.push_back(all[i]);
-  }
-  return some;
-}
-
-void checkImages(const Recording& recording, std::size_t camera, DataFindings& findings) {
-  const CameraCalibration& calibration = recording.calibration.cameras[camera];
-  const auto some = someOf(recording, camera);
-  std::size_t other_size = 0, flat = 0, unreadable = 0;
-  std::string size, why;
-  for (const auto* file : some) {
-    const auto image = monoImageOf(*file);
-    if (!image) {
-      ++unreadable;
-      why = image.error().detail;
-      continue;
-    }
-    const auto width = static_cast<std::uint32_t>(image->cols),
-               height = static_cast<std::uint32_t>(image->rows);
-    if (width != calibration.width || height != calibration.height) {
-      ++other_size;
-      size = fmt::format("{}x{}", width, height);
-    }
-    flat += isFlat(*image) ? 1 : 0;
-  }
-  if (some.empty()) return;
-  if (unreadable == some.size()) {
-    findings.push_back(
-        {Grade::kWarning, "image_unreadable",
-         fmt::format("no image of {} that was tried can be read: {}", calibration.name, why)});
-  } else if (other_size > 0 && other_size + unreadable == some.size()) {
-    findings.push_back(
-        {Grade::kFatal, "image_size",
-         fmt::format(
-             "the images of {} are {}, its calibration is for {}x{}: set `resolution` (width, "
-             "height) where it was only written wrongly, or calibrate at the images' size",
-             calibration.name, size, calibration.width, calibration.height)});
-  } else if (flat == some.size()) {
-    findings.push_back(
-        {Grade::kWarning, "image_flat",
-         fmt::format("the images of {} are of one grey: see exposure, lens cap and bit "
-                     "depth",
-                     calibration.name)});
-  }
-}
-
 }  // namespace
 
 DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
@@ -251,7 +192,10 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
 
 DataFindings checkData(const Recording& recording, const DataUse& use) {
   DataFindings findings;
-  if (use.imu && !recording.imu.empty()) {
+  checkStamps(recording, use, findings);
+  const auto isFatal = [](const auto& one) { return one.grade == Grade::kFatal; };
+  const bool times = std::none_of(findings.begin(), findings.end(), isFatal);
+  if (use.imu && times && !recording.imu.empty()) {
     checkClocks(recording, findings);
     checkRate(recording, findings);
     const DataFindings units = checkImuUnits(recording.imu);

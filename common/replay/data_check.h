@@ -26,8 +26,9 @@ struct DataUse {
 /// In the text of images_upside_down.
 inline constexpr char kUpsideDown[] = "images upside down";
 
-/// Looks at three images of each camera, and at all stamps and samples. Codes: image_unreadable,
-/// image_size, image_flat, clocks_apart, imu_covers_part, imu_rate, accel_in_g, accel_in_mg,
+/// Looks at some images of each camera, at the sizes of all files, and at all stamps and samples.
+/// Codes: image_unreadable, images_unreadable, images_empty, image_size, image_flat, stamps_equal,
+/// stamps_count, stamps_unit, clocks_apart, imu_covers_part, imu_rate, accel_in_g, accel_in_mg,
 /// accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
 /// images_upside_down.
 DataFindings checkData(const Recording& recording, const DataUse& use);

@@ -1,6 +1,7 @@
 #include "common/replay/dataset.h"
 
 #include <algorithm>
+#include <fstream>
 #include <set>
 
 #include "common/base/errors.h"
@@ -73,10 +74,34 @@ Recording readMessages(const DatasetOptions& options) {
                                                  : readRecordedDrive(options);
 }
 
+/// A file that is there, and by its name is none that can be read.
+[[noreturn]] void refuseFile(const std::filesystem::path& path) {
+  std::string head(16, '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(head.data(), static_cast<std::streamsize>(head.size()));
+  const bool bag = head.starts_with("#ROSBAG");
+  const std::string name = path.string();
+  std::string why = name +
+                    " is not a recording that is known by its ending (.mcap, .bag, .db3, or "
+                    "one of them packed)";
+  if (path.extension() == ".active") {
+    why = name + " is an unfinished bag: run `rosbag reindex` on it and name it .bag";
+  } else if (bag) {
+    why = name + " is a bag of ROS 1: name it .bag";
+  } else if (head.starts_with("\x89MCAP0")) {
+    why = name + " is an MCAP recording: name it .mcap";
+  } else if (head.starts_with("SQLite format 3")) {
+    why = name + " is a database of SQLite: where `ros2 bag record` made it, name it .db3";
+  }
+  throw StartupError(ExitCode::kData, why);
+}
+
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
   if (!std::filesystem::is_directory(path)) {
     if (hasMessages(path)) return readMessages(options);
+    std::error_code error;
+    if (std::filesystem::is_regular_file(path, error)) refuseFile(path);
     throwMissing(path, "the dataset folder",
                  "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, or "
                  "a recording (.mcap; of ROS also .db3 and .bag)");

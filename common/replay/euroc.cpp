@@ -57,7 +57,7 @@ void readImu(const fs::path& folder, Recording& recording) {
   const SensorTable table(file, "imu", judgeImu);
   addNotes(table, recording);
   if (table.rows().empty()) {
-    throw StartupError(ExitCode::kUnavailable,
+    throw StartupError(ExitCode::kData,
                        file.string() +
                            " has no inertial sample (a head at most); fetch it again, or see why "
                            "the recorder wrote none");
@@ -118,6 +118,13 @@ class FrameList {
   void close(Recording& recording) const {
     if (!look_ || named_ == 0) return;
     const std::string images = (folder_ / "data").string();
+    if (found_ == 0 && images_.size() == 0) {
+      const std::string others = images_.others();
+      throw StartupError(ExitCode::kData,
+                         (folder_ / "data.csv").string() + " names " + std::to_string(named_) +
+                             " images, the first of them `" + first_ + "`; " + images + " holds " +
+                             (others.empty() ? "no file: unpack or copy them into it" : others));
+    }
     if (found_ == 0) {
       throw StartupError(ExitCode::kData, (folder_ / "data.csv").string() + " names " +
                                               std::to_string(named_) + " images, " + images +
@@ -151,6 +158,11 @@ void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording
   const std::vector<Recording::FrameFile> first = recording.frames;
   FrameList list(folder, look);
   if (camera == 0) recording.frame_count = table.lines();
+  if (camera == 0 && table.rows().empty()) {
+    throw StartupError(ExitCode::kData, (folder / "data.csv").string() +
+                                            " has no frame (a head at most); fetch it again, or "
+                                            "list stamp and file of each image in it");
+  }
   for (const TableRow& row : table.rows()) {
     // A row that is left out keeps its number; a list that was sorted is counted anew.
     const std::uint64_t number = table.wasSorted() ? row.number : recording.frames.size();

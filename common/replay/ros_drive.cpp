@@ -109,7 +109,7 @@ class RosDriveReader {
 
   Recording read() {
     recording_.kind = DatasetKind::kRosRecording;
-    const ChosenTopics chosen = chooseTopics(messages_.topics(), wantedTopics(), file_);
+    const ChosenTopics chosen = chosenTopics();
     for (const auto& topics : chosen.cameras) addCamera(topics);
     imu_ = chosen.imu;
     readMessages();
@@ -126,6 +126,22 @@ class RosDriveReader {
   }
 
  private:
+  /// Where a topic is missing in what was cut off, the cut is why.
+  ChosenTopics chosenTopics() const {
+    const std::string problem = messages_.lastProblem();
+    const std::string kept = " holds no topic any more: it is cut off or damaged";
+    if (messages_.topics().empty() && !problem.empty()) {
+      throw StartupError(ExitCode::kData, file_ + kept + " (" + problem + "); fetch it again");
+    }
+    try {
+      return chooseTopics(messages_.topics(), wantedTopics(), file_);
+    } catch (const StartupError& error) {
+      if (problem.empty()) throw;
+      throw StartupError(ExitCode::kData,
+                         error.what() + ("; the file is cut off or damaged: " + problem));
+    }
+  }
+
   [[noreturn]] void stop(const std::string& what) const {
     throw StartupError(ExitCode::kUnavailable, file_ + ": " + what);
   }

@@ -12,6 +12,7 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/replay/files/output_place.h"
 #include "common/replay/files/sensor_file.h"
 #include "tools/data_check/data_check.h"
 
@@ -151,6 +152,20 @@ void writeSamples(const Recording& recording, const fs::path& mav0) {
   if (!recording.speed.empty()) write(mav0 / "speed0" / "data.csv", speed);
 }
 
+/// The images may lie behind links of a mended drive.
+void refuseSource(const Recording& recording, const fs::path& copy) {
+  std::set<fs::path> folders;
+  for (const auto& frame : recording.frames) {
+    if (!frame.path.empty()) folders.insert(fs::path(frame.path).parent_path());
+  }
+  for (const fs::path& images : folders) {
+    std::error_code error;
+    const fs::path folder = fs::weakly_canonical(images, error);
+    const fs::path sensors = folder.parent_path().parent_path();
+    replay::refuseInside(copy, sensors.filename() == "mav0" ? sensors : folder, "--fix");
+  }
+}
+
 }  // namespace
 
 MendedDrive mendDrive(replay::Recording recording) {
@@ -174,6 +189,7 @@ std::size_t writeDrive(const replay::Recording& recording, const fs::path& folde
                                              " is there and not an empty folder; --fix writes a "
                                              "new one, give another name");
   }
+  refuseSource(recording, folder);
   if (recording.frames.empty() && recording.imu.empty()) {
     throw StartupError(ExitCode::kData, "there are no images and no samples to copy");
   }

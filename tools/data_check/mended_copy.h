@@ -27,7 +27,8 @@ using CopyProgress = std::function<void(std::size_t done, std::size_t all)>;
 /// Writes EuRoC's layout: mav0 with cam0, cam1, imu0 and speed0, sorted, one stamp a line, in
 /// nanoseconds; images as they are (those of a recording that are not compressed as PNG), named by
 /// their stamps. Images that cannot be read are left out. Truth is not copied. Returns how many
-/// images were left out. Throws StartupError: kUsage where `folder` is there and not empty, kData
+/// images were left out. Throws StartupError: kUsage where `folder` is there and not
+/// empty or lies in the drive, kData
 /// where a recording has no images and no samples, kInputOutput where the disk refuses.
 std::size_t writeDrive(const replay::Recording& recording, const std::filesystem::path& folder,
                        const CopyProgress& progress = {});

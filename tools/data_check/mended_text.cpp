@@ -15,6 +15,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
+#include "common/replay/stamp_check.h"
 
 namespace perdure::tools {
 namespace {
@@ -103,8 +104,44 @@ std::size_t placesShort(const Table& table) {
   return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
 }
 
-bool mendStamps(Table& table, std::vector<std::string>& mends) {
-  const std::size_t places = placesShort(table);
+/// Where they are whole numbers: by how many digits those of IMU and camera are short, seen in
+/// their rates.
+struct WholeUnit {
+  std::size_t places = 0;
+  double least = 0.0, most = 0.0;  ///< stamps of that unit, some beyond those of the two
+};
+
+std::vector<TimePoint> wholeStampsOf(const Table& table) {
+  std::vector<TimePoint> stamps;
+  for (const auto& row : table.rows) {
+    if (const auto stamp = replay::parseNanoseconds(row[0])) stamps.push_back(*stamp);
+  }
+  return stamps;
+}
+
+WholeUnit wholeUnitOf(const fs::path& mav0) {
+  std::error_code error;
+  const fs::path imu = mav0 / "imu0" / "data.csv", images = mav0 / "cam0" / "data.csv";
+  if (!fs::is_regular_file(imu, error) || !fs::is_regular_file(images, error)) return {};
+  const auto of_imu = wholeStampsOf(tableOf(imu)), of_images = wholeStampsOf(tableOf(images));
+  const auto factor = replay::factorOfStamps(of_imu, of_images);
+  if (factor == 1) return {};
+  const auto [least, most] = std::minmax_element(of_imu.begin(), of_imu.end());
+  const auto length = toNanoseconds(*most) - toNanoseconds(*least);
+  return {factor == 1000 ? 3U : 6U, static_cast<double>(toNanoseconds(*least) - length),
+          static_cast<double>(toNanoseconds(*most) + length)};
+}
+
+/// Truth and speed may be on the same clock in nanoseconds already.
+bool isOf(const WholeUnit& unit, const Table& table) {
+  if (unit.places == 0 || table.rows.empty()) return false;
+  const auto stamp = replay::parseNumber(table.rows[table.rows.size() / 2][0]);
+  return stamp && *stamp >= unit.least && *stamp <= unit.most;
+}
+
+bool mendStamps(Table& table, const WholeUnit& whole, std::vector<std::string>& mends) {
+  std::size_t places = placesShort(table);
+  if (places == 0 && isOf(whole, table)) places = whole.places;
   if (places == 0) return false;
   const char* unit = places == 9 ? "seconds" : places == 6 ? "milliseconds" : "microseconds";
   for (auto& row : table.rows) {
@@ -275,11 +312,12 @@ MendedText::MendedText(const fs::path& given) : drive_(given) {
   std::error_code error;
   if (!fs::is_directory(mav0, error)) return;
   std::vector<Table> changed;
+  const WholeUnit whole = wholeUnitOf(mav0);
   for (const auto& sensor : fs::directory_iterator(mav0)) {
     const fs::path file = sensor.path() / "data.csv";
     if (!fs::is_regular_file(file, error)) continue;
     Table table = tableOf(file);
-    const bool stamps = mendStamps(table, mends_);
+    const bool stamps = mendStamps(table, whole, mends_);
     const bool columns =
         sensor.path().filename().string().starts_with("imu") && mendColumns(table, mends_);
     if (stamps || columns) changed.push_back(std::move(table));

@@ -3,6 +3,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/files/class_aliases.h"
+#include "common/replay/files/output_place.h"
 #include "common/replay/ros_topics.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -27,6 +28,7 @@ bool usesTruth(const PipelineOptions& options) {
 Pipeline::Pipeline(const PipelineOptions& options)
     : options_(options), configs_(readServiceConfigs(options)) {
   cv::setNumThreads(1);
+  replay::refuseInside(options.out, options.data, "--out");
   checkLandmarks();
   checkRecorded();
   const bool of_data = options.odometry == "vio" || usesTruth(options);

@@ -10,19 +10,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool isImage(const fs::path& file) {
+}  // namespace
+
+bool isImageName(const fs::path& file) {
   constexpr std::array kEndings{".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".webp"};
   const std::string ending = toLower(file.extension().string());
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
-}  // namespace
-
 ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder_, ignored)) {
     const fs::path& file = entry.path();
-    if (!isImage(file)) continue;
+    if (!fs::exists(file, ignored)) {
+      if (dead_links_++ == 0 || file.string() < first_dead_) first_dead_ = file.string();
+      continue;
+    }
+    if (!isImageName(file)) {
+      if (!fs::is_directory(file, ignored)) ++other_endings_[file.extension().string()];
+      continue;
+    }
     // Of two with one stem the first by name is taken.
     std::string& name = by_stem_[file.stem().string()];
     const std::string other = file.filename().string();
@@ -43,6 +50,21 @@ std::optional<fs::path> ImageFolder::find(std::string_view name, TimePoint stamp
     return folder_ / found->second;
   }
   return std::nullopt;
+}
+
+std::string ImageFolder::others() const {
+  std::error_code ignored;
+  if (dead_links_ > 0) {
+    return std::to_string(dead_links_) + " links to nothing, the first of them " + first_dead_ +
+           " to " + fs::read_symlink(first_dead_, ignored).string() +
+           ": copy the images themselves (cp -L, rsync -L)";
+  }
+  const auto most = std::max_element(other_endings_.begin(), other_endings_.end(),
+                                     [](auto& a, auto& b) { return a.second < b.second; });
+  if (most == other_endings_.end()) return {};
+  const std::string files = std::to_string(most->second) + " files ";
+  return files + (most->first.empty() ? "without an ending" : "in " + most->first) +
+         ", which is not read: convert them to PNG or JPEG";
 }
 
 std::string ImageFolder::first() const {

@@ -11,6 +11,9 @@
 
 namespace perdure::replay {
 
+/// By its ending.
+bool isImageName(const std::filesystem::path& file);
+
 class ImageFolder {
  public:
   explicit ImageFolder(std::filesystem::path folder);
@@ -22,12 +25,18 @@ class ImageFolder {
   std::size_t size() const { return by_stem_.size(); }
   /// The first one's name; "" where there is none.
   std::string first() const;
+  /// Why it may hold no image: links to nothing, or files of other endings; "" where it has
+  /// neither.
+  std::string others() const;
   /// How many were found, but not by the name as it is written.
   std::size_t foundOtherwise() const { return found_otherwise_; }
 
  private:
   std::filesystem::path folder_;
   std::map<std::string, std::string, std::less<>> by_stem_;  ///< names
+  std::map<std::string, std::size_t> other_endings_;
+  std::size_t dead_links_ = 0;
+  std::string first_dead_;
   std::size_t found_otherwise_ = 0;
 };
 

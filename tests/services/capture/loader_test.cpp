@@ -188,8 +188,8 @@ TEST_F(LoaderTest, RefusesADriveWithoutReadableImages) {
   drive.frames = 1;
   drive.truncated = 0;
   config_.dataset.path = drive.write(folder_);
-  EXPECT_EQ(error().first, ExitCode::kUnavailable);
-  EXPECT_THAT(error().second, HasSubstr("no readable images"));
+  EXPECT_EQ(error().first, ExitCode::kData);
+  EXPECT_THAT(error().second, HasSubstr("no image of cam0 that was tried (1) can be read"));
 }
 
 TEST_F(LoaderTest, RunFileIsReadBackOnlyForTheSameRun) {

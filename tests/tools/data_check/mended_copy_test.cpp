@@ -112,6 +112,21 @@ TEST(MendedCopy, AFolderThatHoldsSomethingIsNotTouched) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
 }
 
+TEST(MendedCopy, TheDriveItselfIsNotWrittenInto) {
+  const auto recording = sound();
+  const fs::path images = fs::path(recording.frames.front().path).parent_path();
+  for (const fs::path& copy : {images / "copy", images.parent_path() / "copy"}) {
+    try {
+      writeDrive(recording, copy);
+      FAIL() << "it was written";
+    } catch (const StartupError& error) {
+      EXPECT_EQ(error.code(), ExitCode::kUsage);
+      EXPECT_THAT(error.what(), HasSubstr("lies in the data"));
+    }
+    EXPECT_FALSE(fs::exists(copy));
+  }
+}
+
 TEST(MendedCopy, AnImageThatIsGoneIsLeftOutAndCounted) {
   auto recording = sound();
   recording.frames.front().path = "/nonexistent.png";

@@ -60,6 +60,20 @@ TEST(MendedText, SoundFoldersAreLeftAlone) {
   EXPECT_THAT(text.mends(), IsEmpty());
 }
 
+TEST(MendedText, WholeMillisecondsAreKnownByTheRatesOfImuAndCamera) {
+  const auto root = makeTurningDrive("text_whole_ms");
+  for (const char* sensor : {"cam0", "imu0"}) {
+    rewrite(root / "mav0" / sensor / "data.csv", [](const std::string& line) {
+      const auto at = line.find(',');
+      return line.substr(0, at - 6) + line.substr(at);
+    });
+  }
+  const MendedText text(root);
+  EXPECT_THAT(text.mends(), testing::Each(HasSubstr("they were milliseconds")));
+  EXPECT_EQ(text.mends().size(), 2U);
+  expectSound(text);
+}
+
 TEST(MendedText, StampsInSecondsBecomeNanosecondsExactly) {
   const auto root = makeTurningDrive("text_seconds");
   rewrite(root / "mav0/imu0/data.csv", inSeconds);

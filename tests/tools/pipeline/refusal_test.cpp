@@ -85,15 +85,23 @@ TEST(PipelineRefusal, OneFrameIsNoDrive) {
   EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("--every 1000 leaves one frame"), 65));
 }
 
-TEST(PipelineRefusal, WhereNoImageCanBeReadTheLastOneIsNamed) {
+TEST(PipelineRefusal, WhereNoImageCanBeReadTheFirstOneIsNamed) {
   const auto root = makeTurningDrive("unreadable");
   for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
     replay::truncate(entry.path(), 0.5);
   }
   EXPECT_THAT(endOf(optionsFor(root)),
-              testing::Pair(AllOf(HasSubstr("none of 41 frames could be used"),
-                                  HasSubstr("image_truncated 41 times"), HasSubstr(".png")),
+              testing::Pair(AllOf(HasSubstr("no image of cam0 that was tried"),
+                                  HasSubstr("1000000000000000000.png"), HasSubstr("is missing")),
                             65));
+  EXPECT_FALSE(fs::exists(root / "out"));
+}
+
+TEST(PipelineRefusal, ResultsAreNotWrittenBetweenTheImages) {
+  auto options = optionsFor(makeTurningDrive("out_inside"));
+  options.out = options.data + "/mav0/cam0/data/out";
+  EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("lies in the data"), 64));
+  EXPECT_FALSE(fs::exists(options.out));
 }
 
 TEST(PipelineRefusal, PosesOfAnotherEpochAreShownBesideTheFrames) {

@@ -1,0 +1,42 @@
+#include "common/replay/files/output_place.h"
+
+#include <algorithm>
+#include <array>
+
+#include "common/base/errors.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path realOf(const fs::path& path) {
+  std::error_code error;
+  fs::path real = fs::weakly_canonical(fs::absolute(path), error);
+  if (error) real = fs::absolute(path).lexically_normal();
+  return real.has_filename() ? real : real.parent_path();
+}
+
+/// Of the layouts that are read.
+bool isOfSensors(const std::string& name) {
+  constexpr std::array kSensorFolders{"mav0",  "oxts", "calib",   "color",
+                                      "depth", "pose", "label_02"};
+  return std::find(kSensorFolders.begin(), kSensorFolders.end(), name) != kSensorFolders.end() ||
+         name.starts_with("image_0") || name.starts_with("seq-") || name.starts_with("velodyne");
+}
+
+}  // namespace
+
+void refuseInside(const fs::path& out, const fs::path& data, const std::string& option) {
+  std::error_code error;
+  if (!fs::is_directory(data, error)) return;
+  const fs::path folder = realOf(data);
+  const fs::path below = realOf(out).lexically_relative(folder);
+  const std::string first = below.empty() ? ".." : below.begin()->string();
+  if (first == ".." || (first != "." && folder.filename() != "mav0" && !isOfSensors(first))) return;
+  throw StartupError(ExitCode::kUsage, option + " " + out.string() + " lies in the data, " +
+                                           data.string() +
+                                           ", which stay as they are: give a folder beside them");
+}
+
+}  // namespace perdure::replay

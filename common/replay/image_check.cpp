@@ -1,0 +1,190 @@
+#include "common/replay/image_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <random>
+#include <set>
+
+#include "common/replay/files/image_folder.h"
+
+namespace perdure::replay {
+namespace {
+
+namespace fs = std::filesystem;
+using ImageGrade = DataFinding::Grade;
+using FileList = std::vector<const Recording::FrameFile*>;
+
+/// The camera's images by what can be known without reading them.
+struct Listed {
+  std::size_t all = 0, missing = 0;
+  FileList empty, whole;  ///< by time; those of a recording are whole
+};
+
+Listed listedOf(const Recording& recording, std::size_t camera) {
+  Listed listed;
+  for (const auto& frame : recording.frames) {
+    if (frame.camera != camera || (!frame.load && frame.path.empty())) continue;
+    ++listed.all;
+    std::error_code error;
+    const auto size = frame.load ? 1 : fs::file_size(frame.path, error);
+    if (error) {
+      ++listed.missing;
+    } else {
+      (size == 0 ? listed.empty : listed.whole).push_back(&frame);
+    }
+  }
+  return listed;
+}
+
+/// The first, the middle and the last, and of files `more` by chance, which is always the same.
+FileList someOf(const FileList& all, std::size_t more) {
+  if (all.empty()) return {};
+  const std::size_t last = all.size() - 1;
+  std::set<std::size_t> places{0, all.size() / 2, last};
+  std::mt19937_64 chance(1);
+  for (std::size_t i = 0; i < more && !all.front()->load; ++i) places.insert(chance() % all.size());
+  FileList some;
+  for (const std::size_t place : places) some.push_back(all[place]);
+  return some;
+}
+
+std::string nameIn(const Recording::FrameFile& file) {
+  return file.path.empty() ? fmt::format("frame {}", file.index)
+                           : fs::path(file.path).filename().string();
+}
+
+/// What is there of a file that is not.
+std::string whyMissing(const Recording::FrameFile& file) {
+  std::error_code error;
+  if (!fs::is_symlink(file.path, error)) return file.path + " is not there";
+  return file.path + " is a link to " + fs::read_symlink(file.path, error).string() +
+         ", which is not there";
+}
+
+std::string whyUnreadable(const Recording::FrameFile& file, const std::string& detail) {
+  const std::string ending = fs::path(file.path).extension().string();
+  const bool unknown = !file.path.empty() && !isImageName(file.path);
+  return unknown ? fmt::format("{} ({} is not read; convert the images to PNG or JPEG)", detail,
+                               ending.empty() ? "a name without ending" : ending)
+                 : detail;
+}
+
+/// Nothing of cam0, no run; without cam1 cam0 goes on alone.
+ImageGrade gradeOfNone(std::size_t camera) {
+  return camera == 0 ? ImageGrade::kFatal : ImageGrade::kWarning;
+}
+
+void addNone(const Recording& recording, std::size_t camera, const std::string& what,
+             DataFindings& findings) {
+  findings.push_back(
+      {gradeOfNone(camera), "image_unreadable",
+       fmt::format("no image of {} {}", recording.calibration.cameras[camera].name, what)});
+}
+
+/// False where nothing is left to look at.
+bool checkFiles(const Recording& recording, std::size_t camera, const Listed& listed,
+                DataFindings& findings) {
+  const auto& name = recording.calibration.cameras[camera].name;
+  if (listed.whole.empty()) {
+    const auto& frames = recording.frames;
+    const auto first = std::find_if(frames.begin(), frames.end(), [&](const auto& frame) {
+      return frame.camera == camera && !frame.path.empty();
+    });
+    addNone(recording, camera,
+            fmt::format("can be read: of {} files {} are empty and {} not there; {}; copy or fetch "
+                        "the drive again",
+                        listed.all, listed.empty.size(), listed.missing,
+                        listed.empty.empty() ? whyMissing(*first)
+                                             : listed.empty.front()->path + " has 0 bytes"),
+            findings);
+    return false;
+  }
+  constexpr double kMostLost = 0.1;  // as of files that are not there
+  const auto empty = static_cast<double>(listed.empty.size());
+  if (empty > kMostLost * static_cast<double>(listed.all)) {
+    findings.push_back(
+        {ImageGrade::kWarning, "images_empty",
+         fmt::format("{} of the {} images of {} ({:.0f} %) are empty files (0 bytes), the first of "
+                     "them {}: fetch or copy the drive again",
+                     listed.empty.size(), listed.all, name,
+                     100.0 * empty / static_cast<double>(listed.all),
+                     nameIn(*listed.empty.front()))});
+  }
+  return true;
+}
+
+bool isFlat(const cv::Mat& image) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(image, mean, deviation);
+  return deviation[0] < 1.5;
+}
+
+/// What the images that were tried are like.
+struct Looked {
+  std::size_t tried = 0, unreadable = 0, other_size = 0, flat = 0;
+  std::string size, first_unreadable, why;
+};
+
+Looked lookAt(const FileList& some, const CameraCalibration& calibration) {
+  Looked looked;
+  looked.tried = some.size();
+  for (const auto* file : some) {
+    const auto image = monoImageOf(*file);
+    if (!image) {
+      if (looked.unreadable++ > 0) continue;
+      looked.first_unreadable = nameIn(*file);
+      looked.why = whyUnreadable(*file, image.error().detail);
+      continue;
+    }
+    const auto width = static_cast<std::uint32_t>(image->cols),
+               height = static_cast<std::uint32_t>(image->rows);
+    if (width != calibration.width || height != calibration.height) {
+      ++looked.other_size;
+      looked.size = fmt::format("{}x{}", width, height);
+    }
+    looked.flat += isFlat(*image) ? 1 : 0;
+  }
+  return looked;
+}
+
+}  // namespace
+
+void checkImages(const Recording& recording, std::size_t camera, DataFindings& findings) {
+  const CameraCalibration& calibration = recording.calibration.cameras[camera];
+  const Listed listed = listedOf(recording, camera);
+  if (listed.all == 0 || !checkFiles(recording, camera, listed, findings)) return;
+  Looked looked = lookAt(someOf(listed.whole, 9), calibration);
+  // Not by chance of the few.
+  if (looked.unreadable == looked.tried) looked = lookAt(someOf(listed.whole, 60), calibration);
+  if (looked.unreadable == looked.tried) {
+    return addNone(recording, camera,
+                   fmt::format("that was tried ({}) can be read: {}", looked.tried, looked.why),
+                   findings);
+  }
+  if (looked.unreadable > 1) {
+    findings.push_back(
+        {ImageGrade::kWarning, "images_unreadable",
+         fmt::format("{} of {} images of {} that were tried cannot be read, the first of them {}: "
+                     "{}; fetch or copy the drive again",
+                     looked.unreadable, looked.tried, calibration.name, looked.first_unreadable,
+                     looked.why)});
+  }
+  if (looked.other_size > 0 && looked.other_size + looked.unreadable == looked.tried) {
+    findings.push_back(
+        {ImageGrade::kFatal, "image_size",
+         fmt::format(
+             "the images of {} are {}, its calibration is for {}x{}: set `resolution` (width, "
+             "height) where it was only written wrongly, or calibrate at the images' size",
+             calibration.name, looked.size, calibration.width, calibration.height)});
+  } else if (looked.flat == looked.tried) {
+    findings.push_back(
+        {ImageGrade::kWarning, "image_flat",
+         fmt::format("the images of {} are of one grey: see exposure, lens cap and bit depth",
+                     calibration.name)});
+  }
+}
+
+}  // namespace perdure::replay
