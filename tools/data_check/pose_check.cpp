@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "common/math/so3.h"
 #include "tools/data_check/turn_integral.h"
@@ -36,6 +37,10 @@ struct Reading {
 };
 
 constexpr char kInvert[] = "give their inverse, the body in the world";
+constexpr char kConjugate[] = "conjugate the quaternions (write -qx, -qy, -qz), the positions stay";
+constexpr char kEither[] =
+    "give their inverse, the body in the world, where the positions are those of the world in the "
+    "body; else conjugate the quaternions alone (write -qx, -qy, -qz)";
 constexpr char kOrder[] = "write the quaternions as qx qy qz qw";
 constexpr char kAxes[] = "give T_WB, which is T_WC times the inverse of T_BS";
 constexpr char kBoth[] = "give T_WB, in the order t x y z qx qy qz qw";
@@ -107,9 +112,14 @@ std::string namesOf(const std::vector<const Reading*>& readings) {
   return names;
 }
 
+struct Wrong {
+  std::vector<const Reading*> likely;  ///< the best first
+  DataFinding finding;
+};
+
 /// Which readings explain the turns that the poses as they are do not.
-std::optional<DataFinding> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
-                                        const Limits& limits, const Sensor& sensor) {
+std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
+                                  const Limits& limits, const Sensor& sensor) {
   if (steps.size() < limits.fewest) return std::nullopt;
   const TurnPairs given = pairsOf(steps, kReadings[0], q_BC);
   const double disagreement = given.disagreement();
@@ -132,12 +142,33 @@ std::optional<DataFinding> wrongReading(const std::vector<Step>& steps, const Qu
     const double left = pairsOf(steps, reading, q_BC).disagreement();
     if (left < limits.explained && left < 2.0 * best + 0.01) likely.push_back(&reading);
   }
-  return DataFinding{
-      Grade::kFatal, likely.front()->code,
-      fmt::format("the poses turn otherwise than {} in {} steps of the drive (they agree to {:.0f} "
-                  "%); they agree to {:.0f} % where they are read as {}: {}",
-                  sensor.name, steps.size(), 100.0 * std::max(0.0, 1.0 - disagreement),
-                  100.0 * (1.0 - best), namesOf(likely), likely.front()->mend)};
+  return Wrong{
+      likely,
+      {Grade::kFatal, likely.front()->code,
+       fmt::format(
+           "the poses turn otherwise than {} in {} steps of the drive (they agree to {:.0f} "
+           "%); they agree to {:.0f} % where they are read as ",
+           sensor.name, steps.size(), 100.0 * std::max(0.0, 1.0 - disagreement),
+           100.0 * (1.0 - best))}};
+}
+
+/// With the mend. Turns do not tell an inverse from a quaternion that is conjugated alone.
+DataFinding mended(Wrong wrong, const std::vector<StampedPose>& poses,
+                   const replay::Recording& recording) {
+  const Reading& reading = *wrong.likely.front();
+  std::string names = namesOf(wrong.likely), mend = reading.mend;
+  if (reading.inverted && !reading.w_first) {
+    const Inversion how = howInverted(poses, recording, reading.of_camera);
+    if (how == Inversion::kUnsure) mend = kEither;
+    if (how == Inversion::kQuaternion) {
+      wrong.finding.code = "poses_conjugated";
+      names = "conjugated, while their positions are right";
+      mend = kConjugate;
+    }
+    if (how != Inversion::kPose && reading.of_camera) mend += fmt::format("; and {}", kAxes);
+  }
+  wrong.finding.text += names + ": " + mend;
+  return wrong.finding;
 }
 
 /// "their x is the body's -y, …" where R takes axes to axes; else by how much it turns.
@@ -244,8 +275,13 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
   for (const double seconds : kSteps_s) {
     all.push_back(stepsOf(poses, gyro, seconds, camera.time_offset_s));
   }
+  std::vector<Eigen::Vector3d> gyro_turns;
+  for (const Step& step : all.back()) gyro_turns.push_back(step.reference);
+  if (auto findings = judgePoseTurning(poses, gyro_turns); !findings.empty()) return findings;
   for (const auto& steps : all) {
-    if (auto finding = wrongReading(steps, q_BC, kLimits, kGyro)) return {*finding};
+    if (auto wrong = wrongReading(steps, q_BC, kLimits, kGyro)) {
+      return {mended(std::move(*wrong), poses, recording)};
+    }
   }
   if (const auto later = betterTime(poses, gyro, camera, kLimits)) {
     if (std::abs(*later) < 0.1) return {};
@@ -264,7 +300,9 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
 }
 
 DataFindings judgePosesByImages(const std::vector<StampedPose>& poses,
-                                const std::vector<Turn>& turns, const CameraCalibration& camera) {
+                                const std::vector<Turn>& turns,
+                                const replay::Recording& recording) {
+  const CameraCalibration& camera = recording.calibration.cameras.front();
   constexpr double kEnough_px = 2.0;
   // The camera's own way adds to what is seen of its turning.
   const Limits limits{.fewest = 12,
@@ -279,7 +317,9 @@ DataFindings judgePosesByImages(const std::vector<StampedPose>& poses,
     if (from && to) steps.push_back({from->q, to->q, camera.T_BC.q * turn.of_images});
   }
   const Quaternion q_BC = camera.T_BC.q;
-  if (auto finding = wrongReading(steps, q_BC, limits, kImages)) return {*finding};
+  if (auto wrong = wrongReading(steps, q_BC, limits, kImages)) {
+    return {mended(std::move(*wrong), poses, recording)};
+  }
   if (auto finding = otherAxes(steps, q_BC, limits, kImages)) return {*finding};
   return {};
 }
