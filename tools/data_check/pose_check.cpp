@@ -230,6 +230,48 @@ std::optional<double> betterTime(const std::vector<StampedPose>& poses, const Tu
   return offset;
 }
 
+/// What must be added to the poses' times in their first and in their last third, where each third
+/// fits at its own and not at the other's: a clock that is too fast or too slow.
+struct GrowingOffset {
+  double first_s, last_s, per_second;
+};
+
+std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses,
+                                           const TurnIntegral& gyro,
+                                           const CameraCalibration& camera, const Limits& limits) {
+  constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kGrows_s = 0.1, kClearly = 3.0,
+                   kShown = 0.02;
+  if (poses.size() < 6) return std::nullopt;
+  const auto leftAt = [&](const std::vector<StampedPose>& some, double later) {
+    const auto steps = stepsOf(some, gyro, kStep_s, camera.time_offset_s + later);
+    if (steps.size() < limits.fewest) return 1.0;
+    const TurnPairs pairs = pairsOf(steps, kReadings[0], camera.T_BC.q);
+    return pairs.turning() < limits.least_rad ? 1.0 : pairs.disagreement();
+  };
+  if (leftAt(poses, 0.0) < kShown) return std::nullopt;
+  const auto third = static_cast<std::ptrdiff_t>(poses.size() / 3);
+  const std::array thirds{std::vector<StampedPose>(poses.begin(), poses.begin() + third),
+                          std::vector<StampedPose>(poses.end() - third, poses.end())};
+  std::array<double, 2> offset{}, left{};
+  const int most = static_cast<int>(std::lround(kMost_s / kEach_s));
+  for (std::size_t k = 0; k < thirds.size(); ++k) {
+    left[k] = 1.0;
+    for (int i = -most; i <= most; ++i) {
+      const double now = leftAt(thirds[k], kEach_s * i);
+      if (now < left[k]) left[k] = now, offset[k] = kEach_s * i;
+    }
+  }
+  if (std::max(left[0], left[1]) > limits.explained) return std::nullopt;
+  if (std::abs(offset[1] - offset[0]) < kGrows_s) return std::nullopt;
+  if (leftAt(thirds[0], offset[1]) < kClearly * left[0]) return std::nullopt;
+  if (leftAt(thirds[1], offset[0]) < kClearly * left[1]) return std::nullopt;
+  const auto middleOf = [](const std::vector<StampedPose>& some) {
+    return some[some.size() / 2].time;
+  };
+  const double apart = toSeconds(middleOf(thirds[1]) - middleOf(thirds[0]));
+  return GrowingOffset{offset[0], offset[1], (offset[1] - offset[0]) / apart};
+}
+
 /// Poses of another drive, or turns that nobody can explain.
 std::optional<DataFinding> nothingInCommon(const std::vector<Step>& steps, const Quaternion& q_BC,
                                            const Limits& limits) {
@@ -282,6 +324,14 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
     if (auto wrong = wrongReading(steps, q_BC, kLimits, kGyro)) {
       return {mended(std::move(*wrong), poses, recording)};
     }
+  }
+  if (const auto grows = growingOffset(poses, gyro, camera, kLimits)) {
+    return {{Grade::kWarning, "poses_clock_rate",
+             fmt::format("the gyroscope turns {:+.2f} s after the poses in their first third and "
+                         "{:+.2f} s in their last: the clock of the poses is about {:.1f} % too "
+                         "{}; see which frame each of them is of, and give its stamp",
+                         grows->first_s, grows->last_s, 100.0 * std::abs(grows->per_second),
+                         grows->per_second < 0 ? "fast" : "slow")}};
   }
   if (const auto later = betterTime(poses, gyro, camera, kLimits)) {
     if (std::abs(*later) < 0.1) return {};

@@ -17,8 +17,8 @@ std::vector<replay::StampedPose> timedPoses(const replay::PoseFile& file,
                                             const replay::Recording& recording);
 
 /// Against the gyroscope. Codes: poses_without_turning, poses_inverted, poses_conjugated,
-/// poses_w_first, poses_of_camera, poses_other_axes, poses_contradict_gyro, poses_time_offset.
-/// Nothing where too little turns to tell.
+/// poses_w_first, poses_of_camera, poses_other_axes, poses_contradict_gyro, poses_time_offset,
+/// poses_clock_rate. Nothing where too little turns to tell.
 replay::DataFindings judgePosesByGyro(const std::vector<replay::StampedPose>& poses,
                                       const replay::Recording& recording);
 

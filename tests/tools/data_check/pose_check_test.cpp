@@ -304,6 +304,17 @@ TEST(PoseCheck, PosesOnAnotherClockAreToldByTheGyroscope) {
   EXPECT_THAT(findings[0].text, HasSubstr("subtract 0.40 s from"));
 }
 
+TEST(PoseCheck, AClockOfAnotherRateIsTold) {
+  Poses fast = phone().poses;
+  for (auto& pose : fast) {
+    pose.time = fast.front().time +
+                durationFromSeconds(1.02 * toSeconds(pose.time - phone().poses.front().time));
+  }
+  const auto findings = findingsOf(phone(), fast);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_clock_rate"));
+  EXPECT_THAT(findings[0].text, AllOf(HasSubstr("about 2."), HasSubstr("% too fast")));
+}
+
 TEST(PoseCheck, PosesOfAnotherDriveAreTold) {
   EXPECT_THAT(codesIn(findingsOf(wayOf({1.4, 0.0, 0.0}), wayOf({0.0, 1.4, 0.3}).poses)),
               ElementsAre("poses_contradict_gyro"));
