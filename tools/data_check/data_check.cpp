@@ -84,16 +84,21 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
                                 const replay::DataUse& use) {
   if (recording.calibration.cameras.empty()) return {};
   const auto poses = timedPoses(file, recording);
-  auto findings = judgePosesByGyro(poses, recording);
+  auto findings = judgePoseJumps(poses);
+  if (!findings.empty()) return findings;  // all else would follow
+  findings = judgePosesByGyro(poses, recording);
   if (findings.empty() && (use.images || recording.imu.empty())) {
     const CameraCalibration& camera = recording.calibration.cameras.front();
     const auto samples = turnsOfPoses(poses);
     const auto turns = turnsOfImages(recording, samples, use.images ? 60 : 36);
-    findings = judgePosesByImages(poses, turns, camera);
+    findings = judgePosesByImages(poses, turns, recording);
     if (findings.empty()) findings = judgePoseTurns(turns, samples, camera);
   }
   if (!findings.empty()) return findings;  // accelerations would follow
-  return judgePoseUnit(poses, recording);
+  findings = judgePoseMoving(poses, recording);
+  if (findings.empty()) findings = judgePoseAxes(poses, recording);
+  if (findings.empty()) findings = judgePoseUnit(poses, recording);
+  return findings;
 }
 
 nlohmann::ordered_json toJson(const replay::DataFindings& findings) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "common/math/so3.h"
 #include "tools/data_check/turn_integral.h"
@@ -36,6 +37,10 @@ struct Reading {
 };
 
 constexpr char kInvert[] = "give their inverse, the body in the world";
+constexpr char kConjugate[] = "conjugate the quaternions (write -qx, -qy, -qz), the positions stay";
+constexpr char kEither[] =
+    "give their inverse, the body in the world, where the positions are those of the world in the "
+    "body; else conjugate the quaternions alone (write -qx, -qy, -qz)";
 constexpr char kOrder[] = "write the quaternions as qx qy qz qw";
 constexpr char kAxes[] = "give T_WB, which is T_WC times the inverse of T_BS";
 constexpr char kBoth[] = "give T_WB, in the order t x y z qx qy qz qw";
@@ -107,9 +112,14 @@ std::string namesOf(const std::vector<const Reading*>& readings) {
   return names;
 }
 
+struct Wrong {
+  std::vector<const Reading*> likely;  ///< the best first
+  DataFinding finding;
+};
+
 /// Which readings explain the turns that the poses as they are do not.
-std::optional<DataFinding> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
-                                        const Limits& limits, const Sensor& sensor) {
+std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
+                                  const Limits& limits, const Sensor& sensor) {
   if (steps.size() < limits.fewest) return std::nullopt;
   const TurnPairs given = pairsOf(steps, kReadings[0], q_BC);
   const double disagreement = given.disagreement();
@@ -132,12 +142,33 @@ std::optional<DataFinding> wrongReading(const std::vector<Step>& steps, const Qu
     const double left = pairsOf(steps, reading, q_BC).disagreement();
     if (left < limits.explained && left < 2.0 * best + 0.01) likely.push_back(&reading);
   }
-  return DataFinding{
-      Grade::kFatal, likely.front()->code,
-      fmt::format("the poses turn otherwise than {} in {} steps of the drive (they agree to {:.0f} "
-                  "%); they agree to {:.0f} % where they are read as {}: {}",
-                  sensor.name, steps.size(), 100.0 * std::max(0.0, 1.0 - disagreement),
-                  100.0 * (1.0 - best), namesOf(likely), likely.front()->mend)};
+  return Wrong{
+      likely,
+      {Grade::kFatal, likely.front()->code,
+       fmt::format(
+           "the poses turn otherwise than {} in {} steps of the drive (they agree to {:.0f} "
+           "%); they agree to {:.0f} % where they are read as ",
+           sensor.name, steps.size(), 100.0 * std::max(0.0, 1.0 - disagreement),
+           100.0 * (1.0 - best))}};
+}
+
+/// With the mend. Turns do not tell an inverse from a quaternion that is conjugated alone.
+DataFinding mended(Wrong wrong, const std::vector<StampedPose>& poses,
+                   const replay::Recording& recording) {
+  const Reading& reading = *wrong.likely.front();
+  std::string names = namesOf(wrong.likely), mend = reading.mend;
+  if (reading.inverted && !reading.w_first) {
+    const Inversion how = howInverted(poses, recording, reading.of_camera);
+    if (how == Inversion::kUnsure) mend = kEither;
+    if (how == Inversion::kQuaternion) {
+      wrong.finding.code = "poses_conjugated";
+      names = "conjugated, while their positions are right";
+      mend = kConjugate;
+    }
+    if (how != Inversion::kPose && reading.of_camera) mend += fmt::format("; and {}", kAxes);
+  }
+  wrong.finding.text += names + ": " + mend;
+  return wrong.finding;
 }
 
 /// "their x is the body's -y, …" where R takes axes to axes; else by how much it turns.
@@ -199,6 +230,48 @@ std::optional<double> betterTime(const std::vector<StampedPose>& poses, const Tu
   return offset;
 }
 
+/// What must be added to the poses' times in their first and in their last third, where each third
+/// fits at its own and not at the other's: a clock that is too fast or too slow.
+struct GrowingOffset {
+  double first_s, last_s, per_second;
+};
+
+std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses,
+                                           const TurnIntegral& gyro,
+                                           const CameraCalibration& camera, const Limits& limits) {
+  constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kGrows_s = 0.1, kClearly = 3.0,
+                   kShown = 0.02;
+  if (poses.size() < 6) return std::nullopt;
+  const auto leftAt = [&](const std::vector<StampedPose>& some, double later) {
+    const auto steps = stepsOf(some, gyro, kStep_s, camera.time_offset_s + later);
+    if (steps.size() < limits.fewest) return 1.0;
+    const TurnPairs pairs = pairsOf(steps, kReadings[0], camera.T_BC.q);
+    return pairs.turning() < limits.least_rad ? 1.0 : pairs.disagreement();
+  };
+  if (leftAt(poses, 0.0) < kShown) return std::nullopt;
+  const auto third = static_cast<std::ptrdiff_t>(poses.size() / 3);
+  const std::array thirds{std::vector<StampedPose>(poses.begin(), poses.begin() + third),
+                          std::vector<StampedPose>(poses.end() - third, poses.end())};
+  std::array<double, 2> offset{}, left{};
+  const int most = static_cast<int>(std::lround(kMost_s / kEach_s));
+  for (std::size_t k = 0; k < thirds.size(); ++k) {
+    left[k] = 1.0;
+    for (int i = -most; i <= most; ++i) {
+      const double now = leftAt(thirds[k], kEach_s * i);
+      if (now < left[k]) left[k] = now, offset[k] = kEach_s * i;
+    }
+  }
+  if (std::max(left[0], left[1]) > limits.explained) return std::nullopt;
+  if (std::abs(offset[1] - offset[0]) < kGrows_s) return std::nullopt;
+  if (leftAt(thirds[0], offset[1]) < kClearly * left[0]) return std::nullopt;
+  if (leftAt(thirds[1], offset[0]) < kClearly * left[1]) return std::nullopt;
+  const auto middleOf = [](const std::vector<StampedPose>& some) {
+    return some[some.size() / 2].time;
+  };
+  const double apart = toSeconds(middleOf(thirds[1]) - middleOf(thirds[0]));
+  return GrowingOffset{offset[0], offset[1], (offset[1] - offset[0]) / apart};
+}
+
 /// Poses of another drive, or turns that nobody can explain.
 std::optional<DataFinding> nothingInCommon(const std::vector<Step>& steps, const Quaternion& q_BC,
                                            const Limits& limits) {
@@ -244,8 +317,21 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
   for (const double seconds : kSteps_s) {
     all.push_back(stepsOf(poses, gyro, seconds, camera.time_offset_s));
   }
+  std::vector<Eigen::Vector3d> gyro_turns;
+  for (const Step& step : all.back()) gyro_turns.push_back(step.reference);
+  if (auto findings = judgePoseTurning(poses, gyro_turns); !findings.empty()) return findings;
   for (const auto& steps : all) {
-    if (auto finding = wrongReading(steps, q_BC, kLimits, kGyro)) return {*finding};
+    if (auto wrong = wrongReading(steps, q_BC, kLimits, kGyro)) {
+      return {mended(std::move(*wrong), poses, recording)};
+    }
+  }
+  if (const auto grows = growingOffset(poses, gyro, camera, kLimits)) {
+    return {{Grade::kWarning, "poses_clock_rate",
+             fmt::format("the gyroscope turns {:+.2f} s after the poses in their first third and "
+                         "{:+.2f} s in their last: the clock of the poses is about {:.1f} % too "
+                         "{}; see which frame each of them is of, and give its stamp",
+                         grows->first_s, grows->last_s, 100.0 * std::abs(grows->per_second),
+                         grows->per_second < 0 ? "fast" : "slow")}};
   }
   if (const auto later = betterTime(poses, gyro, camera, kLimits)) {
     if (std::abs(*later) < 0.1) return {};
@@ -264,7 +350,9 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
 }
 
 DataFindings judgePosesByImages(const std::vector<StampedPose>& poses,
-                                const std::vector<Turn>& turns, const CameraCalibration& camera) {
+                                const std::vector<Turn>& turns,
+                                const replay::Recording& recording) {
+  const CameraCalibration& camera = recording.calibration.cameras.front();
   constexpr double kEnough_px = 2.0;
   // The camera's own way adds to what is seen of its turning.
   const Limits limits{.fewest = 12,
@@ -279,7 +367,9 @@ DataFindings judgePosesByImages(const std::vector<StampedPose>& poses,
     if (from && to) steps.push_back({from->q, to->q, camera.T_BC.q * turn.of_images});
   }
   const Quaternion q_BC = camera.T_BC.q;
-  if (auto finding = wrongReading(steps, q_BC, limits, kImages)) return {*finding};
+  if (auto wrong = wrongReading(steps, q_BC, limits, kImages)) {
+    return {mended(std::move(*wrong), poses, recording)};
+  }
   if (auto finding = otherAxes(steps, q_BC, limits, kImages)) return {*finding};
   return {};
 }

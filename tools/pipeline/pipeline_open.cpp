@@ -29,6 +29,10 @@ Pipeline::Pipeline(const PipelineOptions& options)
     : options_(options), configs_(readServiceConfigs(options)) {
   cv::setNumThreads(1);
   replay::refuseInside(options.out, options.data, "--out");
+  if (options.record) {
+    replay::refuseOverwriting(std::filesystem::path(options.out) / "run.mcap", options.data,
+                              "--record");
+  }
   checkLandmarks();
   checkRecorded();
   const bool of_data = options.odometry == "vio" || usesTruth(options);

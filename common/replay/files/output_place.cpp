@@ -39,4 +39,12 @@ void refuseInside(const fs::path& out, const fs::path& data, const std::string& 
                                            ", which stay as they are: give a folder beside them");
 }
 
+void refuseOverwriting(const fs::path& written, const fs::path& data, const std::string& option) {
+  std::error_code error;
+  if (!fs::equivalent(written, data, error) || error) return;
+  throw StartupError(ExitCode::kUsage, option + " would write to " + written.string() +
+                                           ", which is the recording that is read: give another "
+                                           "folder");
+}
+
 }  // namespace perdure::replay

@@ -12,4 +12,8 @@ namespace perdure::replay {
 void refuseInside(const std::filesystem::path& out, const std::filesystem::path& data,
                   const std::string& option);
 
+/// Throws StartupError(kUsage) where the file that is written is the recording that is read.
+void refuseOverwriting(const std::filesystem::path& written, const std::filesystem::path& data,
+                       const std::string& option);
+
 }  // namespace perdure::replay

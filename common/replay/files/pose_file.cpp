@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/errors.h"
+#include "common/replay/files/pose_columns.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 
@@ -45,9 +46,16 @@ bool namesWFirst(const std::vector<std::string_view>& names) {
   return true;
 }
 
+/// pandas writes a number before each line, under no name.
+bool isHeaderOfPoses(std::vector<std::string_view> fields) {
+  if (fields.size() > 2 && fields.front().empty()) fields.erase(fields.begin());
+  return isHeader(fields);
+}
+
 void addTum(const TextLine& line, const std::vector<std::string_view>& fields, bool w_first,
-            std::vector<StampedPose>& poses, Complaints& wrong) {
-  const auto time = parseSeconds(fields[0]);
+            bool nanoseconds, std::vector<StampedPose>& poses, Complaints& wrong) {
+  auto time = parseSeconds(fields[0]);
+  if (nanoseconds && fields[0].find('.') == fields[0].npos) time = parseNanoseconds(fields[0]);
   const auto v = parseNumbers(fields);
   if (v && !time) {
     return wrong.add(line.number, "the time " + std::string(fields[0]) +
@@ -110,30 +118,53 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
   const auto lines = readLines(file, mend);
   Complaints wrong(file);
   std::vector<StampedPose> poses;
-  std::size_t columns = 0, last_line = 0;
+  std::size_t columns = 0, last_line = 0, angles = 0;
   bool w_first = false, headed = false;
+  std::optional<PoseColumns> named;
   for (const auto& line : lines) {
     const std::size_t expected = std::exchange(last_line, line.number) + 1;
     // A line without time is the pose of the frame of its number.
-    if (columns > 8 && line.number != expected && !poses.empty()) {
+    if (columns > 8 && !named && line.number != expected && !poses.empty()) {
       wrong.add(expected,
                 "the line is empty, and poses are counted by lines; write the frame's pose");
     }
     const bool comment = line.text.starts_with('#');
     const auto fields = fieldsOf(std::string_view(line.text).substr(comment ? 1 : 0));
-    if (comment || (columns == 0 && !headed && isHeader(fields))) {
+    if (columns == 0) {
+      if (const auto other = otherKindOfPoses(line.text, fields); !other.empty()) {
+        wrong.add(line.number, other);
+        break;
+      }
+    }
+    if (comment || (columns == 0 && !headed && isHeaderOfPoses(fields))) {
       headed = headed || !comment;
       w_first = w_first || (columns == 0 && namesWFirst(fields));
+      if (columns != 0) continue;
+      if (const auto these = poseColumnsOf(fields)) named = these;
+      if (namesAngles(fields)) angles = fields.size();
       continue;
     }
-    if (columns == 0) columns = fields.size();
+    if (columns == 0) {
+      columns = fields.size();
+      if (named && named->count != columns) named.reset();
+      if (angles == columns) {
+        wrong.add(line.number,
+                  "the header names angles (roll, pitch, yaw); write the orientations as "
+                  "quaternions, t x y z qx qy qz qw");
+        break;
+      }
+    }
     const bool known = columns == 8 || columns == 12 || columns == 16;
-    if (!known || fields.size() != columns) {
+    if (named && fields.size() == columns) {
+      std::vector<std::string_view> ordered;
+      for (const std::size_t column : named->of) ordered.push_back(fields[column]);
+      addTum(line, ordered, false, named->nanoseconds, poses, wrong);
+    } else if (!known || fields.size() != columns) {
       wrong.add(line.number, std::to_string(fields.size()) +
                                  " numbers; write 8 (TUM: t x y z qx qy qz qw) or 12 or 16 (KITTI: "
                                  "a row-major pose) in every line");
     } else if (columns == 8) {
-      addTum(line, fields, w_first, poses, wrong);
+      addTum(line, fields, w_first, false, poses, wrong);
     } else {
       addKitti(line, fields, poses, wrong);
     }
@@ -142,7 +173,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
   if (poses.empty()) {
     throw StartupError(ExitCode::kData, file.string() + ": holds no poses");
   }
-  return PoseFile(columns == 8 ? PoseFormat::kTum : PoseFormat::kKitti, std::move(poses));
+  return PoseFile(columns == 8 || named ? PoseFormat::kTum : PoseFormat::kKitti, std::move(poses));
 }
 
 std::optional<RigidTransform> PoseFile::at(std::uint64_t frame, TimePoint time,

@@ -24,8 +24,8 @@ class PoseFile {
   /// Throws StartupError(kData) that names each wrong line: a wrong count of numbers, a
   /// quaternion whose norm is not 1 (to 1e-2), a rotation matrix that is not orthonormal (to
   /// 1e-2), times that do not increase. Lines that begin with '#' are comments, a first line
-  /// without numbers is a header; either may name the columns with w before x. `mend`: what to do
-  /// where it cannot be read.
+  /// without numbers is a header; either may name the columns in another order, or eight of more
+  /// (poseColumnsOf); names of angles are refused. `mend`: what to do where it cannot be read.
   static PoseFile read(const std::filesystem::path& file, std::string_view mend = kMend);
   PoseFile(PoseFormat format, std::vector<StampedPose> poses);
 

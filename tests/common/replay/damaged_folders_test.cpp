@@ -162,6 +162,17 @@ TEST(DamagedFolder, AFileThatIsThereIsNotMissing) {
   EXPECT_THAT(errorOf("d.bag"), HasSubstr("cut off"));
 }
 
+TEST(OutputPlace, NeverOverWhatIsRead) {
+  const auto root = freshFolder("overwriting");
+  writeText(root / "run.mcap", "a recording");
+  const auto codeOf = [&](const fs::path& data) {
+    return startupCodeOf([&] { refuseOverwriting(root / "run.mcap", data, "--record"); });
+  };
+  EXPECT_EQ(codeOf(root / "." / "run.mcap"), ExitCode::kUsage);
+  EXPECT_NO_THROW(refuseOverwriting(root / "run.mcap", root / "other.mcap", "--record"));
+  EXPECT_NO_THROW(refuseOverwriting(root / "none.mcap", root / "run.mcap", "--record"));
+}
+
 TEST(OutputPlace, NeverInTheSensorsOfTheData) {
   const auto root = tinyEuroc("output_place");
   const auto codeOf = [&](const fs::path& out, const fs::path& data) {

@@ -17,6 +17,7 @@ using replay::StampedPose;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 using Poses = std::vector<StampedPose>;
 
 std::vector<std::string> codesIn(const replay::DataFindings& findings) {
@@ -194,6 +195,100 @@ TEST(PoseCheck, FeetAreNamedOnlyWhereNoOtherScaleIsAsLikely) {
   EXPECT_THAT(findings[0].text, HasSubstr("which may be feet"));
 }
 
+Poses conjugated(const Poses& poses) {
+  return changed(poses,
+                 [](const RigidTransform& T) { return RigidTransform(T.q.conjugate(), T.p); });
+}
+/// Positions alone.
+Poses moved(const Poses& poses, const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& to) {
+  return changed(poses, [&](const RigidTransform& T) { return RigidTransform(T.q, to(T.p)); });
+}
+
+TEST(PoseCheck, AConjugatedQuaternionIsNoInversePose) {
+  for (const bool imu : {true, false}) {
+    const Poses poses = rough(conjugated(phone().poses), 0.005, 0.01);
+    replay::Recording recording = phone().recording;
+    if (!imu) recording.imu.clear();
+    EXPECT_EQ(howInverted(poses, recording, false), Inversion::kQuaternion) << imu;
+    EXPECT_EQ(howInverted(inverted(phone().poses), recording, false), Inversion::kPose) << imu;
+  }
+  for (const Way* way : {&phone(), &vehicle()}) {
+    const auto findings = findingsOf(*way, conjugated(way->poses));
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_conjugated"));
+    EXPECT_THAT(findings[0].text,
+                AllOf(HasSubstr("conjugate the quaternions"), Not(HasSubstr("inverse"))));
+  }
+}
+
+TEST(PoseCheck, WhatCannotBeToldFromPositionsIsNamedBothWays) {
+  const auto still = [](const Eigen::Vector3d&) { return Eigen::Vector3d(0, 0, 0); };
+  const auto findings = findingsOf(phone(), conjugated(moved(phone().poses, still)));
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_inverted"));
+  EXPECT_THAT(findings[0].text, AllOf(HasSubstr("give their inverse"), HasSubstr("else conjugate "
+                                                                                 "the")));
+}
+
+TEST(PoseCheck, OrientationsThatStayWhileTheGyroscopeTurnsAreRefused) {
+  const Poses poses = changed(phone().poses, [](const RigidTransform& T) {
+    return RigidTransform(Eigen::Quaterniond::Identity(), T.p);
+  });
+  const auto findings = findingsOf(phone(), poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_without_turning"));
+  EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
+  Way at_rest = wayOf({0.0, 0.0, 0.0});
+  EXPECT_THAT(codesIn(findingsOf(at_rest, at_rest.poses)), ElementsAre());
+}
+
+TEST(PoseCheck, PositionsThatStayAreRefusedUnlessTheBodyStands) {
+  const auto stay = [](const Eigen::Vector3d&) { return Eigen::Vector3d(3, 2, 1); };
+  EXPECT_THAT(codesIn(findingsOf(phone(), moved(phone().poses, stay))),
+              ElementsAre("poses_without_positions"));
+  Way on_the_spot = phone();
+  const Eigen::Vector3d up(0, 0, 9.81);
+  for (std::size_t i = 0; i < on_the_spot.poses.size(); ++i) {
+    on_the_spot.recording.imu[i].accel = on_the_spot.poses[i].T_WB.q.conjugate() * up;
+  }
+  EXPECT_THAT(codesIn(findingsOf(on_the_spot, moved(phone().poses, stay))), ElementsAre());
+}
+
+TEST(PoseCheck, PositionsOfAnotherWorldThanTheOrientationsAreTold) {
+  const auto textOf = [](const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& to) {
+    const auto findings = findingsOf(phone(), moved(phone().poses, to));
+    return findings.empty() ? std::string() : findings[0].code + ": " + findings[0].text;
+  };
+  EXPECT_THAT(textOf([](const auto& p) { return Eigen::Vector3d(-p.x(), p.y(), p.z()); }),
+              AllOf(HasSubstr("poses_other_position_axes"), HasSubstr("write -x, y, z")));
+  EXPECT_THAT(textOf([](const auto& p) { return Eigen::Vector3d(p.y(), p.x(), -p.z()); }),
+              AllOf(HasSubstr("write y, x, z"), HasSubstr("of z the drive shows too little")));
+}
+
+TEST(PoseCheck, DegreesOfLatitudeAndLongitudeAreToldByTheAccelerometer) {
+  const auto findings =
+      findingsOf(phone(), moved(phone().poses, [](const auto& p) {
+                   return Eigen::Vector3d(48.0 + p.y() / 111200.0, 11.0 + p.x() / 74408.0, p.z());
+                 }));
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_in_degrees"));
+  EXPECT_THAT(findings[0].text, HasSubstr("are latitude and longitude"));
+}
+
+TEST(PoseCheck, AJumpBetweenNeighboursIsToldOnce) {
+  Poses poses = eachOf(phone().poses, 10);
+  for (std::size_t i = 100; i < poses.size(); ++i) {
+    poses[i].T_WB = poses[0].T_WB.inverse() * poses[i].T_WB;
+  }
+  for (std::size_t i = 200; i < poses.size(); ++i) poses[i].T_WB.p.x() += 3.0;
+  const auto findings = findingsOf(phone(), poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_jump"));
+  EXPECT_THAT(findings[0].text,
+              AllOf(HasSubstr("(poses 100 and 101 of them), and 1 times more"), HasSubstr("cut")));
+}
+
+TEST(PoseCheck, APauseIsNoJump) {
+  Poses poses = eachOf(phone().poses, 10);
+  poses.erase(poses.begin() + 100, poses.begin() + 140);  // 2 s, and 4 m
+  EXPECT_THAT(codesIn(findingsOf(phone(), poses)), ElementsAre());
+}
+
 TEST(PoseCheck, ASpeedThatNothingHasIsToldWithoutAnImu) {
   Way way = phone();
   way.recording.imu.clear();
@@ -207,6 +302,17 @@ TEST(PoseCheck, PosesOnAnotherClockAreToldByTheGyroscope) {
   const auto findings = findingsOf(phone(), late);
   ASSERT_THAT(codesIn(findings), ElementsAre("poses_time_offset"));
   EXPECT_THAT(findings[0].text, HasSubstr("subtract 0.40 s from"));
+}
+
+TEST(PoseCheck, AClockOfAnotherRateIsTold) {
+  Poses fast = phone().poses;
+  for (auto& pose : fast) {
+    pose.time = fast.front().time +
+                durationFromSeconds(1.02 * toSeconds(pose.time - phone().poses.front().time));
+  }
+  const auto findings = findingsOf(phone(), fast);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_clock_rate"));
+  EXPECT_THAT(findings[0].text, AllOf(HasSubstr("about 2."), HasSubstr("% too fast")));
 }
 
 TEST(PoseCheck, PosesOfAnotherDriveAreTold) {

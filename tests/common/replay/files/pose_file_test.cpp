@@ -76,6 +76,44 @@ TEST(PoseFile, AHeaderThatNamesWFirstIsBelieved) {
   }
 }
 
+TEST(PoseFile, ColumnsAreTakenByTheNamesOfAHeader) {
+  for (const char* text :
+       {"timestamp,qx,qy,qz,qw,tx,ty,tz\n1.5,0,0,0,1,1,2,3\n",
+        "tx ty tz qx qy qz qw timestamp\n1 2 3 0 0 0 1 1.5\n",
+        ",timestamp,tx,ty,tz,qx,qy,qz,qw\n0,1.5,1,2,3,0,0,0,1\n",
+        "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+        "q_RS_z [], v_RS_R_x [m s^-1], b_w_RS_S_x [rad s^-1]\n1500000000,1,2,3,1,0,0,0,9,9\n",
+        "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.pose.position.x,"
+        "field.pose.position.y,field.pose.position.z,field.pose.orientation.x,"
+        "field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w\n"
+        "1600000000,0,1500000000,map,1,2,3,0,0,0,1\n"}) {
+    EXPECT_EQ(errorOfPoses(text), "") << text;
+    const auto poses = readPoses(text).poses();
+    ASSERT_EQ(poses.size(), 1U) << text;
+    EXPECT_EQ(poses[0].time, at(1.5)) << text;
+    EXPECT_TRUE(poses[0].T_WB.p.isApprox(Eigen::Vector3d(1, 2, 3))) << text;
+    EXPECT_TRUE(poses[0].T_WB.R().isIdentity()) << text;
+  }
+  EXPECT_THAT(errorOfPoses("t,x,y,z,x,qx,qy,qz,qw\n1,0,0,0,0,0,0,0,1\n"), HasSubstr("9 numbers"))
+      << "two columns are x";
+}
+
+TEST(PoseFile, AnglesAreNoQuaternions) {
+  for (const char* text : {"t,x,y,z,roll,pitch,yaw,valid\n1,0,0,0,0.1,0,0,1\n",
+                           "# t x y z roll_deg pitch_deg yaw_deg\n1 0 0 0 0.1 0 0\n"}) {
+    EXPECT_THAT(errorOfPoses(text), HasSubstr(":2: the header names angles (roll, pitch, yaw)"));
+  }
+  EXPECT_EQ(errorOfPoses("# roll and yaw are free\n1 0 0 0 0 0 0 1\n"), "");
+}
+
+TEST(PoseFile, FilesThatAreNoTableOfPosesAreNamed) {
+  EXPECT_THAT(errorOfPoses("[{\"t\": 1.0, \"p\": [1, 2, 3]}]\n"), HasSubstr(":1: this is JSON"));
+  EXPECT_THAT(errorOfPoses("# Image list:\n#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, "
+                           "NAME\n1 1 0 0 0 1 2 3 1 a.png\n"),
+              HasSubstr(":2: this is COLMAP's images.txt"));
+  EXPECT_THAT(errorOfPoses("1 1 0 0 0 1 2 3 1 a.png\n"), HasSubstr("this is COLMAP's images.txt"));
+}
+
 TEST(PoseFile, OneHeaderIsNoneOfManyLinesOfWords) {
   EXPECT_THAT(errorOfPoses("hello world\nhello world\n"), HasSubstr(":2: 2 numbers; write 8"));
   EXPECT_THAT(errorOfPoses("nan nan nan nan nan nan nan nan\n"),
