@@ -13,6 +13,7 @@ struct GoldenRun {
   std::string name;
   std::string data = {};  ///< the folder that it needs; "": the simulator's scene of that name
   bool pictures = false;  ///< its results depend on what OpenCV makes of pictures
+  int status = 0;         ///< of the pipeline: 65 where the map has to stay empty
 };
 void PrintTo(const GoldenRun& run, std::ostream* out);
 

@@ -9,9 +9,9 @@
 #include "tools/data_check/axis_changes.h"
 #include "tools/data_check/motion_check.h"
 #include "tools/data_check/pair_check.h"
-#include "tools/data_check/pose_check.h"
+#include "tools/data_check/poses/pose_check.h"
 #include "tools/data_check/rig_numbers.h"
-#include "tools/data_check/stereo_check.h"
+#include "tools/data_check/stereo/stereo_check.h"
 
 namespace perdure::tools {
 

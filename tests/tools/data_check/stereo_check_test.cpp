@@ -1,4 +1,4 @@
-#include "tools/data_check/stereo_check.h"
+#include "tools/data_check/stereo/stereo_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

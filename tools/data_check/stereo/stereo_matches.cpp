@@ -1,4 +1,4 @@
-#include "tools/data_check/stereo_matches.h"
+#include "tools/data_check/stereo/stereo_matches.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "tools/data_check/pose_check.h"
-#include "tools/data_check/pose_pushes.h"
+#include "tools/data_check/poses/pose_check.h"
+#include "tools/data_check/poses/pose_pushes.h"
 
 namespace perdure::tools {
 namespace {

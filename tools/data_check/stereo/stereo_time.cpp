@@ -1,4 +1,4 @@
-#include "tools/data_check/stereo_time.h"
+#include "tools/data_check/stereo/stereo_time.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tools/data_check/pose_check.h"
+#include "tools/data_check/poses/pose_check.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "tools/data_check/stereo_check.h"
+#include "tools/data_check/stereo/stereo_check.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@
 
 #include "common/math/so3.h"
 #include "tools/data_check/pair_check.h"
-#include "tools/data_check/stereo_matches.h"
-#include "tools/data_check/stereo_time.h"
+#include "tools/data_check/stereo/stereo_matches.h"
+#include "tools/data_check/stereo/stereo_time.h"
 
 namespace perdure::tools {
 namespace {

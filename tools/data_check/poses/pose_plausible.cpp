@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
-#include "tools/data_check/pose_check.h"
-#include "tools/data_check/pose_pushes.h"
+#include "tools/data_check/poses/pose_check.h"
+#include "tools/data_check/poses/pose_pushes.h"
 #include "tools/data_check/turn_integral.h"
 
 namespace perdure::tools {

@@ -1,4 +1,4 @@
-#include "tools/data_check/pose_pushes.h"
+#include "tools/data_check/poses/pose_pushes.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
