@@ -100,10 +100,12 @@ constexpr double kEnough_px = 2.0;    ///< of turning between two images, to tel
 constexpr double kExplained = 0.3;    ///< of the turning is unexplained at most where all is well
 constexpr double kUnexplained = 0.7;  ///< and at least where it is not
 
-/// Whether rates are what the images show in degrees: of one course with it and 57 times as large,
-/// or, where T_BS may be wrong, too, so large while the images clearly turn.
-bool isInDegrees(const TurnPairs& pairs, const CameraCalibration& camera) {
-  constexpr double kClearly_px = 1.0, kCommon = 0.5;
+/// Whether rates are what the images show in degrees: more than anything carried turns by, or of
+/// one course with the images and 57 times as large, or, where T_BS may be wrong, too, so large
+/// while the images clearly turn.
+bool isInDegrees(const TurnPairs& pairs, double pair_s, const CameraCalibration& camera) {
+  constexpr double kClearly_px = 1.0, kCommon = 0.5, kFastest = 4.0;  // rad/s, in the mean
+  if (pairs.turningOfGiven() > kFastest * pair_s) return true;
   const double ratio = pairs.turningOfGiven() / std::max(1e-9, pairs.turning());
   const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
   const double shown =
@@ -116,11 +118,12 @@ bool isInDegrees(const TurnPairs& pairs, const CameraCalibration& camera) {
 }
 
 /// Of a unit: rates that are far larger or smaller than what the images show.
-replay::DataFindings judgeScale(const TurnPairs& pairs, const CameraCalibration& camera) {
+replay::DataFindings judgeScale(const TurnPairs& pairs, double pair_s,
+                                const CameraCalibration& camera) {
   const double gyro = pairs.turningOfGiven(), images = pairs.turning(), focal = camera.fx;
   const double ratio = gyro / std::max(1e-9, images);
   if (ratio > 20.0 && gyro * focal > 3.0) {
-    if (isInDegrees(pairs, camera)) {
+    if (isInDegrees(pairs, pair_s, camera)) {
       return {{DataFinding::Grade::kFatal, "gyro_in_degrees",
                fmt::format("the gyroscope's turning is {:.0f} times what the images show: it is in "
                            "degrees per second; multiply its columns by 0.0174533",
@@ -258,7 +261,8 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
   const TurnIntegral gyro(samples);
   const TurnPairs pairs = pairsOf(turns, gyro, camera.time_offset_s);
   if (pairs.count() < kLeastTurns) return {};
-  auto findings = judgeScale(pairs, camera);
+  const double pair_s = toSeconds(turns.front().to - turns.front().from);
+  auto findings = judgeScale(pairs, pair_s, camera);
   if (!findings.empty()) return findings;
   if (std::min(pairs.turningOfGiven(), pairs.turning()) * camera.fx < kEnough_px) return {};
   auto place = judgePlace(turns, gyro, pairs, camera);
