@@ -92,8 +92,9 @@ void checkStamps(const Recording& recording, const DataUse& use, DataFindings& f
   checkEqual("images", recording.reasons.of("frame_not_increasing"), images.size(), findings);
   // Frames alone, as of KITTI tracking, may be numbered where nothing else has a time.
   const bool both = of_imu && !images.empty();
-  const bool counted = both && (checkCount("images", images, findings) |
-                                checkCount("samples of the IMU", imu, findings));
+  const bool images_counted = both && checkCount("images", images, findings);
+  const bool samples_counted = both && checkCount("samples of the IMU", imu, findings);
+  const bool counted = images_counted || samples_counted;
   if (!both || counted) return;
   const auto factor = factorOfStamps(imu, images);
   if (factor == 1) return;
