@@ -56,19 +56,18 @@ bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFi
 }
 
 /// 0, 1, 2 …, as of what was numbered.
-bool checkCount(const char* of, const StampList& stamps, DataFindings& findings) {
+void checkCount(const char* of, const StampList& stamps, DataFindings& findings) {
   constexpr std::int64_t kHighest = 100'000'000;
-  if (stamps.empty() || toNanoseconds(stamps.back()) > kHighest) return false;
+  if (stamps.empty() || toNanoseconds(stamps.back()) > kHighest) return;
   const auto interval = intervalOf(stamps);
   const auto first = toNanoseconds(stamps.front());
-  if (!interval || *interval != 1.0 || first > 10'000'000) return false;
+  if (!interval || *interval != 1.0 || first > 10'000'000) return;
   findings.push_back(
       {StampGrade::kFatal, "stamps_count",
        fmt::format(
            "the stamps of the {} ({} … {}) count them and are no times: write when each was "
            "taken, in nanoseconds, on the clock of the other sensors",
            of, first, toNanoseconds(stamps.back()))});
-  return true;
 }
 
 }  // namespace
@@ -91,13 +90,13 @@ void checkStamps(const Recording& recording, const DataUse& use, DataFindings& f
   if (of_imu) checkEqual("IMU", recording.reasons.of("imu_not_increasing"), imu.size(), findings);
   checkEqual("images", recording.reasons.of("frame_not_increasing"), images.size(), findings);
   // Frames alone, as of KITTI tracking, may be numbered where nothing else has a time.
-  const bool both = of_imu && !images.empty();
-  const bool images_counted = both && checkCount("images", images, findings);
-  const bool samples_counted = both && checkCount("samples of the IMU", imu, findings);
-  const bool counted = images_counted || samples_counted;
-  if (!both || counted) return;
+  if (!of_imu || images.empty()) return;
   const auto factor = factorOfStamps(imu, images);
-  if (factor == 1) return;
+  if (factor == 1) {  // samples of 1 kHz in whole ms count, too
+    checkCount("images", images, findings);
+    checkCount("samples of the IMU", imu, findings);
+    return;
+  }
   findings.push_back(
       {StampGrade::kFatal, "stamps_unit",
        fmt::format("the stamps are in {}, not nanoseconds (in those images would come every {:.0f} "

@@ -17,6 +17,8 @@ fs::path realOf(const fs::path& path) {
   return real.has_filename() ? real : real.parent_path();
 }
 
+constexpr char kRun[] = "run.mcap";
+
 /// Of the layouts that are read.
 bool isOfSensors(const std::string& name) {
   constexpr std::array kSensorFolders{"mav0",  "oxts", "calib",   "color",
@@ -33,7 +35,12 @@ void refuseInside(const fs::path& out, const fs::path& data, const std::string& 
   const fs::path folder = realOf(data);
   const fs::path below = realOf(out).lexically_relative(folder);
   const std::string first = below.empty() ? ".." : below.begin()->string();
-  if (first == ".." || (first != "." && folder.filename() != "mav0" && !isOfSensors(first))) return;
+  if (first == "..") return;
+  const bool sensors = folder.filename() == "mav0" ||
+                       (isOfSensors(first) && fs::is_directory(folder / first, error));
+  // The folder of a recording is that of a run, whose results may be written anew.
+  const bool of_run = first == "." && fs::is_regular_file(folder / kRun, error);
+  if (of_run || (first != "." && !sensors)) return;
   throw StartupError(ExitCode::kUsage, option + " " + out.string() + " lies in the data, " +
                                            data.string() +
                                            ", which stay as they are: give a folder beside them");
@@ -41,7 +48,8 @@ void refuseInside(const fs::path& out, const fs::path& data, const std::string& 
 
 void refuseOverwriting(const fs::path& written, const fs::path& data, const std::string& option) {
   std::error_code error;
-  if (!fs::equivalent(written, data, error) || error) return;
+  const fs::path read = fs::is_directory(data, error) ? data / kRun : data;
+  if (!fs::equivalent(written, read, error) || error) return;
   throw StartupError(ExitCode::kUsage, option + " would write to " + written.string() +
                                            ", which is the recording that is read: give another "
                                            "folder");

@@ -23,7 +23,8 @@ bool isOneOf(std::string_view name, std::initializer_list<std::string_view> name
 }
 
 bool isTime(const std::string& name) {
-  return isOneOf(name, {"t", "time", "timestamp", "stamp", "timestamps", "time_s", "t_s"});
+  return isOneOf(name, {"t", "time", "timestamp", "stamp", "timestamps", "time_s", "t_s",
+                        "timestamp_ns", "time_ns", "t_ns", "stamp_ns"});
 }
 
 /// Which of t x y z qx qy qz qw a name is; nothing where it is none.
@@ -64,7 +65,7 @@ std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& na
     if (std::exchange(named[*column], true)) return std::nullopt;
     columns.of[*column] = i;
     euroc = euroc || name.starts_with("p_rs_") ||
-            (*column == kTime && names[i].find("[ns]") != names[i].npos);
+            (*column == kTime && (name.ends_with("_ns") || names[i].find("[ns]") != names[i].npos));
   }
   if (header_stamp) columns.of[kTime] = *header_stamp, named[kTime] = true;
   if (!std::all_of(named.begin(), named.end(), [](bool is) { return is; })) return std::nullopt;
@@ -73,9 +74,10 @@ std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& na
 }
 
 bool namesAngles(const std::vector<std::string_view>& names) {
-  bool angles = false, quaternion = false;
+  bool angles = false, quaternion = false, time = false;  // prose of a comment names no time
   for (const auto& written : names) {
     std::string name = plainName(written);
+    time = time || isTime(name) || name.ends_with("stamp");
     for (const std::string_view unit : {"_deg", "_rad", "_degrees", "_radians"}) {
       if (name.ends_with(unit)) name.resize(name.size() - unit.size());
     }
@@ -86,7 +88,7 @@ bool namesAngles(const std::vector<std::string_view>& names) {
     const auto column = columnOf(name);
     quaternion = quaternion || (column && *column >= kQx);
   }
-  return angles && !quaternion;
+  return angles && time && !quaternion;
 }
 
 std::string otherKindOfPoses(std::string_view line, const std::vector<std::string_view>& fields) {

@@ -131,6 +131,18 @@ TEST(DamagedFolder, AnIndexIsNoTime) {
   EXPECT_THAT(textOf(root, "clocks_apart"), IsEmpty());
 }
 
+// They count, too.
+TEST(DamagedFolder, SamplesOfAKilohertzInWholeMillisecondsAreNoCount) {
+  const auto root = tinyEuroc("stamps_1khz");
+  std::string list = "#timestamp [ns],filename\n", samples = "#timestamp [ns],w,w,w,a,a,a\n";
+  for (int i = 0; i < 8; ++i) list += std::to_string(50 * i) + ",1000000000.png\n";
+  for (int i = 0; i < 400; ++i) samples += std::to_string(i) + ",0,0,0,0,0,9.8\n";
+  writeText(root / "mav0/cam0/data.csv", list);
+  writeText(root / "mav0/imu0/data.csv", samples);
+  EXPECT_THAT(textOf(root, "stamps_unit"), HasSubstr("multiply them by 1000000"));
+  EXPECT_THAT(textOf(root, "stamps_count"), IsEmpty());
+}
+
 TEST(DamagedFolder, WholeMilliOrMicrosecondsAreSeenByTheRates) {
   for (const std::int64_t factor : {1'000, 1'000'000}) {
     const auto root = tinyEuroc("stamps_unit" + std::to_string(factor));
@@ -169,6 +181,7 @@ TEST(OutputPlace, NeverOverWhatIsRead) {
     return startupCodeOf([&] { refuseOverwriting(root / "run.mcap", data, "--record"); });
   };
   EXPECT_EQ(codeOf(root / "." / "run.mcap"), ExitCode::kUsage);
+  EXPECT_EQ(codeOf(root), ExitCode::kUsage);
   EXPECT_NO_THROW(refuseOverwriting(root / "run.mcap", root / "other.mcap", "--record"));
   EXPECT_NO_THROW(refuseOverwriting(root / "none.mcap", root / "run.mcap", "--record"));
 }
@@ -185,6 +198,10 @@ TEST(OutputPlace, NeverInTheSensorsOfTheData) {
   EXPECT_EQ(codeOf(root / "mav0/out", root / "mav0/"), ExitCode::kUsage);
   EXPECT_EQ(codeOf(root, root), ExitCode::kUsage);
   EXPECT_EQ(codeOf(root / "out", root), ExitCode::kOk);
+  EXPECT_EQ(codeOf(root / "pose", root), ExitCode::kOk) << "no such sensor is there";
+  const auto run = freshFolder("output_of_run");
+  writeText(run / "run.mcap", "a recording");
+  EXPECT_EQ(codeOf(run, run), ExitCode::kOk);
   EXPECT_EQ(codeOf(root.parent_path() / "mav0", root), ExitCode::kOk);
 }
 
