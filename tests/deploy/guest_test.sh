@@ -1,20 +1,21 @@
 #!/usr/bin/env bash
 # Live sensors on a real kernel: a UVC camera and a BMI160 in an emulated guest, capture and vio by their units.
-# usage: guest_test.sh [--seconds 60] [--unplugs 100] [--unplugs-with-vio 3] [--stops 20] [--seed 1]; figures are written to the README of guest/ by hand.
+# usage: guest_test.sh [--seconds 60] [--unplugs 100] [--mistakes 10] [--unplugs-with-vio 3] [--stops 20] [--seed 1]; figures are written to the README of guest/ by hand.
 set -euo pipefail
 cd "$PERDURE_SOURCE"
 guest=$PERDURE_SOURCE/tests/deploy/guest
 cache=${PERDURE_GUEST_CACHE:-$PERDURE_SOURCE/build/guest}
 run=$cache/run
-seconds=60 unplugs=100 with_vio=3 stops=20 seed=1
+seconds=60 unplugs=100 mistakes=10 with_vio=3 stops=20 seed=1
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds=$2 ;;
     --unplugs) unplugs=$2 ;;
+    --mistakes) mistakes=$2 ;;
     --unplugs-with-vio) with_vio=$2 ;;
     --stops) stops=$2 ;;
     --seed) seed=$2 ;;
-    *) echo "usage: $0 [--seconds N] [--unplugs N] [--unplugs-with-vio N] [--stops N] [--seed N]" >&2; exit 64 ;;
+    *) echo "usage: $0 [--seconds N] [--unplugs N] [--mistakes N] [--unplugs-with-vio N] [--stops N] [--seed N]" >&2; exit 64 ;;
   esac
   shift 2
 done
@@ -32,8 +33,8 @@ rm -rf "$run"
 mkdir -p "$run/share"
 stage "$run/tree"
 make_disk "$run/tree" "$run/disk.img"
-printf 'SECONDS_OF_FLOW=%s\nUNPLUGS=%s\nUNPLUGS_WITH_VIO=%s\nSTOPS=%s\nSEED=%s\n' "$seconds" "$unplugs" "$with_vio" "$stops" "$seed" > "$run/share/options"
+printf 'SECONDS_OF_FLOW=%s\nUNPLUGS=%s\nMISTAKES=%s\nUNPLUGS_WITH_VIO=%s\nSTOPS=%s\nSEED=%s\n' "$seconds" "$unplugs" "$mistakes" "$with_vio" "$stops" "$seed" > "$run/share/options"
 start_camera
 trap 'kill "$camera" 2> /dev/null || true' EXIT
-run_guest $((600 + seconds + 30 * unplugs + 30 * stops)) || fail "the guest did not end: $(tail -n 5 "$run/serial.log")"
-python3 "$guest/judge.py" "$run" --unplugs "$unplugs" --unplugs-with-vio "$with_vio" --stops "$stops"
+run_guest $((600 + seconds + 30 * (unplugs + mistakes + stops))) || fail "the guest did not end: $(tail -n 5 "$run/serial.log")"
+python3 "$guest/judge.py" "$run" --unplugs "$unplugs" --mistakes "$mistakes" --unplugs-with-vio "$with_vio" --stops "$stops"

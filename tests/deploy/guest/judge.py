@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Judges what a guest left in its folder: usage: judge.py RUN --unplugs N --unplugs-with-vio N --stops N. A line for each claim; 1 where one fails."""
+"""Judges what a guest left in its folder: usage: judge.py RUN --unplugs N --mistakes N --unplugs-with-vio N --stops N. A line for each claim; 1 where one fails."""
 import argparse
 import pathlib
 import sys
@@ -21,6 +21,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('run', type=pathlib.Path)
     parser.add_argument('--unplugs', type=int, required=True)
+    parser.add_argument('--mistakes', type=int, required=True)
     parser.add_argument('--unplugs-with-vio', type=int, required=True)
     parser.add_argument('--stops', type=int, required=True)
     options = parser.parse_args()
@@ -35,6 +36,7 @@ def main():
     claims.images_are_counted(run, report)
     claims.capture_lives(run, report, options.unplugs)
     claims.images_come_back(run, report)
+    claims.mistakes_are_survived(run, report, options.mistakes)
     if options.unplugs_with_vio:
         claims.odometry_goes_on(run, report, options.unplugs_with_vio)
     if options.stops:

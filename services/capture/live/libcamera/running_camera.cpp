@@ -1,17 +1,13 @@
 #include "services/capture/live/libcamera/running_camera.h"
 
 #include <fmt/format.h>
-#include <linux/videodev2.h>
-#include <sys/ioctl.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <string>
-#include <system_error>
+#include <iterator>
 #include <utility>
 
 #include "services/capture/live/libcamera/last_of_all.h"
+#include "services/capture/live/libcamera/video_nodes.h"
 
 namespace perdure::capture {
 namespace {
@@ -75,8 +71,12 @@ bool RunningCamera::start(const libcamera::ControlList& asked) {
 bool RunningCamera::begin() {
   camera_->requestCompleted.connect(this, &RunningCamera::completed);
   camera_->disconnected.connect(this, &RunningCamera::disconnected);
+  const std::set<int> before = videoNodesWithBuffers();
   if (requests_.empty() || camera_->start(&asked_) != 0) return false;
   running_ = true;
+  const std::set<int> after = videoNodesWithBuffers();
+  std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
+                      std::back_inserter(nodes_));
   asking_ = requests_.front().get();
   requests_.front()->controls().merge(asked_);
   return std::all_of(requests_.begin(), requests_.end(), [&](const auto& request) {
@@ -102,9 +102,12 @@ void RunningCamera::completed(Request* request) {
   }
 }
 
+/// udev names a node, not a camera. Where it is late, and another camera has that node by now, the
+/// one that libcamera takes for gone still gives images, and the next one would end the process.
 void RunningCamera::disconnected() {
   gone_ = true;
   done_.close();
+  for (const int node : nodes_) takeAway(node);
 }
 
 Request* RunningCamera::next(std::chrono::milliseconds longest) {
@@ -133,19 +136,6 @@ void RunningCamera::takeTheRest() {
   std::sort(in_hand_.begin(), in_hand_.end(), [](const Request* a, const Request* b) {
     return isEarlier(sequenceOf(*a), sequenceOf(*b));
   });
-}
-
-bool openVideoNodeVanished(const std::filesystem::path& descriptors) {
-  std::error_code none;
-  for (const auto& entry : std::filesystem::directory_iterator(descriptors, none)) {
-    const std::string target = std::filesystem::read_symlink(entry.path(), none).string();
-    if (!target.starts_with("/dev/video")) continue;
-    v4l2_capability unused{};
-    const int node = std::atoi(entry.path().filename().c_str());
-    if (target.ends_with(" (deleted)")) return true;
-    if (ioctl(node, VIDIOC_QUERYCAP, &unused) != 0 && errno == ENODEV) return true;
-  }
-  return false;
 }
 
 }  // namespace perdure::capture

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
-#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -69,6 +68,7 @@ class RunningCamera final : public Unended, public libcamera::Object {
   libcamera::Thread* const home_;
   std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
   std::vector<std::unique_ptr<libcamera::Request>> requests_;
+  std::vector<int> nodes_;  ///< descriptors of its own video nodes, which libcamera opened
   libcamera::ControlList asked_;
   const libcamera::Request* asking_ = nullptr;  ///< carries the controls, until it is back
   BoundedQueue<libcamera::Request*> done_{2 * kBuffers, Overflow::kDropOldest};  // never full
@@ -77,9 +77,5 @@ class RunningCamera final : public Unended, public libcamera::Object {
   std::atomic<bool> gone_{false}, refused_{false};
   bool acquired_ = false, running_ = false, ending_ = false;
 };
-
-/// Whether a video node that this process has open is there no more. `descriptors`: links to what
-/// is open.
-bool openVideoNodeVanished(const std::filesystem::path& descriptors = "/proc/self/fd");
 
 }  // namespace perdure::capture

@@ -14,6 +14,7 @@
 #include "services/capture/live/libcamera/controls.h"
 #include "services/capture/live/libcamera/running_camera.h"
 #include "services/capture/live/libcamera/shared_manager.h"
+#include "services/capture/live/libcamera/video_nodes.h"
 #include "services/capture/live/pixels.h"
 
 namespace perdure::capture {

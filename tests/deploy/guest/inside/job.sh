@@ -1,6 +1,6 @@
 #!/bin/bash
 # What is done in the guest; the host judges what is left in /share. /share/options: SECONDS_OF_FLOW, UNPLUGS,
-# UNPLUGS_WITH_VIO, STOPS, SEED.
+# MISTAKES, UNPLUGS_WITH_VIO, STOPS, SEED.
 set -u
 export PATH=/guest:/usr/sbin:/usr/bin LC_ALL=C.UTF-8
 modprobe -a 9p 9pnet_virtio
@@ -122,6 +122,21 @@ if [ "$UNPLUGS_WITH_VIO" -gt 0 ]; then
   systemctl stop perdure-vio
 fi
 mark end
+
+# udev says that a camera is gone which is there: so it does, late, of the one before that had the same node.
+for ((n = 1; n <= MISTAKES; ++n)); do
+  [ -d "/proc/$first" ] || break
+  [ $((n % 2)) -eq 0 ] || kill -STOP "$first"   # libcamera finds both at once: that it is gone, and its images
+  udevadm trigger --settle --action=remove --subsystem-match=media
+  sleep .5
+  kill -CONT "$first"
+  sleep "1.$((RANDOM % 10))"
+  touch /run/told
+  udevadm trigger --action=add --subsystem-match=media
+  until_frames 20 || mark "no_frames_after_mistake_$n"
+  sleep "1.$((RANDOM % 10))"
+done
+mark "mistaken_$((n - 1))"
 systemctl show -P NRestarts perdure-capture > /share/restarts
 # stop_capture KIND: how long it took by systemd, and what came of it.
 stop_capture() {

@@ -10,7 +10,6 @@
 
 #include "services/capture/live/libcamera/controls.h"
 #include "services/capture/live/libcamera/log.h"
-#include "services/capture/live/libcamera/running_camera.h"
 #include "services/capture/live/libcamera/session.h"
 #include "services/capture/live/libcamera/shared_manager.h"
 
@@ -326,23 +325,6 @@ TEST(SharedManager, LeavesACameraAloneThatIsNotOverInTime) {
   EXPECT_GT(never.tries, 10);
   EXPECT_TRUE(late.destroyed);
   delete left;
-}
-
-TEST(RunningCamera, SeesThatAVideoNodeThatIsOpenIsThereNoMore) {
-  const std::filesystem::path folder =
-      ::testing::TempDir() + "/perdure_descriptors_" + std::to_string(getpid());
-  std::filesystem::create_directories(folder);
-  const auto link = [&](const char* name, const char* to) {
-    std::filesystem::create_symlink(to, folder / name);
-  };
-  link("0", "/dev/null");
-  link("1", "/dev/video0");
-  link("2", "/tmp/video (deleted)");
-  EXPECT_FALSE(openVideoNodeVanished(folder));
-  link("3", "/dev/video1 (deleted)");
-  EXPECT_TRUE(openVideoNodeVanished(folder));
-  EXPECT_FALSE(openVideoNodeVanished(folder / "none"));
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
