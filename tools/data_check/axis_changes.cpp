@@ -106,6 +106,14 @@ std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples) {
   return lively;
 }
 
+bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                     const CameraCalibration& camera) {
+  constexpr double kAgree = 0.8;
+  constexpr std::size_t kFew = 30;
+  const AxisChanges changes = axisChangesOf(turns, samples, camera);
+  return changes.images.size() >= kFew && correlationOf(changes).diagonal().minCoeff() > kAgree;
+}
+
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera) {

@@ -10,6 +10,11 @@ namespace perdure::tools {
 /// this is lively, each axis can be told from the others.
 std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples);
 
+/// Whether each axis of the gyroscope plainly turns as the images do about it; then there is
+/// nothing that judgeAxisChanges could find.
+bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                     const CameraCalibration& camera);
+
 /// Compares how turning changes from image to image, which what a camera's own way adds hardly
 /// does. Code: gyro_axes. Nothing where fewer than 60 changes, or unclear ones, are seen.
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,

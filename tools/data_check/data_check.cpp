@@ -58,7 +58,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
     axes.push_back(findings.front());
     return axes;
   }
-  if (!findings.empty()) return findings;
+  if (!findings.empty() || axesSurelyAgree(turns, recording.imu, camera)) return findings;
   constexpr std::size_t kTurns = 120;  // an axis with little turning needs more
   return judgeAxisChanges(turnsOfImages(recording, livelinessOfAxes(recording.imu), kTurns),
                           recording.imu, camera);

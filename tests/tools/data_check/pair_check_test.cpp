@@ -95,12 +95,19 @@ TEST(PairCheck, AnExceptionOfOpenCvIsAFinding) {
   EXPECT_THAT(textOf(checkDrive(recording, {}), "check_failed"), HasSubstr("sizes"));
 }
 
-/// A car turns about z, and hardly about x and y; its gyroscope is changed.
-replay::DataFindings axesOf(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& change) {
-  sim::Dice dice(4);
-  const CameraCalibration camera = tests::cameraAhead(320, 240, 220.0);
+using Change = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
+
+const CameraCalibration kAhead = tests::cameraAhead(320, 240, 220.0);
+
+struct Sides {
   std::vector<Turn> turns;
   std::vector<ImuSample> samples;
+};
+
+/// A car turns about z, and hardly about x and y; its gyroscope is changed.
+Sides turningCar(const Change& change) {
+  sim::Dice dice(4);
+  Sides sides;
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   for (int i = 0; i < 120; ++i) {
     const Eigen::Vector3d other(dice.normal(), dice.normal(), dice.normal());
@@ -109,16 +116,26 @@ replay::DataFindings axesOf(const std::function<Eigen::Vector3d(const Eigen::Vec
     turn.from = fromNanoseconds(50'000'000LL * i),
     turn.to = fromNanoseconds(50'000'000LL * (i + 1));
     const Eigen::Vector3d noise(dice.normal(), dice.normal(), dice.normal());
-    turn.of_images = 0.05 * (camera.T_BC.q.conjugate() * (rate + 0.004 * noise));
-    turns.push_back(turn);
+    turn.of_images = 0.05 * (kAhead.T_BC.q.conjugate() * (rate + 0.004 * noise));
+    sides.turns.push_back(turn);
     for (int k = 0; k < 10; ++k) {
       ImuSample sample;
       sample.time = turn.from + std::chrono::milliseconds(5 * k);
       sample.gyro = change(rate);
-      samples.push_back(sample);
+      sides.samples.push_back(sample);
     }
   }
-  return judgeAxisChanges(turns, samples, camera);
+  return sides;
+}
+
+replay::DataFindings axesOf(const Change& change) {
+  const Sides sides = turningCar(change);
+  return judgeAxisChanges(sides.turns, sides.samples, kAhead);
+}
+
+bool agrees(const Change& change) {
+  const Sides sides = turningCar(change);
+  return axesSurelyAgree(sides.turns, sides.samples, kAhead);
 }
 
 TEST(AxisChanges, AnExchangeIsHeardBesideTheAxisThatTurnsMost) {
@@ -129,6 +146,13 @@ TEST(AxisChanges, AnExchangeIsHeardBesideTheAxisThatTurnsMost) {
   EXPECT_THAT(textOf(axesOf([](const auto& w) { return Eigen::Vector3d(-w.x(), w.y(), w.z()); }),
                      "gyro_axes"),
               HasSubstr("the gyroscope's −x, y, z"));
+}
+
+TEST(AxisChanges, AreSurelyRightWhereEachAxisTurnsAsTheImagesDo) {
+  EXPECT_TRUE(agrees([](const auto& w) { return w; }));
+  EXPECT_FALSE(agrees([](const auto& w) { return Eigen::Vector3d(w.y(), w.x(), w.z()); }));
+  EXPECT_FALSE(agrees([](const auto& w) { return Eigen::Vector3d(-w.x(), w.y(), w.z()); }));
+  EXPECT_FALSE(agrees([](const auto& w) { return Eigen::Vector3d(0.0, 0.0, w.z()); }));
 }
 
 }  // namespace
