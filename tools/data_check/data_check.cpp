@@ -83,8 +83,10 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
 replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& file,
                                 const replay::DataUse& use) {
   if (recording.calibration.cameras.empty()) return {};
+  auto findings = judgePoseTimes(file, recording);
+  if (!findings.empty()) return findings;
   const auto poses = timedPoses(file, recording);
-  auto findings = judgePoseJumps(poses);
+  findings = judgePoseJumps(poses);
   if (!findings.empty()) return findings;  // all else would follow
   findings = judgePosesByGyro(poses, recording);
   if (findings.empty() && (use.images || recording.imu.empty())) {

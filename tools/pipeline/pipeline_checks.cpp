@@ -10,6 +10,7 @@
 #include "common/base/errors.h"
 #include "services/vio/cameras.h"
 #include "tools/data_check/data_check.h"
+#include "tools/data_check/poses/pose_check.h"
 #include "tools/pipeline/doubts.h"
 #include "tools/pipeline/pipeline.h"
 
@@ -53,10 +54,6 @@ const std::set<std::string> kUnwritable{"disk_full", "io_error", "read_only", "c
                                         "database_error"};
 
 [[noreturn]] void refuse(const std::string& what) { throw StartupError(ExitCode::kData, what); }
-
-std::string spanText(TimePoint first, TimePoint last) {
-  return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
-}
 
 }  // namespace
 
@@ -135,12 +132,7 @@ void Pipeline::refuseNothing() const {
   }
   if (counts_.odometry == 0 && pose_file_ && !recording.frames.empty() &&
       pose_file_->format() == replay::PoseFormat::kTum) {
-    const auto& poses = pose_file_->poses();
-    const TimePoint first = recording.frames.front().time, last = recording.frames.back().time;
-    refuse(
-        fmt::format("no frame has a pose: frames are of {}, poses of {}; give poses of this drive, "
-                    "on the clock of its images",
-                    spanText(first, last), spanText(poses.front().time, poses.back().time)));
+    refuse(timesBeside(recording, pose_file_->poses()));
   }
   if (counts_.odometry == 0) {
     const ReasonCounts reasons = vio_ ? vio_->reasons() : ReasonCounts();

@@ -1,4 +1,5 @@
 // What doctor says of a network's input beside a camera's images.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -87,6 +88,25 @@ TEST(DoctorOfRecordings, FindsNothingWrongWithTheLayoutOf7Scenes) {
   EXPECT_TRUE(std::any_of(grey.begin(), grey.end(), [](const Finding& finding) {
     return finding.verdict == Verdict::kWarn;
   })) << "images of one grey";
+}
+
+TEST(DoctorOfRecordings, LooksAtPosesOfAnotherProgram) {
+  const fs::path scene = replay::tinySevenScenes("doctor_poses"), file = scene / "poses.tum";
+  const auto dataset = replay::Dataset::open({.path = scene});
+  const auto lastOf = [&](double later_s) {
+    std::ofstream poses(file);
+    for (const auto& frame : dataset->recording().frames) {
+      poses << fmt::format("{:.6f} 0 0 0 0 0 0 1\n",
+                           1e-9 * static_cast<double>(toNanoseconds(frame.time)) + later_s);
+    }
+    poses.close();
+    const Findings found = checkRigBy({.data = scene, .poses = file}, 10.0);
+    return found.at(found.size() - (found.back().verdict == Verdict::kFail ? 1 : 2));
+  };
+  EXPECT_EQ(lastOf(0.0).text, "the poses agree with images and inertial samples");
+  const Finding elsewhere = lastOf(1000.0);
+  EXPECT_EQ(elsewhere.verdict, Verdict::kFail);
+  EXPECT_THAT(elsewhere.text, HasSubstr("no frame has a pose"));
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ struct Drive {
   std::string data;
   std::string rig = {};       ///< a file in place of the recording's own calibration
   std::string sequence = {};  ///< of KITTI tracking, and of a 7-Scenes folder with several
+  std::string poses = {};     ///< a file of another program's poses, looked at as well
 };
 
 /// A camera that hangs upside down is no fault where vio, which feels gravity, agrees.

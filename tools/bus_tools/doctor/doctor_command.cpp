@@ -54,6 +54,9 @@ void runDoctor(const DoctorOptions& given) {
   if (!given.drive.sequence.empty() && given.drive.data.empty()) {
     throw StartupError(ExitCode::kUsage, "--sequence is of a recording; give --data DRIVE as well");
   }
+  if (!given.drive.poses.empty() && given.drive.data.empty()) {
+    throw StartupError(ExitCode::kUsage, "--poses are of a recording; give --data DRIVE as well");
+  }
   if (!given.copy.empty() && given.drive.data.empty()) {
     throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
   }
@@ -149,6 +152,12 @@ void addDoctorCommand(CLI::App& app) {
       ->type_name("NAME");
   command->add_option("--rig", options->drive.rig,
                       "the rig file to judge; the recording's own calibration where not given");
+  command
+      ->add_option("--poses", options->drive.poses,
+                   "with --data: a file of another program's poses, as --odometry of perdure "
+                   "pipeline takes it, compared with images and inertial samples")
+      ->check(not_empty)
+      ->type_name("FILE");
   command
       ->add_option("--fix", options->copy,
                    "with --data: a new folder for a copy with what is sure mended (units, columns "

@@ -23,6 +23,15 @@ bool addFindings(const replay::DataFindings& of_data, Findings& findings) {
   return usable;
 }
 
+void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findings& findings) {
+  if (drive.poses.empty()) return;
+  const auto of_poses = checkPoses(recording, replay::PoseFile::read(drive.poses), {});
+  addFindings(of_poses, findings);
+  if (of_poses.empty()) {
+    findings.push_back({Verdict::kOk, "the poses agree with images and inertial samples"});
+  }
+}
+
 /// Whether the rig can be judged over it.
 bool checkRecording(const Drive& drive, Findings& findings) {
   const auto dataset =
@@ -36,6 +45,7 @@ bool checkRecording(const Drive& drive, Findings& findings) {
   }
   const bool usable = addFindings(checkDrive(dataset->recording(), {}), findings);
   if (findings.empty()) findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
+  if (usable) checkPosesOf(drive, recording, findings);
   if (usable && of_layout && !recording.calibration.imu) {
     findings.push_back(
         {Verdict::kOk,

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <string>
 #include <vector>
 
 #include "common/replay/data_check.h"
@@ -42,6 +43,15 @@ replay::DataFindings judgePoseTurning(const std::vector<replay::StampedPose>& po
 /// poses_without_positions.
 replay::DataFindings judgePoseMoving(const std::vector<replay::StampedPose>& poses,
                                      const replay::Recording& recording);
+
+/// The times of the frames beside those of poses that are none of theirs. Both are not empty.
+std::string timesBeside(const replay::Recording& recording,
+                        const std::vector<replay::StampedPose>& poses);
+
+/// Poses with times, all of them before the first frame or after the last one. Code:
+/// poses_elsewhere.
+replay::DataFindings judgePoseTimes(const replay::PoseFile& file,
+                                    const replay::Recording& recording);
 
 /// Neighbours so far apart as no motion explains. Code: poses_jump.
 replay::DataFindings judgePoseJumps(const std::vector<replay::StampedPose>& poses);

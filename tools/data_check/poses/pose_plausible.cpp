@@ -169,6 +169,29 @@ std::optional<DataFinding> degrees(const Poses& poses, const replay::Recording& 
 
 }  // namespace
 
+std::string timesBeside(const replay::Recording& recording, const Poses& poses) {
+  const auto span = [](TimePoint first, TimePoint last) {
+    return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
+  };
+  return fmt::format(
+      "no frame has a pose: frames are of {}, poses of {}; give poses of this "
+      "drive, on the clock of its images",
+      span(recording.frames.front().time, recording.frames.back().time),
+      span(poses.front().time, poses.back().time));
+}
+
+DataFindings judgePoseTimes(const replay::PoseFile& file, const replay::Recording& recording) {
+  const Poses& poses = file.poses();
+  if (file.format() != replay::PoseFormat::kTum || poses.empty() || recording.frames.empty()) {
+    return {};
+  }
+  if (poses.front().time <= recording.frames.back().time &&
+      poses.back().time >= recording.frames.front().time) {
+    return {};
+  }
+  return {{Grade::kFatal, "poses_elsewhere", timesBeside(recording, poses)}};
+}
+
 Inversion howInverted(const Poses& poses, const replay::Recording& recording, bool of_camera) {
   constexpr double kCommon = 0.5, kMore = 0.25, kSmoother = 3.0;
   Poses inverse = poses, conjugate = poses;
