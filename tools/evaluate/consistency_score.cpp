@@ -76,15 +76,19 @@ void compare(const MapBelief& belief, const sim::TruthObject& object, const Rigi
 }  // namespace
 
 std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
+  constexpr char kMend[] = "`perdure pipeline` writes it";
+  std::ifstream stream(file);
+  if (!stream) {
+    throw StartupError(ExitCode::kUnavailable,
+                       fmt::format("{} cannot be read; {}", file.string(), kMend));
+  }
   std::vector<MapBelief> beliefs;
   try {
-    std::ifstream stream(file);
     const auto root = nlohmann::json::parse(stream);
     for (const auto& object : root.at("objects")) beliefs.push_back(beliefOf(object));
   } catch (const nlohmann::json::exception& error) {
-    throw StartupError(ExitCode::kUnavailable, file.string() + " is missing or no objects.json (" +
-                                                   error.what() +
-                                                   "); `perdure pipeline` writes it");
+    throw StartupError(ExitCode::kData, fmt::format("{} is no objects.json ({}); {}", file.string(),
+                                                    error.what(), kMend));
   }
   return beliefs;
 }

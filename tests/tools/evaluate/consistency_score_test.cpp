@@ -169,6 +169,7 @@ TEST(Consistency, AFileThatIsNoneIsRefusedWithTheMend) {
   EXPECT_THAT(errorOf(), testing::HasSubstr("perdure pipeline"));
   replay::writeText(folder / "objects.json", R"({"objects": [{"id": 1}]})");
   EXPECT_THAT(errorOf(), testing::HasSubstr("class"));
+  EXPECT_EQ(replay::startupCodeOf([&] { readBeliefs(folder / "objects.json"); }), ExitCode::kData);
   replay::writeText(folder / "odometry.csv", "frame,timestamp_ns\n3,4,oops\n");
   EXPECT_THAT(replay::startupErrorOf([&] { readOdometry(folder / "odometry.csv"); }),
               testing::HasSubstr("odometry.csv:2"));
