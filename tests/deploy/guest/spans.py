@@ -46,7 +46,7 @@ STEPS = [('plug → the kernel has made all nodes', 'plug', 'made'),
 def comebacks(run):
     begin, end = run.marks.get('all_counted', 0), run.end
     plugs = [p for p in run.plugs if begin <= p < end]
-    return [Comeback(run, plug, min((u for u in run.unplugs if u > plug), default=None)) for plug in plugs]
+    return [Comeback(run, plug, min((u for u in run.unplugs if plug < u < end), default=None)) for plug in plugs]
 
 
 def row(name, spans):
