@@ -237,23 +237,33 @@ TEST(Ros2InwardsWrong, IsCountedAndSaysTheMend) {
     depth["encoding"] = "32FC1";
     json cut = image(after, stamp + 2 * kMs);
     cut["bytes"] = 100;
-    lines.insert(lines.end(), {depth, cut, image(after, stamp + 3 * kMs, 32), image(after, 0),
-                               image(after, stamp), imu(after, stamp + kOtherClock),
-                               imu(after, stamp + kMs, {"nan", 0, 0}), odometry(after, stamp, 0),
-                               boxes(after, stamp - 100'000 * kMs, json::array())});
     json turned = odometry(after, stamp + kMs, 0);
     turned["q"] = {0, 0, 0, 0};
     json lost = odometry(after, stamp + 2 * kMs, 0);
     lost["p"] = {0, "inf", 0};
     json doubtful = odometry(after, stamp + 3 * kMs, 0);
     doubtful["covariance"] = {1, 9, 0, 0, 0, 0, 9, 1};
-    lines.insert(lines.end(),
-                 {turned, lost, doubtful, odometry(after, stamp + 4 * kMs, 500.0 * i)});
-    lines.push_back(boxes(after, stamp,
-                          {{{"x", 30}, {"y", 20}, {"w", 0}, {"h", 8}, {"scores", {{"car", 0.8}}}},
-                           {{"x", "nan"}, {"y", 1}, {"w", 9}, {"h", 8}, {"scores", {{"car", 0.8}}}},
-                           {{"x", 30}, {"y", 20}, {"w", 9}, {"h", 8}, {"scores", {{"cow", 0.8}}}},
-                           {{"x", 30}, {"y", 20}, {"w", 9}, {"h", 8}, {"scores", {{"car", 7}}}}}));
+    const std::vector<json> wrong{
+        depth,
+        cut,
+        image(after, stamp + 3 * kMs, 32),
+        image(after, 0),
+        image(after, stamp),
+        imu(after, stamp + kOtherClock),
+        imu(after, stamp + kMs, {"nan", 0, 0}),
+        odometry(after, stamp, 0),
+        boxes(after, stamp - 100'000 * kMs, json::array()),
+        turned,
+        lost,
+        doubtful,
+        odometry(after, stamp + 4 * kMs, 500.0 * i),
+        boxes(after, stamp,
+              {{{"x", 30}, {"y", 20}, {"w", 0}, {"h", 8}, {"scores", {{"car", 0.8}}}},
+               {{"x", "nan"}, {"y", 1}, {"w", 9}, {"h", 8}, {"scores", {{"car", 0.8}}}},
+               {{"x", 30}, {"y", 20}, {"w", 9}, {"h", 8}, {"scores", {{"cow", 0.8}}}},
+               {{"x", 30}, {"y", 20}, {"w", 9}, {"h", 8}, {"scores", {{"car", 7}}}}})};
+    // One at a time: a queue that is full drops the oldest, always the same one of a burst.
+    lines.push_back(wrong[static_cast<std::size_t>(i) % wrong.size()]);
   }
   rig.speak(lines);
   // Of the same name and type, with less in it.
