@@ -1,5 +1,6 @@
 #include "tools/evaluate/object_report.h"
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "tools/evaluate/simulated_truth.h"
 
@@ -20,6 +21,7 @@ void copyButImages(const fs::path& from, const fs::path& to) {
     if (!entry.is_regular_file() || isImage(relative)) continue;
     fs::create_directories((to / relative).parent_path(), error);
     fs::copy_file(entry.path(), to / relative, fs::copy_options::overwrite_existing, error);
+    if (error == std::errc::no_space_on_device) throwUnwritten(to / relative, error.message());
     if (error) {
       throw StartupError(ExitCode::kUnavailable, (to / relative).string() + ": " + error.message() +
                                                      "; give --out a folder that can be written");

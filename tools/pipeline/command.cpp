@@ -5,8 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <string>
 
+#include "common/base/errors.h"
 #include "tools/data_check/data_check.h"
+#include "tools/outputs/results_folder.h"
 #include "tools/pipeline/pipeline.h"
 #include "tools/pipeline/report.h"
 
@@ -89,16 +93,7 @@ void drawOverlay(const Pipeline& pipeline, bool quiet) {
   std::fprintf(stderr, "%s%s\n", terminal ? "\r\033[K" : "", sentence.c_str());
 }
 
-void run(const PipelineOptions& options) {
-  Pipeline pipeline(options);
-  printDoubts(pipeline.dataset().recording(), pipeline.findings());
-  pipeline.run([&](const PipelineCounts& counts) {
-    if (!options.quiet) showProgress(pipeline, counts);
-  });
-  if (!options.quiet && isatty(STDERR_FILENO) != 0) std::fputc('\n', stderr);
-  pipeline.finish();
-  pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
-  if (options.pictures) drawOverlay(pipeline, options.quiet);
+void printReasons(const Pipeline& pipeline) {
   for (const auto& [service, reasons] : pipeline.reasons()) {
     for (const auto& [code, count] : reasons.all()) {
       std::fprintf(stderr, "%s: %s %llu times\n", service.c_str(), code.c_str(),
@@ -111,12 +106,41 @@ void run(const PipelineOptions& options) {
   for (const auto& doubt : pipeline.doubts()) {
     std::fprintf(stderr, "warning: %s\n", doubt.c_str());
   }
+}
+
+/// Writes to options.out. Where nothing came out, what is to be said of that once it is kept.
+std::optional<StartupError> runInto(const PipelineOptions& options, const std::string& named) {
+  Pipeline pipeline(options);
+  printDoubts(pipeline.dataset().recording(), pipeline.findings());
+  pipeline.run([&](const PipelineCounts& counts) {
+    if (!options.quiet) showProgress(pipeline, counts);
+  });
+  if (!options.quiet && isatty(STDERR_FILENO) != 0) std::fputc('\n', stderr);
+  pipeline.finish();
+  pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
+  if (options.pictures) drawOverlay(pipeline, options.quiet);
+  printReasons(pipeline);
   std::printf("%llu frames, %llu poses, %llu detections, %zu objects on the map: %s\n",
               static_cast<unsigned long long>(pipeline.counts().frames),
               static_cast<unsigned long long>(pipeline.counts().odometry),
               static_cast<unsigned long long>(pipeline.counts().detections),
-              pipeline.outputs().history().lastBeliefs().size(), options.out.c_str());
-  pipeline.refuseNothing();
+              pipeline.outputs().history().lastBeliefs().size(), named.c_str());
+  try {
+    pipeline.refuseNothing();
+  } catch (const StartupError& nothing) {
+    return nothing;
+  }
+  return std::nullopt;
+}
+
+void run(const PipelineOptions& given) {
+  refuseOut(given);
+  ResultsFolder results(given.out);
+  PipelineOptions options = given;
+  options.out = results.folder().string();
+  const auto nothing = runInto(options, given.out);
+  results.keep();
+  if (nothing) throw StartupError(*nothing);
 }
 
 }  // namespace

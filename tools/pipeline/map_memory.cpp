@@ -48,12 +48,6 @@ std::uint64_t MapMemory::newWorld(const std::filesystem::path& map) {
 }
 
 void MapMemory::copy(const std::filesystem::path& from, const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::equivalent(from, file, ignored)) {
-    throw StartupError(ExitCode::kUsage, from.string() +
-                                             " is this run's own map; give another --out, or copy "
-                                             "it first");
-  }
   clear(file);
   map_store::copyMap(from.string(), file.string());
 }

@@ -35,6 +35,9 @@ struct PipelineCounts {
   std::vector<double> latency_ms;  ///< wall time from a decoded frame to its `objects`
 };
 
+/// Throws StartupError(kUsage) where --out or --record would write over the data.
+void refuseOut(const PipelineOptions& options);
+
 class Pipeline {
  public:
   /// Throws StartupError with the mend: data, poses, detections, model, configuration.

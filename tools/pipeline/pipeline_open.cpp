@@ -25,14 +25,25 @@ bool usesTruth(const PipelineOptions& options) {
 
 }  // namespace
 
+void refuseOut(const PipelineOptions& options) {
+  replay::refuseInside(options.out, options.data, "--out");
+  std::error_code none;
+  if (!options.map.empty() &&
+      std::filesystem::equivalent(options.map, std::filesystem::path(options.out) / "map.sqlite",
+                                  none)) {
+    throw StartupError(
+        ExitCode::kUsage,
+        options.map + " is this run's own map; give another --out, or copy it first");
+  }
+  if (!options.record) return;
+  replay::refuseOverwriting(std::filesystem::path(options.out) / "run.mcap", options.data,
+                            "--record");
+}
+
 Pipeline::Pipeline(const PipelineOptions& options)
     : options_(options), configs_(readServiceConfigs(options)) {
   cv::setNumThreads(1);
-  replay::refuseInside(options.out, options.data, "--out");
-  if (options.record) {
-    replay::refuseOverwriting(std::filesystem::path(options.out) / "run.mcap", options.data,
-                              "--record");
-  }
+  refuseOut(options);
   checkLandmarks();
   checkRecorded();
   const bool of_data = options.odometry == "vio" || usesTruth(options);

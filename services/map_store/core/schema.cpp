@@ -42,8 +42,9 @@ std::string mendOfUse(const Reason& reason) {
 }
 
 [[noreturn]] void cannotUse(const std::string& path, const Reason& reason) {
-  throw StartupError(ExitCode::kUnavailable, "The map " + path + " cannot be used (" + reason.code +
-                                                 ": " + reason.detail + "); " + mendOfUse(reason));
+  const auto code = reason.code == "disk_full" ? ExitCode::kInputOutput : ExitCode::kUnavailable;
+  throw StartupError(code, "The map " + path + " cannot be used (" + reason.code + ": " +
+                               reason.detail + "); " + mendOfUse(reason));
 }
 
 bool damaged(const Reason& reason) {
