@@ -45,6 +45,12 @@ Eigen::Vector2d distortRadTan(DistortionModel model, const Coefficients& d,
           y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
 }
 
+/// d (distorted angle) / d (angle off the axis).
+double slopeOfEquidistant(const Coefficients& d, double angle) {
+  const double t2 = angle * angle;
+  return 1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])));
+}
+
 Eigen::Vector2d distortEquidistant(const Coefficients& d, const Eigen::Vector2d& n,
                                    Eigen::Matrix2d* J) {
   const double r = n.norm();
@@ -56,22 +62,28 @@ Eigen::Vector2d distortEquidistant(const Coefficients& d, const Eigen::Vector2d&
   const double poly = 1.0 + t2 * (d[0] + t2 * (d[1] + t2 * (d[2] + t2 * d[3])));
   const double scale = t * poly / r;
   if (J) {
-    const double dpoly =
-        1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])));
-    const double dscale = (dpoly / (1.0 + r * r) - scale) / r;  // d scale / d r
+    const double dscale = (slopeOfEquidistant(d, t) / (1.0 + r * r) - scale) / r;  // d scale / d r
     *J = scale * Eigen::Matrix2d::Identity() + (dscale / r) * n * n.transpose();
   }
   return scale * n;
 }
 
-// The squared radius at which the radial distortion stops growing: beyond it points fold back.
+constexpr double kLeastSlope = 0.05;
+
+double monotoneRadius2OfEquidistant(const Coefficients& d) {
+  for (double angle = 0.01; angle < 1.57; angle += 0.01) {
+    if (!(slopeOfEquidistant(d, angle) > kLeastSlope)) return std::pow(std::tan(angle), 2);
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// The squared radius at which the distorted radius stops growing: beyond it points fold back.
 double monotoneRadius2(DistortionModel model, const Coefficients& d) {
-  const bool radial =
-      model == DistortionModel::kRadialTangential || model == DistortionModel::kRational;
-  if (!radial) return std::numeric_limits<double>::infinity();
+  if (model == DistortionModel::kNone) return std::numeric_limits<double>::infinity();
+  if (model == DistortionModel::kEquidistant) return monotoneRadius2OfEquidistant(d);
   for (double r2 = 0.01; r2 < 25.0; r2 += 0.01) {
     const auto [value, slope] = radialOf(model, d, r2);
-    if (!(value + 2.0 * r2 * slope > 0.05)) return r2;  // d (r · value) / d r
+    if (!(value + 2.0 * r2 * slope > kLeastSlope)) return r2;  // d (r · value) / d r
   }
   return std::numeric_limits<double>::infinity();
 }

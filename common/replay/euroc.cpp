@@ -1,7 +1,10 @@
 // EuRoC ASL folders: mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}, CSVs and sensor.yaml, and
 // where there is one speed0 (`#timestamp [ns],speed [m s^-1]`), which simulated vehicles have.
 // The body is the IMU: where imu0's T_BS is not the identity, everything is moved to it.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <optional>
 
@@ -225,10 +228,22 @@ fs::path mav0Of(const fs::path& folder) {
   return fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
 }
 
+/// Whether `of` is a word in a name, as in imu0.yaml and not in simulation.yaml.
+bool isWordIn(const std::string& name, const std::string& of) {
+  const auto isLetter = [&](std::size_t i) {
+    return i < name.size() && std::isalpha(static_cast<unsigned char>(name[i])) != 0;
+  };
+  for (auto at = name.find(of); at != std::string::npos; at = name.find(of, at + 1)) {
+    if ((at == 0 || !isLetter(at - 1)) && !isLetter(at + of.size())) return true;
+  }
+  return false;
+}
+
 /// What Kalibr left of the cameras ("camchain") or of the IMU ("imu"), in the folder or where
-/// TUM-VI has it; nothing where there is none.
-std::optional<fs::path> findFile(const fs::path& mav0, const std::string& of) {
+/// TUM-VI has it: the first is taken.
+std::vector<fs::path> kalibrFiles(const fs::path& mav0, const std::string& of) {
   constexpr char kChain[] = "camchain";
+  std::vector<fs::path> all;
   for (const fs::path& folder : {mav0, mav0.parent_path(), mav0.parent_path() / "dso"}) {
     std::vector<fs::path> found;
     std::error_code ignored;
@@ -237,12 +252,28 @@ std::optional<fs::path> findFile(const fs::path& mav0, const std::string& of) {
       const std::string name = file.filename().string();
       const bool is_yaml = file.extension() == ".yaml" || file.extension() == ".yml";
       const bool is_chain = name.find(kChain) != std::string::npos;
-      if (is_yaml && name.find(of) != std::string::npos && is_chain == (of == kChain))
+      if (is_yaml && (of == kChain ? is_chain : !is_chain && isWordIn(name, of))) {
         found.push_back(file);
+      }
     }
-    if (!found.empty()) return *std::min_element(found.begin(), found.end());
+    std::sort(found.begin(), found.end());
+    all.insert(all.end(), found.begin(), found.end());
   }
-  return std::nullopt;
+  return all;
+}
+
+/// Where there are several, somebody meant one of them.
+void noteChoice(const std::vector<fs::path>& files, Recording& recording) {
+  if (files.size() < 2) return;
+  std::string others;
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    others += (i == 1 ? "" : ", ") + files[i].string();
+  }
+  const std::string note =
+      fmt::format("the calibration is that of {}, not of {}; --rig FILE takes another",
+                  files[0].string(), others);
+  const auto& notes = recording.notes;
+  if (std::find(notes.begin(), notes.end(), note) == notes.end()) recording.notes.push_back(note);
 }
 
 void noteKeys(const SensorFile& file, Recording& recording) {
@@ -256,14 +287,18 @@ class EurocCalibration {
  public:
   EurocCalibration(const fs::path& mav0, const fs::path& rig) : mav0_(mav0) {
     if (!rig.empty()) rig_ = readRig(rig);
-    if (const auto chain = findFile(mav0, "camchain"); chain && !rig_) rig_ = readRig(*chain);
+    if (rig_) return;
+    chains_ = kalibrFiles(mav0, "camchain");
+    if (!chains_.empty()) rig_ = readRig(chains_.front());
   }
 
   ImuCalibration imu(Recording& recording) {
     fs::path path = mav0_ / "imu0" / "sensor.yaml";
     if (!fs::exists(path) && rig_ && rig_->imu) return *rig_->imu;
     if (!fs::exists(path)) {
-      if (const auto kalibr = findFile(mav0_, "imu")) path = *kalibr;
+      const auto files = kalibrFiles(mav0_, "imu");
+      if (!files.empty()) path = files.front();
+      noteChoice(files, recording);
     }
     SensorFile file(path);
     if (file.has("imu0")) file = file.section("imu0");
@@ -276,7 +311,10 @@ class EurocCalibration {
   CameraCalibration camera(const std::string& name, Recording& recording) const {
     const fs::path path = mav0_ / name / "sensor.yaml";
     const CameraCalibration* in_rig = rig_ ? rig_->camera(name) : nullptr;
-    if (!fs::exists(path) && in_rig) return *in_rig;
+    if (!fs::exists(path) && in_rig) {
+      noteChoice(chains_, recording);
+      return *in_rig;
+    }
     SensorFile file(path);
     if (file.has(name)) file = file.section(name);
     CameraCalibration camera = readCamera(file, name);
@@ -289,6 +327,7 @@ class EurocCalibration {
 
  private:
   fs::path mav0_;
+  std::vector<fs::path> chains_;  ///< of which the first is rig_
   std::optional<Calibration> rig_;
   RigidTransform T_BI_;  ///< of EuRoC's body, which everything is moved from
 };

@@ -1,5 +1,9 @@
 #include "services/capture/config.h"
 
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
 #include "common/base/errors.h"
 
 namespace perdure::capture {
@@ -162,6 +166,14 @@ void requireTwoIds(const CameraConfig& camera) {
   }
 }
 
+bool isRotation(const std::vector<double>& rows) {
+  const Eigen::Matrix3d R =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
+  constexpr double kOff = 1e-2;
+  return (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kOff &&
+         R.determinant() > 0.0;
+}
+
 void requireSource(const Config& config) {
   const bool live = config.source == "libcamera";
   if (live && config.rig.empty()) {
@@ -171,15 +183,23 @@ void requireSource(const Config& config) {
   }
   if (live) requireTwoIds(config.camera);
   const auto& crop = config.camera.crop;
-  if (live && !crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1)) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "camera.crop is not [x, y, width, height] with a width and height above 0; "
-                       "give these four, or none.");
+  const bool whole =
+      std::all_of(crop.begin(), crop.end(), [](double c) { return c >= 0 && c == std::floor(c); });
+  if (live && !crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1 || !whole)) {
+    throw StartupError(
+        ExitCode::kConfiguration,
+        "camera.crop is not [x, y, width, height] in whole pixels with a width and height "
+        "above 0; give these four, or none.");
   }
   if (live && !config.imu.mount.empty() && config.imu.mount.size() != 9) {
     throw StartupError(ExitCode::kConfiguration,
                        "imu.mount has " + std::to_string(config.imu.mount.size()) +
                            " numbers; give the 9 of a rotation, row by row, or none.");
+  }
+  if (live && config.imu.mount.size() == 9 && !isRotation(config.imu.mount)) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "imu.mount is no rotation: rows of length 1 at right angles, and no mirror "
+                       "image; give the 9 numbers of a rotation, row by row, or none.");
   }
   if (live && !config.gnss.antenna.empty() && config.gnss.antenna.size() != 3) {
     throw StartupError(ExitCode::kConfiguration,

@@ -9,6 +9,7 @@
 #include "common/replay/files/rig_file.h"
 #include "tools/calibrate/command.h"
 #include "tools/calibrate/import.h"
+#include "tools/data_check/rig_numbers.h"
 
 namespace perdure::tools {
 namespace {
@@ -43,12 +44,15 @@ void importTo(const RigImportRequest& request) {
     throw StartupError(ExitCode::kData,
                        all + "Correct the name, remove the line, or give --ignore-unknown.");
   }
+  const auto doubts = checkRigNumbers(imported.rig);
+  replay::refuseFatal(doubts, request.files.front().string());
   std::string comment = "written by perdure calibrate import:";
   for (const auto& one : imported.found) comment += "\n  " + one;
   const std::string text = replay::rigText(imported.rig, comment);
   writeChecked(request.out, text);
   for (const auto& one : imported.found) std::cout << one << "\n";
   for (const auto& one : imported.ignored) std::cout << "left out: " << one << "\n";
+  for (const auto& doubt : doubts) std::cout << "warning: " << doubt.text << "\n";
   if (!imported.rig.imu) {
     std::cout << "no IMU: give its yaml, too, or the noise stays that of the drive\n";
   }

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "common/camera/camera_model.h"
 
 namespace perdure::tools {
 namespace {
@@ -57,6 +60,44 @@ void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
                       : "whether they are of images of another size, or of images that were cut")});
 }
 
+/// Pixels, of a grid, that no direction in front of the camera is seen in: there the distorted
+/// radius shrinks again.
+double shareOfFolds(const CameraCalibration& calibration) {
+  constexpr int kGrid = 24;
+  const CameraModel camera(calibration);
+  int folded = 0;
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const Eigen::Vector2d pixel((i % kGrid + 0.5) / kGrid * calibration.width,
+                                (i / kGrid + 0.5) / kGrid * calibration.height);
+    const auto ray = camera.unproject(pixel);
+    if (!ray || !camera.project(ray->homogeneous())) ++folded;
+  }
+  return static_cast<double>(folded) / (kGrid * kGrid);
+}
+
+void checkLens(const CameraCalibration& camera, DataFindings& findings) {
+  // A fit often folds beyond the corners, where no corner of its board was.
+  constexpr double kFew = 0.05, kMost = 0.5;
+  if (camera.width == 0 || camera.height == 0) return;
+  const double folds = shareOfFolds(camera);
+  if (folds < kFew) return;
+  findings.push_back(
+      {folds > kMost ? Grade::kFatal : Grade::kWarning, "lens_folds",
+       fmt::format("the distortion of {} folds the image over in {:.0f} % of it: see the order, "
+                   "the signs and the model of its coefficients, or calibrate with the board in "
+                   "the corners, too",
+                   camera.name, 100.0 * folds)});
+}
+
+void checkReadout(const CameraCalibration& camera, DataFindings& findings) {
+  constexpr double kLarge_s = 0.2;
+  if (camera.readout_s < kLarge_s) return;
+  findings.push_back({Grade::kWarning, "readout_large",
+                      fmt::format("the readout of {} takes {:.4g} s from the first row to the "
+                                  "last: is it in milliseconds? Then write {:.4g} (readout_s)",
+                                  camera.name, camera.readout_s, 1e-3 * camera.readout_s)});
+}
+
 void checkOffset(const CameraCalibration& camera, DataFindings& findings) {
   constexpr double kLarge_s = 2.0;
   const double offset = camera.time_offset_s;
@@ -71,6 +112,14 @@ void checkOffset(const CameraCalibration& camera, DataFindings& findings) {
 void checkNoise(const ImuCalibration& imu, DataFindings& findings) {
   constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth
   constexpr double kRadians = M_PI / 180.0;
+  for (const auto& [value, name] :
+       {std::pair(imu.gyro_noise, "gyroscope"), std::pair(imu.accel_noise, "accelerometer")}) {
+    if (value > 0.0) continue;
+    findings.push_back({Grade::kWarning, "imu_noise_zero",
+                        fmt::format("the {}'s noise density is 0, which no unit has, and all else "
+                                    "would count for nothing beside it: write its data sheet's",
+                                    name)});
+  }
   if (imu.gyro_noise > kGyro) {
     findings.push_back(
         {Grade::kWarning, "imu_noise_large",
@@ -95,7 +144,9 @@ DataFindings checkRigNumbers(const Calibration& calibration) {
   DataFindings findings;
   for (const CameraCalibration& camera : calibration.cameras) {
     checkIntrinsics(camera, findings);
+    checkLens(camera, findings);
     checkOffset(camera, findings);
+    checkReadout(camera, findings);
   }
   if (calibration.imu) checkNoise(*calibration.imu, findings);
   return findings;

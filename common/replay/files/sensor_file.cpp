@@ -135,8 +135,6 @@ std::vector<std::string> SensorFile::unknownKeys() const {
                                               "rectification_matrix",
                                               "time_offset",
                                               "camera_model",
-                                              "line-delay",
-                                              "line_delay_nanoseconds",
                                               "cam0",
                                               "cam1",
                                               "imu0"};

@@ -1,5 +1,6 @@
 // Cameras and inertial units out of the keys that EuRoC, Kalibr and ROS have for them.
 #include <algorithm>
+#include <utility>
 
 #include "common/camera/lens.h"
 #include "common/camera/wide_lens.h"
@@ -108,6 +109,15 @@ void readLens(const SensorFile& file, CameraCalibration& camera) {
   if (!set) file.wrong(set.error().code, set.error().detail);
 }
 
+/// From the first row to the last; Kalibr and TUM's rolling shutter have it of a row.
+double readoutOf(const SensorFile& file, std::uint32_t rows) {
+  for (const auto& [key, unit_s] : {std::pair("line_delay", 1.0), std::pair("line-delay", 1.0),
+                                    std::pair("line_delay_nanoseconds", 1e-9)}) {
+    if (file.has(key)) return unit_s * file.number(key, 0.0) * rows;
+  }
+  return file.number("readout_s", 0.0, 0.0);
+}
+
 RigidTransform placeOf(const SensorFile& file, const std::optional<RigidTransform>& given) {
   if (const auto T_BS = file.transform("T_BS")) return *T_BS;
   if (const auto T_BC = file.transform("T_imu_cam")) return *T_BC;
@@ -131,7 +141,7 @@ CameraCalibration readCamera(const SensorFile& file, const std::string& name,
   camera.rate_hz = file.number("rate_hz", 1e-3, 0.0);
   camera.time_offset_s = file.has("time_offset_s") ? file.number("time_offset_s", -1.0)
                                                    : file.number("timeshift_cam_imu", -1.0, 0.0);
-  camera.readout_s = file.number("readout_s", 0.0, 0.0);
+  camera.readout_s = readoutOf(file, camera.height);
   return camera;
 }
 

@@ -38,6 +38,11 @@ std::optional<double> angle(std::string_view text, std::string_view hemisphere, 
   return negative ? -degrees : degrees;
 }
 
+/// Four digits before the point of a latitude, five of a longitude: degrees alone have fewer.
+bool hasMinutes(std::string_view text, std::size_t digits) {
+  return text.substr(0, text.find('.')).size() == digits;
+}
+
 /// What stands between $ and *, where the sum behind it is right.
 Result<std::string_view> sentenceOf(std::string_view line) {
   while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) {
@@ -63,6 +68,10 @@ double rangeSigma(double quality) {
   if (quality == 5) return 0.3;     // RTK, float
   return quality == 2 ? 1.0 : 3.0;  // differential; alone
 }
+
+/// Of GGA and RMC: estimated without satellites, entered by hand, simulated.
+constexpr double kLastMeasured = 5;
+constexpr std::string_view kNotMeasured = "NSM";
 
 tl::unexpected<Reason> noFix() {
   return fail("nmea_no_fix", "the receiver of satellites has no fix");
@@ -92,7 +101,9 @@ Result<NmeaReader::Said> NmeaReader::read(std::string_view line, std::int64_t ti
 Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int64_t time_ns) {
   rmc_utc_.clear();
   rmc_ns_ = time_ns;
-  if (field(sentence, 2) != "A") return noFix();
+  const std::string_view mode = field(sentence, 12);
+  const bool measured = mode.empty() || kNotMeasured.find(mode.front()) == std::string_view::npos;
+  if (field(sentence, 2) != "A" || !measured) return noFix();
   const auto knots = wholeNumber(field(sentence, 7));
   speed_ = knots ? std::optional(*knots * kKnot) : std::nullopt;
   const auto course = wholeNumber(field(sentence, 8));
@@ -119,13 +130,24 @@ Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence, std::int
 Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int64_t time_ns) {
   gga_utc_.clear();
   const double quality = wholeNumber(field(sentence, 6)).value_or(0.0);
-  if (quality < 1.0) return noFix();
+  const auto satellites = wholeNumber(field(sentence, 7));
+  if (quality < 1.0 || quality > kLastMeasured || satellites == 0.0) return noFix();
+  if (!hasMinutes(field(sentence, 2), 4) || !hasMinutes(field(sentence, 4), 5)) {
+    return fail(
+        "nmea_malformed",
+        "GGA's place is not ddmm.mmmm and dddmm.mmmm; degrees are to be followed by minutes");
+  }
+  const std::string_view unit = field(sentence, 10);
+  if (!unit.empty() && unit != "M") {
+    return fail("nmea_malformed", "GGA's height is not in metres (M)");
+  }
   const auto latitude = angle(field(sentence, 2), field(sentence, 3), 90.0);
   const auto longitude = angle(field(sentence, 4), field(sentence, 5), 180.0);
   const auto above_sea = wholeNumber(field(sentence, 9));
   if (!latitude || !longitude || !above_sea) {
     return fail("nmea_malformed", "GGA says that there is a fix, and has no place or height");
   }
+  if (*latitude == 0.0 && *longitude == 0.0) return noFix();  // a receiver's zeros
   const double height = *above_sea + wholeNumber(field(sentence, 11)).value_or(0.0);
   if (!isHeight(height)) return fail("nmea_malformed", "GGA says a height that is not on Earth");
   place_.latitude_deg = *latitude;

@@ -76,9 +76,20 @@ Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int
     text.remove_prefix(static_cast<std::size_t>(end - text.data()));
     return text.empty() || text.find_first_of(" \t,") == 0;
   };
+  constexpr double kFastest = 200.0;  // m/s
+  // 5,2 may be 5.2, or 5 with a deviation of 2.
+  if (line.find(',') != std::string_view::npos && line.find_first_of(" \t.") == line.npos) {
+    return fail("speed_malformed",
+                "a line of speed has a comma between two whole numbers; write a decimal point, and "
+                "a blank before SIGMA");
+  }
   SpeedReading reading{time_ns, 0.0, sigma};
   bool right = number(line, reading.speed);
   if (right && !withoutBlanks(line).empty()) right = number(line, reading.sigma) && line.empty();
+  if (right && std::abs(reading.speed) > kFastest) {
+    return fail("speed_malformed",
+                "a line of speed says more than 200 m/s, which no vehicle has; is it in m/s?");
+  }
   if (right && reading.sigma > 0.0) return reading;
   return fail("speed_malformed",
               "a line of speed is not \"SPEED\" or \"SPEED SIGMA\" in m/s, nor a sentence of NMEA");

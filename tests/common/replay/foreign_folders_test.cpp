@@ -224,6 +224,16 @@ TEST(ForeignFolder, KalibrsResultsBesideTheFolderAreItsCalibration) {
   EXPECT_NEAR(b.rate_hz, 20.0, 1e-6) << "by its stamps";
   EXPECT_EQ(dataset->calibration().imu->accel_bias_walk, before.imu->accel_bias_walk);
   EXPECT_TRUE(dataset->recording().notes.empty());
+  // A file that is no IMU's, and another chain.
+  writeText(root / "simulation.yaml", "scene: lap\n");
+  writeText(root / "dso/camchain-old.yaml",
+            readText(root / "dso/camchain.yaml") + "  line_delay_nanoseconds: 30000\n");
+  const auto two = Dataset::open({.path = root});
+  ASSERT_EQ(two->recording().notes.size(), 1U);
+  EXPECT_THAT(two->recording().notes[0],
+              AllOf(HasSubstr("camchain-old.yaml, not of "), HasSubstr("dso/camchain.yaml")));
+  const auto& camera = two->calibration().cameras[0];
+  EXPECT_NEAR(camera.readout_s, 30e-6 * camera.height, 1e-12);
 }
 
 TEST(ForeignFolder, UnknownKeysAreSaid) {

@@ -76,5 +76,35 @@ TEST(RigNumbers, AnOffsetOfSecondsAndNoiseInDegreesAreDoubtful) {
   EXPECT_THAT(noise[0].text, HasSubstr("in degrees (then 0.000169)"));
 }
 
+TEST(RigNumbers, ALensThatFoldsTheImageOverIsNamed) {
+  const auto findingsOf = [](DistortionModel model, std::vector<double> coefficients) {
+    return findingsWith([&](Calibration& rig) {
+      rig.cameras[0].distortion = model;
+      rig.cameras[0].distortion_coefficients = coefficients;
+    });
+  };
+  const auto radial = DistortionModel::kRadialTangential;
+  EXPECT_TRUE(findingsOf(radial, {-0.2834, 0.0740, 1.9e-4, 1.8e-5}).empty()) << "EuRoC's";
+  const auto some = findingsOf(radial, {-0.4, 0, 0, 0});
+  ASSERT_EQ(codeOf(some), "lens_folds");
+  EXPECT_EQ(some[0].grade, replay::DataFinding::Grade::kWarning);
+  const auto most = findingsOf(radial, {-1e300, 1e300, 0, 0});
+  ASSERT_EQ(codeOf(most), "lens_folds");
+  EXPECT_EQ(most[0].grade, replay::DataFinding::Grade::kFatal);
+  const auto equidistant = DistortionModel::kEquidistant;
+  EXPECT_TRUE(findingsOf(equidistant, {-0.005, 0.003, -0.004, 0.001}).empty());
+  EXPECT_EQ(codeOf(findingsOf(equidistant, {-0.8, 0, 0, 0})), "lens_folds");
+}
+
+TEST(RigNumbers, AReadoutOfSecondsAndNoiseOfNothingAreDoubtful) {
+  const auto readout = findingsWith([](Calibration& rig) { rig.cameras[0].readout_s = 15.0; });
+  ASSERT_EQ(codeOf(readout), "readout_large");
+  EXPECT_THAT(readout[0].text, HasSubstr("write 0.015"));
+  EXPECT_EQ(codeOf(findingsWith([](Calibration& rig) { rig.cameras[0].readout_s = 0.03; })),
+            "0 findings");
+  EXPECT_EQ(codeOf(findingsWith([](Calibration& rig) { rig.imu->gyro_noise = 0.0; })),
+            "imu_noise_zero");
+}
+
 }  // namespace
 }  // namespace perdure::tools

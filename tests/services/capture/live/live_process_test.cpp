@@ -215,6 +215,10 @@ TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
   EXPECT_THAT(messageOf(command({}, rig(false)), 69), HasSubstr("cam0 is missing"));
   EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0]"}), 78),
               HasSubstr("imu.mount has 3 numbers"));
+  EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0, 0, 1, 0, 0, 0, -1]"}), 78),
+              HasSubstr("imu.mount is no rotation"));
+  EXPECT_THAT(messageOf(command({"camera.crop=[1.5, 0, 20, 20]"}), 78),
+              HasSubstr("camera.crop is not"));
   EXPECT_THAT(messageOf(command({"camera.second=right"}), 78), HasSubstr("camera.id is empty"));
   EXPECT_THAT(messageOf(command({"camera.id=left", "camera.second=right"}), 78),
               HasSubstr("has no cam1"));

@@ -140,5 +140,29 @@ TEST(Nmea, CoursesAreFromEastCounterClockwise) {
   EXPECT_NEAR(courseOf(359.0), 91.0 * kPi / 180.0, 1e-12);
 }
 
+TEST(Nmea, APlaceThatSatellitesDidNotGiveIsNoFix) {
+  const auto codeOf = [](const std::string& gga, const char* mode = "A") {
+    NmeaReader reader;
+    const auto rmc = reader.read(
+        sentence(std::string("GPRMC,083559.00,A,4717.1,N,00833.9,E,9,77,091202,,,") + mode), 1);
+    if (!rmc) return rmc.error().code;
+    const auto said = reader.read(sentence("GPGGA,083559.00," + gga), 2);
+    return said ? std::string(said->fix ? "fix" : "") : said.error().code;
+  };
+  EXPECT_EQ(codeOf("4717.1,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,"), "fix");
+  EXPECT_EQ(codeOf("4717.1,N,00833.9,E,1,,1.0,499.6,,48.0,M,,"), "fix") << "as short ones write";
+  for (const char* quality : {"6", "7", "8"}) {
+    EXPECT_EQ(codeOf(std::string("4717.1,N,00833.9,E,") + quality + ",08,1.0,499.6,M,48.0,M,,"),
+              "nmea_no_fix");
+  }
+  for (const char* mode : {"N", "S", "M"}) {
+    EXPECT_EQ(codeOf("4717.1,N,00833.9,E,1,08,1.0,499.6,M,48.0,M,,", mode), "nmea_no_fix");
+  }
+  EXPECT_EQ(codeOf("4717.1,N,00833.9,E,1,00,1.0,499.6,M,48.0,M,,"), "nmea_no_fix");
+  EXPECT_EQ(codeOf("0000.000,N,00000.000,E,1,08,1.0,0.0,M,0.0,M,,"), "nmea_no_fix");
+  EXPECT_EQ(codeOf("48.1,N,11.5,E,1,08,1.0,499.6,M,48.0,M,,"), "nmea_malformed") << "degrees";
+  EXPECT_EQ(codeOf("4717.1,N,00833.9,E,1,08,1.0,1640.4,F,48.0,M,,"), "nmea_malformed") << "feet";
+}
+
 }  // namespace
 }  // namespace perdure::capture

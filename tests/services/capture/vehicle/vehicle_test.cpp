@@ -110,11 +110,11 @@ TEST(Vehicle, HearsItsSpeedInLines) {
 }
 
 TEST(Vehicle, LinesOfSpeedAreReadToTheirEnd) {
-  for (const char* line :
-       {"", " ", "1.5 x", "1.5x", "1.5 0", "1.5 -1", "nan", "1.5 0.1 3", "inf"}) {
+  for (const char* line : {"", " ", "1.5 x", "1.5x", "1.5 0", "1.5 -1", "nan", "1.5 0.1 3", "inf",
+                           "5,2", "100000", "-300 1"}) {
     EXPECT_FALSE(readSpeedLine(line, 0.1, 0)) << line;
   }
-  for (const char* line : {"1.5", " 1.5 ", "1.5,0.2", "1.5\t0.2", "1.5 , 0.2 "}) {
+  for (const char* line : {"1.5", " 1.5 ", "1.5,0.2", "5, 2", "1.5\t0.2", "1.5 , 0.2 "}) {
     EXPECT_TRUE(readSpeedLine(line, 0.1, 0)) << line;
   }
 }
