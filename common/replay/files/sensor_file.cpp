@@ -38,9 +38,20 @@ SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string())
   try {
     root_ = YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw StartupError(ExitCode::kUnavailable, name_ + ": " + error.what());
+    throw StartupError(ExitCode::kData, name_ + ": " + error.what());
   }
   if (!root_.IsMap()) wrong("the file", "holds no `key: value` lines");
+  refuseKeysThatComeTwice();
+}
+
+/// Others take the first one, or the last.
+void SensorFile::refuseKeysThatComeTwice() const {
+  std::set<std::string> keys;
+  for (const auto& entry : root_) {
+    if (!entry.first.IsScalar() || keys.insert(entry.first.Scalar()).second) continue;
+    throw StartupError(ExitCode::kData, fmt::format("{}: the key `{}` is there twice; keep one",
+                                                    name_, entry.first.Scalar()));
+  }
 }
 
 SensorFile SensorFile::section(const std::string& key) const {
@@ -114,7 +125,7 @@ std::optional<RigidTransform> SensorFile::transform(const char* key) const {
 }
 
 void SensorFile::wrong(const std::string& key, const std::string& what) const {
-  throw StartupError(ExitCode::kUnavailable,
+  throw StartupError(ExitCode::kData,
                      name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
 }
 

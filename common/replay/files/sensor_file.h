@@ -17,8 +17,8 @@ namespace perdure::replay {
 
 class SensorFile {
  public:
-  /// Throws StartupError(kUnavailable) where the file is missing or no map; so do the others where
-  /// a value is missing or makes no sense.
+  /// Throws StartupError: kUnavailable where the file is missing; kData where it is no map, or a
+  /// key is there twice. So do the others where a value is missing or makes no sense.
   explicit SensorFile(const std::filesystem::path& file);
 
   bool has(const std::string& key) const { return static_cast<bool>(value(key)); }
@@ -42,7 +42,10 @@ class SensorFile {
   std::vector<std::string> unknownKeys() const;
 
  private:
-  SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {}
+  SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {
+    refuseKeysThatComeTwice();
+  }
+  void refuseKeysThatComeTwice() const;
   YAML::Node value(const std::string& key) const;
 
   std::string name_;
@@ -59,8 +62,8 @@ class SensorFile {
 /// One of the three transforms must be there. Where `T_BC_given` is given it may be missing.
 /// Models: none; radial-tangential, radtan, plumb_bob (4 coefficients, 5 with k3, 8 rational);
 /// equidistant, equi, fisheye, kannala_brandt; Kalibr's omni, eucm and ds become the equidistant
-/// lens that is nearest to them (common/camera/wide_lens.h). Time offset, readout and rate are 0 where they are
-/// missing.
+/// lens that is nearest to them (common/camera/wide_lens.h). Time offset, readout and rate are 0
+/// where they are missing.
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given = {});
 /// Of two cameras of Kalibr's chain: where T_cam_imu is missing, T_cn_cnm1 (this camera from the

@@ -101,5 +101,23 @@ TEST_F(RigFile, OfAnotherSizeOrWithoutACameraIsRefused) {
   EXPECT_THROW(applyRig(mono, "rig.yaml", stereo), StartupError);
 }
 
+TEST_F(RigFile, AKeyThatIsThereTwiceIsRefused) {
+  const std::string text = rigText(someRig(), "");
+  const auto refusalOf = [&](const std::string& twice) {
+    try {
+      readRig(write(twice));
+    } catch (const StartupError& error) {
+      EXPECT_EQ(error.code(), ExitCode::kData);
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refusalOf(text + text), testing::HasSubstr("the key `cam0` is there twice"));
+  std::string in_section = text;
+  const auto at = in_section.find("  rate_hz");
+  in_section.insert(at, in_section.substr(at, in_section.find('\n', at) + 1 - at));
+  EXPECT_THAT(refusalOf(in_section), testing::HasSubstr("the key `rate_hz` is there twice"));
+}
+
 }  // namespace
 }  // namespace perdure::replay
