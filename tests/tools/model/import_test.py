@@ -425,9 +425,9 @@ class Operators(Importing):
 
 @unittest.skipUnless("PERDURE_BIN" in os.environ, "run by ctest")
 class Command(Importing):
-    def perdure(self, *words):
+    def perdure(self, *words, folder=None):
         done = subprocess.run([os.environ["PERDURE_BIN"] + "/perdure", "model", *map(str, words)], capture_output=True,
-                              text=True)
+                              text=True, cwd=folder)
         return done.returncode, done.stdout + done.stderr
 
     def test_it_writes_network_description_and_drawing(self):
@@ -444,6 +444,14 @@ class Command(Importing):
                                     path.parent / "picture.ppm", "--out", drawn)
         self.assertEqual(status, 0, told)
         self.assertTrue(drawn.exists())
+
+    def test_without_a_folder_the_files_lie_beside_the_network(self):
+        folder = self.made(tiny.yolox).parent
+        status, told = self.perdure("import", "net.onnx", NAMES, "--no-check", folder=folder)
+        self.assertEqual(status, 0, told)
+        self.assertIn("written     net.perdure.onnx, net.perdure.onnx.model.json\n", told)
+        self.assertEqual(sorted(p.name for p in folder.glob("*net.perdure*")),
+                         ["net.perdure.onnx", "net.perdure.onnx.model.json", "net.perdure.png"])
 
     def test_what_opencv_does_not_have_is_for_onnx_runtime_where_the_program_has_it(self):
         path = self.made(tiny_queries.rtdetr_chosen)
@@ -473,7 +481,72 @@ class Command(Importing):
         status, told = self.perdure("import", path, NAMES, "--out", self.folder / "out")
         self.assertEqual(status, 78, told)
         self.assertIn("OpenCV does not take its operator Unheard", told)
-        self.assertEqual(list((self.folder / "out").iterdir()), [])
+        self.assertIn(f"{self.folder}/out/net.perdure.onnx", told)
+        self.assertFalse((self.folder / "out").exists())
+
+    def contents(self, folder):
+        return {p.name: p.read_bytes() for p in folder.iterdir()}
+
+    def test_a_network_that_was_there_outlives_every_import_that_fails(self):
+        out = self.folder / "out"
+        path = self.made(tiny.yolox)
+        status, told = self.perdure("import", path, NAMES, "--out", out)
+        self.assertEqual(status, 0, told)
+        description = out / "net.perdure.onnx.model.json"
+        description.write_text(description.read_text().replace('"temperature": 1.0', '"temperature": 1.5'))
+        before = self.contents(out)
+        model = onnx.load(str(path))
+        for weights in model.graph.initializer:
+            if weights.data_type == TensorProto.FLOAT:
+                weights.CopyFrom(numpy_helper.from_array(numpy_helper.to_array(weights) * np.float32(np.nan),
+                                                         weights.name))
+        (self.folder / "nan").mkdir()
+        onnx.save(model, str(self.folder / "nan/net.onnx"))
+        for failing in ([path, NAMES, "--no-check", "--scale", "0"], [path, NAMES, "--pad", "300"],
+                        [path, "--classes=car"], [self.folder / "nan/net.onnx", NAMES],
+                        [path, NAMES, "--image", "/nowhere.jpg"]):
+            status, told = self.perdure("import", *failing, "--out", out)
+            self.assertNotEqual(status, 0, told)
+            self.assertTrue(self.contents(out) == before, failing)
+        (self.folder / "taken/net.perdure.onnx.model.json").mkdir(parents=True)
+        status, told = self.perdure("import", path, NAMES, "--out", self.folder / "taken")
+        self.assertEqual(status, 69, told)
+        self.assertEqual([p.name for p in (self.folder / "taken").iterdir()], ["net.perdure.onnx.model.json"])
+        self.assertEqual(self.perdure("import", path, NAMES, "--out", out)[0], 0)
+        self.assertNotIn("1.5", description.read_text())
+
+    def files_of(self, path):
+        status, told = self.perdure("import", path, NAMES, "--out", self.folder / "sized")
+        self.assertEqual(status, 0, told)
+        return sorted((self.folder / "sized").iterdir())
+
+    def on_a_small_disk(self, blocks, command):
+        """What is said, and what is there then, of a disk that `command` fills; {disk} is its folder."""
+        disk = self.folder / "disk"
+        disk.mkdir(exist_ok=True)
+        script = f"mount -t tmpfs -o size={blocks}k small {disk} || exit 99\n{command.format(disk=disk)}\n"
+        done = subprocess.run(["unshare", "--map-root-user", "--mount", "sh", "-c", script], capture_output=True,
+                              text=True)
+        if done.returncode == 99 or "unshare" in done.stderr:
+            self.skipTest("no right to mount a small disk")
+        return done
+
+    def test_a_full_disk_is_74_and_leaves_what_was_there(self):
+        path = self.made(tiny.yolox)
+        importing = f"{os.environ['PERDURE_BIN']}/perdure model import {path} {NAMES} --out {{disk}}"
+        parts = [4 * -(-p.stat().st_size // 4096) for p in self.files_of(path)]
+        for left in (8, parts[0], sum(parts[:2])):  # kilobytes: the network ends in them, then the others do
+            done = self.on_a_small_disk(2000, f"""{importing} >&2 || exit 98
+                cd {{disk}} && sha256sum * > {self.folder}/sums && cd -
+                dd if=/dev/zero of={{disk}}/ballast bs=4k 2>/dev/null; truncate -s -{left}k {{disk}}/ballast
+                {importing} >&2; echo status $? >&2
+                rm {{disk}}/ballast; ls -A {{disk}}; cd {{disk}} && sha256sum --quiet -c {self.folder}/sums""")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("status 74\n", done.stderr)
+            self.assertIn("free space", done.stderr)
+            self.assertIn("net.perdure", done.stderr)
+            self.assertTrue(done.stdout.endswith("net.perdure.onnx\nnet.perdure.onnx.model.json\nnet.perdure.png\n"),
+                            done.stdout)
 
 
 class Computing(unittest.TestCase):

@@ -19,7 +19,7 @@ except ImportError as missing:
 from . import counterpart
 from . import heads as tracing
 from . import level_families, output_families, quantised, reshaping, sayings
-from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault
+from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault, unwritten
 from .finding import INPUTS
 from .graph import Graph
 from .opencv import Repair
@@ -35,6 +35,7 @@ def parsed(arguments):
     parser = argparse.ArgumentParser(prog="perdure_model", description=__doc__)
     parser.add_argument("network", type=Path)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--shown", type=Path, help="what messages call the file of --out")
     parser.add_argument("--reference", type=Path)
     parser.add_argument("--classes", default="")
     parser.add_argument("--family", default="", choices=["", *sayings.FAMILIES])
@@ -215,8 +216,6 @@ def description(args, found, names, size, request):
     keys = dict(found.keys)
     if keys.get("boxes", {}).get("form") == "offsets":
         keys["boxes"]["priors_file"] = args.out.name + ".priors.txt"
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        np.savetxt(str(args.out) + ".priors.txt", request.priors, fmt="%.7g")
     return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
             "family": found.family,
             "input": {"width": size[0], "height": size[1], **input_of(found, request)}, "classes": names, **keys,
@@ -232,11 +231,25 @@ def write_reference(args, graph, size, given, found, inside):
     values, why = counterpart.answers(args.network, graph, image, found, outputs, inside)
     if why:
         return why
-    folder.mkdir(parents=True, exist_ok=True)
-    image.tofile(folder / "input.f32")
-    for name in outputs:
-        np.ascontiguousarray(values[name], np.float32).tofile(folder / f"{name}.f32")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        image.tofile(folder / "input.f32")
+        for name in outputs:
+            np.ascontiguousarray(values[name], np.float32).tofile(folder / f"{name}.f32")
+    except OSError as e:
+        raise unwritten(f"{folder}, where answers are compared,", e)
     return ""
+
+
+def write(args, graph, described, priors):
+    try:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        onnx.save(graph.to_model(), str(args.out))
+        Path(f"{args.out}.model.json").write_text(json.dumps(described, indent=1) + "\n")
+        if "priors_file" in described.get("boxes", {}):
+            np.savetxt(f"{args.out}.priors.txt", priors, fmt="%.7g")
+    except OSError as e:
+        raise unwritten(args.shown or e.filename or args.out, e)
 
 
 def run(args):
@@ -261,13 +274,7 @@ def run(args):
         found.keys["backend"] = "onnxruntime"
         found.notes.append(f"it computes with {', '.join(inside)}, which OpenCV does not have: for ONNX Runtime alone")
     graph.keep(outputs)
-    text = json.dumps(description(args, found, names, size, request), indent=1)
-    try:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        onnx.save(graph.to_model(), str(args.out))
-        Path(str(args.out) + ".model.json").write_text(text + "\n")
-    except OSError as e:
-        raise Fault(f"{e.filename or args.out} cannot be written ({e.strerror}); give --out DIR", UNAVAILABLE)
+    write(args, graph, description(args, found, names, size, request), request.priors)
     print(f"family      {found.family}, {found.classes} classes, input {size[0]}x{size[1]}")
     print(f"cut at      {', '.join(outputs)}: {len(graph.nodes)} operators are left")
     if repaired:
