@@ -236,11 +236,48 @@ class Classes(Importing):
         self.assertIn("does not say the names of its 3 classes; give --classes", message)
         self.assertEqual(status, 64)
 
-    def test_a_file_has_one_a_line_and_repeated_ones_are_told_apart(self):
-        names = self.folder / "names.txt"
-        names.write_text("Car\n\nN/A\nN/A\n")
-        self.assertEqual(self.run_import(self.made(tiny.yolox), f"--classes={names}")[1]["classes"],
+    def of_file(self, content, network=None):
+        (self.folder / "names.txt").write_bytes(content)
+        return [network or self.made(tiny.yolox), f"--classes={self.folder / 'names.txt'}"]
+
+    def test_a_file_has_one_a_line(self):
+        for content in (b"Car\n\nperson \ndog\n", b"\xef\xbb\xbfcar\r\nperson\r\ndog\r\n", b"car\rperson\rdog"):
+            self.assertEqual(self.run_import(*self.of_file(content))[1]["classes"], ["car", "person", "dog"])
+        self.assertEqual(self.run_import(*self.of_file("fußgänger\nauto\nstraßen bahn".encode()))[1]["classes"],
+                         ["fußgänger", "auto", "straßen bahn"])
+
+    def test_numbers_that_no_class_has_are_told_apart(self):
+        self.assertEqual(self.run_import(*self.of_file(b"Car\n\nN/A\nN/A\n"))[1]["classes"],
                          ["car", "n/a-1", "n/a-2"])
+
+    def test_a_name_that_is_there_twice_is_refused(self):
+        message, status = self.refused(*self.of_file(b"car\n\nperson\nCar\n"))
+        self.assertIn("names.txt: lines 1 and 4 are both car; give each class a name of its own", message)
+        self.assertEqual(status, 65)
+        message, _ = self.refused(*self.of_file(b"car\nperson\nperson\ncar\ncar\n"))
+        self.assertIn("lines 2 and 3 are both person, and 2 more names repeat;", message)
+        message, status = self.refused(self.made(tiny.yolox), "--classes=car,dog,car")
+        self.assertIn("--classes: the names 1 and 3 are both car", message)
+        self.assertEqual(status, 64)
+
+    def test_names_that_a_network_itself_repeats_are_told_apart(self):
+        path = self.made(tiny.yolov8)
+        model = onnx.load(str(path))
+        model.metadata_props[0].value = "{0: 'car', 1: 'car', 2: 'dog'}"
+        onnx.save(model, str(path))
+        self.assertEqual(self.run_import(path)[1]["classes"], ["car-0", "car-1", "dog"])
+
+    def test_what_is_no_plain_text_in_utf8_is_refused(self):
+        names = "car\nfußgänger\ndog\n"
+        for content, words in ((names.encode("utf-16"), "names.txt is not UTF-8 but UTF-16"),
+                               (names.encode("utf-16-le"), "names.txt is not UTF-8 but UTF-16"),
+                               (names.encode("latin-1"), "names.txt:2 is not UTF-8 (byte 0xdf); save the file as UTF-8"),
+                               (b"car\nperson\n\x1b[1mdog\n", "names.txt:3 holds the control character U+001B"),
+                               (b"car\tauto\nperson\ndog\n", "names.txt:1 holds the control character U+0009"),
+                               (b"\n \n", "names.txt holds no names")):
+            message, status = self.refused(*self.of_file(content))
+            self.assertIn(words, message)
+            self.assertEqual(status, 65, message)
 
 
 class Families(Importing):

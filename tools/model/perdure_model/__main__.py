@@ -2,9 +2,7 @@
 network, its model.json and what to compare OpenCV's answers with; tells its findings."""
 
 import argparse
-import ast
 import json
-import os
 import sys
 from pathlib import Path
 
@@ -19,6 +17,7 @@ except ImportError as missing:
 from . import counterpart
 from . import heads as tracing
 from . import level_families, output_families, quantised, reshaping, sayings
+from .class_names import names_in, names_of
 from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault, unwritten
 from .finding import INPUTS
 from .graph import Graph
@@ -90,26 +89,6 @@ def pair_of(text):
     return pair
 
 
-def names_of(text):
-    """A file with a name a line, or a list with commas."""
-    if os.path.isfile(text):  # also of a list that is longer than any path: it is none
-        names = [line.strip() for line in Path(text).read_text(errors="replace").splitlines() if line.strip()]
-    elif "," in text or not ("/" in text or text.endswith((".txt", ".names"))):
-        names = [name.strip() for name in text.split(",")]
-    else:
-        raise Fault(f"the file of class names {text} is missing; give a file with a name a line, or names with commas "
-                    "between", UNAVAILABLE)
-    if not all(names) or not names:
-        raise Fault(f"{text} holds no names, or an empty one; give a name for each class of the network", USAGE)
-    return distinct(names)
-
-
-def distinct(names):
-    """COCO's 91 have N/A eleven times: those become n/a-12 and so on."""
-    lower = [name.lower() for name in names]
-    return [n if lower.count(n) == 1 else f"{n}-{i}" for i, n in enumerate(lower)]
-
-
 def priors_of(path):
     try:
         priors = np.loadtxt(path, ndmin=2)
@@ -120,15 +99,6 @@ def priors_of(path):
     if priors.shape[1] != 4 or not (priors[:, 2:] > 0).all():
         raise Fault(f"{path} does not hold priors; a line x y width height for each, in shares of the image")
     return priors
-
-
-def names_in(graph):
-    """Ultralytics writes the class names into the file."""
-    try:
-        names = ast.literal_eval(graph.metadata["names"])
-        return distinct([str(names[i]) for i in sorted(names)] if isinstance(names, dict) else [str(n) for n in names])
-    except (KeyError, ValueError, SyntaxError, TypeError):
-        return None
 
 
 def recognise(path, graph, size, request):
