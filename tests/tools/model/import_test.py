@@ -95,12 +95,13 @@ class Files(Importing):
 
     def test_what_is_no_onnx_or_is_cut_off_is_said_to_be(self):
         whole = self.made(tiny.yolov8).read_bytes()
-        for content in (b"", b"hello", whole[:10], whole[:len(whole) // 2], whole[:-7]):
+        text = b"this is a text\nof two lines\n"
+        for content in (b"", b"hello", text, whole[:10], whole[:len(whole) // 2], whole[:-7]):
             path = self.folder / "part.onnx"
             path.write_bytes(content)
             message, status = self.refused(path, NAMES)
             self.assertIn("not a whole ONNX file", message)
-            self.assertEqual(status, 78)
+            self.assertEqual(status, 65)
 
     def test_flipped_bytes_never_end_without_a_sentence(self):
         whole = bytearray(self.made(tiny.yolov5).read_bytes())
@@ -112,7 +113,7 @@ class Files(Importing):
             path = self.folder / "flipped.onnx"
             path.write_bytes(bytes(broken))
             with redirect_stdout(io.StringIO()):
-                self.assertIn(self.status_of(path), (0, 64, 69, 78))
+                self.assertIn(self.status_of(path), (0, 64, 65, 69, 78))
 
     def status_of(self, path):
         before, sys.argv = sys.argv, ["perdure_model", str(path), "--out", str(self.folder / "o.onnx"), NAMES]
@@ -125,6 +126,17 @@ class Files(Importing):
         finally:
             sys.argv, sys.stderr = before, errors
 
+
+    def test_what_the_disk_does_not_take_is_74(self):
+        path = self.made(tiny.yolox)
+        for name in ("out.onnx", "out.onnx.model.json"):
+            (self.folder / name).symlink_to("/dev/full")
+            with self.assertRaises(Fault) as caught:
+                self.run_import(path, NAMES)
+            self.assertIn("out.onnx cannot be written whole (No space left on device); free space",
+                          str(caught.exception))
+            self.assertEqual(caught.exception.status, 74)
+            (self.folder / name).unlink()
 
     def test_a_folder_that_cannot_be_written_is_said(self):
         blocked = self.folder / "file"
@@ -213,8 +225,23 @@ class Inputs(Importing):
 
     def test_wrong_options_are_usage(self):
         path = self.made(tiny.yolox)
-        for wrong in ("--size=64", "--size=axb", "--anchors=1,2,3", "--scale=x", "--variances=1", "--classes=car,,dog"):
-            self.assertEqual(self.refused(path, NAMES, wrong)[1], 64, wrong)
+        for wrong, words in (
+                ("--size=64", "--size 64: is not WIDTHxHEIGHT in pixels, such as 640x480"),
+                ("--size=416X416", "--size 416X416: is not WIDTHxHEIGHT"), ("--size=abc", "--size abc: is not WIDTHx"),
+                ("--input=1 x 2", "--input 1 x 2: is not WIDTHxHEIGHT"),
+                ("--anchors=1,2,3", "--anchors 1,2,3: are pairs"),
+                ("--anchors=1,2/x,4", "--anchors 1,2/x,4: x is not a number"),
+                ("--scale=x", "--scale x: x is not a number"),
+                ("--mean=1,nan,2", "--mean 1,nan,2: nan is not a number"),
+                ("--pad=grey", "--pad grey: grey is not a number"), ("--variances=1", "--variances 1: are two numbers"),
+                ("--bins=abc", "--bins abc: is not a whole number above 0"), ("--bins=0", "--bins 0: is not a whole"),
+                ("--cell-offset=half", "--cell-offset half: half is not a number"),
+                ("--classes=car,,dog", "--classes car,,dog holds an empty name"),
+                ("--family=foo", "--family foo: is not known; known are yolov5, yolov7"),
+                ("--nonsense=1", "--nonsense=1")):
+            message, status = self.refused(path, NAMES, wrong)
+            self.assertEqual(status, 64, wrong)
+            self.assertIn(words, message)
 
 
 class Classes(Importing):
@@ -271,7 +298,7 @@ class Classes(Importing):
         names = "car\nfußgänger\ndog\n"
         for content, words in ((names.encode("utf-16"), "names.txt is not UTF-8 but UTF-16"),
                                (names.encode("utf-16-le"), "names.txt is not UTF-8 but UTF-16"),
-                               (names.encode("latin-1"), "names.txt:2 is not UTF-8 (byte 0xdf); save the file as UTF-8"),
+                               (names.encode("latin-1"), "names.txt:2 is not UTF-8 (byte 0xdf); save the file as"),
                                (b"car\nperson\n\x1b[1mdog\n", "names.txt:3 holds the control character U+001B"),
                                (b"car\tauto\nperson\ndog\n", "names.txt:1 holds the control character U+0009"),
                                (b"\n \n", "names.txt holds no names")):
@@ -509,6 +536,28 @@ class Command(Importing):
         status, told = self.perdure("--help")
         self.assertEqual(status, 0)
         self.assertIn("perdure model import yolov8n.onnx --image street.jpg", told)
+
+    def test_what_is_wrong_is_one_sentence(self):
+        path = self.made(tiny.yolox)
+        text = self.folder / "text.onnx"
+        text.write_text("this is a text\nof two lines\n")
+        picture = path.parent / "picture.ppm"
+        for words, wanted in ((["import", path, NAMES, "--family", "foo"], 64), (["import", text, NAMES], 65),
+                              (["import", path, NAMES, "--size", "abc"], 64),
+                              (["look", path, "--image", picture, "--out", self.folder / "noext"], 64)):
+            status, told = self.perdure(*words)
+            self.assertEqual(status, wanted, told)
+            self.assertEqual(told.count("\n"), 1, told)
+            self.assertTrue(told.startswith("perdure"), told)
+
+    def test_output_that_nobody_takes_is_74(self):
+        path = self.made(tiny.yolox)
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([os.environ["PERDURE_BIN"] + "/perdure", "model", "import", path, NAMES],
+                                  stdout=full, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 74, done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertIn("standard output cannot be written whole", done.stderr)
 
     def test_what_nobody_can_run_leaves_nothing_behind(self):
         path = self.made(tiny.yolox)
