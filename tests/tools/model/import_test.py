@@ -537,6 +537,21 @@ class Command(Importing):
         self.assertEqual(status, 0)
         self.assertIn("perdure model import yolov8n.onnx --image street.jpg", told)
 
+    def test_files_take_their_places_together(self):
+        """One that cannot be replaced is mounted there; the network before it is taken back."""
+        path = self.made(tiny.yolox)
+        importing = f"{os.environ['PERDURE_BIN']}/perdure model import {path} {NAMES} --out {{disk}}"
+        done = self.on_a_small_disk(2000, f"""{importing} --pad 100 >&2 || exit 98
+            cd {{disk}} && echo >> net.perdure.onnx && sha256sum * > {self.folder}/sums && cd -
+            mount --bind {path} {{disk}}/net.perdure.onnx.model.json || exit 99
+            {importing} >&2; echo status $? >&2; umount {{disk}}/net.perdure.onnx.model.json
+            ls -A {{disk}}; cd {{disk}} && sha256sum --quiet -c {self.folder}/sums""")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("disk/net.perdure.onnx.model.json cannot be written (Device or resource busy); give", done.stderr)
+        self.assertIn("status 69\n", done.stderr)
+        self.assertTrue(done.stdout.endswith("net.perdure.onnx\nnet.perdure.onnx.model.json\nnet.perdure.png\n"),
+                        done.stdout)
+
     def test_what_is_wrong_is_one_sentence(self):
         path = self.made(tiny.yolox)
         text = self.folder / "text.onnx"
