@@ -1,7 +1,6 @@
 #include "tools/model/command.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -13,6 +12,7 @@
 #include "tools/model/import_run.h"
 #include "tools/model/importer.h"
 #include "tools/model/look.h"
+#include "tools/model/staging.h"
 
 namespace perdure::tools {
 namespace {
@@ -37,28 +37,6 @@ with what the file says, and looks at a picture. Writes
 Look at the picture: colours, mean and scale of the input are the usual ones of the family, and
 boxes that are a little off say that they are other ones here.)";
 
-/// A folder that is gone with its owner.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "perdure-model-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw StartupError(ExitCode::kUnavailable, name + " cannot be made; is the disk full?");
-    }
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 void showSights(const fs::path& network, const fs::path& image, double threshold,
                 const fs::path& drawing) {
   std::optional<Frame> frame;
@@ -72,7 +50,6 @@ void showSights(const fs::path& network, const fs::path& image, double threshold
                 s.box.x1, s.box.y1, s.box.x2, s.box.y2);
   }
   drawSights(frame ? *frame : greyRamp(look.input_width, look.input_height), look.sights, drawing);
-  std::printf("drawn       %s\n", drawing.c_str());
 }
 
 void compare(const fs::path& network, const fs::path& reference) {
@@ -90,30 +67,41 @@ void compare(const fs::path& network, const fs::path& reference) {
               answers.difference);
 }
 
-}  // namespace
-
-void importAndLook(const ImportOptions& request) {
-  const fs::path out = importedPath(request.network, request.out);
-  const TemporaryFolder folder;
-  ImportRequest wanted{request.network, out, request.unchecked ? fs::path() : folder.path(),
-                       request.arguments};
+/// The Python part, and what OpenCV makes of its network.
+void importTo(const fs::path& out, const Staging& staging, const ImportOptions& request) {
+  const TemporaryFolder reference(fs::temp_directory_path(), "perdure-model-",
+                                  "set TMPDIR to a folder that you may write");
+  const fs::path made = staging.path() / out.filename();
+  ImportRequest wanted{request.network, made, out,
+                       request.unchecked ? fs::path() : reference.path(), request.arguments};
   if (!request.image.empty()) {  // what "--input camera" goes by
     const Frame picture = readPicture(request.image);
     wanted.arguments.push_back(fmt::format("--camera={}x{}", picture.width, picture.height));
   }
   std::fflush(stdout);
   if (const int status = importNetwork(wanted); status != 0) throw CLI::RuntimeError(status);
-  const fs::path description = out.string() + ".model.json";
-  try {
-    compare(out, folder.path());
-    showSights(out, request.image, request.threshold, fs::path(out).replace_extension(".png"));
-  } catch (...) {  // what cannot be used is not left to be used
-    std::error_code ignored;
-    fs::remove(out, ignored);
-    fs::remove(description, ignored);
-    fs::remove(out.string() + ".priors.txt", ignored);
-    throw;
+  compare(made, reference.path());
+  showSights(made, request.image, request.threshold, fs::path(made).replace_extension(".png"));
+}
+
+}  // namespace
+
+void importAndLook(const ImportOptions& request) {
+  const fs::path out = importedPath(request.network, request.out);
+  std::error_code error;
+  if (!fs::exists(request.network, error) && !error) {
+    throw StartupError(ExitCode::kUnavailable,
+                       request.network.string() + " is missing; give an .onnx file");
   }
+  Staging staging(out.parent_path());
+  try {
+    importTo(out, staging, request);
+    staging.publish();
+  } catch (const StartupError& fault) {
+    throw StartupError(fault.code(), staging.said(fault.what()));
+  }
+  const fs::path description = out.string() + ".model.json";
+  std::printf("drawn       %s\n", fs::path(out).replace_extension(".png").c_str());
   std::printf("written     %s, %s\nuse it      perdure-inference --set model.path=%s\n",
               out.c_str(), description.c_str(), out.c_str());
   std::printf(
@@ -193,7 +181,9 @@ void addLook(CLI::App& model, const std::shared_ptr<ImportOptions>& request) {
       ->check(CLI::Range(0.001, 0.999))
       ->capture_default_str();
   command->callback([request] {
+    checkDrawing(request->out);
     showSights(request->network, request->image, request->threshold, request->out);
+    std::printf("drawn       %s\n", request->out.c_str());
   });
 }
 

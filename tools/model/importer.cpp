@@ -43,18 +43,15 @@ int importNetwork(const ImportRequest& request) {
                        "perdure_model is missing; it belongs into tools/model of the source tree, "
                        "or into share/perdure of the installation");
   }
-  std::vector<std::string> words = {kPython,
-                                    "-B",
-                                    "-m",
-                                    "perdure_model",
-                                    request.network.string(),
-                                    "--out",
-                                    request.out.string()};
+  std::vector<std::string> words = {kPython,         "-B",    "-m",
+                                    "perdure_model", "--out", request.out.string()};
+  if (!request.shown.empty()) words.insert(words.end(), {"--shown", request.shown.string()});
   if (!request.reference.empty()) {
     words.insert(words.end(), {"--reference", request.reference.string()});
   }
   if (inference::hasOnnxRuntime()) words.emplace_back("--onnx-runtime");
   words.insert(words.end(), request.arguments.begin(), request.arguments.end());
+  words.insert(words.end(), {"--", request.network.string()});
   if (!fs::exists(kPython)) {
     throw StartupError(ExitCode::kUnavailable,
                        std::string(kPython) + " is missing; apt-get install python3-onnx");

@@ -11,6 +11,7 @@ namespace perdure::tools {
 struct ImportRequest {
   std::filesystem::path network;
   std::filesystem::path out;           ///< the .onnx to write; its description is OUT.model.json
+  std::filesystem::path shown;         ///< what messages call `out`; empty: as it is
   std::filesystem::path reference;     ///< a folder for checkAnswers(); empty: none is written
   std::vector<std::string> arguments;  ///< of perdure_model: --classes, --family …
 };

@@ -7,7 +7,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
 #include "tools/outputs/pictures/drawing.h"
@@ -89,7 +91,16 @@ Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
   return look;
 }
 
+void checkDrawing(const fs::path& file) {
+  const std::string kind = replay::toLower(file.extension().string());
+  if (kind == ".png" || kind == ".jpg" || kind == ".jpeg") return;
+  throw StartupError(ExitCode::kUsage, "--out " + file.string() +
+                                           ": a drawing is a .png or a .jpg; give a name that "
+                                           "ends so");
+}
+
 void drawSights(const Frame& frame, const std::vector<Sight>& sights, const fs::path& file) {
+  checkDrawing(file);
   cv::Mat image = pixelsOf(frame);
   const cv::Rect all({}, image.size());
   std::vector<cv::Rect> taken;
@@ -106,10 +117,11 @@ void drawSights(const Frame& frame, const std::vector<Sight>& sights, const fs::
     drawText(image, text, {place.x + 3, place.y + place.height - 4}, kPaper);
     taken.push_back(place);
   }
-  if (!cv::imwrite(file.string(), image)) {
-    throw StartupError(ExitCode::kUnavailable,
-                       file.string() + " cannot be written; choose another folder");
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(file.extension().string(), image, bytes)) {
+    throwUnwritten(file, "the picture cannot be packed");
   }
+  writeChecked(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace perdure::tools

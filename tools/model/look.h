@@ -31,7 +31,11 @@ struct Look {
 /// `frame` may be null: the grey ramp of the input's size is then looked at.
 Look lookAt(const std::filesystem::path& network, const Frame* frame, double threshold);
 
-/// Writes the picture with boxes, names and scores. Throws StartupError (69) where it cannot.
+/// Throws StartupError (64) where the name is not that of a PNG or JPEG.
+void checkDrawing(const std::filesystem::path& file);
+
+/// Writes the picture with boxes, names and scores. Throws StartupError (64, 69, 74) where it
+/// cannot.
 void drawSights(const Frame& frame, const std::vector<Sight>& sights,
                 const std::filesystem::path& file);
 

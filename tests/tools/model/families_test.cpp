@@ -107,9 +107,9 @@ class Families : public ::testing::TestWithParam<const char*> {
 fs::path Families::folder_;
 
 TEST_P(Families, AnswerAsTheirPublishedRulesSay) {
-  ASSERT_EQ(
-      importNetwork({here_ / "net.onnx", out_, here_ / "reference", linesOf(here_ / "arguments")}),
-      0);
+  ASSERT_EQ(importNetwork(
+                {here_ / "net.onnx", out_, "", here_ / "reference", linesOf(here_ / "arguments")}),
+            0);
   EXPECT_LT(checkAnswers(out_, here_ / "reference").difference, 1e-4);
   const auto found = candidatesOf(out_, here_ / "picture.ppm");
   const auto expected = expectedIn(here_ / "expected.csv");

@@ -95,12 +95,13 @@ class Files(Importing):
 
     def test_what_is_no_onnx_or_is_cut_off_is_said_to_be(self):
         whole = self.made(tiny.yolov8).read_bytes()
-        for content in (b"", b"hello", whole[:10], whole[:len(whole) // 2], whole[:-7]):
+        text = b"this is a text\nof two lines\n"
+        for content in (b"", b"hello", text, whole[:10], whole[:len(whole) // 2], whole[:-7]):
             path = self.folder / "part.onnx"
             path.write_bytes(content)
             message, status = self.refused(path, NAMES)
             self.assertIn("not a whole ONNX file", message)
-            self.assertEqual(status, 78)
+            self.assertEqual(status, 65)
 
     def test_flipped_bytes_never_end_without_a_sentence(self):
         whole = bytearray(self.made(tiny.yolov5).read_bytes())
@@ -112,7 +113,7 @@ class Files(Importing):
             path = self.folder / "flipped.onnx"
             path.write_bytes(bytes(broken))
             with redirect_stdout(io.StringIO()):
-                self.assertIn(self.status_of(path), (0, 64, 69, 78))
+                self.assertIn(self.status_of(path), (0, 64, 65, 69, 78))
 
     def status_of(self, path):
         before, sys.argv = sys.argv, ["perdure_model", str(path), "--out", str(self.folder / "o.onnx"), NAMES]
@@ -125,6 +126,17 @@ class Files(Importing):
         finally:
             sys.argv, sys.stderr = before, errors
 
+
+    def test_what_the_disk_does_not_take_is_74(self):
+        path = self.made(tiny.yolox)
+        for name in ("out.onnx", "out.onnx.model.json"):
+            (self.folder / name).symlink_to("/dev/full")
+            with self.assertRaises(Fault) as caught:
+                self.run_import(path, NAMES)
+            self.assertIn("out.onnx cannot be written whole (No space left on device); free space",
+                          str(caught.exception))
+            self.assertEqual(caught.exception.status, 74)
+            (self.folder / name).unlink()
 
     def test_a_folder_that_cannot_be_written_is_said(self):
         blocked = self.folder / "file"
@@ -213,8 +225,23 @@ class Inputs(Importing):
 
     def test_wrong_options_are_usage(self):
         path = self.made(tiny.yolox)
-        for wrong in ("--size=64", "--size=axb", "--anchors=1,2,3", "--scale=x", "--variances=1", "--classes=car,,dog"):
-            self.assertEqual(self.refused(path, NAMES, wrong)[1], 64, wrong)
+        for wrong, words in (
+                ("--size=64", "--size 64: is not WIDTHxHEIGHT in pixels, such as 640x480"),
+                ("--size=416X416", "--size 416X416: is not WIDTHxHEIGHT"), ("--size=abc", "--size abc: is not WIDTHx"),
+                ("--input=1 x 2", "--input 1 x 2: is not WIDTHxHEIGHT"),
+                ("--anchors=1,2,3", "--anchors 1,2,3: are pairs"),
+                ("--anchors=1,2/x,4", "--anchors 1,2/x,4: x is not a number"),
+                ("--scale=x", "--scale x: x is not a number"),
+                ("--mean=1,nan,2", "--mean 1,nan,2: nan is not a number"),
+                ("--pad=grey", "--pad grey: grey is not a number"), ("--variances=1", "--variances 1: are two numbers"),
+                ("--bins=abc", "--bins abc: is not a whole number above 0"), ("--bins=0", "--bins 0: is not a whole"),
+                ("--cell-offset=half", "--cell-offset half: half is not a number"),
+                ("--classes=car,,dog", "--classes car,,dog holds an empty name"),
+                ("--family=foo", "--family foo: is not known; known are yolov5, yolov7"),
+                ("--nonsense=1", "--nonsense=1")):
+            message, status = self.refused(path, NAMES, wrong)
+            self.assertEqual(status, 64, wrong)
+            self.assertIn(words, message)
 
 
 class Classes(Importing):
@@ -236,11 +263,48 @@ class Classes(Importing):
         self.assertIn("does not say the names of its 3 classes; give --classes", message)
         self.assertEqual(status, 64)
 
-    def test_a_file_has_one_a_line_and_repeated_ones_are_told_apart(self):
-        names = self.folder / "names.txt"
-        names.write_text("Car\n\nN/A\nN/A\n")
-        self.assertEqual(self.run_import(self.made(tiny.yolox), f"--classes={names}")[1]["classes"],
+    def of_file(self, content, network=None):
+        (self.folder / "names.txt").write_bytes(content)
+        return [network or self.made(tiny.yolox), f"--classes={self.folder / 'names.txt'}"]
+
+    def test_a_file_has_one_a_line(self):
+        for content in (b"Car\n\nperson \ndog\n", b"\xef\xbb\xbfcar\r\nperson\r\ndog\r\n", b"car\rperson\rdog"):
+            self.assertEqual(self.run_import(*self.of_file(content))[1]["classes"], ["car", "person", "dog"])
+        self.assertEqual(self.run_import(*self.of_file("fußgänger\nauto\nstraßen bahn".encode()))[1]["classes"],
+                         ["fußgänger", "auto", "straßen bahn"])
+
+    def test_numbers_that_no_class_has_are_told_apart(self):
+        self.assertEqual(self.run_import(*self.of_file(b"Car\n\nN/A\nN/A\n"))[1]["classes"],
                          ["car", "n/a-1", "n/a-2"])
+
+    def test_a_name_that_is_there_twice_is_refused(self):
+        message, status = self.refused(*self.of_file(b"car\n\nperson\nCar\n"))
+        self.assertIn("names.txt: lines 1 and 4 are both car; give each class a name of its own", message)
+        self.assertEqual(status, 65)
+        message, _ = self.refused(*self.of_file(b"car\nperson\nperson\ncar\ncar\n"))
+        self.assertIn("lines 2 and 3 are both person, and 2 more names repeat;", message)
+        message, status = self.refused(self.made(tiny.yolox), "--classes=car,dog,car")
+        self.assertIn("--classes: the names 1 and 3 are both car", message)
+        self.assertEqual(status, 64)
+
+    def test_names_that_a_network_itself_repeats_are_told_apart(self):
+        path = self.made(tiny.yolov8)
+        model = onnx.load(str(path))
+        model.metadata_props[0].value = "{0: 'car', 1: 'car', 2: 'dog'}"
+        onnx.save(model, str(path))
+        self.assertEqual(self.run_import(path)[1]["classes"], ["car-0", "car-1", "dog"])
+
+    def test_what_is_no_plain_text_in_utf8_is_refused(self):
+        names = "car\nfußgänger\ndog\n"
+        for content, words in ((names.encode("utf-16"), "names.txt is not UTF-8 but UTF-16"),
+                               (names.encode("utf-16-le"), "names.txt is not UTF-8 but UTF-16"),
+                               (names.encode("latin-1"), "names.txt:2 is not UTF-8 (byte 0xdf); save the file as"),
+                               (b"car\nperson\n\x1b[1mdog\n", "names.txt:3 holds the control character U+001B"),
+                               (b"car\tauto\nperson\ndog\n", "names.txt:1 holds the control character U+0009"),
+                               (b"\n \n", "names.txt holds no names")):
+            message, status = self.refused(*self.of_file(content))
+            self.assertIn(words, message)
+            self.assertEqual(status, 65, message)
 
 
 class Families(Importing):
@@ -425,9 +489,9 @@ class Operators(Importing):
 
 @unittest.skipUnless("PERDURE_BIN" in os.environ, "run by ctest")
 class Command(Importing):
-    def perdure(self, *words):
+    def perdure(self, *words, folder=None):
         done = subprocess.run([os.environ["PERDURE_BIN"] + "/perdure", "model", *map(str, words)], capture_output=True,
-                              text=True)
+                              text=True, cwd=folder)
         return done.returncode, done.stdout + done.stderr
 
     def test_it_writes_network_description_and_drawing(self):
@@ -444,6 +508,14 @@ class Command(Importing):
                                     path.parent / "picture.ppm", "--out", drawn)
         self.assertEqual(status, 0, told)
         self.assertTrue(drawn.exists())
+
+    def test_without_a_folder_the_files_lie_beside_the_network(self):
+        folder = self.made(tiny.yolox).parent
+        status, told = self.perdure("import", "net.onnx", NAMES, "--no-check", folder=folder)
+        self.assertEqual(status, 0, told)
+        self.assertIn("written     net.perdure.onnx, net.perdure.onnx.model.json\n", told)
+        self.assertEqual(sorted(p.name for p in folder.glob("*net.perdure*")),
+                         ["net.perdure.onnx", "net.perdure.onnx.model.json", "net.perdure.png"])
 
     def test_what_opencv_does_not_have_is_for_onnx_runtime_where_the_program_has_it(self):
         path = self.made(tiny_queries.rtdetr_chosen)
@@ -465,6 +537,43 @@ class Command(Importing):
         self.assertEqual(status, 0)
         self.assertIn("perdure model import yolov8n.onnx --image street.jpg", told)
 
+    def test_files_take_their_places_together(self):
+        """One that cannot be replaced is mounted there; the network before it is taken back."""
+        path = self.made(tiny.yolox)
+        importing = f"{os.environ['PERDURE_BIN']}/perdure model import {path} {NAMES} --out {{disk}}"
+        done = self.on_a_small_disk(2000, f"""{importing} --pad 100 >&2 || exit 98
+            cd {{disk}} && echo >> net.perdure.onnx && sha256sum * > {self.folder}/sums && cd -
+            mount --bind {path} {{disk}}/net.perdure.onnx.model.json || exit 99
+            {importing} >&2; echo status $? >&2; umount {{disk}}/net.perdure.onnx.model.json
+            ls -A {{disk}}; cd {{disk}} && sha256sum --quiet -c {self.folder}/sums""")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("disk/net.perdure.onnx.model.json cannot be written (Device or resource busy); give", done.stderr)
+        self.assertIn("status 69\n", done.stderr)
+        self.assertTrue(done.stdout.endswith("net.perdure.onnx\nnet.perdure.onnx.model.json\nnet.perdure.png\n"),
+                        done.stdout)
+
+    def test_what_is_wrong_is_one_sentence(self):
+        path = self.made(tiny.yolox)
+        text = self.folder / "text.onnx"
+        text.write_text("this is a text\nof two lines\n")
+        picture = path.parent / "picture.ppm"
+        for words, wanted in ((["import", path, NAMES, "--family", "foo"], 64), (["import", text, NAMES], 65),
+                              (["import", path, NAMES, "--size", "abc"], 64),
+                              (["look", path, "--image", picture, "--out", self.folder / "noext"], 64)):
+            status, told = self.perdure(*words)
+            self.assertEqual(status, wanted, told)
+            self.assertEqual(told.count("\n"), 1, told)
+            self.assertTrue(told.startswith("perdure"), told)
+
+    def test_output_that_nobody_takes_is_74(self):
+        path = self.made(tiny.yolox)
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([os.environ["PERDURE_BIN"] + "/perdure", "model", "import", path, NAMES],
+                                  stdout=full, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 74, done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertIn("standard output cannot be written whole", done.stderr)
+
     def test_what_nobody_can_run_leaves_nothing_behind(self):
         path = self.made(tiny.yolox)
         model = onnx.shape_inference.infer_shapes(onnx.load(str(path)))  # written down: nobody infers them then
@@ -473,7 +582,72 @@ class Command(Importing):
         status, told = self.perdure("import", path, NAMES, "--out", self.folder / "out")
         self.assertEqual(status, 78, told)
         self.assertIn("OpenCV does not take its operator Unheard", told)
-        self.assertEqual(list((self.folder / "out").iterdir()), [])
+        self.assertIn(f"{self.folder}/out/net.perdure.onnx", told)
+        self.assertFalse((self.folder / "out").exists())
+
+    def contents(self, folder):
+        return {p.name: p.read_bytes() for p in folder.iterdir()}
+
+    def test_a_network_that_was_there_outlives_every_import_that_fails(self):
+        out = self.folder / "out"
+        path = self.made(tiny.yolox)
+        status, told = self.perdure("import", path, NAMES, "--out", out)
+        self.assertEqual(status, 0, told)
+        description = out / "net.perdure.onnx.model.json"
+        description.write_text(description.read_text().replace('"temperature": 1.0', '"temperature": 1.5'))
+        before = self.contents(out)
+        model = onnx.load(str(path))
+        for weights in model.graph.initializer:
+            if weights.data_type == TensorProto.FLOAT:
+                weights.CopyFrom(numpy_helper.from_array(numpy_helper.to_array(weights) * np.float32(np.nan),
+                                                         weights.name))
+        (self.folder / "nan").mkdir()
+        onnx.save(model, str(self.folder / "nan/net.onnx"))
+        for failing in ([path, NAMES, "--no-check", "--scale", "0"], [path, NAMES, "--pad", "300"],
+                        [path, "--classes=car"], [self.folder / "nan/net.onnx", NAMES],
+                        [path, NAMES, "--image", "/nowhere.jpg"]):
+            status, told = self.perdure("import", *failing, "--out", out)
+            self.assertNotEqual(status, 0, told)
+            self.assertTrue(self.contents(out) == before, failing)
+        (self.folder / "taken/net.perdure.onnx.model.json").mkdir(parents=True)
+        status, told = self.perdure("import", path, NAMES, "--out", self.folder / "taken")
+        self.assertEqual(status, 69, told)
+        self.assertEqual([p.name for p in (self.folder / "taken").iterdir()], ["net.perdure.onnx.model.json"])
+        self.assertEqual(self.perdure("import", path, NAMES, "--out", out)[0], 0)
+        self.assertNotIn("1.5", description.read_text())
+
+    def files_of(self, path):
+        status, told = self.perdure("import", path, NAMES, "--out", self.folder / "sized")
+        self.assertEqual(status, 0, told)
+        return sorted((self.folder / "sized").iterdir())
+
+    def on_a_small_disk(self, blocks, command):
+        """What is said, and what is there then, of a disk that `command` fills; {disk} is its folder."""
+        disk = self.folder / "disk"
+        disk.mkdir(exist_ok=True)
+        script = f"mount -t tmpfs -o size={blocks}k small {disk} || exit 99\n{command.format(disk=disk)}\n"
+        done = subprocess.run(["unshare", "--map-root-user", "--mount", "sh", "-c", script], capture_output=True,
+                              text=True)
+        if done.returncode == 99 or "unshare" in done.stderr:
+            self.skipTest("no right to mount a small disk")
+        return done
+
+    def test_a_full_disk_is_74_and_leaves_what_was_there(self):
+        path = self.made(tiny.yolox)
+        importing = f"{os.environ['PERDURE_BIN']}/perdure model import {path} {NAMES} --out {{disk}}"
+        parts = [4 * -(-p.stat().st_size // 4096) for p in self.files_of(path)]
+        for left in (8, parts[0], sum(parts[:2])):  # kilobytes: the network ends in them, then the others do
+            done = self.on_a_small_disk(2000, f"""{importing} >&2 || exit 98
+                cd {{disk}} && sha256sum * > {self.folder}/sums && cd -
+                dd if=/dev/zero of={{disk}}/ballast bs=4k 2>/dev/null; truncate -s -{left}k {{disk}}/ballast
+                {importing} >&2; echo status $? >&2
+                rm {{disk}}/ballast; ls -A {{disk}}; cd {{disk}} && sha256sum --quiet -c {self.folder}/sums""")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("status 74\n", done.stderr)
+            self.assertIn("free space", done.stderr)
+            self.assertIn("net.perdure", done.stderr)
+            self.assertTrue(done.stdout.endswith("net.perdure.onnx\nnet.perdure.onnx.model.json\nnet.perdure.png\n"),
+                            done.stdout)
 
 
 class Computing(unittest.TestCase):

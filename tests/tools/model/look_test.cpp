@@ -74,7 +74,24 @@ TEST(Look, SaysWhatIsMissing) {
   EXPECT_THAT(messageOf([] { readPicture("/nowhere.jpg"); }), HasSubstr("give --image a"));
   EXPECT_THAT(messageOf([] { drawSights(greyRamp(8, 8), {}, "/nowhere/seen.png"); }),
               HasSubstr("/nowhere/seen.png cannot be written"));
+  for (const char* name : {"seen", "a.b/seen", "seen.", "seen.abc"}) {
+    EXPECT_THAT(messageOf([&] { drawSights(greyRamp(8, 8), {}, name); }),
+                HasSubstr(std::string("--out ") + name + ": a drawing is a .png or a .jpg"));
+  }
   EXPECT_THAT(messageOf([] { lookAt("/nowhere.onnx", nullptr, 0.5); }), HasSubstr("is missing"));
+}
+
+TEST(Look, SaysThatTheDiskIsFull) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  const Folder folder;
+  fs::create_symlink("/dev/full", folder.path_ / "seen.png");
+  try {
+    drawSights(greyRamp(8, 8), {}, folder.path_ / "seen.png");
+    FAIL() << "nothing was said";
+  } catch (const StartupError& e) {
+    EXPECT_EQ(e.code(), ExitCode::kInputOutput);
+    EXPECT_THAT(e.what(), HasSubstr("No space left on device; free space"));
+  }
 }
 
 TEST(Check, TellsAnswersThatDifferAndTensorsOfAnotherSize) {

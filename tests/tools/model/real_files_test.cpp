@@ -57,7 +57,7 @@ std::vector<Sight> seenBy(const fs::path& network, const std::vector<std::string
   const fs::path out = importedPath(network, folder);
   std::vector<std::string> arguments = {"--classes=" + cocoNames()};
   arguments.insert(arguments.end(), more.begin(), more.end());
-  EXPECT_EQ(importNetwork({network, out, folder / "reference", arguments}), 0);
+  EXPECT_EQ(importNetwork({network, out, "", folder / "reference", arguments}), 0);
   EXPECT_LT(checkAnswers(out, folder / "reference").difference, kMostDifference);
   const Frame frame = readPicture(streetPicture());
   const Look look = lookAt(out, &frame, 0.3);
@@ -139,7 +139,7 @@ TEST_P(RealFiles, SayWhatTheirDescriptionsInConfigSay) {
   const fs::path folder = fs::temp_directory_path() / ("perdure_real_" + std::to_string(getpid()));
   const fs::path out = importedPath(network, folder);
   const std::string names = (source() / "config/models/coco.names").string();
-  ASSERT_EQ(importNetwork({network, out, folder / "reference", {"--classes=" + names}}), 0);
+  ASSERT_EQ(importNetwork({network, out, "", folder / "reference", {"--classes=" + names}}), 0);
   EXPECT_LT(checkAnswers(out, folder / "reference").difference, kMostDifference);
   const Frame frame = readPicture(
       data() / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync/image_02/data/0000000000.jpg");

@@ -1,8 +1,6 @@
 """python3 -m perdure_model: the part of `perdure model import` that looks at graphs. Writes the
 network, its model.json and what to compare OpenCV's answers with; tells its findings."""
 
-import argparse
-import ast
 import json
 import os
 import sys
@@ -19,115 +17,14 @@ except ImportError as missing:
 from . import counterpart
 from . import heads as tracing
 from . import level_families, output_families, quantised, reshaping, sayings
-from .faults import CONFIGURATION, UNAVAILABLE, USAGE, Fault
+from .class_names import names_in
+from .faults import INPUT_OUTPUT, USAGE, Fault, unwritten
 from .finding import INPUTS
 from .graph import Graph
 from .opencv import Repair
+from .options import Request, parsed
 
 USUAL_CLUTTER_RATE = 0.79  # of the networks measured in services/inference/README.md
-
-
-def numbers(text):
-    return [float(n) for n in text.split(",")]
-
-
-def parsed(arguments):
-    parser = argparse.ArgumentParser(prog="perdure_model", description=__doc__)
-    parser.add_argument("network", type=Path)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--reference", type=Path)
-    parser.add_argument("--classes", default="")
-    parser.add_argument("--family", default="", choices=["", *sayings.FAMILIES])
-    parser.add_argument("--size", default="")
-    parser.add_argument("--input", default="")
-    parser.add_argument("--camera", default="")
-    parser.add_argument("--anchors", default="")
-    parser.add_argument("--priors", type=Path)
-    parser.add_argument("--variances", default="0.1,0.2")
-    parser.add_argument("--boxes", default="")
-    parser.add_argument("--y-first", action="store_true")
-    parser.add_argument("--onnx-runtime", action="store_true", help="the program has it beside OpenCV")
-    parser.add_argument("--bins", type=int)
-    parser.add_argument("--cell-offset", type=float)
-    for name in ("colour", "fit", "scale", "mean", "pad"):
-        parser.add_argument(f"--{name}", default="")
-    return parser.parse_args(arguments)
-
-
-class Request:
-    """The command line, read."""
-
-    def __init__(self, args):
-        self.family, self.bins, self.cell_offset = args.family, args.bins, args.cell_offset
-        self.boxes, self.y_first = args.boxes, args.y_first
-        self.onnx_runtime = args.onnx_runtime
-        self.names = names_of(args.classes) if args.classes else None
-        try:
-            self.size, self.camera = (pair_of(text) for text in (args.size, args.camera))
-            self.new_size = args.input if args.input == "camera" else pair_of(args.input)
-            groups = [numbers(g) for g in args.anchors.split("/")] if args.anchors else []
-            self.anchors = [list(zip(g[::2], g[1::2])) for g in groups] or None
-            self.variances = numbers(args.variances)
-            self.input = {k: numbers(v) if k in ("scale", "mean") else float(v) if k == "pad" else v
-                          for k in ("colour", "fit", "scale", "mean", "pad") if (v := getattr(args, k))}
-        except ValueError as e:
-            raise Fault(f"a number was expected: {e}; sizes are 640x640, lists 1,2,3", USAGE)
-        if any(len(g) % 2 for g in groups) or len(self.variances) != 2:
-            raise Fault("--anchors are pairs W,H, --variances two numbers", USAGE)
-        if self.new_size == "camera" and not self.camera:
-            raise Fault("--input camera takes the shape of the camera's pictures; give one with --image", USAGE)
-        if self.input.get("scale") and len(self.input["scale"]) == 1:
-            self.input["scale"] = self.input["scale"][0]
-        self.priors = priors_of(args.priors) if args.priors else None
-
-
-def pair_of(text):
-    """640x480; None where there is no text."""
-    pair = [int(n) for n in text.split("x")] if text else None
-    if pair is not None and (len(pair) != 2 or min(pair) < 1 or max(pair) > 8192):
-        raise ValueError(f"{text} is not WIDTHxHEIGHT")
-    return pair
-
-
-def names_of(text):
-    """A file with a name a line, or a list with commas."""
-    if os.path.isfile(text):  # also of a list that is longer than any path: it is none
-        names = [line.strip() for line in Path(text).read_text(errors="replace").splitlines() if line.strip()]
-    elif "," in text or not ("/" in text or text.endswith((".txt", ".names"))):
-        names = [name.strip() for name in text.split(",")]
-    else:
-        raise Fault(f"the file of class names {text} is missing; give a file with a name a line, or names with commas "
-                    "between", UNAVAILABLE)
-    if not all(names) or not names:
-        raise Fault(f"{text} holds no names, or an empty one; give a name for each class of the network", USAGE)
-    return distinct(names)
-
-
-def distinct(names):
-    """COCO's 91 have N/A eleven times: those become n/a-12 and so on."""
-    lower = [name.lower() for name in names]
-    return [n if lower.count(n) == 1 else f"{n}-{i}" for i, n in enumerate(lower)]
-
-
-def priors_of(path):
-    try:
-        priors = np.loadtxt(path, ndmin=2)
-    except OSError:
-        raise Fault(f"the file of priors {path} is missing or cannot be read", UNAVAILABLE)
-    except ValueError as e:
-        raise Fault(f"{path} cannot be read as priors ({e}); a line x y width height for each")
-    if priors.shape[1] != 4 or not (priors[:, 2:] > 0).all():
-        raise Fault(f"{path} does not hold priors; a line x y width height for each, in shares of the image")
-    return priors
-
-
-def names_in(graph):
-    """Ultralytics writes the class names into the file."""
-    try:
-        names = ast.literal_eval(graph.metadata["names"])
-        return distinct([str(names[i]) for i in sorted(names)] if isinstance(names, dict) else [str(n) for n in names])
-    except (KeyError, ValueError, SyntaxError, TypeError):
-        return None
 
 
 def recognise(path, graph, size, request):
@@ -215,8 +112,6 @@ def description(args, found, names, size, request):
     keys = dict(found.keys)
     if keys.get("boxes", {}).get("form") == "offsets":
         keys["boxes"]["priors_file"] = args.out.name + ".priors.txt"
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        np.savetxt(str(args.out) + ".priors.txt", request.priors, fmt="%.7g")
     return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
             "family": found.family,
             "input": {"width": size[0], "height": size[1], **input_of(found, request)}, "classes": names, **keys,
@@ -232,16 +127,29 @@ def write_reference(args, graph, size, given, found, inside):
     values, why = counterpart.answers(args.network, graph, image, found, outputs, inside)
     if why:
         return why
-    folder.mkdir(parents=True, exist_ok=True)
-    image.tofile(folder / "input.f32")
-    for name in outputs:
-        np.ascontiguousarray(values[name], np.float32).tofile(folder / f"{name}.f32")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        image.tofile(folder / "input.f32")
+        for name in outputs:
+            np.ascontiguousarray(values[name], np.float32).tofile(folder / f"{name}.f32")
+    except OSError as e:
+        raise unwritten(f"{folder}, where answers are compared,", e)
     return ""
 
 
-def run(args):
-    request = Request(args)
-    graph = Graph.load(args.network)
+def write(args, graph, described, priors):
+    try:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        onnx.save(graph.to_model(), str(args.out))
+        Path(f"{args.out}.model.json").write_text(json.dumps(described, indent=1) + "\n")
+        if "priors_file" in described.get("boxes", {}):
+            np.savetxt(f"{args.out}.priors.txt", priors, fmt="%.7g")
+    except OSError as e:
+        raise unwritten(args.shown or e.filename or args.out, e)
+
+
+def imported(args, request, graph):
+    """Writes; returns what was found, the input's size, and what was repaired."""
     eight_bits = quantised.to_float(graph)
     size = graph.fix_input(args.network, request.size)
     graph.fold()
@@ -261,15 +169,14 @@ def run(args):
         found.keys["backend"] = "onnxruntime"
         found.notes.append(f"it computes with {', '.join(inside)}, which OpenCV does not have: for ONNX Runtime alone")
     graph.keep(outputs)
-    text = json.dumps(description(args, found, names, size, request), indent=1)
-    try:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        onnx.save(graph.to_model(), str(args.out))
-        Path(str(args.out) + ".model.json").write_text(text + "\n")
-    except OSError as e:
-        raise Fault(f"{e.filename or args.out} cannot be written ({e.strerror}); give --out DIR", UNAVAILABLE)
+    write(args, graph, description(args, found, names, size, request), request.priors)
+    return found, size, repaired
+
+
+def tell(graph, request, found, size, repaired):
+    given = input_of(found, request)
     print(f"family      {found.family}, {found.classes} classes, input {size[0]}x{size[1]}")
-    print(f"cut at      {', '.join(outputs)}: {len(graph.nodes)} operators are left")
+    print(f"cut at      {', '.join(found.cuts.values())}: {len(graph.nodes)} operators are left")
     if repaired:
         print(f"repaired    {', '.join(f'{what} ({n})' for what, n in sorted(repaired.items()))}")
     print(f"decoding    {found.compared}")
@@ -279,19 +186,33 @@ def run(args):
           f"{'' if said else usual}")
     for note in found.notes:
         print(f"note        {note}")
+    sys.stdout.flush()
+
+
+def run(args):
+    request = Request(args)
+    graph = Graph.load(args.network)
+    try:
+        done = imported(args, request, graph)
+    except Fault:
+        raise
+    except Exception as e:  # a graph at odds with itself can go wrong anywhere
+        raise Fault(f"{args.network} is not a graph that makes sense here ({type(e).__name__}: {e}); export it again, "
+                    "with opset 12")
+    try:
+        tell(graph, request, *done)
+    except OSError as e:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left unwritten fails no more at the end
+        raise Fault(f"standard output cannot be written whole ({e.strerror}); free space, or send it elsewhere",
+                    INPUT_OUTPUT)
 
 
 def main():
-    args = parsed(sys.argv[1:])
     try:
-        run(args)
+        run(parsed(sys.argv[1:]))
     except Fault as fault:
         print(f"perdure model: {fault}", file=sys.stderr)
         sys.exit(fault.status)
-    except Exception as e:  # a graph at odds with itself can go wrong anywhere
-        print(f"perdure model: {args.network} is not a graph that makes sense here ({type(e).__name__}: {e}); export "
-              "it again, with opset 12", file=sys.stderr)
-        sys.exit(CONFIGURATION)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,21 @@
-"""What ends an import: a sentence with the mend, and the exit status (64 usage, 69 missing, 78 wrong)."""
+"""What ends an import: a sentence with the mend, and the exit status (64 usage, 65 data that cannot be used
+as they are, 69 missing, 74 not written, 78 wrong)."""
 
-USAGE, UNAVAILABLE, CONFIGURATION = 64, 69, 78
+import errno
+
+USAGE, DATA, UNAVAILABLE, INPUT_OUTPUT, CONFIGURATION = 64, 65, 69, 74, 78
 
 
 class Fault(Exception):
     def __init__(self, message, status=CONFIGURATION):
         super().__init__(message)
         self.status = status
+
+
+def unwritten(name, error):
+    """Of an OSError; one without a number is numpy's: not all was written."""
+    why = error.strerror or "not all of it could be written"
+    if error.errno in (None, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+        return Fault(f"{name} cannot be written whole ({why}); free space, or give a folder on another disk",
+                     INPUT_OUTPUT)
+    return Fault(f"{name} cannot be written ({why}); give --out DIR", UNAVAILABLE)

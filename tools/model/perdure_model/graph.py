@@ -1,10 +1,12 @@
 """A network's graph: loaded, its input fixed, constants folded, cut, and written again."""
 
+import warnings
+
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper, shape_inference
 
-from .faults import UNAVAILABLE, Fault
+from .faults import DATA, UNAVAILABLE, Fault
 from .numpy_ops import OPS
 
 LARGEST_CONSTANT = 1 << 22  # values
@@ -45,16 +47,18 @@ class Graph:
     @classmethod
     def load(cls, path):
         try:
-            model = onnx.load(str(path))
+            with warnings.catch_warnings():  # protobuf warns where it could not read all
+                warnings.simplefilter("error", RuntimeWarning)
+                model = onnx.load(str(path))
         except FileNotFoundError as e:
             raise Fault(f"{e.filename or path} is missing; give an .onnx file (weights kept in a second file must lie "
                         "beside it)", UNAVAILABLE)
         except Exception as e:  # protobuf's own, and what a truncated file makes it throw
             raise Fault(f"{path} is not a whole ONNX file ({str(e).splitlines()[0] if str(e) else type(e).__name__}); "
-                        "export or copy it again")
+                        "export or copy it again", DATA)
         graph = model.graph
         if not graph.node or not graph.output:
-            raise Fault(f"{path} is not a whole ONNX file (it has no operators); export or copy it again")
+            raise Fault(f"{path} is not a whole ONNX file (it has no operators); export or copy it again", DATA)
         constants = {i.name: numpy_helper.to_array(i) for i in graph.initializer}
         inputs = {}
         for i in graph.input:
