@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 namespace scene = semantic_filter::testing;
 using namespace std::chrono_literals;
 using testing::HasSubstr;
+using testing::Not;
 
 std::string perdure() { return (test::programs() / "perdure").string(); }
 
@@ -137,6 +138,18 @@ TEST(RecordProcess, KilledLosesLessThanASecondAndTheNextOneMakesTheFileWhole) {
   EXPECT_THAT(next.log(), HasSubstr("had been cut off and is whole again"));
   EXPECT_EQ(stateOf(files[0]), "finished");
   EXPECT_EQ(filesIn(out).size(), 2u);
+}
+
+TEST(RecordProcess, WhatIsLostToAFullDiskEndsWith74) {
+  const test::Folder place;
+  (void)test::ownNetwork();
+  Vehicle vehicle;
+  test::Child recorder({perdure(), "record", "--out", place.file("rec"), "--keep-free", "1000000TB",
+                        "--seconds", "2"},
+                       place.file("record.log"));
+  EXPECT_EQ(recorder.wait(20s), 74);
+  EXPECT_THAT(recorder.log(), HasSubstr("messages were lost and are in no file: the disk is full"));
+  EXPECT_THAT(recorder.log(), Not(HasSubstr("recording goes on")));
 }
 
 TEST(LongRecordProcess, TheBlackBoxWritesTheTimeBeforeAFaultAndWhatIsLatched) {
