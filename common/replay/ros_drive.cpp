@@ -29,8 +29,8 @@ std::string_view textOf(const SharedBytes& bytes) {
   return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
 }
 
-Result<Frame> unpacked(const ros::CompressedImage& image) {
-  const auto pixels = vision::decodeImage(textOf(image.data), std::nullopt);
+Result<Frame> unpacked(const ros::CompressedImage& image, int bits) {
+  const auto pixels = vision::decodeImage(textOf(image.data), std::nullopt, bits);
   if (!pixels) return tl::unexpected(pixels.error());
   Frame frame;
   const auto set = vision::setPixels(frame, *pixels);
@@ -76,7 +76,7 @@ class RosImages {
     if constexpr (std::same_as<M, ros::Image>) {
       return {time, ros::frameOf(*image, bits_)};
     } else {
-      return {time, unpacked(*image)};
+      return {time, unpacked(*image, bits_)};
     }
   }
 
@@ -213,7 +213,12 @@ class RosDriveReader {
   void takeImage(RosCamera& camera, const RosMessage& message) {
     if (camera.topics.compressed) {
       const auto image = valueIn<ros::CompressedImage>(message, "frame");
-      if (image) addImage(camera, image->header, message.log_ns);
+      if (!image) return;
+      constexpr std::uint64_t kLooks = 16;  // along the drive: each is decoded
+      const std::uint64_t all = messages_.topics().at(message.topic).messages;
+      if (camera.bits < 16 && camera.images.size() % std::max<std::uint64_t>(all / kLooks, 1) == 0)
+        camera.bits = std::max(camera.bits, vision::usedBitsIn(textOf(image->data)));
+      addImage(camera, image->header, message.log_ns);
     } else if (const auto image = valueIn<ros::Image>(message, "frame")) {
       addImage(camera, image->header, message.log_ns);
       if (camera.bits < 16) camera.bits = std::max(camera.bits, ros::usedBits(*image));

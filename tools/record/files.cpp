@@ -13,13 +13,13 @@
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "common/wire/plain_twin.h"
+#include "tools/record/repair.h"
 #include "tools/record/ros_export.h"
 
 namespace perdure::tools {
 namespace {
 
 namespace fs = std::filesystem;
-namespace mcap = replay::mcap;
 
 std::string dateOf(std::uint64_t ns) {
   return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:03} UTC",
@@ -28,7 +28,7 @@ std::string dateOf(std::uint64_t ns) {
 }
 
 void printInfo(const std::string& path) {
-  const replay::RecordedMessages recording(path);
+  const replay::RecordedMessages recording(path, replay::RecordedMessages::Chunks::kEach);
   const double seconds = 1e-9 * static_cast<double>(recording.endNs() - recording.startNs());
   fmt::print("{}: {:.3f} s from {}\n", path, seconds, dateOf(recording.startNs()));
   for (const auto& [topic, counted] : recording.topics()) {
@@ -38,37 +38,6 @@ void printInfo(const std::string& path) {
   for (const auto& [reason, n] : recording.reasons().all()) fmt::print("  {}: {}\n", reason, n);
   if (!recording.lastProblem().empty()) fmt::print("  {}\n", recording.lastProblem());
   for (const std::string& note : recording.notes()) fmt::print("  {}\n", note);
-}
-
-void repair(const fs::path& file) {
-  if (replay::isPacked(file, ".mcap")) {
-    throw StartupError(ExitCode::kUsage, fmt::format("{} is packed as a whole; unpack it first: "
-                                                     "zstd -d {}, then repair what comes of it",
-                                                     file.string(), file.string()));
-  }
-  auto reader = mcap::Reader::open(file);
-  if (!reader) throw StartupError(ExitCode::kUnavailable, reader.error().detail);
-  if (reader->finished()) return fmt::print("{} is whole\n", file.string());
-  const auto cut = reader->cutBytes();
-  if (reader->chunks().empty()) {
-    throw StartupError(ExitCode::kUnavailable,
-                       fmt::format("{} holds no whole chunk: its {} bytes cannot be made a "
-                                   "recording, and it stays as it is",
-                                   file.string(), cut));
-  }
-  if (const auto finished = reader->finish(); !finished) {
-    throw StartupError(ExitCode::kUnavailable, finished.error().detail);
-  }
-  fmt::print("{} is whole again: {} chunks, {} messages; {} bytes at its end were no whole chunk\n",
-             file.string(), reader->chunks().size(), reader->statistics().messages, cut);
-}
-
-/// Every file of a folder, or the file itself.
-void repairAll(const fs::path& path) {
-  if (!fs::is_directory(path)) return repair(path);
-  for (const auto& entry : fs::directory_iterator(path)) {
-    if (entry.path().extension() == ".mcap") repair(entry.path());
-  }
 }
 
 const dds_topic_descriptor_t* typeNamed(const std::string& name) {
@@ -138,9 +107,7 @@ void addFileCommands(CLI::App& record) {
   });
   CLI::App* mend = record.add_subcommand("repair", "finish files of a recorder that was killed");
   mend->add_option("paths", options->paths, "files, or folders of them")->required();
-  mend->callback([options] {
-    for (const std::string& path : options->paths) repairAll(path);
-  });
+  mend->callback([options] { repairAll({options->paths.begin(), options->paths.end()}); });
   CLI::App* plain = record.add_subcommand(
       "export", "copy into one file that readers without XCDR2 understand too");
   plain->add_option("from", options->from, "a file, or a folder of them")->required();

@@ -52,13 +52,11 @@ TEST_P(Images, OfASqliteRecordingAreThoseOfTheFolder) {
     EXPECT_TRUE(recorded->reasons().all().empty());
   }
 }
-INSTANTIATE_TEST_SUITE_P(Ros, Images,
-                         testing::Values(PlanOptions::Images::kRaw, PlanOptions::Images::kPng));
 
 // How many bits are used is what all images say: by the first three alone it would be eight, and
 // the others would be white.
-TEST(RosDrive, ImagesOf16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
-  const Twin twin = twinOf("ros_dark", {.dark = 3});
+TEST_P(Images, Of16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
+  const Twin twin = twinOf("ros_dark", {.images = GetParam(), .dark = 3});
   const auto bright = test::allOf(*Dataset::open({.path = twin.folder})).pixels;
   const auto pixels = test::allOf(*Dataset::open({.path = twin.file, .rig = twin.rig})).pixels;
   ASSERT_EQ(pixels.size(), bright.size());
@@ -81,6 +79,9 @@ TEST(RosDrive, ImagesOf16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
     EXPECT_EQ(wrong, 0u) << "image " << i;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Ros, Images,
+                         testing::Values(PlanOptions::Images::kRaw, PlanOptions::Images::kPng));
 
 TEST(RosDrive, GivesAnyImageOutOfTurn) {
   const Twin twin = twinOf("ros_turns");

@@ -163,6 +163,16 @@ ros::Image twelveBitsOf(const Frame& frame, const ros::Header& header, bool dark
   return image;
 }
 
+ros::CompressedImage packedOf(const ros::Image& image) {
+  auto* pixels = const_cast<std::uint8_t*>(image.data->data());
+  auto png = std::make_shared<std::vector<std::uint8_t>>();
+  cv::imencode(
+      ".png",
+      cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width), CV_16UC1, pixels),
+      *png);
+  return {image.header, "mono16; png compressed ", png};
+}
+
 ros::CompressedImage packedOf(const Frame& frame, const ros::Header& header) {
   auto png = std::make_shared<const std::vector<std::uint8_t>>(pngOf(frame));
   return {header, "png", png};
@@ -228,8 +238,12 @@ void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions&
     database.add(spaceOf(frame->camera, options) + "/camera_info", log_ns, infoOf(*camera, header));
     const std::string topic = imageTopic(frame->camera, options);
     if (options.dark) {
-      const bool dark = images++ < *options.dark;
-      database.add(topic, log_ns, twelveBitsOf(*frame, header, dark));
+      const ros::Image image = twelveBitsOf(*frame, header, images++ < *options.dark);
+      if (options.images == PlanOptions::Images::kPng) {
+        database.add(topic, log_ns, packedOf(image));
+      } else {
+        database.add(topic, log_ns, image);
+      }
     } else if (options.images == PlanOptions::Images::kPng) {
       database.add(topic, log_ns, packedOf(*frame, header));
     } else {

@@ -16,7 +16,7 @@ struct PlanOptions {
   bool transforms = true;     ///< /tf_static
   bool stamps = true;         ///< of headers
   bool one_log_time = false;  ///< of writeDb3: all was recorded at one moment
-  /// Of writeDb3, raw images: mono16 of which 12 bits are used, and the first so many in the dark.
+  /// Of writeDb3: 16 bits a pixel, of which 12 bits are used, and the first so many in the dark.
   std::optional<std::size_t> dark = {};
   std::string suffix = {};  ///< of cam0's name space: "/cam0SUFFIX/image_raw"
 };
