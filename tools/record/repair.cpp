@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <optional>
 #include <system_error>
@@ -54,11 +55,11 @@ fs::path copyOf(const fs::path& file) {
 
 void refuseDamaged(const fs::path& file, const mcap::Reader& reader) {
   if (reader.damage().empty()) return;
-  throw StartupError(ExitCode::kData,
-                     fmt::format("{}; repair cannot mend that, and the file stays as it is: {} "
-                                 "messages of it are read",
-                                 mcap::sentenceOfDamage(file, reader),
-                                 reader.statistics().messages));
+  throw StartupError(
+      ExitCode::kData,
+      fmt::format("{}; repair cannot mend that, and the file stays as it is: {} "
+                  "messages of it are read",
+                  mcap::sentenceOfDamage(file, reader), reader.statistics().messages));
 }
 
 void finish(const fs::path& file, mcap::Reader& reader) {
@@ -78,9 +79,8 @@ void finish(const fs::path& file, mcap::Reader& reader) {
     return;
   }
   if (copy) fs::rename(*copy, file);
-  const bool full = finished.error().code == "disk_full";
-  throw StartupError(full ? ExitCode::kInputOutput : ExitCode::kUnavailable,
-                     finished.error().detail + (full ? "; it stays as it was, free some room" : ""));
+  const ExitCode code = mcap::exitCodeOf(finished.error());
+  throw StartupError(code, finished.error().detail + "; it stays as it was");
 }
 
 void repair(const fs::path& file) {

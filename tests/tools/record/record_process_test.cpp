@@ -10,6 +10,7 @@
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "common/types/map.h"
+#include "tests/common/replay/ros_twin.h"
 #include "tests/process/support.h"
 #include "tests/services/gateway/objects.h"
 #include "tests/services/semantic_filter/scene.h"
@@ -341,6 +342,46 @@ TEST(RepairProcess, WithoutRoomForTheCopyNothingIsTouched) {
   child.wait(20s);
   if (child.log().find("status") == std::string::npos) GTEST_SKIP() << "no right to mount a disk";
   EXPECT_THAT(child.log(), HasSubstr("status 74\nballast\nrun.mcap\nuntouched"));
+}
+
+TEST(InfoProcess, OfASqliteRecordingOfRosIsTheSameTable) {
+  const test::Twin twin = test::twinOf("record_info");
+  const Said said = record("info", twin.file);
+  EXPECT_EQ(said.status, 0);
+  EXPECT_THAT(said.text, HasSubstr("a recording of ROS"));
+  EXPECT_THAT(said.text, testing::ContainsRegex("/cam0/image_raw +5 +[0-9.]+ Hz +sensor_msgs/Imag"));
+}
+
+TEST(ExportProcess, OfARecordingOfOthersNoFileIsMade) {
+  const test::Folder place;
+  const fs::path file = place.file("run.mcap"), to = place.file("new.mcap");
+  replay::RecordingWriter recording(file);
+  recording.addBytes({"camera", "sensor_msgs/msg/Image", ""}, {}, 1000);
+  recording.finish();
+  for (const bool ros2 : {false, true}) {
+    std::vector<std::string> command{perdure(), "record", "export", file, to};
+    if (ros2) command.push_back("--ros2");
+    test::Child child(command, place.file("log"));
+    EXPECT_EQ(child.wait(20s), 65) << child.log();
+    EXPECT_THAT(child.log(), HasSubstr("holds no message that can be exported"));
+    EXPECT_FALSE(fs::exists(to));
+  }
+}
+
+TEST(ExportProcess, OnAFullDiskNoFileIsLeft) {
+  const test::Folder place;
+  fs::create_directories(place.file("small"));
+  recordChunks(place.file("run.mcap"));
+  const std::string small = place.file("small");
+  const std::string script = "mount -t tmpfs -o size=8k own " + small +
+                             " && dd if=/dev/zero of=" + small + "/ballast bs=1k 2> /dev/null; " +
+                             perdure() + " record export " + place.file("run.mcap") + " " + small +
+                             "/new.mcap; echo status $?; ls " + small;
+  test::Child child({"unshare", "-m", "sh", "-c", script}, place.file("log"));
+  child.wait(20s);
+  if (child.log().find("status") == std::string::npos) GTEST_SKIP() << "no right to mount a disk";
+  EXPECT_THAT(child.log(), HasSubstr("status 74\nballast\n"));
+  EXPECT_THAT(child.log(), Not(HasSubstr("new.mcap\n")));
 }
 
 TEST(RepairProcess, AnEmptyFileIsToldToBeEmpty) {
