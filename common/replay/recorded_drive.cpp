@@ -65,6 +65,7 @@ class DriveReader {
     while (const auto message = messages_.next()) take(*message);
     for (const auto& [reason, n] : messages_.reasons().all()) recording_.reasons.add(reason, n);
     if (recording_.calibration.cameras.empty()) {
+      refuseStrangers();
       const std::string& problem = messages_.lastProblem();
       throwMissing(path_, "the calibration in the recording",
                    problem.empty() ? "record while capture runs: it gives one" : problem);
@@ -79,6 +80,19 @@ class DriveReader {
   }
 
  private:
+  /// Messages of neither Perdure nor ROS: protobuf, JSON and others that MCAP holds.
+  void refuseStrangers() const {
+    for (const auto& [name, topic] : messages_.topics()) {
+      if (topic.schema_encoding == "omgidl") continue;
+      const bool same = topic.schema_encoding == topic.encoding;
+      throw StartupError(
+          ExitCode::kData,
+          path_.string() + ": the messages on " + name + " are " + topic.type + " in `" +
+              topic.encoding + (same ? "" : "` with a schema in `" + topic.schema_encoding) +
+              "`, which is not read; record messages of ROS 1 or 2, or use perdure record");
+    }
+  }
+
   template <class T>
   std::optional<T> valueIn(const RecordedMessage& message) {
     auto value = valueOf<T>(message);

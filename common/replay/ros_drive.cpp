@@ -29,8 +29,8 @@ std::string_view textOf(const SharedBytes& bytes) {
   return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
 }
 
-Result<Frame> unpacked(const ros::CompressedImage& image) {
-  const auto pixels = vision::decodeImage(textOf(image.data), std::nullopt);
+Result<Frame> unpacked(const ros::CompressedImage& image, int bits) {
+  const auto pixels = vision::decodeImage(textOf(image.data), std::nullopt, bits);
   if (!pixels) return tl::unexpected(pixels.error());
   Frame frame;
   const auto set = vision::setPixels(frame, *pixels);
@@ -76,7 +76,7 @@ class RosImages {
     if constexpr (std::same_as<M, ros::Image>) {
       return {time, ros::frameOf(*image, bits_)};
     } else {
-      return {time, unpacked(*image)};
+      return {time, unpacked(*image, bits_)};
     }
   }
 
@@ -213,7 +213,12 @@ class RosDriveReader {
   void takeImage(RosCamera& camera, const RosMessage& message) {
     if (camera.topics.compressed) {
       const auto image = valueIn<ros::CompressedImage>(message, "frame");
-      if (image) addImage(camera, image->header, message.log_ns);
+      if (!image) return;
+      constexpr std::uint64_t kLooks = 16;  // along the drive: each is decoded
+      const std::uint64_t all = messages_.topics().at(message.topic).messages;
+      if (camera.bits < 16 && camera.images.size() % std::max<std::uint64_t>(all / kLooks, 1) == 0)
+        camera.bits = std::max(camera.bits, vision::usedBitsIn(textOf(image->data)));
+      addImage(camera, image->header, message.log_ns);
     } else if (const auto image = valueIn<ros::Image>(message, "frame")) {
       addImage(camera, image->header, message.log_ns);
       if (camera.bits < 16) camera.bits = std::max(camera.bits, ros::usedBits(*image));
@@ -275,25 +280,39 @@ class RosDriveReader {
                              "and give it with --rig";
     if (!camera.info) {
       stop("no camera_info goes with " + camera.topics.image + ": the lens of " + name +
-           " is not known" + mend);
+           " is not known" + damage() + mend);
     }
     auto calibration = ros::cameraOf(*camera.info, camera.topics.rectified);
-    if (!calibration) stop(camera.topics.image + ": " + calibration.error().detail + mend);
+    if (!calibration) {
+      stop(camera.topics.image + ": " + calibration.error().detail + " (on " + camera.topics.info +
+           ")" + mend);
+    }
     if (imu_.empty()) return *calibration;
     const std::string& frame =
         camera.frame_id.empty() ? camera.info->header.frame_id : camera.frame_id;
     const auto T_BC = tree_.find(imu_frame_, frame);
     if (!T_BC) {
       stop("where " + name + " (frame `" + frame + "`) is on the inertial unit (frame `" +
-           imu_frame_ + "`) is not known: " +
-           (tree_.empty() ? "the recording has no /tf_static"
-                          : "/tf_static has no way between the two frames") +
+           imu_frame_ + "`) is not known: " + whyNoWay() + damage() +
            "; record /tf_static, or write " + name +
            " with T_cam_imu (or T_BS, camera in the IMU's frame) into a rig file and give it with "
            "--rig");
     }
     calibration->T_BC = *T_BC;
     return *calibration;
+  }
+
+  std::string whyNoWay() const {
+    const auto& refused = tree_.refused();
+    if (tree_.empty() && refused.empty()) return "the recording has no /tf_static";
+    return "/tf_static has no way between the two frames" +
+           (refused.empty() ? "" : ": " + refused.begin()->second);
+  }
+
+  /// What is missing may have stood there.
+  std::string damage() const {
+    const std::string problem = messages_.lastProblem();
+    return problem.empty() ? "" : "; the file is cut off or damaged: " + problem;
   }
 
   ImuCalibration imuCalibration() const {

@@ -114,7 +114,8 @@ class Choice {
     if (all.empty()) {
       const auto depth = ofTypes(topics_, {kImage, kCompressed});
       stop(depth.empty()
-               ? "holds no images (sensor_msgs/Image or CompressedImage); record them too"
+               ? "holds no images (sensor_msgs/Image or CompressedImage)" + imagesOfOthers() +
+                     "; record them too"
                : "holds depth alone (" + listOf(depth) + "); record a camera's images too");
     }
     if (all.size() == 1) return all;
@@ -124,6 +125,16 @@ class Choice {
     stop("holds images of several cameras: " + listOf(all) +
          "; say which to take: cam0=TOPIC, of a pair also cam1=TOPIC (pipeline and demo: --topic; "
          "capture: dataset.topics; elsewhere `rostopic: TOPIC` under cam0 in the file of --rig)");
+  }
+
+  /// "; those on /cam are foxglove_msgs/CompressedImage, which is not read".
+  std::string imagesOfOthers() const {
+    for (const auto& [name, topic] : topics_) {
+      const bool ours = topic.type == kImage || topic.type == kCompressed;
+      if (!ours && topic.messages > 0 && topic.type.ends_with("Image"))
+        return "; those on " + name + " are " + topic.type + ", which is not read";
+    }
+    return "";
   }
 
   CameraTopics cameraOf(const std::string& stream) const {
@@ -145,9 +156,35 @@ class Choice {
     return alone && all.size() == 1 ? all.front() : "";
   }
 
+  /// The topic of the other half where a driver gives accelerometer and gyroscope apart, as
+  /// RealSense's does: /camera/accel/sample, /camera/gyro/sample.
+  std::string otherHalfOf(const std::string& topic) const {
+    for (const auto& [half, other] : {std::pair("accel", "gyro"), std::pair("gyro", "accel")}) {
+      const auto at = topic.rfind(half);
+      if (at == std::string::npos) continue;
+      std::string name = topic;
+      name.replace(at, std::strlen(half), other);
+      const auto known = topics_.find(name);
+      if (known != topics_.end() && known->second.type == kImu) return name;
+    }
+    return "";
+  }
+
+  [[noreturn]] void stopAtHalf(const std::string& topic) const {
+    stop("has its inertial unit in two halves, accelerometer and gyroscope: " + topic + " and " +
+         otherHalfOf(topic) +
+         "; record it as one topic: realsense2_camera with unite_imu_method:=2 (ROS 1: "
+         "linear_interpolation)");
+  }
+
   std::string imu() const {
-    if (!wantedAs("imu").empty()) return wantedAs("imu");
-    const auto all = ofTypes(topics_, {kImu});
+    const std::string wanted = wantedAs("imu");
+    if (!wanted.empty() && !otherHalfOf(wanted).empty()) stopAtHalf(wanted);
+    if (!wanted.empty()) return wanted;
+    auto all = ofTypes(topics_, {kImu});
+    const std::string half = all.empty() ? "" : all.front();
+    std::erase_if(all, [this](const auto& topic) { return !otherHalfOf(topic).empty(); });
+    if (all.empty() && !half.empty()) stopAtHalf(half);
     if (all.size() > 1) {
       stop("holds several inertial units: " + listOf(all) +
            "; say which to take: imu=TOPIC (pipeline and demo: --topic; capture: dataset.topics; "

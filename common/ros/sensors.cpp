@@ -1,6 +1,10 @@
 #include "common/ros/sensors.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <span>
 
 #include "common/camera/lens.h"
 #include "common/ros/frames.h"
@@ -9,6 +13,27 @@ namespace perdure::ros {
 namespace {
 
 Eigen::Vector3d vectorOf(const Vector3& v) { return {v.x, v.y, v.z}; }
+
+/// "D[1] is nan": the first of `values` that is no finite number; else nothing.
+std::string notFinite(const char* name, std::span<const double> values) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) return fmt::format("{}[{}] is {}", name, i, values[i]);
+  }
+  return {};
+}
+
+std::string sentenceOf(const TransformStamped& one, double norm) {
+  const auto& [p, q] = one.transform;
+  const std::string which =
+      fmt::format("the transform from `{}` to `{}`", one.header.frame_id, one.child_frame_id);
+  const std::string turn = fmt::format("{:g}, {:g}, {:g}, {:g}", q.x, q.y, q.z, q.w);
+  if (std::isfinite(p.x + p.y + p.z + norm)) {
+    return fmt::format("{} is none: the length of its quaternion (x, y, z, w: {}) is not 1", which,
+                       turn);
+  }
+  return fmt::format("{} is none: translation {:g}, {:g}, {:g}, quaternion (x, y, z, w) {}", which,
+                     p.x, p.y, p.z, turn);
+}
 
 }  // namespace
 
@@ -28,6 +53,9 @@ Result<CameraCalibration> cameraOf(const CameraInfo& info, bool rectified) {
   CameraCalibration camera;
   const auto& k = info.k;
   const auto& p = info.p;
+  std::string wrong = rectified ? notFinite("P", p) : notFinite("K", k);
+  if (wrong.empty() && !rectified) wrong = notFinite("D", info.d);
+  if (!wrong.empty()) return fail("not_finite", "in its camera_info " + wrong);
   camera.fx = rectified ? p[0] : k[0], camera.fy = rectified ? p[5] : k[4];
   camera.cx = rectified ? p[2] : k[2], camera.cy = rectified ? p[6] : k[5];
   if (!(camera.fx > 0.0) || !(camera.fy > 0.0)) {
@@ -106,7 +134,10 @@ void FrameTree::add(const TFMessage& message) {
     const auto& q = one.transform.rotation;
     const RigidTransform T = transformOf(one.transform);
     const double norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-    if (!(std::abs(norm - 1.0) < 0.02) || !T.finite()) continue;  // no rotation
+    if (!(std::abs(norm - 1.0) < 0.02) || !T.finite()) {
+      refused_[frameName(one.child_frame_id)] = sentenceOf(one, norm);
+      continue;
+    }
     parents_[frameName(one.child_frame_id)] = {frameName(one.header.frame_id), T};
   }
 }

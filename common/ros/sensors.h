@@ -17,8 +17,8 @@ TimePoint timeOf(const Time& time);
 ImuSample sampleOf(const Imu& imu);
 /// Size and lens of the images that the message is about: by K and D as they come, by P where they
 /// are `rectified` already; binning and region are taken into account. Neither name nor place nor
-/// rate. Reasons: "uncalibrated" (no focal length), "lens" (a model or a number of coefficients
-/// that is not known), with a sentence.
+/// rate. Reasons: "not_finite" (a number that is none, infinity), "uncalibrated" (no focal length),
+/// "lens" (a model or a number of coefficients that is not known), with a sentence.
 Result<CameraCalibration> cameraOf(const CameraInfo& info, bool rectified);
 
 /// In the frame imu_link, without an orientation; `noise` gives the covariances.
@@ -34,6 +34,8 @@ class FrameTree {
  public:
   void add(const TFMessage& message);
   bool empty() const { return parents_.empty(); }
+  /// Of transforms that are none, the last of each child: what is wrong with it, for people.
+  const std::map<std::string, std::string>& refused() const { return refused_; }
   /// T_to_from: points of `from` into `to`; nothing where no way leads from one to the other.
   std::optional<RigidTransform> find(const std::string& to, const std::string& from) const;
 
@@ -45,6 +47,7 @@ class FrameTree {
   std::map<std::string, RigidTransform> toRoots(std::string frame) const;
 
   std::map<std::string, Edge> parents_;  ///< by child
+  std::map<std::string, std::string> refused_;
 };
 
 }  // namespace perdure::ros

@@ -1,7 +1,6 @@
 #include "common/vision/decode.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -28,13 +27,30 @@ int readFlags(std::optional<ImageEncoding> encoding) {
   return *encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE;
 }
 
+constexpr std::size_t kDepthOfPng = 24;
+constexpr int kSixteenGrey = cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE;
+
+std::string headOf(const std::string& path) {
+  std::string head(kDepthOfPng + 1, '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head;
+}
+
 /// By its head: JPEG, or PNG that says so. Other kinds have to be decoded to tell.
-bool hasEightBits(const std::string& path) {
-  constexpr std::size_t kDepthOfPng = 24;
-  std::array<char, kDepthOfPng + 1> head{};
-  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
-  const std::string_view start(head.data(), head.size());
-  return start.starts_with("\xFF\xD8") || (start.starts_with("\x89PNG") && head[kDepthOfPng] <= 8);
+bool hasEightBits(std::string_view bytes) {
+  if (bytes.starts_with("\xFF\xD8")) return true;
+  return bytes.starts_with("\x89PNG") && bytes.size() > kDepthOfPng && bytes[kDepthOfPng] <= 8;
+}
+
+int bitsOf(const cv::Mat& image) {
+  if (image.empty() || image.depth() != CV_16U) return 16;
+  double brightest = 0.0;
+  cv::minMaxLoc(image, nullptr, &brightest);
+  for (int bits = 8; bits < 16; bits += 2) {
+    if (brightest < (1 << bits)) return bits;
+  }
+  return 16;
 }
 
 }  // namespace
@@ -91,20 +107,23 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 
 int usedBits(const std::string& path) {
   if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would complain on stderr
-  if (hasEightBits(path)) return 16;
-  cv::Mat image;
+  if (hasEightBits(headOf(path))) return 16;
   try {
-    image = cv::imread(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+    return bitsOf(cv::imread(path, kSixteenGrey));
   } catch (const cv::Exception&) {
     return 16;
   }
-  if (image.empty() || image.depth() != CV_16U) return 16;
-  double brightest = 0.0;
-  cv::minMaxLoc(image, nullptr, &brightest);
-  for (int bits = 8; bits < 16; bits += 2) {
-    if (brightest < (1 << bits)) return bits;
+}
+
+int usedBitsIn(std::string_view bytes) {
+  if (bytes.empty() || hasEightBits(bytes) || !endsAsItShould(bytes)) return 16;
+  auto* data = const_cast<char*>(bytes.data());
+  try {
+    return bitsOf(
+        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, data), kSixteenGrey));
+  } catch (const cv::Exception&) {
+    return 16;
   }
-  return 16;
 }
 
 }  // namespace perdure::vision

@@ -25,5 +25,7 @@ Result<cv::Mat> decodeDepthFile(const std::string& path);
 /// Of an image with 16 bits: 8, 10, 12, 14 or 16, the fewest that hold its brightest value. Of
 /// other images and of what is no image: 16.
 int usedBits(const std::string& path);
+/// The same of the bytes of such a file.
+int usedBitsIn(std::string_view bytes);
 
 }  // namespace perdure::vision

@@ -12,14 +12,15 @@
 #include "common/bus/topics.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
+#include "common/replay/recordings/ros_messages.h"
 #include "common/wire/plain_twin.h"
+#include "tools/record/repair.h"
 #include "tools/record/ros_export.h"
 
 namespace perdure::tools {
 namespace {
 
 namespace fs = std::filesystem;
-namespace mcap = replay::mcap;
 
 std::string dateOf(std::uint64_t ns) {
   return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:03} UTC",
@@ -27,47 +28,35 @@ std::string dateOf(std::uint64_t ns) {
                      ns / 1'000'000 % 1000);
 }
 
-void printInfo(const std::string& path) {
-  const replay::RecordedMessages recording(path);
+/// Of a recording of Perdure or of ROS.
+template <class Messages>
+void printHead(const std::string& path, const Messages& recording, const char* what = "") {
+  if (recording.endNs() < recording.startNs()) {
+    return fmt::print("{}: {}no messages\n", path, what);
+  }
   const double seconds = 1e-9 * static_cast<double>(recording.endNs() - recording.startNs());
-  fmt::print("{}: {:.3f} s from {}\n", path, seconds, dateOf(recording.startNs()));
+  fmt::print("{}: {}{:.3f} s from {}\n", path, what, seconds, dateOf(recording.startNs()));
   for (const auto& [topic, counted] : recording.topics()) {
     fmt::print("  {:20} {:9} {:8.2f} Hz  {}\n", topic, counted.messages,
                seconds > 0 ? static_cast<double>(counted.messages) / seconds : 0.0, counted.type);
   }
-  for (const auto& [reason, n] : recording.reasons().all()) fmt::print("  {}: {}\n", reason, n);
+}
+
+template <class Messages>
+void printTable(const std::string& path, const Messages& recording, const char* what = "") {
+  printHead(path, recording, what);
+  const ReasonCounts reasons = recording.reasons();
+  for (const auto& [reason, n] : reasons.all()) fmt::print("  {}: {}\n", reason, n);
   if (!recording.lastProblem().empty()) fmt::print("  {}\n", recording.lastProblem());
   for (const std::string& note : recording.notes()) fmt::print("  {}\n", note);
 }
 
-void repair(const fs::path& file) {
-  if (replay::isPacked(file, ".mcap")) {
-    throw StartupError(ExitCode::kUsage, fmt::format("{} is packed as a whole; unpack it first: "
-                                                     "zstd -d {}, then repair what comes of it",
-                                                     file.string(), file.string()));
-  }
-  auto reader = mcap::Reader::open(file);
-  if (!reader) throw StartupError(ExitCode::kUnavailable, reader.error().detail);
-  if (reader->finished()) return fmt::print("{} is whole\n", file.string());
-  const auto cut = reader->cutBytes();
-  if (reader->chunks().empty()) {
-    throw StartupError(ExitCode::kUnavailable,
-                       fmt::format("{} holds no whole chunk: its {} bytes cannot be made a "
-                                   "recording, and it stays as it is",
-                                   file.string(), cut));
-  }
-  if (const auto finished = reader->finish(); !finished) {
-    throw StartupError(ExitCode::kUnavailable, finished.error().detail);
-  }
-  fmt::print("{} is whole again: {} chunks, {} messages; {} bytes at its end were no whole chunk\n",
-             file.string(), reader->chunks().size(), reader->statistics().messages, cut);
-}
-
-/// Every file of a folder, or the file itself.
-void repairAll(const fs::path& path) {
-  if (!fs::is_directory(path)) return repair(path);
-  for (const auto& entry : fs::directory_iterator(path)) {
-    if (entry.path().extension() == ".mcap") repair(entry.path());
+void printInfo(const std::string& path) {
+  using replay::RecordedMessages;
+  if (!RecordedMessages::looksLikeOne(path) && replay::RosMessages::looksLikeOne(path)) {
+    printTable(path, replay::RosMessages(path), "a recording of ROS, a drive for --data; ");
+  } else {
+    printTable(path, RecordedMessages(path, RecordedMessages::Chunks::kEach));
   }
 }
 
@@ -94,6 +83,11 @@ Result<void> addPlain(replay::RecordingWriter& file, const replay::RecordedMessa
 
 }  // namespace
 
+NewFile::~NewFile() {
+  std::error_code ignored;
+  if (!whole_) fs::remove(file_, ignored);
+}
+
 void refuseNothing(const replay::RecordedMessages& recording, const fs::path& path) {
   const std::string& problem = recording.lastProblem();
   throw StartupError(ExitCode::kData, problem.empty()
@@ -103,24 +97,41 @@ void refuseNothing(const replay::RecordedMessages& recording, const fs::path& pa
                                           : problem);
 }
 
+void refuseForeign(const fs::path& path, const ReasonCounts& reasons) {
+  std::string why;
+  for (const auto& [reason, n] : reasons.all()) why += fmt::format("; {}: {}", reason, n);
+  throw StartupError(ExitCode::kData,
+                     fmt::format("{} holds no message that can be exported{}; recordings of "
+                                 "`perdure record` are, and `perdure record info` tells what it "
+                                 "holds",
+                                 path.string(), why));
+}
+
 ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
   replay::RecordedMessages recording(from);
   auto message = recording.next();
   if (!message) refuseNothing(recording, from);
   replay::RecordingWriter file(to);
+  NewFile made(to);
   ReasonCounts reasons;
+  std::uint64_t exported = 0;
   for (; message; message = recording.next()) {
     const auto added = addPlain(file, *message);
-    if (added) continue;
+    if (added) {
+      ++exported;
+      continue;
+    }
     if (added.error().code == "disk_full" || added.error().code == "file") {
       throw StartupError(ExitCode::kInputOutput, added.error().detail);
     }
     reasons.add(message->topic + "_" + added.error().code);
   }
+  for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
+  if (exported == 0) refuseForeign(from, reasons);
   if (const auto finished = file.finish(); !finished) {
     throw StartupError(ExitCode::kInputOutput, finished.error().detail);
   }
-  for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
+  made.keep();
   return reasons;
 }
 
@@ -138,9 +149,7 @@ void addFileCommands(CLI::App& record) {
   });
   CLI::App* mend = record.add_subcommand("repair", "finish files of a recorder that was killed");
   mend->add_option("paths", options->paths, "files, or folders of them")->required();
-  mend->callback([options] {
-    for (const std::string& path : options->paths) repairAll(path);
-  });
+  mend->callback([options] { repairAll({options->paths.begin(), options->paths.end()}); });
   CLI::App* plain = record.add_subcommand(
       "export", "copy into one file that readers without XCDR2 understand too");
   plain->add_option("from", options->from, "a file, or a folder of them")->required();

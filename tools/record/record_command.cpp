@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
 #include <CLI/CLI.hpp>
@@ -55,15 +56,20 @@ void printSummary(const StoreReport& stored, std::uint64_t messages, const std::
               static_cast<unsigned long long>(stored.messages),
               static_cast<unsigned long long>(stored.files),
               1e-6 * static_cast<double>(stored.bytes), out.c_str());
-  if (stored.lost > 0) {
-    std::printf("; %llu were lost: %s", static_cast<unsigned long long>(stored.lost),
-                stored.problem.empty() ? "the disk was full" : stored.problem.c_str());
-  }
   if (stored.overrun > 0) {
     std::printf("; %llu chunks were lost to a slow disk",
                 static_cast<unsigned long long>(stored.overrun));
   }
   std::printf("\n");
+  std::fflush(stdout);
+}
+
+void refuseLoss(const StoreReport& stored) {
+  if (stored.lost == 0) return;
+  throw StartupError(ExitCode::kInputOutput,
+                     fmt::format("{} messages were lost and are in no file: {}; free some room, or "
+                                 "give --out a folder on another disk",
+                                 stored.lost, stored.lost_to));
 }
 
 void runRecord(RecordOptions& options) {
@@ -95,6 +101,7 @@ void runRecord(RecordOptions& options) {
   recorder.cut(options.dump_at_end);
   store.finish();
   printSummary(store.report(), recorder.messages(), options.out);
+  refuseLoss(store.report());
 }
 
 void addOptions(CLI::App& command, RecordOptions& options) {

@@ -149,6 +149,9 @@ void Recorder::onFault(const std::optional<std::string>& what) {
 void Recorder::updateHealth() {
   const StoreReport stored = store_.report();
   std::string problem = stored.problem;
+  if (stored.disk_full) {
+    problem += "; recording goes on as soon as there is room: free some, or lower --quota";
+  }
   constexpr std::int64_t kTold = 10'000'000'000;  // ns: how long that is said
   const std::int64_t now = LogClock::steadyNs();
   if (stored.overrun > overrun_) slow_until_ns_ = now + kTold;

@@ -37,6 +37,7 @@ class Ros2File {
     draft_.add({channelOf(outlet), ++sequence_, log_ns, log_ns, cdr});
     if (draft_.bytes() >= kLargest) cut();
   }
+  bool empty() const { return sequence_ == 0; }
   void finish() {
     cut();
     if (const auto done = file_.finish(); !done) cannotWrite(done.error());
@@ -45,7 +46,7 @@ class Ros2File {
  private:
   static mcap::Writer created(const std::filesystem::path& path) {
     auto file = mcap::Writer::create(path, "ros2");
-    if (!file) throw StartupError(ExitCode::kUnavailable, file.error().detail);
+    if (!file) throw StartupError(mcap::exitCodeOf(file.error()), file.error().detail);
     return *std::move(file);
   }
   void cut() {
@@ -141,8 +142,11 @@ ReasonCounts exportRos2(const std::filesystem::path& from, const std::filesystem
   replay::RecordedMessages recording(from);
   if (!recording.next()) refuseNothing(recording, from);
   Ros2File file(to);
+  NewFile made(to);
   const ReasonCounts reasons = Export(recording, file).run();
+  if (file.empty()) refuseForeign(from, reasons);
   file.finish();
+  made.keep();
   return reasons;
 }
 

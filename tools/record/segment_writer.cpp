@@ -14,13 +14,9 @@ SegmentWriter::SegmentWriter(SegmentFolder& folder, double segment_s, std::strin
 SegmentWriter::~SegmentWriter() { finish(); }
 
 bool SegmentWriter::note(const Result<void>& written) {
-  problem_.clear();
-  if (written) return true;
-  problem_ = written.error().detail;
-  if (written.error().code == "disk_full") {
-    problem_ += "; recording goes on as soon as there is room: free some, or lower --quota";
-  }
-  return false;
+  problem_ = written ? "" : written.error().detail;
+  disk_full_ = !written && written.error().code == "disk_full";
+  return written.has_value();
 }
 
 /// A file is over by its time, or where a quota would hold too few of its size.

@@ -43,6 +43,7 @@ class SegmentWriter {
 
   /// Empty where all is well.
   const std::string& problem() const { return problem_; }
+  bool diskFull() const { return disk_full_; }
   std::uint64_t bytes() const { return bytes_; }
   std::uint64_t files() const { return files_; }
 
@@ -62,6 +63,7 @@ class SegmentWriter {
   std::int64_t began_ns_ = 0;
   std::vector<std::filesystem::path> left_over_;  // unfinished, because the disk was full
   std::string problem_;
+  bool disk_full_ = false;
   std::uint64_t bytes_ = 0, files_ = 0;
 };
 

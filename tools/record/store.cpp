@@ -59,6 +59,7 @@ void Store::write(const PackedChunk& packed) {
     now_.messages += packed.chunk.messages;
   } else {
     now_.lost += packed.chunk.messages;
+    now_.lost_to = writer_.problem();
   }
 }
 
@@ -80,6 +81,7 @@ void Store::publish() {
   now_.bytes = writer_.bytes();
   now_.files = writer_.files();
   now_.problem = writer_.problem();
+  now_.disk_full = writer_.diskFull();
   now_.removed = folder_.removed();
   now_.folder_bytes = folder_.bytes();
   if (black_box_) now_.cut_short = black_box_->cutShort();

@@ -30,6 +30,8 @@ struct StoreReport {
   std::uint64_t overrun = 0;    ///< chunks that the disk was too slow for
   std::uint64_t cut_short = 0;  ///< chunks that the black box had no memory for
   std::string problem;          ///< empty where all is well
+  bool disk_full = false;       ///< that is the problem
+  std::string lost_to;          ///< the problem for which messages were lost last
 };
 
 class Store {

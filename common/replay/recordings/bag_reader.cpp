@@ -138,6 +138,11 @@ class Bag : public RosSource {
                          path_.string() + ": " + (file_ < 0 ? std::strerror(errno) : "not a file"));
     }
     size_ = static_cast<std::uint64_t>(status.st_size);
+    if (size_ == 0) {
+      close(file_);
+      throw StartupError(ExitCode::kUnavailable,
+                         path_.string() + " is empty, 0 bytes; fetch it again");
+    }
     const auto begin = read(0, kMagic.size());
     if (std::equal(begin.begin(), begin.end(), kMagic.begin(), kMagic.end())) return;
     close(file_);
@@ -221,6 +226,8 @@ class Bag : public RosSource {
     chunk.end_ns = std::max(chunk.end_ns, log_ns);
     chunk.connections.insert(connection);
     ++counts_[connection];
+    start_ns_ = std::min(start_ns_, log_ns);
+    end_ns_ = std::max(end_ns_, log_ns);
   }
 
   bool knowsAllOf(const ChunkPlace& chunk) const {

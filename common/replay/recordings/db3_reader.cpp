@@ -2,6 +2,8 @@
 // topic_id, timestamp, data).
 #include <sqlite3.h>
 
+#include <algorithm>
+
 #include "common/base/errors.h"
 #include "common/replay/recordings/ros_messages.h"
 #include "common/ros/definition.h"
@@ -27,7 +29,10 @@ class Db3 : public RosSource {
     const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY, nullptr);
     database_.reset(database);
     if (opened != SQLITE_OK) refuse(sqlite3_errmsg(database));
+    std::error_code ignored;
+    if (std::filesystem::file_size(path, ignored) == 0) refuse("it is empty, 0 bytes");
     readTopics();
+    countMessages();
   }
 
   void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) override {
@@ -35,12 +40,12 @@ class Db3 : public RosSource {
     for (const auto& [id, name] : names_) {
       if (wanted.contains(name)) ids += (ids.empty() ? "" : ",") + std::to_string(id);
     }
-    rows_ = prepared(
-        "SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= ? AND "
-        "topic_id IN (" +
-        ids + ") ORDER BY timestamp, id");
-    sqlite3_bind_int64(rows_.get(), 1, static_cast<sqlite3_int64>(from_ns));
-    last_ns_ = 0;
+    chosen_ = "SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= " +
+              std::to_string(static_cast<sqlite3_int64>(from_ns)) + " AND topic_id IN (" + ids +
+              ") ORDER BY ";
+    rows_ = prepared(chosen_ + "timestamp, id");
+    sorted_ = true;
+    last_ns_ = -1;
   }
 
   std::optional<RosMessage> next() override {
@@ -64,12 +69,23 @@ class Db3 : public RosSource {
     if (!rows_) return false;
     const int got = sqlite3_step(rows_.get());
     if (got == SQLITE_ROW) return true;
-    if (got != SQLITE_DONE) {
-      count({"database_damaged", path_.string() + ": " + sqlite3_errmsg(database_.get()) +
-                                     "; what comes before is read"});
+    if (got != SQLITE_DONE && sorted_ && last_ns_ < 0) {
+      // What has to be sorted first ends before its first row; they were written as they came.
+      sorted_ = false;
+      rows_ = prepared(chosen_ + "id");
+      return step();
     }
+    noteEnd(got);
     rows_.reset();
     return false;
+  }
+
+  void noteEnd(int got) {
+    if (got == SQLITE_DONE) return;
+    const std::string name = path_.string();
+    count({"database_damaged", name + ": " + sqlite3_errmsg(database_.get()) +
+                                   "; what comes before is read, and `sqlite3 " + name +
+                                   " .recover | sqlite3 NEW.db3` may have more of it"});
   }
 
   RosMessage message() {
@@ -81,6 +97,11 @@ class Db3 : public RosSource {
   }
 
   [[noreturn]] void refuse(const std::string& why) const {
+    if (sqlite3_errcode(database_.get()) == SQLITE_CORRUPT) {
+      throw StartupError(ExitCode::kData, path_.string() + " is damaged (" + why + "); `sqlite3 " +
+                                              path_.string() +
+                                              " .recover | sqlite3 NEW.db3` may have more of it");
+    }
     throw StartupError(ExitCode::kUnavailable,
                        path_.string() + " is no recording of rosbag2 (" + why +
                            "); give the folder or the .db3 that `ros2 bag record` made");
@@ -95,26 +116,40 @@ class Db3 : public RosSource {
 
   void readTopics() {
     const auto topics = prepared("SELECT id, name, type, serialization_format FROM topics");
-    while (sqlite3_step(topics.get()) == SQLITE_ROW) {
+    int got = SQLITE_ROW;
+    while ((got = sqlite3_step(topics.get())) == SQLITE_ROW) {
       if (textIn(topics.get(), 3) != "cdr") continue;
       const std::string name = textIn(topics.get(), 1);
       names_[sqlite3_column_int64(topics.get(), 0)] = name;
       topics_[name].type = ros::plainName(textIn(topics.get(), 2));
     }
-    const auto counts = prepared("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id");
-    while (sqlite3_step(counts.get()) == SQLITE_ROW) {
-      const auto name = names_.find(sqlite3_column_int64(counts.get(), 0));
+    noteEnd(got);
+  }
+
+  /// One by one: of a sum nothing would be left where a page is damaged.
+  void countMessages() {
+    const auto rows = prepared("SELECT topic_id, timestamp FROM messages ORDER BY id");
+    int got = SQLITE_ROW;
+    while ((got = sqlite3_step(rows.get())) == SQLITE_ROW) {
+      const auto name = names_.find(sqlite3_column_int64(rows.get(), 0));
       if (name == names_.end()) continue;
-      topics_[name->second].messages +=
-          static_cast<std::uint64_t>(sqlite3_column_int64(counts.get(), 1));
+      ++topics_[name->second].messages;
+      const auto time = sqlite3_column_int64(rows.get(), 1);
+      if (sqlite3_column_type(rows.get(), 1) != SQLITE_INTEGER || time < 0) continue;
+      const auto log_ns = static_cast<std::uint64_t>(time);
+      start_ns_ = std::min(start_ns_, log_ns);
+      end_ns_ = std::max(end_ns_, log_ns);
     }
+    noteEnd(got);
   }
 
   std::filesystem::path path_;
   std::unique_ptr<sqlite3, Close> database_;
   std::map<sqlite3_int64, std::string> names_;
+  std::string chosen_;  ///< the query of what is wanted, without its order
   Statement rows_;
-  sqlite3_int64 last_ns_ = 0;
+  bool sorted_ = true;
+  sqlite3_int64 last_ns_ = -1;
 };
 
 }  // namespace

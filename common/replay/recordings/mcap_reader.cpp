@@ -58,7 +58,22 @@ Result<std::vector<std::uint8_t>> unpacked(const ChunkHead& head, Bytes packed) 
   return records;
 }
 
+const Reason kEndsWithinRecord{"chunk_damaged", "a chunk ends within a record"};
+
 }  // namespace
+
+std::string sentenceOfDamage(const std::filesystem::path& file, const Reader& reader) {
+  const auto& damage = reader.damage();
+  const auto& first = damage.front();
+  const auto read = static_cast<std::size_t>(
+      std::count_if(reader.chunks().begin(), reader.chunks().end(), [&](const auto& chunk) {
+        return std::none_of(damage.begin(), damage.end(),
+                            [&](const auto& one) { return one.offset == chunk.offset; });
+      }));
+  return file.string() + ": " + std::to_string(damage.size()) + " of " +
+         std::to_string(read + damage.size()) + " chunks cannot be read; the first, at byte " +
+         std::to_string(first.offset) + ": " + first.reason.detail;
+}
 
 std::string sentenceOfFollowed(const std::filesystem::path& file) {
   return file.string() +
@@ -103,7 +118,7 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
                 path.string() + " is no MCAP file; recordings come from perdure record");
   }
   const Summary summary = reader.readSummary();
-  reader.finished_ = summary == Summary::kHolds;
+  reader.finished_ = reader.by_summary_ = summary == Summary::kHolds;
   if (!reader.finished_) reader.finished_ = reader.scan() && summary == Summary::kTooLittle;
   if (reader.finished_) reader.whole_ = reader.size_;
   return reader;
@@ -114,9 +129,9 @@ Reader::Reader(Reader&& other) noexcept
       file_(std::exchange(other.file_, -1)),
       size_(other.size_),
       whole_(other.whole_),
-      damaged_(other.damaged_),
-      problem_(std::move(other.problem_)),
+      damage_(std::move(other.damage_)),
       finished_(other.finished_),
+      by_summary_(other.by_summary_),
       followed_(other.followed_),
       catalogue_(std::move(other.catalogue_)),
       chunks_(std::move(other.chunks_)),
@@ -278,10 +293,9 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
   ChunkIndex place;
   place.offset = at;
   place.length = kRecordHead + length;
-  const auto records = unpack(place);
+  const auto records = recordsOf(place);
   if (!records) {
-    ++damaged_;
-    problem_ = records.error();
+    damage_.push_back({at, records.error()});
     return true;
   }
   constexpr std::uint64_t kHead = 256;
@@ -291,25 +305,40 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
   place = head->place;
   place.offset = at;
   place.length = kRecordHead + length;
-  last_index_.clear();
-  const bool whole = forEachMessage(
-      **records,
-      [&](const Message& message, std::uint64_t offset) {
-        last_index_[message.channel].emplace_back(message.log_ns, offset);
-        ++statistics_.by_channel[message.channel];
-      },
-      catalogue_);
-  if (!whole) {
-    ++damaged_;
-    problem_ = {"chunk_damaged", path_.string() + ": a chunk ends within a record"};
-  }
-  for (const auto& [channel, entries] : last_index_) statistics_.messages += entries.size();
+  if (!countMessages(*records)) damage_.push_back({at, kEndsWithinRecord});
   statistics_.start_ns =
       chunks_.empty() ? place.start_ns : std::min(statistics_.start_ns, place.start_ns);
   statistics_.end_ns = std::max(statistics_.end_ns, place.end_ns);
   chunks_.push_back(place);
   whole_ = at + place.length;
   return true;
+}
+
+/// Into the statistics and last_index_; false where they end within a record.
+bool Reader::countMessages(const Records& records) {
+  last_index_.clear();
+  const auto visit = [&](const Message& message, std::uint64_t offset) {
+    last_index_[message.channel].emplace_back(message.log_ns, offset);
+    ++statistics_.by_channel[message.channel];
+    ++statistics_.messages;
+  };
+  return forEachMessage(*records, visit, catalogue_);
+}
+
+void Reader::check() {
+  if (!by_summary_) return;
+  by_summary_ = false;
+  statistics_.messages = 0;
+  statistics_.by_channel.clear();
+  std::erase_if(chunks_, [this](const ChunkIndex& chunk) {
+    const auto records = recordsOf(chunk);
+    if (!records) {
+      damage_.push_back({chunk.offset, records.error()});
+    } else if (!countMessages(*records)) {
+      damage_.push_back({chunk.offset, kEndsWithinRecord});
+    }
+    return !records;
+  });
 }
 
 void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content) {
@@ -335,6 +364,13 @@ void Reader::addBare(std::uint64_t at, std::uint64_t length) {
 }
 
 Result<Records> Reader::unpack(const ChunkIndex& chunk) const {
+  auto records = recordsOf(chunk);
+  if (records) return records;
+  return fail(records.error().code, path_.string() + ": " + records.error().detail + " (at byte " +
+                                        std::to_string(chunk.offset) + ")");
+}
+
+Result<Records> Reader::recordsOf(const ChunkIndex& chunk) const {
   if (chunk.length > kMostRecords + kMostContent) {
     return fail("chunk_too_large", "a chunk of " + std::to_string(chunk.length) + " bytes");
   }
@@ -347,24 +383,26 @@ Result<Records> Reader::unpack(const ChunkIndex& chunk) const {
   const auto head =
       record && record->op == Op::kChunk ? chunkHeadFrom(record->content) : std::nullopt;
   if (!head || head->place.packed > record->content.size() - head->records_at) {
-    return fail("chunk_damaged", path_.string() + ": no chunk at " + std::to_string(chunk.offset));
+    return fail("chunk_damaged", "no whole chunk");
   }
   auto records = unpacked(*head, record->content.subspan(head->records_at, head->place.packed));
-  if (!records) return fail(records.error().code, path_.string() + ": " + records.error().detail);
+  if (!records) return tl::unexpected(records.error());
   return std::make_shared<const std::vector<std::uint8_t>>(*std::move(records));
+}
+
+Result<void> Reader::finishable() const {
+  if (followed_) return fail("followed", sentenceOfFollowed(path_));
+  const bool bare = std::any_of(chunks_.begin(), chunks_.end(),
+                                [](const auto& chunk) { return chunk.compression == kBare; });
+  if (!bare) return {};
+  return fail("not_chunked",
+              path_.string() + " holds messages outside of chunks; it reads as it is");
 }
 
 Result<void> Reader::finish() {
   if (finished_) return {};
-  if (followed_) return fail("followed", sentenceOfFollowed(path_));
+  if (auto can = finishable(); !can) return can;
   std::vector<ChunkIndex> chunks = chunks_;
-  for (const ChunkIndex& chunk : chunks) {
-    if (chunk.compression == kBare) {
-      return fail("not_chunked", path_.string() +
-                                     " holds messages outside of chunks; it reads as "
-                                     "it is");
-    }
-  }
   const bool lacks_index =
       !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
   std::optional<ChunkIndex> last;

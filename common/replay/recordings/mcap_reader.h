@@ -17,6 +17,12 @@ namespace perdure::replay::mcap {
 
 using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
 
+/// A chunk that cannot be read, or not to its end.
+struct Damage {
+  std::uint64_t offset = 0;  ///< of its record in the file
+  Reason reason;             ///< as Reader::unpack has it, without the file
+};
+
 class Reader {
  public:
   /// Reasons: "file", "not_mcap"; the detail says the mend.
@@ -37,10 +43,11 @@ class Reader {
   std::uint64_t size() const { return size_; }
   /// Of an unfinished file: bytes behind the last whole chunk.
   std::uint64_t cutBytes() const { return size_ - whole_; }
-  /// Chunks that could not be read, where the file was gone through, and why the last one could
-  /// not.
-  std::uint64_t damagedChunks() const { return damaged_; }
-  const Reason& problem() const { return problem_; }
+  /// Of a file that was gone through.
+  const std::vector<Damage>& damage() const { return damage_; }
+  /// Goes through every chunk that the summary names: damage() is of all then, and chunks() and
+  /// statistics() are of what can be read.
+  void check();
 
   /// The chunk's records. Reasons: "chunk_damaged", "chunk_of_other_compression",
   /// "chunk_too_large", "file".
@@ -49,9 +56,11 @@ class Reader {
   /// Keeps no file open from now on; unpack() opens it each time.
   void letGo();
 
-  /// Makes an unfinished file a finished one: cuts what is not whole, writes the summary. Refuses
-  /// one that is followed by another, which would be lost.
+  /// Makes an unfinished file a finished one: cuts what is not whole (cutBytes), writes the
+  /// summary. Refuses what finishable() does.
   Result<void> finish();
+  /// Reasons: "followed" (by another recording, which would be lost), "not_chunked".
+  Result<void> finishable() const;
 
  private:
   Reader(std::filesystem::path path, int file, std::uint64_t size)
@@ -65,20 +74,25 @@ class Reader {
   bool endsAt(std::uint64_t end);
   bool scanRecord(Op op, std::uint64_t at, std::uint64_t length);
   bool scanChunk(std::uint64_t at, std::uint64_t length);
+  Result<Records> recordsOf(const ChunkIndex& chunk) const;
+  bool countMessages(const Records& records);
   void scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content);
   void addBare(std::uint64_t at, std::uint64_t length);
   std::vector<std::uint8_t> read(std::uint64_t at, std::uint64_t length) const;
 
   std::filesystem::path path_;
   int file_ = -1;
-  std::uint64_t size_ = 0, whole_ = 0, damaged_ = 0;
-  Reason problem_;
-  bool finished_ = false, followed_ = false;
+  std::uint64_t size_ = 0, whole_ = 0;
+  std::vector<Damage> damage_;
+  bool finished_ = false, by_summary_ = false, followed_ = false;
   Catalogue catalogue_;
   std::vector<ChunkIndex> chunks_;
   Statistics statistics_;
   Draft::Index last_index_;  ///< of the last chunk that the scan found
 };
+
+/// "FILE: 2 of 41 chunks cannot be read; the first, at byte 812: …", of one that has some.
+std::string sentenceOfDamage(const std::filesystem::path& file, const Reader& reader);
 
 /// That another recording follows the first one in `file`, and the mend.
 std::string sentenceOfFollowed(const std::filesystem::path& file);

@@ -97,6 +97,10 @@ class Summary {
 
 }  // namespace
 
+ExitCode exitCodeOf(const Reason& reason) {
+  return reason.code == "disk_full" ? ExitCode::kInputOutput : ExitCode::kUnavailable;
+}
+
 void Draft::add(const Message& message) {
   start_ns_ = std::min(start_ns_, message.log_ns);
   end_ns_ = std::max(end_ns_, message.log_ns);
@@ -136,8 +140,11 @@ Result<Writer> Writer::create(const std::filesystem::path& path, const std::stri
   const auto file = opened(path, O_WRONLY | O_CREAT | O_EXCL);
   if (!file) return tl::unexpected(file.error());
   Writer writer(path, *file);
-  if (auto written = writer.write(beginning(profile)); !written)
+  if (auto written = writer.write(beginning(profile)); !written) {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
     return tl::unexpected(written.error());
+  }
   return writer;
 }
 

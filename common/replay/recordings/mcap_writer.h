@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/errors.h"
 #include "common/base/result.h"
 #include "common/replay/recordings/mcap_format.h"
 
@@ -52,9 +53,12 @@ struct Chunk {
 /// By zstd, fastest level.
 Chunk pack(const Draft& draft);
 
+/// Of a Writer's reason.
+ExitCode exitCodeOf(const Reason& reason);
+
 class Writer {
  public:
-  /// A new file. Reasons: "file" (the detail is the system's).
+  /// A new file. Reasons: "file", "disk_full" (the detail is the system's); none is left then.
   static Result<Writer> create(const std::filesystem::path& path, const std::string& profile = {});
   /// An existing one, from `end` on: what is behind is cut off. `chunks` and `counted` are what
   /// stands before.

@@ -45,13 +45,13 @@ bool RecordedMessages::looksLikeOne(const fs::path& path) {
   return fs::is_directory(path, ignored) && !plainFilesIn(path).empty();
 }
 
-RecordedMessages::RecordedMessages(const fs::path& path)
+RecordedMessages::RecordedMessages(const fs::path& path, Chunks look)
     : unpacked_(unpackedFiles(path, kExtension)) {
   auto files = plainFilesIn(path);
   for (const auto& file : unpacked_) files.push_back(file->path());
   std::sort(files.begin(), files.end(),
             [](const auto& a, const auto& b) { return a.filename() < b.filename(); });
-  for (const fs::path& file : files) openFile(file);
+  for (const fs::path& file : files) openFile(file, look);
   for (std::size_t i = 0; i < files_.size(); ++i) {
     for (const auto& chunk : files_[i].chunks()) chunks_.push_back({i, &chunk});
   }
@@ -67,7 +67,7 @@ RecordedMessages::RecordedMessages(const fs::path& path)
   rewind();
 }
 
-void RecordedMessages::openFile(const fs::path& path) {
+void RecordedMessages::openFile(const fs::path& path, Chunks look) {
   auto reader = mcap::Reader::open(path);
   if (!reader) {
     if (reader.error().code == "file") {
@@ -75,10 +75,15 @@ void RecordedMessages::openFile(const fs::path& path) {
     }
     return count(reader.error());
   }
+  if (reader->size() == 0) {
+    return count({"unfinished", givenFor(path).string() + " is empty (0 bytes)"});
+  }
+  if (look == Chunks::kEach) reader->check();
   if (!reader->finished()) {
     count({reader->followed() ? "followed" : "unfinished", whyUnfinished(*reader)});
   }
-  if (reader->damagedChunks() > 0) count(reader->problem());
+  for (const mcap::Damage& one : reader->damage()) reasons_.add(one.reason);
+  if (!reader->damage().empty()) last_problem_ = mcap::sentenceOfDamage(givenFor(path), *reader);
   const auto& catalogue = reader->catalogue();
   for (const auto& [id, n] : reader->statistics().by_channel) {
     const auto channel = catalogue.channels.find(id);

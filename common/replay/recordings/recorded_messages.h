@@ -42,9 +42,11 @@ class RecordedMessages {
     std::uint64_t messages = 0;
   };
 
+  /// Whether every chunk is unpacked at once, so that topics() is of what can be read.
+  enum class Chunks { kByIndex, kEach };
   /// A .mcap file, or a folder that holds some; packed ones (.mcap.zstd) are unpacked. Throws
   /// StartupError with the mend.
-  explicit RecordedMessages(const std::filesystem::path& path);
+  explicit RecordedMessages(const std::filesystem::path& path, Chunks look = Chunks::kByIndex);
   static bool looksLikeOne(const std::filesystem::path& path);
 
   const std::map<std::string, TopicCount>& topics() const { return topics_; }
@@ -75,7 +77,7 @@ class RecordedMessages {
     }
   };
 
-  void openFile(const std::filesystem::path& path);
+  void openFile(const std::filesystem::path& path, Chunks look);
   std::string whyUnfinished(const mcap::Reader& reader) const;
   std::filesystem::path givenFor(const std::filesystem::path& file) const;
   void count(const Reason& reason);

@@ -9,7 +9,7 @@ namespace {
 
 mcap::Writer created(const std::filesystem::path& path) {
   auto file = mcap::Writer::create(path);
-  if (!file) throw StartupError(ExitCode::kUnavailable, file.error().detail);
+  if (!file) throw StartupError(mcap::exitCodeOf(file.error()), file.error().detail);
   return *std::move(file);
 }
 

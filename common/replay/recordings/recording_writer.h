@@ -11,7 +11,7 @@ namespace perdure::replay {
 
 class RecordingWriter {
  public:
-  /// A new file. Throws StartupError(kUnavailable).
+  /// A new file. Throws StartupError: kUnavailable; the disk is full: kInputOutput.
   explicit RecordingWriter(const std::filesystem::path& file);
 
   /// Log times do not go back. `topic` is "odometry", …; reasons as encodeCdr and Writer::append.

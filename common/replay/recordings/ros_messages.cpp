@@ -28,6 +28,8 @@ class McapSource : public RosSource {
       topics_[name] = {ros::plainName(topic.type), old ? ros::Encoding::kRos1 : ros::Encoding::kCdr,
                        topic.messages};
     }
+    start_ns_ = messages_.startNs();
+    end_ns_ = messages_.endNs();
     reasons_ = messages_.reasons();
     last_problem_ = messages_.lastProblem();
   }
@@ -83,6 +85,8 @@ RosMessages::RosMessages(const fs::path& path) : unpacked_(unpackedFiles(path, "
   for (const auto& file : unpacked_) sources_.push_back(openDb3(file->path()));
   if (sources_.empty()) sources_.push_back(std::make_unique<McapSource>(path));
   for (const auto& source : sources_) {
+    start_ns_ = std::min(start_ns_, source->startNs());
+    end_ns_ = std::max(end_ns_, source->endNs());
     for (const auto& [name, topic] : source->topics()) {
       RosTopic& all = topics_[name];
       const std::uint64_t before = all.messages;

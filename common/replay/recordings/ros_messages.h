@@ -44,6 +44,9 @@ class RosSource {
   virtual std::optional<RosMessage> next() = 0;
   /// For people: what was unpacked.
   virtual std::vector<std::string> notes() const { return {}; }
+  /// When the first and the last message were recorded.
+  std::uint64_t startNs() const { return start_ns_; }
+  std::uint64_t endNs() const { return end_ns_; }
 
  protected:
   void count(const Reason& reason) {
@@ -53,6 +56,7 @@ class RosSource {
   RosTopics topics_;
   ReasonCounts reasons_;
   std::string last_problem_;
+  std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
 };
 
 /// Throw StartupError with the mend.
@@ -67,6 +71,8 @@ class RosMessages {
   explicit RosMessages(const std::filesystem::path& path);
 
   const RosTopics& topics() const { return topics_; }
+  std::uint64_t startNs() const { return start_ns_; }
+  std::uint64_t endNs() const { return end_ns_; }
   /// For people: what was unpacked.
   std::vector<std::string> notes() const;
   ReasonCounts reasons() const;
@@ -90,6 +96,7 @@ class RosMessages {
   std::vector<std::unique_ptr<RosSource>> sources_;
   std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each
   RosTopics topics_;
+  std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
   ReasonCounts reasons_;  ///< beside those of the sources
   std::string last_problem_;
 };

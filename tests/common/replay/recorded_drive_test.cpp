@@ -13,6 +13,7 @@ namespace perdure::replay {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -111,6 +112,22 @@ TEST(RecordedDrive, WithoutCalibrationSaysWhatIsMissing) {
   recording.finish();
   EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = file}); }),
               HasSubstr("record while capture runs"));
+}
+
+TEST(RecordedDrive, MessagesInAnEncodingThatIsNotReadAreNamed) {
+  const fs::path file = freshFolder("recorded_protobuf") / "run.mcap";
+  auto writer = mcap::Writer::create(file);
+  mcap::Catalogue catalogue;
+  catalogue.schemas[1] = {1, "foxglove.RawImage", "protobuf", "..."};
+  catalogue.channels[1] = {1, 1, "/cam0", "protobuf"};
+  mcap::Draft draft;
+  const std::vector<std::uint8_t> data(10);
+  draft.add({1, 1, 1000, 1000, data});
+  ASSERT_TRUE(writer->append(mcap::pack(draft), catalogue));
+  ASSERT_TRUE(writer->finish());
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = file}); }),
+              AllOf(HasSubstr("on /cam0 are foxglove.RawImage in `protobuf`"),
+                    HasSubstr("perdure record")));
 }
 
 TEST(RecordedDrive, AFileWithoutMessagesIsRefused) {

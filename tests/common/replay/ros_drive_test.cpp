@@ -5,6 +5,8 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 #include <random>
 
 #include "common/replay/dataset.h"
@@ -23,6 +25,7 @@ using test::twinOf;
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 void expectSame(const Dataset& a, const Dataset& b) {
   const CameraCalibration &one = a.calibration().cameras[0], &other = b.calibration().cameras[0];
@@ -52,13 +55,11 @@ TEST_P(Images, OfASqliteRecordingAreThoseOfTheFolder) {
     EXPECT_TRUE(recorded->reasons().all().empty());
   }
 }
-INSTANTIATE_TEST_SUITE_P(Ros, Images,
-                         testing::Values(PlanOptions::Images::kRaw, PlanOptions::Images::kPng));
 
 // How many bits are used is what all images say: by the first three alone it would be eight, and
 // the others would be white.
-TEST(RosDrive, ImagesOf16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
-  const Twin twin = twinOf("ros_dark", {.dark = 3});
+TEST_P(Images, Of16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
+  const Twin twin = twinOf("ros_dark", {.images = GetParam(), .dark = 3});
   const auto bright = test::allOf(*Dataset::open({.path = twin.folder})).pixels;
   const auto pixels = test::allOf(*Dataset::open({.path = twin.file, .rig = twin.rig})).pixels;
   ASSERT_EQ(pixels.size(), bright.size());
@@ -81,6 +82,9 @@ TEST(RosDrive, ImagesOf16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
     EXPECT_EQ(wrong, 0u) << "image " << i;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Ros, Images,
+                         testing::Values(PlanOptions::Images::kRaw, PlanOptions::Images::kPng));
 
 TEST(RosDrive, GivesAnyImageOutOfTurn) {
   const Twin twin = twinOf("ros_turns");
@@ -119,6 +123,49 @@ TEST(RosDrive, WhereTheCameraIsMustBeKnown) {
   const Twin twin = twinOf("ros_placeless", {.transforms = false});
   EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = twin.file, .rig = twin.rig}); }),
               AllOf(HasSubstr("has no /tf_static"), HasSubstr("T_cam_imu"), HasSubstr("--rig")));
+}
+
+TEST(RosDrive, ATransformThatIsNoneIsNamed) {
+  const Twin twin = twinOf("ros_no_rotation", {.broken_transforms = true});
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = twin.file, .rig = twin.rig}); }),
+              AllOf(HasSubstr("from `imu_link` to `cam0_optical` is none"), HasSubstr("0, 0, 0, 2"),
+                    Not(HasSubstr("has no /tf_static"))));
+}
+
+/// Zeroes pages of the file from its share `begin` to `end`; its head stays.
+void zeroPages(const fs::path& file, double begin, double end) {
+  constexpr std::streamoff kPage = 4096;
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  const double pages = static_cast<double>(fs::file_size(file)) / kPage;
+  for (auto page = std::max(1.0, std::floor(begin * pages)); page < end * pages; ++page) {
+    stream.seekp(static_cast<std::streamoff>(page) * kPage);
+    const std::string zeros(kPage, '\0');
+    stream.write(zeros.data(), kPage);
+  }
+}
+
+TEST(RosDrive, OfADatabaseWithAHoleWhatComesBeforeIsReadAndTheHoleIsCounted) {
+  for (const bool index : {true, false}) {
+    const Twin twin = twinOf("ros_hole", {.index = index});
+    const auto all = RosMessages(twin.file).topics();
+    zeroPages(twin.file, 0.6, 0.9);
+    RosMessages holed(twin.file);
+    EXPECT_GE(holed.reasons().of("database_damaged"), 1U);
+    EXPECT_THAT(holed.lastProblem(), HasSubstr("malformed"));
+    EXPECT_GT(holed.topics().at("/imu0").messages, 0U);
+    EXPECT_LT(holed.topics().at("/imu0").messages, all.at("/imu0").messages);
+    holed.rewind({"/imu0"});
+    std::uint64_t read = 0;
+    while (holed.next()) ++read;
+    EXPECT_GT(read, 0U) << "index " << index;
+  }
+}
+
+TEST(RosDrive, OfADatabaseThatIsAllHolesTheDamageIsTold) {
+  const Twin twin = twinOf("ros_holes");
+  zeroPages(twin.file, 0.0, 1.0);
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = twin.file, .rig = twin.rig}); }),
+              HasSubstr("malformed"));
 }
 
 TEST(RosDrive, TheNoiseOfTheInertialUnitMustBeKnown) {
@@ -186,6 +233,8 @@ TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheMend) {
   const fs::path folder = freshFolder("ros_none");
   writeText(folder / "a.bag", "#ROSBAG V1.2\n");
   writeText(folder / "b.bag", "something else");
+  writeText(folder / "d.bag", "");
+  writeText(folder / "d.db3", "");
   writeText(folder / "c.db3", "nothing of the kind, and long enough for a head of SQLite's files");
   const auto errorOf = [&](const char* name) {
     return startupErrorOf([&] { Dataset::open({.path = folder / name}); });
@@ -193,6 +242,8 @@ TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheMend) {
   EXPECT_THAT(errorOf("a.bag"), HasSubstr("rosbag fix"));
   EXPECT_THAT(errorOf("b.bag"), HasSubstr("is no bag of ROS 1"));
   EXPECT_THAT(errorOf("c.db3"), HasSubstr("ros2 bag record"));
+  EXPECT_THAT(errorOf("d.bag"), HasSubstr("is empty"));
+  EXPECT_THAT(errorOf("d.db3"), HasSubstr("is empty"));
 }
 
 RosTopics topicsOfTypes(std::vector<std::pair<const char*, const char*>> list) {
@@ -230,6 +281,30 @@ TEST(RosTopics, OfTwoThatAreAPairTheLeftOneIsFirst) {
   EXPECT_EQ(chosen.cameras[0].info, "/left/camera_info");
   EXPECT_EQ(chosen.cameras[1].info, "");
   EXPECT_EQ(chosen.imu, "");
+}
+
+TEST(RosTopics, HalvesOfAnInertialUnitAreNoneAndTheMendIsSaid) {
+  auto topics = topicsOfTypes({{"/camera/color/image_raw", "Image"},
+                               {"/camera/accel/sample", "Imu"},
+                               {"/camera/gyro/sample", "Imu"}});
+  const auto errorOf = [&](const std::vector<std::string>& wanted) {
+    return startupErrorOf([&] { chooseTopics(topics, topicsOf(wanted), "f"); });
+  };
+  for (const auto& wanted :
+       {std::vector<std::string>(), std::vector<std::string>{"imu=/camera/gyro/sample"}}) {
+    EXPECT_THAT(errorOf(wanted),
+                AllOf(HasSubstr("/camera/accel/sample"), HasSubstr("/camera/gyro/sample"),
+                      HasSubstr("unite_imu_method")));
+  }
+  topics["/camera/imu"] = topics["/camera/gyro/sample"];
+  EXPECT_EQ(chooseTopics(topics, {}, "f").imu, "/camera/imu");
+}
+
+TEST(RosTopics, ImagesOfOtherTypesAreNamed) {
+  RosTopics topics;
+  topics["/cam"] = {"foxglove_msgs/CompressedImage", ros::Encoding::kCdr, 3};
+  EXPECT_THAT(startupErrorOf([&] { chooseTopics(topics, {}, "f"); }),
+              HasSubstr("those on /cam are foxglove_msgs/CompressedImage, which is not read"));
 }
 
 TEST(RosTopics, WhereSeveralMayBeMeantOneMustBeNamed) {

@@ -58,6 +58,13 @@ TEST(RosCamera, WhatIsNotKnownIsSaid) {
   EXPECT_THAT(cameraOf(CameraInfo(), false).error().detail, HasSubstr("no focal length in K"));
   EXPECT_THAT(cameraOf(info("double_sphere", {1, 2}), false).error().detail,
               HasSubstr("`double_sphere`"));
+  const double nan = std::nan("");
+  EXPECT_THAT(cameraOf(info("plumb_bob", {0.1, nan, 0, 0, 0}), false).error().detail,
+              HasSubstr("D[1] is nan"));
+  CameraInfo off = info("plumb_bob", {});
+  off.k[2] = -INFINITY;
+  EXPECT_THAT(cameraOf(off, false).error().detail, HasSubstr("K[2] is -inf"));
+  EXPECT_TRUE(cameraOf(off, true)) << "of rectified images K says nothing";
 }
 
 TransformStamped edge(const std::string& parent, const std::string& child, double x,
@@ -91,6 +98,7 @@ TEST(FrameTree, GoesRoundNoCircleAndTakesNoRotationThatIsNone) {
   tree.add({{edge("a", "b", 1.0), edge("b", "a", 1.0), none}});
   EXPECT_TRUE(tree.find("a", "b"));
   EXPECT_FALSE(tree.find("a", "c"));
+  EXPECT_THAT(tree.refused().at("c"), HasSubstr("from `a` to `c` is none"));
 }
 
 }  // namespace

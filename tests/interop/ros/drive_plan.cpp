@@ -64,7 +64,7 @@ ros::Time timeOf(std::int64_t ns) {
 /// A database that is written, row by row.
 class Db3 {
  public:
-  explicit Db3(const fs::path& file) {
+  Db3(const fs::path& file, bool index) {
     sqlite3_open(file.c_str(), &database_);
     run("CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL)");
     run("INSERT INTO schema VALUES(3, 'humble')");
@@ -72,7 +72,7 @@ class Db3 {
         "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)");
     run("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp "
         "INTEGER NOT NULL, data BLOB NOT NULL)");
-    run("CREATE INDEX timestamp_idx ON messages (timestamp ASC)");
+    if (index) run("CREATE INDEX timestamp_idx ON messages (timestamp ASC)");
     run("BEGIN");
   }
   ~Db3() {
@@ -106,7 +106,7 @@ class Db3 {
   std::map<std::string, int> ids_;
 };
 
-ros::TFMessage transformsOf(const Calibration& calibration) {
+ros::TFMessage transformsOf(const Calibration& calibration, const PlanOptions& options) {
   ros::TFMessage message;
   for (const auto& camera : calibration.cameras) {
     ros::TransformStamped one;
@@ -115,6 +115,7 @@ ros::TFMessage transformsOf(const Calibration& calibration) {
     const auto& T = camera.T_BC;
     one.transform.translation = {T.p.x(), T.p.y(), T.p.z()};
     one.transform.rotation = {T.q.x(), T.q.y(), T.q.z(), T.q.w()};
+    if (options.broken_transforms) one.transform.rotation = {0, 0, 0, 2};
     message.transforms.push_back(one);
   }
   return message;
@@ -163,6 +164,16 @@ ros::Image twelveBitsOf(const Frame& frame, const ros::Header& header, bool dark
   return image;
 }
 
+ros::CompressedImage packedOf(const ros::Image& image) {
+  auto* pixels = const_cast<std::uint8_t*>(image.data->data());
+  auto png = std::make_shared<std::vector<std::uint8_t>>();
+  cv::imencode(
+      ".png",
+      cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width), CV_16UC1, pixels),
+      *png);
+  return {image.header, "mono16; png compressed ", png};
+}
+
 ros::CompressedImage packedOf(const Frame& frame, const ros::Header& header) {
   auto png = std::make_shared<const std::vector<std::uint8_t>>(pngOf(frame));
   return {header, "png", png};
@@ -206,7 +217,7 @@ fs::path writePlan(replay::Dataset& dataset, const fs::path& folder, const PlanO
 }
 
 void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions& options) {
-  Db3 database(file);
+  Db3 database(file, options.index);
   bool begun = false;
   std::size_t images = 0;
   while (const auto message = dataset.next()) {
@@ -216,7 +227,7 @@ void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions&
     const std::int64_t ns = toNanoseconds(imu ? imu->time : frame->stamp.time);
     const std::int64_t log_ns = (options.one_log_time ? 0 : ns) + kLogDelay;
     if (!begun && options.transforms)
-      database.add("/tf_static", log_ns, transformsOf(dataset.calibration()));
+      database.add("/tf_static", log_ns, transformsOf(dataset.calibration(), options));
     begun = true;
     ros::Header header{options.stamps ? timeOf(ns) : ros::Time(), kImuFrame};
     if (imu) {
@@ -228,8 +239,12 @@ void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions&
     database.add(spaceOf(frame->camera, options) + "/camera_info", log_ns, infoOf(*camera, header));
     const std::string topic = imageTopic(frame->camera, options);
     if (options.dark) {
-      const bool dark = images++ < *options.dark;
-      database.add(topic, log_ns, twelveBitsOf(*frame, header, dark));
+      const ros::Image image = twelveBitsOf(*frame, header, images++ < *options.dark);
+      if (options.images == PlanOptions::Images::kPng) {
+        database.add(topic, log_ns, packedOf(image));
+      } else {
+        database.add(topic, log_ns, image);
+      }
     } else if (options.images == PlanOptions::Images::kPng) {
       database.add(topic, log_ns, packedOf(*frame, header));
     } else {

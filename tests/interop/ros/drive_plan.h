@@ -13,10 +13,12 @@ namespace perdure::test {
 struct PlanOptions {
   enum class Images { kRaw, kPng };
   Images images = Images::kRaw;
-  bool transforms = true;     ///< /tf_static
-  bool stamps = true;         ///< of headers
-  bool one_log_time = false;  ///< of writeDb3: all was recorded at one moment
-  /// Of writeDb3, raw images: mono16 of which 12 bits are used, and the first so many in the dark.
+  bool transforms = true;          ///< /tf_static
+  bool broken_transforms = false;  ///< of writeDb3: their quaternions are 0, 0, 0, 2
+  bool index = true;               ///< of writeDb3, by time
+  bool stamps = true;              ///< of headers
+  bool one_log_time = false;       ///< of writeDb3: all was recorded at one moment
+  /// Of writeDb3: 16 bits a pixel, of which 12 bits are used, and the first so many in the dark.
   std::optional<std::size_t> dark = {};
   std::string suffix = {};  ///< of cam0's name space: "/cam0SUFFIX/image_raw"
 };
