@@ -24,6 +24,7 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
   std::ifstream in;
   if (regular && !error) in.open(list.path);
   for (std::string line; std::getline(in, line);) {
+    if (lines.empty() && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a byte-order mark
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
     if (!line.empty()) lines.push_back(line);
   }

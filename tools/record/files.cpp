@@ -51,12 +51,13 @@ void printTable(const std::string& path, const Messages& recording, const char* 
   for (const std::string& note : recording.notes()) fmt::print("  {}\n", note);
 }
 
-void printInfo(const std::string& path) {
+void printInfo(const std::string& path, bool each_chunk) {
   using replay::RecordedMessages;
   if (!RecordedMessages::looksLikeOne(path) && replay::RosMessages::looksLikeOne(path)) {
     printTable(path, replay::RosMessages(path), "a recording of ROS, a drive for --data; ");
   } else {
-    printTable(path, RecordedMessages(path, RecordedMessages::Chunks::kEach));
+    using Chunks = RecordedMessages::Chunks;
+    printTable(path, RecordedMessages(path, each_chunk ? Chunks::kEach : Chunks::kByIndex));
   }
 }
 
@@ -139,14 +140,18 @@ void addFileCommands(CLI::App& record) {
   struct Options {
     std::vector<std::string> paths;
     std::string from, to;
-    bool ros2 = false;
+    bool ros2 = false, check = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* info = record.add_subcommand("info", "what recordings hold");
   info->add_option("paths", options->paths, "files, or folders of them")->required();
   info->callback([options] {
-    for (const std::string& path : options->paths) printInfo(path);
+    for (const std::string& path : options->paths) printInfo(path, options->check);
   });
+  info->add_flag(
+      "--check", options->check,
+      "unpack every chunk, which takes as long as reading it all: its counts are of what "
+      "can be read, not of what the index says");
   CLI::App* mend = record.add_subcommand("repair", "finish files of a recorder that was killed");
   mend->add_option("paths", options->paths, "files, or folders of them")->required();
   mend->callback([options] { repairAll({options->paths.begin(), options->paths.end()}); });

@@ -203,7 +203,7 @@ TEST(Schema, LeavesAnOlderMapAsItWasWhereItCannotBeTakenOver) {
     ASSERT_EQ(connection->integer("PRAGMA freelist_count").value(), 0);
   }
   const auto refusal = refusalOf([&] { openStore({path, 32.0, 1}); });
-  EXPECT_EQ(refusal.code(), ExitCode::kUnavailable);
+  EXPECT_EQ(refusal.code(), ExitCode::kInputOutput);
   EXPECT_THAT(refusal.what(), HasSubstr("disk_full"));
   EXPECT_THAT(refusal.what(), HasSubstr("store.max_size"));
   EXPECT_EQ(versionOf(path), 2);

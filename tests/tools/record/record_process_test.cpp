@@ -280,9 +280,11 @@ struct Said {
   std::string text;
 };
 
-Said record(const std::string& what, const fs::path& file) {
+Said record(const std::string& what, const fs::path& file, const char* flag = nullptr) {
   const test::Folder logs;
-  test::Child child({perdure(), "record", what, file}, logs.file("log"));
+  std::vector<std::string> words{perdure(), "record", what, file};
+  if (flag != nullptr) words.emplace_back(flag);
+  test::Child child(words, logs.file("log"));
   const int status = child.wait(20s);
   return {status, child.log()};
 }
@@ -296,7 +298,7 @@ TEST(RepairProcess, DamagedChunksAreCountedAndTheFileIsNotCalledWhole) {
   setByte(file, offsets[1] + kCrcAt, 'x');
   setByte(file, offsets[2] + kLengthAt, 'x');  // 2^62 bytes
   const std::string before = test::contentsOf(file);
-  const Said info = record("info", file), repair = record("repair", file);
+  const Said info = record("info", file, "--check"), repair = record("repair", file);
   EXPECT_EQ(info.status, 0);
   const std::string why = "2 of 4 chunks cannot be read; the first, at byte " +
                           std::to_string(offsets[1]) + ": a chunk with a wrong checksum";
@@ -349,7 +351,8 @@ TEST(InfoProcess, OfASqliteRecordingOfRosIsTheSameTable) {
   const Said said = record("info", twin.file);
   EXPECT_EQ(said.status, 0);
   EXPECT_THAT(said.text, HasSubstr("a recording of ROS"));
-  EXPECT_THAT(said.text, testing::ContainsRegex("/cam0/image_raw +5 +[0-9.]+ Hz +sensor_msgs/Imag"));
+  EXPECT_THAT(said.text,
+              testing::ContainsRegex("/cam0/image_raw +5 +[0-9.]+ Hz +sensor_msgs/Imag"));
 }
 
 TEST(ExportProcess, OfARecordingOfOthersNoFileIsMade) {
