@@ -18,6 +18,12 @@ std::optional<double> number(const Json& json, const char* key) {
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
+/// gpsd's statuses of dead reckoning, of a receiver that was told its place, of a simulator.
+bool isMeasured(const Json& json) {
+  const double status = number(json, "status").value_or(0.0);
+  return status != 5.0 && status != 7.0 && status != 8.0;
+}
+
 }  // namespace
 
 Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time_ns) {
@@ -33,6 +39,9 @@ Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time
   if (!height) height = number(json, "alt");
   if (number(json, "mode").value_or(0) < 3 || !latitude || !longitude || !height) {
     return fail("gpsd_no_fix", "gpsd has no fix in three dimensions");
+  }
+  if (!isMeasured(json) || (*latitude == 0.0 && *longitude == 0.0)) {
+    return fail("gpsd_no_fix", "gpsd says a place that satellites did not give");
   }
   if (std::abs(*latitude) > 90.0 || std::abs(*longitude) > 180.0 || !isHeight(*height)) {
     return fail("gpsd_malformed", "gpsd said a place that is not on Earth");

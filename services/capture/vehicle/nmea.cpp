@@ -74,7 +74,9 @@ constexpr double kLastMeasured = 5;
 constexpr std::string_view kNotMeasured = "NSM";
 
 tl::unexpected<Reason> noFix() {
-  return fail("nmea_no_fix", "the receiver of satellites has no fix");
+  return fail("nmea_no_fix",
+              "the receiver has no fix of satellites (one that is simulated, entered or estimated "
+              "is none)");
 }
 
 }  // namespace

@@ -42,6 +42,12 @@ TEST(Gpsd, SaysWhatIsNone) {
   EXPECT_EQ(code(R"({"class":"TPV","mode":1})"), "gpsd_no_fix");
   EXPECT_EQ(code(R"({"class":"TPV","mode":2,"lat":1,"lon":2,"alt":3})"), "gpsd_no_fix");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":"1","lon":2,"alt":3})"), "gpsd_no_fix");
+  for (const char* status : {"5", "7", "8"}) {
+    const auto line = std::string(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":3,"status":)");
+    EXPECT_EQ(code((line + status + "}").c_str()), "gpsd_no_fix") << status;
+  }
+  EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":3,"status":4})"), "read");
+  EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":0,"lon":0,"alt":3})"), "gpsd_no_fix");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":91,"lon":2,"alt":3})"), "gpsd_malformed");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":1e300})"), "gpsd_malformed");
 }
