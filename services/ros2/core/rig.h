@@ -29,7 +29,7 @@ class Rig {
       std::string body);
 
   void onTransforms(const ros::TFMessage& message);
-  /// Reasons: lens, uncalibrated (infos that cannot be used).
+  /// Reasons: lens, not_finite, uncalibrated (infos that cannot be used).
   Result<void> onInfo(std::size_t camera, const ros::CameraInfo& info);
   void onImageOf(std::size_t camera, const std::string& frame_id, TimePoint time);
   void onImuOf(const std::string& frame_id);

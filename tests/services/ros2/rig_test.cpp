@@ -96,7 +96,7 @@ TEST(Ros2Rig, RefusesInfosOfNoCalibration) {
   EXPECT_EQ(rig.onInfo(0, none).error().code, "uncalibrated");
   ros::CameraInfo nan = info();
   nan.k[2] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(rig.onInfo(0, nan).error().code, "uncalibrated");
+  EXPECT_EQ(rig.onInfo(0, nan).error().code, "not_finite");
   ros::CameraInfo odd = info();
   odd.distortion_model = "thin_prism", odd.d = {1, 2, 3};
   EXPECT_EQ(rig.onInfo(0, odd).error().code, "lens");

@@ -212,7 +212,7 @@ TEST_F(LiveProcess, EndsAtOnceWhereTheConfigurationIsWrong) {
     EXPECT_EQ(capture.wait(10s), status) << capture.log();
     return capture.log();
   };
-  EXPECT_THAT(messageOf(command({}, rig(false)), 69), HasSubstr("cam0 is missing"));
+  EXPECT_THAT(messageOf(command({}, rig(false)), 65), HasSubstr("cam0 is missing"));
   EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0]"}), 78),
               HasSubstr("imu.mount has 3 numbers"));
   EXPECT_THAT(messageOf(command({"imu.mount=[1, 0, 0, 0, 1, 0, 0, 0, -1]"}), 78),
