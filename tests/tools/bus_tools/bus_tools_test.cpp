@@ -135,6 +135,13 @@ TEST_F(BusTools, DoctorNamesWhoIsThereAndWhoIsNot) {
   EXPECT_THAT(outcome.output, HasSubstr("OK   65500-byte datagrams pass over loopback"));
 }
 
+TEST_F(BusTools, DoctorLooksAtNoPosesBesideAFixAndSaysSo) {
+  const ProgramAnswer outcome = runWhilePublishing(
+      {perdure, "doctor", "--data", "DRIVE", "--fix", "COPY", "--poses", "poses.tum"});
+  EXPECT_EQ(outcome.status, 64);
+  EXPECT_THAT(outcome.output, HasSubstr("a second call, with --data COPY"));
+}
+
 TEST_F(BusTools, StatusNamesWhatIsNotThereAndEndsWithTheWorst) {
   const ProgramAnswer outcome = runWhilePublishing({perdure, "status"});
   EXPECT_EQ(outcome.status, 2);

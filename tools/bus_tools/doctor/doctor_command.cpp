@@ -57,6 +57,11 @@ void runDoctor(const DoctorOptions& given) {
   if (!given.drive.poses.empty() && given.drive.data.empty()) {
     throw StartupError(ExitCode::kUsage, "--poses are of a recording; give --data DRIVE as well");
   }
+  if (!given.drive.poses.empty() && !given.copy.empty()) {
+    throw StartupError(ExitCode::kUsage,
+                       "--poses are not looked at beside --fix; give them in a second call, with "
+                       "--data COPY");
+  }
   if (!given.copy.empty() && given.drive.data.empty()) {
     throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
   }
