@@ -173,6 +173,17 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   return seen;
 }
 
+/// Confirmed objects that were last seen from the anchor before this visit.
+std::set<ObjectId> LoopSearch::objectsSeenFrom(AnchorId anchor, const Whereabouts& body) const {
+  std::set<ObjectId> ids;
+  for (const ObjectId object : body.state.seenFrom(anchor)) {
+    const ObjectRecord& record = body.state.records().at(object);
+    const Sighting* known = sightingOfBefore(record, body, parameters_.loop.visit_m);
+    if (record.confirmed && known != nullptr && known->anchor == anchor) ids.insert(object);
+  }
+  return ids;
+}
+
 LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
   const LoopParameters& loop = parameters_.loop;
   Around around;
@@ -188,11 +199,7 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
       nearest_m = distance - sigma;
       around.nearest = T_ba;
     }
-    for (const ObjectId object : body.state.seenFrom(id)) {
-      const ObjectRecord& record = body.state.records().at(object);
-      const Sighting* known = sightingOfBefore(record, body, loop.visit_m);
-      if (record.confirmed && known != nullptr && known->anchor == id) ids.insert(object);
-    }
+    ids.merge(objectsSeenFrom(id, body));
   }
   for (const ObjectId id : ids) {
     const ObjectRecord& record = body.state.records().at(id);
@@ -229,6 +236,38 @@ bool LoopSearch::isBelieved(const PlaceMatch& match, double sigma_m) const {
   const std::size_t least = near ? 1 : sigma_m < loop.far_m ? 2 : 4;
   const double nats = near ? loop.near_nats : loop.nats;
   return match.pairs.size() >= least && match.score - match.next >= nats + std::log(match.cells);
+}
+
+std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
+                                                      const LastPlace& last) const {
+  const auto seen = seenOfLate(body);
+  if (seen.size() < parameters_.loop.least_elsewhere) return std::nullopt;
+  const auto components = componentsOf(body.state.graph());
+  const Eigen::Vector2d place = last.T_MB.mean.p.head<2>();
+  const double sigma_m = planeSigma(last.T_MB.covariance);
+  const double far_m = parameters_.loop.view_m + parameters_.place.gate_sigmas * sigma_m;
+  std::vector<PlacedObject> objects;
+  std::vector<Eigen::Vector2d> driven;
+  std::map<ObjectId, AnchorId> homes;
+  for (const auto& [id, pose] : body.state.graph().poses()) {
+    if (components.at(id) != components.at(last.anchor)) continue;
+    if ((pose.p.head<2>() - place).norm() > far_m) continue;
+    driven.push_back(pose.p.head<2>());
+    for (const ObjectId object : objectsSeenFrom(id, body)) {
+      const ObjectRecord& record = body.state.records().at(object);
+      objects.push_back(
+          inM(body.state, *sightingOfBefore(record, body, parameters_.loop.visit_m)));
+      homes[object] = id;
+    }
+  }
+  if (objects.empty()) return std::nullopt;
+  const MapIndex index(std::move(objects), std::move(driven), parameters_.place);
+  auto match = bestMatch(seen, index, last.T_MB, parameters_.place);
+  constexpr double kNowhere = std::numeric_limits<double>::infinity();
+  if (!match || !isBelieved(*match, kNowhere)) return std::nullopt;
+  if (match->score - match->next < parameters_.loop.at_once_nats) return std::nullopt;
+  const AnchorId home = homeOf(*match, homes);
+  return Found{std::move(*match), home, std::nullopt, kNowhere};
 }
 
 void LoopSearch::indexOthers(const Whereabouts& body) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "common/mapping/frames/anchor_builder.h"
@@ -43,6 +44,13 @@ bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m);
 /// The object in M.
 PlacedObject inM(const MapState& state, const Sighting& sighting);
 
+/// Where the body was when the odometry lost its frame of reference, for the search of a session
+/// that begins after that.
+struct LastPlace {
+  AnchorId anchor = 0;  ///< the newest one of the session that ended
+  LevelGaussian T_MB;   ///< in the M of its component; the yaw is not known
+};
+
 /// T_Mb as an anchor sees it: the anchor's own error in M does not count.
 LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba);
 
@@ -67,6 +75,9 @@ class LoopSearch {
   std::optional<Found> nearby(const Whereabouts& body) const;
   /// In the components of the graph that the body's session does not hang together with.
   std::optional<Found> elsewhere(const Whereabouts& body);
+  /// In the component of the session that ended, around the place where it ended. Returns a match
+  /// that needs no second search.
+  std::optional<Found> nearLast(const Whereabouts& body, const LastPlace& last) const;
   /// The graph or the objects of other components have changed.
   void forget() { others_.clear(); }
 
@@ -79,6 +90,7 @@ class LoopSearch {
     std::optional<LevelGaussian> nearest;  ///< T_ba of its nearest place
   };
   Around mapAround(const Whereabouts& body) const;
+  std::set<ObjectId> objectsSeenFrom(AnchorId anchor, const Whereabouts& body) const;
   bool isBelieved(const PlaceMatch& match, double sigma_m) const;
   void indexOthers(const Whereabouts& body);
 

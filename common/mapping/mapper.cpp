@@ -27,14 +27,43 @@ Mapper::Mapper(const Parameters& parameters, SavedMap saved)
       loop_book_(parameters.loop),
       drift_scale_(parameters.drift_scale) {}
 
+/// The body has moved on since by what its speed and the gap allow.
+void Mapper::rememberLastPlace(const Odometry& next) {
+  constexpr double kAtRest_m = 2.0, kLeastSpeed = 1.0, kLongest_s = 60.0;
+  const auto before = std::exchange(newest_odometry_, std::nullopt);
+  ended_.reset();
+  if (!before || !builder_.last() || session_ == next.world) return;
+  const double gap_s = toSeconds(next.stamp.time - before->time);
+  if (gap_s < 0.0 || gap_s > kLongest_s) return;
+  ended_ = {builder_.last()->id, builder_.sinceLast()->mean,
+            kAtRest_m + gap_s * std::max(kLeastSpeed, before->speed), next.T_WB.p};
+}
+
+/// The yaw of this W in M is not known: what was driven since may lead in any direction.
+std::optional<LastPlace> Mapper::lastPlace() const {
+  constexpr double kTurns_rad = 10.0, kFarthest_m = 150.0;
+  if (!ended_) return std::nullopt;
+  const Eigen::Vector3d moved = builder_.last()->T_WA.p - ended_->begins_W;
+  if (moved.norm() > kFarthest_m) return std::nullopt;
+  LastPlace last{ended_->anchor, {state_.graph().pose(ended_->anchor) * ended_->T_AB, {}}};
+  const double variance = ended_->sigma_m * ended_->sigma_m;
+  last.T_MB.mean.p.z() += moved.z();
+  last.T_MB.covariance = variance * Eigen::Matrix4d::Identity();
+  last.T_MB.covariance.diagonal().head<2>().array() += 0.5 * moved.head<2>().squaredNorm();
+  last.T_MB.covariance(3, 3) = kTurns_rad * kTurns_rad;
+  return last;
+}
+
 /// Of a session that is known already it goes on from its newest anchor.
 void Mapper::begin(const Odometry& odometry) {
+  rememberLastPlace(odometry);
   session_ = odometry.world;
   for (const EdgeId id : loop_book_.begin()) state_.removeLoop(id);
   builder_ = AnchorBuilder(parameters_.anchor);
   if (const auto last = state_.newestOf(odometry.world)) builder_.resume(*last);
   learnAnew(odometry.world);
   searched_at_m_ = searched_elsewhere_at_m_ = builder_.way_m();
+  seen_ = searched_with_ = 0;
   active_.reset();
   tentative_.reset();
   marginals_.reset();
@@ -88,6 +117,7 @@ void Mapper::replay(const WorldId& session) {
 void Mapper::onOdometry(const Odometry& odometry) {
   if (odometry.state == OdometryState::kInitialising) return;
   if (session_ != odometry.world) begin(odometry);
+  newest_odometry_ = {odometry.stamp.time, odometry.v_WB.norm()};
   const auto before = builder_.last();
   auto anchor = builder_.add(odometry, state_.nextAnchor());
   if (!anchor) return;
@@ -142,7 +172,9 @@ void Mapper::see(const ObjectBelief& belief, const Objects& objects) {
 
   ObjectRecord record;
   const auto known = state_.records().find(belief.id);
-  if (known != state_.records().end()) {
+  if (known == state_.records().end()) {
+    ++seen_;
+  } else {
     record = known->second;
     if (isOld(record)) record.earlier = record.sighting;
   }
@@ -173,8 +205,11 @@ void Mapper::onObjects(const Objects& objects) {
                           known->second.session != *session_;
     if (seen_now) see(belief, objects);
   }
-  if (builder_.way_m() - searched_at_m_ < parameters_.loop.search_each_m) return;
+  // A body that lost its place and stands still may learn it by more objects alone.
+  const bool more = ended_ && seen_ > searched_with_;
+  if (!more && builder_.way_m() - searched_at_m_ < parameters_.loop.search_each_m) return;
   searched_at_m_ = builder_.way_m();
+  searched_with_ = seen_;
   forgetUnconfirmed();
   tie();
   search();

@@ -151,6 +151,8 @@ class Mapper {
   void search();
   std::optional<LoopSearch::Found> searchNearby(const Whereabouts& here, bool new_view);
   std::optional<LoopSearch::Found> searchElsewhere(const Whereabouts& here, bool new_view);
+  void rememberLastPlace(const Odometry& next);
+  std::optional<LastPlace> lastPlace() const;
   View viewOfNow() const;
   void graphMoved();
   void settle();
@@ -196,8 +198,22 @@ class Mapper {
     double way_m = 0.0;
   };
   std::optional<Tentative> tentative_;
+  /// Where the session before ended, until this one is connected with it.
+  struct Ended {
+    AnchorId anchor = 0;
+    LevelPose T_AB;               ///< the body beside its newest anchor
+    double sigma_m = 0.0;         ///< of the place at which this session begins
+    Eigen::Vector3d begins_W = Eigen::Vector3d::Zero();  ///< in the W of this session
+  };
+  std::optional<Ended> ended_;
+  struct Moment {
+    TimePoint time;
+    double speed = 0.0;  ///< m/s
+  };
+  std::optional<Moment> newest_odometry_;
   bool replays_ = false;
   AnchorId looked_from_ = 0;  ///< the anchor whose view was searched last
+  std::size_t seen_ = 0, searched_with_ = 0;  ///< objects of the session; those at the last search
   double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };

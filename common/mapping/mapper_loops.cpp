@@ -138,6 +138,9 @@ std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, b
 
 std::optional<LoopSearch::Found> Mapper::searchElsewhere(const Whereabouts& here, bool new_view) {
   std::optional<LoopSearch::Found> found;
+  if (const auto last = lastPlace()) found = loop_search_.nearLast(here, *last);
+  if (found && !view_search_.contradicts(*found, here, viewOfNow())) return found;
+  found.reset();
   if (builder_.way_m() - searched_elsewhere_at_m_ >= parameters_.loop.elsewhere_each_m) {
     searched_elsewhere_at_m_ = builder_.way_m();
     found = loop_search_.elsewhere(here);
@@ -206,7 +209,10 @@ void Mapper::close(const LoopSearch::Found& found) {
     state_.removeLoop(*old);
     loop_book_.remove(*old);
   }
-  if (!found.prior) bringTogether(edge);
+  if (!found.prior) {
+    bringTogether(edge);
+    ended_.reset();
+  }
   const EdgeId id = state_.addLoop(edge);
   if (old) rehang(*old, id);
   for (const EdgeId tie : ties) loop_book_.hang(tie, id);

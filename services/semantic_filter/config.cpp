@@ -140,8 +140,6 @@ void describeExpertTracks(Parameters& p, Fields& fields) {
                  {"kept for one track at most; 0: no batch estimate"});
   fields.integer("smoothing.per_frame", s.per_frame, between(1, 10000),
                  {"tracks that are fitted in one frame at most; the others wait"});
-  fields.number("alignment.nats", p.alignment.nats, positive(),
-                {"log-likelihood ratio against chance from which another map counts as found"});
 }
 
 /// Keys of earlier versions, by the sentence that refuses them.
@@ -226,12 +224,13 @@ void describeFormer(Fields& fields) {
                            {"ground.reach_m", "60 m"},
                            {"ground.resolved", "0.06"},
                            {"ground.span_m", "3 m"},
-                           {"ground.body_height_sigma_m", "0.05 m"},
-                           {"alignment.margin_nats", "10"},
-                           {"alignment.pairs", "4"},
-                           {"alignment.known_share", "0.7"}};
+                           {"ground.body_height_sigma_m", "0.05 m"}};
   for (const auto& [old, value] : fixed) {
     fields.formerly(old, std::string("is fixed at ") + value + "; leave it out");
+  }
+  for (const char* old : {"alignment.nats", "alignment.margin_nats", "alignment.pairs",
+                          "alignment.known_share"}) {
+    fields.formerly(old, "is gone: the map store alone searches for earlier maps; leave it out");
   }
   for (const char* old : {"drift.position", "drift.rotation", "drift.things", "drift.within_m"}) {
     fields.formerly(old, "is gone: the map store's graph takes drift out; leave it out");

@@ -35,10 +35,6 @@ EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
   return known;
 }
 
-void EventTracker::recalled(ObjectId id, bool restored, std::string how) {
-  recalled_[id] = {restored, std::move(how)};
-}
-
 void EventTracker::clear() {
   known_.clear();
   recalled_.clear();
@@ -122,11 +118,10 @@ std::vector<Event> EventTracker::update(const Objects& objects,
     if (fresh) {
       const auto back = recalled_.find(o.id);
       const EventKind kind = back == recalled_.end() ? EventKind::kBorn
-                             : back->second.first    ? EventKind::kRestored
+                             : back->second          ? EventKind::kRestored
                                                      : EventKind::kRecalled;
       events.push_back(make(blank, kind, o, o.existence));
       if (back != recalled_.end()) {
-        events.back().detail = back->second.second;
         it->second = comeBack(o);
         recalled_.erase(back);
       }

@@ -18,9 +18,8 @@ class EventTracker {
   void renamed(ObjectId from, ObjectId to);
   /// Returns the events since the last call, ordered by object id. `merges`: those since then.
   std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
-  /// An object was recalled with this id. The next update makes its event. `how`: detail of the
-  /// event.
-  void recalled(ObjectId id, bool restored, std::string how = "");
+  /// An object was recalled with this id. The next update makes its event.
+  void recalled(ObjectId id, bool restored) { recalled_[id] = restored; }
   /// An object is archived from now on. The next update makes its event.
   void archived(ObjectId id) { archived_.insert(id); }
   void clear();
@@ -39,7 +38,7 @@ class EventTracker {
                const Event& blank);
 
   std::map<ObjectId, Known> known_;
-  std::map<ObjectId, std::pair<bool, std::string>> recalled_;
+  std::map<ObjectId, bool> recalled_;  ///< whether it was restored
   std::set<ObjectId> archived_;
 };
 

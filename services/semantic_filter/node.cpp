@@ -27,8 +27,7 @@ Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance,
       outputs_(std::move(outputs)),
       history_(config.filter, priors, static_cast<std::size_t>(config.history.frames), reasons_),
       models_(priors),
-      archive_(config.filter.memory, config.filter.motion.min_speed),
-      former_(config.filter, priors) {}
+      archive_(config.filter.memory, config.filter.motion.min_speed) {}
 
 void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) {
@@ -46,17 +45,14 @@ void Node::onModel(const ModelInfo& model) {
 }
 
 void Node::beginWorld(const WorldId& world) {
-  if (world_) {
-    reasons_.add("world_changed");
-    keepFormer();
-  }
+  if (world_) reasons_.add("world_changed");
   world_ = world;
   history_.beginWorld();
   events_.clear();
   returns_.clear();
   archive_.clear();
   if (const auto recalled = std::exchange(waiting_recalled_, std::nullopt)) {
-    recalled->world == world ? insertRecalled(*recalled) : onRecalledOfFormer(*recalled);
+    if (recalled->world == world) insertRecalled(*recalled);
   }
 }
 
@@ -209,7 +205,6 @@ void Node::forgetEarlyBefore(TimePoint time) {
 void Node::flush() {
   if (history_.empty() || history_.newest().stepped) return;
   history_.step();
-  rejoin(history_.newest());
   letGo(history_.newest());
   publish(history_.newest());
   askTheMap(history_.newest());
@@ -255,7 +250,7 @@ void Node::publish(const Frame& frame) {
 
 std::string Node::note() const {
   constexpr double kWorthSaying = 1.1;
-  std::string note = former_.note();
+  std::string note;
   const BoxParameters& assumed = config_.filter.box;
   const auto say = [&](const char* what, double ratio) {
     const double times = std::sqrt(ratio);

@@ -17,7 +17,6 @@
 #include "services/semantic_filter/core/history.h"
 #include "services/semantic_filter/core/memory/archive.h"
 #include "services/semantic_filter/events.h"
-#include "services/semantic_filter/former_map.h"
 #include "services/semantic_filter/model_book.h"
 #include "services/semantic_filter/probation.h"
 #include "services/semantic_filter/return_events.h"
@@ -49,7 +48,7 @@ class Node {
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return history_.belief(); }
-  /// For people: a search for an earlier map, and how far the network's boxes err.
+  /// For people: how far the network's boxes err.
   std::string note() const;
 
  private:
@@ -76,13 +75,9 @@ class Node {
   void recall(const ObjectBelief& belief);
   void insertLaid(const Recalled& recalled);
   bool isNear(const ObjectBelief& belief) const;
-  void recallLaid(const ObjectBelief& belief);
-  void onRecalledOfFormer(const Recalled& recalled);
   void letGo(const Frame& frame);
   void askTheMap(const Frame& frame);
   void ask(const Archive::Question& question, const WorldId& world);
-  void keepFormer();
-  void rejoin(const Frame& frame);
 
   Config config_;
   InstanceId instance_;
@@ -100,7 +95,6 @@ class Node {
   EventTracker events_;
   ReappearanceMonitor returns_;
   Archive archive_;
-  FormerMap former_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -1,6 +1,4 @@
 // What leaves the working set of the node for the map, and what comes back from there.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <set>
 
@@ -39,10 +37,7 @@ void Node::askTheMap(const Frame& frame) {
   if (const auto question = archive_.ask(p_WB, now)) {
     ask(*question, frame.world);
   }
-  if (const auto question = former_.ask(p_WB, now)) {
-    ask(*question, *former_.world());
-  }
-  const auto silent = archive_.takeUnanswered() + former_.takeUnanswered();
+  const auto silent = archive_.takeUnanswered();
   if (silent > 0) reasons_.add("map_store_silent", silent);
 }
 
@@ -56,37 +51,6 @@ void Node::ask(const Archive::Question& question, const WorldId& world) {
   query.world = world;
   query.limit = kMostRecalled;
   outputs_.queries(query);
-}
-
-/// What was known when the frame of reference ended.
-void Node::keepFormer() {
-  std::vector<ObjectBelief> objects;
-  for (const Track& o : history_.belief().tracks) {
-    objects.push_back(toBelief(o, models_.priors(), config_.filter.motion.min_speed));
-  }
-  former_.keep(*world_, objects);
-}
-
-/// Where the map of before is found again, what it holds comes back, and what was taken for new
-/// meanwhile goes on under the old id.
-void Node::rejoin(const Frame& frame) {
-  if (!former_.waits() || !history_.isLevel(frame)) return;
-  const FrameInput& input = frame.input;
-  const FrameAlignment* found =
-      former_.look(history_.belief().tracks, input.view.T_WB.p, input.stamp.time);
-  if (!found) return;
-  for (const ObjectBelief& belief : former_.takeKept()) recallLaid(belief);
-  for (const auto& [remembered, seen] : found->pairs) history_.join(remembered, seen, input);
-}
-
-void Node::recallLaid(const ObjectBelief& belief) {
-  const auto same = [&](const Track& o) { return o.id == belief.id; };
-  if (std::any_of(history_.belief().tracks.begin(), history_.belief().tracks.end(), same)) return;
-  if (!isNear(belief)) return;
-  history_.insert(fromBelief(belief, history_.poseError().product, ExistenceEvidence::kRecall));
-  events_.recalled(belief.id, false,
-                   fmt::format("of frame of reference {:x}/{}, found again", former_.world()->world,
-                               former_.world()->epoch));
 }
 
 void Node::restore(const ObjectBelief& belief) {
@@ -174,31 +138,16 @@ void Node::onRecalled(const Recalled& recalled) {
     waiting_recalled_ = recalled;
     return;
   }
-  if (recalled.world != *world_) return onRecalledOfFormer(recalled);
+  if (recalled.world != *world_) {
+    if (!recalled.restore) reasons_.add("recalled_of_other_world");
+    return;
+  }
   if (recalled.laid) return insertLaid(recalled);
   const bool asked = recalled.restore || for_all;
   if (!asked && !archive_.answered(recalled.request, recalled.kept, recalled.truncated)) {
     return reasons_.add("recalled_unasked");
   }
   insertRecalled(recalled);
-}
-
-void Node::onRecalledOfFormer(const Recalled& recalled) {
-  if (recalled.restore) return former_.keep(recalled.world, soundOf(recalled.objects));
-  if (!former_.found() || recalled.world != *former_.world()) {
-    return reasons_.add("recalled_of_other_world");
-  }
-  if (!former_.answered(recalled.request, recalled.kept, recalled.truncated)) {
-    return reasons_.add("recalled_unasked");
-  }
-  former_.refine(history_.belief().tracks);
-  for (const ObjectBelief& belief : soundOf(recalled.objects)) {
-    if (belief.moving > 0.5) {
-      reasons_.add("recalled_moving");
-    } else {
-      recallLaid(former_.laid(belief));
-    }
-  }
 }
 
 }  // namespace perdure::semantic_filter

@@ -19,7 +19,6 @@ void History::beginWorld() {
   frames_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
-  told_not_level_ = false;
 }
 
 HistoryFrame& History::add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera) {
@@ -59,13 +58,6 @@ void History::stepAgainFrom(std::size_t index) {
     step(frames_[i]);
     late_merges_.insert(late_merges_.end(), frames_[i].merges.begin(), frames_[i].merges.end());
   }
-}
-
-bool History::isLevel(const HistoryFrame& frame) {
-  constexpr double kLevel = 0.99;  // cosine of 8 degrees
-  if (frame.input.view.up_W.normalized().z() > kLevel) return true;
-  if (!std::exchange(told_not_level_, true)) reasons_.add("frame_not_level_to_place_map");
-  return false;
 }
 
 void History::insert(const Track& track) {

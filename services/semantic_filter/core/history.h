@@ -41,8 +41,6 @@ class History {
   void step();
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
-  /// Whether the frame is level enough to ask where the map lies; counts once a world if not.
-  bool isLevel(const HistoryFrame& frame);
 
   /// Into the newest belief and those that late detections may go back to, in order of id.
   void insert(const Track& track);
@@ -84,7 +82,6 @@ class History {
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;
   std::vector<MergeRecord> late_merges_;
-  bool told_not_level_ = false;
 };
 
 }  // namespace perdure::semantic_filter

@@ -23,7 +23,6 @@ struct Parameters {
   SmoothingParameters smoothing;
   GroundParameters ground;
   MemoryParameters memory;
-  AlignmentParameters alignment;
 };
 
 }  // namespace perdure::semantic_filter

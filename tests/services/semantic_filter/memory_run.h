@@ -55,6 +55,7 @@ struct Pair {
   std::vector<Event> events;
   std::vector<std::function<void()>> to_map;
   bool deaf = false;
+  bool odometry_to_map = false;  ///< the map keeps a graph
   std::unique_ptr<map_store::Node> map;
   std::uint64_t frame = 0;
   double x = 0.0;
@@ -103,6 +104,7 @@ struct Pair {
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {
       Odometry odometry = odometryAt(frame, T_W * bodyAt(x));
       odometry.world = world;
+      if (odometry_to_map && !deaf) to_map.push_back([this, odometry] { map->onOdometry(odometry); });
       filter.onOdometry(odometry);
       filter.onDetections(detectionsAt(frame, boxesFrom(bodyAt(x), frame, things)));
       talk();
