@@ -14,8 +14,11 @@ namespace perdure {
 using InstanceId = std::uint64_t;
 InstanceId makeInstanceId();
 
-/// Never reused within a map. 0 means "no object".
+/// What people and programs call an object: the lowest id among the tracks that the map holds to be
+/// one. Never reused within a map. 0 means "no object".
 using ObjectId = std::uint64_t;
+/// The filter's estimate of an object over one or more visits. Drawn by the filter, never changed.
+using TrackId = std::uint64_t;
 
 /// Which image a message is about: (source instance, sequence number) is its identity; the rest
 /// is carried along so that no reader has to look it up.

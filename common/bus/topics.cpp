@@ -66,14 +66,14 @@ Table makeTable() {
       row(kObjects, kept(8), kCameraHz, kRecorded, kSemanticFilter,
           kMapStore | kVio | kSubscriber),  // vio masks what moves (input.moving_mask)
       row(kObjectState, latched(1), 0, kNotRecorded, kSemanticFilter, kSubscriber),
-      row(kRecalled, reliable(8), 0, kRecorded, kMapStore, kSemanticFilter),
       row(kEvents, latched(256), 0, kRecorded, kSemanticFilter | kMapStore,
-          kMapStore | kSubscriber),  // map_store: loops of the graph
+          kSubscriber),  // map_store: loops of the graph
       row(kPredictions, bestEffort(1), kCameraHz, kRecorded, kSemanticFilter,
           kInference | kSubscriber),
       row(kMap, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
       row(kMapHeader, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
       row(kMapFrame, latched(1), 0, kRecorded, kMapStore, kSubscriber),
+      row(kMapNear, latched(1), 0, kRecorded, kMapStore, kSemanticFilter),
       row(kMapQuery, reliable(16), 0, kRecorded,
           kSemanticFilter | kOperator | kSubscriber | kGateway, kMapStore),
       row(kMapReply, reliable(16), 0, kRecorded, kMapStore, kSubscriber),

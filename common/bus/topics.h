@@ -61,12 +61,12 @@ inline const Topic<ModelInfo> kModel{"model"};
 inline const Topic<SwapNotice> kSwap{"inference/swap"};
 inline const Topic<Objects> kObjects{"objects"};
 inline const Topic<ObjectState> kObjectState{"object_state"};
-inline const Topic<Recalled> kRecalled{"recalled"};
 inline const Topic<Event> kEvents{"events"};
 inline const Topic<Predictions> kPredictions{"predictions"};
 inline const Topic<MapTile> kMap{"map"};
 inline const Topic<MapHeader> kMapHeader{"map/header"};
 inline const Topic<MapFrame> kMapFrame{"map/frame"};
+inline const Topic<MapNear> kMapNear{"map/near"};
 inline const Topic<MapQuery> kMapQuery{"map/query"};
 inline const Topic<MapReply> kMapReply{"map/reply"};
 inline const Topic<Health> kHealth{"health"};
@@ -87,9 +87,9 @@ bool withTopic(const std::string& name, Visit visit) {
     offer(frame(name.substr(kFramePrefix.size())));
   }
   offer(kImu), offer(kSpeed), offer(kCalibration), offer(kOdometry), offer(kLandmarks);
-  offer(kDetections), offer(kModel), offer(kSwap), offer(kObjects), offer(kObjectState),
-      offer(kRecalled);
+  offer(kDetections), offer(kModel), offer(kSwap), offer(kObjects), offer(kObjectState);
   offer(kEvents), offer(kPredictions), offer(kMap), offer(kMapHeader), offer(kMapFrame);
+  offer(kMapNear);
   offer(kMapQuery), offer(kMapReply), offer(kHealth);
   return found;
 }

@@ -16,18 +16,7 @@ void LoopBook::add(LoopClosure loop, const LevelPose& before, double way_m) {
   entries_[id] = {std::move(loop), before, way_m, false, std::nullopt};
 }
 
-void LoopBook::remove(EdgeId id) {
-  entries_.erase(id);
-  std::erase_if(ties_, [&](const auto& tie) { return tie.second == id; });
-}
-
-std::vector<EdgeId> LoopBook::tiesOf(EdgeId loop) const {
-  std::vector<EdgeId> ties;
-  for (const auto& [tie, of] : ties_) {
-    if (of == loop) ties.push_back(tie);
-  }
-  return ties;
-}
+void LoopBook::remove(EdgeId id) { entries_.erase(id); }
 
 bool LoopBook::isTold(EdgeId id) const {
   const auto at = entries_.find(id);
@@ -49,8 +38,6 @@ LoopBook::Verdict LoopBook::judge(const PoseGraph& graph, double way_m) {
       if (!std::exchange(entry.told, true)) {
         entry.loop->correction_m = (graph.pose(edge.b).p - entry.before.p).norm();
         verdict.told.push_back(*entry.loop);
-      } else if (way_m - entry.closed_m > parameters_.sound_after_m) {
-        verdict.sound.push_back(id);
       }
       continue;
     }

@@ -1,6 +1,6 @@
 // Which loops are told, and which are no longer believed. A loop that the graph does not believe
 // when it is closed waits for others that agree; one that was told and is contradicted later is
-// withdrawn, with the merges and ties that hang on it.
+// withdrawn.
 #pragma once
 
 #include <map>
@@ -32,9 +32,6 @@ class LoopBook {
   /// Closed at `way_m` of the session, not told yet. `before`: the pose of its b in M until then.
   void add(LoopClosure loop, const LevelPose& before, double way_m);
   void remove(EdgeId id);
-  /// A tie by objects that were merged by this loop.
-  void hang(EdgeId tie, EdgeId loop) { ties_[tie] = loop; }
-  std::vector<EdgeId> tiesOf(EdgeId loop) const;
   /// Whether it was told; so is what an earlier process has left.
   bool isTold(EdgeId id) const;
   /// How it was found; null where that was before the last start or session. Valid until the next
@@ -45,7 +42,6 @@ class LoopBook {
     std::vector<LoopClosure> told;  ///< believed, for the first time
     std::vector<EdgeId> withdrawn;  ///< told before, and contradicted for some way
     std::vector<EdgeId> given_up;   ///< not believed, and never told
-    std::vector<EdgeId> sound;      ///< so old that what hangs on them is no longer kept
   };
   /// After an optimisation, `way_m` on the session's way.
   Verdict judge(const PoseGraph& graph, double way_m);
@@ -61,7 +57,6 @@ class LoopBook {
 
   LoopParameters parameters_;
   std::map<EdgeId, Entry> entries_;
-  std::map<EdgeId, EdgeId> ties_;
 };
 
 }  // namespace perdure::mapping

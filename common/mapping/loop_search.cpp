@@ -205,9 +205,9 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
     const ObjectRecord& record = body.state.records().at(id);
     const Sighting& known = *sightingOfBefore(record, body, loop.visit_m);
     around.objects.push_back(inM(body.state, known));
+    around.homes[known.in_anchor.id] = known.anchor;
     const double beyond = varianceBeyond(*body.relative.to(known.anchor), *around.nearest);
     around.objects.back().covariance.diagonal().head<2>().array() += beyond;
-    around.homes[id] = known.anchor;
   }
   return around;
 }
@@ -255,9 +255,9 @@ std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
     driven.push_back(pose.p.head<2>());
     for (const ObjectId object : objectsSeenFrom(id, body)) {
       const ObjectRecord& record = body.state.records().at(object);
-      objects.push_back(
-          inM(body.state, *sightingOfBefore(record, body, parameters_.loop.visit_m)));
-      homes[object] = id;
+      const Sighting& known = *sightingOfBefore(record, body, parameters_.loop.visit_m);
+      objects.push_back(inM(body.state, known));
+      homes[known.in_anchor.id] = id;
     }
   }
   if (objects.empty()) return std::nullopt;
@@ -282,7 +282,7 @@ void LoopSearch::indexOthers(const Whereabouts& body) {
     const AnchorId component = components.at(known->anchor);
     if (component == own) continue;
     objects[component].push_back(inM(body.state, *known));
-    others_[component].homes[id] = known->anchor;
+    others_[component].homes[known->in_anchor.id] = known->anchor;
   }
   for (const auto& [anchor, component] : components) {
     if (component != own) driven[component].push_back(body.state.graph().pose(anchor).p.head<2>());

@@ -1,5 +1,7 @@
 #include "common/mapping/map_state.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -8,7 +10,9 @@ namespace perdure::mapping {
 MapState::MapState(const GraphParameters& parameters, SavedMap saved)
     : graph_(parameters),
       records_(std::move(saved.records)),
-      merges_(std::move(saved.merges)),
+      tracks_(std::move(saved.tracks)),
+      identity_(saved.facts),
+      saved_facts_(std::move(saved.facts)),
       views_(std::move(saved.views)) {
   for (std::size_t k = 0; k < saved.classes.size(); ++k) {
     class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
@@ -50,7 +54,10 @@ std::optional<Anchor> MapState::newestOf(const WorldId& session) const {
   return std::nullopt;
 }
 
-void MapState::removeLoop(EdgeId id) { graph_.remove(id); }
+void MapState::removeLoop(EdgeId id) {
+  graph_.remove(id);
+  endFactsOf(id);
+}
 
 void MapState::scaleOdometry(double factor, const WorldId& session) {
   std::set<AnchorId> of_session;
@@ -83,7 +90,7 @@ const std::set<ObjectId>& MapState::seenFrom(AnchorId id) const {
   return at == seen_from_.end() ? kNone : at->second;
 }
 
-void MapState::put(ObjectId id, ObjectRecord record) {
+void MapState::putObject(ObjectId id, ObjectRecord record) {
   touched_.insert(id);
   const auto at = records_.find(id);
   if (at != records_.end()) unindex(id, at->second);
@@ -96,7 +103,7 @@ void MapState::put(ObjectId id, ObjectRecord record) {
   records_.insert_or_assign(id, std::move(record));
 }
 
-void MapState::erase(ObjectId id) {
+void MapState::eraseObject(ObjectId id) {
   const auto at = records_.find(id);
   if (at == records_.end()) return;
   if (at->second.confirmed) erased_.insert(id);
@@ -118,16 +125,126 @@ void MapState::putView(AnchorId id, View view) {
   views_touched_.insert(id);
 }
 
-void MapState::putMerge(ObjectId absorbed, HungMerge merge) {
-  merges_.insert_or_assign(absorbed, std::move(merge));
-  merges_touched_.insert(absorbed);
-  merges_erased_.erase(absorbed);
+const ObjectRecord* MapState::recordOfTrack(TrackId id) const {
+  const auto& all = identity_.isShared(id) ? tracks_ : records_;
+  const auto at = all.find(id);
+  return at == all.end() ? nullptr : &at->second;
 }
 
-void MapState::eraseMerge(ObjectId absorbed) {
-  if (merges_.erase(absorbed) == 0) return;
-  merges_touched_.erase(absorbed);
-  merges_erased_.insert(absorbed);
+void MapState::put(TrackId id, ObjectRecord record) {
+  record.sighting.in_anchor.id = id;
+  if (record.earlier) record.earlier->in_anchor.id = id;
+  if (!identity_.isShared(id)) return putObject(id, std::move(record));
+  tracks_.insert_or_assign(id, std::move(record));
+  tracks_touched_.insert(id);
+  combine(identity_.objectOf(id));
+}
+
+void MapState::end(TrackId id) {
+  if (!identity_.isShared(id)) return eraseObject(id);
+  const auto at = tracks_.find(id);
+  if (at == tracks_.end()) return;
+  at->second.gone = true;
+  tracks_touched_.insert(id);
+  combine(identity_.objectOf(id));
+}
+
+void MapState::erase(TrackId id) {
+  if (!identity_.isShared(id)) return eraseObject(id);
+  if (tracks_.erase(id) == 0) return;
+  tracks_touched_.erase(id);
+  tracks_erased_.insert(id);
+  combine(identity_.objectOf(id));
+}
+
+/// Clocks of sessions do not compare.
+bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
+  if (a.session != b.session && (a.session == session_ || b.session == session_)) {
+    return a.session == session_;
+  }
+  return a.last_seen >= b.last_seen;
+}
+
+/// The newest track decides whether the object is there, and where. What was seen of it before is
+/// of the same track, or of the newest other one.
+std::optional<ObjectRecord> MapState::combined(ObjectId object) const {
+  const ObjectRecord *newest = nullptr, *before = nullptr;
+  bool confirmed = false;
+  for (const TrackId track : identity_.tracksOf(object)) {
+    const auto at = tracks_.find(track);
+    if (at == tracks_.end()) continue;
+    const ObjectRecord& record = at->second;
+    confirmed = confirmed || record.confirmed;
+    if (newest == nullptr || isNewer(record, *newest)) {
+      before = std::exchange(newest, &record);
+    } else if (before == nullptr || isNewer(record, *before)) {
+      before = &record;
+    }
+  }
+  if (newest == nullptr || newest->gone) return std::nullopt;
+  ObjectRecord result = *newest;
+  result.confirmed = confirmed;
+  if (!result.earlier && before != nullptr && !before->gone) result.earlier = before->sighting;
+  return result;
+}
+
+void MapState::combine(ObjectId object) {
+  auto record = combined(object);
+  record ? putObject(object, *std::move(record)) : eraseObject(object);
+}
+
+void MapState::add(const SameObject& fact) {
+  const Groups before = groupsOf(fact.a, fact.b);
+  identity_.add(fact);
+  regroup(before);
+}
+
+void MapState::endFactsOf(EdgeId loop) {
+  Groups before;
+  for (const SameObject& fact : identity_.factsOf(loop)) before.merge(groupsOf(fact.a, fact.b));
+  identity_.endLoop(loop);
+  regroup(before);
+}
+
+/// All tracks of the objects of both.
+MapState::Groups MapState::groupsOf(TrackId a, TrackId b) const {
+  Groups groups;
+  for (const TrackId track : {a, b}) {
+    const ObjectId object = identity_.objectOf(track);
+    groups[track] = object;
+    for (const TrackId each : identity_.tracksOf(object)) groups[each] = object;
+  }
+  return groups;
+}
+
+/// Moves records between tracks and objects where a track shares its object now, or no longer.
+void MapState::regroup(const Groups& before) {
+  std::map<ObjectId, std::size_t> sizes;
+  std::set<ObjectId> objects;
+  for (const auto& [track, object] : before) {
+    ++sizes[object];
+    objects.insert({object, identity_.objectOf(track)});
+  }
+  for (const auto& [track, object] : before) {
+    const bool was_shared = sizes.at(object) > 1, is_shared = identity_.isShared(track);
+    if (was_shared != is_shared || identity_.objectOf(track) != object) regrouped_.insert(track);
+    const auto alone = records_.find(track);
+    if (was_shared || !is_shared || alone == records_.end()) continue;
+    tracks_[track] = alone->second;
+    tracks_touched_.insert(track);
+    tracks_erased_.erase(track);
+  }
+  for (const ObjectId object : objects) {
+    identity_.tracksOf(object).empty() ? eraseObject(object) : combine(object);
+  }
+  for (const auto& [track, object] : before) {
+    if (identity_.isShared(track)) continue;
+    auto record = tracks_.extract(track);
+    if (record.empty()) continue;
+    tracks_touched_.erase(track);
+    tracks_erased_.insert(track);
+    if (!record.mapped().gone) putObject(track, std::move(record.mapped()));
+  }
 }
 
 SavedAnchor MapState::savedAnchor(AnchorId id) const {
@@ -167,15 +284,22 @@ Unsaved MapState::unsaved() const {
   for (const ObjectId id : erased_) {
     if (!result.changed.records.contains(id)) result.records_gone.insert(id);
   }
-  for (const ObjectId id : merges_touched_) result.changed.merges[id] = merges_.at(id);
-  result.merges_gone = merges_erased_;
+  for (const TrackId id : tracks_touched_) result.changed.tracks[id] = tracks_.at(id);
+  result.tracks_gone = tracks_erased_;
+  const std::set<SameObject>& facts = identity_.facts();
+  std::set_difference(facts.begin(), facts.end(), saved_facts_.begin(), saved_facts_.end(),
+                      std::inserter(result.changed.facts, result.changed.facts.end()));
+  std::set_difference(saved_facts_.begin(), saved_facts_.end(), facts.begin(), facts.end(),
+                      std::inserter(result.facts_gone, result.facts_gone.end()));
   for (const AnchorId id : views_touched_) result.changed.views[id] = views_.at(id);
   return result;
 }
 
 void MapState::markSaved() {
-  merges_touched_.clear();
-  merges_erased_.clear();
+  tracks_touched_.clear();
+  tracks_erased_.clear();
+  regrouped_.clear();
+  saved_facts_ = identity_.facts();
   views_touched_.clear();
   for (const auto& [id, anchor] : anchors_) {
     saved_anchors_[id] = {graph_.pose(id), anchor.scale2};

@@ -1,9 +1,11 @@
-// What the mapper knows: anchors, the graph over them, and where each object was seen from. Keeps
-// book of what has changed since it was saved.
+// What the mapper knows: anchors, the graph over them, which tracks are one object, and from where
+// each object was seen. Records of objects that have several tracks are computed from those of the
+// tracks. Keeps book of what has changed since it was saved.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -27,6 +29,7 @@ class MapState {
 
   const PoseGraph& graph() const { return graph_; }
   EdgeId addLoop(const Edge& edge) { return graph_.add(edge); }
+  /// Ends the facts that rest on it, too.
   void removeLoop(EdgeId id);
   void scaleOdometry(double factor, const WorldId& session);
   void optimise() { (void)graph_.optimise(); }
@@ -37,17 +40,29 @@ class MapState {
   const View& viewFrom(AnchorId id) const;
   void putView(AnchorId id, View view);
 
+  /// Of objects. `earlier` of an object that has several tracks may be of another track than
+  /// `sighting`: the id in `in_anchor` names it.
   const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
-  void put(ObjectId id, ObjectRecord record);
-  void erase(ObjectId id);
+  /// Null: the track is not known.
+  const ObjectRecord* recordOfTrack(TrackId id) const;
+  void put(TrackId id, ObjectRecord record);
+  /// The object of the track has ended, as far as this track is concerned.
+  void end(TrackId id);
+  /// The track was merged into another one: it leaves no record.
+  void erase(TrackId id);
+  /// The session whose records count as newer than any other's.
+  void follow(const WorldId& session) { session_ = session; }
+  bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   const std::set<ObjectId>& unconfirmed() const { return unconfirmed_; }
   /// Objects that were seen from an anchor, on the newest visit or on the one before.
   const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
-  /// Merges that hang on loops, by the absorbed object.
-  const std::map<ObjectId, HungMerge>& merges() const { return merges_; }
-  void putMerge(ObjectId absorbed, HungMerge merge);
-  void eraseMerge(ObjectId absorbed);
+  const Identity& identity() const { return identity_; }
+  void add(const SameObject& fact);
+  /// The facts that rest on a loop closure rest on another one.
+  void replaceLoop(EdgeId loop, EdgeId by) { identity_.replaceLoop(loop, by); }
+  /// Tracks whose object has changed since markSaved(), or that share it now, or no longer.
+  const std::set<TrackId>& regrouped() const { return regrouped_; }
 
   Unsaved unsaved() const;
   void markSaved();
@@ -60,20 +75,32 @@ class MapState {
   };
   void index(ObjectId id, const ObjectRecord& record);
   void unindex(ObjectId id, const ObjectRecord& record);
+  void putObject(ObjectId id, ObjectRecord record);
+  void eraseObject(ObjectId id);
+  std::optional<ObjectRecord> combined(ObjectId object) const;
+  void combine(ObjectId object);
+  void endFactsOf(EdgeId loop);
+  /// Tracks, each with its object.
+  using Groups = std::map<TrackId, ObjectId>;
+  Groups groupsOf(TrackId a, TrackId b) const;
+  void regroup(const Groups& before);
   SavedAnchor savedAnchor(AnchorId id) const;
   bool isSaved(AnchorId id) const;
 
   PoseGraph graph_;
   std::map<AnchorId, Anchor> anchors_;
   std::map<ObjectId, ObjectRecord> records_;
+  std::map<TrackId, ObjectRecord> tracks_;  ///< of objects that have several
+  Identity identity_;
+  WorldId session_;
   std::map<AnchorId, std::set<ObjectId>> seen_from_;
   std::set<ObjectId> unconfirmed_;
   std::map<std::string, std::uint32_t> class_numbers_;
   std::map<AnchorId, Kept> saved_anchors_;
   std::map<EdgeId, double> saved_edges_;  ///< weights of loops
   std::set<ObjectId> touched_, erased_;
-  std::map<ObjectId, HungMerge> merges_;
-  std::set<ObjectId> merges_touched_, merges_erased_;
+  std::set<TrackId> tracks_touched_, tracks_erased_, regrouped_;
+  std::set<SameObject> saved_facts_;
   std::map<AnchorId, View> views_;
   std::set<AnchorId> views_touched_;
 };

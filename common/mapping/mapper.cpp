@@ -58,7 +58,8 @@ std::optional<LastPlace> Mapper::lastPlace() const {
 void Mapper::begin(const Odometry& odometry) {
   rememberLastPlace(odometry);
   session_ = odometry.world;
-  for (const EdgeId id : loop_book_.begin()) state_.removeLoop(id);
+  state_.follow(odometry.world);
+  dropTentativeLoops();
   builder_ = AnchorBuilder(parameters_.anchor);
   if (const auto last = state_.newestOf(odometry.world)) builder_.resume(*last);
   learnAnew(odometry.world);
@@ -70,6 +71,13 @@ void Mapper::begin(const Odometry& odometry) {
   loop_search_.forget();
   view_builder_.clear();
   tracked_ties_.begin();
+}
+
+/// Those that took the place of accepted ones stay, because object ids rest on them.
+void Mapper::dropTentativeLoops() {
+  for (const EdgeId id : loop_book_.begin()) {
+    if (state_.identity().factsOf(id).empty()) state_.removeLoop(id);
+  }
 }
 
 /// How far a session's odometry errs is learned anew; what was learned of it stays until then.
@@ -93,7 +101,8 @@ void Mapper::replay(const WorldId& session) {
   }
   if (way.empty()) return;
   session_ = session;
-  for (const EdgeId id : loop_book_.begin()) state_.removeLoop(id);
+  state_.follow(session);
+  dropTentativeLoops();
   active_.reset();
   tentative_.reset();
   learnAnew(session);
@@ -104,11 +113,7 @@ void Mapper::replay(const WorldId& session) {
   replays_ = true;
   for (const AnchorId id : way) {
     stand(state_.anchors().at(id));
-    const std::size_t told = change_.merges.size();
     search();
-    for (std::size_t k = told; k < change_.merges.size(); ++k) {
-      onMerged(change_.merges[k].survivor, change_.merges[k].absorbed);
-    }
   }
   replays_ = false;
   searched_at_m_ = learned_at_m_ = builder_.way_m();
@@ -171,11 +176,11 @@ void Mapper::see(const ObjectBelief& belief, const Objects& objects) {
   o.covariance += J * builder_.sinceLast()->covariance * J.transpose();
 
   ObjectRecord record;
-  const auto known = state_.records().find(belief.id);
-  if (known == state_.records().end()) {
+  const ObjectRecord* known = state_.recordOfTrack(belief.id);
+  if (known == nullptr) {
     ++seen_;
   } else {
-    record = known->second;
+    record = *known;
     if (isOld(record)) record.earlier = record.sighting;
   }
   record.session = *session_;
@@ -199,10 +204,9 @@ void Mapper::onObjects(const Objects& objects) {
   for (const ObjectBelief& belief : objects.objects) {
     if (belief.moving > 0.5 || belief.classes.empty() || belief.recalled) continue;
     if (!belief.confirmed && (belief.existence < 0.5 || belief.hits < 2)) continue;
-    const auto known = state_.records().find(belief.id);
-    const bool seen_now = known == state_.records().end() ||
-                          belief.last_seen > known->second.last_seen ||
-                          known->second.session != *session_;
+    const ObjectRecord* known = state_.recordOfTrack(belief.id);
+    const bool seen_now = known == nullptr || belief.last_seen > known->last_seen ||
+                          known->session != *session_;
     if (seen_now) see(belief, objects);
   }
   // A body that lost its place and stands still may learn it by more objects alone.
@@ -224,40 +228,29 @@ void Mapper::forgetUnconfirmed() {
   for (const ObjectId id : old) state_.erase(id);
 }
 
-/// Clocks of sessions do not compare.
-bool Mapper::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
-  if (a.session != b.session && session_) return a.session == *session_;
-  return a.last_seen >= b.last_seen;
-}
-
-void Mapper::onMerged(ObjectId survivor, ObjectId absorbed) {
-  const auto from = state_.records().find(absorbed);
-  if (from == state_.records().end()) return;
-  ObjectRecord merged = from->second;
-  const auto into = state_.records().find(survivor);
-  keepForUndo(survivor, absorbed);
-  if (into != state_.records().end()) {
-    const ObjectRecord& record = into->second;
-    const bool confirmed = merged.confirmed || record.confirmed;
-    // What is seen now is seen of the survivor.
-    if (!isNewer(merged, record)) {
-      merged = record;
-    } else if (isOld(record)) {
-      merged.earlier = record.sighting;
-    } else if (!merged.earlier) {
-      merged.earlier = record.earlier;
+void Mapper::onMerged(TrackId survivor, TrackId absorbed) {
+  if (const ObjectRecord* from = state_.recordOfTrack(absorbed)) {
+    ObjectRecord merged = *from;
+    if (const ObjectRecord* into = state_.recordOfTrack(survivor)) {
+      const bool confirmed = merged.confirmed || into->confirmed;
+      if (!state_.isNewer(merged, *into)) {
+        merged = *into;
+      } else if (isOld(*into)) {
+        merged.earlier = into->sighting;
+      } else if (!merged.earlier) {
+        merged.earlier = into->earlier;
+      }
+      merged.confirmed = confirmed;
     }
-    merged.confirmed = confirmed;
+    state_.erase(absorbed);
+    state_.put(survivor, std::move(merged));
   }
-  merged.sighting.in_anchor.id = survivor;
-  if (merged.earlier) merged.earlier->in_anchor.id = survivor;
-  state_.put(survivor, std::move(merged));
-  state_.erase(absorbed);
+  state_.add({0, survivor, absorbed});
   loop_search_.forget();
 }
 
-void Mapper::onGone(ObjectId id) {
-  state_.erase(id);
+void Mapper::onGone(TrackId id) {
+  state_.end(id);
   loop_search_.forget();
 }
 
@@ -284,12 +277,25 @@ std::vector<Recallable> Mapper::near(const Eigen::Vector3d& centre_W, double rad
       if ((pose * record.sighting.in_anchor.p - centre_M).norm() > radius_m) continue;
       if (!std::exchange(asked, true)) of_anchor = relativeTo(here, state_.anchors().at(anchor));
       if (!of_anchor) break;
-      result.push_back(*of_anchor);
-      result.back().id = id;
-      result.back().pose_error = record.pose_error;
+      result.push_back(withRecord(*of_anchor, id, record));
     }
   }
   return result;
+}
+
+Recallable Mapper::withRecord(Recallable there, ObjectId id, const ObjectRecord& record) const {
+  there.id = id;
+  there.track = record.sighting.in_anchor.id;
+  there.pose_error = record.pose_error;
+  return there;
+}
+
+std::optional<Recallable> Mapper::placeOf(TrackId track) {
+  const ObjectRecord* record = state_.recordOfTrack(track);
+  if (record == nullptr || record->gone || !builder_.last()) return std::nullopt;
+  auto there = relativeTo(*builder_.last(), state_.anchors().at(record->sighting.anchor));
+  if (!there) return std::nullopt;
+  return withRecord(*std::move(there), state_.identity().objectOf(track), *record);
 }
 
 const ObjectRecord* Mapper::recordOf(ObjectId id) const {

@@ -41,9 +41,10 @@ struct LoopWithdrawal {
 /// What has changed since it was asked for last.
 struct MapChange {
   std::vector<LoopClosure> loops;
-  std::vector<MergeOrder> merges;
+  std::vector<SameObject> facts;   ///< of these loops: a was known, b was seen as new
+  std::vector<MergeOrder> merges;  ///< the objects that have become one by them
   std::vector<LoopWithdrawal> withdrawn;
-  std::vector<MergeOrder> splits;  ///< merges of these to be undone
+  std::vector<MergeOrder> splits;  ///< the objects that are two again
 
   bool empty() const { return loops.empty() && withdrawn.empty(); }
 };
@@ -51,6 +52,7 @@ struct MapChange {
 /// An object of the map that lies near the body.
 struct Recallable {
   ObjectId id = 0;
+  TrackId track = 0;  ///< under which it was detected last
   /// Maps what is stored of it in its session's W into today's W; nothing: it is in today's W, and
   /// its relation to the body is the odometry's own.
   std::optional<RigidTransform> T_now;
@@ -70,11 +72,12 @@ class Mapper {
   void onObjects(const Objects& objects);
   /// What the places of the way look like. May be left out: then objects alone say where it is.
   void onLandmarks(const Landmarks& landmarks);
-  void onMerged(ObjectId survivor, ObjectId absorbed);
-  void onGone(ObjectId id);
+  /// The filter has merged two confirmed tracks, or has deleted one.
+  void onMerged(TrackId survivor, TrackId absorbed);
+  void onGone(TrackId id);
   /// Drives along a saved session again and looks for its places among what other sessions have
-  /// seen, with what was seen a little later, too. For maps that are brought together. Merges are
-  /// carried out as they are found; the change tells them. Afterwards the mapper stands at its end.
+  /// seen, with what was seen a little later, too. For maps that are brought together. Afterwards
+  /// the mapper stands at its end.
   void replay(const WorldId& session);
   MapChange takeChange() { return std::exchange(change_, {}); }
 
@@ -84,14 +87,17 @@ class Mapper {
   /// Objects within radius_m of a place in W whose place relative to the body is known well enough
   /// to be taken for what is seen there.
   std::vector<Recallable> near(const Eigen::Vector3d& centre_W, double radius_m);
+  /// The same of one track as it was detected last; nothing if its place is not known well enough.
+  std::optional<Recallable> placeOf(TrackId track);
 
   /// Whether the object belongs to an anchor.
   bool holds(ObjectId id) const;
   /// Its record, if it belongs to one.
   const ObjectRecord* recordOf(ObjectId id) const;
 
-  /// Merges that hang on loops, by the absorbed object.
-  const std::map<ObjectId, HungMerge>& merges() const { return state_.merges(); }
+  const Identity& identity() const { return state_.identity(); }
+  /// Tracks whose object has changed since markSaved(), or that share it now, or no longer.
+  const std::set<TrackId>& regrouped() const { return state_.regrouped(); }
 
   /// What is to be saved, and that it has been.
   Unsaved unsaved() const { return state_.unsaved(); }
@@ -138,6 +144,7 @@ class Mapper {
 
  private:
   void begin(const Odometry& odometry);
+  void dropTentativeLoops();
   Whereabouts body();
   void see(const ObjectBelief& belief, const Objects& objects);
   PlacedObject placedOf(const ObjectBelief& belief, const Matrix6d& pose_error);
@@ -145,8 +152,6 @@ class Mapper {
   void forgetUnconfirmed();
   void learnAnew(const WorldId& session);
   void stand(const Anchor& anchor);
-  void keepForUndo(ObjectId survivor, ObjectId absorbed);
-  bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   void tie();
   void search();
   std::optional<LoopSearch::Found> searchNearby(const Whereabouts& here, bool new_view);
@@ -156,15 +161,12 @@ class Mapper {
   View viewOfNow() const;
   void graphMoved();
   void settle();
-  void orderMerges(const LoopClosure& loop);
+  void join(const LoopClosure& loop);
   void withdraw(EdgeId loop);
   void putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>>& pairs,
                     std::size_t& points) const;
-  void undo(ObjectId absorbed, const HungMerge& merge);
-  bool hasMerges(EdgeId loop) const;
-  void forgetMergesOf(EdgeId loop);
-  void rehang(EdgeId old, EdgeId now);
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
+  Recallable withRecord(Recallable there, ObjectId id, const ObjectRecord& record) const;
   bool isAgreedOn(const LoopSearch::Found& found);
   void close(const LoopSearch::Found& found);
   void learnDrift(const PlaceMatch& match, const LevelGaussian& prior);

@@ -23,12 +23,7 @@ void Mapper::tie() {
   tracked_ties_.use(*tie, builder_.way_m());
   const Edge edge = edgeFrom(tie->home, builder_.last()->id, tie->T_Mb, EdgeKind::kTracking);
   const double chi2 = state_.graph().chi2(edge);
-  const EdgeId id = state_.addLoop(edge);
-  for (const auto& [absorbed, merge] : state_.merges()) {
-    const bool of_it =
-        std::find(tie->objects.begin(), tie->objects.end(), merge.survivor) != tie->objects.end();
-    if (of_it) loop_book_.hang(id, merge.loop);
-  }
+  state_.addLoop(edge);
   marginals_.reset();
   constexpr double kAgrees = 4.0;  // the next solve takes it along
   if (chi2 > kAgrees) graphMoved();
@@ -42,47 +37,38 @@ void Mapper::graphMoved() {
   ++revision_;
 }
 
-/// Tells what the graph believes now, and takes back what it no longer does.
+/// Reports the loop closures that the graph accepts now, and removes those that it rejects.
 void Mapper::settle() {
   const LoopBook::Verdict verdict = loop_book_.judge(state_.graph(), builder_.way_m());
-  for (const EdgeId id : verdict.sound) forgetMergesOf(id);
   for (const EdgeId id : verdict.given_up) {
-    if (hasMerges(id)) {
+    if (!state_.identity().factsOf(id).empty()) {  // it took the place of an accepted one
       withdraw(id);
-    } else {
-      state_.removeLoop(id);
-      loop_book_.remove(id);
+      continue;
     }
+    state_.removeLoop(id);
+    loop_book_.remove(id);
   }
   for (const EdgeId id : verdict.withdrawn) withdraw(id);
-  if (!change_.withdrawn.empty()) state_.optimise();
+  if (!verdict.given_up.empty() || !verdict.withdrawn.empty()) state_.optimise();
   for (const LoopClosure& loop : verdict.told) {
     change_.loops.push_back(loop);
-    orderMerges(loop);
+    join(loop);
   }
 }
 
-void Mapper::orderMerges(const LoopClosure& loop) {
+/// The pairs of the loop closure are one object each.
+void Mapper::join(const LoopClosure& loop) {
+  const Identity& identity = state_.identity();
   for (const auto& [known, seen] : loop.match.pairs) {
-    const auto survivor = state_.records().find(known), absorbed = state_.records().find(seen);
-    const bool both = survivor != state_.records().end() && absorbed != state_.records().end();
+    const bool both = state_.recordOfTrack(known) && state_.recordOfTrack(seen);
     if (known == seen || !both) continue;  // one may be gone since the loop was found
-    change_.merges.push_back({loop.id, known, seen});
-    state_.putMerge(seen, {loop.id, known, false, survivor->second, absorbed->second});
+    const auto [survivor, absorbed] =
+        std::minmax({identity.objectOf(known), identity.objectOf(seen)});
+    const SameObject fact{loop.id, known, seen};
+    state_.add(fact);
+    change_.facts.push_back(fact);
+    if (survivor != absorbed) change_.merges.push_back({loop.id, survivor, absorbed});
   }
-}
-
-bool Mapper::hasMerges(EdgeId loop) const {
-  return std::any_of(state_.merges().begin(), state_.merges().end(),
-                     [&](const auto& each) { return each.second.loop == loop; });
-}
-
-void Mapper::forgetMergesOf(EdgeId loop) {
-  std::vector<ObjectId> of_it;
-  for (const auto& [absorbed, merge] : state_.merges()) {
-    if (merge.loop == loop) of_it.push_back(absorbed);
-  }
-  for (const ObjectId id : of_it) state_.eraseMerge(id);
 }
 
 void Mapper::withdraw(EdgeId loop) {
@@ -90,34 +76,15 @@ void Mapper::withdraw(EdgeId loop) {
   LoopWithdrawal withdrawal{loop, edge.a, edge.b, edge};
   putWitnesses(loop, withdrawal.pairs, withdrawal.points);
   change_.withdrawn.push_back(std::move(withdrawal));
-  const auto merges = state_.merges();
-  for (const auto& [absorbed, merge] : merges) {
-    if (merge.loop != loop) continue;
-    undo(absorbed, merge);
-    change_.splits.push_back({loop, merge.survivor, absorbed});
-  }
-  forgetMergesOf(loop);
-  for (const EdgeId tie : loop_book_.tiesOf(loop)) state_.removeLoop(tie);
+  const auto facts = state_.identity().factsOf(loop);
   state_.removeLoop(loop);
   loop_book_.remove(loop);
-  if (active_ && active_->id == loop) active_.reset();
-}
-
-/// What was seen of the survivor since is of the absorbed one.
-void Mapper::undo(ObjectId absorbed, const HungMerge& merge) {
-  const auto at = state_.records().find(merge.survivor);
-  if (!merge.done || at == state_.records().end()) return;
-  ObjectRecord now = merge.absorbed_before;
-  if (isNewer(at->second, now)) {
-    now.session = at->second.session;
-    now.way_m = at->second.way_m;
-    now.last_seen = at->second.last_seen;
-    now.pose_error = at->second.pose_error;
-    now.sighting = at->second.sighting;
-    now.sighting.in_anchor.id = absorbed;
+  for (const SameObject& fact : facts) {
+    const auto [survivor, absorbed] =
+        std::minmax({state_.identity().objectOf(fact.a), state_.identity().objectOf(fact.b)});
+    if (survivor != absorbed) change_.splits.push_back({loop, survivor, absorbed});
   }
-  state_.put(absorbed, std::move(now));
-  state_.put(merge.survivor, merge.survivor_before);
+  if (active_ && active_->id == loop) active_.reset();
 }
 
 /// What is seen now, in the newest anchor; a stored view where the way is driven along again.
@@ -204,30 +171,19 @@ void Mapper::close(const LoopSearch::Found& found) {
       active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
                              [&](const auto& pair) { return active_->pairs.contains(pair); });
   const std::optional<EdgeId> old = rests_on_the_same ? std::optional(active_->id) : std::nullopt;
-  const std::vector<EdgeId> ties = old ? loop_book_.tiesOf(*old) : std::vector<EdgeId>();
-  if (old) {
-    state_.removeLoop(*old);
-    loop_book_.remove(*old);
-  }
+  if (old) loop_book_.remove(*old);
   if (!found.prior) {
     bringTogether(edge);
     ended_.reset();
   }
   const EdgeId id = state_.addLoop(edge);
-  if (old) rehang(*old, id);
-  for (const EdgeId tie : ties) loop_book_.hang(tie, id);
+  if (old) {
+    state_.replaceLoop(*old, id);
+    state_.removeLoop(*old);
+  }
   if (!match.pairs.empty()) active_ = {id, pairsOf(match)};
   loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
   graphMoved();
-}
-
-/// One loop takes another's place.
-void Mapper::rehang(EdgeId old, EdgeId now) {
-  for (auto [absorbed, merge] : std::map<ObjectId, HungMerge>(state_.merges())) {
-    if (merge.loop != old) continue;
-    merge.loop = now;
-    state_.putMerge(absorbed, std::move(merge));
-  }
 }
 
 /// Moves the younger of two components to where the edge says that it lies in the older one's M.
@@ -253,18 +209,6 @@ Edge Mapper::edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKin
   edge.T_ab.covariance = turnedBy(T_Ma.R().transpose(), T_Mb.covariance);
   addFloor(edge.T_ab.covariance, parameters_.loop.floor_m, parameters_.loop.floor_rad);
   return edge;
-}
-
-/// Of a merge that a loop ordered: both as they are before.
-void Mapper::keepForUndo(ObjectId survivor, ObjectId absorbed) {
-  const auto ordered = state_.merges().find(absorbed);
-  if (ordered == state_.merges().end() || ordered->second.survivor != survivor) return;
-  HungMerge merge = ordered->second;
-  merge.done = true;
-  merge.absorbed_before = state_.records().at(absorbed);
-  const auto into = state_.records().find(survivor);
-  if (into != state_.records().end()) merge.survivor_before = into->second;
-  state_.putMerge(absorbed, std::move(merge));
 }
 
 }  // namespace perdure::mapping

@@ -5,7 +5,7 @@
 
 namespace perdure::mapping {
 
-/// By what a loop was found; of one of an earlier process by the merges that still hang on it.
+/// By what a loop was found; of one of an earlier process by the facts that rest on it.
 void Mapper::putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>>& pairs,
                           std::size_t& points) const {
   if (const LoopClosure* closure = loop_book_.closureOf(loop)) {
@@ -13,9 +13,7 @@ void Mapper::putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>
     points = closure->match.points;
     return;
   }
-  for (const auto& [absorbed, merge] : state_.merges()) {
-    if (merge.loop == loop) pairs.emplace_back(merge.survivor, absorbed);
-  }
+  for (const SameObject& fact : state_.identity().factsOf(loop)) pairs.emplace_back(fact.a, fact.b);
 }
 
 std::vector<Mapper::Loop> Mapper::loops() const {

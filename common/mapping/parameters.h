@@ -49,9 +49,9 @@ struct LoopParameters {
   /// how well they must know its place, as a share of the deviation that the graph says.
   std::uint64_t least_tracked = 2;
   double tracked_gain = 0.7;
-  /// A told loop that the graph does not believe for so much way is withdrawn. One that was never
-  /// believed waits so long for others that agree. What hangs on a sound one is kept so long.
-  double withdraw_after_m = 8.0, give_up_after_m = 60.0, sound_after_m = 500.0;
+  /// An accepted loop closure that the graph rejects over this distance is retracted. One that was
+  /// never accepted waits this long for others that agree.
+  double withdraw_after_m = 8.0, give_up_after_m = 60.0;
   double floor_m = 0.1, floor_rad = 0.005;  ///< least deviation of a loop
   /// An object is recalled where its place relative to the body is known better than that.
   double hold_back_m = 1.0, hold_back_rad = 0.035;

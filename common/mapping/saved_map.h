@@ -14,6 +14,7 @@
 #include "common/mapping/appearance/view.h"
 #include "common/mapping/frames/anchor.h"
 #include "common/mapping/graph/pose_graph.h"
+#include "common/mapping/identity.h"
 #include "common/mapping/places/placed_object.h"
 #include "common/types/odometry.h"
 
@@ -25,7 +26,7 @@ struct Sighting {
   PlacedObject in_anchor;
 };
 
-/// What the mapper knows of an object.
+/// What the mapper knows of a track, or of an object by all of its tracks.
 struct ObjectRecord {
   WorldId session;
   double way_m = 0.0;  ///< of the session when it was last detected
@@ -34,6 +35,7 @@ struct ObjectRecord {
   Sighting sighting;                       ///< the newest
   std::optional<Sighting> earlier;         ///< of the visit before, if it came back
   bool confirmed = false;                  ///< once: it is on the map. Others are not saved
+  bool gone = false;                       ///< of a track alone: its object has ended
 };
 
 struct SavedAnchor {
@@ -47,21 +49,14 @@ struct SavedEdge {
   double weight = 1.0;  ///< of the last optimisation, (0, 1]
 };
 
-/// A merge that hangs on a loop, with what its undoing needs. Kept until the loop is old and sound.
-struct HungMerge {
-  EdgeId loop = 0;
-  ObjectId survivor = 0;
-  bool done = false;  ///< else ordered: the records are as of the order
-  ObjectRecord survivor_before, absorbed_before;
-};
-
 /// All of it, or what has changed and replaces what is stored under the same ids.
 struct SavedMap {
   std::vector<std::string> classes;  ///< names by the numbers in ClassShare; always all of them
   std::map<AnchorId, SavedAnchor> anchors;
   std::map<EdgeId, SavedEdge> edges;
-  std::map<ObjectId, ObjectRecord> records;
-  std::map<ObjectId, HungMerge> merges = {};  ///< by the absorbed object
+  std::map<ObjectId, ObjectRecord> records;     ///< of objects
+  std::map<TrackId, ObjectRecord> tracks = {};  ///< of objects that have several tracks
+  std::set<SameObject> facts = {};
   std::map<AnchorId, View> views = {};        ///< what anchors look like, where landmarks were seen
 };
 
@@ -69,7 +64,8 @@ struct Unsaved {
   SavedMap changed;
   std::set<EdgeId> edges_gone;
   std::set<ObjectId> records_gone;
-  std::set<ObjectId> merges_gone = {};
+  std::set<TrackId> tracks_gone = {};
+  std::set<SameObject> facts_gone = {};
 };
 
 }  // namespace perdure::mapping

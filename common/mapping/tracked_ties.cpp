@@ -62,6 +62,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   for (const ObjectId id : body.objectsOfVisit(loop.fresh_m)) {
     const ObjectRecord& record = body.state.records().at(id);
     if (!record.confirmed || !record.earlier || isUsed(id, way_m)) continue;
+    if (record.earlier->in_anchor.id != record.sighting.in_anchor.id) continue;
     const auto T_ba = body.relative.to(record.earlier->anchor);
     const auto T_bA = body.relative.to(record.sighting.anchor);
     if (!T_ba || !T_bA) continue;

@@ -18,7 +18,7 @@ class TrackedTies {
   struct Tie {
     LevelGaussian T_Mb;  ///< by detections alone
     AnchorId home = 0;   ///< that most of the objects belong to
-    std::vector<ObjectId> objects;
+    std::vector<ObjectId> objects;  ///< seen on both visits as the same track: no loop is needed
   };
   /// Nothing while they say no more than the graph. Each object is used once in a visit.
   std::optional<Tie> find(const Whereabouts& body) const;

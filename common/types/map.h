@@ -66,9 +66,8 @@ enum class MapQueryKind : std::uint8_t {
   kByRadius,
   kByBox,
   kAll,
-  kRestore,  ///< the newest working set of another filter, on `recalled`
-  kRecall,   ///< what is near a place and in no working set, in full, on `recalled`
-  kGraph,    ///< anchors nearest to `low` first, within `radius` (0: all), and loops between them
+  kRestore,    ///< a filter begins: the newest working set of another one, on `map/near`
+  kGraph = 7,  ///< anchors nearest to `low` first, within `radius` (0: all), and loops between them
 };
 
 struct MapQuery {
@@ -144,27 +143,33 @@ struct MapReply {
   std::uint32_t anchor_count = 0, loop_count = 0;
 };
 
-/// Full beliefs that come back from the map into the filter's working set.
-struct Recalled {
+/// A track that belongs to an object with another id.
+struct Member {
+  TrackId track = 0;
+  ObjectId object = 0;
+};
+
+/// All that the map knows of the surroundings of the body, for one filter. Complete: a later one
+/// replaces it.
+struct MapNear {
+  FrameStamp stamp;  ///< of the newest working set that was used
   InstanceId instance = 0;
-  WorldId world;          ///< frame of the beliefs
-  bool restore = false;   ///< the working set of a filter that went away, in answer to kRestore
-  InstanceId client = 0;  ///< for whom; 0: for every filter
-  ObjectId next_id = 1;
-  std::vector<ObjectBelief> objects;
-  std::uint64_t request = 0;  ///< of the query; 0: not known
-  /// Time of the newest frame of the client's whose working set is on the disk; 0: none.
+  InstanceId client = 0;       ///< the filter whose working set it is, or that asked kRestore
+  WorldId world;               ///< W
+  std::uint64_t revision = 0;  ///< grows by one with each message of an instance
+  /// What the client published up to this time is on the disk; 0: nothing.
   TimePoint kept;
-  bool truncated = false;  ///< there are more near that place: these are the nearest
-  /// The beliefs were laid where they are by the map's graph: covariances are relative to the body,
-  /// and cross_pose is zero. False: as they were in W.
-  bool laid = false;
-  /// The map's graph hears this odometry, and takes its drift out.
-  bool graph = false;
-  std::vector<MergeOrder> merges;  ///< to be done once `objects` are in the working set
-  /// Merges to be undone before anything else: their loop was withdrawn. What was seen of the
-  /// survivor since is of the absorbed one.
-  std::vector<MergeOrder> splits;
+  ObjectId next_id = 1;         ///< ids below it are taken
+  bool corrects_drift = false;  ///< the map's graph receives this odometry
+  bool more = false;            ///< more objects are near
+  /// Tracks of the working set and of the lists below whose object has another id. A track that is
+  /// not listed has its own id.
+  std::vector<Member> members;
+  /// Objects that are not in the working set, and objects there that were not detected since and
+  /// are placed differently now. Covariances are relative to the body, cross_pose is zero.
+  std::vector<ObjectBelief> placed;
+  /// Objects that this client detected in this W and that the graph has not moved: as published.
+  std::vector<ObjectBelief> as_published;
 };
 
 }  // namespace perdure

@@ -41,6 +41,7 @@ enum class Memory : std::uint8_t { kWorking = 0, kLongTerm = 1 };
 
 struct ObjectBelief {
   ObjectId id = 0;
+  TrackId track = 0;       ///< 0: the same as id
   double existence = 0.0;  ///< r in [0, 1]
   bool confirmed = false;
   std::vector<ClassBelief> classes;  ///< not empty; the most probable first
@@ -56,9 +57,17 @@ struct ObjectBelief {
   Ledger why;             ///< what existence and the classes' probabilities are made of
 
   const ClassBelief& best() const { return classes.front(); }
+  TrackId trackId() const { return track != 0 ? track : id; }
 };
 
-/// The working set at one frame: enough to restore it.
+/// A confirmed track that ended.
+struct EndedTrack {
+  TrackId track = 0;
+  TrackId into = 0;  ///< the track that it was merged into; 0: the object is gone
+  TimePoint time;
+};
+
+/// The working set at one frame: enough to restore it. Complete: a later one replaces it.
 struct Objects {
   FrameStamp stamp;
   InstanceId instance = 0;
@@ -70,14 +79,14 @@ struct Objects {
   /// Of [θ, p] as in Odometry: what `cross_pose` of objects detected in this frame refers to. Zero:
   /// not known.
   Eigen::Matrix<double, 6, 6> pose_error = Eigen::Matrix<double, 6, 6>::Zero();
+  /// The newest `map/near` that was used; 0: none.
+  InstanceId near_source = 0;
+  std::uint64_t near_revision = 0;
+  /// The map is to give what is nearer to the body than this, m; 0: nothing.
+  double near_m = 0.0;
+  std::vector<EndedTrack> ended;  ///< after MapNear::kept; at most kMostEnded
 };
-
-/// Two objects that a loop in the map shows to be one.
-struct MergeOrder {
-  std::uint64_t loop = 0;  ///< counts from 1 within a map
-  ObjectId survivor = 0;   ///< the older one
-  ObjectId absorbed = 0;
-};
+inline constexpr std::size_t kMostEnded = 256;
 
 /// The newest state of one object of the working set; latched on `object_state`, keyed by its id,
 /// and disposed when the object leaves it: gone, merged away, or archived (it is then on the map;

@@ -70,7 +70,7 @@ template struct Instances<ModelInfo>;
 template struct Instances<SwapNotice>;
 template struct Instances<Objects>;
 template struct Instances<ObjectState>;
-template struct Instances<Recalled>;
+template struct Instances<MapNear>;
 template struct Instances<Event>;
 template struct Instances<Predictions>;
 template struct Instances<MapTile>;

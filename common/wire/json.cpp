@@ -156,7 +156,7 @@ template Json toJson(const ModelInfo&);
 template Json toJson(const SwapNotice&);
 template Json toJson(const Objects&);
 template Json toJson(const ObjectState&);
-template Json toJson(const Recalled&);
+template Json toJson(const MapNear&);
 template Json toJson(const Event&);
 template Json toJson(const Predictions&);
 template Json toJson(const MapTile&);

@@ -44,29 +44,19 @@ class Replays {
     apply(aligned, mapper_.unsaved());
     for (const MergeOrder& order : overlapping(map, aligned, mapper_.graph())) {
       mapper_.onMerged(order.survivor, order.absorbed);
-      merges_.push_back(order);
     }
   }
 
   Mapper& mapper() { return mapper_; }
-  const std::vector<MergeOrder>& merges() const { return merges_; }
   std::size_t loops() const { return loops_; }
 
  private:
   void replay(const WorldId& session) {
     mapper_.replay(session);
-    const MapChange change = mapper_.takeChange();
-    loops_ += change.loops.size();
-    merges_.insert(merges_.end(), change.merges.begin(), change.merges.end());
-    for (const MergeOrder& undone : change.splits) {
-      std::erase_if(merges_, [&](const MergeOrder& order) {
-        return order.survivor == undone.survivor && order.absorbed == undone.absorbed;
-      });
-    }
+    loops_ += mapper_.takeChange().loops.size();
   }
 
   Mapper mapper_;
-  std::vector<MergeOrder> merges_;
   std::size_t loops_ = 0;
 };
 
@@ -100,7 +90,8 @@ void align(MapContents& map, const std::vector<WorldId>& sessions, const Paramet
   replays.settle(map);
   const std::map<ObjectId, ObjectRecord> records = map.graph.records;
   apply(map.graph, replays.mapper().unsaved());
-  report.merges = mergeObjects(map, records, replays.merges(), replays.mapper().graph());
+  report.merges =
+      mergeObjects(map, records, replays.mapper().identity(), replays.mapper().graph());
   const std::size_t after = loopsOf(map.graph);
   report.loops = after > before ? after - before : 0;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "common/mapping/frames/level_errors.h"
@@ -128,25 +129,6 @@ class Renewal {
   std::vector<Change> changes_;
 };
 
-/// Objects that are one, by the survivor's id; it is the first.
-std::map<ObjectId, std::vector<ObjectId>> groupsOf(const MapContents& map,
-                                                   const std::vector<MergeOrder>& orders) {
-  std::map<ObjectId, std::vector<ObjectId>> groups;
-  for (const MergeOrder& order : orders) {
-    if (!map.objects.contains(order.survivor) || !map.objects.contains(order.absorbed)) continue;
-    auto& group = groups[order.survivor];
-    if (group.empty()) group.push_back(order.survivor);
-    const auto other = groups.find(order.absorbed);
-    if (other == groups.end()) {
-      group.push_back(order.absorbed);
-    } else {
-      group.insert(group.end(), other->second.begin(), other->second.end());
-      groups.erase(order.absorbed);
-    }
-  }
-  return groups;
-}
-
 class Joining {
  public:
   Joining(MapContents& map, const std::map<ObjectId, ObjectRecord>& before, const PoseGraph& graph)
@@ -213,10 +195,14 @@ std::vector<Change> renew(MapContents& map, const Addition& addition) {
 }
 
 std::size_t mergeObjects(MapContents& map, const std::map<ObjectId, ObjectRecord>& before,
-                         const std::vector<MergeOrder>& orders, const PoseGraph& graph) {
+                         const Identity& identity, const PoseGraph& graph) {
   Joining joining(map, before, graph);
   std::size_t count = 0;
-  for (const auto& [survivor, group] : groupsOf(map, orders)) {
+  for (const auto& [object, tracks] : identity.shared()) {
+    std::vector<ObjectId> group;
+    std::copy_if(tracks.begin(), tracks.end(), std::back_inserter(group),
+                 [&](ObjectId id) { return map.objects.contains(id); });
+    if (group.size() < 2) continue;
     joining.join(group);
     count += group.size() - 1;
   }

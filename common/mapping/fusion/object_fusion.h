@@ -6,6 +6,7 @@
 
 #include "common/mapping/fusion/united_map.h"
 #include "common/mapping/graph/pose_graph.h"
+#include "common/mapping/identity.h"
 
 namespace perdure::mapping {
 
@@ -13,9 +14,9 @@ namespace perdure::mapping {
 /// on what other maps have seen the two are fused. Says what stands elsewhere now, or is gone.
 std::vector<Change> renew(MapContents& map, const Addition& addition);
 
-/// Carries out merges in which a mapper with the graph has joined the records. `before`: the
-/// records as they were. Absorbed objects become history. Returns how many.
+/// Fuses the beliefs of objects that `identity` holds to be one. `before`: the records as they were.
+/// Absorbed objects become history. Returns their number.
 std::size_t mergeObjects(MapContents& map, const std::map<ObjectId, ObjectRecord>& before,
-                         const std::vector<MergeOrder>& orders, const PoseGraph& graph);
+                         const Identity& identity, const PoseGraph& graph);
 
 }  // namespace perdure::mapping

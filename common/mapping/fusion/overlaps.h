@@ -7,6 +7,7 @@
 
 #include "common/mapping/fusion/map_contents.h"
 #include "common/mapping/graph/pose_graph.h"
+#include "common/mapping/identity.h"
 
 namespace perdure::mapping {
 

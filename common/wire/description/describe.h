@@ -240,6 +240,29 @@ void describe(A& a, D& d, W& w) {
   a.value("anchors", d.anchors, w.anchor_count);
 }
 
+template <class A, Is<Member> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("track", d.track, w.track);
+  a.value("object", d.object, w.object);
+  a.ensure("object", "out_of_range", [&] { return d.track != 0 && d.object != 0; });
+}
+
+template <class A, Is<MapNear> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.value("instance", d.instance, w.source);
+  a.value("client", d.client, w.client);
+  a.object("world", d.world, w.reference);
+  a.value("revision", d.revision, w.revision);
+  a.time("kept_ns", d.kept, w.kept_ns);
+  a.value("next_id", d.next_id, w.next_object_id);
+  a.value("corrects_drift", d.corrects_drift, w.corrects_drift);
+  a.value("more", d.more, w.more);
+  a.list("members", d.members, w.members, kObjects);
+  a.list("placed", d.placed, w.placed, kObjects);
+  a.list("as_published", d.as_published, w.as_published, kObjects);
+}
+
 template <class A, Is<MapQuery> D, class W>
 void describe(A& a, D& d, W& w) {
   a.value("client", d.client, w.client);

@@ -73,6 +73,15 @@ void describe(A& a, D& d, W& w) {
   a.choice("memory", d.memory, w.memory, Memory::kLongTerm);
   a.value("recalled", d.recalled, w.recalled);
   a.object("why", d.why, w);
+  a.value("track", d.track, w.track);
+}
+
+template <class A, Is<EndedTrack> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("track", d.track, w.track);
+  a.value("into", d.into, w.into);
+  a.time("time_ns", d.time, w.time_ns);
+  a.ensure("track", "out_of_range", [&] { return d.track != 0 && d.track != d.into; });
 }
 
 template <class A, Is<Objects> D, class W>
@@ -85,6 +94,10 @@ void describe(A& a, D& d, W& w) {
   a.value("next_id", d.next_id, w.next_object_id);
   a.list("objects", d.objects, w.items, kObjects);
   a.symmetric("pose_error", d.pose_error, w.pose_error);
+  a.value("near_source", d.near_source, w.near_source);
+  a.value("near_revision", d.near_revision, w.near_revision);
+  a.number("near_m", d.near_m, w.near_m, kNotNegative);
+  a.list("ended", d.ended, w.ended, kMostEnded);
 }
 
 template <class A, Is<ObjectState> D, class W>
@@ -95,32 +108,6 @@ void describe(A& a, D& d, W& w) {
   a.object("object", d.object, w.belief);
   a.value("id", d.object.id, w.object_id);  // the key: all that a dispose carries
   a.ensureWire("id", "size_mismatch", [&] { return w.object_id == w.belief.object_id; });
-}
-
-template <class A, Is<MergeOrder> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("loop", d.loop, w.loop);
-  a.value("survivor", d.survivor, w.survivor);
-  a.value("absorbed", d.absorbed, w.absorbed);
-  a.ensure("absorbed", "out_of_range",
-           [&] { return d.survivor != 0 && d.absorbed != 0 && d.survivor != d.absorbed; });
-}
-
-template <class A, Is<Recalled> D, class W>
-void describe(A& a, D& d, W& w) {
-  a.value("instance", d.instance, w.source);
-  a.object("world", d.world, w.reference);
-  a.value("restore", d.restore, w.restore);
-  a.value("client", d.client, w.client);
-  a.value("next_id", d.next_id, w.next_object_id);
-  a.list("objects", d.objects, w.items, kObjects);
-  a.value("request", d.request, w.request);
-  a.time("kept_ns", d.kept, w.kept_ns);
-  a.value("truncated", d.truncated, w.truncated);
-  a.value("laid", d.laid, w.laid);
-  a.value("graph", d.graph, w.graph);
-  a.list("merges", d.merges, w.merges, kObjects);
-  a.list("splits", d.splits, w.splits, kObjects);
 }
 
 template <class A, Is<Event> D, class W>

@@ -49,7 +49,7 @@ struct Type<Objects> : TypeOf<perdure_msg_Objects, &perdure_msg_Objects_desc> {}
 template <>
 struct Type<ObjectState> : TypeOf<perdure_msg_ObjectState, &perdure_msg_ObjectState_desc> {};
 template <>
-struct Type<Recalled> : TypeOf<perdure_msg_Recalled, &perdure_msg_Recalled_desc> {};
+struct Type<MapNear> : TypeOf<perdure_msg_MapNear, &perdure_msg_MapNear_desc> {};
 template <>
 struct Type<Event> : TypeOf<perdure_msg_Event, &perdure_msg_Event_desc> {};
 template <>

@@ -156,6 +156,7 @@ Bytes encodeHeader(const Objects& objects) {
   out.put(objects.T_WB.p);
   out.put(objects.up_W);
   out.put(objects.next_id);
+  out.put(objects.pose_error);
   return out.take();
 }
 
@@ -175,6 +176,7 @@ Result<Objects> decodeHeader(std::span<const std::uint8_t> bytes) {
   in.takeInto(objects.T_WB.p);
   in.takeInto(objects.up_W);
   objects.next_id = in.take<std::uint64_t>();
+  if (version >= 3) in.takeInto(objects.pose_error);
   if (!in.finished()) return malformed(in, version);
   return objects;
 }

@@ -5,11 +5,13 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
 #include "services/map_store/core/outbox.h"
+#include "services/map_store/core/track_rows.h"
 
 namespace perdure::map_store {
 namespace {
@@ -54,11 +56,22 @@ std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); 
 }  // namespace
 
 struct MapDatabase::Change {
-  std::set<ObjectId> objects;    ///< whose rows have changed
-  std::map<ObjectId, Row> rows;  ///< to be remembered once committed
-  std::set<ObjectId> shut_out;   ///< removed later than this frame
+  std::set<ObjectId> objects;      ///< whose rows have changed
+  std::map<TrackId, Row> rows;     ///< to be remembered once committed
+  std::set<TrackId> shut_out;      ///< removed later than this frame
+  std::set<TrackId> alive;         ///< in the working set
+  std::set<ObjectId> to_derive;    ///< from the rows of their tracks
+  std::uint64_t revision = 0;      ///< that this commit makes
   std::optional<Statement> put_object, put_place;
 };
+
+namespace {
+
+bool isShared(TrackId track, const Batch& batch) {
+  return batch.identity != nullptr && batch.identity->isShared(track);
+}
+
+}  // namespace
 
 MapDatabase::MapDatabase(const StoreOptions& options) : MapDatabase(openStore(options), options) {}
 
@@ -127,19 +140,30 @@ Result<void> MapDatabase::rememberWorking() {
 
 Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
   auto statement = connection_.prepare(
-      "SELECT tile_x, tile_y, gone, gone_ns, memory, world, epoch, belief FROM objects "
-      "WHERE id = ?1");
+      "SELECT gone, gone_ns, memory, world, epoch, belief FROM objects WHERE id = ?1");
   if (!statement) return tl::unexpected<Reason>(statement.error());
   const auto there = statement->bindId(1, id).step();
   if (!there) return tl::unexpected<Reason>(there.error());
   Row row;
   if (!*there) return row;
-  row.square = Square{static_cast<std::int32_t>(statement->integer(0)),
-                      static_cast<std::int32_t>(statement->integer(1))};
-  if (statement->integer(2) != 0) row.gone = fromNanoseconds(statement->integer(3));
-  const WorldId world{statement->id(5), static_cast<std::uint32_t>(statement->integer(6))};
+  row.stored = true;
+  if (statement->integer(0) != 0) row.gone = fromNanoseconds(statement->integer(1));
+  const WorldId world{statement->id(3), static_cast<std::uint32_t>(statement->integer(4))};
   // One that had left the working set is written again, whatever its belief.
-  if (statement->integer(4) == 0) row.digest = digestOf(statement->blob(7), world);
+  if (statement->integer(2) == 0) row.digest = digestOf(statement->blob(5), world);
+  return row;
+}
+
+Result<MapDatabase::Row> MapDatabase::rowOfTrack(TrackId id, const Batch& batch) const {
+  const auto known = committed_.find(id);
+  if (known != committed_.end()) return known->second;
+  if (!isShared(id, batch)) return rowOf(id);
+  const auto track = readTrack(connection_, id);
+  if (!track) return tl::unexpected<Reason>(track.error());
+  Row row;
+  if (!*track) return row;
+  row.stored = true;
+  row.gone = (*track)->gone;
   return row;
 }
 
@@ -160,43 +184,107 @@ Result<void> MapDatabase::insert(const PlacedBelief& placed, const Square& squar
                   m[0], m[1], m[1], m[2], m[2]);
 }
 
-Result<void> MapDatabase::put(const PlacedBelief& placed, TimePoint now, Change& change) {
-  const ObjectId id = placed.belief.id;
+Result<void> MapDatabase::put(const PlacedBelief& placed, const Batch& batch, Change& change) {
+  const TrackId id = placed.belief.id;
   const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
   if (!square) return fail("object_invalid", "an object's centre is not a place on the map");
-  const auto known = committed_.find(id);
-  const auto before = known != committed_.end() ? Result<Row>(known->second) : rowOf(id);
+  const auto before = rowOfTrack(id, batch);
   if (!before) return failed(before.error());
-  if (before->gone && *before->gone >= now) {
+  if (before->gone && *before->gone >= batch.working->stamp.time) {
     change.shut_out.insert(id);
     return {};
   }
   const Bytes bytes = encodeBelief(placed.belief);
-  const Row after{digestOf(bytes, placed.world), square, std::nullopt};
+  const Row after{digestOf(bytes, placed.world), true, std::nullopt};
   change.rows[id] = after;
   if (after.digest == before->digest) return {};
+  if (isShared(id, batch)) {
+    change.to_derive.insert(batch.identity->objectOf(id));
+    return writeTrack(connection_, {id, placed, change.revision, std::nullopt});
+  }
   change.objects.insert(id);
   return insert(placed, *square, bytes, change);
 }
 
 Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
-  const TimePoint now = batch.working->stamp.time;
   for (const auto& [id, placed] : batch.left) {
-    const auto done = put(placed, now, change);
+    const auto done = put(placed, batch, change);
     if (!done) return done;
   }
   for (const auto& belief : batch.working->objects) {
-    if (!belief.confirmed || batch.laid.contains(belief.id)) continue;
-    const auto done = put({batch.working->world, belief}, now, change);
+    if (!belief.confirmed || batch.placed.contains(belief.id)) continue;
+    const auto done = put({batch.working->world, belief}, batch, change);
     if (!done) return done;
   }
   return {};
 }
 
+/// Moves rows where a track shares its object now, or no longer.
+Result<void> MapDatabase::regroup(const Batch& batch, Change& change) {
+  for (const TrackId id : batch.regrouped) {
+    committed_.erase(id);
+    if (isShared(id, batch)) {
+      change.to_derive.insert(batch.identity->objectOf(id));
+      const auto done = shareTrack(connection_, id);
+      if (!done) return done;
+      continue;
+    }
+    const auto track = readTrack(connection_, id);
+    if (!track) return failed(track.error());
+    if (!*track) continue;
+    auto done = deleteTrack(connection_, id);
+    const PlacedBelief& placed = (*track)->placed;
+    const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
+    if (done && square) done = insert(placed, *square, encodeBelief(placed.belief), change);
+    change.objects.insert(id);
+    if (done && (*track)->gone) done = remove(id, {EventKind::kGone, *(*track)->gone, 0}, change);
+    if (done && !change.alive.contains(id)) done = markLeft(id, change);
+    if (!done) return done;
+  }
+  return {};
+}
+
+/// The row of an object is that of its newest track: one of the working set, or else the one that
+/// was written last. If that track is gone, so is the object.
+Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& change) {
+  std::optional<StoredTrack> newest;
+  const auto rank = [&](const StoredTrack& track) {
+    return std::tuple(change.alive.contains(track.id), track.written, track.id);
+  };
+  for (const TrackId id : batch.identity->tracksOf(object)) {
+    auto track = readTrack(connection_, id);
+    if (!track) return failed(track.error());
+    if (*track && (!newest || rank(**track) > rank(*newest))) newest = *std::move(*track);
+    if (id == object) continue;
+    const auto done = remove(id, {EventKind::kMerged, batch.working->stamp.time, object}, change);
+    if (!done) return done;
+  }
+  if (!newest) return {};
+  if (newest->gone) return remove(object, {EventKind::kGone, *newest->gone, 0}, change);
+  newest->placed.belief.id = object;
+  const auto square = squareOf(newest->placed.belief.best().mean.head<3>(), tile_size_m_);
+  if (!square) return {};
+  change.objects.insert(object);
+  const auto done =
+      insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
+  if (!done || change.alive.contains(newest->id)) return done;
+  return markLeft(object, change);
+}
+
+Result<void> MapDatabase::end(TrackId id, const Removal& removal, const Batch& batch,
+                              Change& change) {
+  if (!isShared(id, batch)) return remove(id, removal, change);
+  change.rows.erase(id);
+  change.to_derive.insert(batch.identity->objectOf(id));
+  // What is known of a merged track is in the one that goes on.
+  if (removal.kind == EventKind::kMerged) return deleteTrack(connection_, id);
+  return endTrack(connection_, id, removal.time);
+}
+
 /// Those of the last working set that are on the map and were no longer confirmed.
 Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
   auto rows = connection_.prepare(
-      "SELECT w.id FROM working w JOIN objects o ON o.id = w.id WHERE w.belief IS NOT NULL");
+      "SELECT id FROM working WHERE belief IS NOT NULL");
   if (!rows) return failed(rows.error());
   for (;;) {
     const auto row = rows->step();
@@ -209,60 +297,17 @@ Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
 Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
-  if (!row->square || row->gone) return {};
+  if (!row->stored || row->gone) return {};
   change.objects.insert(id);
   return runOnce(connection_, "UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1",
                  asStored(id), static_cast<std::int64_t>(Visibility::kOutOfView),
                  static_cast<std::int64_t>(Memory::kLongTerm));
 }
 
-/// The absorbed one as it went: history, and on the map again.
-Result<void> MapDatabase::bringBack(ObjectId absorbed, ObjectId survivor, Change& change) {
-  change.objects.insert(absorbed);
-  auto done = runOnce(connection_,
-                      "UPDATE objects SET gone = 0, gone_ns = NULL, merged_into = NULL "
-                      "WHERE id = ?1 AND merged_into = ?2",
-                      asStored(absorbed), asStored(survivor));
-  if (!done) return done;
-  return runOnce(connection_,
-                 "REPLACE INTO positions SELECT id, x, x, y, y, z, z FROM objects "
-                 "WHERE id = ?1 AND gone = 0",
-                 asStored(absorbed));
-}
-
-Result<void> MapDatabase::undoMerge(const MergeOrder& split, Change& change) {
-  auto rows = connection_.prepare(
-      "SELECT m.world, m.epoch, m.belief, o.world, o.epoch, o.belief FROM merges m "
-      "LEFT JOIN objects o ON o.id = m.survivor AND o.gone = 0 WHERE m.absorbed = ?1");
-  if (!rows) return failed(rows.error());
-  const auto there = rows->bindId(1, split.absorbed).step();
-  if (!there) return failed(there.error());
-  if (!*there) return {};
-  const auto placedAt = [&](int column) -> std::optional<PlacedBelief> {
-    auto belief = decodeBelief(rows->blob(column + 2));
-    if (!belief) return std::nullopt;
-    return PlacedBelief{{rows->id(column), static_cast<std::uint32_t>(rows->integer(column + 1))},
-                        *std::move(belief)};
-  };
-  const std::optional<PlacedBelief> before = placedAt(0);
-  std::optional<PlacedBelief> now = placedAt(3);
-  auto done = bringBack(split.absorbed, split.survivor, change);
-  committed_.erase(split.survivor);
-  committed_.erase(split.absorbed);
-  if (!before || !now || now->belief.last_seen == before->belief.last_seen) return done;
-  now->belief.id = split.absorbed;
-  for (const PlacedBelief* placed : {static_cast<const PlacedBelief*>(&*now), &*before}) {
-    const auto square = squareOf(placed->belief.best().mean.head<3>(), tile_size_m_);
-    if (done && square) done = insert(*placed, *square, encodeBelief(placed->belief), change);
-    change.objects.insert(placed->belief.id);
-  }
-  return done ? markLeft(split.survivor, change) : done;
-}
-
 Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& change) {
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
-  if (!row->square || row->gone) return {};  // never confirmed, or gone before
+  if (!row->stored || row->gone) return {};  // never confirmed, or gone before
   change.objects.insert(id);
   change.rows.erase(id);
   const auto done = runOnce(
@@ -338,24 +383,33 @@ Result<std::uint64_t> MapDatabase::putGraph(const mapping::Unsaved& graph) {
 }
 
 Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
-  Result<void> done;
-  for (const MergeOrder& split : batch.splits) {
-    if (done) done = undoMerge(split, change);
-  }
+  const auto revision = reader().revision();
+  if (!revision) return tl::unexpected<Reason>(revision.error());
+  change.revision = *revision + 1;
+  for (const auto& belief : batch.working->objects) change.alive.insert(belief.id);
+  auto done = regroup(batch, change);
   if (done) done = putObjects(batch, change);
-  std::set<ObjectId> alive, away;
-  for (const auto& belief : batch.working->objects) alive.insert(belief.id);
+  std::set<TrackId> away;
   for (const auto& [id, row] : committed_) away.insert(id);
   for (const auto& [id, placed] : batch.left) away.insert(id);
   if (done) done = addDoubtful(away);
   for (const ObjectId id : away) {
-    if (done && !alive.contains(id)) done = markLeft(id, change);
+    if (!done || change.alive.contains(id)) continue;
+    if (isShared(id, batch)) {
+      change.to_derive.insert(batch.identity->objectOf(id));
+    } else {
+      done = markLeft(id, change);
+    }
   }
   for (const auto& [id, removal] : batch.removed) {
-    if (removal.time < batch.working->stamp.time && alive.contains(id)) continue;
-    if (done) done = remove(id, removal, change);
+    if (removal.time < batch.working->stamp.time && change.alive.contains(id)) continue;
+    if (done) done = end(id, removal, batch, change);
     change.shut_out.insert(id);
   }
+  for (const ObjectId object : change.to_derive) {
+    if (done) done = derive(object, batch, change);
+  }
+  if (done && batch.facts != nullptr) done = writeFacts(connection_, *batch.facts);
   if (done) done = putWorking(*batch.working, change);
   if (done && !batch.earth_anchor.empty()) {
     done = runOnce(connection_, "REPLACE INTO meta VALUES('earth_anchor', ?1)",
@@ -366,11 +420,11 @@ Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
 }
 
 Result<Written> MapDatabase::nextRevision(const Change& change) {
-  const auto revision = reader().revision();
-  if (!revision) return tl::unexpected<Reason>(revision.error());
-  Written written{{change.objects.begin(), change.objects.end()}, *revision};
-  if (change.objects.empty()) return written;
-  ++written.revision;
+  Written written{{change.objects.begin(), change.objects.end()}, change.revision};
+  if (change.objects.empty()) {
+    --written.revision;
+    return written;
+  }
   const auto done =
       runOnce(connection_, "REPLACE INTO meta VALUES('revision', ?1)", asStored(written.revision));
   if (!done) return tl::unexpected<Reason>(done.error());

@@ -37,17 +37,20 @@ struct Removal {
   ObjectId merged_into = 0;
 };
 
-/// What one commit writes. `left`: last beliefs of confirmed objects that left the working set.
+/// What one commit writes. Ids are those of tracks. `left`: last beliefs of confirmed tracks that
+/// left the working set.
 struct Batch {
   const Objects* working = nullptr;  ///< not null
-  std::map<ObjectId, PlacedBelief> left;
-  std::map<ObjectId, Removal> removed;
-  /// Of the working set: laid by the graph and not seen since. What is stored of them stays.
-  std::set<ObjectId> laid = {};
+  std::map<TrackId, PlacedBelief> left;
+  std::map<TrackId, Removal> removed;
+  /// Of the working set: placed by the graph and not seen since. What is stored of them stays.
+  std::set<TrackId> placed = {};
   const mapping::Unsaved* graph = nullptr;  ///< what of it has changed; null: nothing
-  /// Merges to be undone, the newest first: the survivor is as it was before, and what it is now
-  /// is the absorbed one.
-  std::vector<MergeOrder> splits = {};
+  /// Which tracks are one object, what has changed of that, and the tracks that this concerns.
+  /// Null: each track is an object of its own.
+  const mapping::Identity* identity = nullptr;
+  const mapping::Unsaved* facts = nullptr;
+  std::set<TrackId> regrouped = {};
   std::int64_t acknowledged = 0;  ///< entries of the outbox that a server has
   std::string earth_anchor = {};  ///< of M (earth_place.h); empty: as it is stored
 };
@@ -60,7 +63,7 @@ struct Written {
 
 struct Found {
   std::vector<MapObject> objects;
-  std::vector<ObjectBelief> beliefs;  ///< of kById and longTermNear: the objects in full
+  std::vector<ObjectBelief> beliefs;  ///< of kById and inFullNear: the objects in full
   bool truncated = false;
   std::uint64_t malformed = 0;  ///< rows whose belief could not be read; left out
 };
@@ -87,9 +90,11 @@ class MapReader {
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
-  /// What is nearer than radius and not in the working set as committed: nearest first, in full.
-  Result<Found> longTermNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
-                             std::uint32_t limit) const;
+  /// What is nearer than radius, nearest first, in full.
+  Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
+                           std::uint32_t limit) const;
+  /// The last belief of a track; nothing if it is not on the map.
+  Result<std::optional<PlacedBelief>> beliefOf(TrackId track) const;
   /// Of the objects with these ids, in their order, those that are on the map; at most `limit`.
   Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
   /// Of all objects on the map, by id.
@@ -102,6 +107,7 @@ class MapReader {
   Result<std::optional<Objects>> working() const;
   /// The pose graph as it was at the last commit; an empty one on a map without.
   Result<SavedGraph> graph() const { return readGraph(*connection_); }
+  Result<std::set<mapping::SameObject>> facts() const { return readFacts(*connection_); }
   /// Frames of reference that the map has something of.
   Result<std::set<std::uint64_t>> worlds() const;
   /// Where on Earth M lies, as earthAnchorOfMap() writes it; empty: not known.
@@ -130,10 +136,10 @@ class MapDatabase {
   const std::string& notice() const { return notice_; }
 
  private:
-  /// What the file holds of one object.
+  /// What the file holds of one track, or of an object.
   struct Row {
-    std::uint64_t digest = 0;      ///< of the belief; 0: not known
-    std::optional<Square> square;  ///< nothing: not in the file
+    std::uint64_t digest = 0;  ///< of the belief; 0: not known
+    bool stored = false;
     std::optional<TimePoint> gone;
   };
   struct Change;  ///< what one write has done so far
@@ -143,15 +149,17 @@ class MapDatabase {
   Result<void> retile();
   Result<void> rememberWorking();
   Result<Row> rowOf(ObjectId id) const;
-  Result<void> put(const PlacedBelief& placed, TimePoint now, Change& change);
+  Result<Row> rowOfTrack(TrackId id, const Batch& batch) const;
+  Result<void> put(const PlacedBelief& placed, const Batch& batch, Change& change);
   Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes,
                       Change& change);
   Result<void> putObjects(const Batch& batch, Change& change);
-  Result<void> undoMerge(const MergeOrder& split, Change& change);
-  Result<void> bringBack(ObjectId absorbed, ObjectId survivor, Change& change);
+  Result<void> regroup(const Batch& batch, Change& change);
+  Result<void> derive(ObjectId object, const Batch& batch, Change& change);
   Result<void> addDoubtful(std::set<ObjectId>& ids) const;
   Result<void> markLeft(ObjectId id, Change& change);
   Result<void> remove(ObjectId id, const Removal& removal, Change& change);
+  Result<void> end(TrackId id, const Removal& removal, const Batch& batch, Change& change);
   Result<void> putWorking(const Objects& working, const Change& change);
   Result<Written> putAll(const Batch& batch, Change& change);
   Result<Written> nextRevision(const Change& change);
@@ -161,8 +169,8 @@ class MapDatabase {
   Connection connection_;
   std::string notice_;
   double tile_size_m_;
-  /// Of the confirmed objects of the working set, as committed.
-  std::map<ObjectId, Row> committed_;
+  /// Of the confirmed tracks of the working set, as committed.
+  std::map<TrackId, Row> committed_;
   bool graph_is_whole_ = false;  ///< nothing in the file that readGraph leaves out
 };
 

@@ -71,11 +71,11 @@ Result<Statement> byBox(const Connection& connection, const MapQuery& query, con
 }
 
 Result<Statement> byRadius(const Connection& connection, const MapQuery& query,
-                           const WorldId& world, const std::string& condition = "") {
+                           const WorldId& world) {
   constexpr char kSquaredDistance[] =
       "((o.x - ?9) * (o.x - ?9) + (o.y - ?10) * (o.y - ?10) + (o.z - ?11) * (o.z - ?11))";
   auto statement =
-      connection.prepare(std::string(kColumns) + kInBox + condition + "AND " + kSquaredDistance +
+      connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
                          " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
   if (!statement) return statement;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(query.radius);
@@ -106,18 +106,30 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
     case MapQueryKind::kAll:
       return connection.prepare(from + "ORDER BY o.id");
     case MapQueryKind::kRestore:
-    case MapQueryKind::kRecall:
     case MapQueryKind::kGraph:
       break;
   }
-  return fail("query_invalid", "a restore, a recall or the graph is no question about objects");
+  return fail("query_invalid", "a restore or the graph is no question about objects");
 }
 
-/// The beliefs of the working set; confirmed ones are in `objects`.
+/// Maps of older versions have no tracks that share an object.
+Result<bool> hasTracks(const Connection& connection) {
+  const auto count =
+      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'tracks'");
+  if (!count) return tl::unexpected<Reason>(count.error());
+  return *count > 0;
+}
+
+/// The beliefs of the working set; confirmed ones are in `tracks` or `objects`.
 Result<std::vector<ObjectBelief>> workingBeliefs(const Connection& connection) {
+  const auto has_tracks = hasTracks(connection);
+  if (!has_tracks) return tl::unexpected<Reason>(has_tracks.error());
   auto rows = connection.prepare(
-      "SELECT coalesce(w.belief, o.belief) FROM working w LEFT JOIN objects o ON o.id = w.id "
-      "ORDER BY w.position");
+      *has_tracks ? "SELECT coalesce(w.belief, t.belief, o.belief) FROM working w "
+                    "LEFT JOIN tracks t ON t.id = w.id LEFT JOIN objects o ON o.id = w.id "
+                    "ORDER BY w.position"
+                  : "SELECT coalesce(w.belief, o.belief) FROM working w "
+                    "LEFT JOIN objects o ON o.id = w.id ORDER BY w.position");
   if (!rows) return tl::unexpected<Reason>(rows.error());
   std::vector<ObjectBelief> beliefs;
   for (;;) {
@@ -178,15 +190,28 @@ Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
   }
 }
 
-Result<Found> MapReader::longTermNear(const Eigen::Vector3d& centre, double radius,
-                                      const WorldId& world, std::uint32_t limit) const {
+Result<Found> MapReader::inFullNear(const Eigen::Vector3d& centre, double radius,
+                                    const WorldId& world, std::uint32_t limit) const {
   MapQuery query;
   query.low = centre;
   query.radius = radius;
-  auto statement =
-      byRadius(*connection_, query, world, "AND o.id NOT IN (SELECT id FROM working) ");
+  auto statement = byRadius(*connection_, query, world);
   if (!statement) return tl::unexpected<Reason>(statement.error());
   return collect(*statement, limit, true);
+}
+
+Result<std::optional<PlacedBelief>> MapReader::beliefOf(TrackId track) const {
+  auto row = connection_->prepare(
+      "SELECT world, epoch, 0, 0, belief FROM tracks WHERE id = ?1 AND gone = 0 UNION ALL "
+      "SELECT world, epoch, visibility, memory, belief FROM objects WHERE id = ?1 AND gone = 0 "
+      "LIMIT 1");
+  if (!row) return tl::unexpected<Reason>(row.error());
+  const auto there = row->bindId(1, track).step();
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (!*there) return std::optional<PlacedBelief>();
+  auto placed = beliefFrom(*row);
+  if (!placed) return tl::unexpected<Reason>(placed.error());
+  return std::optional(*std::move(placed));
 }
 
 Result<Found> MapReader::byIds(const std::vector<ObjectId>& ids, std::size_t limit) const {

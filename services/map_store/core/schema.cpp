@@ -112,8 +112,8 @@ Result<void> create(const Connection& connection) {
   return transaction->commit();
 }
 
-/// Tables of older versions are the same, and their beliefs are read as they are; those of the
-/// graph are new. All or nothing.
+/// Tables of older versions are the same, and their beliefs are read as they are; some are new. All
+/// or nothing.
 Result<void> adopt(const Connection& connection, const Identity& identity) {
   if (identity.version == kSchemaVersion) return connection.execute(kAddedSchema);
   auto transaction = Transaction::begin(connection);
@@ -122,8 +122,9 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   if (!version) return tl::unexpected<Reason>(version.error());
   if (*version == kSchemaVersion) return {};  // another process was first
   const auto made =
-      connection.execute(std::string(kGraphSchema) + kAddedSchema +
-                         "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
+      connection.execute(std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") +
+                         kAddedSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) +
+                         ";");
   if (!made) return made;
   return transaction->commit();
 }

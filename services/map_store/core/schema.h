@@ -10,9 +10,9 @@ namespace perdure::map_store {
 
 /// "PERD" in the database's header: tells our files from other programs'.
 inline constexpr int kApplicationId = 0x50455244;
-/// 2: beliefs with ledgers. 3: the pose graph. Older maps are read as they are, and become one of 3
-/// when they are opened to be written.
-inline constexpr int kSchemaVersion = 3;
+/// 2: beliefs with ledgers. 3: the pose graph. 4: tracks that are one object. Older maps are read as
+/// they are, and become one of 4 when they are opened to be written.
+inline constexpr int kSchemaVersion = 4;
 
 struct StoreOptions {
   std::string path;

@@ -10,7 +10,6 @@ namespace {
 
 using mapping::Anchor;
 using mapping::Edge;
-using mapping::HungMerge;
 using mapping::LevelGaussian;
 using mapping::LevelPose;
 using mapping::ObjectRecord;
@@ -164,11 +163,6 @@ bool isSound(const ObjectRecord& record) {
          isSoundSighting(record.sighting) && (!record.earlier || isSoundSighting(*record.earlier));
 }
 
-bool isSound(const HungMerge& merge) {
-  return merge.loop != 0 && merge.survivor != 0 && isSound(merge.survivor_before) &&
-         isSound(merge.absorbed_before);
-}
-
 bool isSound(const mapping::View& view) {
   return !view.empty() && view.size() <= mapping::kMostPoints &&
          std::all_of(view.begin(), view.end(), [](const mapping::SeenPoint& point) {
@@ -235,31 +229,6 @@ Result<ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes) {
   return decode<ObjectRecord>("sighting", bytes, [](ByteReader& in, ObjectRecord& record) {
     take(in, record);
     record.confirmed = true;
-  });
-}
-
-Bytes encodeMerge(const HungMerge& merge) {
-  ByteWriter out;
-  out.put(kGraphFormat);
-  out.put(merge.loop);
-  out.put(merge.survivor);
-  out.put(merge.done);
-  for (const ObjectRecord* record : {&merge.survivor_before, &merge.absorbed_before}) {
-    put(out, *record);
-    out.put(record->confirmed);
-  }
-  return out.take();
-}
-
-Result<HungMerge> decodeMerge(std::span<const std::uint8_t> bytes) {
-  return decode<HungMerge>("merge", bytes, [](ByteReader& in, HungMerge& merge) {
-    merge.loop = in.take<std::uint64_t>();
-    merge.survivor = in.take<std::uint64_t>();
-    merge.done = in.takeFlag();
-    for (ObjectRecord* record : {&merge.survivor_before, &merge.absorbed_before}) {
-      take(in, *record);
-      record->confirmed = in.takeFlag();
-    }
   });
 }
 

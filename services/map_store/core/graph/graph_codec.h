@@ -20,7 +20,6 @@ bool isSound(const mapping::LevelPose& pose);
 bool isSound(const mapping::Anchor& anchor);
 bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
-bool isSound(const mapping::HungMerge& merge);
 bool isSound(const mapping::View& view);
 
 // The decoders refuse ("graph_malformed") what is cut short, too long, of another version or not
@@ -32,12 +31,9 @@ Result<mapping::Anchor> decodeAnchor(std::span<const std::uint8_t> bytes);
 Bytes encodeEdge(const mapping::Edge& edge);
 Result<mapping::Edge> decodeEdge(std::span<const std::uint8_t> bytes);
 
-/// Of confirmed objects: `confirmed` is not kept and comes back true.
+/// `confirmed` and `gone` are not kept: the first comes back true.
 Bytes encodeRecord(const mapping::ObjectRecord& record);
 Result<mapping::ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes);
-
-Bytes encodeMerge(const mapping::HungMerge& merge);
-Result<mapping::HungMerge> decodeMerge(std::span<const std::uint8_t> bytes);
 
 /// Exact: places and deviations are floats, as they are kept.
 Bytes encodeView(const mapping::View& view);

@@ -29,6 +29,14 @@ Result<void> takeRows(const Connection& connection, std::string_view sql, std::u
   }
 }
 
+/// Tables that came later than the graph.
+Result<bool> hasTable(const Connection& connection, const std::string& name) {
+  const auto count =
+      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
+  if (!count) return tl::unexpected<Reason>(count.error());
+  return *count > 0;
+}
+
 /// Names by their numbers from 0 on; those after a gap cannot be placed.
 Result<void> readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
@@ -88,24 +96,26 @@ Result<void> readRecords(const Connection& connection, SavedGraph& graph) {
                   });
 }
 
-Result<void> readMerges(const Connection& connection, SavedGraph& graph) {
-  const auto there = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'merges'");
+Result<void> readTracks(const Connection& connection, SavedGraph& graph) {
+  const auto there = hasTable(connection, "track_sightings");
   if (!there) return tl::unexpected<Reason>(there.error());
-  if (*there == 0) return {};
-  auto& merges = graph.map.merges;
-  return takeRows(connection, "SELECT absorbed, undo FROM merges ORDER BY absorbed",
+  if (!*there) return {};
+  auto& tracks = graph.map.tracks;
+  return takeRows(connection, "SELECT id, confirmed, gone, record FROM track_sightings ORDER BY id",
                   graph.malformed, [&](const Statement& row) {
-                    auto merge = decodeMerge(row.blob(1));
-                    if (!merge || row.id(0) == 0) return false;
-                    merges.emplace_hint(merges.end(), row.id(0), *std::move(merge));
+                    auto record = decodeRecord(row.blob(3));
+                    if (!record || row.id(0) == 0) return false;
+                    record->confirmed = row.integer(1) != 0;
+                    record->gone = row.integer(2) != 0;
+                    tracks.emplace_hint(tracks.end(), row.id(0), *std::move(record));
                     return true;
                   });
 }
 
 Result<void> readViews(const Connection& connection, SavedGraph& graph) {
-  const auto there = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'views'");
+  const auto there = hasTable(connection, "views");
   if (!there) return tl::unexpected<Reason>(there.error());
-  if (*there == 0) return {};
+  if (!*there) return {};
   auto& views = graph.map.views;
   return takeRows(connection, "SELECT anchor, points FROM views ORDER BY anchor", graph.malformed,
                   [&](const Statement& row) {
@@ -144,11 +154,8 @@ void leaveOutDangling(SavedGraph& graph) {
   });
   graph.malformed += std::erase_if(
       map.records, [&](const auto& each) { return !isKnown(each.second.sighting, map); });
-  graph.malformed += std::erase_if(map.merges, [&](const auto& each) {
-    const mapping::HungMerge& merge = each.second;
-    return !map.edges.contains(merge.loop) || !isKnown(merge.survivor_before.sighting, map) ||
-           !isKnown(merge.absorbed_before.sighting, map);
-  });
+  graph.malformed += std::erase_if(
+      map.tracks, [&](const auto& each) { return !isKnown(each.second.sighting, map); });
   graph.malformed +=
       std::erase_if(map.views, [&](const auto& each) { return !map.anchors.contains(each.first); });
   for (auto& [id, record] : map.records) {
@@ -156,6 +163,9 @@ void leaveOutDangling(SavedGraph& graph) {
     record.earlier.reset();
     graph.shortened.insert(id);
     ++graph.malformed;
+  }
+  for (auto& [id, record] : map.tracks) {
+    if (record.earlier && !isKnown(*record.earlier, map)) record.earlier.reset();
   }
 }
 
@@ -199,12 +209,27 @@ Result<void> readAll(const Connection& connection, SavedGraph& graph) {
   if (done) done = readAnchors(connection, graph);
   if (done) done = readEdges(connection, graph);
   if (done) done = readRecords(connection, graph);
-  if (done) done = readMerges(connection, graph);
+  if (done) done = readTracks(connection, graph);
   if (done) done = readViews(connection, graph);
   return done;
 }
 
 }  // namespace
+
+Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
+  std::set<mapping::SameObject> facts;
+  const auto there = hasTable(connection, "same");
+  if (!there) return tl::unexpected<Reason>(there.error());
+  if (!*there) return facts;
+  std::uint64_t ignored = 0;
+  const auto done = takeRows(connection, "SELECT loop, a, b FROM same", ignored,
+                             [&](const Statement& row) {
+                               facts.insert({row.id(0), row.id(1), row.id(2)});
+                               return true;
+                             });
+  if (!done) return tl::unexpected<Reason>(done.error());
+  return facts;
+}
 
 Result<SavedGraph> readGraph(const Connection& connection) {
   // A savepoint is a transaction of its own where there is none: the tables belong together.
@@ -212,12 +237,18 @@ Result<SavedGraph> readGraph(const Connection& connection) {
   if (!done) return tl::unexpected<Reason>(done.error());
   SavedGraph graph;
   done = readAll(connection, graph);
+  const auto facts = readFacts(connection);
   const auto released = connection.execute("RELEASE graph");
   if (!done) return tl::unexpected<Reason>(done.error());
+  if (!facts) return tl::unexpected<Reason>(facts.error());
   if (!released) return tl::unexpected<Reason>(released.error());
   leaveOutBrokenChains(graph);
   leaveOutDangling(graph);
   holdEachComponent(graph.map);
+  for (mapping::SameObject fact : *facts) {  // of a loop that was left out: it stays for good
+    if (!graph.map.edges.contains(fact.loop)) fact.loop = 0;
+    graph.map.facts.insert(fact);
+  }
   return graph;
 }
 

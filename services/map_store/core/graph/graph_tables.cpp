@@ -10,7 +10,6 @@ namespace perdure::map_store {
 // Blobs are what core/graph/graph_codec.h says, and the columns beside them repeat what they hold,
 // to be asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
 // weight. These have no type: REAL would lose the sign of zero.
-// A merge that hangs on a loop keeps the survivor's belief as it was: world, epoch, belief.
 const char* const kGraphSchema = R"sql(
 CREATE TABLE graph_classes(number INTEGER PRIMARY KEY, name TEXT NOT NULL);
 CREATE TABLE anchors(
@@ -38,10 +37,16 @@ CREATE VIEW objects_in_map AS
 )sql";
 
 const char* const kAddedSchema = R"sql(
-CREATE TABLE IF NOT EXISTS merges(
-  absorbed INTEGER PRIMARY KEY, survivor INTEGER NOT NULL, loop INTEGER NOT NULL,
-  done INTEGER NOT NULL, undo BLOB NOT NULL, world INTEGER, epoch INTEGER, belief BLOB);
 CREATE TABLE IF NOT EXISTS views(anchor INTEGER PRIMARY KEY, points BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS same(
+  loop INTEGER NOT NULL, a INTEGER NOT NULL, b INTEGER NOT NULL, PRIMARY KEY(loop, a, b))
+  WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS track_sightings(
+  id INTEGER PRIMARY KEY, confirmed INTEGER NOT NULL, gone INTEGER NOT NULL, record BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS tracks(
+  id INTEGER PRIMARY KEY, world INTEGER NOT NULL, epoch INTEGER NOT NULL,
+  written INTEGER NOT NULL, gone INTEGER NOT NULL, gone_ns INTEGER, belief BLOB NOT NULL);
+DROP TABLE IF EXISTS merges;
 )sql";
 
 namespace {
@@ -54,10 +59,9 @@ constexpr char kPutPose[] = "REPLACE INTO anchor_poses VALUES(?1, ?2, ?3, ?4, ?5
 constexpr char kPutEdge[] = "REPLACE INTO edges VALUES(?1, ?2, ?3, ?4, ?5, ?6)";
 constexpr char kPutSighting[] =
     "REPLACE INTO sightings VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
-constexpr char kPutMerge[] =
-    "INSERT INTO merges SELECT ?1, ?2, ?3, ?4, ?5, o.world, o.epoch, o.belief "
-    "FROM (SELECT 1) LEFT JOIN objects o ON o.id = ?2 WHERE true "
-    "ON CONFLICT(absorbed) DO UPDATE SET survivor = ?2, loop = ?3, done = ?4, undo = ?5";
+constexpr char kPutTrack[] = "REPLACE INTO track_sightings VALUES(?1, ?2, ?3, ?4)";
+constexpr char kPutFact[] = "REPLACE INTO same VALUES(?1, ?2, ?3)";
+constexpr char kDeleteFact[] = "DELETE FROM same WHERE loop = ?1 AND a = ?2 AND b = ?3";
 constexpr char kPutView[] = "REPLACE INTO views VALUES(?1, ?2)";
 constexpr char kPutClass[] =
     "INSERT INTO graph_classes VALUES(?1, ?2) ON CONFLICT(number) DO UPDATE SET name = ?2 "
@@ -80,7 +84,6 @@ Result<void> runForEach(const Connection& connection, std::string_view sql, cons
 
 using AnchorRow = std::pair<const mapping::AnchorId, mapping::SavedAnchor>;
 using EdgeRow = std::pair<const mapping::EdgeId, mapping::SavedEdge>;
-using MergeRow = std::pair<const ObjectId, mapping::HungMerge>;
 using ViewRow = std::pair<const mapping::AnchorId, mapping::View>;
 using SightingRow = std::pair<const ObjectId, mapping::ObjectRecord>;
 
@@ -116,11 +119,14 @@ void bindSighting(Statement& to, const SightingRow& row) {
   to.bind(10, std::span<const std::uint8_t>(encodeRecord(record)));
 }
 
-void bindMerge(Statement& to, const MergeRow& row) {
-  const mapping::HungMerge& merge = row.second;
-  to.bindId(1, row.first).bindId(2, merge.survivor).bindId(3, merge.loop);
-  to.bind(4, std::int64_t{merge.done});
-  to.bind(5, std::span<const std::uint8_t>(encodeMerge(merge)));
+void bindTrack(Statement& to, const SightingRow& row) {
+  to.bindId(1, row.first).bind(2, std::int64_t{row.second.confirmed});
+  to.bind(3, std::int64_t{row.second.gone});
+  to.bind(4, std::span<const std::uint8_t>(encodeRecord(row.second)));
+}
+
+void bindFact(Statement& to, const mapping::SameObject& fact) {
+  to.bindId(1, fact.loop).bindId(2, fact.a).bindId(3, fact.b);
 }
 
 void bindView(Statement& to, const ViewRow& row) {
@@ -189,8 +195,8 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
     unconfirmed += r.confirmed ? 0 : 1;
     return r.confirmed && isSound(r);
   });
-  const auto merges = soundOnes(changed.merges, refused,
-                                [](const mapping::HungMerge& merge) { return isSound(merge); });
+  const auto tracks = soundOnes(changed.tracks, refused,
+                                [](const mapping::ObjectRecord& record) { return isSound(record); });
   const auto views =
       soundOnes(changed.views, refused, [](const mapping::View& view) { return isSound(view); });
   auto done = putClasses(connection, changed.classes);
@@ -200,11 +206,17 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
   if (done) done = runForEach(connection, kPutPose, anchors, bindPose);
   if (done) done = runForEach(connection, kPutEdge, edges, bindEdge);
   if (done) done = runForEach(connection, kPutSighting, records, bindSighting);
-  if (done) done = deleteFrom(connection, "merges", unsaved.merges_gone, "absorbed");
-  if (done) done = runForEach(connection, kPutMerge, merges, bindMerge);
+  if (done) done = deleteFrom(connection, "track_sightings", unsaved.tracks_gone);
+  if (done) done = runForEach(connection, kPutTrack, tracks, bindTrack);
   if (done) done = runForEach(connection, kPutView, views, bindView);
   if (!done) return tl::unexpected<Reason>(done.error());
   return refused - unconfirmed;
+}
+
+Result<void> writeFacts(const Connection& connection, const mapping::Unsaved& unsaved) {
+  auto done = runForEach(connection, kDeleteFact, unsaved.facts_gone, bindFact);
+  if (done) done = runForEach(connection, kPutFact, unsaved.changed.facts, bindFact);
+  return done;
 }
 
 Result<void> sweepGraph(const Connection& connection) {
@@ -220,7 +232,7 @@ Result<void> sweepGraph(const Connection& connection) {
   if (done) done = deleteOthers(connection, "anchor_poses", map.anchors);
   if (done) done = deleteOthers(connection, "edges", map.edges);
   if (done) done = deleteOthers(connection, "sightings", map.records);
-  if (done) done = deleteOthers(connection, "merges", map.merges, "absorbed");
+  if (done) done = deleteOthers(connection, "track_sightings", map.tracks);
   if (done) done = deleteOthers(connection, "views", map.views, "anchor");
   if (!done) return done;
   const auto written = writeGraph(connection, shortened);

@@ -15,8 +15,8 @@ inline constexpr int kFirstSchemaWithGraph = 3;
 
 /// SQL that makes the tables.
 extern const char* const kGraphSchema;
-/// The same of merges that hang on loops, and of views; where they are there, nothing. The first
-/// maps of schema 3 were made without.
+/// The same of tables that came later: views, and tracks that share an object with others. Does
+/// nothing if they exist.
 extern const char* const kAddedSchema;
 
 /// What a file holds, such that the ends of edges, the anchors of sightings and predecessors of
@@ -34,6 +34,11 @@ Result<SavedGraph> readGraph(const Connection& connection);
 /// Within the caller's transaction. What is not sound (graph_codec.h) is left as it is stored;
 /// returns how many these are. Records of objects that were not confirmed are not written.
 Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Unsaved& unsaved);
+
+/// Which tracks are one object; empty for a map of an older version.
+Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
+/// Within the caller's transaction.
+Result<void> writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
 /// Within the caller's transaction: deletes what readGraph leaves out. A mapper that begins with
 /// what was read gives those ids again.

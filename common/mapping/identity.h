@@ -1,0 +1,59 @@
+// Which tracks are one object. The facts are kept, and the object ids are computed from them: the
+// object id of a track is the lowest id among the tracks that facts connect with it. A fact that
+// rests on a loop closure ends with it; nothing else has to be undone.
+#pragma once
+
+#include <compare>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/mapping/graph/pose_graph.h"
+
+namespace perdure::mapping {
+
+/// Two tracks are one object.
+struct SameObject {
+  EdgeId loop = 0;  ///< by which they were found to be one; 0: by the filter, which is final
+  TrackId a = 0, b = 0;
+  auto operator<=>(const SameObject&) const = default;
+};
+
+/// Two objects became one, or are two again.
+struct MergeOrder {
+  EdgeId loop = 0;
+  ObjectId survivor = 0;  ///< the older one, with the lower id
+  ObjectId absorbed = 0;
+};
+
+class Identity {
+ public:
+  Identity() = default;
+  explicit Identity(std::set<SameObject> facts);
+
+  void add(const SameObject& fact);
+  /// Ends the facts of a loop closure.
+  void endLoop(EdgeId loop);
+  /// Another loop closure takes its place.
+  void replaceLoop(EdgeId loop, EdgeId by);
+
+  ObjectId objectOf(TrackId track) const;
+  /// The tracks of an object that has several, in order; empty for any other.
+  const std::vector<TrackId>& tracksOf(ObjectId object) const;
+  const std::set<SameObject>& facts() const { return facts_; }
+  std::vector<SameObject> factsOf(EdgeId loop) const;
+  /// The objects that have several tracks.
+  const std::map<ObjectId, std::vector<TrackId>>& shared() const { return tracks_of_; }
+  /// Whether a fact names the track.
+  bool isShared(TrackId track) const { return object_of_.contains(track); }
+
+ private:
+  void connect();
+
+  std::set<SameObject> facts_;
+  std::map<TrackId, ObjectId> object_of_;
+  std::map<ObjectId, std::vector<TrackId>> tracks_of_;
+};
+
+}  // namespace perdure::mapping
