@@ -187,6 +187,7 @@ void Mapper::see(const ObjectBelief& belief, const Objects& objects) {
   record.way_m = builder_.way_m();
   record.last_seen = belief.last_seen;
   record.confirmed = record.confirmed || belief.confirmed;
+  record.gone = false;
   record.pose_error = objects.pose_error;
   record.sighting = {anchor.id, std::move(o)};
   state_.put(belief.id, std::move(record));

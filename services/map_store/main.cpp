@@ -64,13 +64,12 @@ void serve(service::Context& context, const map_store::Config& config) {
                         .emptied = [&](const MapTile& key) { (void)tiles.dispose(key); },
                         .header = context.sink(topics::kMapHeader),
                         .reply = context.sink(topics::kMapReply),
-                        .recalled = context.sink(topics::kRecalled),
+                        .near = context.sink(topics::kMapNear),
                         .frame = context.sink(topics::kMapFrame),
                         .event = context.sink(topics::kEvents)});
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
   context.on(topics::kLandmarks, [&](const Landmarks& seen) { node.onLandmarks(seen); });
-  context.on(topics::kEvents, [&](const Event& event) { node.onEvent(event); });
   auto& heard =
       context.needs("objects", "semantic_filter's Health says why, or start semantic_filter");
   context.on(topics::kObjects, [&](const Objects& objects) {

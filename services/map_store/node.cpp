@@ -17,7 +17,6 @@ std::string faultOf(const MapQuery& query) {
   if (query.limit == 0) return "limit is 0; ask for at least one object";
   switch (query.kind) {
     case MapQueryKind::kByRadius:
-    case MapQueryKind::kRecall:
     case MapQueryKind::kGraph:
       if (!query.low.allFinite() || !std::isfinite(query.radius) || query.radius < 0.0) {
         return "a radius query needs a finite centre and a radius of at least 0 m";
@@ -31,12 +30,29 @@ std::string faultOf(const MapQuery& query) {
       return {};
     case MapQueryKind::kByClass:
       return query.class_name.empty() ? "a class query needs the name of a class" : "";
-    default:
+    case MapQueryKind::kById:
+    case MapQueryKind::kAll:
+    case MapQueryKind::kRestore:
       return {};
   }
+  return "kind " + std::to_string(static_cast<int>(query.kind)) +
+         " is not known; what comes near is on map/near, unasked";
 }
 
 namespace {
+
+/// With the ids of tracks in place of those of objects.
+Objects byTrack(Objects objects) {
+  for (ObjectBelief& belief : objects.objects) {
+    belief.id = belief.trackId();
+    belief.track = 0;
+  }
+  return objects;
+}
+
+bool operator==(const EndedTrack& a, const EndedTrack& b) {
+  return a.track == b.track && a.into == b.into && a.time == b.time;
+}
 
 std::string mendOf(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size";
@@ -92,23 +108,37 @@ void Node::onObjects(const Objects& objects) {
     reasons_.add("objects_repeated");
     return;
   }
-  Objects next = objects;
-  if (graph_) {
-    // Where the graph laid what has not been seen since is not a new observation.
-    for (const auto& belief : next.objects) {
-      if (!belief.recalled) laid_.erase(belief.id);
-    }
+  Objects next = byTrack(objects);
+  for (const auto& belief : next.objects) {
+    // A place that the graph gave, and that was not seen since, is not a new observation.
+    if (!belief.recalled) placed_.erase(belief.id);
   }
   std::erase_if(next.objects, [this](const ObjectBelief& b) { return !acceptable(b); });
-  renameSplit(next);
+  takeEnded(next.ended);
   leaveBehind(next);
+  if (!same_filter || newest_->world != next.world) client_since_ = next.stamp.time;
   if (newest_ && !same_filter) previous_ = std::move(newest_);
   // The filter whose ids these are knows the next one; another one may not have been restored yet.
   next_id_ = same_filter ? next.next_id : std::max(next_id_, next.next_id);
   newest_ = std::move(next);
   dirty_ = true;
-  if (!graph_) return;
-  followGraph();
+  if (graph_) followGraph();
+  constexpr double kStep_m = 20.0 / 3.0;  // the filter keeps this much more than it asks for
+  const bool moved = !near_from_W_ || (newest_->T_WB.p - *near_from_W_).norm() > kStep_m;
+  if (moved || !same_filter) sendNear();
+}
+
+/// What was not in the message before.
+void Node::takeEnded(const std::vector<EndedTrack>& ended) {
+  for (const EndedTrack& each : ended) {
+    if (newest_ && std::find(newest_->ended.begin(), newest_->ended.end(), each) !=
+                       newest_->ended.end()) {
+      continue;
+    }
+    const bool merged = each.into != 0;
+    merged ? mapper_.onMerged(each.into, each.track) : mapper_.onGone(each.track);
+    removed_[each.track] = {merged ? EventKind::kMerged : EventKind::kGone, each.time, each.into};
+  }
 }
 
 /// Confirmed objects that `next` no longer holds: their last belief may not have been written.
@@ -119,25 +149,9 @@ void Node::leaveBehind(const Objects& next) {
   if (!newest_) return;
   for (auto& belief : newest_->objects) {
     if (alive.contains(belief.id)) continue;
-    const bool as_it_was = laid_.erase(belief.id) > 0;  // laid, and left without being seen
+    const bool as_it_was = placed_.erase(belief.id) > 0;  // it left without being seen
     if (belief.confirmed && !as_it_was) left_[belief.id] = {newest_->world, belief};
   }
-}
-
-void Node::onEvent(const Event& event) {
-  if (event.instance == instance_) return;
-  if (graph_ && event.kind == EventKind::kGone) mapper_.onGone(event.object_id);
-  if (graph_ && event.kind == EventKind::kMerged) {
-    mapper_.onMerged(event.object_id, event.other_id);
-  }
-  if (event.kind == EventKind::kGone) {
-    removed_[event.object_id] = {event.kind, event.stamp.time, 0};
-  } else if (event.kind == EventKind::kMerged) {
-    removed_[event.other_id] = {event.kind, event.stamp.time, event.object_id};
-  } else {
-    return;
-  }
-  dirty_ = true;
 }
 
 void Node::tick(Duration now) {
@@ -164,16 +178,18 @@ void Node::commit() {
     dirty_ = false;
     return;
   }
-  const mapping::Unsaved graph = graph_ ? mapper_.unsaved() : mapping::Unsaved();
+  const mapping::Unsaved unsaved = mapper_.unsaved();
   const NewEarth earth = newEarthAnchor();
-  const auto written =
-      database_.write({&*newest_, left_, removed_, laid_, graph_ ? &graph : nullptr,
-                       unwritten_splits_, acknowledged_, earth.text});
+  std::set<TrackId> placed;
+  for (const auto& [track, given] : placed_) placed.insert(track);
+  const auto written = database_.write({&*newest_, left_, removed_, std::move(placed),
+                                        graph_ ? &unsaved : nullptr, &mapper_.identity(), &unsaved,
+                                        mapper_.regrouped(), acknowledged_, earth.text});
   if (!written) {
     blame(written.error());
     return;  // still dirty: it is tried again
   }
-  if (graph_) mapper_.markSaved();
+  mapper_.markSaved();
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);
   if (!earth.text.empty()) told_earth_ = earth.of;
   failure_.clear();
@@ -183,16 +199,15 @@ void Node::commit() {
   kept_ = newest_->stamp.time;
   left_.clear();
   removed_.clear();
-  unwritten_splits_.clear();
   ++commits_;
   header_stale_ = header_stale_ || written->revision != revision_;
   revision_ = written->revision;
   followView(written->objects);
+  sendNear();
 }
 
 void Node::onQuery(const MapQuery& query) {
   if (query.kind == MapQueryKind::kRestore) return restore(query);
-  if (query.kind == MapQueryKind::kRecall && faultOf(query).empty()) return recall(query);
   if (query.kind == MapQueryKind::kGraph) return answerGraph(query);
   if (const MapReply* again = replies_.find(query.client, query.request)) {
     reasons_.add("query_repeated");
@@ -229,64 +244,6 @@ MapReply Node::answer(const MapQuery& query) {
   }
   reply.ok = false;
   return reply;
-}
-
-const Objects* Node::workingSetFor(const MapQuery& query) const {
-  // A filter that published before it asked wants what its predecessor knew.
-  const auto& set = newest_ && newest_->instance == query.client ? previous_ : newest_;
-  if (!set || (query.world.world != 0 && query.world != set->world)) return nullptr;
-  return &*set;
-}
-
-void Node::restore(const MapQuery& query) {
-  Recalled recalled;
-  recalled.instance = instance_;
-  recalled.restore = true;
-  recalled.client = query.client;
-  recalled.world = query.world;
-  recalled.next_id = next_id_;
-  if (const Objects* set = workingSetFor(query)) {
-    recalled.world = set->world;
-    for (const auto& belief : set->objects) {
-      if (!removed_.contains(belief.id)) recalled.objects.push_back(belief);
-    }
-  }
-  reasons_.add("restores");
-  outputs_.recalled(recalled);
-}
-
-/// What the filter has just let go is written first: the answer is about what it has now.
-void Node::recall(const MapQuery& query) {
-  if (dirty_) commit();
-  const auto limit = std::min(query.limit, static_cast<std::uint32_t>(config_.query_limit));
-  auto found = database_.reader().longTermNear(query.low, query.radius, query.world, limit);
-  if (!found) return blame(found.error());
-  if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
-  // A filter that looks for the map of a frame that has ended lays it by itself.
-  const bool by_graph =
-      graph_ && newest_ && query.world == newest_->world && mapper_.follows(query.world);
-  if (by_graph) {
-    constexpr double kAround_m = 10.0;  // places in M and in W differ
-    std::set<ObjectId> as_stored;
-    for (const mapping::Recallable& there : mapper_.near(query.low, query.radius + kAround_m)) {
-      if (!there.T_now) as_stored.insert(there.id);
-    }
-    std::erase_if(found->beliefs, [&](const ObjectBelief& b) {
-      return mapper_.holds(b.id) && !as_stored.contains(b.id);
-    });
-  }
-  Recalled recalled;
-  recalled.instance = instance_;
-  recalled.world = query.world;
-  recalled.client = query.client;
-  recalled.next_id = next_id_;
-  recalled.objects = std::move(found->beliefs);
-  recalled.request = query.request;
-  recalled.graph = by_graph;
-  if (kept_of_ == query.client) recalled.kept = kept_;
-  recalled.truncated = found->truncated;
-  outputs_.recalled(recalled);
-  if (by_graph) recallLaid(query.low, query.radius, {}, false);
 }
 
 void Node::blame(const Reason& reason) {

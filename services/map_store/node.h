@@ -36,7 +36,7 @@ struct Outputs {
   Sink<MapTile> emptied;  ///< a key to dispose of
   Sink<MapHeader> header;
   Sink<MapReply> reply;
-  Sink<Recalled> recalled;
+  Sink<MapNear> near;
   Sink<MapFrame> frame = [](const MapFrame&) {};
   Sink<Event> event = [](const Event&) {};  ///< of the graph
 };
@@ -49,7 +49,6 @@ class Node {
   Node& operator=(const Node&) = delete;
 
   void onObjects(const Objects& objects);
-  void onEvent(const Event& event);
   void onOdometry(const Odometry& odometry);
   /// What it says of the vehicle's place on Earth is kept with the map.
   void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
@@ -74,22 +73,16 @@ class Node {
   // In node_graph.cpp.
   void loadGraph();
   void followGraph();
-  void tellLoops(const mapping::MapChange& change);
-  void tellFrame();
-  void tellWithdrawals(const mapping::MapChange& change);
-  void split(const std::vector<MergeOrder>& splits);
-  void renameSplit(Objects& objects);
-  void resendOrders();
+  void reportLoops(const mapping::MapChange& change);
+  void reportFrame();
+  void reportWithdrawals(const mapping::MapChange& change);
   struct NewEarth {
     std::string text;  ///< empty: as it is stored
     std::pair<std::uint64_t, TimePoint> of{};
   };
   NewEarth newEarthAnchor();
-  /// Sends what the graph has laid near a place, with what else has changed.
-  void recallLaid(const Eigen::Vector3d& centre_W, double radius_m,
-                  const mapping::MapChange& change, bool lay_again);
-  std::optional<ObjectBelief> laidNow(const mapping::Recallable& there);
 
+  void takeEnded(const std::vector<EndedTrack>& ended);
   void leaveBehind(const Objects& next);
   bool acceptable(const ObjectBelief& belief);
   void commit();
@@ -103,9 +96,16 @@ class Node {
   bool publishSquare(const Square& square, const std::vector<ObjectId>& ids);
   Result<Found> find(const MapQuery& query);
 
+  // In node_near.cpp.
+  void sendNear();
   void restore(const MapQuery& query);
-  void recall(const MapQuery& query);
   const Objects* workingSetFor(const MapQuery& query) const;
+  MapNear nearNow();
+  MapNear blankNear(InstanceId client, const WorldId& world) const;
+  void putNearByGraph(MapNear& near);
+  void putNearAsStored(MapNear& near);
+  void give(const mapping::Recallable& there, MapNear& near);
+  void publish(MapNear near);
   void blame(const Reason& reason);
 
   const Config config_;
@@ -124,22 +124,32 @@ class Node {
   std::uint64_t view_revision_ = 0;  ///< of the graph
   std::size_t view_anchors_ = 0;
   std::map<Square, std::vector<ObjectId>> stale_squares_;  ///< to be published
-  std::optional<Objects> newest_;                          ///< as received, or as loaded
+  std::optional<Objects> newest_;    ///< as received, or as loaded, by the ids of tracks
   std::optional<Objects> previous_;  ///< the last one of the filter before this one
-  std::map<ObjectId, PlacedBelief> left_;
-  std::map<ObjectId, Removal> removed_;
-  std::set<ObjectId> laid_;  ///< by the graph, and not seen since
-  std::vector<MergeOrder> unwritten_splits_;
-  std::map<ObjectId, ObjectId> splits_;  ///< that the filter has not obeyed: survivors by absorbed
-  std::optional<TimePoint> orders_sent_;
-  bool adopts_merges_ = true;  ///< the filter may have merged while nobody heard it
-  struct ToldFrame {
+  TimePoint client_since_;           ///< of the first one of this filter in this W
+  std::map<TrackId, PlacedBelief> left_;
+  std::map<TrackId, Removal> removed_;
+  struct Given {
+    std::uint64_t graph = 0;  ///< revision by which it was placed
+    std::uint64_t near = 0;   ///< revision of the message
+  };
+  std::map<TrackId, Given> placed_;  ///< given to the filter, and not detected since
+  struct Join {
+    TrackId seen = 0;
+    std::uint64_t near = 0;  ///< revision of the first message that gave it; 0: none yet
+  };
+  /// By a known track: the track that was seen as new, with which the filter is to fuse it.
+  std::map<TrackId, Join> joins_;
+  std::uint64_t near_revision_ = 0;
+  std::optional<MapNear> near_;                ///< as sent last
+  std::optional<Eigen::Vector3d> near_from_W_;  ///< where the body was then
+  struct ReportedFrame {
     WorldId world;
     std::uint64_t revision = 0;
     std::size_t anchors = 0;
-    bool operator==(const ToldFrame&) const = default;
+    bool operator==(const ReportedFrame&) const = default;
   };
-  std::optional<ToldFrame> told_frame_;
+  std::optional<ReportedFrame> reported_frame_;
   std::deque<mapping::LoopWithdrawal> withdrawn_;  ///< the newest, for who asks for the graph
   ObjectId next_id_ = 1;
   InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk

@@ -40,7 +40,7 @@ void Node::publish() {
     stale_squares_.erase(square);
   }
   header_stale_ = false;
-  if (graph_) tellFrame();
+  if (graph_) reportFrame();
   outputs_.header({instance_, revision_, config_.tile_size_m, tiles_.tiles(), tiles_.objects()});
 }
 

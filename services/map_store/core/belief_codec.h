@@ -11,8 +11,8 @@
 namespace perdure::map_store {
 
 /// The first two bytes of every blob. A reader refuses versions that it does not know. 1 has no
-/// ledger.
-inline constexpr std::uint16_t kBeliefFormat = 2;
+/// ledger, 2 no pose error in the header.
+inline constexpr std::uint16_t kBeliefFormat = 3;
 
 Bytes encodeBelief(const ObjectBelief& belief);
 /// Refuses ("belief_malformed") what is cut short, too long, of another version or without class.

@@ -1,0 +1,193 @@
+// What the map knows of the surroundings of the body, for the filter: the state on `map/near`.
+#include <algorithm>
+#include <utility>
+
+#include "common/mapping/frames/laid_belief.h"
+#include "services/map_store/node.h"
+
+namespace perdure::map_store {
+namespace {
+
+/// Clocks of sessions do not compare.
+ObjectBelief notLaterThan(TimePoint now, ObjectBelief belief) {
+  belief.last_seen = std::min(belief.last_seen, now);
+  belief.first_seen = std::min(belief.first_seen, belief.last_seen);
+  belief.as_of = std::min(belief.as_of, now);
+  return belief;
+}
+
+std::uint64_t digestOf(const std::vector<ObjectBelief>& beliefs) {
+  std::string bytes;
+  for (const ObjectBelief& belief : beliefs) {
+    const Bytes each = encodeBelief(belief);
+    bytes.append(each.begin(), each.end());
+  }
+  return digest(bytes);
+}
+
+bool sameMembers(const std::vector<Member>& a, const std::vector<Member>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Member& x, const Member& y) {
+    return x.track == y.track && x.object == y.object;
+  });
+}
+
+/// But for the stamp, the revision and the next id.
+bool sameContent(const MapNear& a, const MapNear& b) {
+  return a.client == b.client && a.world == b.world && a.kept == b.kept &&
+         a.corrects_drift == b.corrects_drift && a.more == b.more &&
+         sameMembers(a.members, b.members) && digestOf(a.placed) == digestOf(b.placed) &&
+         digestOf(a.as_published) == digestOf(b.as_published);
+}
+
+}  // namespace
+
+MapNear Node::blankNear(InstanceId client, const WorldId& world) const {
+  MapNear near;
+  if (newest_) near.stamp = newest_->stamp;
+  near.instance = instance_;
+  near.client = client;
+  near.world = world;
+  near.next_id = next_id_;
+  if (kept_of_ == client) near.kept = kept_;
+  return near;
+}
+
+void Node::sendNear() {
+  if (!newest_) return;
+  near_from_W_ = newest_->T_WB.p;
+  publish(nearNow());
+}
+
+/// Gives each track its object, and sends the message unless it says what the last one said.
+void Node::publish(MapNear near) {
+  const mapping::Identity& identity = mapper_.identity();
+  const auto addMember = [&](TrackId track) {
+    if (identity.objectOf(track) != track) near.members.push_back({track, identity.objectOf(track)});
+  };
+  if (newest_ && newest_->instance == near.client) {
+    for (const ObjectBelief& belief : newest_->objects) addMember(belief.id);
+  }
+  for (auto* list : {&near.placed, &near.as_published}) {
+    for (ObjectBelief& belief : *list) {
+      belief.track = belief.id;
+      belief.id = identity.objectOf(belief.track);
+      addMember(belief.track);
+    }
+  }
+  if (near_ && sameContent(near, *near_)) return;
+  near.revision = ++near_revision_;
+  outputs_.near(near);
+  near_ = std::move(near);
+}
+
+MapNear Node::nearNow() {
+  MapNear near = blankNear(newest_->instance, newest_->world);
+  near.corrects_drift = graph_ && mapper_.follows(newest_->world);
+  if (newest_->near_m > 0.0) near.corrects_drift ? putNearByGraph(near) : putNearAsStored(near);
+  const auto most = static_cast<std::size_t>(config_.query_limit);
+  for (auto* list : {&near.placed, &near.as_published}) {
+    near.more = near.more || list->size() > most;
+    if (list->size() > most) list->resize(most);
+  }
+  return near;
+}
+
+/// Objects that are not in the working set, those there that are placed differently now, and known
+/// tracks that a loop has shown to be objects of the working set.
+void Node::putNearByGraph(MapNear& near) {
+  std::map<TrackId, bool> working;  // recalled
+  std::set<ObjectId> present;
+  for (const ObjectBelief& belief : newest_->objects) {
+    working[belief.id] = belief.recalled;
+    present.insert(mapper_.identity().objectOf(belief.id));
+  }
+  const bool heard = newest_->near_source == instance_;
+  const auto isTaken = [&](std::uint64_t revision) {
+    return revision > 0 && heard && newest_->near_revision >= revision;
+  };
+  for (const mapping::Recallable& there : mapper_.near(newest_->T_WB.p, newest_->near_m)) {
+    const auto in = working.find(there.track);
+    if (in == working.end() && present.contains(there.id)) continue;
+    if (in != working.end()) {
+      const auto given = placed_.find(there.track);
+      if (!in->second || given == placed_.end() || !there.T_now) continue;
+      if (given->second.graph == mapper_.revision() && isTaken(given->second.near)) continue;
+    }
+    give(there, near);
+  }
+  std::erase_if(joins_, [&](const auto& join) {
+    return isTaken(join.second.near) || working.contains(join.first) ||
+           !working.contains(join.second.seen);
+  });
+  for (auto& [known, join] : joins_) {
+    if (join.near == 0) join.near = near_revision_ + 1;
+    if (const auto there = mapper_.placeOf(known)) give(*there, near);
+  }
+}
+
+/// Without a graph that receives this odometry all of W is taken as it was.
+void Node::putNearAsStored(MapNear& near) {
+  std::set<ObjectId> present;
+  for (const ObjectBelief& belief : newest_->objects) {
+    present.insert(mapper_.identity().objectOf(belief.id));
+  }
+  const auto limit = static_cast<std::uint32_t>(config_.query_limit);
+  auto found =
+      database_.reader().inFullNear(newest_->T_WB.p, newest_->near_m, newest_->world, limit);
+  if (!found) return blame(found.error());
+  if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
+  near.more = found->truncated;
+  for (ObjectBelief& belief : found->beliefs) {
+    if (present.contains(belief.id) || removed_.contains(belief.id) || belief.moving > 0.5) continue;
+    if (belief.last_seen >= client_since_) {
+      near.as_published.push_back(std::move(belief));
+      continue;
+    }
+    placed_[belief.id] = {mapper_.revision(), near_revision_ + 1};
+    for (ClassBelief& c : belief.classes) c.cross_pose.setZero();
+    near.placed.push_back(notLaterThan(newest_->stamp.time, std::move(belief)));
+  }
+}
+
+void Node::give(const mapping::Recallable& there, MapNear& near) {
+  auto stored = database_.reader().beliefOf(there.track);
+  if (!stored) return blame(stored.error());
+  if (!*stored || (*stored)->belief.moving > 0.5 || removed_.contains(there.track)) return;
+  ObjectBelief belief = std::move((*stored)->belief);
+  belief.id = there.track;
+  if (!there.T_now && belief.last_seen >= client_since_) {
+    near.as_published.push_back(std::move(belief));
+    return;
+  }
+  belief = mapping::relativeToBody(std::move(belief), there.pose_error);
+  if (there.T_now) belief = mapping::turned(*there.T_now, std::move(belief));
+  belief = mapping::withFrameError(std::move(belief), there.covariance, there.about_W);
+  placed_[there.track] = {mapper_.revision(), near_revision_ + 1};
+  near.placed.push_back(notLaterThan(newest_->stamp.time, std::move(belief)));
+}
+
+const Objects* Node::workingSetFor(const MapQuery& query) const {
+  // A filter that published before it asked wants what its predecessor knew.
+  const auto& set = newest_ && newest_->instance == query.client ? previous_ : newest_;
+  if (!set || (query.world.world != 0 && query.world != set->world)) return nullptr;
+  return &*set;
+}
+
+/// The whole working set of the filter before, unconfirmed and moving tracks too, relative to the
+/// body: the pose error of the new process begins at zero.
+void Node::restore(const MapQuery& query) {
+  MapNear near = blankNear(query.client, query.world);
+  if (const Objects* set = workingSetFor(query)) {
+    near.world = set->world;
+    for (const auto& belief : set->objects) {
+      if (removed_.contains(belief.id)) continue;
+      near.placed.push_back(mapping::relativeToBody(belief, set->pose_error));
+      placed_[belief.id] = {mapper_.revision(), near_revision_ + 1};
+    }
+  }
+  reasons_.add("restores");
+  near_.reset();  // an answer is sent again
+  publish(std::move(near));
+}
+
+}  // namespace perdure::map_store
