@@ -90,6 +90,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
   }
   if (next_id_ > 1) next_id_ += kIdReserve;
   if (config_.graph) loadGraph();
+  if (!graph_) loadFacts();
   earth_stored_ = graph_ && !database_.reader().earthAnchor().value_or("").empty();
   (void)loadView();
 }

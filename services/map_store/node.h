@@ -72,6 +72,7 @@ class Node {
  private:
   // In node_graph.cpp.
   void loadGraph();
+  void loadFacts();
   void followGraph();
   void reportLoops(const mapping::MapChange& change);
   void reportFrame();

@@ -48,6 +48,15 @@ void Node::loadGraph() {
   }
 }
 
+/// Object ids without a graph.
+void Node::loadFacts() {
+  auto facts = database_.reader().facts();
+  if (!facts) return blame(facts.error());
+  mapping::SavedMap map;
+  map.facts = *std::move(facts);
+  mapper_ = mapping::Mapper(config_.mapping, std::move(map));
+}
+
 void Node::onOdometry(const Odometry& odometry) {
   earth_.onOdometry(odometry);
   if (graph_) mapper_.onOdometry(odometry);

@@ -73,78 +73,92 @@ void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Even
   known.class_name = o.best().name;
 }
 
-void EventTracker::renamed(ObjectId from, ObjectId to) {
-  auto node = known_.extract(from);
-  if (node.empty()) return;
-  node.key() = to;
-  known_.insert(std::move(node));
+void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Event& blank,
+                         Changes& changes) {
+  const auto it = known_.find(m.absorbed);
+  if (it == known_.end()) return;  // initiated and merged within one frame: never published
+  if (m.by_map) {
+    known_.erase(it);
+    return;
+  }
+  const auto survivor =
+      std::find_if(objects.objects.begin(), objects.objects.end(),
+                   [&](const ObjectBelief& o) { return o.trackId() == m.survivor; });
+  Event e = blank;
+  e.kind = EventKind::kMerged;
+  e.object_id = survivor == objects.objects.end() ? m.survivor : survivor->id;
+  e.other_id = it->second.id;
+  e.class_name = it->second.class_name;
+  e.probability = 1.0;
+  changes.events.push_back(e);
+  if (it->second.ever_confirmed) {
+    changes.ended.push_back({m.absorbed, m.survivor, objects.stamp.time});
+  }
+  e.other_id = 0;
+  if (m.moved) {
+    e.kind = EventKind::kMoved;
+    changes.events.push_back(e);
+    known_[m.survivor].moving = true;  // a moving object gives no second event
+  }
+  if (m.returned) {
+    e.kind = EventKind::kReappeared;
+    changes.events.push_back(e);
+    known_[m.survivor] = it->second;
+    known_[m.survivor].id = e.object_id;
+  }
+  known_.erase(it);
 }
 
-std::vector<Event> EventTracker::update(const Objects& objects,
-                                        const std::vector<MergeRecord>& merges) {
+EventTracker::Changes EventTracker::update(const Objects& objects,
+                                           const std::vector<MergeRecord>& merges) {
   Event blank;
   blank.stamp = objects.stamp;
   blank.instance = objects.instance;
   blank.world = objects.world;
-  std::vector<Event> events;
-  for (const auto& m : merges) {
-    const auto it = known_.find(m.absorbed);
-    if (it == known_.end()) continue;  // initiated and merged within one frame: never published
-    Event e = blank;
-    e.kind = EventKind::kMerged;
-    e.object_id = m.survivor;
-    e.other_id = m.absorbed;
-    e.class_name = it->second.class_name;
-    e.probability = 1.0;
-    events.push_back(e);
-    if (m.moved) {
-      e.kind = EventKind::kMoved;
-      e.other_id = 0;
-      events.push_back(e);
-      known_[m.survivor].moving = true;  // a moving object gives no second event
-    }
-    if (m.returned) {
-      e.kind = EventKind::kReappeared;
-      e.other_id = 0;
-      events.push_back(e);
-      known_[m.survivor] = it->second;
-    }
-    known_.erase(it);
-  }
-  ScratchVector<ObjectId> present;
+  Changes changes;
+  std::vector<Event>& events = changes.events;
+  for (const auto& m : merges) merge(m, objects, blank, changes);
+  ScratchVector<TrackId> present;
   for (const auto& o : objects.objects) {
-    present.push_back(o.id);
-    const auto [it, fresh] = known_.try_emplace(o.id);
+    present.push_back(o.trackId());
+    const auto [it, fresh] = known_.try_emplace(o.trackId());
+    Known& known = it->second;
     if (fresh) {
-      const auto back = recalled_.find(o.id);
+      const auto back = recalled_.find(o.trackId());
       const EventKind kind = back == recalled_.end() ? EventKind::kBorn
                              : back->second          ? EventKind::kRestored
                                                      : EventKind::kRecalled;
       events.push_back(make(blank, kind, o, o.existence));
       if (back != recalled_.end()) {
-        it->second = comeBack(o);
+        known = comeBack(o);
         recalled_.erase(back);
       }
+    } else if (o.id < known.id) {  // the map holds it to be an older object
+      events.push_back(make(blank, EventKind::kMerged, o, 1.0));
+      events.back().other_id = known.id;
     }
-    compare(o, it->second, events, blank);
+    known.id = o.id;
+    compare(o, known, events, blank);
   }
   std::sort(present.begin(), present.end());
   for (auto it = known_.begin(); it != known_.end();) {
-    if (std::binary_search(present.begin(), present.end(), it->first)) {
+    const auto& [track, known] = *it;
+    if (std::binary_search(present.begin(), present.end(), track)) {
       ++it;
       continue;
     }
-    if (const bool kept = archived_.contains(it->first); kept || it->second.ever_confirmed) {
+    if (const bool kept = archived_.contains(track); kept || known.ever_confirmed) {
       Event e = blank;
       e.kind = kept ? EventKind::kArchived : EventKind::kGone;
-      e.object_id = it->first;
-      e.class_name = it->second.class_name;
+      e.object_id = known.id;
+      e.class_name = known.class_name;
       events.push_back(e);
+      if (!kept) changes.ended.push_back({track, 0, objects.stamp.time});
     }
     it = known_.erase(it);
   }
   archived_.clear();
-  return events;
+  return changes;
 }
 
 }  // namespace perdure::semantic_filter

@@ -14,14 +14,16 @@ namespace perdure::semantic_filter {
 
 class EventTracker {
  public:
-  /// An object goes on under another id.
-  void renamed(ObjectId from, ObjectId to);
-  /// Returns the events since the last call, ordered by object id. `merges`: those since then.
-  std::vector<Event> update(const Objects& objects, const std::vector<MergeRecord>& merges);
-  /// An object was recalled with this id. The next update makes its event.
-  void recalled(ObjectId id, bool restored) { recalled_[id] = restored; }
-  /// An object is archived from now on. The next update makes its event.
-  void archived(ObjectId id) { archived_.insert(id); }
+  struct Changes {
+    std::vector<Event> events;      ///< ordered by track
+    std::vector<EndedTrack> ended;  ///< confirmed tracks
+  };
+  /// Returns what has changed since the last call. `merges`: those since then.
+  Changes update(const Objects& objects, const std::vector<MergeRecord>& merges);
+  /// The track comes from the map. The next update that has it makes the event.
+  void recalled(TrackId id, bool restored) { recalled_[id] = restored; }
+  /// The track is archived from now on. The next update makes its event.
+  void archived(TrackId id) { archived_.insert(id); }
   void clear();
 
  private:
@@ -29,17 +31,20 @@ class EventTracker {
     bool confirmed = false, resolved = false, missing = false, moving = false;
     bool hidden = false;  ///< not visible, and not detected since
     std::uint32_t hits = 0;
+    ObjectId id = 0;  ///< as published
     bool static_once = false, ever_confirmed = false;
     std::string class_name;
   };
 
   static Known comeBack(const ObjectBelief& object);
+  void merge(const MergeRecord& merge, const Objects& objects, const Event& blank,
+             Changes& changes);
   void compare(const ObjectBelief& object, Known& known, std::vector<Event>& events,
                const Event& blank);
 
-  std::map<ObjectId, Known> known_;
-  std::map<ObjectId, bool> recalled_;  ///< whether it was restored
-  std::set<ObjectId> archived_;
+  std::map<TrackId, Known> known_;
+  std::map<TrackId, bool> recalled_;  ///< whether it was restored
+  std::set<TrackId> archived_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -65,8 +65,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   semantic_filter::Node node(config, semantic_filter::loadPriors(config), context.instance(),
                              {.objects = publish,
                               .events = context.sink(topics::kEvents),
-                              .predictions = context.sink(topics::kPredictions),
-                              .queries = [&](const MapQuery& m) { (void)queries.write(m); }});
+                              .predictions = context.sink(topics::kPredictions)});
   Gate gate;
   ReasonCounts lost;
   bus::Gaps odometry_gaps;
@@ -76,9 +75,9 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
   context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
   context.on(topics::kSwap, [&](const SwapNotice& m) { node.onSwap(m); });
-  context.on(topics::kRecalled, [&](const Recalled& m) {
-    node.onRecalled(m);
-    if (m.restore && m.client == context.instance()) gate.open();
+  context.on(topics::kMapNear, [&](const MapNear& m) {
+    node.onNear(m);
+    if (m.client == context.instance()) gate.open();
   });
   auto& odometry = context.needs("odometry", "vio's Health says why, or start vio");
   context.on(topics::kOdometry, [&](const Odometry& m) {

@@ -51,8 +51,9 @@ void Node::beginWorld(const WorldId& world) {
   events_.clear();
   returns_.clear();
   archive_.clear();
-  if (const auto recalled = std::exchange(waiting_recalled_, std::nullopt)) {
-    if (recalled->world == world) insertRecalled(*recalled);
+  members_.clear();
+  if (const auto near = std::exchange(waiting_near_, std::nullopt)) {
+    if (near->world == world) take(*near, ExistenceEvidence::kRestore);
   }
 }
 
@@ -149,7 +150,7 @@ bool Node::use(Frame& frame, const Detections& detections) {
   for (const auto& detection : detections.detections) {
     if (detection.primed) {
       auto ratios = topDownRatios(detection, *frame.input.model, config_.filter.clutter);
-      if (ratios) frame.input.top_down[detection.primed_for] = *std::move(ratios);
+      if (ratios) frame.input.top_down[trackOf(detection.primed_for)] = *std::move(ratios);
       if (!ratios) reasons_.add("primed_malformed");
       continue;
     }
@@ -207,11 +208,11 @@ void Node::flush() {
   history_.step();
   letGo(history_.newest());
   publish(history_.newest());
-  askTheMap(history_.newest());
 }
 
 void Node::publish(const Frame& frame) {
   const ScratchScope scope;
+  nameObjects();
   Objects& objects = published_;
   objects.stamp = frame.input.stamp;
   objects.instance = instance_;
@@ -220,6 +221,9 @@ void Node::publish(const Frame& frame) {
   objects.up_W = frame.input.view.up_W;
   objects.next_id = history_.ids().next();
   objects.pose_error = frame.input.pose_error.covariance;
+  objects.near_source = near_source_;
+  objects.near_revision = near_revision_;
+  objects.near_m = archive_.nearRadius();
   const MotionParameters& motion = config_.filter.motion;
   const std::vector<Track>& tracks = history_.belief().tracks;
   objects.objects.resize(tracks.size());
@@ -231,15 +235,30 @@ void Node::publish(const Frame& frame) {
       const Track now = extrapolated(object, frame.input.stamp.time, motion);
       belief.classes = toBelief(now, models_.priors(), motion.min_speed).classes;
     }
+    belief.blocked_by = objectOf(belief.blocked_by);
+    if (const ObjectId id = objectOf(object.id); id != object.id) {
+      belief.track = object.id;
+      belief.id = id;
+    }
+  }
+  if (!object_of_.empty()) {
+    std::sort(objects.objects.begin(), objects.objects.end(),
+              [](const ObjectBelief& a, const ObjectBelief& b) { return a.id < b.id; });
   }
   auto merges = history_.takeLateMerges();
   merges.insert(merges.end(), frame.merges.begin(), frame.merges.end());
-  auto events = events_.update(objects, merges);
+  auto [events, ended] = events_.update(objects, merges);
+  keepEnded(ended);
+  objects.ended.assign(ended_.begin(), ended_.end());
   const auto coming = history_.comingAfter(frame);
   Event blank;
   blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
-  const auto returns =
+  auto returns =
       returns_.update(history_.belief().tracks, frame.input, coming, config_.filter, blank);
+  for (Event& event : returns) {
+    event.object_id = objectOf(event.object_id);
+    event.other_id = objectOf(event.other_id);
+  }
   events.insert(events.end(), returns.begin(), returns.end());
   if (outputs_.objects) outputs_.objects(objects);
   for (const auto& event : events) {
@@ -271,7 +290,9 @@ void Node::publishPredictions(const Frame& frame, const std::optional<ComingFram
   predictions.camera = camera_name_;
   for (const auto& object : history_.belief().tracks) {
     auto prediction = predictionOf(object, frame.input, coming);
-    if (prediction) predictions.predictions.push_back(*std::move(prediction));
+    if (!prediction) continue;
+    prediction->object_id = objectOf(prediction->object_id);
+    predictions.predictions.push_back(*std::move(prediction));
   }
   outputs_.predictions(predictions);
 }

@@ -1,5 +1,5 @@
-// The semantic filter as a node: odometry, landmarks, detections and recalled objects in; objects,
-// events and predictions out. Single-threaded; time enters by messages only.
+// The semantic filter as a node: odometry, landmarks, detections and what the map has near in;
+// objects, events and predictions out. Single-threaded; time enters by messages only.
 //
 // What is estimated is core/history's. The node checks messages, waits for detections, and
 // publishes.
@@ -27,7 +27,6 @@ struct Outputs {
   Sink<Objects> objects;  ///< one for each odometry frame, in order
   Sink<Event> events;
   Sink<Predictions> predictions;
-  Sink<MapQuery> queries = {};  ///< to the map, for what comes near
 };
 
 class Node {
@@ -40,7 +39,7 @@ class Node {
   void onOdometry(const Odometry& odometry);
   void onLandmarks(const Landmarks& landmarks);
   void onDetections(const Detections& detections);
-  void onRecalled(const Recalled& recalled);
+  void onNear(const MapNear& near);
   /// Publishes the newest frame even though its detections have not come: the end of the data, or
   /// a tick of a service whose detections have stopped.
   void flush();
@@ -69,15 +68,13 @@ class Node {
   bool isInDoubt(const Frame& frame, const Detections& detections);
   void settleProbation(bool believed);
   // In node_memory.cpp.
-  std::vector<ObjectBelief> soundOf(std::vector<ObjectBelief> beliefs);
-  void insertRecalled(const Recalled& recalled);
-  void restore(const ObjectBelief& belief);
-  void recall(const ObjectBelief& belief);
-  void insertLaid(const Recalled& recalled);
-  bool isNear(const ObjectBelief& belief) const;
   void letGo(const Frame& frame);
-  void askTheMap(const Frame& frame);
-  void ask(const Archive::Question& question, const WorldId& world);
+  void take(const MapNear& near, ExistenceEvidence evidence);
+  Arrivals arrivalsOf(const MapNear& near, ExistenceEvidence evidence);
+  void nameObjects();
+  ObjectId objectOf(TrackId track) const;
+  TrackId trackOf(ObjectId object) const;
+  void keepEnded(const std::vector<EndedTrack>& ended);
 
   Config config_;
   InstanceId instance_;
@@ -90,7 +87,13 @@ class Node {
   Probation probation_;
   std::optional<WorldId> world_;
   std::deque<Detections> early_;
-  std::optional<Recalled> waiting_recalled_;
+  std::optional<MapNear> waiting_near_;  ///< came before the first odometry
+  InstanceId near_source_ = 0;           ///< of the newest message that was used
+  std::uint64_t near_revision_ = 0;
+  std::map<TrackId, ObjectId> members_;    ///< as the map says
+  std::map<TrackId, ObjectId> object_of_;  ///< as published; tracks with their own id are left out
+  std::map<ObjectId, TrackId> track_of_;
+  std::deque<EndedTrack> ended_;
   Objects published_;  ///< the newest message, whose memory the next one takes
   EventTracker events_;
   ReappearanceMonitor returns_;

@@ -9,8 +9,8 @@ namespace perdure::tests {
 namespace {
 
 /// Bottom to top: a folder uses only itself and those before it.
-constexpr std::array kCommon{"base",   "math", "types", "camera", "mapping", "sim",    "config",
-                             "vision", "wire", "ros",   "bus",    "replay",  "service"};
+constexpr std::array kCommon{"base",   "math",   "types", "earth", "camera", "mapping", "sim",
+                             "config", "vision", "wire",  "ros",   "bus",    "replay",  "service"};
 
 /// Folders with layers of their own: their sub-folders from bottom to top; "" is the folder itself.
 struct Layers {

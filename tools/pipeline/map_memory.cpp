@@ -20,7 +20,7 @@ map_store::Outputs outputsTo(MapMemory::Sinks sinks) {
   outputs.tile = outputs.emptied = [](const MapTile&) {};
   outputs.header = [](const MapHeader&) {};
   outputs.reply = std::move(sinks.replies);
-  outputs.recalled = std::move(sinks.recalled);
+  outputs.near = std::move(sinks.near);
   outputs.frame = std::move(sinks.frames);
   outputs.event = std::move(sinks.events);
   return outputs;
@@ -80,10 +80,6 @@ void MapMemory::onObjects(const Objects& objects) {
     node_.onObjects(objects);
     node_.tick(objects.stamp.time.time_since_epoch());
   });
-}
-
-void MapMemory::onEvent(const Event& event) {
-  waiting_.push_back([this, event] { node_.onEvent(event); });
 }
 
 void MapMemory::onQuery(const MapQuery& query) {

@@ -20,7 +20,7 @@ class MapMemory {
   static void copy(const std::filesystem::path& from, const std::filesystem::path& file);
 
   struct Sinks {
-    Sink<Recalled> recalled;  ///< for the filter
+    Sink<MapNear> near;  ///< for the filter
     Sink<Event> events;       ///< what the map's graph has found
     Sink<MapFrame> frames;
     Sink<MapReply> replies;
@@ -35,7 +35,6 @@ class MapMemory {
   void onOdometry(const Odometry& odometry);
   void onLandmarks(const Landmarks& landmarks);
   void onObjects(const Objects& objects);
-  void onEvent(const Event& event);
   void onQuery(const MapQuery& query);
   /// Does what has come, in order: not while the filter is at work, since answers go to it.
   void work();

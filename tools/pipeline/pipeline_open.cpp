@@ -93,10 +93,6 @@ void Pipeline::openFilter() {
   sinks.events = [this](const Event& event) {
     keep("events", event, event.stamp.time);
     timer_.timeTowardsNext("outputs", [&] { outputs_->onEvent(event); });
-    timer_.timeTowardsNext("map_store", [&] { map_->onEvent(event); });
-  };
-  sinks.queries = [this](const MapQuery& query) {
-    timer_.timeTowardsNext("map_store", [&] { map_->onQuery(query); });
   };
   sinks.predictions = [this](const Predictions& predictions) { expected_ = predictions; };
   filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors,
@@ -105,7 +101,7 @@ void Pipeline::openFilter() {
   options_.map.empty() ? MapMemory::clear(file) : MapMemory::copy(options_.map, file);
   map_ = std::make_unique<MapMemory>(
       configs_.map_store, file, instanceOf(kMapStore),
-      MapMemory::Sinks{.recalled = [this](const Recalled& m) { filter_->onRecalled(m); },
+      MapMemory::Sinks{.near = [this](const MapNear& m) { filter_->onNear(m); },
                        .events =
                            [this](const Event& event) {
                              keep("events", event, event.stamp.time);

@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 /// What is said by one process to another one that is not there any more, and who was how.
-const std::set<std::string> kNotByItself{"health", "map/query", "map/reply", "recalled"};
+const std::set<std::string> kNotByItself{"health", "map/query", "map/near", "map/reply"};
 
 const std::map<std::string, std::set<std::string>> kInputs{
     {"vio", {"calibration", "imu", "speed", "frame/"}},

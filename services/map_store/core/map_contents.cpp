@@ -131,7 +131,13 @@ Result<void> readWhole(const Connection& connection, WholeMap& map) {
   if (!graph) return tl::unexpected<Reason>(graph.error());
   map.malformed += graph->malformed;
   map.contents.graph = std::move(graph->map);
-  map.contents.graph.merges.clear();  // what is united is not undone
+  // What is united is not parted: each object goes on as one track.
+  map.contents.graph.tracks.clear();
+  map.contents.graph.facts.clear();
+  for (auto& [id, record] : map.contents.graph.records) {
+    record.sighting.in_anchor.id = id;
+    if (record.earlier) record.earlier->in_anchor.id = id;
+  }
   auto done = readObjects(connection, map);
   if (done) done = readProvenance(connection, map.contents);
   if (done) done = readChanges(connection, map.contents);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/check.h"
 #include "services/semantic_filter/core/association/joint_association.h"
 #include "services/semantic_filter/core/association/occlusion_revision.h"
 #include "services/semantic_filter/core/association/top_down.h"
@@ -165,20 +166,19 @@ void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput&
   }
 }
 
-std::optional<MergeRecord> SemanticFilter::join(Belief& belief, ObjectId id, ObjectId absorbed,
-                                                const FrameInput& input) const {
-  const auto find = [&](ObjectId wanted) {
+bool SemanticFilter::join(Belief& belief, TrackId id, TrackId absorbed,
+                          const FrameInput& input) const {
+  const auto find = [&](TrackId wanted) {
     return std::find_if(belief.tracks.begin(), belief.tracks.end(),
                         [&](const Track& o) { return o.id == wanted; });
   };
   const auto kept = find(id), other = find(absorbed);
-  if (kept == belief.tracks.end() || other == belief.tracks.end() || kept == other) {
-    return std::nullopt;
-  }
-  if (!sameKind(*kept, *other)) return std::nullopt;
+  check(kept != belief.tracks.end() && other != belief.tracks.end() && kept != other,
+        "two tracks of the working set are joined");
+  if (!sameKind(*kept, *other)) return false;
   mergeTwo(*kept, *other, contextOf(belief, input));
   belief.tracks.erase(other);
-  return MergeRecord{id, absorbed};
+  return true;
 }
 
 FrameInput SemanticFilter::withLearnedNoise(const Belief& belief, FrameInput input) const {

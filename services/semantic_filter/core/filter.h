@@ -26,10 +26,9 @@ class SemanticFilter {
 
   /// Makes the belief before a frame the one after it.
   StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
-  /// Of two tracks that are known to be one, `id` goes on with what both knew, as of that frame.
-  /// Nothing happens where one of them is not there, or their classes exclude each other.
-  std::optional<MergeRecord> join(Belief& belief, ObjectId id, ObjectId absorbed,
-                                  const FrameInput& input) const;
+  /// Fuses two tracks of one object as of that frame; `id` goes on. Returns false and does nothing
+  /// if their classes exclude each other. Both must exist.
+  bool join(Belief& belief, TrackId id, TrackId absorbed, const FrameInput& input) const;
 
   const Parameters& parameters() const { return parameters_; }
   const ClassPriors& priors() const { return priors_; }

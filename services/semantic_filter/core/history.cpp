@@ -19,6 +19,7 @@ void History::beginWorld() {
   frames_.clear();
   pose_error_ = {};
   last_T_WB_.reset();
+  arrivals_.reset();
 }
 
 HistoryFrame& History::add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera) {
@@ -39,15 +40,20 @@ HistoryFrame& History::add(const Odometry& odometry, std::shared_ptr<const Camer
   return frames_.back();
 }
 
-void History::step() { step(frames_.back()); }
+void History::step() {
+  frames_.back().arrivals = std::exchange(arrivals_, nullptr);
+  step(frames_.back());
+}
 
 void History::step(HistoryFrame& frame) {
   if (frame.before.tracks.empty()) frame.before = std::exchange(spare_, {});
   const std::size_t n = belief_.tracks.size();
   if (frame.before.tracks.capacity() < n) frame.before.tracks.reserve(n + n / 4);
   frame.before = belief_;
-  StepReport report = filter_.step(belief_, frame.input, ids_);
-  frame.merges = std::move(report.merges);
+  frame.merges.clear();
+  if (frame.arrivals) frame.merges = takeIn(*frame.arrivals, belief_, frame.input, filter_);
+  const StepReport report = filter_.step(belief_, frame.input, ids_);
+  frame.merges.insert(frame.merges.end(), report.merges.begin(), report.merges.end());
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);
   frame.stepped = true;
 }
@@ -60,51 +66,12 @@ void History::stepAgainFrom(std::size_t index) {
   }
 }
 
-void History::insert(const Track& track) {
-  const auto into = [&](Belief& b) {
-    const auto at = std::find_if(b.tracks.begin(), b.tracks.end(),
-                                 [&](const Track& t) { return t.id > track.id; });
-    b.tracks.insert(at, track);
-  };
-  into(belief_);
-  for (HistoryFrame& f : frames_) into(f.before);
-}
-
-void History::erase(const std::set<ObjectId>& ids) {
+void History::erase(const std::set<TrackId>& ids) {
   const auto from = [&](std::vector<Track>& tracks) {
     std::erase_if(tracks, [&](const Track& t) { return ids.contains(t.id); });
   };
   from(belief_.tracks);
   for (HistoryFrame& f : frames_) from(f.before.tracks);
-}
-
-void History::join(ObjectId id, ObjectId absorbed, const FrameInput& input) {
-  if (const auto merge = filter_.join(belief_, id, absorbed, input)) {
-    late_merges_.push_back(*merge);
-  }
-  for (HistoryFrame& f : frames_) (void)filter_.join(f.before, id, absorbed, f.input);
-}
-
-bool History::split(ObjectId id, ObjectId absorbed) {
-  const auto rename = [&](std::vector<Track>& tracks) {
-    const auto find = [&](ObjectId wanted) {
-      return std::find_if(tracks.begin(), tracks.end(),
-                          [&](const Track& o) { return o.id == wanted; });
-    };
-    const auto joined = find(id);
-    if (joined == tracks.end()) return false;
-    const bool is_seen = !joined->life.recalled && find(absorbed) == tracks.end();
-    if (!is_seen) {  // before the join, or laid and not seen since
-      tracks.erase(joined);
-      return false;
-    }
-    joined->id = absorbed;
-    std::sort(tracks.begin(), tracks.end(),
-              [](const Track& a, const Track& b) { return a.id < b.id; });
-    return true;
-  };
-  for (HistoryFrame& f : frames_) (void)rename(f.before.tracks);
-  return rename(belief_.tracks);
 }
 
 std::optional<ComingFrame> History::comingAfter(const HistoryFrame& frame) const {

@@ -12,6 +12,7 @@
 #include "common/base/result.h"
 #include "common/types/odometry.h"
 #include "services/semantic_filter/core/filter.h"
+#include "services/semantic_filter/core/memory/arrivals.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
@@ -22,6 +23,7 @@ struct HistoryFrame {
   std::shared_ptr<const CameraModel> camera;  ///< keeps input.view.camera alive
   Belief before;
   bool stepped = false;
+  std::shared_ptr<const Arrivals> arrivals = {};  ///< from the map; null: none
   std::vector<MergeRecord> merges = {};  ///< of its latest step
 };
 
@@ -37,19 +39,15 @@ class History {
   void beginWorld();
   /// Adds a frame that is newer than all before, not yet stepped. The oldest leaves.
   HistoryFrame& add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera);
+  /// Takes these in with the next frame that is stepped for the first time.
+  void arrive(std::shared_ptr<const Arrivals> arrivals) { arrivals_ = std::move(arrivals); }
   /// Steps the newest frame.
   void step();
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
 
-  /// Into the newest belief and those that late detections may go back to, in order of id.
-  void insert(const Track& track);
-  void erase(const std::set<ObjectId>& ids);
-  /// Two tracks are one object, in all of these beliefs.
-  void join(ObjectId id, ObjectId absorbed, const FrameInput& input);
-  /// Undoes a join: what was seen of `id` since is of the absorbed object. What `id` was laid with
-  /// says little beside that. Returns whether it was seen since.
-  bool split(ObjectId id, ObjectId absorbed);
+  /// From the newest belief and those that late detections may go back to.
+  void erase(const std::set<TrackId>& ids);
 
   std::deque<HistoryFrame>& frames() { return frames_; }
   const std::deque<HistoryFrame>& frames() const { return frames_; }
@@ -58,7 +56,7 @@ class History {
   TimePoint oldestTime() const { return frames_.front().input.stamp.time; }
   /// The frame after `frame`, if body and clock go on as since the frame before it.
   std::optional<ComingFrame> comingAfter(const HistoryFrame& frame) const;
-  /// Merges of frames that were stepped again, and joins, since the last call.
+  /// Merges of frames that were stepped again, since the last call.
   std::vector<MergeRecord> takeLateMerges();
 
   const Belief& belief() const { return belief_; }
@@ -82,6 +80,7 @@ class History {
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;
   std::vector<MergeRecord> late_merges_;
+  std::shared_ptr<const Arrivals> arrivals_;  ///< not yet taken in
 };
 
 }  // namespace perdure::semantic_filter

@@ -24,6 +24,9 @@ struct Learned {
 struct Belief {
   std::vector<Track> tracks;            ///< ordered by id
   std::vector<Track> recently_deleted;  ///< kept for re-identification (core/tracks/reidentify.h)
+  /// Tracks that the map gave and that were fused with a track of the same object, by that track:
+  /// they are not fused a second time.
+  std::map<TrackId, TrackId> fused = {};
   Learned learned = {};
   BodyPath path = {};  ///< recent positions of the body
 };

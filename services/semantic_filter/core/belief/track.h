@@ -128,7 +128,7 @@ struct UnusedFrames {
 };
 
 struct Track {
-  ObjectId id = 0;
+  TrackId id = 0;
   Existence existence;
   /// Log-odds of "it is a real object" above those of "it is still there"
   /// (tools/docs/maths/class_and_existence_update.md).

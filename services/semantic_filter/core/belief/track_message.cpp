@@ -74,6 +74,7 @@ void toClassBelief(const Track& track, const ClassPrior& prior, const std::strin
 void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
               ObjectBelief& belief) {
   belief.id = track.id;
+  belief.track = 0;
   belief.existence = track.existence;
   belief.confirmed = track.life.confirmed;
   ScratchVector<const std::string*> names;
@@ -115,7 +116,7 @@ ObjectBelief toBelief(const Track& track, const ClassPriors& priors, double min_
 
 Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back) {
   Track track;
-  track.id = belief.id;
+  track.id = belief.trackId();
   track.existence = {belief.existence, belief.why.existence, back, belief.as_of};
   track.classes = {belief.why.classes, belief.why.ousted};
   track.life.confirmed = belief.confirmed;

@@ -7,9 +7,6 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr double kPatience_s = 1.0;  // wait for an answer
-constexpr double kAgain_s = 0.5;     // between two questions whether waiting tracks are on disk
-constexpr double kStepShare = 1.0 / 3.0;        // of the margin: distance between two questions
 constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
 /// The map has it, or will have it with the next commit. A track that is not confirmed now because
@@ -44,7 +41,7 @@ Archive::Leaving Archive::leaving(const std::vector<Track>& tracks, const Eigen:
                                   TimePoint now, TimePoint oldest) {
   Leaving result;
   if (!parameters_.archive) return result;
-  std::map<ObjectId, TimePoint> waiting;
+  std::map<TrackId, TimePoint> waiting;
   for (const Track& o : tracks) {
     if (!farAndUnseen(o, p_WB, now, oldest)) continue;
     if (!onTheMap(o) || mayMove(o, min_speed_)) {
@@ -63,41 +60,9 @@ Archive::Leaving Archive::leaving(const std::vector<Track>& tracks, const Eigen:
   return result;
 }
 
-bool Archive::due(const Eigen::Vector3d& p_WB, TimePoint now) const {
-  if (!asked_at_) return true;
-  const double since_s = toSeconds(now - *asked_at_);
-  if (open_) return since_s > kPatience_s || since_s < 0.0;
-  if (!known_around_) return true;
-  if ((p_WB - *known_around_).norm() > kStepShare * parameters_.margin_m) return true;
-  return !waiting_.empty() && since_s > kAgain_s;
-}
-
-std::optional<Archive::Question> Archive::ask(const Eigen::Vector3d& p_WB, TimePoint now) {
-  if (!parameters_.archive || !due(p_WB, now)) return std::nullopt;
-  asked_at_ = now;
-  if (open_) {
-    ++unanswered_;
-    return open_;
-  }
-  // Also asks for what comes near before the next question is answered.
-  open_ = {++requests_, p_WB, parameters_.recall_m + kStepShare * parameters_.margin_m};
-  return open_;
-}
-
-bool Archive::answered(std::uint64_t request, TimePoint kept, bool truncated) {
-  if (!open_ || open_->request != request) return false;
-  kept_ = std::max(kept_, kept);
-  if (truncated) {
-    known_around_.reset();  // the rest comes with the next answer
-  } else {
-    known_around_ = open_->centre_W;
-  }
-  open_.reset();
-  return true;
-}
-
-bool Archive::near(const Eigen::Vector3d& p_WO, const Eigen::Vector3d& p_WB) const {
-  return (p_WO - p_WB).norm() <= parameters_.recall_m + parameters_.margin_m;
+double Archive::nearRadius() const {
+  constexpr double kShare = 1.0 / 3.0;  // of the margin: objects that come near before the next one
+  return parameters_.archive ? parameters_.recall_m + kShare * parameters_.margin_m : 0.0;
 }
 
 void Archive::rememberReference(const Track& track) {
@@ -113,9 +78,6 @@ std::optional<Matrix6d> Archive::referenceAt(TimePoint as_of) const {
 
 void Archive::clear() {
   waiting_.clear();
-  open_.reset();
-  asked_at_.reset();
-  known_around_.reset();
   references_.clear();
   kept_ = {};
 }

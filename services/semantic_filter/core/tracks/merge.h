@@ -10,9 +10,10 @@
 namespace perdure::semantic_filter {
 
 struct MergeRecord {
-  ObjectId survivor = 0, absorbed = 0;
+  TrackId survivor = 0, absorbed = 0;
   bool moved = false;  ///< re-identified: the object was moved or drove off (tracks/reidentify.h)
   bool returned = false;  ///< re-identified: the survivor had been deleted
+  bool by_map = false;    ///< the map holds both to be one object
 };
 
 /// Returns the shared volume over the joint volume of two upright cuboids. `up_W`: against gravity.
