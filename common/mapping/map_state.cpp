@@ -193,7 +193,7 @@ void MapState::combine(ObjectId object) {
   record ? putObject(object, *std::move(record)) : eraseObject(object);
 }
 
-void MapState::add(const SameObject& fact) {
+void MapState::unite(const SameObject& fact) {
   const Groups before = groupsOf(fact.a, fact.b);
   identity_.add(fact);
   regroup(before);

@@ -58,7 +58,7 @@ class MapState {
   const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
   const Identity& identity() const { return identity_; }
-  void add(const SameObject& fact);
+  void unite(const SameObject& fact);
   /// The facts that rest on a loop closure rest on another one.
   void replaceLoop(EdgeId loop, EdgeId by) { identity_.replaceLoop(loop, by); }
   /// Tracks whose object has changed since markSaved(), or that share it now, or no longer.

@@ -246,7 +246,7 @@ void Mapper::onMerged(TrackId survivor, TrackId absorbed) {
     state_.erase(absorbed);
     state_.put(survivor, std::move(merged));
   }
-  state_.add({0, survivor, absorbed});
+  state_.unite({0, survivor, absorbed});
   loop_search_.forget();
 }
 

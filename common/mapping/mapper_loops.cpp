@@ -65,7 +65,7 @@ void Mapper::join(const LoopClosure& loop) {
     const auto [survivor, absorbed] =
         std::minmax({identity.objectOf(known), identity.objectOf(seen)});
     const SameObject fact{loop.id, known, seen};
-    state_.add(fact);
+    state_.unite(fact);
     change_.facts.push_back(fact);
     if (survivor != absorbed) change_.merges.push_back({loop.id, survivor, absorbed});
   }

@@ -147,6 +147,7 @@ struct MapReply {
 struct Member {
   TrackId track = 0;
   ObjectId object = 0;
+  bool operator==(const Member&) const = default;
 };
 
 /// All that the map knows of the surroundings of the body, for one filter. Complete: a later one

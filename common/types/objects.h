@@ -65,6 +65,7 @@ struct EndedTrack {
   TrackId track = 0;
   TrackId into = 0;  ///< the track that it was merged into; 0: the object is gone
   TimePoint time;
+  bool operator==(const EndedTrack&) const = default;
 };
 
 /// The working set at one frame: enough to restore it. Complete: a later one replaces it.

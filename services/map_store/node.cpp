@@ -50,10 +50,6 @@ Objects byTrack(Objects objects) {
   return objects;
 }
 
-bool operator==(const EndedTrack& a, const EndedTrack& b) {
-  return a.track == b.track && a.into == b.into && a.time == b.time;
-}
-
 std::string mendOf(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size";
   if (reason.code == "read_only") return "make store.path writable for this user";

@@ -95,7 +95,7 @@ void Node::followGraph() {
 void Node::reportWithdrawals(const mapping::MapChange& change) {
   for (const mapping::LoopWithdrawal& loop : change.withdrawn) {
     std::string split;
-    for (const MergeOrder& order : change.splits) {
+    for (const mapping::MergeOrder& order : change.splits) {
       if (order.loop != loop.id) continue;
       split +=
           fmt::format("{}{} from {}", split.empty() ? "" : ", ", order.absorbed, order.survivor);

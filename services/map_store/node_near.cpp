@@ -25,17 +25,11 @@ std::uint64_t digestOf(const std::vector<ObjectBelief>& beliefs) {
   return digest(bytes);
 }
 
-bool sameMembers(const std::vector<Member>& a, const std::vector<Member>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Member& x, const Member& y) {
-    return x.track == y.track && x.object == y.object;
-  });
-}
-
 /// But for the stamp, the revision and the next id.
 bool sameContent(const MapNear& a, const MapNear& b) {
   return a.client == b.client && a.world == b.world && a.kept == b.kept &&
          a.corrects_drift == b.corrects_drift && a.more == b.more &&
-         sameMembers(a.members, b.members) && digestOf(a.placed) == digestOf(b.placed) &&
+         a.members == b.members && digestOf(a.placed) == digestOf(b.placed) &&
          digestOf(a.as_published) == digestOf(b.as_published);
 }
 
