@@ -240,12 +240,16 @@ bool LoopSearch::isBelieved(const PlaceMatch& match, double sigma_m) const {
 
 std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
                                                       const LastPlace& last) const {
-  const auto seen = seenOfLate(body);
-  if (seen.size() < parameters_.loop.least_elsewhere) return std::nullopt;
+  auto seen = seenOfLate(body);
+  const auto T_bF = body.relative.to(last.begins);
+  if (seen.size() < parameters_.loop.least_elsewhere || !T_bF) return std::nullopt;
+  const LevelPose T_Fb = T_bF->mean.inverse();
+  for (PlacedObject& object : seen) object = transformed(T_Fb, std::move(object));
   const auto components = componentsOf(body.state.graph());
-  const Eigen::Vector2d place = last.T_MB.mean.p.head<2>();
-  const double sigma_m = planeSigma(last.T_MB.covariance);
-  const double far_m = parameters_.loop.view_m + parameters_.place.gate_sigmas * sigma_m;
+  const Eigen::Vector2d place = last.T_MF.mean.p.head<2>();
+  const double far_m =
+      parameters_.loop.view_m + T_Fb.p.norm() +
+      parameters_.place.gate_sigmas * planeSigma(last.T_MF.covariance);
   std::vector<PlacedObject> objects;
   std::vector<Eigen::Vector2d> driven;
   std::map<ObjectId, AnchorId> homes;
@@ -262,12 +266,20 @@ std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
   }
   if (objects.empty()) return std::nullopt;
   const MapIndex index(std::move(objects), std::move(driven), parameters_.place);
-  auto match = bestMatch(seen, index, last.T_MB, parameters_.place);
-  constexpr double kNowhere = std::numeric_limits<double>::infinity();
-  if (!match || !isBelieved(*match, kNowhere)) return std::nullopt;
-  if (match->score - match->next < parameters_.loop.at_once_nats) return std::nullopt;
+  auto match = bestMatch(std::move(seen), index, last.T_MF, parameters_.place);
+  if (!match || !isSureAtOnce(*match)) return std::nullopt;
+  match->T_MB = compose(match->T_MB, {T_Fb, Eigen::Matrix4d::Zero()});
   const AnchorId home = homeOf(*match, homes);
+  constexpr double kNowhere = std::numeric_limits<double>::infinity();
   return Found{std::move(*match), home, std::nullopt, kNowhere};
+}
+
+/// Against chance, beyond the number of ways inside the prior, and against the best other way.
+bool LoopSearch::isSureAtOnce(const PlaceMatch& match) const {
+  const LoopParameters& loop = parameters_.loop;
+  return match.pairs.size() >= loop.least_elsewhere &&
+         match.score >= loop.at_once_nats + std::log(match.cells) &&
+         match.score - match.next >= loop.nats;
 }
 
 void LoopSearch::indexOthers(const Whereabouts& body) {

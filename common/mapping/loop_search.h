@@ -48,7 +48,8 @@ PlacedObject inM(const MapState& state, const Sighting& sighting);
 /// that begins after that.
 struct LastPlace {
   AnchorId anchor = 0;  ///< the newest one of the session that ended
-  LevelGaussian T_MB;   ///< in the M of its component; the yaw is not known
+  AnchorId begins = 0;  ///< F, the first one of the session that follows
+  LevelGaussian T_MF;   ///< in the M of the component of `anchor`; the yaw is not known
 };
 
 /// T_Mb as an anchor sees it: the anchor's own error in M does not count.
@@ -92,6 +93,7 @@ class LoopSearch {
   Around mapAround(const Whereabouts& body) const;
   std::set<ObjectId> objectsSeenFrom(AnchorId anchor, const Whereabouts& body) const;
   bool isBelieved(const PlaceMatch& match, double sigma_m) const;
+  bool isSureAtOnce(const PlaceMatch& match) const;
   void indexOthers(const Whereabouts& body);
 
   Parameters parameters_;

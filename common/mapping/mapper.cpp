@@ -35,22 +35,18 @@ void Mapper::rememberLastPlace(const Odometry& next) {
   if (!before || !builder_.last() || session_ == next.world) return;
   const double gap_s = toSeconds(next.stamp.time - before->time);
   if (gap_s < 0.0 || gap_s > kLongest_s) return;
-  ended_ = {builder_.last()->id, builder_.sinceLast()->mean,
-            kAtRest_m + gap_s * std::max(kLeastSpeed, before->speed), next.T_WB.p};
+  ended_ = {builder_.last()->id, 0, builder_.sinceLast()->mean,
+            kAtRest_m + gap_s * std::max(kLeastSpeed, before->speed)};
 }
 
-/// The yaw of this W in M is not known: what was driven since may lead in any direction.
+/// Where the session began. The yaw of this W in M is not known.
 std::optional<LastPlace> Mapper::lastPlace() const {
   constexpr double kTurns_rad = 10.0, kFarthest_m = 150.0;
-  if (!ended_) return std::nullopt;
-  const Eigen::Vector3d moved = builder_.last()->T_WA.p - ended_->begins_W;
-  if (moved.norm() > kFarthest_m) return std::nullopt;
-  LastPlace last{ended_->anchor, {state_.graph().pose(ended_->anchor) * ended_->T_AB, {}}};
-  const double variance = ended_->sigma_m * ended_->sigma_m;
-  last.T_MB.mean.p.z() += moved.z();
-  last.T_MB.covariance = variance * Eigen::Matrix4d::Identity();
-  last.T_MB.covariance.diagonal().head<2>().array() += 0.5 * moved.head<2>().squaredNorm();
-  last.T_MB.covariance(3, 3) = kTurns_rad * kTurns_rad;
+  if (!ended_ || ended_->begins == 0 || builder_.way_m() > kFarthest_m) return std::nullopt;
+  LastPlace last{ended_->anchor, ended_->begins, {}};
+  last.T_MF.mean = state_.graph().pose(ended_->anchor) * ended_->T_AB;
+  last.T_MF.covariance = ended_->sigma_m * ended_->sigma_m * Eigen::Matrix4d::Identity();
+  last.T_MF.covariance(3, 3) = kTurns_rad * kTurns_rad;
   return last;
 }
 
@@ -134,6 +130,7 @@ void Mapper::onOdometry(const Odometry& odometry) {
   anchor->from_previous.covariance *= odometry_variance_;
   anchor->scale2 = odometry_variance_;
   state_.add(*anchor);
+  if (ended_ && ended_->begins == 0) ended_->begins = anchor->id;
   marginals_.reset();
 }
 

@@ -202,10 +202,9 @@ class Mapper {
   std::optional<Tentative> tentative_;
   /// Where the session before ended, until this one is connected with it.
   struct Ended {
-    AnchorId anchor = 0;
-    LevelPose T_AB;               ///< the body beside its newest anchor
-    double sigma_m = 0.0;         ///< of the place at which this session begins
-    Eigen::Vector3d begins_W = Eigen::Vector3d::Zero();  ///< in the W of this session
+    AnchorId anchor = 0, begins = 0;  ///< its newest one, and the first one of this session
+    LevelPose T_AB;                   ///< the body beside its newest anchor
+    double sigma_m = 0.0;             ///< of the place at which this session begins
   };
   std::optional<Ended> ended_;
   struct Moment {

@@ -38,9 +38,9 @@ struct LoopParameters {
   std::uint64_t least_elsewhere = 4;
   /// A session is joined where two searches agree that lie so much way apart, but no more.
   double agree_after_m = 8.0, agree_within_m = 60.0;
-  /// Likelihood ratio at which one search suffices, around the place where the odometry lost its
-  /// frame of reference.
-  double at_once_nats = 25.0;
+  /// Around the place where the odometry lost its frame of reference one search suffices, at this
+  /// log-likelihood ratio against chance, beyond that of the number of ways.
+  double at_once_nats = 15.0;
   double nats = 8.0;       ///< log-odds against the best other way, above those of the prior
   double near_m = 1.6;     ///< where the body is known within this deviation,
   double near_nats = 2.5;  ///< the same of which object is which

@@ -47,12 +47,6 @@ Result<void> forRows(const Connection& connection, std::string_view sql, Take ta
   }
 }
 
-bool hasTable(const Connection& connection, const std::string& name) {
-  const auto count =
-      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
-  return count && *count > 0;
-}
-
 WorldId worldAt(const Statement& row, int column) {
   return {row.id(column), static_cast<std::uint32_t>(row.integer(column + 1))};
 }
@@ -83,7 +77,7 @@ Result<void> readObjects(const Connection& connection, WholeMap& map) {
 }
 
 Result<void> readProvenance(const Connection& connection, MapContents& map) {
-  if (!hasTable(connection, "provenance")) return {};
+  if (!connection.has("provenance").value_or(false)) return {};
   return forRows(connection,
                  "SELECT map_first, map_second, old_id, id, first_seen_ns, last_seen_ns FROM "
                  "provenance ORDER BY rowid",
@@ -97,7 +91,7 @@ Result<void> readProvenance(const Connection& connection, MapContents& map) {
 }
 
 Result<void> readChanges(const Connection& connection, MapContents& map) {
-  if (!hasTable(connection, "changes")) return {};
+  if (!connection.has("changes").value_or(false)) return {};
   return forRows(connection,
                  "SELECT map_world, map_epoch, by_world, by_epoch, id, kind, class, x, y, z, "
                  "last_seen_ns, since_ns FROM changes ORDER BY rowid",

@@ -112,17 +112,9 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
   return fail("query_invalid", "a restore or the graph is no question about objects");
 }
 
-/// Maps of older versions have no tracks that share an object.
-Result<bool> hasTracks(const Connection& connection) {
-  const auto count =
-      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'tracks'");
-  if (!count) return tl::unexpected<Reason>(count.error());
-  return *count > 0;
-}
-
 /// The beliefs of the working set; confirmed ones are in `tracks` or `objects`.
 Result<std::vector<ObjectBelief>> workingBeliefs(const Connection& connection) {
-  const auto has_tracks = hasTracks(connection);
+  const auto has_tracks = connection.has("tracks");  // older maps have none
   if (!has_tracks) return tl::unexpected<Reason>(has_tracks.error());
   auto rows = connection.prepare(
       *has_tracks ? "SELECT coalesce(w.belief, t.belief, o.belief) FROM working w "
@@ -281,11 +273,10 @@ Result<std::optional<Objects>> MapReader::working() const {
 }
 
 Result<std::set<std::uint64_t>> MapReader::worlds() const {
-  const auto has_graph =
-      connection_->integer("SELECT count(*) FROM sqlite_master WHERE name = 'anchors'");
+  const auto has_graph = connection_->has("anchors");
   if (!has_graph) return tl::unexpected<Reason>(has_graph.error());
   auto rows = connection_->prepare(std::string("SELECT DISTINCT world FROM objects") +
-                                   (*has_graph > 0 ? " UNION SELECT world FROM anchors" : ""));
+                                   (*has_graph ? " UNION SELECT world FROM anchors" : ""));
   if (!rows) return tl::unexpected<Reason>(rows.error());
   std::set<std::uint64_t> worlds;
   for (;;) {

@@ -54,13 +54,6 @@ std::string schema() {
          "REPLACE INTO meta VALUES('outbox_acknowledged', 0);";
 }
 
-Result<bool> isThere(const Connection& connection, const char* what = "outbox") {
-  const auto found = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" +
-                                        std::string(what) + "'");
-  if (!found) return tl::unexpected<Reason>(found.error());
-  return *found > 0;
-}
-
 std::string removal() {
   std::string sql =
       "DROP TABLE IF EXISTS outbox; DROP TRIGGER IF EXISTS outbox_meta_INSERT;"
@@ -86,7 +79,7 @@ Result<std::string> text(const Connection& connection, std::string_view sql) {
 Result<void> openOutbox(const Connection& connection) {
   auto transaction = Transaction::begin(connection);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto follows_all = isThere(connection, "outbox_views_INSERT");
+  const auto follows_all = connection.has("outbox_views_INSERT");
   if (!follows_all) return tl::unexpected<Reason>(follows_all.error());
   if (*follows_all) return {};
   const auto made = connection.execute(removal() + schema());
@@ -94,7 +87,7 @@ Result<void> openOutbox(const Connection& connection) {
 }
 
 Result<void> dropOutbox(const Connection& connection) {
-  const auto there = isThere(connection);
+  const auto there = connection.has("outbox");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return {};
   auto transaction = Transaction::begin(connection);
@@ -116,7 +109,7 @@ Result<void> acknowledge(const Connection& connection, std::int64_t number) {
 }
 
 Result<OutboxMark> outboxMark(const Connection& connection) {
-  const auto there = isThere(connection);
+  const auto there = connection.has("outbox");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return fail("no_outbox", "the map's file has no outbox");
   const auto file = text(connection, "SELECT value FROM meta WHERE key = 'file'");

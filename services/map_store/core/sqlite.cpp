@@ -173,6 +173,12 @@ Result<std::int64_t> Connection::integer(std::string_view sql) const {
   return statement->integer(0);
 }
 
+Result<bool> Connection::has(const std::string& name) const {
+  const auto count = integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
+  if (!count) return tl::unexpected<Reason>(count.error());
+  return *count > 0;
+}
+
 Result<void> Connection::copyInto(const Connection& target) const {
   constexpr int kAllPages = -1;
   sqlite3* to = target.connection_.get();

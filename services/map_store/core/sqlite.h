@@ -65,6 +65,8 @@ class Connection {
   Result<void> execute(const std::string& sql) const;
   /// The first column of the first row of a query that has one.
   Result<std::int64_t> integer(std::string_view sql) const;
+  /// Whether the file has a table or trigger of this name.
+  Result<bool> has(const std::string& name) const;
   /// Makes `target` the same, page by page: one state, also while others write this one.
   Result<void> copyInto(const Connection& target) const;
 

@@ -29,14 +29,6 @@ Result<void> takeRows(const Connection& connection, std::string_view sql, std::u
   }
 }
 
-/// Tables that came later than the graph.
-Result<bool> hasTable(const Connection& connection, const std::string& name) {
-  const auto count =
-      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
-  if (!count) return tl::unexpected<Reason>(count.error());
-  return *count > 0;
-}
-
 /// Names by their numbers from 0 on; those after a gap cannot be placed.
 Result<void> readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
@@ -97,7 +89,7 @@ Result<void> readRecords(const Connection& connection, SavedGraph& graph) {
 }
 
 Result<void> readTracks(const Connection& connection, SavedGraph& graph) {
-  const auto there = hasTable(connection, "track_sightings");
+  const auto there = connection.has("track_sightings");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return {};
   auto& tracks = graph.map.tracks;
@@ -113,7 +105,7 @@ Result<void> readTracks(const Connection& connection, SavedGraph& graph) {
 }
 
 Result<void> readViews(const Connection& connection, SavedGraph& graph) {
-  const auto there = hasTable(connection, "views");
+  const auto there = connection.has("views");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return {};
   auto& views = graph.map.views;
@@ -218,7 +210,7 @@ Result<void> readAll(const Connection& connection, SavedGraph& graph) {
 
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
   std::set<mapping::SameObject> facts;
-  const auto there = hasTable(connection, "same");
+  const auto there = connection.has("same");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return facts;
   std::uint64_t ignored = 0;
