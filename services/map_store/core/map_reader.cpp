@@ -204,7 +204,7 @@ Result<std::optional<PlacedBelief>> MapReader::beliefOf(TrackId track) const {
   auto row = connection_->prepare(
       "SELECT world, epoch, 0, 0, belief FROM tracks WHERE id = ?1 AND gone = 0 UNION ALL "
       "SELECT world, epoch, visibility, memory, belief FROM objects WHERE id = ?1 AND gone = 0 "
-      "LIMIT 1");
+      "AND NOT EXISTS (SELECT 1 FROM tracks WHERE id = ?1) LIMIT 1");
   if (!row) return tl::unexpected<Reason>(row.error());
   const auto there = row->bindId(1, track).step();
   if (!there) return tl::unexpected<Reason>(there.error());

@@ -228,7 +228,7 @@ TEST_F(MapQueries, GiveInFullWhatIsNearInTheWorkingSetOrNot) {
   MapQuery query;
   query.kind = MapQueryKind::kByRadius;
   query.low = all_.objects[0].best().mean.head<3>();
-  query.radius = 4.0;
+  query.radius = 8.0;
   const auto near = database_.reader().inFullNear(query.low, query.radius, kWorld, 1000).value();
   EXPECT_EQ(idsOf(near), idsOf(ask(query)));
   ASSERT_GT(near.beliefs.size(), 3u);
