@@ -86,7 +86,17 @@ std::vector<Bytes> parts() {
 // length of what follows: the text or blob, of edges behind the weight, of poses four numbers and
 // whether it is held fast, of facts the two tracks.
 
-enum class Table : std::uint8_t { kClass, kAnchor, kPose, kEdge, kSighting, kTrack, kFact, kView, kCount };
+enum class Table : std::uint8_t {
+  kClass,
+  kAnchor,
+  kPose,
+  kEdge,
+  kSighting,
+  kTrack,
+  kFact,
+  kView,
+  kCount
+};
 
 constexpr const char* kInsert[] = {"REPLACE INTO graph_classes VALUES(?1, CAST(?2 AS TEXT))",
                                    "REPLACE INTO anchors VALUES(?1, 0, 0, 0, 0, 0, 0, 0, ?2)",

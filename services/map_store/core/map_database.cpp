@@ -56,12 +56,12 @@ std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); 
 }  // namespace
 
 struct MapDatabase::Change {
-  std::set<ObjectId> objects;      ///< whose rows have changed
-  std::map<TrackId, Row> rows;     ///< to be remembered once committed
-  std::set<TrackId> shut_out;      ///< removed later than this frame
-  std::set<TrackId> alive;         ///< in the working set
-  std::set<ObjectId> to_derive;    ///< from the rows of their tracks
-  std::uint64_t revision = 0;      ///< that this commit makes
+  std::set<ObjectId> objects;    ///< whose rows have changed
+  std::map<TrackId, Row> rows;   ///< to be remembered once committed
+  std::set<TrackId> shut_out;    ///< removed later than this frame
+  std::set<TrackId> alive;       ///< in the working set
+  std::set<ObjectId> to_derive;  ///< from the rows of their tracks
+  std::uint64_t revision = 0;    ///< that this commit makes
   std::optional<Statement> put_object, put_place;
 };
 
@@ -290,8 +290,7 @@ Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& ch
   const auto square = squareOf(newest->placed.belief.best().mean.head<3>(), tile_size_m_);
   if (!square) return {};
   change.objects.insert(object);
-  const auto done =
-      insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
+  const auto done = insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
   if (!done || change.alive.contains(newest->id)) return done;
   return markLeft(object, change);
 }
@@ -308,8 +307,7 @@ Result<void> MapDatabase::end(TrackId id, const Removal& removal, const Batch& b
 
 /// Those of the last working set that are on the map and were no longer confirmed.
 Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
-  auto rows = connection_.prepare(
-      "SELECT id FROM working WHERE belief IS NOT NULL");
+  auto rows = connection_.prepare("SELECT id FROM working WHERE belief IS NOT NULL");
   if (!rows) return failed(rows.error());
   for (;;) {
     const auto row = rows->step();

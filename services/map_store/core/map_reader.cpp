@@ -74,9 +74,8 @@ Result<Statement> byRadius(const Connection& connection, const MapQuery& query,
                            const WorldId& world) {
   constexpr char kSquaredDistance[] =
       "((o.x - ?9) * (o.x - ?9) + (o.y - ?10) * (o.y - ?10) + (o.z - ?11) * (o.z - ?11))";
-  auto statement =
-      connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
-                         " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
+  auto statement = connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
+                                      " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
   if (!statement) return statement;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(query.radius);
   bindBox(*statement, query.low - reach, query.low + reach, world);
@@ -114,8 +113,7 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
 
 /// Maps of older versions have no tracks that share an object.
 Result<bool> hasTracks(const Connection& connection) {
-  const auto count =
-      connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'tracks'");
+  const auto count = connection.integer("SELECT count(*) FROM sqlite_master WHERE name = 'tracks'");
   if (!count) return tl::unexpected<Reason>(count.error());
   return *count > 0;
 }

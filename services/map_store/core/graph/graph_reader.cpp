@@ -243,13 +243,13 @@ Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return facts;
   std::uint64_t ignored = 0;
-  const auto done = takeRows(connection, "SELECT loop, a, b FROM same", ignored,
-                             [&](const Statement& row) {
-                               const mapping::SameObject fact{row.id(0), row.id(1), row.id(2)};
-                               if (fact.a == 0 || fact.b == 0 || fact.a == fact.b) return false;
-                               facts.insert(fact);
-                               return true;
-                             });
+  const auto done =
+      takeRows(connection, "SELECT loop, a, b FROM same", ignored, [&](const Statement& row) {
+        const mapping::SameObject fact{row.id(0), row.id(1), row.id(2)};
+        if (fact.a == 0 || fact.b == 0 || fact.a == fact.b) return false;
+        facts.insert(fact);
+        return true;
+      });
   if (!done) return tl::unexpected<Reason>(done.error());
   return facts;
 }

@@ -195,8 +195,8 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
     unconfirmed += r.confirmed ? 0 : 1;
     return r.confirmed && isSound(r);
   });
-  const auto tracks = soundOnes(changed.tracks, refused,
-                                [](const mapping::ObjectRecord& record) { return isSound(record); });
+  const auto tracks = soundOnes(
+      changed.tracks, refused, [](const mapping::ObjectRecord& record) { return isSound(record); });
   const auto views =
       soundOnes(changed.views, refused, [](const mapping::View& view) { return isSound(view); });
   auto done = putClasses(connection, changed.classes);
