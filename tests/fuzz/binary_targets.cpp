@@ -62,8 +62,8 @@ std::vector<WireType> wireTypes() {
 const std::vector<WireType>& allTypes() {
   static const auto types =
       wireTypes<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions, MapTile,
-                MapHeader, MapFrame, MapQuery, MapReply, Health>();
+                ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile, MapHeader,
+                MapFrame, MapNear, MapQuery, MapReply, Health>();
   return types;
 }
 

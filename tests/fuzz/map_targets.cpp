@@ -44,7 +44,7 @@ std::vector<Bytes> headers() {
   return {encodeHeader(objects)};
 }
 
-/// The first byte says whether it is an anchor, an edge, a sighting, a merge or a view.
+/// The first byte says whether it is an anchor, an edge, a sighting or a view.
 bool takePart(View bytes) {
   if (bytes.empty()) return false;
   const View blob = bytes.subspan(1);
@@ -55,15 +55,13 @@ bool takePart(View bytes) {
     require(decode(encode(*value)).has_value(), "a part of the graph reads back");
     return true;
   };
-  switch (bytes[0] % 5) {
+  switch (bytes[0] % 4) {
     case 0:
       return isTaken(decodeAnchor, encodeAnchor);
     case 1:
       return isTaken(decodeEdge, encodeEdge);
     case 2:
       return isTaken(decodeRecord, encodeRecord);
-    case 3:
-      return isTaken(decodeMerge, encodeMerge);
     default:
       return isTaken(decodeView, encodeView);
   }
@@ -76,34 +74,44 @@ std::vector<Bytes> parts() {
     seeds.push_back(encodeAnchor(map.anchors.at(id).anchor));
     seeds.push_back(encodeEdge(map.edges.at(id).edge));
     seeds.push_back(encodeRecord(map.records.at(id)));
-    seeds.push_back(encodeMerge(std::next(map.merges.begin(), static_cast<int>(id))->second));
     seeds.push_back(encodeView(std::next(map.views.begin(), static_cast<int>(id))->second));
   }
   for (std::size_t i = 0; i < seeds.size(); ++i) {
-    seeds[i].insert(seeds[i].begin(), static_cast<std::uint8_t>(i % 5));
+    seeds[i].insert(seeds[i].begin(), static_cast<std::uint8_t>(i % 4));
   }
   return seeds;
 }
 
 // A whole graph: rows of its tables, each a byte that says which table, one for its id, two for the
 // length of what follows: the text or blob, of edges behind the weight, of poses four numbers and
-// whether it is held fast.
+// whether it is held fast, of facts the two tracks.
 
-enum class Table : std::uint8_t { kClass, kAnchor, kPose, kEdge, kSighting, kMerge, kView, kCount };
+enum class Table : std::uint8_t {
+  kClass,
+  kAnchor,
+  kPose,
+  kEdge,
+  kSighting,
+  kTrack,
+  kFact,
+  kView,
+  kCount
+};
 
 constexpr const char* kInsert[] = {"REPLACE INTO graph_classes VALUES(?1, CAST(?2 AS TEXT))",
                                    "REPLACE INTO anchors VALUES(?1, 0, 0, 0, 0, 0, 0, 0, ?2)",
                                    "REPLACE INTO anchor_poses VALUES(?1, ?3, ?4, ?5, ?6, ?7)",
                                    "REPLACE INTO edges VALUES(?1, 0, 0, 0, ?3, ?2)",
                                    "REPLACE INTO sightings VALUES(?1, 0, 0, 0, 0, 0, 0, 0, 0, ?2)",
-                                   "REPLACE INTO merges VALUES(?1, 0, 0, 0, ?2, NULL, NULL, NULL)",
+                                   "REPLACE INTO track_sightings VALUES(?1, 1, 0, ?2)",
+                                   "REPLACE INTO same VALUES(?1, ?3, ?4)",
                                    "REPLACE INTO views VALUES(?1, ?2)"};
 
 const Connection& emptyFile() {
   static const Connection file = [] {
     auto made = Connection::open(":memory:", Connection::Mode::kReadWriteCreate);
     require(made && made->execute(kGraphSchema) && made->execute(kAddedSchema) &&
-                made->execute("PRAGMA user_version = 3"),
+                made->execute("PRAGMA user_version = 4"),
             "there is a file");
     return *std::move(made);
   }();
@@ -121,11 +129,14 @@ double takeDouble(View& from) {
 void insertRow(std::vector<Statement>& statements, Table table, std::uint64_t id, View content) {
   Statement& row = statements[static_cast<std::size_t>(table)];
   row.bindId(1, id);
-  const int numbers = table == Table::kPose ? 4 : table == Table::kEdge ? 1 : 0;
+  const int numbers = table == Table::kPose   ? 4
+                      : table == Table::kFact ? 2
+                      : table == Table::kEdge ? 1
+                                              : 0;
   for (int i = 0; i < numbers; ++i) row.bind(3 + i, takeDouble(content));
   if (table == Table::kPose) {
     row.bind(7, std::int64_t{!content.empty() && content[0] != 0});
-  } else {
+  } else if (table != Table::kFact) {
     row.bind(2, content);
   }
   (void)row.run();  // what a column may not be is not there
@@ -173,6 +184,10 @@ bool takeGraph(View bytes) {
     require(graph->map.anchors.contains(saved.edge.a) && graph->map.anchors.contains(saved.edge.b),
             "an edge has its ends");
   }
+  for (const mapping::SameObject& fact : graph->map.facts) {
+    require(fact.a != 0 && fact.b != 0 && fact.a != fact.b, "a fact joins two tracks");
+    require(fact.loop == 0 || graph->map.edges.contains(fact.loop), "a fact has its loop");
+  }
   tell(graph->map);
   require(sweepGraph(emptyFile()).has_value(), "a graph is swept");
   const auto swept = readGraph(emptyFile());
@@ -217,16 +232,20 @@ Bytes graphSeed(std::uint32_t seed, const test::GraphSize& size) {
     put(bytes, Table::kEdge, id, edge);
   }
   for (const auto& [id, r] : map.records) put(bytes, Table::kSighting, id, encodeRecord(r));
-  for (const auto& [id, merge] : map.merges) put(bytes, Table::kMerge, id, encodeMerge(merge));
+  for (const auto& [id, r] : map.tracks) put(bytes, Table::kTrack, id, encodeRecord(r));
+  for (const auto& fact : map.facts) {
+    put(bytes, Table::kFact, fact.loop,
+        bytesOfNumbers({static_cast<double>(fact.a), static_cast<double>(fact.b)}));
+  }
   for (const auto& [id, view] : map.views) put(bytes, Table::kView, id, encodeView(view));
   return bytes;
 }
 
 std::vector<Bytes> graphs() {
   return {graphSeed(
-              1, {.anchors = 3, .edges = 2, .records = 2, .sessions = 1, .merges = 1, .views = 1}),
+              1, {.anchors = 3, .edges = 2, .records = 2, .sessions = 1, .shared = 1, .views = 1}),
           graphSeed(
-              2, {.anchors = 6, .edges = 6, .records = 3, .sessions = 2, .merges = 0, .views = 0})};
+              2, {.anchors = 6, .edges = 6, .records = 3, .sessions = 2, .shared = 0, .views = 0})};
 }
 
 bool takeEarthAnchor(View bytes) {

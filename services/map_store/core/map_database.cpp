@@ -56,12 +56,12 @@ std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); 
 }  // namespace
 
 struct MapDatabase::Change {
-  std::set<ObjectId> objects;      ///< whose rows have changed
-  std::map<TrackId, Row> rows;     ///< to be remembered once committed
-  std::set<TrackId> shut_out;      ///< removed later than this frame
-  std::set<TrackId> alive;         ///< in the working set
-  std::set<ObjectId> to_derive;    ///< from the rows of their tracks
-  std::uint64_t revision = 0;      ///< that this commit makes
+  std::set<ObjectId> objects;    ///< whose rows have changed
+  std::map<TrackId, Row> rows;   ///< to be remembered once committed
+  std::set<TrackId> shut_out;    ///< removed later than this frame
+  std::set<TrackId> alive;       ///< in the working set
+  std::set<ObjectId> to_derive;  ///< from the rows of their tracks
+  std::uint64_t revision = 0;    ///< that this commit makes
   std::optional<Statement> put_object, put_place;
 };
 
@@ -244,20 +244,45 @@ Result<void> MapDatabase::regroup(const Batch& batch, Change& change) {
   return {};
 }
 
-/// The row of an object is that of its newest track: one of the working set, or else the one that
-/// was written last. If that track is gone, so is the object.
+/// The row of a track that is not its object's own is history: what was seen of that track.
+Result<void> MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId object,
+                               TimePoint time, Change& change) {
+  const auto row = rowOf(id);
+  if (!row) return failed(row.error());
+  if (row->gone) {
+    return runOnce(connection_,
+                   "UPDATE objects SET merged_into = ?2 WHERE id = ?1 AND merged_into <> ?2",
+                   asStored(id), asStored(object));
+  }
+  if (row->stored && track != nullptr) {
+    const PlacedBelief& placed = track->placed;
+    const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
+    if (square) {
+      const auto done = insert(placed, *square, encodeBelief(placed.belief), change);
+      if (!done) return done;
+    }
+  }
+  return remove(id, {EventKind::kMerged, time, object}, change);
+}
+
+/// The row of an object is that of its newest track: one of the working set, one of this W that was
+/// detected last, or else the one that was written last. If that track is gone, so is the object.
 Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& change) {
   std::optional<StoredTrack> newest;
   const auto rank = [&](const StoredTrack& track) {
-    return std::tuple(change.alive.contains(track.id), track.written, track.id);
+    const bool here = track.placed.world == batch.working->world;
+    return std::tuple(change.alive.contains(track.id), here,
+                      here ? track.placed.belief.last_seen : TimePoint(), track.written, track.id);
   };
   for (const TrackId id : batch.identity->tracksOf(object)) {
     auto track = readTrack(connection_, id);
     if (!track) return failed(track.error());
+    if (id != object) {
+      const auto done =
+          hide(*track ? &**track : nullptr, id, object, batch.working->stamp.time, change);
+      if (!done) return done;
+    }
     if (*track && (!newest || rank(**track) > rank(*newest))) newest = *std::move(*track);
-    if (id == object) continue;
-    const auto done = remove(id, {EventKind::kMerged, batch.working->stamp.time, object}, change);
-    if (!done) return done;
   }
   if (!newest) return {};
   if (newest->gone) return remove(object, {EventKind::kGone, *newest->gone, 0}, change);
@@ -265,8 +290,7 @@ Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& ch
   const auto square = squareOf(newest->placed.belief.best().mean.head<3>(), tile_size_m_);
   if (!square) return {};
   change.objects.insert(object);
-  const auto done =
-      insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
+  const auto done = insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
   if (!done || change.alive.contains(newest->id)) return done;
   return markLeft(object, change);
 }
@@ -283,8 +307,7 @@ Result<void> MapDatabase::end(TrackId id, const Removal& removal, const Batch& b
 
 /// Those of the last working set that are on the map and were no longer confirmed.
 Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
-  auto rows = connection_.prepare(
-      "SELECT id FROM working WHERE belief IS NOT NULL");
+  auto rows = connection_.prepare("SELECT id FROM working WHERE belief IS NOT NULL");
   if (!rows) return failed(rows.error());
   for (;;) {
     const auto row = rows->step();
@@ -351,11 +374,15 @@ Result<Written> MapDatabase::write(const Batch& batch) {
   check(batch.working != nullptr, "a batch has a working set");
   auto transaction = Transaction::begin(connection_);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
+  if (batch.graph != nullptr && !graph_is_whole_) {  // before ids are given again
+    const auto swept = sweepGraph(connection_);
+    if (!swept) return tl::unexpected<Reason>(swept.error());
+  }
   Change change;
   auto written = putAll(batch, change);
   if (!written) return written;
   if (batch.graph != nullptr) {
-    const auto unsound = putGraph(*batch.graph);
+    const auto unsound = writeGraph(connection_, *batch.graph);
     if (!unsound) return tl::unexpected<Reason>(unsound.error());
     written->unsound = *unsound;
   }
@@ -372,14 +399,6 @@ Result<SavedGraph> MapDatabase::takeGraph() {
   auto graph = reader().graph();
   graph_is_whole_ = graph && graph->malformed == 0;
   return graph;
-}
-
-Result<std::uint64_t> MapDatabase::putGraph(const mapping::Unsaved& graph) {
-  if (!graph_is_whole_) {
-    const auto swept = sweepGraph(connection_);
-    if (!swept) return tl::unexpected<Reason>(swept.error());
-  }
-  return writeGraph(connection_, graph);
 }
 
 Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {

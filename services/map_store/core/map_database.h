@@ -37,6 +37,8 @@ struct Removal {
   ObjectId merged_into = 0;
 };
 
+struct StoredTrack;  // core/track_rows.h
+
 /// What one commit writes. Ids are those of tracks. `left`: last beliefs of confirmed tracks that
 /// left the working set.
 struct Batch {
@@ -155,6 +157,8 @@ class MapDatabase {
                       Change& change);
   Result<void> putObjects(const Batch& batch, Change& change);
   Result<void> regroup(const Batch& batch, Change& change);
+  Result<void> hide(const StoredTrack* track, TrackId id, ObjectId object, TimePoint time,
+                    Change& change);
   Result<void> derive(ObjectId object, const Batch& batch, Change& change);
   Result<void> addDoubtful(std::set<ObjectId>& ids) const;
   Result<void> markLeft(ObjectId id, Change& change);
@@ -163,7 +167,6 @@ class MapDatabase {
   Result<void> putWorking(const Objects& working, const Change& change);
   Result<Written> putAll(const Batch& batch, Change& change);
   Result<Written> nextRevision(const Change& change);
-  Result<std::uint64_t> putGraph(const mapping::Unsaved& graph);
   void remember(const Objects& working, const Change& change);
 
   Connection connection_;

@@ -74,9 +74,8 @@ Result<Statement> byRadius(const Connection& connection, const MapQuery& query,
                            const WorldId& world) {
   constexpr char kSquaredDistance[] =
       "((o.x - ?9) * (o.x - ?9) + (o.y - ?10) * (o.y - ?10) + (o.z - ?11) * (o.z - ?11))";
-  auto statement =
-      connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
-                         " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
+  auto statement = connection.prepare(std::string(kColumns) + kInBox + "AND " + kSquaredDistance +
+                                      " <= ?12 ORDER BY " + kSquaredDistance + ", o.id");
   if (!statement) return statement;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(query.radius);
   bindBox(*statement, query.low - reach, query.low + reach, world);
@@ -196,7 +195,7 @@ Result<std::optional<PlacedBelief>> MapReader::beliefOf(TrackId track) const {
   auto row = connection_->prepare(
       "SELECT world, epoch, 0, 0, belief FROM tracks WHERE id = ?1 AND gone = 0 UNION ALL "
       "SELECT world, epoch, visibility, memory, belief FROM objects WHERE id = ?1 AND gone = 0 "
-      "LIMIT 1");
+      "AND NOT EXISTS (SELECT 1 FROM tracks WHERE id = ?1) LIMIT 1");
   if (!row) return tl::unexpected<Reason>(row.error());
   const auto there = row->bindId(1, track).step();
   if (!there) return tl::unexpected<Reason>(there.error());

@@ -30,7 +30,7 @@ class Evolution : public testing::Test {
  protected:
   /// The topic as a program of the first version declares it.
   dds_entity_t firstTopic() const {
-    return topicAs<Recalled>(perdure_first_Recalled_desc, "recalled");
+    return topicAs<Objects>(perdure_first_Objects_desc, "objects");
   }
   template <class T>
   dds_entity_t topicAs(dds_topic_descriptor_t first, const char* name) const {
@@ -49,10 +49,10 @@ class Evolution : public testing::Test {
   WaitLoop loop{here};
 };
 
-TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedger) {
-  Reader<Recalled> reader(here, topics::kRecalled);
-  std::vector<Recalled> got;
-  loop.on(reader, [&](const Recalled& m) { got.push_back(m); });
+TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedgerAndItsOwnTrack) {
+  Reader<Objects> reader(here, topics::kObjects);
+  std::vector<Objects> got;
+  loop.on(reader, [&](const Objects& m) { got.push_back(m); });
   const dds_entity_t writer =
       dds_create_writer(there.handle(), firstTopic(), reliable().get(), nullptr);
   ASSERT_GT(writer, 0);
@@ -71,22 +71,25 @@ TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedger) {
     items[i].hits = 7;
     items[i].recalled = true;
   }
-  perdure_first_Recalled message{};
-  message.client = 99;
+  perdure_first_Objects message{};
+  message.source = 99;
+  message.T_WB.q[3] = message.up_W[2] = 1.0;
   message.items = {2, 2, items.data(), false};
   ASSERT_EQ(dds_write(writer, &message), DDS_RETCODE_OK);
   ASSERT_TRUE(eventually(loop, [&] { return !got.empty(); }));
   // What a recording of that version holds.
   const auto recorded =
-      wire::decodeCdr<Recalled>(wire::writeCdr(&message, perdure_first_Recalled_desc), nullptr);
+      wire::decodeCdr<Objects>(wire::writeCdr(&message, perdure_first_Objects_desc), nullptr);
   ASSERT_TRUE(recorded) << recorded.error().detail;
   got.push_back(*recorded);
-  for (const Recalled& read : got) {
+  for (const Objects& read : got) {
     ASSERT_EQ(read.objects.size(), 2u);
-    EXPECT_EQ(read.client, 99u);
-    EXPECT_FALSE(read.laid);
-    EXPECT_FALSE(read.graph);
-    EXPECT_TRUE(read.merges.empty());
+    EXPECT_EQ(read.instance, 99u);
+    EXPECT_TRUE(read.pose_error.isZero(0.0));
+    EXPECT_EQ(read.near_source, 0u);
+    EXPECT_EQ(read.near_revision, 0u);
+    EXPECT_EQ(read.near_m, 0.0) << "it asks the map for nothing";
+    EXPECT_TRUE(read.ended.empty());
     for (std::size_t i = 0; i < 2; ++i) {
       EXPECT_EQ(read.objects[i].id, 10 + i);
       EXPECT_EQ(read.objects[i].best().name, "car");
@@ -94,28 +97,33 @@ TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedger) {
       EXPECT_TRUE(read.objects[i].recalled);
       EXPECT_TRUE(read.objects[i].why.empty());
       EXPECT_TRUE(read.objects[i].why.classes.empty());
+      EXPECT_EQ(read.objects[i].track, 0u);
+      EXPECT_EQ(read.objects[i].trackId(), 10 + i);
     }
   }
 }
 
-TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedger) {
+TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedgerAndATrack) {
   const dds_entity_t reader =
       dds_create_reader(there.handle(), firstTopic(), reliable().get(), nullptr);
   ASSERT_GT(reader, 0);
-  Writer<Recalled> writer(here, topics::kRecalled);
+  Writer<Objects> writer(here, topics::kObjects);
   ASSERT_TRUE(eventually(loop, [&] { return writer.matched() == 1; }));
   wire::Examples examples(3);
-  Recalled message;
+  Objects message;
   while (message.objects.size() < 3) message.objects.push_back(examples.belief());
   ASSERT_FALSE(message.objects[0].why.empty());
-  message.merges = {examples.mergeOrder(), examples.mergeOrder()};
+  message.objects[1].track = 77;
+  message.near_source = message.near_revision = 5;
+  message.near_m = 60.0;
+  message.ended = {examples.endedTrack(), examples.endedTrack()};
   ASSERT_TRUE(writer.write(message));
   void* sample = nullptr;
   dds_sample_info_t info{};
   ASSERT_TRUE(
       eventually(loop, [&] { return sample || dds_take(reader, &sample, &info, 1, 1) > 0; }));
   ASSERT_TRUE(info.valid_data);
-  const auto& got = *static_cast<const perdure_first_Recalled*>(sample);
+  const auto& got = *static_cast<const perdure_first_Objects*>(sample);
   ASSERT_EQ(got.items._length, 3u);
   for (std::uint32_t i = 0; i < 3; ++i) {
     const auto& [read, sent] = std::tie(got.items._buffer[i], message.objects[i]);

@@ -13,8 +13,8 @@ class Codec : public testing::Test {};
 
 using Messages =
     testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                   ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions,
-                   MapTile, MapHeader, MapFrame, MapQuery, MapReply, Health>;
+                   ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile,
+                   MapHeader, MapFrame, MapNear, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Codec, Messages);
 
 TYPED_TEST(Codec, BringsEveryFieldThereAndBackToTheBit) {
@@ -84,9 +84,11 @@ TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
   const auto object = toJson(objects)["objects"][0];
   EXPECT_EQ(object.size(), members<ObjectBelief>());
   EXPECT_EQ(object["classes"][0].size(), members<ClassBelief>());
-  Recalled recalled;
-  recalled.merges = {examples.mergeOrder()};
-  EXPECT_EQ(toJson(recalled)["merges"][0].size(), members<MergeOrder>());
+  objects.ended = {examples.endedTrack()};
+  EXPECT_EQ(toJson(objects)["ended"][0].size(), members<EndedTrack>());
+  MapNear near;
+  near.members = {examples.member()};
+  EXPECT_EQ(toJson(near)["members"][0].size(), members<Member>());
   Objects explained;
   explained.objects = {examples.belief()};
   Ledger& ledger = explained.objects[0].why;

@@ -185,6 +185,7 @@ class Examples {
     b.memory = coin() ? Memory::kWorking : Memory::kLongTerm;
     b.recalled = coin();
     b.why = ledger();
+    b.track = coin() ? 1 + below(99) : 0;
     return b;
   }
   void fill(Objects& m) {
@@ -195,28 +196,17 @@ class Examples {
          unit(),
          bits(),
          several([&] { return belief(); }),
-         covariance<Matrix6d>()};
+         covariance<Matrix6d>(),
+         bits(),
+         bits(),
+         uniform(0, 99),
+         several([&] { return endedTrack(); })};
   }
-  MergeOrder mergeOrder() {
-    const ObjectId survivor = 1 + below(99);
-    return {bits(), survivor, survivor + 1 + below(99)};
+  EndedTrack endedTrack() {
+    const TrackId into = coin() ? 1 + below(99) : 0;
+    return {into + 1 + below(99), into, time()};
   }
   void fill(ObjectState& m) { m = {stamp(), bits(), world(), belief()}; }
-  void fill(Recalled& m) {
-    m = {bits(),
-         world(),
-         coin(),
-         bits(),
-         bits(),
-         several([&] { return belief(); }),
-         bits(),
-         time(),
-         coin(),
-         coin(),
-         coin(),
-         several([&] { return mergeOrder(); }),
-         several([&] { return mergeOrder(); })};
-  }
   void fill(Event& m) {
     m = {stamp(), bits(),        world(), static_cast<EventKind>(below(18)), bits(), bits(),
          word(),  uniform(0, 1), word()};
@@ -282,6 +272,24 @@ class Examples {
   void fill(MapFrame& m) {
     m = {stamp(), bits(),    world(),   world(),  pose(), covariance<Eigen::Matrix4d>(),
          bits(),  below(99), below(99), below(99)};
+  }
+  Member member() {
+    const ObjectId object = 1 + below(99);
+    return {object + 1 + below(99), object};
+  }
+  void fill(MapNear& m) {
+    m = {stamp(),
+         bits(),
+         bits(),
+         world(),
+         bits(),
+         time(),
+         bits(),
+         coin(),
+         coin(),
+         several([&] { return member(); }),
+         several([&] { return belief(); }),
+         several([&] { return belief(); })};
   }
   void fill(MapQuery& m) {
     m = {bits(),

@@ -158,14 +158,36 @@ TEST(Refusals, OfPoseErrorsThatAreNone) {
   EXPECT_EQ(refusal(objects), "");
 }
 
-TEST(Refusals, OfMergesOfNothingAndOfOneObjectWithItself) {
-  Recalled recalled = example<Recalled>();
-  recalled.merges = {{3, 7, 9}, {3, 8, 10}};
-  EXPECT_EQ(refusal(recalled), "");
-  recalled.merges[1].absorbed = 8;
-  EXPECT_EQ(refusal(recalled), "out_of_range merges[1].absorbed");
-  recalled.merges[1] = {3, 0, 10};
-  EXPECT_EQ(refusal(recalled), "out_of_range merges[1].absorbed");
+TEST(Refusals, OfMembersWithoutTrackOrObject) {
+  MapNear near = example<MapNear>();
+  near.members = {{9, 7}, {10, 8}};
+  EXPECT_EQ(refusal(near), "");
+  near.members[1].object = 0;
+  EXPECT_EQ(refusal(near), "out_of_range members[1].object");
+  near.members[1] = {0, 8};
+  EXPECT_EQ(refusal(near), "out_of_range members[1].object");
+}
+
+TEST(Refusals, OfTracksThatEndedInThemselvesAndOfTooMany) {
+  Objects objects = example<Objects>();
+  objects.ended = {{9, 7, {}}, {10, 0, {}}};
+  EXPECT_EQ(refusal(objects), "");
+  objects.ended[1].into = 10;
+  EXPECT_EQ(refusal(objects), "out_of_range ended[1].track");
+  objects.ended[1] = {0, 8, {}};
+  EXPECT_EQ(refusal(objects), "out_of_range ended[1].track");
+  objects.ended.assign(kMostEnded, {9, 7, {}});
+  EXPECT_EQ(refusal(objects), "");
+  objects.ended.push_back({9, 7, {}});
+  EXPECT_EQ(refusal(objects), "over_bound ended");
+}
+
+TEST(Refusals, OfDistancesBelowZero) {
+  Objects objects = example<Objects>();
+  objects.near_m = -1.0;
+  EXPECT_EQ(refusal(objects), "out_of_range near_m");
+  objects.near_m = 0.0;  // the map is to give nothing
+  EXPECT_EQ(refusal(objects), "");
 }
 
 TEST(Refusals, OfRotationsThatAreNone) {

@@ -128,8 +128,8 @@ template <class T>
 class Damaged : public testing::Test {};
 using Messages =
     testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                   ModelInfo, SwapNotice, Objects, ObjectState, Recalled, Event, Predictions,
-                   MapTile, MapHeader, MapFrame, MapQuery, MapReply, Health>;
+                   ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile,
+                   MapHeader, MapFrame, MapNear, MapQuery, MapReply, Health>;
 TYPED_TEST_SUITE(Damaged, Messages);
 
 TYPED_TEST(Damaged, MessagesGiveASoundValueOrAReason) {

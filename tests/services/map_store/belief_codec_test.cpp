@@ -48,9 +48,31 @@ TEST(BeliefCodec, ReadsTheFormatWithoutLedgers) {
   EXPECT_EQ(encodeBelief(*back), encodeBelief(belief));
   bytes.push_back(0);
   EXPECT_FALSE(decodeBelief(bytes).has_value());
-  Bytes header = encodeHeader(test::workingSet(9, {belief}));
-  header[0] = 1;
-  EXPECT_TRUE(decodeHeader(header).has_value());
+}
+
+TEST(BeliefCodec, ReadsHeadersWithoutThePoseError) {
+  Objects objects = test::workingSet(9, {carAt(4, {1, 2, 3})});
+  objects.pose_error.setIdentity();
+  Bytes header = encodeHeader(objects);
+  header.resize(header.size() - 36 * sizeof(double));
+  for (const std::uint8_t version : {1, 2}) {
+    header[0] = version;
+    const auto back = decodeHeader(header);
+    ASSERT_TRUE(back.has_value()) << back.error().detail;
+    EXPECT_EQ(back->next_id, 5u);
+    EXPECT_TRUE(back->pose_error.isZero(0.0));
+  }
+  header[0] = 3;
+  EXPECT_FALSE(decodeHeader(header).has_value());
+}
+
+TEST(BeliefCodec, ReadsBeliefsOfTheSecondFormatAsTheyAre) {
+  const ObjectBelief belief = carAt(4, {1, 2, 3});
+  Bytes bytes = encodeBelief(belief);
+  bytes[0] = 2;
+  const auto back = decodeBelief(bytes);
+  ASSERT_TRUE(back.has_value()) << back.error().detail;
+  EXPECT_EQ(encodeBelief(*back), encodeBelief(belief));
 }
 
 TEST(BeliefCodec, RefusesALedgerThatClaimsMoreThanThereIs) {
@@ -65,6 +87,7 @@ TEST(BeliefCodec, GivesBackEveryBitOfAHeader) {
   Objects objects = test::workingSet(9, {carAt(4, {0, 0, 0})});
   objects.T_WB = RigidTransform(Eigen::Quaterniond(0.5, 0.1, -0.3, 0.7), {4, 5, 6});
   objects.up_W = {0.01, 0.02, 0.9997};
+  objects.pose_error(3, 2) = 0.125;
   const auto back = decodeHeader(encodeHeader(objects));
   ASSERT_TRUE(back.has_value());
   EXPECT_TRUE(back->stamp.sameFrame(objects.stamp));
@@ -74,13 +97,14 @@ TEST(BeliefCodec, GivesBackEveryBitOfAHeader) {
   EXPECT_EQ(back->T_WB.p, objects.T_WB.p);
   EXPECT_EQ(back->up_W, objects.up_W);
   EXPECT_EQ(back->next_id, 5u);
+  EXPECT_EQ(back->pose_error, objects.pose_error);
   EXPECT_TRUE(back->objects.empty());
 }
 
 TEST(BeliefCodec, WritesItsVersionAndIdLittleEndian) {
   const Bytes bytes = encodeBelief(carAt(0x0102030405060708u, {0, 0, 0}));
   const Bytes head(bytes.begin(), bytes.begin() + 10);
-  EXPECT_EQ(head, (Bytes{2, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
+  EXPECT_EQ(head, (Bytes{3, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
 }
 
 TEST(BeliefCodec, RefusesEveryTruncation) {
@@ -97,7 +121,7 @@ TEST(BeliefCodec, RefusesLeftOverBytesOtherVersionsAndNoClass) {
   longer.push_back(0);
   EXPECT_FALSE(decodeBelief(longer).has_value());
   Bytes newer = encodeBelief(carAt(3, {1, 2, 3}));
-  newer[0] = 3;
+  newer[0] = 4;
   EXPECT_FALSE(decodeBelief(newer).has_value());
   ObjectBelief nothing = carAt(3, {1, 2, 3});
   nothing.classes.clear();

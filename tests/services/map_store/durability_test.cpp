@@ -20,7 +20,7 @@ using test::carAt;
   config.store_path = path;
   Node node(config, 5,
             {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
-             [](const MapReply&) {}, [](const Recalled&) {}});
+             [](const MapReply&) {}, [](const MapNear&) {}});
   std::vector<ObjectBelief> cars;
   for (ObjectId id = 1;; ++id) {
     cars.push_back(carAt(id, {1.0 * static_cast<double>(id), 0, 0}));
@@ -74,7 +74,7 @@ TEST(MapStoreDurability, LosesNothingThatWasCommittedWhenItIsKilled) {
     for (auto& [id, saved] : graph.changed.edges) saved.weight = 1.0 / static_cast<double>(n);
     const Objects objects = test::workingSet(n, {carAt(n, {1, 2, 3})});
     Batch batch{&objects, {}, {}};
-    batch.graph = &graph;
+    batch.graph = batch.facts = &graph;
     if (!database.write(batch)) _exit(1);
     if (write(pipe, &n, sizeof n) != static_cast<ssize_t>(sizeof n)) _exit(1);
   }
@@ -110,6 +110,8 @@ TEST(MapStoreDurability, KeepsAllOfAGraphOfOneCommitWhenItIsKilled) {
     EXPECT_EQ(graph->malformed, 0u);
     ASSERT_EQ(graph->map.anchors.size(), 400u);
     ASSERT_EQ(graph->map.edges.size(), 500u);
+    EXPECT_EQ(graph->map.facts.size(), 5u);
+    EXPECT_EQ(graph->map.tracks.size(), 10u);
     const double n = graph->map.anchors.begin()->second.T_MA.p.x();
     EXPECT_GE(n, static_cast<double>(durable));
     EXPECT_LE(n, static_cast<double>(durable + 1));

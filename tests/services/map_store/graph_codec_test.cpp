@@ -109,6 +109,7 @@ TEST(GraphCodec, GivesBackEveryBitOfARecord) {
     EXPECT_EQ(back->sighting.in_anchor.covariance, record.sighting.in_anchor.covariance);
     ASSERT_EQ(back->sighting.in_anchor.pmf.size(), record.sighting.in_anchor.pmf.size());
     EXPECT_TRUE(back->confirmed);
+    EXPECT_FALSE(back->gone);
     ASSERT_EQ(back->earlier.has_value(), record.earlier.has_value());
     if (!record.earlier) continue;
     ++with_earlier;

@@ -27,7 +27,7 @@ class GraphTables : public ::testing::Test {
   Result<Written> write(MapDatabase& database, const Unsaved& graph) {
     const Objects objects = workingSet(++sequence_, {carAt(1, {0, 0, 0})});
     Batch batch{&objects, {}, {}};
-    batch.graph = &graph;
+    batch.graph = batch.facts = &graph;
     return database.write(batch);
   }
   void write(const Unsaved& graph) {
@@ -68,6 +68,13 @@ class GraphTables : public ::testing::Test {
     for (const auto& [id, record] : map.records) {
       EXPECT_TRUE(map.anchors.contains(record.sighting.anchor));
       EXPECT_TRUE(!record.earlier || map.anchors.contains(record.earlier->anchor));
+    }
+    for (const auto& [id, record] : map.tracks) {
+      EXPECT_TRUE(map.anchors.contains(record.sighting.anchor));
+      EXPECT_TRUE(!record.earlier || map.anchors.contains(record.earlier->anchor));
+    }
+    for (const mapping::SameObject& fact : map.facts) {
+      EXPECT_TRUE(fact.loop == 0 || map.edges.contains(fact.loop));
     }
   }
 
@@ -111,10 +118,17 @@ TEST_F(GraphTables, TakeWhatHasChangedAndKeepTheRest) {
   map.edges.at(5).weight = 0.25;
   more.changed.edges[5] = map.edges.at(5);
   more.changed.records[4] = map.records[4] = random.record(4, map);
+  more.changed.tracks[4] = map.tracks[4] = random.trackRecord(4, map);
+  more.changed.facts = {{200, 4, 60}};
   more.edges_gone = {7, 8};
   more.records_gone = {10, 99, 5000};
+  more.tracks_gone = {2, 1002, 5000};
+  more.facts_gone = {*map.facts.begin(), {60, 5000, 5001}};
+  map.facts.insert({200, 4, 60});
   for (const auto id : more.edges_gone) map.edges.erase(id);
   for (const auto id : more.records_gone) map.records.erase(id);
+  for (const auto id : more.tracks_gone) map.tracks.erase(id);
+  for (const auto& fact : more.facts_gone) map.facts.erase(fact);
   write(more);
   EXPECT_TRUE(bitsOf(read().map) == bitsOf(map));
 }
@@ -347,89 +361,74 @@ TEST_F(GraphTables, StayAsTheyWereWhereTheDiskIsFull) {
   EXPECT_EQ(read().map.edges.size(), map.edges.size() - 1);
 }
 
-class UndoneMerge : public GraphTables {
- protected:
-  static constexpr ObjectId kOld = 3, kNew = 9;
-
-  UndoneMerge() : graph_{RandomGraph(5).map({40, 60, 20, 1, 0}), {}, {}} {
-    commit({carAt(kOld, {1, 2, 0}), carAt(kNew, {8, 2, 0})}, {}, {});
-    const mapping::EdgeId loop = graph_.changed.edges.rbegin()->first;
-    order_ = {loop, kOld, kNew};
-    graph_.changed.merges[kNew] = {loop, kOld, false, graph_.changed.records.at(kOld),
-                                   graph_.changed.records.at(kNew)};
-    commit({carAt(kOld, {1, 2, 0}), carAt(kNew, {8, 2, 0})}, {}, {});
-  }
-  void commit(std::vector<ObjectBelief> beliefs, std::map<ObjectId, Removal> removed,
-              std::vector<MergeOrder> splits) {
-    const Objects objects = workingSet(++commits_, std::move(beliefs));
-    Batch batch{&objects, {}, std::move(removed)};
-    batch.graph = &graph_;
-    batch.splits = std::move(splits);
-    MapDatabase database({path()});
-    const auto written = database.write(batch);
-    ASSERT_TRUE(written.has_value()) << written.error().detail;
-  }
-  /// The survivor is seen where the absorbed one was.
-  ObjectBelief joined() const {
-    ObjectBelief belief = carAt(kOld, {8.1, 2, 0});
-    belief.last_seen += std::chrono::seconds(5);
-    return belief;
-  }
-  void merge() {
-    commit({joined()}, {{kNew, {EventKind::kMerged, fromNanoseconds(900'000'000), kOld}}}, {});
-    ASSERT_EQ(placeOf(kNew), std::nullopt);
-    ASSERT_NEAR(placeOf(kOld)->x(), 8.1, 1e-12);
-  }
-  void withdraw() {
-    graph_.changed.merges.clear();
-    graph_.merges_gone = {kNew};
-  }
-  std::optional<Eigen::Vector3d> placeOf(ObjectId id) {
-    const auto connection = openStoreForReading(path());
-    const auto place = MapReader(&connection).placeOf(id);
-    return place && *place ? std::optional((*place)->p_W) : std::nullopt;
-  }
-
-  Unsaved graph_;
-  MergeOrder order_;
-  std::uint64_t commits_ = 10;
-};
-
-TEST_F(UndoneMerge, GivesTheSurvivorBackAsItWasAndTheAbsorbedOneWhatWasSeenSince) {
-  merge();
-  withdraw();
-  ObjectBelief renamed = joined();
-  renamed.id = kNew;
-  commit({renamed}, {}, {order_});
-  EXPECT_EQ(*placeOf(kOld), Eigen::Vector3d(1, 2, 0));
-  EXPECT_EQ(*placeOf(kNew), Eigen::Vector3d(8.1, 2, 0));
-  EXPECT_EQ(ask("SELECT count(*) FROM positions WHERE id IN (3, 9)"), 2);
-  EXPECT_EQ(ask("SELECT count(*) FROM merges"), 0);
-  EXPECT_EQ(ask("SELECT memory FROM objects WHERE id = 3"),
-            static_cast<std::int64_t>(Memory::kLongTerm));
+TEST_F(GraphTables, AFactOfALoopThatIsLeftOutStaysForGoodAndIsSwept) {
+  auto map = writeSome();
+  change("UPDATE edges SET edge = x'00' WHERE id = 60");
+  map.edges.erase(60);
+  std::set<mapping::SameObject> final;
+  for (const auto& fact : map.facts) final.insert({0, fact.a, fact.b});
+  ASSERT_NE(map.facts, final);
+  EXPECT_EQ(read().map.facts, final);
+  MapDatabase database({path()});
+  map.facts = database.takeGraph().value().map.facts;
+  // Another loop gets the id, and a fact of its own.
+  Unsaved more;
+  more.changed.classes = map.classes;
+  more.changed.edges[60] = map.edges[60] = RandomGraph(8).edge(4, 30, mapping::EdgeKind::kLoop);
+  more.changed.facts = {{60, 6, 7}};
+  map.facts.insert({60, 6, 7});
+  ASSERT_TRUE(write(database, more).has_value());
+  EXPECT_EQ(read().malformed, 0u);
+  EXPECT_TRUE(bitsOf(read().map) == bitsOf(map));
 }
 
-TEST_F(UndoneMerge, WorksWhereTheObjectHasLeftTheWorkingSet) {
-  merge();
-  commit({}, {}, {});
-  withdraw();
-  commit({}, {}, {order_});
-  EXPECT_EQ(*placeOf(kOld), Eigen::Vector3d(1, 2, 0));
-  EXPECT_EQ(*placeOf(kNew), Eigen::Vector3d(8.1, 2, 0)) << "what was seen since is of it";
+TEST_F(GraphTables, AnEarlierSightingOfATrackFromAnAnchorThatIsGoneIsLeftOutAndSwept) {
+  auto map = writeSome();
+  map.tracks.at(1).sighting.anchor = 2;
+  map.tracks.at(1).earlier = map.tracks.at(1).sighting;
+  map.tracks.at(1).earlier->anchor = 40;
+  Unsaved more;
+  more.changed.classes = map.classes;
+  more.changed.tracks[1] = map.tracks.at(1);
+  write(more);
+  change("DELETE FROM anchors WHERE id = 40");
+  ASSERT_TRUE(read().map.tracks.contains(1));
+  EXPECT_FALSE(read().map.tracks.at(1).earlier);
+  MapDatabase database({path()});
+  (void)database.takeGraph();
+  Unsaved again;
+  again.changed.classes = map.classes;
+  again.changed.anchors[40] = map.anchors.at(40);
+  ASSERT_TRUE(write(database, again).has_value());
+  EXPECT_EQ(read().malformed, 0u);
+  EXPECT_FALSE(read().map.tracks.at(1).earlier) << "the new anchor is another one";
 }
 
-TEST_F(UndoneMerge, ChangesNothingWhereTheOrderWasNeverObeyed) {
-  withdraw();
-  commit({carAt(kOld, {1, 2, 0}), carAt(kNew, {8, 2, 0})}, {}, {order_});
-  EXPECT_EQ(*placeOf(kOld), Eigen::Vector3d(1, 2, 0));
-  EXPECT_EQ(*placeOf(kNew), Eigen::Vector3d(8, 2, 0));
+TEST_F(GraphTables, LeaveOutFactsThatJoinNothing) {
+  const auto map = writeSome();
+  change("INSERT INTO same VALUES(0, 0, 5), (0, 6, 0), (0, 7, 7), (0, 'six', 8)");
+  EXPECT_EQ(read().map.facts, map.facts);
 }
 
-TEST_F(UndoneMerge, MapsOfTheFirstSchemaThreeAreGivenTheTable) {
-  change("DROP TABLE merges");
-  EXPECT_EQ(read().malformed, 0u) << "a reader does without";
-  merge();
-  EXPECT_EQ(ask("SELECT count(*) FROM merges"), 1);
+TEST_F(GraphTables, AnObjectWithoutFactsGoesOnAsOneTrack) {
+  const auto map = writeSome();
+  Unsaved more;
+  more.changed.classes = map.classes;
+  more.changed.records[50] = map.records.at(50);
+  more.changed.records[50].sighting.in_anchor.id = 2000;  // its newest track
+  write(more);
+  EXPECT_EQ(read().map.records.at(50).sighting.in_anchor.id, 50u);
+  more.changed.facts = {{0, 50, 2000}};
+  write(more);
+  EXPECT_EQ(read().map.records.at(50).sighting.in_anchor.id, 2000u);
+}
+
+TEST_F(GraphTables, MapsOfTheFirstSchemaFourAreGivenTheTablesOfTracks) {
+  const auto map = writeSome();
+  change("DROP TABLE same; DROP TABLE track_sightings; DROP TABLE tracks");
+  EXPECT_EQ(read().malformed, 0u);
+  write({map, {}, {}});
+  EXPECT_TRUE(bitsOf(read().map) == bitsOf(map));
 }
 
 }  // namespace

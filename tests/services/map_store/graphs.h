@@ -12,7 +12,7 @@
 namespace perdure::map_store::test {
 
 struct GraphSize {
-  std::size_t anchors = 40, edges = 60, records = 100, sessions = 2, merges = 5, views = 12;
+  std::size_t anchors = 40, edges = 60, records = 100, sessions = 2, shared = 5, views = 12;
 };
 
 class RandomGraph {
@@ -38,8 +38,7 @@ class RandomGraph {
       map.edges[next++] = edge(a, b, mapping::EdgeKind::kLoop);
     }
     for (ObjectId id = 1; id <= size.records; ++id) map.records[id] = record(id, map);
-    for (ObjectId id = 1; id <= size.merges; ++id)
-      map.merges[1000 + id] = merge(id, 1000 + id, map);
+    for (ObjectId id = 1; id <= size.shared; ++id) share(id, map);
     for (std::uint64_t id = 1; id <= std::min(size.views, size.anchors); ++id) {
       map.views[id] = view(1 + random_() % mapping::kMostPoints);
     }
@@ -91,14 +90,21 @@ class RandomGraph {
     return record;
   }
 
-  mapping::HungMerge merge(ObjectId survivor, ObjectId absorbed, const mapping::SavedMap& map) {
-    mapping::HungMerge merge{map.edges.rbegin()->first, survivor, random_() % 2 == 0,
-                             record(survivor, map), record(absorbed, map)};
-    merge.absorbed_before.confirmed = random_() % 2 == 0;
-    return merge;
+  mapping::ObjectRecord trackRecord(TrackId id, const mapping::SavedMap& map) {
+    mapping::ObjectRecord record = this->record(id, map);
+    record.confirmed = random_() % 2 == 0;
+    record.gone = random_() % 4 == 0;
+    return record;
   }
 
  private:
+  /// The object gets a second track, by the newest loop or by the filter.
+  void share(ObjectId id, mapping::SavedMap& map) {
+    const TrackId other = 1000 + id;
+    map.tracks[id] = trackRecord(id, map);
+    map.tracks[other] = trackRecord(other, map);
+    map.facts.insert({random_() % 4 == 0 ? 0 : map.edges.rbegin()->first, id, other});
+  }
   mapping::SavedAnchor savedAnchor(mapping::AnchorId id, mapping::AnchorId previous,
                                    const mapping::SavedMap& map) {
     mapping::SavedAnchor saved{anchor(id, previous), pose(), false};
@@ -161,9 +167,16 @@ inline std::string bitsOf(const mapping::SavedMap& map) {
     out.put(record.confirmed);
     add(encodeRecord(record));
   }
-  for (const auto& [absorbed, merge] : map.merges) {
-    out.put(absorbed);
-    add(encodeMerge(merge));
+  for (const auto& [id, record] : map.tracks) {
+    out.put(id);
+    out.put(record.confirmed);
+    out.put(record.gone);
+    add(encodeRecord(record));
+  }
+  for (const mapping::SameObject& fact : map.facts) {
+    out.put(fact.loop);
+    out.put(fact.a);
+    out.put(fact.b);
   }
   for (const auto& [anchor, view] : map.views) {
     out.put(anchor);

@@ -33,7 +33,7 @@ class MapCopy : public ::testing::Test {
     const Objects objects = workingSet(count, cars);
     const mapping::Unsaved graph{map_, {}, {}};
     Batch batch{&objects, {}, {}};
-    batch.graph = &graph;
+    batch.graph = batch.facts = &graph;
     ASSERT_TRUE(database.write(batch).has_value());
   }
   void expectCopy(std::size_t count) const {
@@ -113,7 +113,9 @@ TEST_F(MapCopy, KeepsAnOlderSchemaUntilItIsOpened) {
     ASSERT_TRUE(connection
                     ->execute("DROP VIEW objects_in_map; DROP TABLE anchors; DROP TABLE edges;"
                               "DROP TABLE anchor_poses; DROP TABLE sightings;"
-                              "DROP TABLE graph_classes; PRAGMA user_version=2")
+                              "DROP TABLE graph_classes; DROP TABLE same; DROP TABLE tracks;"
+                              "DROP TABLE track_sightings; DROP TABLE views;"
+                              "PRAGMA user_version=2")
                     .has_value());
   }
   copyMap(from_, to_);

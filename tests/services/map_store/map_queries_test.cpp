@@ -222,6 +222,40 @@ TEST_F(MapQueries, GiveObjectsByTheirIdsInTheOrderAskedFor) {
   EXPECT_FALSE(database_.reader().byIds({9, 3, 1000}, 2).value().truncated);
 }
 
+TEST_F(MapQueries, GiveInFullWhatIsNearInTheWorkingSetOrNot) {
+  const Objects fewer = workingSet(2, {all_.objects[0]});
+  ASSERT_TRUE(database_.write({&fewer, {}, {}}).has_value());
+  MapQuery query;
+  query.kind = MapQueryKind::kByRadius;
+  query.low = all_.objects[0].best().mean.head<3>();
+  query.radius = 8.0;
+  const auto near = database_.reader().inFullNear(query.low, query.radius, kWorld, 1000).value();
+  EXPECT_EQ(idsOf(near), idsOf(ask(query)));
+  ASSERT_GT(near.beliefs.size(), 3u);
+  bool working = false;
+  for (std::size_t k = 0; k < near.beliefs.size(); ++k) {
+    EXPECT_EQ(near.beliefs[k].id, near.objects[k].id);
+    EXPECT_EQ(near.beliefs[k].best().mean, all_.objects[near.beliefs[k].id - 1].best().mean);
+    working = working || near.beliefs[k].id == 1;
+  }
+  EXPECT_TRUE(working);
+  EXPECT_TRUE(database_.reader().inFullNear(query.low, query.radius, kWorld, 2).value().truncated);
+  EXPECT_TRUE(
+      database_.reader().inFullNear(query.low, query.radius, {77, 2}, 2).value().beliefs.empty());
+}
+
+TEST_F(MapQueries, GiveTheBeliefOfATrackWithItsWorldUntilItIsGone) {
+  const auto placed = database_.reader().beliefOf(9).value();
+  ASSERT_TRUE(placed);
+  EXPECT_EQ(placed->world, kWorld);
+  EXPECT_EQ(encodeBelief(placed->belief), encodeBelief(all_.objects[8]));
+  EXPECT_FALSE(database_.reader().beliefOf(1000).value());
+  Objects later = workingSet(3, {});
+  const Removal gone{EventKind::kGone, fromNanoseconds(250'000'000), 0};
+  ASSERT_TRUE(database_.write({&later, {}, {{9, gone}}}).has_value());
+  EXPECT_FALSE(database_.reader().beliefOf(9).value());
+}
+
 TEST_F(MapQueries, AWriteSaysWhichObjectsItChanged) {
   Objects next = all_;
   next.stamp.sequence = 2;

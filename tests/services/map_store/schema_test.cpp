@@ -174,7 +174,7 @@ TEST(Schema, TakesOverMapsOfOlderVersionsWithAllTheirObjects) {
     EXPECT_EQ(versionOf(path), version);  // a reader changes nothing
     MapDatabase database({path});
     EXPECT_TRUE(database.notice().empty());
-    EXPECT_EQ(versionOf(path), 3);
+    EXPECT_EQ(versionOf(path), 4);
     const auto beliefs = database.reader().beliefs().value();
     ASSERT_EQ(beliefs.size(), 60u);
     EXPECT_EQ(encodeBelief(beliefs[6].belief), encodeBelief(carAt(7, {7, 0, 0})));
@@ -182,10 +182,75 @@ TEST(Schema, TakesOverMapsOfOlderVersionsWithAllTheirObjects) {
     const mapping::Unsaved graph{test::RandomGraph(1).map({}), {}, {}};
     const Objects objects = workingSet(1, {});
     Batch batch{&objects, {}, {}};
-    batch.graph = &graph;
+    batch.graph = batch.facts = &graph;
     ASSERT_TRUE(database.write(batch).has_value());
     EXPECT_TRUE(test::bitsOf(database.reader().graph().value().map) == test::bitsOf(graph.changed));
   }
+}
+
+/// As Perdure made it of schema 3: object 9 was merged into 3, which the map could undo.
+void makeThird(const std::string& path) {
+  {
+    MapDatabase database({path});
+    const mapping::Unsaved graph{test::RandomGraph(1).map({.shared = 0}), {}, {}};
+    const Objects objects = workingSet(1, {carAt(3, {1, 2, 0}), carAt(9, {8, 2, 0})});
+    Batch batch{&objects, {}, {}};
+    batch.graph = &graph;
+    ASSERT_TRUE(database.write(batch).has_value());
+    const Objects merged = workingSet(2, {carAt(3, {1, 2, 0})});
+    const Removal into{EventKind::kMerged, fromNanoseconds(200'000'000), 3};
+    ASSERT_TRUE(database.write({&merged, {}, {{9, into}}}).has_value());
+  }
+  const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
+  const auto done = connection->execute(
+      "DROP TABLE same; DROP TABLE tracks; DROP TABLE track_sightings;"
+      "CREATE TABLE merges(absorbed INTEGER PRIMARY KEY, survivor INTEGER NOT NULL,"
+      "  loop INTEGER NOT NULL, done INTEGER NOT NULL, undo BLOB NOT NULL, world INTEGER,"
+      "  epoch INTEGER, belief BLOB);"
+      "INSERT INTO merges SELECT 9, 3, 60, 1, x'0100', world, epoch, belief FROM objects"
+      "  WHERE id = 3;"
+      "PRAGMA user_version=3");
+  ASSERT_TRUE(done.has_value()) << done.error().detail;
+}
+
+TEST(Schema, TakesOverAMapOfTheThirdVersionWhoseMergesAreFinal) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("map.sqlite");
+  makeThird(path);
+  std::string graph_as_it_was;
+  {
+    const Connection reading = openStoreForReading(path);
+    const MapReader reader(&reading);
+    EXPECT_EQ(reader.beliefs().value().size(), 1u);
+    const auto graph = reader.graph().value();
+    EXPECT_EQ(graph.malformed, 0u);
+    EXPECT_TRUE(graph.map.tracks.empty() && graph.map.facts.empty());
+    EXPECT_EQ(reader.working().value()->objects.size(), 1u);
+    graph_as_it_was = test::bitsOf(graph.map);
+  }
+  EXPECT_EQ(versionOf(path), 3);  // a reader changes nothing
+  MapDatabase database({path});
+  EXPECT_EQ(versionOf(path), 4);
+  const MapReader reader = database.reader();
+  EXPECT_TRUE(test::bitsOf(database.takeGraph().value().map) == graph_as_it_was);
+  EXPECT_TRUE(reader.facts().value().empty());
+  const auto beliefs = reader.beliefs().value();
+  ASSERT_EQ(beliefs.size(), 1u);
+  EXPECT_EQ(encodeBelief(beliefs[0].belief), encodeBelief(carAt(3, {1, 2, 0})));
+  EXPECT_THAT(reader.mergedInto(3).value(), ::testing::ElementsAre(9u));
+  EXPECT_EQ(openStoreForReading(path)
+                .integer("SELECT count(*) FROM sqlite_master WHERE name = 'merges'")
+                .value(),
+            0);
+  // It goes on: a loop is withdrawn, and nothing is parted.
+  const mapping::Unsaved withdrawn{{}, {60}, {}};
+  const Objects objects = workingSet(3, {carAt(3, {1, 2, 0})});
+  const mapping::Identity identity;
+  Batch batch{&objects, {}, {}};
+  batch.graph = batch.facts = &withdrawn;
+  batch.identity = &identity;
+  ASSERT_TRUE(database.write(batch).has_value());
+  EXPECT_EQ(reader.beliefs().value().size(), 1u);
 }
 
 TEST(Schema, LeavesAnOlderMapAsItWasWhereItCannotBeTakenOver) {

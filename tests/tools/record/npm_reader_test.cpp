@@ -40,9 +40,9 @@ void addAll(replay::RecordingWriter& recording) {
   addExamples<ModelInfo>(recording, "model");
   addExamples<SwapNotice>(recording, "inference/swap");
   addExamples<Objects>(recording, "objects");
-  addExamples<Recalled>(recording, "recalled");
   addExamples<Event>(recording, "events");
   addExamples<Predictions>(recording, "predictions");
+  addExamples<MapNear>(recording, "map/near");
   addExamples<MapQuery>(recording, "map/query");
   addExamples<MapReply>(recording, "map/reply");
   addExamples<Health>(recording, "health");

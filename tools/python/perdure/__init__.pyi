@@ -44,10 +44,9 @@ from .messages import ClassLedger as ClassLedger
 from .messages import OustedClass as OustedClass
 from .messages import Ledger as Ledger
 from .messages import ObjectBelief as ObjectBelief
+from .messages import EndedTrack as EndedTrack
 from .messages import Objects as Objects
 from .messages import ObjectState as ObjectState
-from .messages import MergeOrder as MergeOrder
-from .messages import Recalled as Recalled
 from .messages import Event as Event
 from .messages import Prediction as Prediction
 from .messages import Predictions as Predictions
@@ -55,6 +54,8 @@ from .messages import MapObject as MapObject
 from .messages import MapTile as MapTile
 from .messages import MapHeader as MapHeader
 from .messages import MapFrame as MapFrame
+from .messages import Member as Member
+from .messages import MapNear as MapNear
 from .messages import MapQuery as MapQuery
 from .messages import MapAnchor as MapAnchor
 from .messages import MapLoopPair as MapLoopPair

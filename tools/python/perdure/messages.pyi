@@ -227,6 +227,7 @@ class ObjectBelief(Message):
     memory: Literal["working", "long_term"]  # working | long_term
     recalled: bool  # bool
     why: Ledger  # Ledger, the evidence for it, in nats
+    track: int  # int
     @property
     def position(self) -> Array: ...  # (3,) centre, m.
     @property
@@ -246,6 +247,11 @@ class ObjectBelief(Message):
     @property
     def covariance(self) -> Array: ...  # (7, 7) of ``mean``.
 
+class EndedTrack(Message):
+    track: int  # int
+    into: int  # int
+    time_ns: int  # ns, sensor clock
+
 class Objects(Message):
     stamp: FrameStamp  # FrameStamp
     instance: int  # int
@@ -255,6 +261,10 @@ class Objects(Message):
     next_id: int  # int
     objects: List[ObjectBelief]  # list of ObjectBelief
     pose_error: npt.NDArray[np.float64]  # (6, 6), symmetric, of [θ, p]: what cross_pose refers to
+    near_source: int  # int
+    near_revision: int  # int
+    near_m: float  # float
+    ended: List[EndedTrack]  # list of EndedTrack
     def __iter__(self) -> Iterator[ObjectBelief]: ...
     def __len__(self) -> int: ...
     @property
@@ -275,26 +285,6 @@ class ObjectState(Message):
     def id(self) -> int: ...  # The object's id, by which the topic is keyed.
     @id.setter
     def id(self, value: Any) -> None: ...
-
-class MergeOrder(Message):
-    loop: int  # int
-    survivor: int  # int
-    absorbed: int  # int
-
-class Recalled(Message):
-    instance: int  # int
-    world: WorldId  # WorldId
-    restore: bool  # bool
-    client: int  # int
-    next_id: int  # int
-    objects: List[ObjectBelief]  # list of ObjectBelief
-    request: int  # int
-    kept_ns: int  # ns, sensor clock
-    truncated: bool  # bool
-    laid: bool  # bool
-    graph: bool  # bool
-    merges: List[MergeOrder]  # list of MergeOrder
-    splits: List[MergeOrder]  # list of MergeOrder
 
 class Event(Message):
     stamp: FrameStamp  # FrameStamp
@@ -384,6 +374,24 @@ class MapFrame(Message):
     sessions: int  # int
     loops: int  # int
     anchors: int  # int
+
+class Member(Message):
+    track: int  # int
+    object: int  # int
+
+class MapNear(Message):
+    stamp: FrameStamp  # FrameStamp
+    instance: int  # int
+    client: int  # int
+    world: WorldId  # WorldId
+    revision: int  # int
+    kept_ns: int  # ns, sensor clock
+    next_id: int  # int
+    corrects_drift: bool  # bool
+    more: bool  # bool
+    members: List[Member]  # list of Member
+    placed: List[ObjectBelief]  # list of ObjectBelief
+    as_published: List[ObjectBelief]  # list of ObjectBelief
 
 class MapQuery(Message):
     client: int  # int

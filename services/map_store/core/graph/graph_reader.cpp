@@ -157,7 +157,28 @@ void leaveOutDangling(SavedGraph& graph) {
     ++graph.malformed;
   }
   for (auto& [id, record] : map.tracks) {
-    if (record.earlier && !isKnown(*record.earlier, map)) record.earlier.reset();
+    if (!record.earlier || isKnown(*record.earlier, map)) continue;
+    record.earlier.reset();
+    ++graph.malformed;
+  }
+}
+
+/// Facts of a loop that was left out stay for good. Where facts are missing (a map from a server),
+/// an object goes on as one track.
+void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
+  SavedMap& map = graph.map;
+  for (mapping::SameObject fact : facts) {
+    if (fact.loop != 0 && !map.edges.contains(fact.loop)) {
+      fact.loop = 0;
+      ++graph.malformed;
+    }
+    map.facts.insert(fact);
+  }
+  const mapping::Identity identity(map.facts);
+  for (auto& [id, record] : map.records) {
+    if (identity.isShared(id)) continue;
+    record.sighting.in_anchor.id = id;
+    if (record.earlier) record.earlier->in_anchor.id = id;
   }
 }
 
@@ -214,11 +235,13 @@ Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return facts;
   std::uint64_t ignored = 0;
-  const auto done = takeRows(connection, "SELECT loop, a, b FROM same", ignored,
-                             [&](const Statement& row) {
-                               facts.insert({row.id(0), row.id(1), row.id(2)});
-                               return true;
-                             });
+  const auto done =
+      takeRows(connection, "SELECT loop, a, b FROM same", ignored, [&](const Statement& row) {
+        const mapping::SameObject fact{row.id(0), row.id(1), row.id(2)};
+        if (fact.a == 0 || fact.b == 0 || fact.a == fact.b) return false;
+        facts.insert(fact);
+        return true;
+      });
   if (!done) return tl::unexpected<Reason>(done.error());
   return facts;
 }
@@ -237,10 +260,7 @@ Result<SavedGraph> readGraph(const Connection& connection) {
   leaveOutBrokenChains(graph);
   leaveOutDangling(graph);
   holdEachComponent(graph.map);
-  for (mapping::SameObject fact : *facts) {  // of a loop that was left out: it stays for good
-    if (!graph.map.edges.contains(fact.loop)) fact.loop = 0;
-    graph.map.facts.insert(fact);
-  }
+  takeFacts(graph, *facts);
   return graph;
 }
 

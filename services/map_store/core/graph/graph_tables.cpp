@@ -195,8 +195,8 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
     unconfirmed += r.confirmed ? 0 : 1;
     return r.confirmed && isSound(r);
   });
-  const auto tracks = soundOnes(changed.tracks, refused,
-                                [](const mapping::ObjectRecord& record) { return isSound(record); });
+  const auto tracks = soundOnes(
+      changed.tracks, refused, [](const mapping::ObjectRecord& record) { return isSound(record); });
   const auto views =
       soundOnes(changed.views, refused, [](const mapping::View& view) { return isSound(view); });
   auto done = putClasses(connection, changed.classes);
@@ -226,6 +226,8 @@ Result<void> sweepGraph(const Connection& connection) {
   const mapping::SavedMap& map = whole->map;
   mapping::Unsaved shortened;
   for (const ObjectId id : whole->shortened) shortened.changed.records[id] = map.records.at(id);
+  shortened.changed.tracks = map.tracks;
+  shortened.changed.facts = map.facts;
   auto done = connection.execute("DELETE FROM graph_classes WHERE number < 0 OR number >= " +
                                  std::to_string(map.classes.size()));
   if (done) done = deleteOthers(connection, "anchors", map.anchors);
@@ -234,6 +236,8 @@ Result<void> sweepGraph(const Connection& connection) {
   if (done) done = deleteOthers(connection, "sightings", map.records);
   if (done) done = deleteOthers(connection, "track_sightings", map.tracks);
   if (done) done = deleteOthers(connection, "views", map.views, "anchor");
+  if (done) done = connection.execute("DELETE FROM same");
+  if (done) done = writeFacts(connection, shortened);
   if (!done) return done;
   const auto written = writeGraph(connection, shortened);
   if (!written) return tl::unexpected<Reason>(written.error());

@@ -71,7 +71,7 @@ inline Config configOf(const std::string& path, const std::string& url,
 
 inline Outputs noOutputs() {
   return {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
-          [](const MapReply&) {}, [](const Recalled&) {}};
+          [](const MapReply&) {}, [](const MapNear&) {}};
 }
 
 /// A vehicle's node and its replicator, as main.cpp ties them; each step is one commit.
@@ -89,14 +89,9 @@ class Vehicle {
       if (id % 10 == 5 && n >= id + 5) continue;  // it is gone
       cars.push_back(carAt(id, {3.0 * static_cast<double>(id), 0.1 * static_cast<double>(n), 0}));
     }
-    if (n % 10 == 0) {
-      Event event;
-      event.kind = EventKind::kGone;
-      event.object_id = n - 5;
-      event.stamp = workingSet(n, {}).stamp;
-      node_.onEvent(event);
-    }
-    node_.onObjects(workingSet(n, cars, filter_));
+    Objects objects = workingSet(n, cars, filter_);
+    if (n % 10 == 0) objects.ended = {{n - 5, 0, objects.stamp.time}};
+    node_.onObjects(objects);
     node_.tick(std::chrono::milliseconds(600 * n));
     fleet_.wake();
     node_.onAcknowledged(fleet_.progress().sent);

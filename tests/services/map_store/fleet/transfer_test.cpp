@@ -28,7 +28,7 @@ using ::testing::HasSubstr;
 /// A map of a graph and some objects, as a service or a fusion would leave it.
 void writeMap(const std::string& path, std::uint32_t seed, bool outbox = false) {
   MapDatabase database({.path = path, .outbox = outbox});
-  mapping::Unsaved graph{test::RandomGraph(seed).map({.merges = 0}), {}, {}};
+  mapping::Unsaved graph{test::RandomGraph(seed).map({.shared = 0}), {}, {}};
   std::vector<ObjectBelief> cars;
   for (ObjectId id = 1; id <= 60; ++id) {
     cars.push_back(test::carAt(id, {2.0 * static_cast<double>(id), 5, 0}));
@@ -64,7 +64,7 @@ TEST(FleetTransfer, AMapThatIsPushedAndPulledIsTheSame) {
     EXPECT_EQ(test::metaOf(from), test::metaOf(to));
     const MapDatabase opened({.path = to});
     EXPECT_EQ(test::bitsOf(opened.reader().graph()->map),
-              test::bitsOf(test::RandomGraph(seed).map({.merges = 0})));
+              test::bitsOf(test::RandomGraph(seed).map({.shared = 0})));
     EXPECT_FALSE(std::filesystem::exists(to + ".pulled"));
   }
   const auto maps = fleet::listMaps(url);
