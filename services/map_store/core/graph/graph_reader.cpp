@@ -30,7 +30,7 @@ Result<void> takeRows(const Connection& connection, std::string_view sql, std::u
 }
 
 /// Tables that came later than the graph.
-Result<bool> hasTable(const Connection& connection, const std::string& name) {
+Result<bool> tableExists(const Connection& connection, const std::string& name) {
   const auto count =
       connection.integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
   if (!count) return tl::unexpected<Reason>(count.error());
@@ -97,7 +97,7 @@ Result<void> readRecords(const Connection& connection, SavedGraph& graph) {
 }
 
 Result<void> readTracks(const Connection& connection, SavedGraph& graph) {
-  const auto there = hasTable(connection, "track_sightings");
+  const auto there = tableExists(connection, "track_sightings");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return {};
   auto& tracks = graph.map.tracks;
@@ -113,7 +113,7 @@ Result<void> readTracks(const Connection& connection, SavedGraph& graph) {
 }
 
 Result<void> readViews(const Connection& connection, SavedGraph& graph) {
-  const auto there = hasTable(connection, "views");
+  const auto there = tableExists(connection, "views");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return {};
   auto& views = graph.map.views;
@@ -218,7 +218,7 @@ Result<void> readAll(const Connection& connection, SavedGraph& graph) {
 
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
   std::set<mapping::SameObject> facts;
-  const auto there = hasTable(connection, "same");
+  const auto there = tableExists(connection, "same");
   if (!there) return tl::unexpected<Reason>(there.error());
   if (!*there) return facts;
   std::uint64_t ignored = 0;
