@@ -302,6 +302,7 @@ class LapDrive : public ::testing::Test {
     next_id_ = 1;
     kept_ = {};
     sayHello();
+    hear();  // it waits for the answer before its first frame
   }
   void sayHello() {
     MapQuery query;
