@@ -54,24 +54,25 @@ TEST_F(GraphSession, ABodyThatBeginsElsewhereIsRelocalisedOnceAndOldIdsSurvive) 
   while (count(EventKind::kRelocalised) == 0 && way_m_ < 1.2 * kLap_m) step();
   ASSERT_EQ(count(EventKind::kRelocalised), 1u);
   EXPECT_EQ(node_->reasons().of("relocalised"), 1u);
-  const MapNear laid = nears_.back();
-  EXPECT_EQ(laid.world, kElsewhere);
-  EXPECT_TRUE(laid.corrects_drift);
+  const MapNear near = nears_.back();
+  EXPECT_EQ(near.world, kElsewhere);
+  EXPECT_TRUE(near.corrects_drift);
   std::size_t joined = 0;
-  for (const Member& member : laid.members) {
+  for (const Member& member : near.members) {
     EXPECT_LT(member.object, first_new);
     EXPECT_EQ(thing_of_.at(member.object), thing_of_.at(member.track));
     if (!working_.contains(member.track)) continue;
     ++joined;
     EXPECT_GE(member.track, first_new);
-    EXPECT_TRUE(has(laid.placed, member.object));
+    EXPECT_TRUE(has(near.placed, member.object));
   }
   EXPECT_GE(joined, 3u);
-  EXPECT_THAT(laid.as_published, IsEmpty());
+  EXPECT_THAT(near.as_published, IsEmpty());
   const RigidTransform T_BM = onLap(way_m_).inverse();
-  for (const ObjectBelief& belief : laid.placed) {
-    const Eigen::Vector3d laid_B = T_WB_.inverse() * Eigen::Vector3d(belief.best().mean.head<3>());
-    EXPECT_LT((laid_B - T_BM * truthOf(belief.track)).norm(), 2.0) << belief.id;
+  for (const ObjectBelief& belief : near.placed) {
+    const Eigen::Vector3d placed_B =
+        T_WB_.inverse() * Eigen::Vector3d(belief.best().mean.head<3>());
+    EXPECT_LT((placed_B - T_BM * truthOf(belief.track)).norm(), 2.0) << belief.id;
     EXPECT_LE(belief.last_seen, stamp(sequence_).time) << "clocks of sessions do not compare";
   }
   node_->flush();
@@ -83,8 +84,8 @@ TEST_F(GraphSession, ABodyThatBeginsElsewhereIsRelocalisedOnceAndOldIdsSurvive) 
 
 TEST_F(GraphSession, WhatWasPlacedBeforeARestartIsStillNotWrittenOver) {
   start();
-  const MapNear laid = driveToTheLoop();
-  const ObjectBelief* unseen = unseenOf(laid);
+  const MapNear near = driveToTheLoop();
+  const ObjectBelief* unseen = unseenOf(near);
   ASSERT_NE(unseen, nullptr);
   const ObjectId id = unseen->id;
   const auto before = encodeBelief(stored(id));

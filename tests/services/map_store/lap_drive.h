@@ -50,7 +50,8 @@ inline std::vector<Thing> things(const Path& path = onLap, double length_m = kLa
   const char* names[] = {"car", "person", "car", "van", "car", "car", "person"};
   std::vector<Thing> result;
   double s = 2.0;
-  for (std::size_t i = 0; s < length_m; s += 4.0 + 0.9 * static_cast<double>((5 * i * i) % 7), ++i) {
+  for (std::size_t i = 0; s < length_m;
+       s += 4.0 + 0.9 * static_cast<double>((5 * i * i) % 7), ++i) {
     const double side = i % 3 == 1 ? -1.0 : 1.0;
     result.push_back(
         {path(s) * Eigen::Vector3d(0.0, side * (4.0 + 0.5 * static_cast<double>(i % 5)), 0.8),
