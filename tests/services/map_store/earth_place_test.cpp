@@ -119,7 +119,7 @@ TEST(EarthPlace, IsKeptInTheMapsFile) {
   const auto drive = [&](const WorldId& world, double x, bool with_anchor) {
     Node node(config, 1,
               {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
-               [](const MapReply&) {}, [](const Recalled&) {}});
+               [](const MapReply&) {}, [](const MapNear&) {}});
     const TimePoint time = fromNanoseconds(static_cast<std::int64_t>(world.world) * 10'000'000'000);
     if (with_anchor) node.onCalibration(rigWith(anchorAt(time, 0.0)));
     node.onOdometry(poseAt(time, world, {Eigen::Quaterniond::Identity(), {x, 0.0, 0.0}}));

@@ -134,7 +134,7 @@ TEST_F(GraphAnswer, OutlivesTheProcessBeforeAnyOdometry) {
   }
   std::size_t known = 0;
   for (const MapLoop& loop : after.loops) known += loop.pairs.size();
-  EXPECT_GT(known, 0u) << "by the merges that hang on it";
+  EXPECT_GT(known, 0u) << "by the facts that rest on it";
 }
 
 TEST_F(GraphAnswer, ShowsWithdrawnLoopsWithWhatTheySaid) {

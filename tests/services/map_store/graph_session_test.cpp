@@ -16,10 +16,6 @@ const WorldId kElsewhere{78, 1};
 
 class GraphSession : public LapDrive {
  protected:
-  std::size_t count(EventKind kind) const {
-    return static_cast<std::size_t>(std::count_if(events_.begin(), events_.end(),
-                                                  [&](const Event& e) { return e.kind == kind; }));
-  }
   /// A lap, and the store's process ends.
   void mapOfALap() {
     start();
@@ -58,21 +54,25 @@ TEST_F(GraphSession, ABodyThatBeginsElsewhereIsRelocalisedOnceAndOldIdsSurvive) 
   while (count(EventKind::kRelocalised) == 0 && way_m_ < 1.2 * kLap_m) step();
   ASSERT_EQ(count(EventKind::kRelocalised), 1u);
   EXPECT_EQ(node_->reasons().of("relocalised"), 1u);
-  ASSERT_FALSE(recalled_.empty());
-  const Recalled laid = recalled_.back();
-  EXPECT_TRUE(laid.laid);
-  EXPECT_EQ(laid.world, kElsewhere);
-  ASSERT_GE(laid.merges.size(), 3u);
-  for (const MergeOrder& merge : laid.merges) {
-    EXPECT_LT(merge.survivor, first_new);
-    EXPECT_GE(merge.absorbed, first_new);
-    EXPECT_EQ(thing_of_.at(merge.survivor), thing_of_.at(merge.absorbed));
-    EXPECT_TRUE(has(laid, merge.survivor));
+  const MapNear near = nears_.back();
+  EXPECT_EQ(near.world, kElsewhere);
+  EXPECT_TRUE(near.corrects_drift);
+  std::size_t joined = 0;
+  for (const Member& member : near.members) {
+    EXPECT_LT(member.object, first_new);
+    EXPECT_EQ(thing_of_.at(member.object), thing_of_.at(member.track));
+    if (!working_.contains(member.track)) continue;
+    ++joined;
+    EXPECT_GE(member.track, first_new);
+    EXPECT_TRUE(has(near.placed, member.object));
   }
+  EXPECT_GE(joined, 3u);
+  EXPECT_THAT(near.as_published, IsEmpty());
   const RigidTransform T_BM = onLap(way_m_).inverse();
-  for (const ObjectBelief& belief : laid.objects) {
-    const Eigen::Vector3d laid_B = T_WB_.inverse() * Eigen::Vector3d(belief.best().mean.head<3>());
-    EXPECT_LT((laid_B - T_BM * things_[thing_of_.at(belief.id)].p).norm(), 2.0) << belief.id;
+  for (const ObjectBelief& belief : near.placed) {
+    const Eigen::Vector3d placed_B =
+        T_WB_.inverse() * Eigen::Vector3d(belief.best().mean.head<3>());
+    EXPECT_LT((placed_B - T_BM * truthOf(belief.track)).norm(), 2.0) << belief.id;
     EXPECT_LE(belief.last_seen, stamp(sequence_).time) << "clocks of sessions do not compare";
   }
   node_->flush();
@@ -82,26 +82,23 @@ TEST_F(GraphSession, ABodyThatBeginsElsewhereIsRelocalisedOnceAndOldIdsSurvive) 
   EXPECT_EQ(frames_.back().sessions, 2u);
 }
 
-TEST_F(GraphSession, WhatWasLaidBeforeARestartIsStillNotWrittenOver) {
+TEST_F(GraphSession, WhatWasPlacedBeforeARestartIsStillNotWrittenOver) {
   start();
-  const Recalled laid = driveToTheLoop();
-  const ObjectBelief* unseen = unseenOf(laid);
+  const MapNear near = driveToTheLoop();
+  const ObjectBelief* unseen = unseenOf(near);
   ASSERT_NE(unseen, nullptr);
   const ObjectId id = unseen->id;
   const auto before = encodeBelief(stored(id));
-  takeUp(*unseen);
-  ++sequence_;
-  publish();
+  rest(1);
+  ASSERT_TRUE(working_.contains(id));
   node_->flush();
-  node_.reset();
-  start();
+  restartStore();
   EXPECT_EQ(encodeBelief(stored(id)), before);
-  ++sequence_;
-  publish();
-  EXPECT_EQ(encodeBelief(stored(id)), before) << "the filter still has it as it was laid";
+  rest(1);
+  EXPECT_EQ(encodeBelief(stored(id)), before) << "the filter still has it as it was placed";
   working_.erase(id);
-  ++sequence_;
-  publish();
+  forgetSight(id);
+  rest(1);
   EXPECT_EQ(encodeBelief(stored(id)), before) << "and has let it go";
 }
 
@@ -119,12 +116,10 @@ TEST_F(GraphSession, ARestartBringsTheWholeGraphBack) {
     EXPECT_EQ(node_->mapper().graph().pose(id).p, pose.p) << id;
     EXPECT_EQ(node_->mapper().graph().pose(id).yaw, pose.yaw) << id;
   }
-  const std::size_t merged = recalled_.size();
   const double off = (node_->mapper().along(kHere).back().T_MW.p - T_MW.back().T_MW.p).norm();
   EXPECT_EQ(off, 0.0);
   driveTo(way_m_ + 20.0);
   EXPECT_LE(count(EventKind::kLoopClosed), 4u) << "it does not begin anew";
-  EXPECT_GE(recalled_.size(), merged);
 }
 
 TEST_F(GraphSession, TheFrameIsToldWhereItChangesAndNotEachSecond) {
@@ -152,7 +147,6 @@ TEST_F(GraphSession, TheFrameIsToldWhereItChangesAndNotEachSecond) {
   EXPECT_LE(frames_.size(), node_->mapper().anchors().size());
   const auto before = frames_.size();
   const auto revision = frames_.back().revision;
-  recalled_.clear();
   driveToTheLoop();
   node_->flush();
   ASSERT_GT(frames_.size(), before);
@@ -178,77 +172,86 @@ TEST_F(GraphSession, OfAFrameThatHasEndedNothingIsToldAsIfItWereToday) {
   for (const MapFrame& frame : frames_) EXPECT_EQ(frame.world, kHere);
 }
 
-TEST_F(GraphSession, AnswersSayTheGraphOnlyWhereItHearsTheOdometry) {
+TEST_F(GraphSession, ItCorrectsDriftOnlyIfItReceivesTheOdometry) {
   start();
   driveTo(70.0);
-  ask(T_WB_.p, 30.0);
-  ASSERT_FALSE(recalled_.empty());
-  EXPECT_TRUE(recalled_.front().graph);
+  EXPECT_TRUE(nears_.back().corrects_drift);
   node_->flush();
   node_.reset();
+  nears_.clear();
   start();
-  publish();
-  ask(T_WB_.p, 30.0);
-  ASSERT_FALSE(recalled_.empty());
-  EXPECT_FALSE(recalled_.front().graph) << "no odometry since the start: the filter watches drift";
-  for (const Recalled& r : recalled_) EXPECT_FALSE(r.laid);
-  step();
-  ask(T_WB_.p, 30.0);
-  EXPECT_TRUE(recalled_.front().graph);
-  ++sequence_;
+  rest(1);
+  ASSERT_FALSE(nears_.empty());
+  EXPECT_FALSE(nears_.back().corrects_drift) << "no odometry since the start";
+  for (const MapNear& near : nears_) EXPECT_THAT(near.placed, IsEmpty());
+  driveTo(way_m_ + 6.0);
+  EXPECT_TRUE(nears_.back().corrects_drift);
   world_ = kElsewhere;  // objects are of another frame than the odometry
-  publish();
-  ask(T_WB_.p, 30.0);
-  EXPECT_FALSE(recalled_.front().graph);
+  rest();
+  EXPECT_EQ(nears_.back().world, kElsewhere);
+  EXPECT_FALSE(nears_.back().corrects_drift);
 }
 
-TEST_F(GraphSession, ItsOwnEventsAreNotHeard) {
+TEST_F(GraphSession, AnObjectThatTheFilterEndedIsNotHeldAnyMore) {
   start();
   driveTo(70.0);
-  Event gone;
-  gone.kind = EventKind::kGone;
-  gone.world = kHere;
-  gone.stamp = stamp(sequence_);
-  gone.object_id = 2;
-  gone.instance = 5;
-  node_->onEvent(gone);
-  EXPECT_TRUE(node_->mapper().holds(2));
-  gone.instance = 11;
-  node_->onEvent(gone);
+  ASSERT_TRUE(node_->mapper().holds(2));
+  end(2);
+  rest(1);
   EXPECT_FALSE(node_->mapper().holds(2));
+  rest(12);
+  EXPECT_TRUE(ended_.empty()) << "it is on the disk";
 }
 
-TEST_F(GraphSession, AMergeThatComesBeforeTheFirstPoseIsTaken) {
+TEST_F(GraphSession, AMergeThatComesBeforeTheFirstPoseIsUsed) {
   mapOfALap();
   start();
   ASSERT_TRUE(node_->mapper().holds(3));
-  Event merged;
-  merged.kind = EventKind::kMerged;
-  merged.instance = 11;
-  merged.world = kElsewhere;
-  merged.object_id = 1;
-  merged.other_id = 3;
-  node_->onEvent(merged);
+  beginAnew(kElsewhere, 0.0, {});
+  ended_ = {{3, 1, stamp(sequence_ + 1).time}};
+  rest(1);
   EXPECT_FALSE(node_->mapper().holds(3));
+  EXPECT_TRUE(node_->mapper().holds(1));
+  EXPECT_EQ(node_->mapper().identity().objectOf(3), 1u);
 }
 
 TEST_F(GraphSession, IdsAreNotGivenTwiceOverRestarts) {
   mapOfALap();
   const ObjectId taken = next_id_;
+  world_ = kElsewhere;
   for (int round = 0; round < 2; ++round) {
     start();
-    recalled_.clear();
-    MapQuery query;
-    query.client = 31;
-    query.kind = MapQueryKind::kRestore;
-    query.world = kElsewhere;
-    query.limit = 1;
-    node_->onQuery(query);
-    ASSERT_EQ(recalled_.size(), 1u);
-    EXPECT_GE(recalled_.front().next_id, taken);
-    EXPECT_THAT(recalled_.front().objects, IsEmpty());
+    nears_.clear();
+    filter_ = 31;
+    sayHello();
+    ASSERT_EQ(nears_.size(), 1u);
+    EXPECT_EQ(nears_.front().client, 31u);
+    EXPECT_GE(nears_.front().next_id, taken);
+    EXPECT_THAT(nears_.front().placed, IsEmpty());
+    EXPECT_THAT(nears_.front().as_published, IsEmpty());
     node_.reset();
   }
+}
+
+TEST_F(GraphSession, AFilterThatBeginsDuringARunGoesOnWithTheIds) {
+  start();
+  driveTo(100.0);
+  const auto before = idsOnTheMap();
+  std::set<TrackId> working;
+  for (const auto& [track, belief] : working_) working.insert(track);
+  ASSERT_GE(working.size(), 8u);
+  const ObjectId next = next_id_;
+  restartFilter();
+  const MapNear near = nears_.back();
+  EXPECT_EQ(near.placed.size(), working.size());
+  for (const auto& [track, belief] : working_) EXPECT_TRUE(working.contains(track));
+  EXPECT_GE(next_id_, next);
+  rest();
+  EXPECT_EQ(idsOnTheMap(), before);
+  driveTo(130.0);
+  const auto after = idsOnTheMap();
+  for (const auto& [thing, ids] : before) EXPECT_EQ(after.at(thing), ids) << thing;
+  for (const auto& [thing, ids] : after) EXPECT_EQ(ids.size(), 1u) << thing;
 }
 
 }  // namespace

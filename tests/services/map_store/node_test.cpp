@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "tests/services/map_store/beliefs.h"
 
 namespace perdure::map_store {
@@ -19,14 +21,14 @@ struct Heard {
   std::vector<MapTile> tiles, emptied;
   std::vector<MapHeader> headers;
   std::vector<MapReply> replies;
-  std::vector<Recalled> recalled;
+  std::vector<MapNear> nears;
 
   Outputs outputs() {
     return {[this](const MapTile& t) { tiles.push_back(t); },
             [this](const MapTile& t) { emptied.push_back(t); },
             [this](const MapHeader& h) { headers.push_back(h); },
             [this](const MapReply& r) { replies.push_back(r); },
-            [this](const Recalled& r) { recalled.push_back(r); }};
+            [this](const MapNear& n) { nears.push_back(n); }};
   }
 };
 
@@ -87,7 +89,7 @@ TEST_F(MapStoreNode, KeepsAnObjectThatWasConfirmedForOneFrameBetweenCommits) {
   EXPECT_EQ(heard_.replies[0].objects[0].memory, Memory::kLongTerm);
 }
 
-TEST_F(MapStoreNode, GivesANewFilterTheWorkingSetBitForBitAfterItsOwnRestartToo) {
+TEST_F(MapStoreNode, GivesANewFilterTheWholeWorkingSetAfterItsOwnRestartToo) {
   auto unsure = carAt(2, {1, 0, 0});
   unsure.confirmed = false;
   const Objects known = workingSet(1, {carAt(1, {0, 0, 0}), unsure, carAt(7, {5, 5, 0})}, 11);
@@ -96,17 +98,68 @@ TEST_F(MapStoreNode, GivesANewFilterTheWorkingSetBitForBitAfterItsOwnRestartToo)
     node->onObjects(known);
     node->tick(0ms);
   }
+  heard_ = {};
   const auto node = start();
   node->onQuery(restoreFor(12, {77, 1}));
-  const Recalled& recalled = heard_.recalled.at(0);
-  EXPECT_TRUE(recalled.restore);
-  EXPECT_EQ(recalled.client, 12u);
-  EXPECT_EQ(recalled.world, known.world);
-  EXPECT_GE(recalled.next_id, known.next_id);
-  ASSERT_EQ(recalled.objects.size(), 3u);
+  const MapNear& near = heard_.nears.at(0);
+  EXPECT_EQ(near.client, 12u);
+  EXPECT_EQ(near.world, known.world);
+  EXPECT_GE(near.next_id, known.next_id);
+  EXPECT_THAT(near.as_published, IsEmpty());
+  ASSERT_EQ(near.placed.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(encodeBelief(recalled.objects[i]), encodeBelief(known.objects[i]));
+    EXPECT_EQ(near.placed[i].track, known.objects[i].id);
+    ObjectBelief but_for_covariances = near.placed[i];
+    for (std::size_t k = 0; k < but_for_covariances.classes.size(); ++k) {
+      but_for_covariances.classes[k].covariance = known.objects[i].classes[k].covariance;
+      but_for_covariances.classes[k].cross_pose = known.objects[i].classes[k].cross_pose;
+    }
+    EXPECT_EQ(encodeBelief(but_for_covariances), encodeBelief(known.objects[i]));
   }
+}
+
+/// The pose error of its process begins at zero: what the old one explains is no error of objects.
+TEST_F(MapStoreNode, AHelloDuringARunGivesAllOfTheFilterBeforeRelativeToTheBody) {
+  const auto node = start();
+  auto unsure = carAt(2, {1, 0, 0}), moving = carAt(3, {4, 0, 0});
+  unsure.confirmed = false;
+  moving.moving = 0.9;
+  moving.velocity = {2, 0, 0};
+  Objects known = workingSet(1, {carAt(1, {0, 0, 0}), unsure, moving}, 11);
+  known.pose_error = 0.04 * Eigen::Matrix<double, 6, 6>::Identity();
+  known.near_m = 50.0;
+  for (ObjectBelief& belief : known.objects) {
+    for (ClassBelief& c : belief.classes) {
+      c.covariance.setIdentity();
+      c.cross_pose.setZero();
+      c.cross_pose.topRightCorner<3, 3>() = 0.04 * Eigen::Matrix3d::Identity();
+    }
+  }
+  node->onObjects(known);
+  node->tick(0ms);
+  node->onQuery(restoreFor(12, known.world));
+  const MapNear near = heard_.nears.back();
+  EXPECT_EQ(near.client, 12u);
+  EXPECT_EQ(near.next_id, known.next_id);
+  ASSERT_EQ(near.placed.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const ObjectBelief &given = near.placed[i], &before = known.objects[i];
+    EXPECT_EQ(given.id, before.id);
+    EXPECT_EQ(given.confirmed, before.confirmed);
+    EXPECT_EQ(given.moving, before.moving);
+    for (std::size_t k = 0; k < given.classes.size(); ++k) {
+      EXPECT_TRUE(given.classes[k].cross_pose.isZero(0.0));
+      EXPECT_EQ(given.classes[k].mean, before.classes[k].mean);
+      const Matrix7d less = before.classes[k].covariance - given.classes[k].covariance;
+      EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix7d>(less).eigenvalues().minCoeff(), -1e-5);
+      EXPECT_NEAR(given.classes[k].covariance(0, 0), 0.96, 1e-5) << "without the body's error";
+    }
+  }
+  const std::size_t before = heard_.nears.size();
+  node->onQuery(restoreFor(12, known.world));
+  EXPECT_EQ(heard_.nears.size(), before + 1) << "an answer may be lost";
+  EXPECT_EQ(heard_.nears.back().placed.size(), 3u);
+  EXPECT_GT(heard_.nears.back().revision, near.revision);
 }
 
 TEST_F(MapStoreNode, NeverGivesOutAnIdAgainThatMayHaveBeenGivenBeforeItDied) {
@@ -118,7 +171,7 @@ TEST_F(MapStoreNode, NeverGivesOutAnIdAgainThatMayHaveBeenGivenBeforeItDied) {
   }
   const auto node = start();
   node->onQuery(restoreFor(12));
-  EXPECT_GT(heard_.recalled.at(0).next_id, 500u);
+  EXPECT_GT(heard_.nears.back().next_id, 500u);
 }
 
 TEST_F(MapStoreNode, SkipsNoIdsOnceTheSameFilterHasSpokenAgain) {
@@ -130,7 +183,7 @@ TEST_F(MapStoreNode, SkipsNoIdsOnceTheSameFilterHasSpokenAgain) {
   const auto node = start();
   node->onObjects(workingSet(2, {carAt(11, {0, 0, 0})}));
   node->onQuery(restoreFor(12));
-  EXPECT_EQ(heard_.recalled.at(0).next_id, 12u);
+  EXPECT_EQ(heard_.nears.back().next_id, 12u);
 }
 
 TEST_F(MapStoreNode, GivesAFilterThatAlreadyPublishedWhatItsPredecessorKnew) {
@@ -138,17 +191,19 @@ TEST_F(MapStoreNode, GivesAFilterThatAlreadyPublishedWhatItsPredecessorKnew) {
   node->onObjects(workingSet(1, {carAt(10, {0, 0, 0})}, 11));
   node->onObjects(workingSet(2, {}, 12));
   node->onQuery(restoreFor(12));
-  ASSERT_EQ(heard_.recalled.at(0).objects.size(), 1u);
-  EXPECT_EQ(heard_.recalled[0].objects[0].id, 10u);
-  EXPECT_EQ(heard_.recalled[0].next_id, 11u);
+  ASSERT_EQ(heard_.nears.back().placed.size(), 1u);
+  EXPECT_EQ(heard_.nears.back().placed[0].id, 10u);
+  EXPECT_EQ(heard_.nears.back().next_id, 11u);
 }
 
 TEST_F(MapStoreNode, RestoresNothingIntoAnotherFrameOfReferenceButKeepsIdsGoing) {
   const auto node = start();
   node->onObjects(workingSet(1, {carAt(10, {0, 0, 0})}));
   node->onQuery(restoreFor(12, {78, 1}));
-  EXPECT_THAT(heard_.recalled.at(0).objects, IsEmpty());
-  EXPECT_EQ(heard_.recalled[0].next_id, 11u);
+  EXPECT_EQ(heard_.nears.back().client, 12u);
+  EXPECT_THAT(heard_.nears.back().placed, IsEmpty());
+  EXPECT_THAT(heard_.nears.back().as_published, IsEmpty());
+  EXPECT_EQ(heard_.nears.back().next_id, 11u);
 }
 
 TEST_F(MapStoreNode, PublishesTheMapAtTheStartAndThenWhatChanged) {
@@ -190,22 +245,58 @@ TEST_F(MapStoreNode, TakesMergedAndGoneObjectsOffTheMap) {
   const auto node = start();
   node->onObjects(workingSet(1, {carAt(1, {0, 0, 0}), carAt(2, {1, 0, 0}), carAt(3, {9, 0, 0})}));
   node->tick(0ms);
-  Event merged;
-  merged.kind = EventKind::kMerged;
-  merged.object_id = 1;
-  merged.other_id = 2;
-  merged.stamp.time = fromNanoseconds(200'000'000);
-  Event gone = merged;
-  gone.kind = EventKind::kGone;
-  gone.object_id = 3;
-  node->onObjects(workingSet(2, {carAt(1, {0, 0, 0})}));
-  node->onEvent(merged);
-  node->onEvent(gone);
+  Objects next = workingSet(2, {carAt(1, {0, 0, 0})});
+  next.ended = {{2, 1, next.stamp.time}, {3, 0, next.stamp.time}};
+  node->onObjects(next);
   node->tick(1000ms);
   node->onQuery(all(1));
   ASSERT_EQ(heard_.replies.at(0).objects.size(), 1u);
   EXPECT_EQ(heard_.replies[0].objects[0].id, 1u);
   EXPECT_EQ(heard_.headers.back().objects, 1u);
+}
+
+/// The filter says it until it is on the disk, and the store may have begun anew meanwhile.
+TEST_F(MapStoreNode, AnEndThatIsSaidAgainChangesNothing) {
+  Objects next = workingSet(2, {carAt(1, {0, 0, 0})});
+  next.ended = {{2, 1, next.stamp.time}, {3, 0, next.stamp.time}};
+  {
+    const auto node = start();
+    node->onObjects(workingSet(1, {carAt(1, {0, 0, 0}), carAt(2, {1, 0, 0}), carAt(3, {9, 0, 0})}));
+    node->tick(0ms);
+    node->onObjects(next);
+    node->tick(1000ms);
+  }
+  const auto node = start();
+  for (std::uint64_t sequence = 3; sequence < 6; ++sequence) {
+    next.stamp = workingSet(sequence, {}).stamp;
+    node->onObjects(next);
+    node->tick(std::chrono::seconds(sequence));
+  }
+  node->onQuery(all(1));
+  ASSERT_EQ(heard_.replies.at(0).objects.size(), 1u);
+  EXPECT_EQ(heard_.replies[0].objects[0].id, 1u);
+  EXPECT_EQ(heard_.headers.back().objects, 1u);
+}
+
+TEST_F(MapStoreNode, AnObjectThatTheFilterMergedKeepsTheLowestId) {
+  const auto node = start();
+  node->onObjects(workingSet(1, {carAt(1, {0, 0, 0}), carAt(2, {1, 0, 0})}));
+  node->tick(0ms);
+  Objects next = workingSet(2, {carAt(2, {1, 0, 0})});
+  next.ended = {{1, 2, next.stamp.time}};
+  node->onObjects(next);
+  node->tick(1000ms);
+  node->onQuery(all(1));
+  ASSERT_EQ(heard_.replies.at(0).objects.size(), 1u);
+  EXPECT_EQ(heard_.replies[0].objects[0].id, 1u);
+  EXPECT_EQ(heard_.replies[0].objects[0].mean, carAt(2, {1, 0, 0}).best().mean);
+  next = workingSet(3, {});  // and then it is gone
+  next.ended = {{2, 0, next.stamp.time}};
+  node->onObjects(next);
+  node->tick(2000ms);
+  node->onQuery(all(2));
+  EXPECT_THAT(heard_.replies.at(1).objects, IsEmpty());
+  EXPECT_EQ(heard_.headers.back().objects, 0u);
 }
 
 TEST_F(MapStoreNode, AnswersARepeatedRequestWithTheSameReply) {

@@ -118,6 +118,8 @@ TEST(StoredMap, OfAnOlderVersionIsTakenOverInTheCopyAlone) {
             .execute("PRAGMA journal_mode=DELETE; DROP VIEW objects_in_map; DROP TABLE sightings; "
                      "DROP TABLE edges;"
                      "DROP TABLE anchor_poses; DROP TABLE anchors; DROP TABLE graph_classes;"
+                     "DROP TABLE views; DROP TABLE same; DROP TABLE tracks; "
+                     "DROP TABLE track_sightings;"
                      "PRAGMA user_version=2")
             .has_value());
   }
