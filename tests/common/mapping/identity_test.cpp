@@ -200,11 +200,13 @@ class JoinedTracks : public ::testing::Test {
     alone_ = state_;
     state_.unite({kLoop, 2, 1});
   }
-  void put(TrackId id, double seconds) {
+  /// In the session that is followed.
+  ObjectRecord now(double seconds) {
     ObjectRecord record = detected(random_, seconds);
     record.session = kSessions[1];
-    state_.put(id, std::move(record));
+    return record;
   }
+  void put(TrackId id, double seconds) { state_.put(id, now(seconds)); }
 
   std::mt19937 random_{5};
   MapState state_ = emptyMap(), alone_ = emptyMap();
@@ -219,7 +221,8 @@ TEST_F(JoinedTracks, TheRecordOfAnObjectIsThatOfItsNewestTrack) {
   expectSame(*object.earlier, alone_.records().at(1).sighting, "before");
   EXPECT_TRUE(state_.seenFrom(object.sighting.anchor).contains(1));
   put(1, 40.0);
-  EXPECT_EQ(state_.records().at(1).sighting.in_anchor.id, 1u) << "detected again as the first track";
+  EXPECT_EQ(state_.records().at(1).sighting.in_anchor.id, 1u)
+      << "detected again as the first track";
   EXPECT_EQ(state_.records().at(1).earlier->in_anchor.id, 2u);
 }
 
@@ -231,7 +234,7 @@ TEST_F(JoinedTracks, AreAsBeforeAfterTheRetraction) {
 TEST_F(JoinedTracks, WhatWasDetectedInBetweenStaysWithItsTrack) {
   for (const TrackId again : {1u, 2u}) {
     MapState joined = state_, alone = alone_;
-    const ObjectRecord record = detected(random_, 40.0);
+    const ObjectRecord record = now(40.0);
     for (MapState* state : {&joined, &alone}) state->put(again, record);
     EXPECT_EQ(joined.records().at(1).sighting.in_anchor.id, again);
     joined.removeLoop(kLoop);
@@ -248,7 +251,7 @@ TEST_F(JoinedTracks, ATrackThatEndedEndsItsObjectOnlyWhileItIsTheNewest) {
   newer.end(2);
   EXPECT_FALSE(newer.records().contains(1));
   MapState again = newer;
-  again.put(1, detected(random_, 40.0));
+  again.put(1, now(40.0));
   EXPECT_TRUE(again.records().contains(1)) << "detected since as the other track";
 
   older.removeLoop(kLoop);

@@ -119,7 +119,8 @@ class WithdrawnLoop : public ::testing::Test {
     }
     SavedMap map = drive_.whole();
     ASSERT_GT(map.records.size(), 20u);
-    known_ = std::next(map.records.begin(), static_cast<std::ptrdiff_t>(map.records.size() / 2))->first;
+    known_ =
+        std::next(map.records.begin(), static_cast<std::ptrdiff_t>(map.records.size() / 2))->first;
     seen_ = map.records.rbegin()->first;
     before_ = map.records.at(seen_);
     drive_.restartOn(withFact(std::move(map), {kWrong, known_, seen_}));
@@ -184,7 +185,8 @@ TEST_F(WithdrawnLoop, BothObjectsAreAsTheyWouldBeWithoutTheFact) {
 
 TEST_F(WithdrawnLoop, WhatEndedUnderOneIdDoesNotEndTheOther) {
   SavedMap map = without_fact_.whole();
-  const auto older = std::next(map.records.begin(), static_cast<std::ptrdiff_t>(map.records.size() / 3));
+  const auto older =
+      std::next(map.records.begin(), static_cast<std::ptrdiff_t>(map.records.size() / 3));
   const TrackId old = older->first, young = known_;
   const ObjectRecord before = older->second;
   ASSERT_LT(old, young);

@@ -13,6 +13,7 @@ namespace {
 using test::apply;
 using test::expectSame;
 using test::isEmpty;
+using test::keysOf;
 
 constexpr WorldId kOlder{1, 0}, kYounger{2, 0};
 
@@ -92,6 +93,23 @@ TEST(MapState, AnObjectThatIsGoneAndBegunAgainUnconfirmedIsNoLongerStored) {
   pair.see(7, 1, true, 6.0);
   pair.save();
   EXPECT_EQ(pair.stored().records.at(7).sighting.in_anchor.p.x(), 6.0);
+}
+
+TEST(MapState, AnObjectThatLosesItsConfirmedTrackIsNoLongerStored) {
+  Pair pair;
+  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kOlder, 0.0)); });
+  pair.see(7, 1, false, 1.0);
+  pair.see(8, 1, true, 2.0);
+  pair.both([](MapState& state) { state.unite({0, 7, 8}); });
+  pair.save();
+  EXPECT_TRUE(pair.stored().records.contains(7));
+  pair.both([](MapState& state) { state.erase(8); });
+  pair.save();
+  EXPECT_TRUE(pair.stored().records.empty());
+  EXPECT_EQ(keysOf(pair.stored().tracks), std::vector<TrackId>{7});
+  pair.see(8, 1, true, 3.0);
+  pair.save();
+  EXPECT_TRUE(pair.stored().records.contains(7)) << "and it is there again";
 }
 
 TEST(MapState, WhatCameAndWentBetweenTwoSavesLeavesNothing) {

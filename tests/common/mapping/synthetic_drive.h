@@ -1,5 +1,6 @@
 // A body that drives laps among objects, with odometry that drifts, and a filter that takes the
-// tracks that the mapper has near. Sessions can follow each other on one map, each in a W of its own.
+// tracks that the mapper has near. Sessions can follow each other on one map, each in a W of its
+// own.
 #pragma once
 
 #include <gtest/gtest.h>
